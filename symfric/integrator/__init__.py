@@ -1,0 +1,8 @@
+"""Integration of a `Model` over time. Knows nothing of laws or mechanisms."""
+
+from symfric.integrator.inputs import Hold as Hold
+from symfric.integrator.inputs import Input as Input
+from symfric.integrator.inputs import Linear as Linear
+from symfric.integrator.simulate import simulate as simulate
+from symfric.integrator.trajectory import Statistics as Statistics
+from symfric.integrator.trajectory import Trajectory as Trajectory

@@ -1,0 +1,171 @@
+"""Laws made of laws: sum, asymmetric and load-dependent. Wrap, never subclass."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, final
+
+from symfric.laws import smooth
+from symfric.laws.base import Facts, Law, State
+from symfric.numeric import Scalar, column, empty, is_casadi
+from symfric.parameters import param, parameters, with_values
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Sum(Law):
+    """Friction forces added; the states of the terms stand below each other.
+
+        F = F_1 + F_2 + ...
+
+    Limits: those of the terms. Parameters that share a name get the endings _1, _2, ...
+    Source: superposition, as in Coulomb + viscous friction.
+    """
+
+    facts: ClassVar[Facts] = Facts((), "that of its terms", "superposition", "superposition")
+
+    laws: tuple[Law, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.laws) < 2:
+            raise ValueError(f"Sum: expected at least two laws, got {len(self.laws)}")
+        super().__post_init__()
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The states of all terms, numbered where there are several."""
+        found = [state for law in self.laws for state in law.states]
+        names = [state.name for state in found]
+        return tuple(
+            replace(s, name=f"{s.name}_{i + 1}") if names.count(s.name) > 1 else s
+            for i, s in enumerate(found)
+        )
+
+    def _split(self, z: Scalar) -> list[Scalar]:
+        ends = [0]
+        for law in self.laws:
+            ends.append(ends[-1] + len(law.states))
+        return [z[a:b] for a, b in zip(ends, ends[1:], strict=False)]
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        first, *rest = [
+            law.force(v, N, part) for law, part in zip(self.laws, self._split(z), strict=True)
+        ]
+        return sum(rest, start=first)
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Rates of all states."""
+        parts = zip(self.laws, self._split(z), strict=True)
+        return _join(v, [law.rate(v, N, part) for law, part in parts if law.states])
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """Steady states of all terms."""
+        return _join(v, [law.steady_state(v, N) for law in self.laws if law.states])
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Asymmetric(Law):
+    """One law with different parameters for the two directions of sliding.
+
+        p(v) = p_neg + (p_pos - p_neg) [1 + tanh(v / v_blend)] / 2
+
+    Every parameter that differs between `positive` and `negative` is blended, so a bristle law
+    keeps its one state and a parameter that is equal on both sides costs nothing.
+    Limits: one-sided curves beyond 3 v_blend; keep v_blend below the smoothing velocity of the law.
+    Source: separate parameter sets per direction, usual for drives (Armstrong-Helouvry 1991).
+    """
+
+    facts: ClassVar[Facts] = Facts((), "that of its law", "constructed", "separate sets")
+    suffixes: ClassVar[tuple[str, ...]] = ("pos", "neg")
+
+    positive: Law
+    negative: Law
+    v_blend: Scalar = param(1e-4, unit="m/s", doc="blending velocity of the sides", lower=1e-12)
+
+    def __post_init__(self) -> None:
+        if list(parameters(self.positive)) != list(parameters(self.negative)):
+            raise ValueError(
+                "Asymmetric: expected the same law on both sides, got "
+                f"{type(self.positive).__name__} and {type(self.negative).__name__}"
+            )
+        super().__post_init__()
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The states of the law."""
+        return self.positive.states
+
+    def _at(self, v: Scalar) -> Law:
+        weight = (1 + smooth.sign(v, self.v_blend)) / 2
+        sides = zip(
+            parameters(self.positive).values(), parameters(self.negative).values(), strict=True
+        )
+        blended = {
+            pos.name: neg.value + (pos.value - neg.value) * weight
+            for pos, neg in sides
+            if _differ(pos.value, neg.value)
+        }
+        return with_values(self.positive, blended)
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        return self._at(v).force(v, N, z)
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Rates of the states of the law."""
+        return self._at(v).rate(v, N, z)
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """Steady states of the law."""
+        return self._at(v).steady_state(v, N)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class LoadDependent(Law):
+    """A law under the effective normal force of a preloaded, load-carrying contact.
+
+        N_eff = N_0 + c max(N, 0)
+
+    N_0 is the preload (seal, bearing), c the share of the external load; max is smooth over N_eps
+    so that nothing divides by zero or turns negative at lift-off.
+    Limits: N_0 = 0, c = 1, N_eps = 0 is the law itself for N >= 0.
+    Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134(5), 2012 (linear load part).
+    """
+
+    facts: ClassVar[Facts] = Facts((), "that of its law", "memory", "Bittencourt and Gunnarsson 2012")
+
+    law: Law
+    N_0: Scalar = param(0.0, unit="N", doc="preload", lower=0.0)
+    c: Scalar = param(1.0, unit="1", doc="share of the external load", lower=0.0)
+    N_eps: Scalar = param(1e-3, unit="N", doc="smoothing of the lift-off", lower=0.0)
+
+    def _load(self, N: Scalar) -> Scalar:
+        return self.N_0 + self.c * smooth.positive(N, self.N_eps)
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The states of the law."""
+        return self.law.states
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        return self.law.force(v, self._load(N), z)
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Rates of the states of the law."""
+        return self.law.rate(v, self._load(N), z)
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """Steady states of the law."""
+        return self.law.steady_state(v, self._load(N))
+
+
+def _differ(a: Scalar, b: Scalar) -> bool:
+    return a is not b and (is_casadi(a, b) or bool(a != b))
+
+
+def _join(v: Scalar, columns: list[Scalar]) -> Scalar:
+    if not columns:
+        return empty(v)
+    return column(*(row for c in columns for row in (c[i] for i in range(c.shape[0]))))

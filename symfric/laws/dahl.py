@@ -1,0 +1,60 @@
+"""Dahl friction: a bristle without stiction."""
+
+from dataclasses import dataclass
+from typing import ClassVar, final
+
+from symfric.laws import smooth
+from symfric.laws.base import Facts, Law, State
+from symfric.numeric import Scalar, column
+from symfric.parameters import param
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Dahl(Law):
+    """Dahl friction (one state), exponent n.
+
+        rho   = 1 - sigma_0 z / (mu_d N) sign(v)
+        dz/dt = v rho |rho|^(n-1)            (n = 1: dz/dt = v - sigma_0 |v| z / (mu_d N))
+        F     = sigma_0 z
+
+    `z` is the mean bristle deflection [m].
+    Limits: steady state mu_d N sign(v); rate-independent; drifts under vibration; n = 1 has the
+    virgin curve F = mu_d N (1 - exp(-sigma_0 x / (mu_d N))). |v| and sign(v) are smooth over
+    v_eps; v_eps = 0 is the original with a kink at v = 0 (n = 1 only). Not valid for N = 0.
+    Source: Dahl, Aerospace Corp. TOR-0158(3107-18)-1, 1968; exponent: Dahl, AIAA J. 14, 1976.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "P"),
+        smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
+        confidence="two sources for n = 1; memory for the exponent",
+        source="Dahl 1968, 1976",
+    )
+
+    sigma_0: Scalar = param(1e5, unit="N/m", doc="bristle stiffness", lower=1e-12)
+    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=1e-12)
+    n: Scalar = param(1.0, unit="1", doc="exponent", lower=0.0, upper=10.0)
+    v_eps: Scalar = param(1e-6, unit="m/s", doc="smoothing velocity of |v|", lower=0.0)
+    rho_eps: Scalar = param(1e-6, unit="1", doc="smoothing of |rho|, for n != 1", lower=1e-12)
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The bristle deflection."""
+        return (State("z", "m", 1e-5),)
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        return self.sigma_0 * z[0]
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Rate of the bristle deflection [m/s], shape (1, 1)."""
+        level = self.sigma_0 * z[0] / (self.mu_d * N)
+        if isinstance(self.n, int | float) and self.n == 1.0:
+            return column(v - smooth.magnitude(v, self.v_eps) * level)
+        rho = 1 - level * smooth.sign(v, self.v_eps)
+        return column(v * smooth.signed_power(rho, self.n, self.rho_eps))
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """Bristle deflection in steady sliding [m], shape (1, 1)."""
+        return column(self.mu_d * N / self.sigma_0 * smooth.sign(v, self.v_eps))

@@ -1,0 +1,70 @@
+"""Laws by name: the text a user types on the command line."""
+
+from re import fullmatch
+
+from symfric.laws.base import Law
+from symfric.laws.brown_mcphee import BrownMcPhee
+from symfric.laws.compose import Asymmetric, LoadDependent, Sum
+from symfric.laws.coulomb import Coulomb, Viscous
+from symfric.laws.dahl import Dahl
+from symfric.laws.lugre import LuGre
+from symfric.laws.self_tuning import SelfTuning
+from symfric.laws.stribeck import Stribeck
+from symfric.parameters import check_names
+
+ALL_LAWS: dict[str, type[Law]] = {
+    "coulomb": Coulomb,
+    "viscous": Viscous,
+    "stribeck": Stribeck,
+    "brown_mcphee": BrownMcPhee,
+    "self_tuning": SelfTuning,
+    "dahl": Dahl,
+    "lugre": LuGre,
+}
+"""Every law that stands alone, by name; the contract tests run over it."""
+
+
+def law_name(law: Law) -> str:
+    """The text that `law_from_text` turns into a law of this kind."""
+    if isinstance(law, Sum):
+        return "+".join(law_name(term) for term in law.laws)
+    if isinstance(law, Asymmetric):
+        return f"asymmetric({law_name(law.positive)})"
+    if isinstance(law, LoadDependent):
+        return f"load_dependent({law_name(law.law)})"
+    return next(name for name, kind in ALL_LAWS.items() if kind is type(law))
+
+
+def law_from_text(text: str) -> Law:
+    """The law with default parameters that `text` names.
+
+    `brown_mcphee`, sums `coulomb+viscous`, wrappers `asymmetric(coulomb+viscous)` and
+    `load_dependent(lugre)`.
+
+    Raises:
+        ValueError: unknown name; the closest one is offered.
+    """
+    terms = _split_terms(text.replace(" ", ""))
+    laws = tuple(_single(term, text) for term in terms)
+    return laws[0] if len(laws) == 1 else Sum(laws)
+
+
+def _single(term: str, text: str) -> Law:
+    wrapped = fullmatch(r"(asymmetric|load_dependent)\((.+)\)", term)
+    if wrapped:
+        inner = law_from_text(wrapped[2])
+        return Asymmetric(inner, inner) if wrapped[1] == "asymmetric" else LoadDependent(inner)
+    check_names(f"law '{text}'", [term], ALL_LAWS)
+    return ALL_LAWS[term]()
+
+
+def _split_terms(text: str) -> list[str]:
+    """Split at the plus signs outside parentheses."""
+    terms, depth = [""], 0
+    for letter in text:
+        depth += (letter == "(") - (letter == ")")
+        if letter == "+" and depth == 0:
+            terms.append("")
+        else:
+            terms[-1] += letter
+    return terms

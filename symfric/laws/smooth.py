@@ -1,0 +1,72 @@
+"""Smooth stand-ins for sign, abs, max and powers: the only home of regularisation.
+
+`fabs`, `sign`, `if_else`, `norm` and fractional powers have silently wrong or NaN derivatives at
+zero; no law uses them. A width `eps` is always a parameter of the law, in the unit of `x`. The
+float `eps = 0.0` asks for the original, non-smooth function where one is offered.
+"""
+
+import casadi as ca
+import numpy as np
+
+from symfric.numeric import Scalar, exp, expm1, is_casadi, sqrt, tanh
+
+
+def sign(x: Scalar, eps: Scalar) -> Scalar:
+    """Smooth sign tanh(x / eps); within 1 % of +-1 beyond 2.65 eps."""
+    return tanh(x / eps)
+
+
+def magnitude(x: Scalar, eps: Scalar) -> Scalar:
+    """Smooth |x| = x tanh(x / eps), exactly 0 at x = 0.
+
+    Being zero at rest it does not relax a bristle that stands still (trap N6), and beyond 20 eps
+    it equals |x| to rounding. The float `eps = 0.0` gives |x| itself, with its kink at x = 0.
+    """
+    if isinstance(eps, int | float) and eps == 0.0:
+        return ca.fabs(x) if is_casadi(x) else np.abs(x)
+    return x * tanh(x / eps)
+
+
+def power(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
+    """Smooth |x|^exponent = (x^2 + eps^2)^(exponent/2) - eps^exponent, exactly 0 at x = 0.
+
+    Finite with all derivatives in x and in the exponent (traps N1-N3). The float `exponent = 2.0`
+    gives x^2 exactly and costs one multiplication.
+    """
+    if isinstance(exponent, int | float) and exponent == 2.0:
+        return x * x
+    return (x * x + eps * eps) ** (exponent / 2) - eps**exponent
+
+
+def signed_power(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
+    """Smooth |x|^exponent sign(x) = x (x^2 + eps^2)^((exponent - 1)/2), exactly 0 at x = 0."""
+    return x * (x * x + eps * eps) ** ((exponent - 1) / 2)
+
+
+def positive(x: Scalar, eps: Scalar) -> Scalar:
+    """Smooth max(x, 0) = (x + sqrt(x^2 + eps^2)) / 2; value eps/2 at x = 0.
+
+    The float `eps = 0.0` gives max(x, 0) itself, with its kink at x = 0.
+    """
+    if isinstance(eps, int | float) and eps == 0.0:
+        return ca.fmax(x, 0.0) if is_casadi(x) else np.maximum(x, 0.0)
+    return (x + sqrt(x * x + eps * eps)) / 2
+
+
+def stribeck(v: Scalar, v_s: Scalar, delta: Scalar, eps: Scalar) -> Scalar:
+    """The Stribeck weight exp(-|v / v_s|^delta): 1 at rest, 0 far above v_s."""
+    return exp(-power(v / v_s, delta, eps / v_s))
+
+
+def phi1(x: Scalar) -> Scalar:
+    """(exp(x) - 1) / x, with value 1 and all derivatives right at x = 0.
+
+    A Taylor polynomial replaces the quotient for |x| < 1e-2 (next term x^5/720, 1.4e-13): the
+    usual guarded quotient has derivative 0 at x = 0 instead of 1/2.
+    """
+    series = 1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5)))
+    if not is_casadi(x):
+        near = np.abs(x) < 1e-2
+        return np.where(near, series, expm1(x) / np.where(near, 1.0, x))[()]
+    near = ca.fabs(x) < 1e-2
+    return ca.if_else(near, series, expm1(x) / ca.if_else(near, 1.0, x))

@@ -1,0 +1,45 @@
+"""Stribeck friction: the general exponential law with exponent delta."""
+
+from dataclasses import dataclass
+from typing import ClassVar, final
+
+from symfric.laws import smooth
+from symfric.laws.base import Facts, StaticLaw
+from symfric.numeric import Scalar
+from symfric.parameters import param
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Stribeck(StaticLaw):
+    """Stribeck friction with exponent delta (Bo-Pavelescu), smooth at rest.
+
+        F = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)] tanh(v / v_eps) + sigma_2 v
+
+    delta = 1 is Tustin's law, delta = 2 the Gaussian one. Keep v_eps << v_s: the peak is
+    0.968 mu_s N at v_eps = v_s/10 and tends to mu_s N as v_eps -> 0.
+    Limits: mu_s = mu_d gives `Coulomb` + `Viscous`; at |v| = v_s the bracket is
+    mu_d + (mu_s - mu_d)/e for every delta. Creeps under load like `Coulomb`.
+    Source: Stribeck 1902; Hess and Soom 1990; Bo and Pavelescu, Wear 82, 1982 (exponent).
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "St", "V"),
+        smoothness="C∞",
+        confidence="two sources",
+        source="Stribeck 1902; Bo and Pavelescu 1982 (exponent)",
+    )
+    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+
+    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
+    v_s: Scalar = param(1e-3, unit="m/s", doc="Stribeck velocity", lower=1e-12)
+    delta: Scalar = param(2.0, unit="1", doc="Stribeck exponent", lower=0.1, upper=10.0)
+    v_eps: Scalar = param(1e-4, unit="m/s", doc="smoothing velocity", lower=1e-12)
+    sigma_2: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        falling = smooth.stribeck(v, self.v_s, self.delta, self.v_eps)
+        mu = self.mu_d + (self.mu_s - self.mu_d) * falling
+        return mu * N * smooth.sign(v, self.v_eps) + self.sigma_2 * v

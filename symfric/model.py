@@ -1,0 +1,198 @@
+"""The one interface between those who write equations and those who solve them.
+
+Scenes and mechanisms produce a `Model`; simulation, optimal control, identification and code
+generation consume it. Letters as in CasADi's DaeBuilder: time t, differential states x, algebraic
+variables z, inputs u, parameters p.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.numeric import Scalar
+from symfric.parameters import Variable, check_names
+
+Variables = tuple[Variable, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Output:
+    """A named result of a model: an expression in t, x, z, u, p, with its unit."""
+
+    expression: Scalar
+    unit: str
+    doc: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A dynamic system 0 = F(t, x', x, z, u, p), explicit where it can be.
+
+    Explicit form (semi-explicit DAE of index 1; an ODE where there is no z):
+
+        x' = ode(t, x, z, u, p),   0 = alg(t, x, z, u, p)
+
+    Give `ode` and `alg`, or give `residual` with `xdot` for a fully implicit model.
+
+    Attributes:
+        name: what the scene is called.
+        x, z, u, p: named variables; an absent group is empty and costs nothing.
+        ode: SX (nx, 1), or None for an implicit model.
+        alg: SX (nz, 1).
+        xdot: SX symbols (nx, 1) of an implicit model; made by the explicit one.
+        residual: SX (nx + nz, 1).
+        outputs: named results in addition to x, z and u.
+        t: SX symbol of time [s].
+
+    Raises:
+        ValueError: all problems at once: repeated names, wrong row counts, undeclared symbols.
+    """
+
+    name: str
+    x: Variables = ()
+    z: Variables = ()
+    u: Variables = ()
+    p: Variables = ()
+    ode: ca.SX | None = None
+    alg: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    xdot: ca.SX = field(default_factory=lambda: ca.SX(0, 0))
+    residual: ca.SX = field(default_factory=lambda: ca.SX(0, 0))
+    outputs: Mapping[str, Output] = field(default_factory=dict[str, Output])
+    t: ca.SX = field(default_factory=lambda: ca.SX.sym("t"))
+
+    def __post_init__(self) -> None:
+        if self.ode is not None:
+            object.__setattr__(self, "ode", ca.SX(self.ode))
+            rates = [ca.SX.sym(f"{v.name}_dot") for v in self.x]
+            object.__setattr__(self, "xdot", ca.vertcat(ca.SX(0, 1), *rates))
+            if self.ode.numel() == len(self.x):
+                object.__setattr__(
+                    self, "residual", ca.vertcat(self.xdot - ca.vec(self.ode), self.alg)
+                )
+        problems = self._problems()
+        if problems:
+            raise ValueError(f"model '{self.name}': " + "; ".join(problems))
+
+    def _problems(self) -> list[str]:
+        problems: list[str] = []
+        names = [v.name for group in (self.x, self.z, self.u, self.p) for v in group]
+        names += list(self.outputs)
+        repeated = sorted({n for n in names if names.count(n) > 1} | ({"t"} & set(names)))
+        if repeated:
+            problems.append(f"expected every name once (and none called t), got {repeated}")
+        nx, nz = len(self.x), len(self.z)
+        if self.ode is not None and self.ode.numel() != nx:
+            problems.append(f"ode: expected {nx} rows (one a state), got {self.ode.numel()}")
+        elif self.ode is not None and self.alg.numel() != nz:
+            problems.append(f"alg: expected {nz} rows, got {self.alg.numel()}")
+        elif self.residual.numel() != nx + nz:
+            problems.append(f"residual: expected {nx + nz} rows, got {self.residual.numel()}")
+        declared = {e.__hash__() for e in ca.symvar(self._symbols())}
+        expressions = [self.residual, *(ca.SX(o.expression) for o in self.outputs.values())]
+        stray = [
+            str(s)
+            for s in ca.symvar(ca.veccat(*expressions))
+            if s.__hash__() not in declared
+        ]
+        if stray:
+            problems.append(
+                f"expected only declared symbols, got {', '.join(stray)}; declare them as x, z, u or p"
+            )
+        return problems
+
+    def _symbols(self) -> ca.SX:
+        return ca.vertcat(self.t, self.xdot, *(self.vector(letter) for letter in "xzup"))
+
+    def vector(self, letter: str) -> ca.SX:
+        """The symbols of the group "x", "z", "u" or "p" as a column (n, 1)."""
+        return ca.vertcat(ca.SX(0, 1), *(v.symbol for v in getattr(self, letter)))
+
+    def nominal(self, letter: str) -> NDArray[np.float64]:
+        """Typical magnitudes of a group, shape (n,)."""
+        return np.array([v.nominal for v in getattr(self, letter)], dtype=float)
+
+    @cached_property
+    def signals(self) -> dict[str, str]:
+        """Name -> unit of everything a trajectory holds besides time: x, z, u, outputs."""
+        found = {v.name: v.unit for group in (self.x, self.z, self.u) for v in group}
+        return found | {name: output.unit for name, output in self.outputs.items()}
+
+    def function(self, what: str) -> ca.Function:
+        """One CasADi Function with named arguments.
+
+        Args:
+            what: "ode" and "alg" (t, x, z, u, p), "residual" (t, xdot, x, z, u, p), "signals"
+                (t, x, z, u, p), which stacks x, z, u and the outputs in the order of `signals`,
+                or the name of one output.
+
+        Raises:
+            ValueError: unknown name, or "ode" of an implicit model.
+        """
+        t, x, z, u, p = self.t, *(self.vector(letter) for letter in "xzup")
+        if what == "residual":
+            return ca.Function(
+                "residual",
+                [t, self.xdot, x, z, u, p],
+                [self.residual],
+                ["t", "xdot", "x", "z", "u", "p"],
+                ["residual"],
+            )
+        known: dict[str, Any] = {"alg": self.alg}
+        if self.ode is not None:
+            known["ode"] = self.ode
+        known["signals"] = ca.vertcat(
+            x, z, u, *(ca.SX(o.expression) for o in self.outputs.values())
+        )
+        known |= {name: ca.SX(output.expression) for name, output in self.outputs.items()}
+        check_names(f"model '{self.name}'", [what], [*known, "residual"])
+        return ca.Function(what, [t, x, z, u, p], [known[what]], ["t", "x", "z", "u", "p"], [what])
+
+    def values(
+        self, letter: str, given: Mapping[str, float] | None = None
+    ) -> NDArray[np.float64]:
+        """Numbers of the group "u" or "p": start values, replaced by those `given` by name."""
+        group: Variables = getattr(self, letter)
+        given = dict(given or {})
+        check_names(f"model '{self.name}' {letter}", given, [v.name for v in group])
+        return np.array(
+            [finite(f"{self.name}.{v.name}", given.get(v.name, v.start)) for v in group],
+            dtype=float,
+        )
+
+    def initial_state(
+        self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None
+    ) -> NDArray[np.float64]:
+        """Start values of x, shape (nx,), replaced by those `given` by name.
+
+        A start value that is an expression (a bristle at steady state depends on the sliding
+        velocity) is evaluated with the given values of the other states and parameters.
+        """
+        given = dict(given or {})
+        check_names(f"model '{self.name}' x0", given, [v.name for v in self.x])
+        start = ca.vertcat(ca.SX(0, 1), *(given.get(v.name, v.start) for v in self.x))
+        symbols, values = self.vector("x"), start
+        parameters = self.values("p", p)
+        for _ in range(2):
+            values = ca.substitute(values, symbols, values)
+        evaluate = ca.Function("start", [self.vector("p"), self.vector("u")], [values])
+        numbers = evaluate(parameters, self.values("u")).full().ravel()
+        return np.array(
+            [finite(f"{self.name}.{v.name}", x) for v, x in zip(self.x, numbers, strict=True)],
+            dtype=float,
+        )
+
+
+def finite(where: str, value: Any) -> float:
+    """`value` as a float, or an error that says where it stands."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError, RuntimeError):
+        number = np.nan
+    if not np.isfinite(number):
+        raise ValueError(f"{where}: expected a finite number, got {value!r}")
+    return number

@@ -1,0 +1,65 @@
+"""Elementary functions that accept floats, NumPy arrays and CasADi SX, MX, DM alike.
+
+CasADi's own functions turn an array into a DM column and NumPy's turn a DM into an array;
+a law written with these keeps the type it was given.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+Scalar = Any
+"""A real number: float, NumPy array (element-wise), SX, MX or DM."""
+
+_CASADI = (ca.SX, ca.MX, ca.DM)
+
+
+def is_symbolic(value: object) -> bool:
+    """Whether `value` holds a CasADi symbol, so that numerical checks do not apply."""
+    return isinstance(value, ca.MX) or (isinstance(value, ca.SX) and not value.is_constant())
+
+
+def is_casadi(*values: object) -> bool:
+    """Whether any of `values` is a CasADi matrix."""
+    return any(isinstance(value, _CASADI) for value in values)
+
+
+def _dispatch(name: str, numpy_name: str | None = None) -> Callable[..., Any]:
+    of_casadi: Callable[..., Any] = getattr(ca, name)
+    of_numpy: Callable[..., Any] = getattr(np, numpy_name or name)
+
+    def function(*args: Scalar) -> Scalar:
+        return of_casadi(*args) if is_casadi(*args) else of_numpy(*args)
+
+    function.__name__ = name
+    function.__doc__ = f"`{name}` of floats, arrays, SX, MX or DM."
+    return function
+
+
+exp = _dispatch("exp")
+log = _dispatch("log")
+sqrt = _dispatch("sqrt")
+sin = _dispatch("sin")
+cos = _dispatch("cos")
+tan = _dispatch("tan")
+atan = _dispatch("atan", "arctan")
+asin = _dispatch("asin", "arcsin")
+tanh = _dispatch("tanh")
+expm1 = _dispatch("expm1")
+
+
+def column(*rows: Scalar) -> Scalar:
+    """Stack `rows` into a column: shape (n, 1) for CasADi, (n, ...) for arrays."""
+    if is_casadi(*rows):
+        return ca.vertcat(*rows)
+    return np.stack(np.broadcast_arrays(*rows)) if rows else np.zeros(0)
+
+
+def empty(like: Scalar) -> Scalar:
+    """The column without rows that a stateless law returns: DM (0, 1), or an array (0, ...).
+
+    A DM joins SX and MX columns without a trace, so absent states cost nothing.
+    """
+    return ca.DM(0, 1) if is_casadi(like) else np.zeros((0, *np.shape(like)))

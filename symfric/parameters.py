@@ -1,0 +1,244 @@
+"""Parameters of laws and scenes: value, unit, bounds, default; named sets and symbols of them.
+
+A parametric object is a frozen dataclass whose numbers are declared with `param`. A field holds a
+float (folded into every expression as a constant) or a CasADi symbol (visible to derivatives,
+identification and optimal control). Objects nest: a scene holds a law, a sum holds its terms.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
+from difflib import get_close_matches
+from math import inf, isfinite
+from typing import Any, ClassVar, Self, TypeVar
+
+import casadi as ca
+
+from symfric.numeric import Scalar, is_casadi, is_symbolic
+
+
+def param(
+    default: float, *, unit: str, doc: str, lower: float = -inf, upper: float = inf
+) -> Any:
+    """Declare a parameter field of a `Parametric` dataclass.
+
+    Args:
+        default: value used when none is given.
+        unit: SI unit as text, "1" for a pure number.
+        doc: what it is, in a few words.
+        lower, upper: closed bounds; identification takes its box constraints from here.
+    """
+    return field(
+        default=default, metadata={"unit": unit, "doc": doc, "lower": lower, "upper": upper}
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Parameter:
+    """One parameter as a user sees it."""
+
+    name: str
+    value: Scalar
+    unit: str
+    default: float
+    lower: float
+    upper: float
+    doc: str
+
+
+@dataclass(frozen=True, eq=False)
+class Variable:
+    """A named scalar of a model: its symbol, unit and the numbers that belong to it.
+
+    Attributes:
+        symbol: SX symbol, shape (1, 1).
+        start: initial or default value; an expression in other symbols where it depends on them.
+        nominal: typical magnitude; absolute tolerances and scalings are relative to it.
+        lower, upper: bounds for optimisation and identification.
+    """
+
+    name: str
+    unit: str
+    start: Scalar = 0.0
+    nominal: float = 1.0
+    lower: float = -inf
+    upper: float = inf
+    doc: str = ""
+    symbol: ca.SX = field(default_factory=lambda: ca.SX(0, 0))
+
+    def __post_init__(self) -> None:
+        if self.symbol.is_empty():
+            object.__setattr__(self, "symbol", ca.SX.sym(self.name))
+
+
+@dataclass(frozen=True, eq=False)
+class Parametric:
+    """A frozen dataclass with `param` fields; checks its numbers when it is made.
+
+    `eq=False` because comparing fields that hold symbols has no truth value.
+    """
+
+    ordered: ClassVar[tuple[tuple[str, str], ...]] = ()
+    """Pairs of fields (a, b) that must satisfy a <= b."""
+
+    suffixes: ClassVar[tuple[str, ...]] = ()
+    """Fixed name endings of the children; without them a child is renamed only on a clash."""
+
+    def __post_init__(self) -> None:
+        problems = list(_problems(self))
+        if problems:
+            raise ValueError(f"{type(self).__name__}: " + "; ".join(problems))
+
+
+P = TypeVar("P", bound=Parametric)
+
+
+def _problems(obj: Parametric) -> Iterator[str]:
+    for item in fields(obj):
+        if "unit" not in item.metadata:
+            continue
+        value, meta = getattr(obj, item.name), item.metadata
+        if is_casadi(value) or hasattr(value, "shape"):
+            continue
+        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+            yield f"{item.name}: expected a finite number [{meta['unit']}] or a symbol, got {value!r}"
+        elif not meta["lower"] <= value <= meta["upper"]:
+            yield (
+                f"{item.name}: expected {meta['lower']:g} <= {item.name} <= {meta['upper']:g} "
+                f"[{meta['unit']}], got {value:g}"
+            )
+    for low, high in obj.ordered:
+        a, b = getattr(obj, low), getattr(obj, high)
+        if isinstance(a, int | float) and isinstance(b, int | float) and a > b:
+            yield f"expected {low} <= {high}, got {low} = {a:g} and {high} = {b:g}"
+
+
+def _children(obj: Parametric) -> list[tuple[str, int | None, Parametric]]:
+    """Nested parametric objects as (field, index in a tuple or None, child)."""
+    found: list[tuple[str, int | None, Parametric]] = []
+    for item in fields(obj):
+        value = getattr(obj, item.name)
+        if isinstance(value, Parametric):
+            found.append((item.name, None, value))
+        elif isinstance(value, tuple):
+            found += [(item.name, i, v) for i, v in enumerate(value) if isinstance(v, Parametric)]
+    return found
+
+
+def _names(obj: Parametric) -> dict[str, tuple[int | None, str]]:
+    """Flat name -> (child number or None, name inside it)."""
+    own = [item.name for item in fields(obj) if "unit" in item.metadata]
+    inner = [list(_names(child)) for _, _, child in _children(obj)]
+    names: dict[str, tuple[int | None, str]] = {name: (None, name) for name in own}
+    for i, child_names in enumerate(inner):
+        others = own + [n for j, c in enumerate(inner) if j != i for n in c]
+        for name in child_names:
+            if obj.suffixes:
+                names[f"{name}_{obj.suffixes[i]}"] = (i, name)
+            else:
+                clash = name in others
+                names[f"{name}_{i + 1}" if clash else name] = (i, name)
+    return names
+
+
+def parameters(obj: Parametric) -> dict[str, Parameter]:
+    """All parameters of `obj` and of what it holds, by flat name.
+
+    Names are the field names. Terms of a sum that share a name get `_1`, `_2`, ...; the two sides
+    of an asymmetric law get `_pos` and `_neg`.
+    """
+    found: dict[str, Parameter] = {}
+    children = [parameters(child) for _, _, child in _children(obj)]
+    own = {item.name: item for item in fields(obj)}
+    for flat, (child, name) in _names(obj).items():
+        if child is None:
+            meta = own[name].metadata
+            found[flat] = Parameter(
+                flat,
+                getattr(obj, name),
+                meta["unit"],
+                own[name].default,  # pyright: ignore[reportArgumentType]
+                meta["lower"],
+                meta["upper"],
+                meta["doc"],
+            )
+        else:
+            found[flat] = replace(children[child][name], name=flat)
+    return found
+
+
+def with_values(obj: P, values: Mapping[str, Scalar]) -> P:
+    """A copy of `obj` with the parameters in `values` replaced, wherever they sit.
+
+    Raises:
+        ValueError: a name that `obj` does not have (the closest ones are offered), or a value
+            outside its bounds.
+    """
+    names = _names(obj)
+    check_names(type(obj).__name__, values, names)
+    changes: dict[str, Any] = {}
+    per_child: dict[int, dict[str, Scalar]] = {}
+    for flat, value in values.items():
+        child, name = names[flat]
+        if child is None:
+            changes[name] = value
+        else:
+            per_child.setdefault(child, {})[name] = value
+    for number, (field_name, index, child) in enumerate(_children(obj)):
+        if number not in per_child:
+            continue
+        new = with_values(child, per_child[number])
+        if index is None:
+            changes[field_name] = new
+        else:
+            items = list(changes.get(field_name, getattr(obj, field_name)))
+            items[index] = new
+            changes[field_name] = tuple(items)
+    return replace(obj, **changes)
+
+
+def symbolise(obj: P, *names: str) -> tuple[P, tuple[Variable, ...]]:
+    """A copy of `obj` in which the named parameters are SX symbols, and those symbols.
+
+    Every other parameter stays a constant of the expression, so that a term switched off by a
+    float zero leaves no trace.
+
+    Returns:
+        The copy and one `Variable` per name with start value, unit and bounds of the parameter.
+
+    Raises:
+        ValueError: unknown or repeated name.
+    """
+    known = parameters(obj)
+    check_names(type(obj).__name__, names, known)
+    if len(set(names)) != len(names):
+        raise ValueError(f"symbolise: expected every name once, got {', '.join(names)}")
+    variables = tuple(
+        Variable(
+            name,
+            known[name].unit,
+            start=known[name].value,
+            nominal=_magnitude(known[name].value),
+            lower=known[name].lower,
+            upper=known[name].upper,
+            doc=known[name].doc,
+        )
+        for name in names
+    )
+    return with_values(obj, {v.name: v.symbol for v in variables}), variables
+
+
+def _magnitude(value: Scalar) -> float:
+    return 1.0 if is_symbolic(value) or float(value) == 0.0 else abs(float(value))
+
+
+def check_names(where: str, names: Any, known: Any) -> None:
+    """Refuse names that are not in `known`, all in one error that offers the closest ones."""
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        hints = [get_close_matches(name, list(known), n=1, cutoff=0.4) for name in unknown]
+        did_you_mean = ", ".join(h[0] for h in hints if h)
+        raise ValueError(
+            f"{where}: expected one of {', '.join(known) or 'no parameters'}, "
+            f"got {', '.join(unknown)}"
+            + (f"; did you mean {did_you_mean}?" if did_you_mean else "; check the spelling")
+        )

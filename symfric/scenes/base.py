@@ -1,0 +1,41 @@
+"""A scene: a parametric machine that takes a friction law and gives a `Model`."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import casadi as ca
+
+from symfric.laws import Law
+from symfric.model import Model, Variables
+from symfric.numeric import Scalar
+from symfric.parameters import Parametric, Variable, symbolise
+
+
+@dataclass(frozen=True, eq=False)
+class Scene(Parametric, ABC):
+    """A machine with one friction law; `model()` writes its equations."""
+
+    law: Law
+
+    @abstractmethod
+    def equations(self, p: Variables) -> Model:
+        """The model of this machine as it stands, with `p` as its parameters."""
+
+    def model(self, free: Iterable[str] = ()) -> Model:
+        """The model, with the parameters named in `free` as symbols in `Model.p`.
+
+        All others are constants of the equations, so terms they switch off vanish.
+        """
+        scene, p = symbolise(self, *free)
+        return scene.equations(p)
+
+
+def friction_states(law: Law, v: Scalar, N: Scalar) -> tuple[Variables, ca.SX]:
+    """The internal states of `law` as model variables, starting in steady sliding at `v`."""
+    start = ca.SX(law.steady_state(ca.SX(v), N))
+    variables = tuple(
+        Variable(s.name, s.unit, start=start[i], nominal=s.nominal, doc="internal friction state")
+        for i, s in enumerate(law.states)
+    )
+    return variables, ca.vertcat(ca.SX(0, 1), *(v.symbol for v in variables))

@@ -1,0 +1,51 @@
+"""A positioning drive: one mass, a force input, friction and a constant offset."""
+
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+
+from symfric.model import Model, Output, Variables
+from symfric.numeric import Scalar
+from symfric.parameters import Variable, param
+from symfric.scenes.base import Scene, friction_states
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Drive(Scene):
+    """A mass driven by a force, with friction and a constant offset force.
+
+        x' = v,   m v' = force - F(v, N) - offset
+
+    `force` is the input. With the normal force N = 1 N the coefficients mu of a law read as force
+    levels in newton, which is how the friction of a drive of unknown load is identified.
+    Defaults: mass and load of the block of seed table 2 (N = m g).
+    """
+
+    m: Scalar = param(0.8, unit="kg", doc="moving mass", lower=1e-12)
+    N: Scalar = param(0.8 * 9.81, unit="N", doc="normal force", lower=0.0)
+    offset: Scalar = param(0.0, unit="N", doc="constant force opposing the input")
+
+    def equations(self, p: Variables) -> Model:
+        """States x, v and those of the law; input force; outputs friction, power."""
+        x = Variable("x", "m", nominal=0.1, doc="position")
+        v = Variable("v", "m/s", nominal=0.1, doc="velocity")
+        force = Variable("force", "N", nominal=1.0, doc="driving force")
+        bristles, z = friction_states(self.law, v.symbol, self.N)
+        F = self.law.force(v.symbol, self.N, z)
+        return Model(
+            name="drive",
+            x=(x, v, *bristles),
+            u=(force,),
+            p=p,
+            ode=ca.vertcat(
+                v.symbol,
+                (force.symbol - F - self.offset) / self.m,
+                self.law.rate(v.symbol, self.N, z),
+            ),
+            outputs={
+                "friction": Output(F, "N", "friction force opposing v"),
+                "power": Output(F * v.symbol, "W", "power taken by friction"),
+            },
+        )

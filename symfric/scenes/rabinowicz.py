@@ -1,0 +1,53 @@
+"""Rabinowicz's stick-slip test: a block on a moving belt, held by a spring."""
+
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+
+from symfric.model import Model, Output, Variables
+from symfric.numeric import Scalar
+from symfric.parameters import Variable, param
+from symfric.scenes.base import Scene, friction_states
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Rabinowicz(Scene):
+    """Block on a belt that moves at constant speed, held to the ground by a spring.
+
+        x' = v,   m v' = -k x - F(v - v_belt, N),   N = m g
+
+    x is the spring elongation, positive in the direction of the belt. The sliding velocity is that
+    of the block relative to the belt, so while the belt carries the block the friction force F is
+    negative: it opposes the block's motion relative to the belt.
+
+    Defaults: Marques-type comparison of eleven laws, tables 2 and 3 (m = 0.8 kg, k = 2.1 N/m,
+    belt 0.1 m/s); the block starts at x = 0 at rest.
+    """
+
+    m: Scalar = param(0.8, unit="kg", doc="mass of the block", lower=1e-12)
+    k: Scalar = param(2.1, unit="N/m", doc="spring stiffness", lower=0.0)
+    v_belt: Scalar = param(0.1, unit="m/s", doc="belt velocity")
+    g: Scalar = param(9.81, unit="m/s^2", doc="gravity", lower=0.0)
+
+    def equations(self, p: Variables) -> Model:
+        """States x, v and those of the law; outputs v_rel, friction, power."""
+        x = Variable("x", "m", nominal=0.1, doc="spring elongation")
+        v = Variable("v", "m/s", nominal=0.1, doc="velocity of the block")
+        N, v_rel = self.m * self.g, v.symbol - self.v_belt
+        bristles, z = friction_states(self.law, v_rel, N)
+        F = self.law.force(v_rel, N, z)
+        return Model(
+            name="rabinowicz",
+            x=(x, v, *bristles),
+            p=p,
+            ode=ca.vertcat(
+                v.symbol, (-self.k * x.symbol - F) / self.m, self.law.rate(v_rel, N, z)
+            ),
+            outputs={
+                "v_rel": Output(v_rel, "m/s", "velocity of the block relative to the belt"),
+                "friction": Output(F, "N", "friction force opposing v_rel"),
+                "power": Output(F * v_rel, "W", "power taken by the contact"),
+            },
+        )

@@ -1,0 +1,47 @@
+"""How a solve ended: each member's value is the sentence shown to the user."""
+
+from enum import Enum, unique
+from typing import Any
+
+
+@unique
+class Status(Enum):
+    """Result of a simulation, an optimisation or a fit."""
+
+    SUCCESS = "The end was reached within the tolerances."
+    INTERRUPTED = "Interrupted by the user; the result reaches up to the last time stored."
+    MAX_STEPS = (
+        "The maximum number of steps was used up; loosen rtol, raise max_steps or look for a "
+        "discontinuity."
+    )
+    STEP_TOO_SMALL = (
+        "The step became too small; a discontinuity or a singular equation is near this time."
+    )
+    NOT_FINITE = "An equation returned NaN or infinity."
+    SINGULAR = "The iteration matrix became singular."
+    SOLVER_FAILED = "The solver gave up."
+    SOLVED = "The optimality conditions hold within the tolerance."
+    ACCEPTABLE = "The optimality conditions hold only within the acceptable tolerance."
+    INFEASIBLE = (
+        "No point satisfies all constraints near the last iterate; check bounds and boundary "
+        "values, give a better guess or more time."
+    )
+    MAX_ITERATIONS = "The maximum number of iterations was reached; give a better guess."
+    TERMINAL_MISS = (
+        "The optimiser met its conditions, but the re-simulated control misses the target; "
+        "use more intervals."
+    )
+
+    @property
+    def ok(self) -> bool:
+        """Whether the result can be used as it is."""
+        return self in (Status.SUCCESS, Status.SOLVED, Status.ACCEPTABLE)
+
+
+class SolveError(RuntimeError):
+    """A solve failed; `status` says how, `partial` is what there is so far."""
+
+    def __init__(self, message: str, status: Status, partial: Any = None) -> None:
+        super().__init__(message)
+        self.status = status
+        self.partial = partial
