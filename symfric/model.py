@@ -94,11 +94,7 @@ class Model:
             problems.append(f"residual: expected {nx + nz} rows, got {self.residual.numel()}")
         declared = {e.__hash__() for e in ca.symvar(self._symbols())}
         expressions = [self.residual, *(ca.SX(o.expression) for o in self.outputs.values())]
-        stray = [
-            str(s)
-            for s in ca.symvar(ca.veccat(*expressions))
-            if s.__hash__() not in declared
-        ]
+        stray = [str(s) for s in ca.symvar(ca.veccat(*expressions)) if s.__hash__() not in declared]
         if stray:
             problems.append(
                 f"expected only declared symbols, got {', '.join(stray)}; declare them as x, z, u or p"
@@ -152,9 +148,7 @@ class Model:
         check_names(f"model '{self.name}'", [what], [*known, "residual"])
         return ca.Function(what, [t, x, z, u, p], [known[what]], ["t", "x", "z", "u", "p"], [what])
 
-    def values(
-        self, letter: str, given: Mapping[str, float] | None = None
-    ) -> NDArray[np.float64]:
+    def values(self, letter: str, given: Mapping[str, float] | None = None) -> NDArray[np.float64]:
         """Numbers of the group "u" or "p": start values, replaced by those `given` by name."""
         group: Variables = getattr(self, letter)
         given = dict(given or {})

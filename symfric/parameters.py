@@ -9,16 +9,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
 from math import inf, isfinite
-from typing import Any, ClassVar, Self, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import casadi as ca
 
 from symfric.numeric import Scalar, is_casadi, is_symbolic
 
 
-def param(
-    default: float, *, unit: str, doc: str, lower: float = -inf, upper: float = inf
-) -> Any:
+def param(default: float, *, unit: str, doc: str, lower: float = -inf, upper: float = inf) -> Any:
     """Declare a parameter field of a `Parametric` dataclass.
 
     Args:

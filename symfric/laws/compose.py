@@ -133,7 +133,9 @@ class LoadDependent(Law):
     Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134(5), 2012 (linear load part).
     """
 
-    facts: ClassVar[Facts] = Facts((), "that of its law", "memory", "Bittencourt and Gunnarsson 2012")
+    facts: ClassVar[Facts] = Facts(
+        (), "that of its law", "memory", "Bittencourt and Gunnarsson 2012"
+    )
 
     law: Law
     N_0: Scalar = param(0.0, unit="N", doc="preload", lower=0.0)

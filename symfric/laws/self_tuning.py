@@ -43,7 +43,7 @@ class SelfTuning(StaticLaw):
     E: Scalar = param(0.0, unit="1", doc="curvature factor", upper=0.999)
 
     @property
-    def C(self) -> Scalar:  # noqa: N802
+    def C(self) -> Scalar:
         """Shape factor [1], between 1 and 2, in closed form."""
         return shape_factor(self.mu_d / self.mu_s)
 
@@ -55,7 +55,9 @@ class SelfTuning(StaticLaw):
         return self.mu_s * N * sin(self.C * atan(phi))
 
     @classmethod
-    def from_peak_velocity(cls, v_p: Scalar, mu_s: Scalar = 0.15, mu_d: Scalar = 0.1) -> "SelfTuning":
+    def from_peak_velocity(
+        cls, v_p: Scalar, mu_s: Scalar = 0.15, mu_d: Scalar = 0.1
+    ) -> "SelfTuning":
         """The law with E = 0 whose peak mu_s N lies at the velocity `v_p` [m/s].
 
         Ill-posed as mu_d -> mu_s, where the peak moves to infinity.

@@ -42,9 +42,7 @@ class Rabinowicz(Scene):
             name="rabinowicz",
             x=(x, v, *bristles),
             p=p,
-            ode=ca.vertcat(
-                v.symbol, (-self.k * x.symbol - F) / self.m, self.law.rate(v_rel, N, z)
-            ),
+            ode=ca.vertcat(v.symbol, (-self.k * x.symbol - F) / self.m, self.law.rate(v_rel, N, z)),
             outputs={
                 "v_rel": Output(v_rel, "m/s", "velocity of the block relative to the belt"),
                 "friction": Output(F, "N", "friction force opposing v_rel"),
