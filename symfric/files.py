@@ -2,33 +2,34 @@
 
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
 @contextmanager
-def written(path: str | Path) -> Iterator[Path]:
+def written(path: str | Path) -> Generator[Path, None, None]:
     """A temporary path beside `path` that takes its name when the block ends without error.
 
     The folder is made where it is missing. After an error or an interrupt the old file, if any, is
     as it was and nothing is left behind.
 
     Raises:
-        ValueError: the path is a folder or its folder cannot be made.
+        ValueError: the path is a folder or a device, or its folder cannot be made or written.
     """
-    target = Path(path)
+    target = Path(path).resolve()  # a link stays a link to the new file
+    if target.exists() and not target.is_file():
+        kind = "a folder" if target.is_dir() else "a device"
+        raise ValueError(f"output '{path}': expected a file name, got {kind}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(
+            prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent
+        )
     except OSError as error:
         raise ValueError(
             f"output '{path}': expected a writable place, got {error.strerror}"
         ) from None
-    if target.is_dir():
-        raise ValueError(f"output '{path}': expected a file name, got a folder")
-    handle, name = tempfile.mkstemp(
-        prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent
-    )
     os.close(handle)
     temporary = Path(name)
     try:

@@ -18,6 +18,8 @@ from symfric.numeric import Scalar
 from symfric.parameters import Variable, check_names
 
 Variables = tuple[Variable, ...]
+RESERVED = {"t", "ode", "alg", "residual", "signals"}
+"""Names that `Model.function` uses itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,12 +81,7 @@ class Model:
             raise ValueError(f"model '{self.name}': " + "; ".join(problems))
 
     def _problems(self) -> list[str]:
-        problems: list[str] = []
-        names = [v.name for group in (self.x, self.z, self.u, self.p) for v in group]
-        names += list(self.outputs)
-        repeated = sorted({n for n in names if names.count(n) > 1} | ({"t"} & set(names)))
-        if repeated:
-            problems.append(f"expected every name once (and none called t), got {repeated}")
+        problems = self._naming_problems()
         nx, nz = len(self.x), len(self.z)
         if self.ode is not None and self.ode.numel() != nx:
             problems.append(f"ode: expected {nx} rows (one a state), got {self.ode.numel()}")
@@ -97,8 +94,27 @@ class Model:
         stray = [str(s) for s in ca.symvar(ca.veccat(*expressions)) if s.__hash__() not in declared]
         if stray:
             problems.append(
-                f"expected only declared symbols, got {', '.join(stray)}; declare them as x, z, u or p"
+                f"expected only declared symbols, got {', '.join(stray)}; "
+                "declare them as x, z, u or p"
             )
+        return problems
+
+    def _naming_problems(self) -> list[str]:
+        problems: list[str] = []
+        names = [v.name for group in (self.x, self.z, self.u, self.p) for v in group]
+        names += list(self.outputs)
+        repeated = sorted({n for n in names if names.count(n) > 1} | (RESERVED & set(names)))
+        if repeated:
+            problems.append(
+                f"expected every name once and none of {', '.join(sorted(RESERVED))}, "
+                f"got {', '.join(repeated)}"
+            )
+        odd = [n for n in names if not (n.isascii() and n.isidentifier())]
+        if odd:
+            problems.append(f"expected names that are C identifiers, got {', '.join(odd)}")
+        long = [n for n, output in self.outputs.items() if ca.SX(output.expression).numel() != 1]
+        if long:
+            problems.append(f"outputs: expected scalar expressions, got {', '.join(long)}")
         return problems
 
     def _symbols(self) -> ca.SX:
@@ -153,10 +169,8 @@ class Model:
         group: Variables = getattr(self, letter)
         given = dict(given or {})
         check_names(f"model '{self.name}' {letter}", given, [v.name for v in group])
-        return np.array(
-            [finite(f"{self.name}.{v.name}", given.get(v.name, v.start)) for v in group],
-            dtype=float,
-        )
+        numbers = {v.name: v.start for v in group} | given
+        return np.array([finite(f"{self.name}.{name}", x) for name, x in numbers.items()], float)
 
     def initial_state(
         self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None
@@ -166,19 +180,18 @@ class Model:
         A start value that is an expression (a bristle at steady state depends on the sliding
         velocity) is evaluated with the given values of the other states and parameters.
         """
-        given = dict(given or {})
+        given = {name: finite(f"{self.name}.{name}", x) for name, x in (given or {}).items()}
         check_names(f"model '{self.name}' x0", given, [v.name for v in self.x])
-        start = ca.vertcat(ca.SX(0, 1), *(given.get(v.name, v.start) for v in self.x))
+        starts = {v.name: v.start for v in self.x} | given
+        start = ca.vertcat(ca.SX(0, 1), *starts.values())
         symbols, values = self.vector("x"), start
         parameters = self.values("p", p)
         for _ in range(2):
             values = ca.substitute(values, symbols, values)
         evaluate = ca.Function("start", [self.vector("p"), self.vector("u")], [values])
         numbers = evaluate(parameters, self.values("u")).full().ravel()
-        return np.array(
-            [finite(f"{self.name}.{v.name}", x) for v, x in zip(self.x, numbers, strict=True)],
-            dtype=float,
-        )
+        named = zip(self.x, numbers, strict=True)
+        return np.array([finite(f"{self.name}.{v.name}", x) for v, x in named], float)
 
 
 def finite(where: str, value: Any) -> float:

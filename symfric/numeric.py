@@ -5,6 +5,7 @@ a law written with these keeps the type it was given.
 """
 
 from collections.abc import Callable
+from numbers import Real
 from typing import Any
 
 import casadi as ca
@@ -16,14 +17,27 @@ Scalar = Any
 _CASADI = (ca.SX, ca.MX, ca.DM)
 
 
-def is_symbolic(value: object) -> bool:
+def is_symbolic(value: Scalar) -> bool:
     """Whether `value` holds a CasADi symbol, so that numerical checks do not apply."""
     return isinstance(value, ca.MX) or (isinstance(value, ca.SX) and not value.is_constant())
 
 
-def is_casadi(*values: object) -> bool:
+def is_casadi(*values: Scalar) -> bool:
     """Whether any of `values` is a CasADi matrix."""
     return any(isinstance(value, _CASADI) for value in values)
+
+
+def is_number(value: Scalar) -> bool:
+    """Whether `value` is a plain number: an int or a float, NumPy's scalars included."""
+    return not isinstance(value, bool) and isinstance(value, Real)
+
+
+def equals(value: Scalar, number: float) -> bool:
+    """Whether `value` is the plain number `number`, so that a special case may be built in.
+
+    False for a symbol: what it will be is not known when the expression is made.
+    """
+    return is_number(value) and float(value) == number
 
 
 def _dispatch(name: str, numpy_name: str | None = None) -> Callable[..., Any]:

@@ -5,15 +5,17 @@ float (folded into every expression as a constant) or a CasADi symbol (visible t
 identification and optimal control). Objects nest: a scene holds a law, a sum holds its terms.
 """
 
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
 from math import inf, isfinite
 from typing import Any, ClassVar, TypeVar
 
 import casadi as ca
+import numpy as np
 
-from symfric.numeric import Scalar, is_casadi, is_symbolic
+from symfric.numeric import Scalar, is_casadi, is_number, is_symbolic
 
 
 def param(default: float, *, unit: str, doc: str, lower: float = -inf, upper: float = inf) -> Any:
@@ -95,10 +97,12 @@ def _problems(obj: Parametric) -> Iterator[str]:
         if "unit" not in item.metadata:
             continue
         value, meta = getattr(obj, item.name), item.metadata
-        if is_casadi(value) or hasattr(value, "shape"):
+        if is_casadi(value) or isinstance(value, np.ndarray):
             continue
-        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-            yield f"{item.name}: expected a finite number [{meta['unit']}] or a symbol, got {value!r}"
+        if not is_number(value) or not isfinite(value):
+            yield (
+                f"{item.name}: expected a finite number [{meta['unit']}] or a symbol, got {value!r}"
+            )
         elif not meta["lower"] <= value <= meta["upper"]:
             yield (
                 f"{item.name}: expected {meta['lower']:g} <= {item.name} <= {meta['upper']:g} "
@@ -106,7 +110,7 @@ def _problems(obj: Parametric) -> Iterator[str]:
             )
     for low, high in obj.ordered:
         a, b = getattr(obj, low), getattr(obj, high)
-        if isinstance(a, int | float) and isinstance(b, int | float) and a > b:
+        if is_number(a) and is_number(b) and a > b:
             yield f"expected {low} <= {high}, got {low} = {a:g} and {high} = {b:g}"
 
 
@@ -126,16 +130,30 @@ def _names(obj: Parametric) -> dict[str, tuple[int | None, str]]:
     """Flat name -> (child number or None, name inside it)."""
     own = [item.name for item in fields(obj) if "unit" in item.metadata]
     inner = [list(_names(child)) for _, _, child in _children(obj)]
+    if obj.suffixes:
+        flat = [[f"{n}_{s}" for n in c] for c, s in zip(inner, obj.suffixes, strict=True)]
+    else:
+        flat = distinct(inner, own)
     names: dict[str, tuple[int | None, str]] = {name: (None, name) for name in own}
-    for i, child_names in enumerate(inner):
-        others = own + [n for j, c in enumerate(inner) if j != i for n in c]
-        for name in child_names:
-            if obj.suffixes:
-                names[f"{name}_{obj.suffixes[i]}"] = (i, name)
-            else:
-                clash = name in others
-                names[f"{name}_{i + 1}" if clash else name] = (i, name)
+    for i, (new, old) in enumerate(zip(flat, inner, strict=True)):
+        names |= {n: (i, o) for n, o in zip(new, old, strict=True)}
     return names
+
+
+def distinct(groups: Sequence[Sequence[str]], taken: Sequence[str] = ()) -> list[list[str]]:
+    """The names of several groups made unique: one that stands twice gets its group's number."""
+    count = Counter([*taken, *(name for group in groups for name in group)])
+    used = set(count)
+    renamed: list[list[str]] = []
+    for number, group in enumerate(groups, start=1):
+        renamed.append([])
+        for name in group:
+            flat = name
+            while count[name] > 1 and flat in used:
+                flat = f"{flat}_{number}"
+            used.add(flat)
+            renamed[-1].append(flat)
+    return renamed
 
 
 def parameters(obj: Parametric) -> dict[str, Parameter]:
@@ -229,7 +247,7 @@ def _magnitude(value: Scalar) -> float:
     return 1.0 if is_symbolic(value) or float(value) == 0.0 else abs(float(value))
 
 
-def check_names(where: str, names: Any, known: Any) -> None:
+def check_names(where: str, names: Iterable[str], known: Collection[str]) -> None:
     """Refuse names that are not in `known`, all in one error that offers the closest ones."""
     unknown = [name for name in names if name not in known]
     if unknown:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from symfric.files import written
@@ -23,7 +24,7 @@ def save(figure: Figure, path: str | Path | None) -> Figure:
     return figure
 
 
-def panels(count: int, width: float = 7.0, height: float = 1.9) -> tuple[Figure, list[plt.Axes]]:
+def panels(count: int, width: float = 7.0, height: float = 1.9) -> tuple[Figure, list[Axes]]:
     """`count` panels under each other with a shared abscissa and a light grid."""
     figure, axes = plt.subplots(
         count, 1, sharex=True, squeeze=False, figsize=(width, 0.7 + height * count)

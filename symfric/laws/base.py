@@ -78,6 +78,13 @@ class Law(Parametric, ABC):
         """Internal states after long sliding at constant `v`; zero at v = 0."""
 
 
+def check_law(where: str, law: object) -> None:
+    """Refuse what is not a law: its class, or its name."""
+    if not isinstance(law, Law):
+        got = f"the class {law.__name__}" if isinstance(law, type) else repr(law)
+        raise ValueError(f"{where}: expected a law such as LuGre(), got {got}")
+
+
 @dataclass(frozen=True, eq=False)
 class StaticLaw(Law):
     """A memoryless law: no internal states, the rate has no rows."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar, final
 
 from symfric.laws.base import Facts, StaticLaw
-from symfric.numeric import Scalar, tanh
+from symfric.numeric import Scalar, equals, tanh
 from symfric.parameters import param
 
 
@@ -41,6 +41,6 @@ class BrownMcPhee(StaticLaw):
         x = v / self.v_t
         bump = x / (0.25 * (x * x) + 0.75) ** 2
         dry = self.mu_d * tanh(4 * x) + (self.mu_s - self.mu_d) * bump
-        if isinstance(self.mu_v, int | float) and self.mu_v == 0.0:
+        if equals(self.mu_v, 0.0):
             return dry * N
         return dry * N + self.mu_v * v * tanh(4 * N / self.N_t)

@@ -1,12 +1,13 @@
 """Laws made of laws: sum, asymmetric and load-dependent. Wrap, never subclass."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import ClassVar, final
 
 from symfric.laws import smooth
-from symfric.laws.base import Facts, Law, State
+from symfric.laws.base import Facts, Law, State, check_law
 from symfric.numeric import Scalar, column, empty, is_casadi
-from symfric.parameters import param, parameters, with_values
+from symfric.parameters import distinct, param, parameters, with_values
 
 
 @final
@@ -16,7 +17,9 @@ class Sum(Law):
 
         F = F_1 + F_2 + ...
 
-    Limits: those of the terms. Parameters that share a name get the endings _1, _2, ...
+    A sum of sums is one sum. Parameters and states that share a name get the number of their
+    term: mu_d_1, mu_d_2, ...
+    Limits: those of the terms.
     Source: superposition, as in Coulomb + viscous friction.
     """
 
@@ -25,25 +28,29 @@ class Sum(Law):
     laws: tuple[Law, ...]
 
     def __post_init__(self) -> None:
+        for law in self.laws:
+            check_law("Sum", law)
         if len(self.laws) < 2:
             raise ValueError(f"Sum: expected at least two laws, got {len(self.laws)}")
+        terms = (law.laws if isinstance(law, Sum) else (law,) for law in self.laws)
+        object.__setattr__(self, "laws", tuple(law for group in terms for law in group))
         super().__post_init__()
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The states of all terms, numbered where there are several."""
-        found = [state for law in self.laws for state in law.states]
-        names = [state.name for state in found]
+        """The states of all terms."""
+        names = distinct([[state.name for state in law.states] for law in self.laws])
         return tuple(
-            replace(s, name=f"{s.name}_{i + 1}") if names.count(s.name) > 1 else s
-            for i, s in enumerate(found)
+            replace(state, name=name)
+            for law, group in zip(self.laws, names, strict=True)
+            for state, name in zip(law.states, group, strict=True)
         )
 
     def _split(self, z: Scalar) -> list[Scalar]:
         ends = [0]
         for law in self.laws:
             ends.append(ends[-1] + len(law.states))
-        return [z[a:b] for a, b in zip(ends, ends[1:], strict=False)]
+        return [z[a:b] for a, b in pairwise(ends)]
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -67,7 +74,7 @@ class Sum(Law):
 class Asymmetric(Law):
     """One law with different parameters for the two directions of sliding.
 
-        p(v) = p_neg + (p_pos - p_neg) [1 + tanh(v / v_blend)] / 2
+        p(v) = p_pos w + p_neg (1 - w),   w = [1 + tanh(v / v_blend)] / 2
 
     Every parameter that differs between `positive` and `negative` is blended, so a bristle law
     keeps its one state and a parameter that is equal on both sides costs nothing.
@@ -83,6 +90,8 @@ class Asymmetric(Law):
     v_blend: Scalar = param(1e-4, unit="m/s", doc="blending velocity of the sides", lower=1e-12)
 
     def __post_init__(self) -> None:
+        check_law("Asymmetric", self.positive)
+        check_law("Asymmetric", self.negative)
         if list(parameters(self.positive)) != list(parameters(self.negative)):
             raise ValueError(
                 "Asymmetric: expected the same law on both sides, got "
@@ -101,7 +110,7 @@ class Asymmetric(Law):
             parameters(self.positive).values(), parameters(self.negative).values(), strict=True
         )
         blended = {
-            pos.name: neg.value + (pos.value - neg.value) * weight
+            pos.name: pos.value * weight + neg.value * (1 - weight)
             for pos, neg in sides
             if _differ(pos.value, neg.value)
         }
@@ -128,7 +137,8 @@ class LoadDependent(Law):
         N_eff = N_0 + c max(N, 0)
 
     N_0 is the preload (seal, bearing), c the share of the external load; max is smooth over N_eps
-    so that nothing divides by zero or turns negative at lift-off.
+    so that nothing divides by zero or turns negative at lift-off (with N_0 = 0 down to
+    N = -1e7 N_eps, where the difference of the square root rounds to zero).
     Limits: N_0 = 0, c = 1, N_eps = 0 is the law itself for N >= 0.
     Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134(5), 2012 (linear load part).
     """
@@ -141,6 +151,10 @@ class LoadDependent(Law):
     N_0: Scalar = param(0.0, unit="N", doc="preload", lower=0.0)
     c: Scalar = param(1.0, unit="1", doc="share of the external load", lower=0.0)
     N_eps: Scalar = param(1e-3, unit="N", doc="smoothing of the lift-off", lower=0.0)
+
+    def __post_init__(self) -> None:
+        check_law("LoadDependent", self.law)
+        super().__post_init__()
 
     def _load(self, N: Scalar) -> Scalar:
         return self.N_0 + self.c * smooth.positive(N, self.N_eps)

@@ -5,7 +5,7 @@ from typing import ClassVar, final
 
 from symfric.laws import smooth
 from symfric.laws.base import Facts, Law, State
-from symfric.numeric import Scalar, column
+from symfric.numeric import Scalar, column, equals
 from symfric.parameters import param
 
 
@@ -21,7 +21,7 @@ class Dahl(Law):
     `z` is the mean bristle deflection [m].
     Limits: steady state mu_d N sign(v); rate-independent; drifts under vibration; n = 1 has the
     virgin curve F = mu_d N (1 - exp(-sigma_0 x / (mu_d N))). |v| and sign(v) are smooth over
-    v_eps; v_eps = 0 is the original with a kink at v = 0 (n = 1 only). Not valid for N = 0.
+    v_eps; v_eps = 0 is the original with a kink at v = 0. Not valid for N = 0.
     Source: Dahl, Aerospace Corp. TOR-0158(3107-18)-1, 1968; exponent: Dahl, AIAA J. 14, 1976.
     """
 
@@ -50,7 +50,7 @@ class Dahl(Law):
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Rate of the bristle deflection [m/s], shape (1, 1)."""
         level = self.sigma_0 * z[0] / (self.mu_d * N)
-        if isinstance(self.n, int | float) and self.n == 1.0:
+        if equals(self.n, 1.0):
             return column(v - smooth.magnitude(v, self.v_eps) * level)
         rho = 1 - level * smooth.sign(v, self.v_eps)
         return column(v * smooth.signed_power(rho, self.n, self.rho_eps))

@@ -25,14 +25,15 @@ ALL_LAWS: dict[str, type[Law]] = {
 
 
 def law_name(law: Law) -> str:
-    """The text that `law_from_text` turns into a law of this kind."""
+    """The text that `law_from_text` turns into a law of this kind; the class name of your own."""
     if isinstance(law, Sum):
         return "+".join(law_name(term) for term in law.laws)
     if isinstance(law, Asymmetric):
         return f"asymmetric({law_name(law.positive)})"
     if isinstance(law, LoadDependent):
         return f"load_dependent({law_name(law.law)})"
-    return next(name for name, kind in ALL_LAWS.items() if kind is type(law))
+    known = (name for name, kind in ALL_LAWS.items() if kind is type(law))
+    return next(known, type(law).__name__)
 
 
 def law_from_text(text: str) -> Law:
@@ -42,9 +43,9 @@ def law_from_text(text: str) -> Law:
     `load_dependent(lugre)`.
 
     Raises:
-        ValueError: unknown name; the closest one is offered.
+        ValueError: unknown name (the closest one is offered), empty term, unbalanced parentheses.
     """
-    terms = _split_terms(text.replace(" ", ""))
+    terms = _split_terms(text)
     laws = tuple(_single(term, text) for term in terms)
     return laws[0] if len(laws) == 1 else Sum(laws)
 
@@ -61,10 +62,19 @@ def _single(term: str, text: str) -> Law:
 def _split_terms(text: str) -> list[str]:
     """Split at the plus signs outside parentheses."""
     terms, depth = [""], 0
-    for letter in text:
+    for letter in text.replace(" ", ""):
         depth += (letter == "(") - (letter == ")")
+        if depth < 0:
+            break
         if letter == "+" and depth == 0:
             terms.append("")
         else:
             terms[-1] += letter
+    if depth != 0:
+        raise ValueError(f"law '{text}': expected balanced parentheses")
+    if not all(terms):
+        raise ValueError(
+            f"law '{text}': expected the name of a law, got an empty term; "
+            "write one as in coulomb+viscous"
+        )
     return terms

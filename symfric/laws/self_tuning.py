@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from math import asin as asin_of_float
 from math import cos as cos_of_float
-from math import pi
+from math import inf, pi
 from math import sin as sin_of_float
 from typing import ClassVar, final
 
 from symfric.laws.base import Facts, StaticLaw
-from symfric.numeric import Scalar, asin, atan, exp, sin, tan
+from symfric.numeric import Scalar, asin, atan, equals, exp, sin, tan
 from symfric.parameters import param
 
 
@@ -50,8 +50,7 @@ class SelfTuning(StaticLaw):
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         y = self.B * v
-        straight = isinstance(self.E, int | float) and self.E == 0.0
-        phi = y if straight else (1 - self.E) * y + self.E * atan(y)
+        phi = y if equals(self.E, 0.0) else (1 - self.E) * y + self.E * atan(y)
         return self.mu_s * N * sin(self.C * atan(phi))
 
     @classmethod
@@ -90,12 +89,12 @@ def corrected_shape_factor(
             f"corrected_shape_factor: expected 0 <= mu_d/mu_s <= 1, got {ratio:g}; "
             "the dynamic level cannot exceed the static one"
         )
-    C = pi / theta
+    shape, error = pi / theta, inf
     for iteration in range(max_iterations):
-        error = sin_of_float(C * theta) - ratio
+        error = sin_of_float(shape * theta) - ratio
         if abs(error) < tolerance:
-            return C, iteration
-        C -= error / (theta * cos_of_float(C * theta))
+            return shape, iteration
+        shape -= error / (theta * cos_of_float(shape * theta))
     raise ValueError(
         f"corrected_shape_factor: expected convergence within {max_iterations} iterations, "
         f"got residual {error:.1e} at ratio {ratio:g}; use the closed form "

@@ -8,11 +8,16 @@ float `eps = 0.0` asks for the original, non-smooth function where one is offere
 import casadi as ca
 import numpy as np
 
-from symfric.numeric import Scalar, exp, expm1, is_casadi, sqrt, tanh
+from symfric.numeric import Scalar, equals, exp, expm1, is_casadi, sqrt, tanh
 
 
 def sign(x: Scalar, eps: Scalar) -> Scalar:
-    """Smooth sign tanh(x / eps); within 1 % of +-1 beyond 2.65 eps."""
+    """Smooth sign tanh(x / eps); within 1 % of +-1 beyond 2.65 eps.
+
+    The float `eps = 0.0` gives the sign itself, with value and derivative 0 at x = 0.
+    """
+    if equals(eps, 0.0):
+        return ca.sign(x) if is_casadi(x) else np.sign(x)
     return tanh(x / eps)
 
 
@@ -22,7 +27,7 @@ def magnitude(x: Scalar, eps: Scalar) -> Scalar:
     Being zero at rest it does not relax a bristle that stands still (trap N6), and beyond 20 eps
     it equals |x| to rounding. The float `eps = 0.0` gives |x| itself, with its kink at x = 0.
     """
-    if isinstance(eps, int | float) and eps == 0.0:
+    if equals(eps, 0.0):
         return ca.fabs(x) if is_casadi(x) else np.abs(x)
     return x * tanh(x / eps)
 
@@ -31,10 +36,13 @@ def power(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
     """Smooth |x|^exponent = (x^2 + eps^2)^(exponent/2) - eps^exponent, exactly 0 at x = 0.
 
     Finite with all derivatives in x and in the exponent (traps N1-N3). The float `exponent = 2.0`
-    gives x^2 exactly and costs one multiplication.
+    gives x^2 exactly and costs one multiplication; the float `eps = 0.0` gives |x|^exponent
+    itself, without a derivative at x = 0 for exponents below 1.
     """
-    if isinstance(exponent, int | float) and exponent == 2.0:
+    if equals(exponent, 2.0):
         return x * x
+    if equals(eps, 0.0):
+        return magnitude(x, 0.0) ** exponent
     return (x * x + eps * eps) ** (exponent / 2) - eps**exponent
 
 
@@ -48,7 +56,7 @@ def positive(x: Scalar, eps: Scalar) -> Scalar:
 
     The float `eps = 0.0` gives max(x, 0) itself, with its kink at x = 0.
     """
-    if isinstance(eps, int | float) and eps == 0.0:
+    if equals(eps, 0.0):
         return ca.fmax(x, 0.0) if is_casadi(x) else np.maximum(x, 0.0)
     return (x + sqrt(x * x + eps * eps)) / 2
 

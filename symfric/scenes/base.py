@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from symfric.laws import Law
+from symfric.laws.base import check_law
 from symfric.model import Model, Variables
 from symfric.numeric import Scalar
 from symfric.parameters import Parametric, Variable, symbolise
@@ -17,6 +18,10 @@ class Scene(Parametric, ABC):
     """A machine with one friction law; `model()` writes its equations."""
 
     law: Law
+
+    def __post_init__(self) -> None:
+        check_law(type(self).__name__, self.law)
+        super().__post_init__()
 
     @abstractmethod
     def equations(self, p: Variables) -> Model:
