@@ -75,7 +75,10 @@ class Law(Parametric, ABC):
 
     @abstractmethod
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Internal states after long sliding at constant `v`; zero at v = 0."""
+        """Internal states after long sliding at constant `v`; zero at v = 0.
+
+        With a smoothing velocity the rate vanishes there to rounding beyond 20 v_eps.
+        """
 
 
 def check_law(where: str, law: object) -> None:

@@ -21,7 +21,8 @@ class Dahl(Law):
     `z` is the mean bristle deflection [m].
     Limits: steady state mu_d N sign(v); rate-independent; drifts under vibration; n = 1 has the
     virgin curve F = mu_d N (1 - exp(-sigma_0 x / (mu_d N))). |v| and sign(v) are smooth over
-    v_eps; v_eps = 0 is the original with a kink at v = 0. Not valid for N = 0.
+    v_eps, to be kept ten times below the slowest motion of interest (see `LuGre`); v_eps = 0 is
+    the original with a kink at v = 0. Not valid for N = 0.
     Source: Dahl, Aerospace Corp. TOR-0158(3107-18)-1, 1968; exponent: Dahl, AIAA J. 14, 1976.
     """
 
@@ -35,7 +36,7 @@ class Dahl(Law):
     sigma_0: Scalar = param(1e5, unit="N/m", doc="bristle stiffness", lower=1e-12)
     mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=1e-12)
     n: Scalar = param(1.0, unit="1", doc="exponent", lower=0.0, upper=10.0)
-    v_eps: Scalar = param(1e-6, unit="m/s", doc="smoothing velocity of |v|", lower=0.0)
+    v_eps: Scalar = param(1e-9, unit="m/s", doc="smoothing velocity of |v|", lower=0.0)
     rho_eps: Scalar = param(1e-6, unit="1", doc="smoothing of |rho|, for n != 1", lower=1e-12)
 
     @property

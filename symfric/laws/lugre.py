@@ -19,11 +19,14 @@ class LuGre(Law):
         F     = sigma_0 z + sigma_1 dz/dt + sigma_2 v
 
     `z` is the mean bristle deflection [m].
-    Limits: steady state g sign(v) + sigma_2 v; |z| <= mu_s N / sigma_0 is invariant; drifts under
-    vibration. |v| is smooth over v_eps and exactly zero at rest; v_eps = 0 is the original with a
-    kink at v = 0. Passive from v to F only if sigma_2 >= sigma_1 (mu_s - mu_d) / mu_d, which the
-    default set does not meet: after a jump in v the force may point forward for an instant.
-    Not valid for N = 0 or a fast-varying N, since the deflection does not shrink with the load.
+    Limits: steady state g sign(v) + sigma_2 v; drifts under vibration. |v| is smooth over v_eps
+    and exactly zero at rest; v_eps = 0 is the original with a kink at v = 0, for which
+    |z| <= mu_s N / sigma_0 is invariant. Keep v_eps ten times below the creep while sticking, the
+    loading rate over sigma_0 (on a belt k v_belt / sigma_0): at more, the bristle stretches on
+    instead of breaking away and stick-slip comes out wrong without a sign of it. Passive from v
+    to F only if sigma_2 >= sigma_1 (mu_s - mu_d) / mu_d, which the default set does not meet:
+    after a jump in v the force may point forward for an instant. Not valid for N = 0 or a
+    fast-varying N, since the deflection does not shrink with the load.
     Source: Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE TAC 40(3), 1995, 419-425.
     """
 
@@ -42,7 +45,7 @@ class LuGre(Law):
     sigma_0: Scalar = param(1e5, unit="N/m", doc="bristle stiffness", lower=1e-12)
     sigma_1: Scalar = param(190.0, unit="N s/m", doc="bristle damping", lower=0.0)
     sigma_2: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
-    v_eps: Scalar = param(1e-6, unit="m/s", doc="smoothing velocity of |v|", lower=0.0)
+    v_eps: Scalar = param(1e-9, unit="m/s", doc="smoothing velocity of |v|", lower=0.0)
 
     @property
     def states(self) -> tuple[State, ...]:
