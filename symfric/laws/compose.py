@@ -105,12 +105,13 @@ class Asymmetric(Law):
         return self.positive.states
 
     def _at(self, v: Scalar) -> Law:
-        weight = (1 + smooth.sign(v, self.v_blend)) / 2
+        w = (1 + smooth.sign(v, self.v_blend)) / 2
+        rest = 1 - w
         sides = zip(
             parameters(self.positive).values(), parameters(self.negative).values(), strict=True
         )
         blended = {
-            pos.name: pos.value * weight + neg.value * (1 - weight)
+            pos.name: pos.value * w + neg.value * rest
             for pos, neg in sides
             if _differ(pos.value, neg.value)
         }
