@@ -1,0 +1,97 @@
+"""Answers from elsewhere: closed forms and right-hand sides written out in plain Python.
+
+Nothing here imports symfric, so that a mistake cannot stand on both sides of a comparison.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import atan, cos, exp, hypot, inf, pi, sin, sqrt
+
+
+@dataclass(frozen=True)
+class StickSlip:
+    """Periodic stick-slip of a block on a belt."""
+
+    period: float
+    stick_time: float
+    slip_time: float
+    x_max: float
+    x_min: float
+    x_centre: float
+
+
+def rabinowicz_coulomb(
+    mu_s: float, mu_d: float, m: float, k: float, v_belt: float, g: float
+) -> StickSlip:
+    """Stick-slip under Coulomb friction with a static level, in closed form.
+
+    The block sticks until the spring force reaches mu_s m g, then swings freely about the
+    elongation mu_d m g / k; it leaves and returns to the belt with the belt's velocity, so that
+    the elongations at both ends of the slip lie symmetrically about the centre.
+    """
+    centre, excess = mu_d * m * g / k, (mu_s - mu_d) * m * g / k
+    w = sqrt(k / m)
+    amplitude = hypot(excess, v_belt / w)
+    stick, slip = 2 * excess / v_belt, 2 / w * (pi - atan(excess * w / v_belt))
+    return StickSlip(stick + slip, stick, slip, centre + amplitude, centre - amplitude, centre)
+
+
+def rabinowicz_lugre(
+    m: float = 0.8,
+    k: float = 2.1,
+    v_belt: float = 0.1,
+    g: float = 9.81,
+    mu_s: float = 0.15,
+    mu_d: float = 0.1,
+    v_s: float = 1e-3,
+    sigma_0: float = 1e5,
+    sigma_1: float = 190.0,
+) -> Callable[[float, list[float]], list[float]]:
+    """Right-hand side of (x, v, z) for the block on a belt with LuGre friction, with a true |v|."""
+
+    def rates(t: float, y: list[float]) -> list[float]:
+        x, v, z = y
+        sliding = v - v_belt
+        level = m * g * (mu_d + (mu_s - mu_d) * exp(-((sliding / v_s) ** 2)))
+        z_dot = sliding - abs(sliding) * sigma_0 * z / level
+        return [v, -(k * x + sigma_0 * z + sigma_1 * z_dot) / m, z_dot]
+
+    return rates
+
+
+def dahl_virgin(n: float, x: float, sigma_0: float, F_C: float) -> float:
+    """Force after sliding the distance `x` from rest, of Dahl's law with exponent n."""
+    s = sigma_0 * x / F_C
+    if n == 0.0:
+        return min(s, 1.0) * F_C
+    if n == 0.5:
+        return F_C * (1 - max(1 - s / 2, 0.0) ** 2)
+    if n == 1.0:
+        return F_C * (1 - exp(-s))
+    if n == 2.0:
+        return F_C * s / (1 + s)
+    raise NotImplementedError(n)
+
+
+def viscous_ramp(t: float, m: float, c: float, v_0: float, u_0: float, slope: float) -> float:
+    """Velocity of m v' = u_0 + slope t - c v from v(0) = v_0."""
+    tau = m / c
+    steady = (u_0 + slope * (t - tau)) / c
+    return steady + (v_0 - (u_0 - slope * tau) / c) * exp(-t / tau)
+
+
+def viscous_sine(t: float, m: float, c: float, amplitude: float, w: float) -> float:
+    """Velocity of m v' = amplitude sin(w t) - c v from rest."""
+    tau = m / c
+    gain = amplitude / c / (1 + (w * tau) ** 2)
+    return gain * (sin(w * t) - w * tau * cos(w * t) + w * tau * exp(-t / tau))
+
+
+def stribeck_curve(
+    v: float, N: float, mu_s: float, mu_d: float, v_s: float, delta: float, sigma_2: float = 0.0
+) -> float:
+    """Steady-state force of the bristle laws at v != 0, after the tables of the thesis form."""
+    direction = 1.0 if v > 0 else -1.0
+    speed = abs(v)
+    weight = 0.0 if speed == inf else exp(-((speed / v_s) ** delta))
+    return direction * N * (mu_s * weight + mu_d * (1 - weight)) + sigma_2 * v

@@ -1,0 +1,251 @@
+"""What every law promises, checked over all of them."""
+
+from dataclasses import fields
+from functools import cache
+from math import inf
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from law_cases import BRISTLE, CASES, STATIC, SYMMETRIC, compiled, state_symbols, symbolic
+
+from symfric import (
+    ALL_LAWS,
+    BrownMcPhee,
+    Law,
+    LuGre,
+    SelfTuning,
+    Stribeck,
+    parameters,
+    symbolise,
+    with_values,
+)
+from symfric.laws import PHENOMENA
+
+magnitudes = st.floats(-12.0, 3.0).map(lambda e: 10.0**e)
+velocities = st.builds(lambda s, m: s * m, st.sampled_from([-1.0, 1.0]), magnitudes)
+loads = st.floats(0.1, 1e3)
+deflections = st.floats(-1.5, 1.5)
+
+EXTREMES = [s * m for m in (0.0, 1e-300, 1e-12, 1e-6, 1e-3, 1.0, 1e3) for s in (1.0, -1.0)]
+
+each_law = pytest.mark.parametrize("kind", ALL_LAWS.values(), ids=ALL_LAWS.keys())
+each_case = pytest.mark.parametrize("name", CASES)
+each_symmetric = pytest.mark.parametrize("name", SYMMETRIC)
+each_static = pytest.mark.parametrize("name", STATIC)
+each_bristle = pytest.mark.parametrize("name", BRISTLE)
+
+
+def stretched(law: Law, N: float, share: float) -> np.ndarray:
+    """Internal states at a share of what steady sliding gives."""
+    return share * np.asarray(law.steady_state(1.0, N))
+
+
+@cache
+def derivatives(name: str) -> ca.Function:
+    """Force and rate with gradients and Hessians in v, z and every parameter."""
+    _, symbols, outputs, _ = symbolic(name)
+    expressions = [outputs, ca.jacobian(outputs, symbols)]
+    expressions += [ca.hessian(outputs[i], symbols)[0] for i in range(outputs.numel())]
+    return ca.Function("derivatives", [symbols], expressions)
+
+
+def level(law: Law, which: str) -> float:
+    """Sum of the given friction coefficient over the terms of a law."""
+    return sum(float(p.value) for n, p in parameters(law).items() if n.startswith(which))
+
+
+@each_symmetric
+@given(v=velocities, N=loads, share=deflections)
+def test_force_and_rate_are_odd(name: str, v: float, N: float, share: float) -> None:
+    z = stretched(SYMMETRIC[name], N, share)
+    forward, backward = compiled(name)(v, N, z), compiled(name)(-v, N, -z)
+    for one, other in zip(forward, backward, strict=True):
+        np.testing.assert_array_equal(one.full(), -other.full())
+
+
+@each_case
+@given(v=velocities, N=loads)
+def test_steady_sliding_takes_power(name: str, v: float, N: float) -> None:
+    law = CASES[name]
+    assert law.force(v, N, law.steady_state(v, N)) * v >= 0
+
+
+@each_static
+@given(v=velocities, N=loads, mu_s=st.floats(1e-3, 2.0), ratio=st.floats(0.0, 1.0))
+def test_static_force_stays_below_static_level_plus_viscous(
+    name: str, v: float, N: float, mu_s: float, ratio: float
+) -> None:
+    known = parameters(SYMMETRIC[name])
+    chosen = {"mu_s": mu_s, "mu_d": mu_s * ratio if "mu_s" in known else mu_s}
+    law = with_values(SYMMETRIC[name], {n: x for n, x in chosen.items() if n in known})
+    top = level(law, "mu_s") or level(law, "mu_d")
+    bound = top * N + (level(law, "sigma_2") + level(law, "mu_v")) * abs(v)
+    assert abs(law.force(v, N)) <= bound * (1 + 1e-15)
+
+
+@pytest.mark.parametrize("name", ["dahl", "dahl, n 2", "dahl, n 0.5", "lugre"])
+@given(v=velocities, N=loads)
+def test_bristle_never_grows_beyond_its_limit(name: str, v: float, N: float) -> None:
+    law = with_values(CASES[name], {"v_eps": 0.0})
+    limit = (level(law, "mu_s") or level(law, "mu_d")) * N / level(law, "sigma_0")
+    inward = -float(law.rate(v, N, np.array([np.sign(v) * limit]))[0]) * np.sign(v)
+    assert inward >= -1e-12 * abs(v)
+
+
+@each_bristle
+@given(v=velocities, N=loads)
+def test_rate_vanishes_in_steady_sliding(name: str, v: float, N: float) -> None:
+    law = SYMMETRIC[name]
+    smoothing = [float(p.value) for n, p in parameters(law).items() if n.startswith("v_eps")]
+    v += np.sign(v) * 20 * max(smoothing)
+    rate = law.rate(v, N, law.steady_state(v, N))
+    assert np.abs(rate).max() <= 1e-12 * abs(v)
+
+
+@pytest.mark.parametrize("name", ["coulomb", "stribeck", "brown_mcphee", "self_tuning"])
+@given(v=velocities, N=loads, factor=st.floats(0.01, 100.0))
+def test_dry_force_is_proportional_to_the_load(
+    name: str, v: float, N: float, factor: float
+) -> None:
+    law = CASES[name]
+    assert law.force(v, factor * N) == pytest.approx(factor * law.force(v, N), rel=1e-14)
+
+
+@pytest.mark.parametrize("name", ["dahl", "lugre"])
+@given(v=velocities, N=loads, factor=st.floats(0.01, 100.0))
+def test_steady_bristle_force_is_proportional_to_the_load(
+    name: str, v: float, N: float, factor: float
+) -> None:
+    law = with_values(CASES[name], {"v_eps": 0.0})
+    one, other = (law.force(v, load, law.steady_state(v, load)) for load in (N, factor * N))
+    assert other == pytest.approx(factor * one, rel=1e-9)
+
+
+@each_case
+@pytest.mark.parametrize("v", EXTREMES)
+@pytest.mark.parametrize("share", [0.0, 1.0, -1.0])
+def test_value_gradient_and_hessian_are_finite(name: str, v: float, share: float) -> None:
+    names, _, _, values = symbolic(name)
+    z = stretched(CASES[name], 7.848, share).ravel()
+    results = derivatives(name)([v, *z, *(values[n] for n in names[1 + z.size :])])
+    assert all(np.isfinite(result.full()).all() for result in results)
+
+
+@each_static
+@pytest.mark.parametrize("v", EXTREMES)
+def test_without_load_only_viscous_friction_remains(name: str, v: float) -> None:
+    law = SYMMETRIC[name]
+    viscous = 0.0 if name.startswith("brown_mcphee") else level(law, "sigma_2")
+    assert law.force(v, 0.0) == pytest.approx(viscous * v, abs=1e-300)
+
+
+@each_case
+@pytest.mark.parametrize("v", [0.0, 3e-4, -0.2])
+def test_all_number_types_give_the_same(name: str, v: float) -> None:
+    law, N = CASES[name], 5.0
+    z = stretched(law, N, 0.7).ravel()
+    n = z.size
+    F, rate = float(law.force(v, N, z)), np.asarray(law.rate(v, N, z))
+    assert rate.shape == (n,)
+    many = law.force(np.full(3, v), N, np.tile(z[:, None], (1, 3)))
+    rates = law.rate(np.full(3, v), N, np.tile(z[:, None], (1, 3)))
+    assert many.shape == (3,)
+    assert rates.shape == (n, 3)
+    results = [(many[1], rates[:, 1]), tuple(r.full() for r in compiled(name)(v, N, z))]
+    w, L, s = ca.MX.sym("v"), ca.MX.sym("N"), ca.MX.sym("z", n)
+    of_mx = ca.Function("law", [w, L, s], [law.force(w, L, s), law.rate(w, L, s)])
+    results.append(tuple(r.full() for r in of_mx(v, N, z)))
+    dm = ca.DM(v), ca.DM(N), ca.DM(z) if n else ca.DM(0, 1)
+    assert law.force(*dm).shape == (1, 1)
+    assert law.rate(*dm).shape == (n, 1)
+    results.append((law.force(*dm).full(), law.rate(*dm).full()))
+    for one, other in results:
+        np.testing.assert_allclose(np.ravel(one), F, rtol=1e-14, atol=1e-300)
+        np.testing.assert_allclose(np.ravel(other), rate, rtol=1e-12, atol=1e-18)
+
+
+@each_case
+@given(v=velocities, share=deflections)
+def test_symbolised_law_equals_the_numeric_one(name: str, v: float, share: float) -> None:
+    names, symbols, outputs, values = symbolic(name)
+    z = stretched(CASES[name], 7.848, share).ravel()
+    point = [v, *z, *(values[n] for n in names[1 + z.size :])]
+    of_symbols = ca.Function("outputs", [symbols], [outputs])(point).full().ravel()
+    expected = np.concatenate([np.ravel(r.full()) for r in compiled(name)(v, 7.848, z)])
+    scale = np.array([1.0, *np.full(z.size, abs(v))])
+    np.testing.assert_allclose(of_symbols / scale, expected / scale, rtol=1e-12, atol=1e-12)
+
+
+@each_case
+def test_default_expressions_use_no_nonsmooth_primitive(name: str) -> None:
+    law = CASES[name]
+    v, N, z = ca.SX.sym("v"), ca.SX.sym("N"), state_symbols(law)
+    function = ca.Function("law", [v, N, z], [law.force(v, N, z), law.rate(v, N, z)])
+    used = {function.instruction_id(k) for k in range(function.n_instructions())}
+    forbidden = {ca.OP_SIGN, ca.OP_FABS, ca.OP_IF_ELSE_ZERO, ca.OP_FMIN, ca.OP_FMAX, ca.OP_LT}
+    assert not used & forbidden
+
+
+@each_law
+def test_docstring_states_equation_limits_and_source(kind: type[Law]) -> None:
+    text = kind.__doc__ or ""
+    assert "Limits:" in text
+    assert "Source:" in text
+    assert "        F " in text, "the equation of the force, indented"
+
+
+@each_law
+def test_facts_are_complete(kind: type[Law]) -> None:
+    facts = kind.facts
+    assert facts.phenomena
+    assert set(facts.phenomena) <= set(PHENOMENA)
+    assert facts.smoothness
+    assert facts.confidence
+    assert facts.source
+
+
+@each_law
+def test_every_parameter_carries_unit_text_and_bounds(kind: type[Law]) -> None:
+    found = parameters(kind())
+    assert list(found) == [item.name for item in fields(kind)]
+    for p in found.values():
+        assert p.unit
+        assert p.doc
+        assert p.lower <= p.default <= p.upper
+        assert p.value == p.default
+
+
+BOUNDED = [
+    (kind, p.name, beyond)
+    for kind in ALL_LAWS.values()
+    for p in parameters(kind()).values()
+    for beyond in (p.lower - 1, p.upper + 1)
+    if abs(beyond) < inf
+]
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "value"), BOUNDED, ids=[f"{k.__name__}-{n}-{x:g}" for k, n, x in BOUNDED]
+)
+def test_value_beyond_a_bound_is_refused_by_name(kind: type[Law], name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=rf"{kind.__name__}: {name}: expected .* got {value:g}"):
+        kind(**{name: value})
+
+
+@pytest.mark.parametrize("kind", [Stribeck, BrownMcPhee, SelfTuning, LuGre])
+def test_dynamic_coefficient_above_the_static_one_is_refused(kind: type[Law]) -> None:
+    with pytest.raises(ValueError, match=r"mu_d <= mu_s, got mu_d = 0.3 and mu_s = 0.2"):
+        kind(mu_s=0.2, mu_d=0.3)
+
+
+@each_law
+def test_symbols_take_the_bounds_of_their_parameters(kind: type[Law]) -> None:
+    known = parameters(kind())
+    _, variables = symbolise(kind(), *known)
+    for variable in variables:
+        p = known[variable.name]
+        assert (variable.lower, variable.upper) == (p.lower, p.upper)
+        assert (variable.unit, variable.start) == (p.unit, p.value)
