@@ -32,6 +32,36 @@ class Output:
 
 
 @dataclass(frozen=True, eq=False)
+class Monitor:
+    """An expression in t, x, z, u, p whose relative error is controlled along with the states.
+
+    A sliding velocity is the difference of two velocities that may be a thousand times larger;
+    `nominal` is the scale on which the friction force changes with it.
+    """
+
+    expression: Scalar
+    nominal: float
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """Something that happens when an expression passes through zero.
+
+    Attributes:
+        expression: in t, x, z, u, p.
+        direction: +1 only rising, -1 only falling, 0 both.
+        terminal: the simulation ends there.
+        reset: state -> its value after the event, in terms of the values before it.
+    """
+
+    name: str
+    expression: Scalar
+    direction: int = 0
+    terminal: bool = False
+    reset: Mapping[str, Scalar] = field(default_factory=dict[str, Scalar])
+
+
+@dataclass(frozen=True, eq=False)
 class Model:
     """A dynamic system 0 = F(t, x', x, z, u, p), explicit where it can be.
 
@@ -49,6 +79,8 @@ class Model:
         xdot: SX symbols (nx, 1) of an implicit model; made by the explicit one.
         residual: SX (nx + nz, 1).
         outputs: named results in addition to x, z and u.
+        monitors: expressions that error control watches besides x.
+        events: what happens at zero crossings.
         t: SX symbol of time [s].
 
     Raises:
@@ -65,6 +97,8 @@ class Model:
     xdot: ca.SX = field(default_factory=lambda: ca.SX(0, 0))
     residual: ca.SX = field(default_factory=lambda: ca.SX(0, 0))
     outputs: Mapping[str, Output] = field(default_factory=dict[str, Output])
+    monitors: tuple[Monitor, ...] = ()
+    events: tuple[Event, ...] = ()
     t: ca.SX = field(default_factory=lambda: ca.SX.sym("t"))
 
     def __post_init__(self) -> None:
@@ -91,6 +125,9 @@ class Model:
             problems.append(f"residual: expected {nx + nz} rows, got {self.residual.numel()}")
         declared = {e.__hash__() for e in ca.symvar(self._symbols())}
         expressions = [self.residual, *(ca.SX(o.expression) for o in self.outputs.values())]
+        expressions += [ca.SX(m.expression) for m in self.monitors]
+        for event in self.events:
+            expressions += map(ca.SX, (event.expression, *event.reset.values()))
         stray = [str(s) for s in ca.symvar(ca.veccat(*expressions)) if s.__hash__() not in declared]
         if stray:
             problems.append(
@@ -112,6 +149,18 @@ class Model:
         odd = [n for n in names if not (n.isascii() and n.isidentifier())]
         if odd:
             problems.append(f"expected names that are C identifiers, got {', '.join(odd)}")
+        states = [v.name for v in self.x]
+        for event in self.events:
+            missing = [n for n in event.reset if n not in states]
+            if missing:
+                problems.append(
+                    f"event '{event.name}': expected resets of {', '.join(states)}, "
+                    f"got {', '.join(missing)}"
+                )
+            if event.direction not in (-1, 0, 1):
+                problems.append(
+                    f"event '{event.name}': expected direction -1, 0 or 1, got {event.direction}"
+                )
         long = [n for n, output in self.outputs.items() if ca.SX(output.expression).numel() != 1]
         if long:
             problems.append(f"outputs: expected scalar expressions, got {', '.join(long)}")

@@ -77,3 +77,11 @@ def empty(like: Scalar) -> Scalar:
     A DM joins SX and MX columns without a trace, so absent states cost nothing.
     """
     return ca.DM(0, 1) if is_casadi(like) else np.zeros((0, *np.shape(like)))
+
+
+def smallest(*values: Scalar) -> Scalar:
+    """The smallest of `values`."""
+    least = values[0]
+    for value in values[1:]:
+        least = ca.fmin(least, value) if is_casadi(least, value) else np.minimum(least, value)
+    return least

@@ -9,6 +9,11 @@ class Status(Enum):
     """Result of a simulation, an optimisation or a fit."""
 
     SUCCESS = "The end was reached within the tolerances."
+    TERMINATED = "A terminal event ended the simulation."
+    EVENT_STORM = (
+        "Events pile up without time advancing (Zeno); give the model a mode in which the contact "
+        "rests."
+    )
     INTERRUPTED = "Interrupted by the user; the result reaches up to the last time stored."
     MAX_STEPS = (
         "The maximum number of steps was used up; loosen rtol, raise max_steps or look for a "
@@ -35,7 +40,7 @@ class Status(Enum):
     @property
     def ok(self) -> bool:
         """Whether the result can be used as it is."""
-        return self in (Status.SUCCESS, Status.SOLVED, Status.ACCEPTABLE)
+        return self in (Status.SUCCESS, Status.TERMINATED, Status.SOLVED, Status.ACCEPTABLE)
 
 
 class SolveError(RuntimeError):

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symfric.model import Model
+from symfric.model import Model, finite
 from symfric.parameters import check_names
 
 
@@ -86,16 +86,19 @@ class Drivers:
         data: SX symbols that are constant on each interval.
         breaks: interval ends in [t_start, t_end], shape (n + 1,).
         values: `data` on each interval, shape (n_data, n).
+        key: the structure; two drivers of a model with one key have the same equations.
     """
 
     expression: ca.SX
     data: ca.SX
     breaks: NDArray[np.float64]
     values: NDArray[np.float64]
+    key: tuple[object, ...]
 
-    def of_time(self, t: ca.SX) -> ca.Function:
-        """Inputs as a Function of (t, data)."""
-        return ca.Function("inputs", [t, self.data], [self.expression])
+    def interval(self, times: NDArray[np.float64]) -> NDArray[np.intp]:
+        """Number of the interval that holds each time; at a break the later one."""
+        last = self.values.shape[1] - 1
+        return np.clip(np.searchsorted(self.breaks, times, side="right") - 1, 0, last)
 
 
 def drivers(
@@ -118,12 +121,14 @@ def drivers(
     symbols: list[ca.SX] = []
     values: list[NDArray[np.float64]] = []
     start = ca.SX.sym("t_k")
+    key: list[object] = []
     for variable in model.u:
         signal = given.get(variable.name, variable.start)
         if isinstance(signal, Sampled):
             c, slope = ca.SX.sym(f"{variable.name}_k"), ca.SX.sym(f"{variable.name}_dot")
             value, rise = signal.coefficients(breaks)
             symbols, values = [*symbols, c], [*values, value]
+            key.append("linear" if rise.any() else "hold")
             if rise.any():
                 rows.append(c + slope * (model.t - start))
                 symbols, values = [*symbols, slope], [*values, rise]
@@ -131,8 +136,10 @@ def drivers(
                 rows.append(c)
         elif callable(signal):
             rows.append(ca.SX(signal(model.t)))
+            key.append(signal)
         else:
-            rows.append(ca.SX(float(signal)))
+            rows.append(ca.SX(finite(f"input '{variable.name}'", signal)))
+            key.append(float(signal))
     expression = ca.vertcat(ca.SX(0, 1), *rows)
     if ca.depends_on(expression, start):
         symbols, values = [*symbols, start], [*values, breaks[:-1]]
@@ -141,4 +148,5 @@ def drivers(
         ca.vertcat(ca.SX(0, 1), *symbols),
         breaks,
         np.vstack(values) if values else np.zeros((0, breaks.size - 1)),
+        tuple(key),
     )

@@ -1,19 +1,30 @@
-"""Simulate a model: one call for every backend."""
+"""Simulate a model: one call for every method and backend."""
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from time import perf_counter
+from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from symfric.integrator.casadi_backend import integrate
-from symfric.integrator.inputs import Input
-from symfric.integrator.trajectory import Trajectory
+from symfric.integrator.casadi_backend import integrate_by_peer
+from symfric.integrator.dense import Dense
+from symfric.integrator.inputs import Drivers, Input, drivers
+from symfric.integrator.integrator import Integrator
+from symfric.integrator.run import Run, Tolerances, integrate
+from symfric.integrator.tableaux import ROSENBROCK
+from symfric.integrator.trajectory import Statistics, Trajectory
 from symfric.model import Model, finite
+from symfric.parameters import check_names
 from symfric.status import SolveError
 
+Array = NDArray[np.float64]
 LOOSE = 1e-5
-"""Above this relative tolerance whole stick phases are lost without a sign of it."""
+"""Above this relative tolerance whole stick phases may be lost without a sign of it."""
+BACKENDS = ("auto", "vm", "compiled", "rosenbrock", "sundials")
+_BUILT: WeakKeyDictionary[Model, dict[object, Integrator]] = WeakKeyDictionary()
 
 
 def simulate(
@@ -28,70 +39,208 @@ def simulate(
     atol: float | None = None,
     t_eval: ArrayLike | None = None,
     samples: int = 2001,
+    method: str = "rodas5p",
     backend: str = "auto",
+    event_tolerance: float = 1e-10,
+    max_steps: int = 10_000_000,
+    measure_error: bool = False,
+    progress: Callable[[float], None] | None = None,
     throw: bool = True,
 ) -> Trajectory:
     """Integrate `model` from `t_start` to `t_end` [s].
 
     Args:
-        model: the equations.
+        model: the equations; its events and monitored expressions are respected.
         t_end: last time [s].
         t_start: first time [s].
-        x0: start values of states by name; the others start where the model says.
+        x0: start values of states by name; the others start where the model says (bristles in
+            steady sliding).
         u: inputs by name: a number, `Hold` or `Linear` samples, or a function of symbolic time.
         p: values of the model's parameters by name.
         rtol: relative tolerance of each step.
         atol: absolute tolerance in multiples of each state's nominal value; default 0.1 rtol.
         t_eval: times of the result [s]; default `samples` equal intervals. They force no steps.
         samples: number of equally spaced times.
-        backend: "rosenbrock" or "sundials", both CasADi's; "auto" takes rosenbrock for explicit
-            models and sundials (idas) for implicit ones.
+        method: "rodas5p" (order 5), "rodas4p" (order 4, cheaper at loose tolerances), "rodas3".
+        backend: "vm" needs no compiler; "compiled" compiles the step once and keeps it in the
+            user's cache; "auto" starts in the former and goes over to the latter when that is
+            predicted to pay; "rosenbrock" and "sundials" are CasADi's own integrators.
+        event_tolerance: how sharply events are located [s].
+        max_steps: attempts allowed.
+        measure_error: run again at rtol/100 and report the difference in the statistics.
+        progress: called with the fraction done every few tens of milliseconds.
         throw: raise `SolveError` on failure; with False the partial trajectory is returned.
 
     Returns:
-        The trajectory. Its dense output between the result times is cubic.
+        The trajectory. An interrupt (Ctrl-C) returns it, too, with status INTERRUPTED.
 
     Raises:
         ValueError: bad input.
         SolveError: the integration failed; its `partial` is the trajectory so far.
 
     Warns:
-        UserWarning: rtol above 1e-5, where stick phases get lost.
+        UserWarning: rtol above 1e-5, where stick phases may get lost.
     """
+    _check(t_start, t_end, rtol, method, backend)
+    times = _times(t_start, t_end, t_eval, samples)
+    built = perf_counter()
+    inputs = drivers(model, u, float(t_start), float(t_end))
+    integrator, fresh = _integrator(model, inputs, method)
+    build_time = perf_counter() - built if fresh else 0.0
+    tolerances = Tolerances(
+        rtol,
+        (0.1 * rtol if atol is None else atol) * integrator.system.nominal,
+        event_tolerance,
+        max_steps,
+    )
+    y0, values = _start(integrator, model, x0, p, t_start), model.values("p", p)
+    compiled_before, begin = integrator.compile_time, perf_counter()
+    if backend in ("rosenbrock", "sundials"):
+        if model.events:
+            raise ValueError(
+                f"simulate: backend: expected auto, vm or compiled for a model with events, "
+                f"got {backend}"
+            )
+        run, dense, counts = integrate_by_peer(
+            integrator.system, inputs, y0, values, times, tolerances, backend
+        )
+        name = "Rosenbrock 5(4)" if backend == "rosenbrock" else "BDF"
+    else:
+        run, dense = integrate(integrator, inputs, y0, values, tolerances, backend, progress)
+        counts = {
+            "steps": run.steps,
+            "rejections": run.attempts - run.steps,
+            "evaluations": run.attempts * integrator.tableau.stages,
+            "jacobians": run.attempts,
+            "factorisations": run.attempts,
+        }
+        name = integrator.tableau.name
+    elapsed = perf_counter() - begin
+    compile_time = integrator.compile_time - compiled_before
+    statistics = Statistics(
+        backend=run.engine,
+        method=name,
+        events=len(run.happened),
+        smallest_step=run.smallest if run.steps else float(np.min(dense.t1 - dense.t0)),
+        build_time=build_time,
+        compile_time=compile_time,
+        run_time=elapsed - compile_time,
+        **counts,
+    )
+    trajectory = _trajectory(integrator, inputs, run, dense, values, times, statistics)
+    if throw and not trajectory.status.ok and trajectory.status.name != "INTERRUPTED":
+        raise SolveError(trajectory.message, trajectory.status, trajectory)
+    if measure_error and trajectory.status.ok:
+        finer = simulate(
+            model, t_end, t_start=t_start, x0=x0, u=u, p=p, rtol=max(rtol / 100, 1e-13),
+            t_eval=trajectory.t, method=method, backend=backend,
+        )  # fmt: skip
+        error = _difference(model, trajectory, finer)
+        trajectory = replace(trajectory, statistics=replace(statistics, error=error))
+    return trajectory
+
+
+def _check(t_start: float, t_end: float, rtol: float, method: str, backend: str) -> None:
     t_start, t_end = finite("simulate: t_start", t_start), finite("simulate: t_end", t_end)
     if t_end <= t_start:
         raise ValueError(f"simulate: expected t_end > t_start = {t_start:g} s, got {t_end:g} s")
     if not 1e-13 <= rtol <= 0.1:
         raise ValueError(f"simulate: expected 1e-13 <= rtol <= 0.1, got {rtol:g}")
+    check_names("simulate: method", [method], ROSENBROCK)
+    check_names("simulate: backend", [backend], BACKENDS)
     if rtol > LOOSE:
         warnings.warn(
             f"simulate: rtol = {rtol:g} is above {LOOSE:g}; whole stick phases may be lost "
             "without a sign of it, compare with a tighter run",
             UserWarning,
-            stacklevel=2,
+            stacklevel=3,
         )
+
+
+def _times(t_start: float, t_end: float, t_eval: ArrayLike | None, samples: int) -> Array:
     if t_eval is None:
-        times = np.linspace(t_start, t_end, samples)
-    else:
-        times = np.asarray(t_eval, dtype=float)
-        inside = times.size and t_start <= times[0] and times[-1] <= t_end
-        if times.ndim != 1 or not inside or not (np.diff(times) > 0).all():
-            raise ValueError(
-                f"simulate: t_eval: expected increasing times in [{t_start:g}, {t_end:g}] s, "
-                f"got an array of shape {times.shape}"
-            )
-    trajectory = integrate(
-        model,
-        t_start,
-        t_end,
-        times,
-        model.initial_state(x0, p),
-        u,
-        model.values("p", p),
-        rtol,
-        0.1 * rtol if atol is None else atol,
-        backend,
+        if samples < 2:
+            raise ValueError(f"simulate: expected samples >= 2, got {samples}")
+        return np.linspace(t_start, t_end, samples)
+    times = np.asarray(t_eval, dtype=float)
+    if (
+        times.ndim != 1
+        or not times.size
+        or not (t_start <= times[0] and times[-1] <= t_end and (np.diff(times) > 0).all())
+    ):
+        raise ValueError(
+            f"simulate: t_eval: expected increasing times in [{t_start:g}, {t_end:g}] s, "
+            f"got an array of shape {times.shape}"
+        )
+    return times
+
+
+def _integrator(model: Model, inputs: Drivers, method: str) -> tuple[Integrator, bool]:
+    """The integrator of this model and input structure, built on first use."""
+    known = _BUILT.setdefault(model, {})
+    key = (method, inputs.key)
+    fresh = key not in known
+    if fresh:
+        known[key] = Integrator(model, inputs, ROSENBROCK[method])
+    return known[key], fresh
+
+
+def _start(
+    integrator: Integrator,
+    model: Model,
+    x0: Mapping[str, float] | None,
+    p: Mapping[str, float] | None,
+    t_start: float,
+) -> Array:
+    """Start column of the unknowns: states, guesses of the algebraic ones, time."""
+    system = integrator.system
+    y = np.zeros(system.n)
+    y[: system.nx] = model.initial_state(x0, p)
+    guesses = {v.name: float(v.start) for v in model.z}
+    for i, name in enumerate(system.names):
+        y[i] = guesses.get(name, y[i])
+    if system.timed:
+        y[-1] = t_start
+    return y
+
+
+def _trajectory(
+    integrator: Integrator,
+    inputs: Drivers,
+    run: Run,
+    dense: Dense,
+    p: Array,
+    times: Array,
+    statistics: Statistics,
+) -> Trajectory:
+    model = integrator.model
+    names = list(model.signals)
+    signals = integrator.signals()
+
+    def evaluate(at: Array) -> dict[str, Array]:
+        d = np.vstack([np.tile(p[:, None], (1, at.size)), inputs.values[:, inputs.interval(at)]])
+        values = signals.map(max(1, at.size))(at[None, :], dense(at), d).full()
+        return dict(zip(names, values, strict=True))
+
+    reached = times[(times >= dense.t0[0]) & (times <= dense.t1[-1])]
+    return Trajectory(
+        model.name,
+        reached,
+        dict(model.signals),
+        run.status,
+        run.message,
+        statistics,
+        np.append(dense.t0, dense.t1[-1]),
+        evaluate,
+        tuple(run.happened),
     )
-    if throw and not trajectory.status.ok:
-        raise SolveError(trajectory.message, trajectory.status, trajectory)
-    return trajectory
+
+
+def _difference(model: Model, one: Trajectory, other: Trajectory) -> float:
+    """Largest difference of a state over both runs, relative to its magnitude."""
+    n = min(one.t.size, other.t.size)
+    worst = 0.0
+    for v in model.x:
+        a, b = one[v.name][:n], other[v.name][:n]
+        worst = max(worst, float(np.max(np.abs(a - b)) / max(np.max(np.abs(b)), v.nominal)))
+    return worst

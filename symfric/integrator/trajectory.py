@@ -4,6 +4,7 @@ import csv
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,8 +29,13 @@ class Statistics:
         backend: what ran it.
         method: integration method.
         steps, rejections: accepted and rejected steps.
-        evaluations, jacobians: calls of the right-hand side and of its Jacobian.
-        build_time, run_time: wall time [s] for making and for running the integrator.
+        evaluations, jacobians, factorisations: calls of the right-hand side, of its Jacobian, and
+            LU factorisations.
+        events: events that happened.
+        smallest_step: smallest accepted step [s].
+        build_time, compile_time, run_time: wall time [s] for making the integrator (0 where it is
+            reused), compiling it, and running it.
+        error: measured error relative to each state's magnitude, the largest; NaN if not asked for.
     """
 
     backend: str
@@ -38,12 +44,17 @@ class Statistics:
     rejections: int
     evaluations: int
     jacobians: int
+    factorisations: int
+    events: int
+    smallest_step: float
     build_time: float
+    compile_time: float
     run_time: float
+    error: float = float("nan")
 
     def to_dict(self) -> dict[str, Any]:
-        """The fields by name."""
-        return asdict(self)
+        """The fields by name; an error that was not measured is left out."""
+        return {k: v for k, v in asdict(self).items() if v == v}
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,30 +62,38 @@ class Trajectory:
     """Named signals of a simulated model.
 
     `trajectory["v"]` is a signal at the times `trajectory.t`; `trajectory.at(times)` evaluates
-    all signals between them.
+    all signals anywhere in the span by the dense output of the method. Signals are evaluated when
+    they are first asked for.
 
     Attributes:
         scene: name of the model.
-        t: times [s], shape (n,).
-        signals: name -> values, shape (n,): states, algebraic variables, inputs, outputs.
-        units: name -> unit.
+        t: times of the result [s], shape (n,).
+        units: name -> unit of every signal.
         status: how it ended; `message` says it in a sentence.
         statistics: steps, evaluations, times.
+        happened: (time [s], name) of every event.
+        steps: ends of the accepted steps [s], shape (steps + 1,).
     """
 
     scene: str
     t: Array
-    signals: dict[str, Array]
     units: dict[str, str]
     status: Status
     message: str
     statistics: Statistics
-    dense: Callable[[Array], dict[str, Array]]
+    steps: Array
+    evaluate: Callable[[Array], dict[str, Array]]
+    happened: tuple[tuple[float, str], ...] = ()
+
+    @cached_property
+    def signals(self) -> dict[str, Array]:
+        """Name -> values at `t`, shape (n,): states, algebraic variables, inputs, outputs."""
+        return self.evaluate(self.t)
 
     def __getitem__(self, name: str) -> Array:
         if name == "t":
             return self.t
-        check_names(f"trajectory of '{self.scene}'", [name], self.signals)
+        check_names(f"trajectory of '{self.scene}'", [name], self.units)
         return self.signals[name]
 
     def at(self, times: ArrayLike) -> dict[str, Array]:
@@ -84,17 +103,18 @@ class Trajectory:
             ValueError: a time outside the span.
         """
         at = np.atleast_1d(np.asarray(times, dtype=float))
-        if at.size and not (self.t[0] <= at.min() and at.max() <= self.t[-1]):
+        first, last = self.steps[0], self.steps[-1]
+        if at.size and not (first <= at.min() and at.max() <= last):
             raise ValueError(
-                f"trajectory of '{self.scene}': expected times in "
-                f"[{self.t[0]:g}, {self.t[-1]:g}] s, got {at.min():g} ... {at.max():g} s"
+                f"trajectory of '{self.scene}': expected times in [{first:g}, {last:g}] s, "
+                f"got {at.min():g} ... {at.max():g} s"
             )
-        return self.dense(at)
+        return self.evaluate(at)
 
-    @property
+    @cached_property
     def final(self) -> dict[str, float]:
-        """All signals at the last time."""
-        return {name: float(values[-1]) for name, values in self.signals.items()}
+        """All signals at the last time reached."""
+        return {k: float(v[0]) for k, v in self.evaluate(self.steps[-1:]).items()}
 
     def plot(self, *names: str, path: str | Path | None = None, label: str = "") -> "Figure":
         """One panel per signal over time, labelled with units; saved to `path` if given.

@@ -65,6 +65,11 @@ class Law(Parametric, ABC):
     def states(self) -> tuple[State, ...]:
         """The internal states, in the order of the rows of `z`."""
 
+    @property
+    @abstractmethod
+    def velocity_scale(self) -> Scalar:
+        """Sliding velocity [m/s] over which the force changes; inf where there is none."""
+
     @abstractmethod
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N] opposing the sliding velocity."""

@@ -36,6 +36,11 @@ class BrownMcPhee(StaticLaw):
     mu_v: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
     N_t: Scalar = param(1.0, unit="N", doc="transition normal force", lower=1e-12)
 
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The transition velocity [m/s]."""
+        return self.v_t
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         x = v / self.v_t

@@ -6,7 +6,7 @@ from typing import ClassVar, final
 
 from symfric.laws import smooth
 from symfric.laws.base import Facts, Law, State, check_law
-from symfric.numeric import Scalar, column, empty, is_casadi
+from symfric.numeric import Scalar, column, empty, is_casadi, smallest
 from symfric.parameters import distinct, param, parameters, with_values
 
 
@@ -51,6 +51,11 @@ class Sum(Law):
         for law in self.laws:
             ends.append(ends[-1] + len(law.states))
         return [z[a:b] for a, b in pairwise(ends)]
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The smallest one of the terms [m/s]."""
+        return smallest(*(law.velocity_scale for law in self.laws))
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -117,6 +122,11 @@ class Asymmetric(Law):
         }
         return with_values(self.positive, blended)
 
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The smaller one of the sides [m/s]."""
+        return smallest(self.positive.velocity_scale, self.negative.velocity_scale)
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         return self._at(v).force(v, N, z)
@@ -164,6 +174,11 @@ class LoadDependent(Law):
     def states(self) -> tuple[State, ...]:
         """The states of the law."""
         return self.law.states
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """That of the law [m/s]."""
+        return self.law.velocity_scale
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

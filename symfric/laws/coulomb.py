@@ -1,6 +1,7 @@
 """Coulomb friction with a smooth sign, and viscous friction."""
 
 from dataclasses import dataclass
+from math import inf
 from typing import ClassVar, final
 
 from symfric.laws import smooth
@@ -31,6 +32,11 @@ class Coulomb(StaticLaw):
     mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
     v_eps: Scalar = param(1e-3, unit="m/s", doc="smoothing velocity", lower=1e-12)
 
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The smoothing velocity [m/s]."""
+        return self.v_eps
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         return self.mu_d * N * smooth.sign(v, self.v_eps)
@@ -52,6 +58,11 @@ class Viscous(StaticLaw):
     )
 
     sigma_2: Scalar = param(0.4, unit="N s/m", doc="viscous coefficient", lower=0.0)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """None: the force is linear."""
+        return inf
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

@@ -1,6 +1,7 @@
 """Dahl friction: a bristle without stiction."""
 
 from dataclasses import dataclass
+from math import inf
 from typing import ClassVar, final
 
 from symfric.laws import smooth
@@ -43,6 +44,11 @@ class Dahl(Law):
     def states(self) -> tuple[State, ...]:
         """The bristle deflection."""
         return (State("z", "m", 1e-5),)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """None: the force depends on the path alone."""
+        return inf
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

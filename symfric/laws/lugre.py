@@ -62,6 +62,11 @@ class LuGre(Law):
         relaxation = self.sigma_0 * smooth.magnitude(v, self.v_eps) / self.level(v, N)
         return column(v - relaxation * z[0])
 
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The Stribeck velocity [m/s]."""
+        return self.v_s
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         return self.sigma_0 * z[0] + self.sigma_1 * self.rate(v, N, z)[0] + self.sigma_2 * v

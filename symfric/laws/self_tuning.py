@@ -39,13 +39,18 @@ class SelfTuning(StaticLaw):
 
     mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=1e-12)
     mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    B: Scalar = param(1000.0, unit="s/m", doc="stiffness factor", lower=0.0)
+    B: Scalar = param(1000.0, unit="s/m", doc="stiffness factor", lower=1e-12)
     E: Scalar = param(0.0, unit="1", doc="curvature factor", upper=0.999)
 
     @property
     def C(self) -> Scalar:
         """Shape factor [1], between 1 and 2, in closed form."""
         return shape_factor(self.mu_d / self.mu_s)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The velocity 1/B [m/s]."""
+        return 1 / self.B
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

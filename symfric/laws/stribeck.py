@@ -38,6 +38,11 @@ class Stribeck(StaticLaw):
     v_eps: Scalar = param(1e-4, unit="m/s", doc="smoothing velocity", lower=1e-12)
     sigma_2: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
 
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The smoothing velocity [m/s]."""
+        return self.v_eps
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         falling = smooth.stribeck(v, self.v_s, self.delta, self.v_eps)

@@ -3,12 +3,13 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
+from math import isfinite
 
 import casadi as ca
 
 from symfric.laws import Law
 from symfric.laws.base import check_law
-from symfric.model import Model, Variables
+from symfric.model import Model, Monitor, Variables
 from symfric.numeric import Scalar
 from symfric.parameters import Parametric, Variable, symbolise
 
@@ -34,6 +35,17 @@ class Scene(Parametric, ABC):
         """
         scene, p = symbolise(self, *free)
         return scene.equations(p)
+
+
+def slip_monitor(law: Law, v: Scalar, p: Variables) -> tuple[Monitor, ...]:
+    """What error control must watch of a contact: its sliding velocity `v`, on the law's scale.
+
+    The scale is taken at the start values of `p`; a law without one adds nothing.
+    """
+    symbols = ca.vertcat(ca.SX(0, 1), *(variable.symbol for variable in p))
+    values = ca.vertcat(ca.SX(0, 1), *(variable.start for variable in p))
+    scale = float(ca.DM(ca.substitute(ca.SX(law.velocity_scale), symbols, ca.SX(values))))
+    return (Monitor(v, scale),) if isfinite(scale) else ()
 
 
 def friction_states(law: Law, v: Scalar, N: Scalar) -> tuple[Variables, ca.SX]:

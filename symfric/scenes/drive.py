@@ -8,7 +8,7 @@ import casadi as ca
 from symfric.model import Model, Output, Variables
 from symfric.numeric import Scalar
 from symfric.parameters import Variable, param
-from symfric.scenes.base import Scene, friction_states
+from symfric.scenes.base import Scene, friction_states, slip_monitor
 
 
 @final
@@ -44,6 +44,7 @@ class Drive(Scene):
                 (force.symbol - F - self.offset) / self.m,
                 self.law.rate(v.symbol, self.N, z),
             ),
+            monitors=slip_monitor(self.law, v.symbol, p),
             outputs={
                 "friction": Output(F, "N", "friction force opposing v"),
                 "power": Output(F * v.symbol, "W", "power taken by friction"),

@@ -8,7 +8,7 @@ import casadi as ca
 from symfric.model import Model, Output, Variables
 from symfric.numeric import Scalar
 from symfric.parameters import Variable, param
-from symfric.scenes.base import Scene, friction_states
+from symfric.scenes.base import Scene, friction_states, slip_monitor
 
 
 @final
@@ -43,6 +43,7 @@ class Rabinowicz(Scene):
             x=(x, v, *bristles),
             p=p,
             ode=ca.vertcat(v.symbol, (-self.k * x.symbol - F) / self.m, self.law.rate(v_rel, N, z)),
+            monitors=slip_monitor(self.law, v_rel, p),
             outputs={
                 "v_rel": Output(v_rel, "m/s", "velocity of the block relative to the belt"),
                 "friction": Output(F, "N", "friction force opposing v_rel"),

@@ -1,0 +1,94 @@
+"""Find a C compiler, compile a source once, and keep the result in the user's cache."""
+
+import ctypes
+import hashlib
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+from symfric.files import written
+
+FLAGS = ("-O2", "-march=native", "-fPIC", "-shared")
+
+
+@cache
+def find_compiler() -> tuple[str, ...] | None:
+    """Command of the C compiler: `$CC`, else gcc, clang or cc; None if there is none."""
+    wanted = os.environ.get("CC")
+    candidates = [shlex.split(wanted)] if wanted else [["gcc"], ["clang"], ["cc"]]
+    for command in candidates:
+        path = shutil.which(command[0]) if command else None
+        if path:
+            return (path, *command[1:])
+    return None
+
+
+def cache_folder() -> Path:
+    """Where compiled code is kept: `$SYMFRIC_CACHE`, else the user's cache folder."""
+    chosen = os.environ.get("SYMFRIC_CACHE")
+    if chosen:
+        return Path(chosen)
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA", Path.home()))
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+    return base / "symfric"
+
+
+def library_path(source: str) -> Path | None:
+    """File that holds, or will hold, the compiled `source`; None without a compiler.
+
+    The name is a hash of the source, the compiler (path, size, time), its flags and the machine,
+    so that code of another kind is never loaded.
+    """
+    compiler = find_compiler()
+    if compiler is None:
+        return None
+    binary = Path(compiler[0]).stat()
+    parts = (source, compiler, FLAGS, binary.st_size, binary.st_mtime_ns, platform.machine())
+    name = hashlib.sha256(repr(parts).encode() + _processor()).hexdigest()[:32]
+    return cache_folder() / f"{name}.so"
+
+
+@cache
+def _processor() -> bytes:
+    """What `-march=native` depends on, so that a shared home does not mix processors."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor().encode()
+    return next((line for line in lines if line.startswith(("flags", "Features"))), "").encode()
+
+
+def load(source: str) -> ctypes.CDLL:
+    """The shared library of `source`, compiled unless the cache holds it.
+
+    Several processes may do this at once: the file appears whole, under its final name.
+
+    Raises:
+        RuntimeError: no compiler, or it refused the source; its first message is quoted.
+    """
+    path, compiler = library_path(source), find_compiler()
+    if path is None or compiler is None:
+        raise RuntimeError(
+            "compile: expected a C compiler ($CC, gcc, clang or cc), found none; use backend='vm'"
+        )
+    if not path.exists():
+        with written(path) as temporary:
+            done = subprocess.run(
+                [*compiler, *FLAGS, "-x", "c", "-", "-o", str(temporary), "-lm"],
+                input=source.encode(),
+                capture_output=True,
+                check=False,
+            )
+            if done.returncode:
+                first = done.stderr.decode(errors="replace").strip().splitlines()[:1]
+                raise RuntimeError(f"compile: {compiler[0]} failed: {' '.join(first)}")
+    return ctypes.CDLL(str(path))

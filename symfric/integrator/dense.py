@@ -1,0 +1,83 @@
+"""Dense output: the continuous solution between accepted steps."""
+
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Dense:
+    """Piecewise polynomial solution, one piece an accepted step.
+
+    With theta = (t - t0) / (t1 - t0) and d(theta) = d_1 + theta (d_2 + theta d_3):
+
+        y(theta) = (1 - theta) y0 + theta [y1 + (1 - theta) d(theta)]
+
+    Attributes:
+        t0, t1: start and end of each piece, shape (k,).
+        y0, y1: values there, shape (k, n); y0 differs from the y1 before it after an event.
+        D: coefficients, shape (k, r, n).
+    """
+
+    t0: Array
+    t1: Array
+    y0: Array
+    y1: Array
+    D: Array
+
+    def __call__(self, times: Array) -> Array:
+        """Values at `times`, shape (n, m); at an event the value after it."""
+        k = np.clip(np.searchsorted(self.t0, times, side="right") - 1, 0, self.t0.size - 1)
+        return self.piece(k, (times - self.t0[k]) / (self.t1[k] - self.t0[k])).T
+
+    def piece(self, k: NDArray[np.intp], theta: Array) -> Array:
+        """Values of the pieces `k` at `theta`, shape (m, n)."""
+        s = theta[:, None]
+        bend = np.zeros_like(self.y0[k])
+        for row in range(self.D.shape[1] - 1, -1, -1):
+            bend = self.D[k, row] + s * bend
+        return (1 - s) * self.y0[k] + s * (self.y1[k] + (1 - s) * bend)
+
+
+def hermite(t: Array, y: Array, slope: Array) -> Dense:
+    """Cubic Hermite interpolation through y (n, m) with slopes (n, m) at times t (m,)."""
+    h = np.diff(t)[None, :]
+    rise = np.diff(y, axis=1)
+    first = h * slope[:, :-1] - rise
+    second = rise - h * slope[:, 1:] - first
+    D = np.stack([first.T, second.T], axis=1)
+    return Dense(t[:-1], t[1:], y[:, :-1].T, y[:, 1:].T, D)
+
+
+def from_records(records: Array, n: int, slope: ca.Function | None, d: Array) -> Dense:
+    """Pieces from the rows (t0, t1, y0, y1, D) that a step engine writes.
+
+    A method without dense output coefficients gets cubic ones from its slopes (y, d) -> y'.
+    """
+    k = records.shape[0]
+    t0, t1 = records[:, 0].copy(), records[:, 1].copy()
+    y0, y1 = records[:, 2 : 2 + n].copy(), records[:, 2 + n : 2 + 2 * n].copy()
+    D = records[:, 2 + 2 * n :].reshape(k, -1, n).copy()
+    if slope is not None and k:
+        both = slope.map(2 * k)(np.vstack([y0, y1]).T, np.tile(d[:, None], (1, 2 * k))).full()
+        h, rise = (t1 - t0)[:, None], y1 - y0
+        first = h * both[:, :k].T - rise
+        D = np.stack([first, rise - h * both[:, k:].T - first], axis=1)
+    return Dense(t0, t1, y0, y1, D)
+
+
+def join(pieces: list[Dense]) -> Dense:
+    """Pieces of several runs, in order."""
+    return Dense(
+        np.concatenate([p.t0 for p in pieces]),
+        np.concatenate([p.t1 for p in pieces]),
+        np.concatenate([p.y0 for p in pieces]),
+        np.concatenate([p.y1 for p in pieces]),
+        np.concatenate([p.D for p in pieces]),
+    )

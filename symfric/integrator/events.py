@@ -1,0 +1,185 @@
+"""Events: zero crossings found on the dense output, located, and carried out."""
+
+from collections import deque
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.integrator.dense import Dense
+from symfric.integrator.integrator import Integrator
+
+Array = NDArray[np.float64]
+LOOKS = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+"""Where each step is looked at; a double crossing closer than this is not seen."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """Events that happen together.
+
+    Attributes:
+        t: time [s].
+        step: number of the piece that holds it.
+        y: values just before, shape (n,).
+        which: numbers of the events.
+    """
+
+    t: float
+    step: int
+    y: Array
+    which: tuple[int, ...]
+
+    def before(self, piece: Dense) -> Dense:
+        """The pieces up to the crossing; the last one keeps its polynomial, rescaled."""
+        k = self.step
+        cut = _shorten(piece, k, self.t)
+        return Dense(
+            np.append(piece.t0[:k], cut.t0),
+            np.append(piece.t1[:k], cut.t1),
+            np.vstack([piece.y0[:k], cut.y0]),
+            np.vstack([piece.y1[:k], self.y[None]]),
+            np.concatenate([piece.D[:k], cut.D]),
+        )
+
+
+def _shorten(piece: Dense, k: int, t: float) -> Dense:
+    """Piece `k` on [t0, t], as the same polynomial in the shorter interval."""
+    t0, t1 = piece.t0[k], piece.t1[k]
+    s = (t - t0) / (t1 - t0)
+    y0, y1, D = piece.y0[k], piece.y1[k], piece.D[k]
+    rows = D.shape[0]
+    # Coefficients in powers of theta, scaled, and brought back to the form of `Dense`.
+    powers = np.zeros((rows + 2, y0.size))
+    powers[0], powers[1] = y0, y1 - y0
+    for r in range(rows):
+        powers[r + 1] += D[r]
+        powers[r + 2] -= D[r]
+    powers *= s ** np.arange(rows + 2)[:, None]
+    new = np.zeros_like(D)
+    carry = np.zeros_like(y0)
+    for r in range(rows - 1, -1, -1):
+        new[r] = -(powers[r + 2] - (carry if r < rows - 1 else 0.0))
+        carry = new[r]
+    end = powers.sum(axis=0)
+    return Dense(np.array([t0]), np.array([t]), y0[None], end[None], new[None])
+
+
+def first_crossing(
+    integrator: Integrator, piece: Dense, d: Array, fired: frozenset[int], tolerance: float
+) -> Crossing | None:
+    """The earliest crossing in `piece`, or None.
+
+    An event in `fired` has just happened at the very start; its sign there is that of the first
+    look after it.
+    """
+    steps = piece.t0.size
+    if not steps:
+        return None
+    g = _values(integrator, piece, d)
+    if fired:
+        g[list(fired), 0, 0] = g[list(fired), 0, 1]
+    directions = np.array([e.direction for e in integrator.model.events])
+    before, after = g[:, :, :-1], g[:, :, 1:]
+    rising = (before < 0) & (after >= 0) & (directions >= 0)[:, None, None]
+    falling = (before > 0) & (after <= 0) & (directions <= 0)[:, None, None]
+    hits = rising | falling
+    if not hits.any():
+        return None
+    order = hits.any(axis=0).reshape(-1)
+    first = int(np.argmax(order))
+    step, look = divmod(first, LOOKS.size - 1)
+    candidates = np.flatnonzero(hits[:, step, look])
+    h = piece.t1[step] - piece.t0[step]
+    roots = [
+        _locate(integrator, piece, d, int(i), step, LOOKS[look], LOOKS[look + 1], tolerance / h)
+        for i in candidates
+    ]
+    theta = min(roots)
+    together = tuple(
+        int(i) for i, root in zip(candidates, roots, strict=True) if (root - theta) * h <= tolerance
+    )
+    y = piece.piece(np.array([step]), np.array([theta]))[0]
+    return Crossing(float(piece.t0[step] + theta * h), step, y, together)
+
+
+def _values(integrator: Integrator, piece: Dense, d: Array) -> Array:
+    """Event expressions at the looks, shape (events, steps, looks)."""
+    steps, looks = piece.t0.size, LOOKS.size
+    k = np.repeat(np.arange(steps), looks)
+    theta = np.tile(LOOKS, steps)
+    y = piece.piece(k, theta)
+    t = piece.t0[k] + theta * (piece.t1[k] - piece.t0[k])
+    count = k.size
+    values = integrator.events.map(count)(t[None, :], y.T, np.tile(d[:, None], (1, count)))
+    return values.full().reshape(-1, steps, looks)
+
+
+def _locate(
+    integrator: Integrator,
+    piece: Dense,
+    d: Array,
+    event: int,
+    step: int,
+    low: float,
+    high: float,
+    tolerance: float,
+) -> float:
+    """Root in theta of one event on one step, by the Illinois method; the side after the root."""
+    index = np.array([step])
+    h = piece.t1[step] - piece.t0[step]
+
+    def value(theta: float) -> float:
+        y = piece.piece(index, np.array([theta]))[0]
+        return float(integrator.events(piece.t0[step] + theta * h, y, d)[event])
+
+    a, b, fa, fb = low, high, value(low), value(high)
+    if fa == 0.0 or fb == 0.0:
+        return b if fb == 0.0 else a
+    side = 0
+    for _ in range(100):
+        if b - a <= max(tolerance, 1e-15):
+            break
+        c = (fa * b - fb * a) / (fa - fb)
+        c = min(max(c, a + 1e-3 * (b - a)), b - 1e-3 * (b - a)) if side else c
+        fc = value(c)
+        if fc == 0.0:
+            return c
+        if (fc > 0) == (fb > 0):
+            b, fb = c, fc
+            fa = fa / 2 if side == 1 else fa
+            side = 1
+        else:
+            a, fa = c, fc
+            fb = fb / 2 if side == -1 else fb
+            side = -1
+    return b
+
+
+def resets(integrator: Integrator, crossing: Crossing, d: Array) -> Array:
+    """Values after the events of a crossing; all resets read the values before it."""
+    y = crossing.y.copy()
+    names = [v.name for v in integrator.model.x]
+    for i in crossing.which:
+        for state, expression in integrator.model.events[i].reset.items():
+            function = integrator.of_time("reset", ca.SX(expression))
+            y[names.index(state)] = float(function(crossing.t, crossing.y, d))
+    return y
+
+
+@final
+class EventStorm:
+    """Notices events that pile up at one time (Zeno) instead of letting the clock stand still."""
+
+    def __init__(self, span: float, count: int = 100) -> None:
+        self._recent: deque[float] = deque(maxlen=count)
+        self._span = span
+
+    def raged_at(self, t: float) -> bool:
+        """Whether the last events, a hundred of them, fell into a 1e-9th of the span."""
+        self._recent.append(t)
+        full = len(self._recent) == self._recent.maxlen
+        return full and t - self._recent[0] < 1e-9 * self._span

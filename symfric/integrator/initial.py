@@ -1,0 +1,60 @@
+"""Consistent start values: algebraic variables that satisfy their equations, a first step size."""
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.integrator.system import System
+
+Array = NDArray[np.float64]
+
+
+def algebraic(system: System) -> tuple[list[int], list[int]]:
+    """Rows without rates (equations) and columns without rates (unknowns) of M y' = f."""
+    pattern = np.array(ca.DM(system.mass.sparsity(), 1).full() != 0)
+    rows = [int(i) for i in np.flatnonzero(~pattern.any(axis=1))]
+    columns = [int(i) for i in np.flatnonzero(~pattern.any(axis=0))]
+    return rows, columns
+
+
+def consistent(system: System, where: str, y: Array, d: Array) -> Array:
+    """`y` with its algebraic unknowns solved for, by Newton's method from the given guess.
+
+    Raises:
+        ValueError: no solution near the guess.
+    """
+    rows, columns = algebraic(system)
+    if not columns:
+        return y
+    known = [i for i in range(system.n) if i not in columns]
+    solve = ca.rootfinder(
+        "consistent",
+        "newton",
+        {
+            "x": system.y[columns],
+            "p": ca.vertcat(system.y[known], system.d),
+            "g": system.f[rows],
+        },
+        {"error_on_fail": True},
+    )
+    try:
+        found = solve(y[columns], np.concatenate([y[known], d])).full().ravel()
+    except RuntimeError:
+        names = ", ".join(system.names[i] for i in columns)
+        raise ValueError(
+            f"{where}: expected consistent start values, found no solution of the algebraic "
+            f"equations for {names} near their start values; give better ones"
+        ) from None
+    y = y.copy()
+    y[columns] = found
+    return y
+
+
+def first_step(system: System, f: Array, y: Array, atol: Array, rtol: float, span: float) -> float:
+    """A cautious first step [s] (Hairer, Norsett, Wanner, II.4, without the second evaluation)."""
+    nx = system.nx
+    scale = atol + rtol * np.abs(y[:nx])
+    size = float(np.sqrt(np.mean((y[:nx] / scale) ** 2)))
+    speed = float(np.sqrt(np.mean((f[:nx] / scale) ** 2)))
+    guess = 0.01 * size / speed if size > 1e-5 and speed > 1e-5 else 1e-6 * span
+    return min(max(guess, 1e-12), span)

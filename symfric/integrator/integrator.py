@@ -1,0 +1,122 @@
+"""The adaptive integrator of one model: built once, run for any numbers."""
+
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.integrator.compiler import find_compiler, library_path
+from symfric.integrator.engine import CompiledEngine, Engine, VmEngine, c_source
+from symfric.integrator.inputs import Drivers
+from symfric.integrator.step import build_step
+from symfric.integrator.system import System, system
+from symfric.integrator.tableaux import Rosenbrock
+from symfric.model import Model
+
+Array = NDArray[np.float64]
+INLINE = 6000
+"""Steps with more instructions are compiled as calls of blocks, which compile much faster."""
+
+
+@final
+@dataclass(eq=False)
+class Integrator:
+    """System, step and Functions of a model with one structure of inputs.
+
+    Mutable only in what it remembers: its engines, and the time spent in the virtual machine,
+    from which it decides when compiling pays.
+    """
+
+    model: Model
+    inputs: Drivers
+    tableau: Rosenbrock
+    build_time: float = 0.0
+    compile_time: float = 0.0
+    vm_time: float = 0.0
+    _engines: dict[str, Engine] = field(default_factory=dict[str, Engine])
+
+    def __post_init__(self) -> None:
+        begin = perf_counter()
+        self.system: System = system(self.model, self.inputs)
+        self.step = build_step(self.system, self.tableau)
+        self.f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
+        self.events = self._event_function()
+        self.build_time = perf_counter() - begin
+
+    def _event_function(self) -> ca.Function:
+        """Event expressions as a Function (t, y, d)."""
+        values = ca.vertcat(ca.SX(0, 1), *(ca.SX(e.expression) for e in self.model.events))
+        return self.of_time("events", values)
+
+    def of_time(self, name: str, expression: ca.SX) -> ca.Function:
+        """`expression` of the model as a Function (t, y, d), inputs put in."""
+        s, t = self.system, ca.SX.sym("time")
+        driven = ca.substitute(expression, self.model.vector("u"), self.inputs.expression)
+        if s.timed:
+            return ca.Function(name, [t, s.y, s.d], [driven])
+        return ca.Function(name, [self.model.t, s.y, s.d], [driven])
+
+    def signals(self) -> ca.Function:
+        """All signals of the model as a Function (t, y, d)."""
+        m = self.model
+        outputs = (ca.SX(o.expression) for o in m.outputs.values())
+        stacked = ca.vertcat(m.vector("x"), m.vector("z"), m.vector("u"), *outputs)
+        return self.of_time("signals", stacked)
+
+    @property
+    def slope(self) -> ca.Function | None:
+        """(y, d) -> y' for cubic dense output; None where the method has its own."""
+        return None if self.tableau.H.shape[0] else self.f
+
+    def vm(self) -> Engine:
+        """The engine that needs no compiler."""
+        if "vm" not in self._engines:
+            self._engines["vm"] = VmEngine.of(self.step)
+        return self._engines["vm"]
+
+    def compiled(self) -> Engine:
+        """The compiled engine; compiles, or loads from the cache, on first use.
+
+        Raises:
+            RuntimeError: there is no compiler, or it failed.
+        """
+        if "compiled" not in self._engines:
+            begin = perf_counter()
+            self._engines["compiled"] = CompiledEngine.of(
+                self._step_to_compile(), self.tableau.H.shape[0]
+            )
+            self.compile_time = perf_counter() - begin
+        return self._engines["compiled"]
+
+    def _step_to_compile(self) -> ca.Function:
+        if self.step.n_instructions() <= INLINE:
+            return self.step
+        return build_step(self.system, self.tableau, ca.MX)
+
+    def choose(self, backend: str, left: float) -> Engine:
+        """The engine for `backend`; "auto" compiles when that is predicted to pay.
+
+        Args:
+            backend: "vm", "compiled" or "auto".
+            left: predicted time [s] that the virtual machine still needs, 0 where unknown.
+        """
+        if backend == "compiled":
+            return self.compiled()
+        if backend == "vm" or find_compiler() is None:
+            return self.vm()
+        if "compiled" in self._engines:
+            return self._engines["compiled"]
+        n = self.step.n_instructions()
+        look_up, compile_ = 2e-3 + 1e-5 * n, 0.1 + 1.5e-4 * n
+        expected = max(left, self.vm_time)
+        if expected > 2 * compile_:
+            return self.compiled()
+        if expected > 2 * look_up and "looked up" not in self._engines:
+            self._engines["looked up"] = self.vm()
+            path = library_path(c_source(self._step_to_compile(), self.tableau.H.shape[0]))
+            if path is not None and path.exists():
+                return self.compiled()
+        return self.vm()
