@@ -9,7 +9,7 @@ from enum import IntEnum
 from pathlib import Path
 from string import Template
 from tempfile import TemporaryDirectory
-from typing import Protocol, final
+from typing import Any, Protocol, final
 
 import casadi as ca
 import numpy as np
@@ -33,7 +33,10 @@ class Stop(IntEnum):
 class Engine(Protocol):
     """Runs attempts until the end time, a full record, a number of attempts or a tiny step."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """ "vm" or "compiled"."""
+        ...
 
     def run(
         self, S: Array, R: Array, rows: int, attempts: int, h_min: float
@@ -70,11 +73,11 @@ class VmEngine:
         S_out, D = np.zeros((size, S.size)), np.zeros((size, self.step.numel_out(1)))
         every = np.tile(R, size)
         buffer, evaluate = self.batch.buffer()
-        buffer.set_arg(0, memoryview(S))
-        buffer.set_arg(1, memoryview(every))
-        buffer.set_res(0, memoryview(S_out.reshape(-1)))
+        buffer.set_arg(0, _view(S))
+        buffer.set_arg(1, _view(every))
+        buffer.set_res(0, _view(S_out))
         if D.size:
-            buffer.set_res(1, memoryview(D.reshape(-1)))
+            buffer.set_res(1, _view(D))
         found: list[Array] = []
         count = made = 0
         while S[0] < R[0] and count < rows and made < attempts and S[1] >= h_min:
@@ -98,6 +101,11 @@ class VmEngine:
             S[:] = S_out[-1]
         records = np.vstack(found) if found else np.zeros((0, width(n, D.shape[1] // n)))
         return records, made, _reason(S, R, count >= rows, h_min)
+
+
+def _view(array: Array) -> Any:
+    """The memory of a contiguous array, flat, as CasADi's buffers take it."""
+    return memoryview(array.reshape(-1))  # pyright: ignore[reportArgumentType, reportCallIssue]
 
 
 def _reason(S: Array, R: Array, full: bool, h_min: float) -> Stop:

@@ -4,7 +4,6 @@ from collections import deque
 from dataclasses import dataclass
 from typing import final
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -73,15 +72,17 @@ def first_crossing(
 ) -> Crossing | None:
     """The earliest crossing in `piece`, or None.
 
-    An event in `fired` has just happened at the very start; its sign there is that of the first
-    look after it.
+    An event in `fired` has just happened at the very start, where its expression is zero; its sign
+    there is that two tolerances later.
     """
     steps = piece.t0.size
     if not steps:
         return None
     g = _values(integrator, piece, d)
-    if fired:
-        g[list(fired), 0, 0] = g[list(fired), 0, 1]
+    soon = min(0.1, 2 * tolerance / (piece.t1[0] - piece.t0[0]))
+    for i in fired:
+        y = piece.piece(np.array([0]), np.array([soon]))[0]
+        g[i, 0, 0] = float(integrator.events(piece.t0[0], y, d)[i])
     directions = np.array([e.direction for e in integrator.model.events])
     before, after = g[:, :, :-1], g[:, :, 1:]
     rising = (before < 0) & (after >= 0) & (directions >= 0)[:, None, None]
@@ -94,9 +95,10 @@ def first_crossing(
     step, look = divmod(first, LOOKS.size - 1)
     candidates = np.flatnonzero(hits[:, step, look])
     h = piece.t1[step] - piece.t0[step]
+    starts = [soon if first == 0 and i in fired else LOOKS[look] for i in candidates]
     roots = [
-        _locate(integrator, piece, d, int(i), step, LOOKS[look], LOOKS[look + 1], tolerance / h)
-        for i in candidates
+        _locate(integrator, piece, d, int(i), step, low, LOOKS[look + 1], tolerance / h)
+        for i, low in zip(candidates, starts, strict=True)
     ]
     theta = min(roots)
     together = tuple(
@@ -164,22 +166,31 @@ def resets(integrator: Integrator, crossing: Crossing, d: Array) -> Array:
     y = crossing.y.copy()
     names = [v.name for v in integrator.model.x]
     for i in crossing.which:
-        for state, expression in integrator.model.events[i].reset.items():
-            function = integrator.of_time("reset", ca.SX(expression))
+        for state, function in integrator.resets[i].items():
             y[names.index(state)] = float(function(crossing.t, crossing.y, d))
     return y
 
 
 @final
 class EventStorm:
-    """Notices events that pile up at one time (Zeno) instead of letting the clock stand still."""
+    """Notices events that pile up at one time (Zeno) instead of letting the clock stand still.
 
-    def __init__(self, span: float, count: int = 100) -> None:
-        self._recent: deque[float] = deque(maxlen=count)
-        self._span = span
+    A storm is four events of one kind in a row at shrinking distances, the last one below a
+    thousand event tolerances; or a hundred events within a 1e-9th of the span.
+    """
 
-    def raged_at(self, t: float) -> bool:
-        """Whether the last events, a hundred of them, fell into a 1e-9th of the span."""
-        self._recent.append(t)
+    def __init__(self, span: float, tolerance: float) -> None:
+        self._recent: deque[tuple[float, tuple[int, ...]]] = deque(maxlen=100)
+        self._span, self._tolerance = span, tolerance
+
+    def raged_at(self, t: float, which: tuple[int, ...]) -> bool:
+        """Whether the events `which` at time `t` complete a storm."""
+        self._recent.append((t, which))
         full = len(self._recent) == self._recent.maxlen
-        return full and t - self._recent[0] < 1e-9 * self._span
+        if full and t - self._recent[0][0] < 1e-9 * self._span:
+            return True
+        last = list(self._recent)[-4:]
+        gaps = np.diff([time for time, _ in last])
+        alike = len(last) == 4 and len({events for _, events in last}) == 1
+        shrinking = bool((gaps[1:] < gaps[:-1]).all())
+        return alike and shrinking and bool(gaps[-1] < 1000 * self._tolerance)

@@ -44,6 +44,10 @@ class Integrator:
         self.step = build_step(self.system, self.tableau)
         self.f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
         self.events = self._event_function()
+        self.resets = [
+            {state: self.of_time("reset", ca.SX(new)) for state, new in event.reset.items()}
+            for event in self.model.events
+        ]
         self.build_time = perf_counter() - begin
 
     def _event_function(self) -> ca.Function:

@@ -38,9 +38,8 @@ class SymbolicLU:
                 b[r] = b[r] - packed[at] * b[row]
                 at += 1
         x = [ca.SX(0)] * len(b)
-        for (row, column), (inverse, entries) in zip(
-            reversed(self.order), reversed(rows), strict=True
-        ):
+        for k in range(len(b) - 1, -1, -1):
+            (row, column), (inverse, entries) = self.order[k], rows[k]
             value = b[row]
             for c, entry in entries:
                 value = value - entry * x[c]

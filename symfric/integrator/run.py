@@ -85,7 +85,7 @@ def integrate(
     f = integrator.f(y, d).full().ravel()
     h = first_step(integrator.system, f, y, tolerances.atol, tolerances.rtol, t_end - t_start)
     S = np.concatenate([[t_start, h, h, E_MEMORY, 0.0], y])
-    storm = EventStorm(t_end - t_start)
+    storm = EventStorm(t_end - t_start, tolerances.event)
     try:
         for k in range(inputs.breaks.size - 1):
             d = np.concatenate([p, inputs.values[:, k]])
@@ -176,7 +176,7 @@ def _happen(
     if any(events[i].terminal for i in crossing.which):
         run.stop(Status.TERMINATED)
         return frozenset()
-    if storm.raged_at(crossing.t):
+    if storm.raged_at(crossing.t, crossing.which):
         run.stop(
             Status.EVENT_STORM,
             f"{Status.EVENT_STORM.value} It stands at t = {crossing.t:.9g} s, "

@@ -161,7 +161,7 @@ def build_step(system: System, tableau: Rosenbrock, kind: Any = ca.SX) -> ca.Fun
     )
     S_next = ca.vertcat(memory, ca.if_else(accept, y_new, y))
     D = ca.horzcat(*dense) if dense else kind(n, 0)
-    outputs = [S_next, ca.vec(D)]
+    outputs: Any = [S_next, ca.vec(D)]
     if kind is ca.SX:
         outputs = ca.cse(outputs)
     return ca.Function("symfric_step", [S, R], outputs, ["S", "R"], ["S_next", "D"])
