@@ -50,5 +50,5 @@ def test_stribeck_force_has_the_printed_digits_above_the_smoothing(
 def test_lugre_slides_at_the_printed_level(delta: float, v: float, g: float) -> None:
     law = LuGre(mu_s=1.5, mu_d=1.0, v_s=1e-3, delta=delta, v_eps=0.0)
     for N, direction in ((1.0, 1.0), (7.0, -1.0)):
-        F = law.force(direction * v, N, law.steady_state(direction * v, N))
-        assert F == pytest.approx(direction * N * g, abs=N * 5.1e-10)
+        force = law.force(direction * v, N, law.steady_state(direction * v, N))
+        assert force == pytest.approx(direction * N * g, abs=N * 5.1e-10)
