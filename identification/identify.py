@@ -1,0 +1,178 @@
+"""Identify mass, offset and the friction law of a drive from force and position."""
+
+from collections.abc import Callable, Iterable, Mapping
+
+import numpy as np
+
+from identification.choice import Choice, choose, is_coefficient
+from identification.coordinates import coordinates
+from identification.data import Array, Dataset
+from identification.errors import evaluate
+from identification.filters import Filter
+from identification.precision import precision
+from identification.problem import Fit, Problem, problem
+from identification.regress import linear_regression
+from identification.result import Estimate, Identification
+from identification.signals import Signals, differentiate
+from identification.start import start_values
+from symfric.laws import Law, law_from_text
+from symfric.laws.names import law_name
+from symfric.model import finite
+from symfric.parameters import parameters, with_values
+from symfric.scenes import Drive
+from symfric.status import SolveError
+
+Progress = Callable[[str, float], None]
+"""Called with what is being done and the fraction done."""
+
+AT_BOUND = 1e-5
+"""Distance to a bound, in coordinates of the fit, below which a parameter stands at it."""
+
+
+def identify(
+    data: Dataset,
+    law: Law | str,
+    *,
+    validate: Dataset | None = None,
+    normal_force: float = 1.0,
+    free: Iterable[str] = (),
+    fixed: Mapping[str, float] | None = None,
+    filter: Filter | None = None,
+    folds: int = 0,
+    throw: bool = True,
+    progress: Progress | None = None,
+) -> Identification:
+    """Fit a static friction law to a record of the scene `drive`.
+
+        minimise sum (D [force - m a - F(v, N) - offset])^2
+
+    with v, a by zero-phase filtering and differences and D a common low pass and decimation.
+    Linear regression and a scan over the velocity scale give the start; Ipopt with the exact
+    Hessian does the fit, parameters scaled or logarithmic inside the bounds of their metadata.
+
+    Args:
+        data: equally spaced samples of position and force.
+        law: any static law, or its name such as "coulomb+viscous" or "asymmetric(stribeck)".
+        validate: second record, for errors only.
+        normal_force: N [N]. With the default 1 N the coefficients mu read as newtons.
+        free: parameters to fit beside the default ones (see `identification.choice.choose`).
+        fixed: parameters held at given values.
+        filter: cut-off and decimation; from the data if none is given.
+        folds: number of pieces (>= 2) for cross-validation inside the record; 0 leaves it out.
+        throw: raise `SolveError` if the solver fails; its `partial` is the result so far.
+        progress: called with a text and the fraction done.
+
+    Returns:
+        Estimates with uncertainty, errors on both records, the fitted drive.
+
+    Raises:
+        ValueError: a law with states, unknown names, data that cannot be used.
+        SolveError: the fit failed.
+
+    Limits: noise in v biases the slope of a law near rest, since v is taken as known; samples at
+    rest count as sliding at v = 0, where a static law gives no force. A Stribeck part needs motion
+    at speeds around its velocity scale, or its standard errors say so.
+    """
+    if folds < 0 or folds == 1:
+        raise ValueError(f"identify: folds: expected 0 or at least 2, got {folds}")
+    tell = progress or (lambda text, fraction: None)
+    law = law_from_text(law) if isinstance(law, str) else law
+    signals = differentiate(data, filter)
+    v_max = float(np.abs(signals.v).max())
+    choice = choose(law, v_max, finite("identify: normal_force", normal_force), free, fixed)
+    if not choice.free:
+        raise ValueError("identify: expected at least one free parameter, got all fixed")
+    if signals.decimation.rows < 3 * len(choice.free):
+        raise ValueError(
+            f"data '{data.name}': expected at least {3 * len(choice.free)} equations for "
+            f"{len(choice.free)} parameters, got {signals.decimation.rows}; lower the decimation"
+        )
+    tell("start values", 0.1)
+    linear = linear_regression(signals)
+    level = max(abs(linear.values["F_c"]), linear.force_rms)
+    at = coordinates(choice, level, float(signals.v.std()), abs(linear.values["m"]))
+    task = problem(at, signals, max(linear.force_rms, 1e-9 * level))
+    start = start_values(choice, linear, task)
+    tell("fit", 0.4)
+    fit = task.solve(start)
+    drive = with_values(choice.drive, _values(task, fit.w))
+    tell("cross-validation", 0.6)
+    crossed = _cross_validation(task, fit, signals, folds) if folds else {}
+    tell("simulation", 0.8)
+    estimates, correlation, undetermined = _estimates(drive, choice, task, fit)
+    result = Identification(
+        law=law_name(law),
+        drive=drive,
+        parameters=estimates,
+        levels={
+            name: estimates[name].times(float(drive.N), "N")
+            for name, p in parameters(drive).items()
+            if is_coefficient(p)
+        },
+        names=choice.free,
+        correlation=correlation,
+        undetermined=undetermined,
+        status=fit.status,
+        message=fit.status.value,
+        errors=evaluate(drive, data, signals.filter),
+        validation=None if validate is None else evaluate(drive, validate, signals.filter),
+        cross_validation=crossed,
+        linear=linear,
+        filter=signals.filter,
+        iterations=fit.iterations,
+        benchmark=data.benchmark,
+        signals=signals,
+    )
+    tell("done", 1.0)
+    if throw and not fit.status.ok:
+        raise SolveError(f"identify {result.law}: {result.message}", fit.status, result)
+    return result
+
+
+def _values(task: Problem, w: Array) -> dict[str, float]:
+    values = task.coordinates.values(w).tolist()
+    return dict(zip(task.coordinates.names, values, strict=True))
+
+
+def _estimates(
+    drive: Drive, choice: Choice, task: Problem, fit: Fit
+) -> tuple[dict[str, Estimate], Array, tuple[tuple[str, ...], ...]]:
+    """Estimates by name, correlation of the fitted ones, groups the data cannot tell apart."""
+    at = task.coordinates
+    held = (fit.w - at.lower < AT_BOUND) | (at.upper - fit.w < AT_BOUND)
+    J = task.sensitivities(fit.w) @ np.linalg.inv(at.slope(fit.w))
+    found = precision(J, task.residuals(fit.w), held)
+    groups = tuple(tuple(at.names[i] for i in group) for group in found.undetermined)
+    notes = {at.names[i]: "at its bound" for i in np.flatnonzero(held)}
+    for group in groups:
+        for name in group:
+            others = ", ".join(n for n in group if n != name)
+            notes[name] = f"cannot be told from {others}" if others else "without influence"
+    estimates: dict[str, Estimate] = {}
+    for name, parameter in parameters(drive).items():
+        value, unit = float(parameter.value), parameter.unit
+        if name in choice.reasons:
+            estimates[name] = Estimate(value, unit, fixed=True, note=choice.reasons[name])
+            continue
+        i = at.names.index(name)
+        errors = found.standard_errors[i], found.block_errors[i]
+        known = [float(e) if np.isfinite(e) else None for e in errors]
+        estimates[name] = Estimate(value, unit, known[0], known[1], note=notes.get(name, ""))
+    return estimates, found.correlation, groups
+
+
+def _cross_validation(task: Problem, fit: Fit, signals: Signals, folds: int) -> dict[str, float]:
+    """Force errors on each of `folds` pieces with parameters fitted to the others."""
+    force = signals.decimated["force"]
+    pieces = np.array_split(np.arange(task.rows), folds)
+    error = np.zeros(task.rows)
+    for piece in pieces:
+        weights = np.ones(task.rows)
+        weights[piece] = 0.0
+        error[piece] = task.residuals(task.solve(task.coordinates.inside(fit.w), weights).w)[piece]
+    each = [np.linalg.norm(error[p]) / np.linalg.norm(force[p]) for p in pieces]
+    return {
+        "folds": float(folds),
+        "force_relative": 100 * float(np.linalg.norm(error) / np.linalg.norm(force)),
+        "worst": 100 * float(max(each)),
+    }
