@@ -171,7 +171,14 @@ class Model:
 
     def vector(self, letter: str) -> ca.SX:
         """The symbols of the group "x", "z", "u" or "p" as a column (n, 1)."""
-        return ca.vertcat(ca.SX(0, 1), *(v.symbol for v in getattr(self, letter)))
+        return self._vectors[letter]
+
+    @cached_property
+    def _vectors(self) -> dict[str, ca.SX]:
+        return {
+            letter: ca.vertcat(ca.SX(0, 1), *(v.symbol for v in getattr(self, letter)))
+            for letter in "xzup"
+        }
 
     def nominal(self, letter: str) -> NDArray[np.float64]:
         """Typical magnitudes of a group, shape (n,)."""
@@ -229,18 +236,38 @@ class Model:
         A start value that is an expression (a bristle at steady state depends on the sliding
         velocity) is evaluated with the given values of the other states and parameters.
         """
+        if not given and not p:
+            return self._default_state.copy()
         given = {name: finite(f"{self.name}.{name}", x) for name, x in (given or {}).items()}
         check_names(f"model '{self.name}' x0", given, [v.name for v in self.x])
-        starts = {v.name: v.start for v in self.x} | given
-        start = ca.vertcat(ca.SX(0, 1), *starts.values())
-        symbols, values = self.vector("x"), start
-        parameters = self.values("p", p)
-        for _ in range(2):
-            values = ca.substitute(values, symbols, values)
-        evaluate = ca.Function("start", [self.vector("p"), self.vector("u")], [values])
-        numbers = evaluate(parameters, self.values("u")).full().ravel()
+        return self._evaluate_start(given, p)
+
+    @cached_property
+    def _default_state(self) -> NDArray[np.float64]:
+        return self._evaluate_start({}, None)
+
+    def _evaluate_start(
+        self, given: Mapping[str, float], p: Mapping[str, float] | None
+    ) -> NDArray[np.float64]:
+        known = np.array([given.get(v.name, 0.0) for v in self.x])
+        chosen = np.array([float(v.name in given) for v in self.x])
+        arguments = (known, chosen, self.values("u"), self.values("p", p))
+        numbers = self._start(*arguments).full().ravel()
         named = zip(self.x, numbers, strict=True)
         return np.array([finite(f"{self.name}.{v.name}", x) for v, x in named], float)
+
+    @cached_property
+    def _start(self) -> ca.Function:
+        """Start values as a Function of (values given, which are given, u, p)."""
+        n, x = len(self.x), self.vector("x")
+        known, chosen = ca.SX.sym("known", n), ca.SX.sym("chosen", n)
+        rows = [
+            ca.if_else(chosen[i], known[i], variable.start) for i, variable in enumerate(self.x)
+        ]
+        values = ca.vertcat(ca.SX(0, 1), *rows)
+        for _ in range(2):
+            values = ca.substitute(values, x, values)
+        return ca.Function("start", [known, chosen, self.vector("u"), self.vector("p")], [values])
 
 
 def finite(where: str, value: Any) -> float:

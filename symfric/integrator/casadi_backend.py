@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.dense import Dense, hermite
-from symfric.integrator.initial import algebraic, consistent
+from symfric.integrator.initial import consistent
 from symfric.integrator.inputs import Drivers
 from symfric.integrator.run import Run, Tolerances
 from symfric.integrator.system import System
@@ -54,7 +54,7 @@ def peer(system: System, inputs: Drivers, p: Array, tolerances: Tolerances, back
     Raises:
         ValueError: a mass matrix that is not diagonal, which CasADi does not take.
     """
-    rows, columns = algebraic(system)
+    rows, columns = system.algebraic
     rates = [i for i in range(system.n) if i not in columns]
     mass = ca.DM(system.mass)
     if rows != columns or mass.nnz() != len(rates):
@@ -100,8 +100,8 @@ def integrate_by_peer(
 ) -> tuple[Run, Dense, dict[str, int]]:
     """Integrate with CasADi over `times`; a failure keeps what came before it."""
     problem = peer(system, inputs, p, tolerances, backend)
-    rates = [i for i in range(system.n) if i not in algebraic(system)[1]]
-    columns = algebraic(system)[1]
+    rates = [i for i in range(system.n) if i not in system.algebraic[1]]
+    columns = system.algebraic[1]
     nominal = np.ones(system.n)
     nominal[: system.nx] = system.nominal
     y = consistent(system, "simulate", y0, np.concatenate([p, inputs.values[:, 0]]))
@@ -156,6 +156,6 @@ def _dense(system: System, inputs: Drivers, p: Array, grid: Array, y: Array) -> 
     d = np.vstack([np.tile(p[:, None], (1, grid.size)), inputs.values[:, inputs.interval(grid)]])
     f = ca.Function("f", [system.y, system.d], [system.f])
     slope = f.map(grid.size)(y, d).full()
-    columns = algebraic(system)[1]
+    columns = system.algebraic[1]
     slope[columns] = np.gradient(y[columns], grid, axis=1) if columns else slope[columns]
     return hermite(grid, y, slope)

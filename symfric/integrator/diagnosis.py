@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.integrator.initial import algebraic
 from symfric.integrator.integrator import Integrator
 from symfric.integrator.step import blocks
 from symfric.status import Status
@@ -32,7 +31,7 @@ def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> t
         )
     factors = blocks(system, integrator.tableau).factor(y, max(h, 1e-12), d).full()
     if not np.isfinite(factors).all():
-        _, unknowns = algebraic(system)
+        _, unknowns = system.algebraic
         names = ", ".join(system.names[i] for i in unknowns) or "the states"
         return (
             Status.SINGULAR,

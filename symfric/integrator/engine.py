@@ -35,7 +35,7 @@ class Engine(Protocol):
 
     @property
     def name(self) -> str:
-        """ "vm" or "compiled"."""
+        """What ran: vm or compiled."""
         ...
 
     def run(

@@ -9,21 +9,13 @@ from symfric.integrator.system import System
 Array = NDArray[np.float64]
 
 
-def algebraic(system: System) -> tuple[list[int], list[int]]:
-    """Rows without rates (equations) and columns without rates (unknowns) of M y' = f."""
-    pattern = np.array(ca.DM(system.mass.sparsity(), 1).full() != 0)
-    rows = [int(i) for i in np.flatnonzero(~pattern.any(axis=1))]
-    columns = [int(i) for i in np.flatnonzero(~pattern.any(axis=0))]
-    return rows, columns
-
-
 def consistent(system: System, where: str, y: Array, d: Array) -> Array:
     """`y` with its algebraic unknowns solved for, by Newton's method from the given guess.
 
     Raises:
         ValueError: no solution near the guess.
     """
-    rows, columns = algebraic(system)
+    rows, columns = system.algebraic
     if not columns:
         return y
     known = [i for i in range(system.n) if i not in columns]

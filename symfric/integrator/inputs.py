@@ -111,6 +111,8 @@ def drivers(
     Raises:
         ValueError: unknown name or a value of another kind.
     """
+    if not model.u and not given:
+        return _undriven(t_start, t_end)
     given = dict(given or {})
     check_names(f"model '{model.name}' u", given, [v.name for v in model.u])
     sampled = {name: s for name, s in given.items() if isinstance(s, Sampled)}
@@ -150,3 +152,9 @@ def drivers(
         np.vstack(values) if values else np.zeros((0, breaks.size - 1)),
         tuple(key),
     )
+
+
+def _undriven(t_start: float, t_end: float) -> Drivers:
+    """The drivers of a model without inputs."""
+    none = ca.SX(0, 1)
+    return Drivers(none, none, np.array([t_start, t_end]), np.zeros((0, 1)), ())

@@ -1,6 +1,7 @@
 """The adaptive integrator of one model: built once, run for any numbers."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from time import perf_counter
 from typing import final
 
@@ -63,6 +64,7 @@ class Integrator:
             return ca.Function(name, [t, s.y, s.d], [driven])
         return ca.Function(name, [self.model.t, s.y, s.d], [driven])
 
+    @cached_property
     def signals(self) -> ca.Function:
         """All signals of the model as a Function (t, y, d)."""
         m = self.model

@@ -215,7 +215,7 @@ def _trajectory(
 ) -> Trajectory:
     model = integrator.model
     names = list(model.signals)
-    signals = integrator.signals()
+    signals = integrator.signals
 
     def evaluate(at: Array) -> dict[str, Array]:
         d = np.vstack([np.tile(p[:, None], (1, at.size)), inputs.values[:, inputs.interval(at)]])

@@ -1,6 +1,7 @@
 """A model as the step sees it: one column of unknowns, one right-hand side, a mass pattern."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import final
 
 import casadi as ca
@@ -47,6 +48,14 @@ class System:
     def n(self) -> int:
         """Number of unknowns."""
         return self.y.numel()
+
+    @cached_property
+    def algebraic(self) -> tuple[list[int], list[int]]:
+        """Rows without rates (equations) and columns without rates (unknowns) of M y' = f."""
+        pattern = ca.DM(self.mass.sparsity(), 1).full() != 0
+        rows = [int(i) for i in np.flatnonzero(~pattern.any(axis=1))]
+        columns = [int(i) for i in np.flatnonzero(~pattern.any(axis=0))]
+        return rows, columns
 
 
 def system(model: Model, inputs: Drivers) -> System:
