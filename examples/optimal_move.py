@@ -1,0 +1,67 @@
+"""Move a mass with friction over 1 m from rest to rest: as fast as possible, and with least effort.
+
+    m v' = force - F(v),   m = 1 kg,   |force| <= 20 N
+
+F is Brown-McPhee friction: 6 N to break away, 4 N while sliding. Effort is the integral of force^2;
+friction makes waiting expensive, so there is a best time for it. Every control is then simulated:
+the last column says by how much the mass really misses its target.
+
+    python examples/optimal_move.py [OUT]
+"""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from ocp import TIME, Free, Problem, Solution, integral, solve
+from ocp.picture import plot_solutions
+from symfric import BrownMcPhee, drive
+
+
+def problems() -> dict[str, Problem]:
+    """The moves by name."""
+    friction = BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-3)  # with N = 1 N these are newtons
+    gentle = Problem(
+        drive(friction, m=1.0, N=1.0),
+        T=1.0,
+        cost=integral(lambda s: s.force**2),
+        final={"x": 1.0, "v": 0.0},
+        bounds={"force": (-20.0, 20.0)},
+    )
+    return {
+        "fastest": replace(gentle, T=Free(0.1, 10.0, guess=1.0), cost=TIME),
+        "least effort, T given": gentle,
+        "least effort, T free": replace(gentle, T=Free(0.1, 10.0, guess=1.0)),
+    }
+
+
+def table(moves: dict[str, Solution]) -> Table:
+    """A row a move."""
+    result = Table("move", "status", "iterations", "T [s]", "cost", "miss [mm]")
+    for name, move in moves.items():
+        result.add_row(
+            name,
+            move.status.name,
+            str(move.iterations),
+            f"{move.T:.4f}",
+            f"{move.cost:.4f}",
+            f"{1e3 * move.terminal_miss['x']:+.2f}",
+        )
+    return result
+
+
+def main(out: Path) -> None:
+    """Solve, print, and write pictures and data into `out`."""
+    moves = {name: solve(problem) for name, problem in problems().items()}
+    Console().print(table(moves))
+    plot_solutions(moves, ["x", "v", "force", "friction"], out / "optimal_moves.png")
+    moves["fastest"].plot(path=out / "fastest_move.png")
+    moves["fastest"].to_csv(out / "fastest_move.csv")
+    moves["fastest"].to_json(out / "fastest_move.json")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "out"))

@@ -1,0 +1,33 @@
+"""Ready problems: moves of a driven mass."""
+
+from ocp.cost import TIME, integral
+from ocp.problem import Free, Problem
+from symfric.model import Model
+
+
+def rest_to_rest(
+    model: Model,
+    distance: float,
+    T: float | Free,
+    *,
+    limit: float,
+    position: str = "x",
+    velocity: str = "v",
+    force: str = "force",
+) -> Problem:
+    """Move a mass over `distance` [m] from rest to rest, with |force| <= `limit` [N].
+
+    With a given duration `T` [s] the move of least effort, min int force^2 dt; with
+    `T=Free(lower, upper)` the fastest one, min T.
+
+    Raises:
+        ValueError: what `Problem` finds wrong, such as a model without these signals.
+    """
+    return Problem(
+        model,
+        T,
+        cost=TIME if isinstance(T, Free) else integral(lambda s: s[force] ** 2),
+        initial={position: 0.0, velocity: 0.0},
+        final={position: distance, velocity: 0.0},
+        bounds={force: (-limit, limit)},
+    )
