@@ -1,0 +1,81 @@
+"""Scenes take any law, free parameters by name, and refuse what they cannot use."""
+
+import casadi as ca
+import pytest
+from law_cases import CASES
+
+from symfric import Coulomb, LuGre, Stribeck, Sum, Viscous, drive, parameters, rabinowicz
+from symfric.scenes import ALL_SCENES, Scene, friction_states
+
+each_scene = pytest.mark.parametrize("kind", ALL_SCENES.values(), ids=ALL_SCENES.keys())
+
+
+@each_scene
+@pytest.mark.parametrize("name", CASES)
+def test_every_law_gives_a_model_of_its_size_that_starts(kind: type[Scene], name: str) -> None:
+    law = CASES[name]
+    model = kind(law).model()
+    assert len(model.x) == 2 + len(law.states)
+    assert model.initial_state().shape == (len(model.x),)
+    assert model.p == ()
+
+
+@each_scene
+def test_every_parameter_can_be_free(kind: type[Scene]) -> None:
+    scene = kind(Sum((LuGre(), Viscous())))
+    names = list(parameters(scene))
+    model = scene.model(names)
+    assert [p.name for p in model.p] == names
+    assert {p.name: p.start for p in model.p} == {n: q.value for n, q in parameters(scene).items()}
+
+
+@each_scene
+def test_constant_parameters_cost_less_than_free_ones(kind: type[Scene]) -> None:
+    scene = kind(Stribeck())
+    fixed, free = (scene.model(f).function("ode").n_instructions() for f in ([], parameters(scene)))
+    assert fixed < free
+
+
+@each_scene
+@pytest.mark.parametrize(
+    ("law", "got"), [(LuGre, "got the class LuGre"), ("lugre", "got 'lugre'"), (None, "got None")]
+)
+def test_what_is_not_a_law_is_refused(kind: type[Scene], law: object, got: str) -> None:
+    with pytest.raises(ValueError, match=rf"{kind.__name__}: expected a law such as .* {got}"):
+        kind(law)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: rabinowicz(LuGre(), mass=3.0), "got mass"),
+        (lambda: rabinowicz(LuGre(), m=-1.0), "m: expected 1e-12 <= m <= inf .kg., got -1"),
+        (lambda: rabinowicz(LuGre(), free=["mu"]), "got mu; did you mean mu_"),
+        (lambda: rabinowicz(LuGre(), free=["m", "m"]), "every name once, got m, m"),
+        (lambda: drive(Coulomb(), sigma_2=1.0), "Drive: .*got sigma_2"),
+        (lambda: drive(Coulomb(), N=float("nan")), "N: expected a finite number .N. .* got nan"),
+    ],
+)
+def test_bad_parameters_are_refused_by_name(call: object, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        call()  # type: ignore[operator]
+
+
+def test_friction_states_start_in_steady_sliding_at_the_given_velocity() -> None:
+    v = ca.SX.sym("v")
+    (bristle,), column = friction_states(LuGre(v_eps=0.0), v, 5.0)
+    assert (bristle.name, bristle.unit) == ("z", "m")
+    assert column.shape == (1, 1)
+    start = ca.Function("start", [v], [bristle.start])
+    assert float(start(-0.3)) == pytest.approx(-0.5 / 1e5)
+
+
+def test_bristle_starts_loaded_for_the_given_start_velocity() -> None:
+    model = drive(LuGre())
+    assert model.initial_state()[2] == 0.0
+    assert model.initial_state({"v": 0.3})[2] == pytest.approx(0.1 * 0.8 * 9.81 / 1e5)
+    assert model.initial_state({"v": 0.3, "z": 2e-6})[2] == 2e-6
+
+
+def test_original_kink_starts_at_rest_too() -> None:
+    assert drive(LuGre(v_eps=0.0)).initial_state() == pytest.approx([0.0, 0.0, 0.0])
