@@ -1,0 +1,189 @@
+"""A friction law as a block: one stateless function, or a step that is exact for held inputs."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, replace
+from inspect import getdoc
+from re import sub
+
+import casadi as ca
+
+from symfric.codegen.block import Block
+from symfric.codegen.exponential import phi1_phi2
+from symfric.codegen.folding import runtime_parameters
+from symfric.codegen.graph import LEAVES, graph, rebuild
+from symfric.laws import Law, law_name
+from symfric.model import Output, Variables, finite
+from symfric.numeric import is_casadi
+from symfric.parameters import Variable, check_names, parameters, symbolise
+
+STEP_SIZE = 1e-3
+"""Default of the parameter h [s]."""
+
+FORCE = "friction force, opposes the motion"
+SLIDING = "Initial state of long sliding at the given inputs, to start while the machine moves."
+
+
+def law_block(
+    law: Law,
+    *,
+    name: str | None = None,
+    h: float | None = None,
+    free: Sequence[str] | None = None,
+) -> Block:
+    """The discrete-time block of `law` with inputs v, N and output F.
+
+    A law without states becomes F(v, N). The rate of a law with states must be affine in each of
+    them by itself, dz/dt = a(v, N) - lambda(v, N) z; then the step is exact for v and N held over
+    it, however large lambda h is (for LuGre that is sigma_0 |v| h / g, often far above 2, where
+    explicit Euler diverges):
+
+        phi1(x) = (exp(x) - 1) / x,   phi2(x) = (phi1(x) - 1) / x,   x = -lambda h
+        r  = phi1(x) (a - lambda z)          mean rate over the step
+        z+ = z + h r
+        zm = z + h phi2(x) (a - lambda z)    mean state over the step
+        F  = force(v, N, zm)                 mean force over the step, with r for the rate in it
+
+    F h is the impulse and F v h the work of the step. The bristle damping sees r = (z+ - z) / h,
+    which is bounded by the bristle's travel, and not the rate at one instant, which after a jump is
+    as large as v. Feed the mean velocity of the step, such as the encoder increment over h; with
+    the velocity at its beginning the error is of first order in h.
+
+    Initial states: zero (a machine at rest, bristles relaxed), or by the reset `init_sliding` those
+    of long sliding at v, N (a controller that starts while the machine moves).
+
+    Args:
+        law: a law whose parameters are numbers.
+        name: C identifier; default the name of the law.
+        h: step size [s] as a constant; without it h is a parameter, by default 1 ms. A law without
+            states has no step size.
+        free: parameters that stay variable at run time, the others become constants; default see
+            `runtime_parameters`. Parameters without effect never appear.
+
+    Raises:
+        ValueError: symbols in the law; names in `free` that are unknown, repeated or without
+            effect; a rate that is not affine in the states (Dahl's law with n != 1) or couples
+            them; a force that is not finite at rest (a smoothing width of 0 left variable).
+    """
+    where = f"codegen '{law_name(law)}'"
+    known = parameters(law)
+    symbols = [p.name for p in known.values() if is_casadi(p.value)]
+    if symbols:
+        raise ValueError(f"{where}: expected numbers as parameters, got symbols {symbols}")
+    check_names(where, free or (), known)
+    names = runtime_parameters(law) if free is None else free
+    symbolic, runtime = symbolise(law, *names)
+    block = _step(symbolic, runtime, h, where) if law.states else _function(symbolic, runtime)
+    idle = [p.name for p in runtime if not ca.depends_on(block.everything, p.symbol)]
+    if idle and free is not None:
+        raise ValueError(
+            f"{where}: free: expected parameters that have an effect, got {', '.join(idle)}; "
+            "the values of the other parameters switch them off"
+        )
+    block = replace(
+        block,
+        name=name or sub(r"\W+", "_", law_name(law)).strip("_"),
+        doc="\n\n".join(dict.fromkeys(_documents(law))),
+        parameters=tuple(p for p in block.parameters if p.name not in idle),
+        constants={p.name: float(p.value) for p in known.values() if p.name not in names}
+        | dict(block.constants),
+    )
+    _check_at_rest(block, where)
+    return block
+
+
+def _inputs() -> Variables:
+    return (
+        Variable("v", "m/s", doc="sliding velocity"),
+        Variable("N", "N", nominal=10.0, lower=0.0, doc="normal force"),
+    )
+
+
+def _function(law: Law, runtime: Variables) -> Block:
+    v, N = inputs = _inputs()
+    force = law.force(v.symbol, N.symbol, ca.SX(0, 1))
+    return Block("F", inputs=inputs, parameters=runtime, outputs={"F": Output(force, "N", FORCE)})
+
+
+def _step(law: Law, runtime: Variables, h: float | None, where: str) -> Block:
+    v, N = inputs = _inputs()
+    states = tuple(Variable(s.name, s.unit, nominal=s.nominal) for s in law.states)
+    size = Variable("h", "s", start=STEP_SIZE if h is None else h, lower=0.0, doc="step size")
+    if not finite(f"{where}: h", size.start) > 0.0:
+        raise ValueError(f"{where}: h: expected a step size > 0 [s], got {h}")
+    duration = size.symbol if h is None else float(h)
+
+    z = ca.vertcat(*(state.symbol for state in states))
+    rate = ca.SX(law.rate(v.symbol, N.symbol, z))
+    phi1, phi2 = phi1_phi2(duration * _decay(rate, z, where))
+    mean_rate = phi1 * rate
+    mean_state = z + duration * (phi2 * rate)
+    force, r = _force_of_rate(ca.SX(law.force(v.symbol, N.symbol, z)), rate, z, where)
+    mean_force = ca.substitute(force, ca.vertcat(z, r), ca.vertcat(mean_state, mean_rate))
+    return Block(
+        "F",
+        states=states,
+        inputs=inputs,
+        parameters=runtime + ((size,) if h is None else ()),
+        next=z + duration * mean_rate,
+        outputs={"F": Output(mean_force, "N", FORCE + ", mean over the step")},
+        resets={"init_sliding": (ca.SX(law.steady_state(v.symbol, N.symbol)), SLIDING)},
+        constants={} if h is None else {"h": float(h)},
+    )
+
+
+def _decay(rate: ca.SX, z: ca.SX, where: str) -> ca.SX:
+    """Derivative of the rates by z, of uncoupled affine states, as a column."""
+    jacobian = ca.jacobian(rate, z)
+    if ca.depends_on(jacobian, z):
+        raise ValueError(
+            f"{where}: expected rates affine in the states, so that the step is exact, got rates "
+            "that are not (such as Dahl's law with n != 1); simulate it with smaller steps instead"
+        )
+    if not jacobian.sparsity().is_diag():
+        raise ValueError(
+            f"{where}: expected states that do not act on each other, got coupled ones"
+        )
+    return ca.densify(ca.diag(jacobian))
+
+
+def _force_of_rate(force: ca.SX, rate: ca.SX, z: ca.SX, where: str) -> tuple[ca.SX, ca.SX]:
+    """The force with symbols r for the rates that occur in it, and r.
+
+    Its mean is then taken at the mean rates and not at the rates of the mean state, which are equal
+    but, in float at high velocities, the difference of two large numbers.
+    """
+    r = ca.SX.sym("r", rate.numel())
+    others = ca.veccat(*(s for s in ca.symvar(ca.vertcat(force, rate)) if not ca.depends_on(z, s)))
+    source = graph(ca.Function("law", [z, others], [ca.densify(rate), ca.densify(force)]))
+    rates = {
+        number: r[i]
+        for i, number in enumerate(source.results[0])
+        if source.nodes[number].op not in LEAVES
+    }
+    force = rebuild(source, [z, others], rates)[1]
+    unknowns = ca.vertcat(z, r)
+    if ca.depends_on(ca.jacobian(force, unknowns), unknowns):
+        raise ValueError(f"{where}: expected a force affine in the states, got one that is not")
+    return force, r
+
+
+def _check_at_rest(block: Block, where: str) -> None:
+    """A division by zero at rest must show here and not on the machine."""
+    values = [[v.start for v in group] for group in (block.states, block.parameters)]
+    rest = [0.0 if v.name == "v" else v.nominal for v in block.inputs]
+    _, force = block.step(*values, rest)
+    if not force.is_regular():
+        raise ValueError(
+            f"{where}: expected a finite force at rest, got {float(force)}; "
+            "keep a smoothing width of 0 constant (leave it out of free)"
+        )
+
+
+def _documents(law: Law) -> Iterator[str]:
+    """The docstring of the law and of those that it holds."""
+    yield getdoc(type(law)) or type(law).__name__
+    for item in fields(law):
+        value = getattr(law, item.name)
+        for inner in value if isinstance(value, tuple) else (value,):
+            if isinstance(inner, Law):
+                yield from _documents(inner)

@@ -1,0 +1,156 @@
+"""The operations of a CasADi function as a graph in which equal parts are one node."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+
+SELECT = -1
+"""Operation of a node that stands for `if_else`, which CasADi writes as a sum of two halves."""
+
+LEAVES = frozenset({ca.OP_INPUT, ca.OP_CONST})
+
+
+@dataclass(frozen=True)
+class Node:
+    """One operation.
+
+    Attributes:
+        op: CasADi's operation number, or `SELECT`.
+        args: numbers of the nodes it takes, all smaller than its own.
+        entry: of an input: (argument, row).
+        value: of a constant.
+    """
+
+    op: int
+    args: tuple[int, ...] = ()
+    entry: tuple[int, int] = (0, 0)
+    value: float = 0.0
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """Equal for nodes with equal values, to the bit (0.0 and -0.0 differ)."""
+        return self.op, self.args, self.entry, self.value.hex()
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Nodes, arguments before their users, and the node of every row of every result."""
+
+    nodes: tuple[Node, ...]
+    results: tuple[tuple[int, ...], ...]
+
+    @property
+    def operations(self) -> int:
+        """Number of operations, leaves not counted."""
+        return sum(node.op not in LEAVES for node in self.nodes)
+
+    def depends(self, arguments: Sequence[int]) -> list[bool]:
+        """Whether each node depends on one of the function's `arguments`."""
+        found: list[bool] = []
+        for node in self.nodes:
+            own = node.op == ca.OP_INPUT and node.entry[0] in arguments
+            found.append(own or any(found[i] for i in node.args))
+        return found
+
+
+@dataclass
+class _Builder:
+    nodes: list[Node] = field(default_factory=list[Node])
+    known: dict[tuple[Any, ...], int] = field(default_factory=dict[tuple[Any, ...], int])
+
+    def add(self, node: Node) -> int:
+        if node.op == ca.OP_ADD:
+            node = self._if_else(*node.args) or self._if_else(*reversed(node.args)) or node
+        number = self.known.setdefault(node.key, len(self.nodes))
+        if number == len(self.nodes):
+            self.nodes.append(node)
+        return number
+
+    def _if_else(self, a: int, b: int) -> Node | None:
+        """(c ? x : 0) + (!c ? y : 0) is c ? x : y (but for the sign of a zero)."""
+        yes, no = self.nodes[a], self.nodes[b]
+        if not yes.op == no.op == ca.OP_IF_ELSE_ZERO:
+            return None
+        if self.nodes[no.args[0]].key != Node(ca.OP_NOT, (yes.args[0],)).key:
+            return None
+        return Node(SELECT, (yes.args[0], yes.args[1], no.args[1]))
+
+
+def graph(function: ca.Function) -> Graph:
+    """The graph of an SX function with dense arguments and results; nothing in it is unused.
+
+    Raises:
+        ValueError: not an SX function, free symbols, or sparse arguments or results.
+    """
+    _check(function)
+    builder = _Builder()
+    slots: dict[int, int] = {}
+    rows: list[dict[int, int]] = [{} for _ in range(function.n_out())]
+    for k in range(function.n_instructions()):
+        op = function.instruction_id(k)
+        into, of = function.instruction_output(k), function.instruction_input(k)
+        if op == ca.OP_OUTPUT:
+            rows[into[0]][into[1]] = slots[of[0]]
+        elif op == ca.OP_ASSIGN:
+            slots[into[0]] = slots[of[0]]
+        elif op == ca.OP_INPUT:
+            slots[into[0]] = builder.add(Node(op, entry=(of[0], of[1])))
+        elif op == ca.OP_CONST:
+            slots[into[0]] = builder.add(Node(op, value=function.instruction_constant(k)))
+        else:
+            slots[into[0]] = builder.add(Node(op, tuple(slots[i] for i in of)))
+    results = [tuple(row[i] for i in range(len(row))) for row in rows]
+    return _without_unused(builder.nodes, results)
+
+
+def _check(function: ca.Function) -> None:
+    where = f"codegen '{function.name()}'"
+    if not function.is_a("SXFunction"):
+        raise ValueError(
+            f"{where}: expected an SX function, got {function.class_name()}; expand it"
+        )
+    if function.has_free():
+        raise ValueError(f"{where}: expected no free symbols, got {function.get_free()}")
+    sides = [*map(function.sparsity_in, range(function.n_in()))]
+    sides += map(function.sparsity_out, range(function.n_out()))
+    if not all(sparsity.is_dense() for sparsity in sides):
+        raise ValueError(f"{where}: expected dense arguments and results, got sparse ones; densify")
+
+
+def _without_unused(nodes: Sequence[Node], results: Sequence[tuple[int, ...]]) -> Graph:
+    used = {i for row in results for i in row}
+    for i in reversed(range(len(nodes))):
+        if i in used:
+            used.update(nodes[i].args)
+    number = {old: new for new, old in enumerate(sorted(used))}
+    kept = (nodes[i] for i in sorted(used))
+    return Graph(
+        tuple(Node(n.op, tuple(number[i] for i in n.args), n.entry, n.value) for n in kept),
+        tuple(tuple(number[i] for i in row) for row in results),
+    )
+
+
+def rebuild(source: Graph, arguments: Sequence[ca.SX], replace: Mapping[int, ca.SX]) -> list[ca.SX]:
+    """The results as columns of new expressions in `arguments`, with some nodes replaced.
+
+    This is how a part of an expression is substituted that is not a symbol.
+    """
+    found: list[ca.SX] = []
+    for i, node in enumerate(source.nodes):
+        args = [found[j] for j in node.args]
+        if i in replace:
+            found.append(replace[i])
+        elif node.op == ca.OP_INPUT:
+            found.append(arguments[node.entry[0]][node.entry[1]])
+        elif node.op == ca.OP_CONST:
+            found.append(ca.SX(node.value))
+        elif node.op == SELECT:
+            condition, yes, no = args
+            found.append(ca.if_else(condition, yes, no))
+        elif len(args) == 1:
+            found.append(ca.SX.unary(node.op, *args))
+        else:
+            found.append(ca.SX.binary(node.op, *args))
+    return [ca.vertcat(ca.SX(0, 1), *(found[i] for i in row)) for row in source.results]
