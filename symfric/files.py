@@ -18,10 +18,10 @@ def written(path: str | Path) -> Generator[Path, None, None]:
         ValueError: the path is a folder or a device, or its folder cannot be made or written.
     """
     target = Path(path).resolve()  # a link stays a link to the new file
-    if target.exists() and not target.is_file():
-        kind = "a folder" if target.is_dir() else "a device"
-        raise ValueError(f"output '{path}': expected a file name, got {kind}")
     try:
+        if target.exists() and not target.is_file():
+            kind = "a folder" if target.is_dir() else "a device"
+            raise ValueError(f"output '{path}': expected a file name, got {kind}")
         target.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(
             prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent

@@ -1,0 +1,161 @@
+"""The interface between equations and solvers."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric import Model, Output, Variable
+from symfric.model import finite
+
+x, y = Variable("x", "m", start=1.0, nominal=0.1), Variable("y", "m/s")
+w, u, k = Variable("w", "N"), Variable("u", "N", start=2.0), Variable("k", "N/m", start=3.0)
+
+
+def oscillator() -> Model:
+    """x' = y, y' = w, 0 = w + k x - u."""
+    return Model(
+        "oscillator",
+        x=(x, y),
+        z=(w,),
+        u=(u,),
+        p=(k,),
+        ode=ca.vertcat(y.symbol, w.symbol),
+        alg=w.symbol + k.symbol * x.symbol - u.symbol,
+        outputs={"energy": Output(k.symbol * x.symbol**2 / 2, "J")},
+    )
+
+
+def test_functions_have_named_arguments_and_the_values_of_the_equations() -> None:
+    model = oscillator()
+    point = {"t": 0.0, "x": [1.0, 2.0], "z": 3.0, "u": 4.0, "p": 5.0}
+    assert model.function("ode")(**point)["ode"].full().ravel().tolist() == [2.0, 3.0]
+    assert model.function("alg")(**point)["alg"].full().ravel().tolist() == [4.0]
+    assert float(model.function("energy")(**point)["energy"]) == 2.5
+    residual = model.function("residual")
+    assert residual.name_in() == ["t", "xdot", "x", "z", "u", "p"]
+    assert residual(xdot=[2.5, 3.5], **point)["residual"].full().ravel().tolist() == [0.5, 0.5, 4.0]
+
+
+def test_signals_stack_in_the_order_of_their_names() -> None:
+    model = oscillator()
+    assert model.signals == {"x": "m", "y": "m/s", "w": "N", "u": "N", "energy": "J"}
+    stacked = model.function("signals")(0.0, [1.0, 2.0], 3.0, 4.0, 5.0)
+    assert stacked.full().ravel().tolist() == [1.0, 2.0, 3.0, 4.0, 2.5]
+
+
+def test_absent_groups_are_columns_without_rows() -> None:
+    model = Model("decay", x=(x,), ode=-x.symbol)
+    assert [model.vector(letter).shape for letter in "xzup"] == [(1, 1), (0, 1), (0, 1), (0, 1)]
+    assert model.function("ode").size_in("u") == (0, 1)
+    assert model.nominal("x").tolist() == [0.1]
+    assert model.nominal("p").shape == (0,)
+
+
+def test_values_are_starts_replaced_by_name() -> None:
+    model = oscillator()
+    assert model.values("p").tolist() == [3.0]
+    assert model.values("u", {"u": 5}).tolist() == [5.0]
+    assert model.initial_state({"y": -1.0}).tolist() == [1.0, -1.0]
+
+
+def test_start_values_may_depend_on_states_and_parameters() -> None:
+    a = Variable("a", "1", start=2.0)
+    b = Variable("b", "1", start=a.symbol * k.symbol)
+    c = Variable("c", "1", start=b.symbol + 1)
+    model = Model("chain", x=(c, a, b), p=(k,), ode=ca.SX(3, 1))
+    assert model.initial_state().tolist() == [7.0, 2.0, 6.0]
+    assert model.initial_state({"a": 1.0}, {"k": 5.0}).tolist() == [6.0, 1.0, 5.0]
+    assert model.initial_state({"b": 0.0}).tolist() == [1.0, 2.0, 0.0]
+
+
+def test_implicit_model_has_a_residual_and_no_ode() -> None:
+    xdot = ca.SX.sym("xdot")
+    model = Model("implicit", x=(x,), xdot=xdot, residual=xdot**3 + x.symbol)
+    assert model.ode is None
+    assert float(model.function("residual")(0, 2.0, 1.0, [], [], [])) == 9.0
+    with pytest.raises(ValueError, match=r"model 'implicit': expected one of alg, .*got ode"):
+        model.function("ode")
+
+
+stray = ca.SX.sym("stray")
+BAD = {
+    "wrong ode rows": ({"x": (x,), "ode": ca.SX(2, 1)}, r"ode: expected 1 rows .* got 2"),
+    "wrong alg rows": (
+        {"x": (x,), "ode": ca.SX(1, 1), "alg": ca.SX(1, 1)},
+        r"alg: expected 0 rows, got 1",
+    ),
+    "wrong residual rows": ({"x": (x,), "residual": ca.SX(2, 1)}, r"residual: expected 1 rows"),
+    "undeclared symbol": (
+        {"x": (x,), "ode": x.symbol * stray},
+        r"expected only declared symbols, got stray; declare",
+    ),
+    "undeclared in an output": (
+        {"x": (x,), "ode": x.symbol, "outputs": {"o": Output(stray, "1")}},
+        r"got stray",
+    ),
+    "repeated name": ({"x": (x,), "u": (Variable("x", "1"),), "ode": x.symbol}, r"once .* got x"),
+    "output named like a state": (
+        {"x": (x,), "ode": x.symbol, "outputs": {"x": Output(x.symbol, "m")}},
+        r"got x",
+    ),
+    "state named t": ({"x": (Variable("t", "s"),), "ode": ca.SX(1, 1)}, r"none of .* got t"),
+    "output named ode": (
+        {"x": (x,), "ode": x.symbol, "outputs": {"ode": Output(x.symbol, "m")}},
+        r"got ode",
+    ),
+    "name that C does not take": (
+        {"x": (Variable("v rel", "m/s"),), "ode": ca.SX(1, 1)},
+        r"C identifiers, got v rel",
+    ),
+    "vector output": (
+        {"x": (x,), "ode": x.symbol, "outputs": {"two": Output(ca.SX(2, 1), "1")}},
+        r"scalar expressions, got two",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_inconsistent_model_is_refused(case: str) -> None:
+    arguments, message = BAD[case]
+    with pytest.raises(ValueError, match=rf"model 'bad': .*{message}"):
+        Model("bad", **arguments)
+
+
+def test_all_problems_of_a_model_are_reported_at_once() -> None:
+    with pytest.raises(ValueError, match=r"got x; ode: expected 2 rows .* got 1; .* got stray"):
+        Model("bad", x=(x, Variable("x", "m")), ode=stray)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda m: m.function("nrg"), "model 'oscillator': expected one of .* got nrg"),
+        (lambda m: m.values("p", {"kk": 1.0}), "model 'oscillator' p: .* got kk; did you mean k"),
+        (lambda m: m.values("p", {"k": "stiff"}), "oscillator.k: expected a finite .* got 'stiff'"),
+        (lambda m: m.initial_state({"z": 1.0}), "model 'oscillator' x0: .* got z"),
+        (lambda m: m.initial_state({"x": np.nan}), "oscillator.x: expected a finite .* got nan"),
+        (lambda m: m.initial_state({"x": None}), "oscillator.x: expected a finite .* got None"),
+    ],
+)
+def test_bad_values_are_refused_by_name(call: object, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        call(oscillator())  # type: ignore[operator]
+
+
+def test_start_value_that_is_not_a_number_is_refused() -> None:
+    model = Model(
+        "log", x=(Variable("s", "1", start=ca.log(k.symbol - 3)),), p=(k,), ode=ca.SX(1, 1)
+    )
+    with pytest.raises(ValueError, match=r"log\.s: expected a finite number, got -?inf"):
+        model.initial_state()
+
+
+@pytest.mark.parametrize("value", [1, 2.5, np.float64(3.0), "4", ca.DM(5.0)])
+def test_finite_takes_numbers(value: object) -> None:
+    assert finite("here", value) == float(value)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("value", [np.inf, np.nan, "x", None, ca.SX.sym("s"), [1.0, 2.0]])
+def test_finite_refuses_everything_else(value: object) -> None:
+    with pytest.raises(ValueError, match="here: expected a finite number, got "):
+        finite("here", value)
