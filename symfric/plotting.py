@@ -5,14 +5,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from symfric.files import written
-from symfric.parameters import check_names
+from symfric.parameters import check_names, parameters
 
 if TYPE_CHECKING:
     from symfric.integrator.trajectory import Trajectory
+    from symfric.laws import Law
 
 
 def save(figure: Figure, path: str | Path | None) -> Figure:
@@ -24,10 +26,12 @@ def save(figure: Figure, path: str | Path | None) -> Figure:
     return figure
 
 
-def panels(count: int, width: float = 7.0, height: float = 1.9) -> tuple[Figure, list[Axes]]:
-    """`count` panels under each other with a shared abscissa and a light grid."""
+def panels(
+    count: int, width: float = 7.0, height: float = 1.9, shared: bool = True
+) -> tuple[Figure, list[Axes]]:
+    """`count` panels under each other with a light grid, their abscissa shared by default."""
     figure, axes = plt.subplots(
-        count, 1, sharex=True, squeeze=False, figsize=(width, 0.7 + height * count)
+        count, 1, sharex=shared, squeeze=False, figsize=(width, 0.7 + height * count)
     )
     figure.set_layout_engine("constrained")
     for row in axes[:, 0]:
@@ -56,8 +60,47 @@ def plot_trajectories(
         for label, trajectory in trajectories.items():
             axis.plot(trajectory.t, trajectory[name], label=label, linewidth=1.2)
         axis.set_ylabel(f"{name} [{first.units[name]}]")
-    axes[0].set_title(first.scene)
-    if len(trajectories) > 1:
-        axes[0].legend(loc="upper right", fontsize="small", ncols=len(trajectories))
+    axes[0].set_title(first.scene, loc="left")
+    if list(trajectories) != [first.scene]:
+        axes[0].legend(
+            loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize="small", ncols=3
+        )
     axes[-1].set_xlabel("t [s]")
+    figure.align_ylabels(axes)
     return save(figure, path)
+
+
+def plot_laws(laws: "Mapping[str, Law]", N: float = 1.0, path: str | Path | None = None) -> Figure:
+    """Friction force in steady sliding against velocity: near rest, and over many decades.
+
+    Args:
+        laws: legend entry -> law, with numbers for parameters.
+        N: normal force [N].
+        path: image file.
+    """
+    figure, (near, far) = plt.subplots(1, 2, sharey=True, figsize=(7.5, 3.2), layout="constrained")
+    scales = [scale for law in laws.values() for scale in _velocity_scales(law)]
+    scale = max(scales, default=0.1)
+    decades = np.geomspace(1e-3 * scale, max(1.0, 10 * scale), 1201)
+    around = np.linspace(-10 * scale, 10 * scale, 2001)
+    for label, law in laws.items():
+        for axis, v in ((near, around), (far, decades)):
+            force = law.force(v, N, law.steady_state(v, N))
+            axis.plot(v, np.broadcast_to(force, v.shape), label=label, linewidth=1.3)
+    near.ticklabel_format(axis="x", style="sci", scilimits=(-2, 3), useMathText=True)
+    far.set_xscale("log")
+    for axis in (near, far):
+        axis.grid(alpha=0.3)
+        axis.set_xlabel("v [m/s]")
+    near.set_ylabel("F in steady sliding [N]")
+    near.set_title(f"near rest, N = {N:g} N", fontsize="medium")
+    far.set_title("over decades", fontsize="medium")
+    near.legend(fontsize="small")
+    return save(figure, path)
+
+
+def _velocity_scales(law: "Law") -> list[float]:
+    """The velocities [m/s] among the parameters, on which the force changes."""
+    known = [(float(p.value), p.unit) for p in parameters(law).values()]
+    scales = [value for value, unit in known if unit == "m/s"]
+    return scales + [1 / value for value, unit in known if unit == "s/m" and value > 0]

@@ -1,0 +1,109 @@
+"""The commands put together, and how errors become exit statuses."""
+
+import os
+import sys
+import warnings
+from collections.abc import Sequence
+from io import TextIOWrapper
+from types import TracebackType
+from typing import Annotated, cast
+
+import typer
+
+from symfric import SolveError, Status, __version__
+from symfric.cli.codegen import codegen
+from symfric.cli.identify import identify
+from symfric.cli.laws import laws
+from symfric.cli.run import run
+
+BAD_INPUT, FAILED_SOLVE, INTERRUPTED = 2, 1, 130
+
+# Of all usage errors Typer exports only BadParameter; this is what they derive from.
+USAGE_ERROR = cast("type[typer.BadParameter]", typer.BadParameter.__mro__[2])
+
+app = typer.Typer(
+    help="Friction laws from formula to simulation, identification, optimal control and C.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for function in (laws, run, identify, codegen):
+    app.command()(function)
+
+
+@app.callback(invoke_without_command=True)
+def symfric(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Show the version and exit.")] = False,
+) -> None:
+    """Show the version, or what there is when no command is given."""
+    if version:
+        typer.echo(f"symfric {__version__}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status.
+
+    0: done; 1: a solve failed (what there is so far is written); 2: bad input; 130: Ctrl-C. Every
+    error is one sentence on standard error. With SYMFRIC_DEBUG set, errors are raised instead.
+    """
+    if arguments is None:
+        _prepare_process()
+    try:
+        with warnings.catch_warnings():
+            warnings.showwarning = _show_warning
+            command = typer.main.get_command(app)
+            status = command.main(arguments, prog_name="symfric", standalone_mode=False)
+        return status if isinstance(status, int) else 0
+    except SolveError as error:
+        interrupted = error.status is Status.INTERRUPTED
+        return _refuse(error, INTERRUPTED if interrupted else FAILED_SOLVE)
+    except (KeyboardInterrupt, typer.Abort):
+        return _refuse(KeyboardInterrupt("interrupted"), INTERRUPTED)
+    except (ValueError, OSError, USAGE_ERROR) as error:
+        return _refuse(error, BAD_INPUT)
+
+
+def _refuse(error: BaseException, status: int) -> int:
+    """Say `error` in one sentence and return `status`."""
+    if os.environ.get("SYMFRIC_DEBUG"):
+        raise error
+    typer.echo(f"symfric: {sentence(error)}", err=True)
+    return status
+
+
+def sentence(error: BaseException) -> str:
+    """The message of `error` on one line."""
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"'{error.filename}': {error.strerror}"
+    text = error.format_message() if isinstance(error, USAGE_ERROR) else str(error)
+    text = " ".join(text.split()).removesuffix(".")
+    return text.replace(". Did you mean", "; did you mean")
+
+
+def _prepare_process() -> None:
+    """Settings of a process that is nothing but this command line."""
+    os.environ.setdefault("MPLBACKEND", "Agg")
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")
+    if not os.environ.get("SYMFRIC_DEBUG"):
+        sys.excepthook = _report_defect
+
+
+def _show_warning(message: Warning | str, category: type[Warning], *_: object) -> None:
+    typer.echo(f"symfric: warning: {' '.join(str(message).split())}", err=True)
+
+
+def _report_defect(
+    kind: type[BaseException], error: BaseException, _: TracebackType | None
+) -> None:
+    text = " ".join(str(error).split())
+    typer.echo(
+        f"symfric: internal error, {kind.__name__}: {text}; "
+        "set SYMFRIC_DEBUG=1 to see where, and please report it",
+        err=True,
+    )

@@ -1,0 +1,154 @@
+"""`symfric laws`: what laws there are, and what one of them says."""
+
+from dataclasses import fields
+from inspect import getdoc
+from typing import Annotated, Any
+
+import casadi as ca
+import typer
+
+from symfric import ALL_LAWS, Law, law_from_text, parameters
+from symfric.cli import output
+from symfric.cli.options import JsonOption, PlotOption, SetOption, check_outputs, law_with
+from symfric.laws import PHENOMENA
+from symfric.model import finite
+
+
+def laws(
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME]", help="One law, such as lugre.")
+    ] = None,
+    settings: SetOption = None,
+    plot: PlotOption = None,
+    normal_force: Annotated[
+        float, typer.Option("--normal-force", help="Normal force of the picture [N].")
+    ] = 1.0,
+    json: JsonOption = None,
+) -> None:
+    """List the friction laws, or show one: equation, limits, source, parameters, picture.
+
+    Example: symfric laws lugre --plot lugre.png
+    """
+    check_outputs(json, picture=plot)
+    chosen = {name: law_with(name, settings)} if name else {n: law_from_text(n) for n in ALL_LAWS}
+    if settings and not name:
+        raise ValueError("--set: expected the name of a law before it, got none")
+    if plot:
+        from symfric.plotting import plot_laws  # noqa: PLC0415  (matplotlib is slow)
+
+        plot_laws(chosen, finite("--normal-force", normal_force), plot)
+    described = {text: to_dict(law) for text, law in chosen.items()}
+    output.emit_json({"name": name, **described[name]} if name else {"laws": described}, json)
+    if json != "-":
+        show_law(name, chosen[name]) if name else show_list(chosen)
+    output.say_written(plot, json)
+
+
+def to_dict(law: Law) -> dict[str, Any]:
+    """What `--json` holds of one law."""
+    return {
+        "title": title(law),
+        "phenomena": {code: PHENOMENA[code] for code in phenomena(law)},
+        "states": {state.name: state.unit for state in law.states},
+        "smoothness": law.facts.smoothness,
+        "confidence": law.facts.confidence,
+        "source": law.facts.source,
+        "instructions": instructions(law),
+        "parameters": {
+            p.name: {
+                "value": p.value,
+                "unit": p.unit,
+                "lower": p.lower,
+                "upper": p.upper,
+                "doc": p.doc,
+            }
+            for p in parameters(law).values()
+        },
+        "doc": "\n\n".join(getdoc(part) or "" for part in parts(law)),
+    }
+
+
+def parts(law: Law) -> list[type[Law]]:
+    """The kinds of law inside `law`, from the outside in, each once."""
+    found = [type(law)]
+    for item in fields(law):
+        value = getattr(law, item.name)
+        for child in value if isinstance(value, tuple) else (value,):
+            if isinstance(child, Law):
+                found += parts(child)
+    return list(dict.fromkeys(found))
+
+
+def phenomena(law: Law) -> list[str]:
+    """The codes of everything that `law` and the laws in it show."""
+    shown = {code for part in parts(law) for code in part.facts.phenomena}
+    return [code for code in PHENOMENA if code in shown]
+
+
+def title(law: Law) -> str:
+    """The first line of the docstring."""
+    return (getdoc(type(law)) or "").partition("\n")[0].removesuffix(".")
+
+
+def instructions(law: Law) -> int:
+    """CasADi instructions for force and rate together, inputs and outputs included."""
+    v, N = ca.SX.sym("v"), ca.SX.sym("N")
+    z = ca.SX.sym("z", len(law.states))
+    both = [ca.SX(law.force(v, N, z)), ca.SX(law.rate(v, N, z))]
+    return ca.Function("law", [v, N, z], ca.cse(both)).n_instructions()
+
+
+def show_list(chosen: dict[str, Law]) -> None:
+    """All laws, their parameters and what the codes mean."""
+    output.show_table(
+        ["law", "shows", "states", "smoothness", "instr.", "formula confirmed by"],
+        [
+            (
+                name,
+                " ".join(phenomena(law)),
+                ", ".join(f"{s.name} [{s.unit}]" for s in law.states) or "-",
+                law.facts.smoothness,
+                instructions(law),
+                law.facts.confidence,
+            )
+            for name, law in chosen.items()
+        ],
+    )
+    output.show()
+    output.show_table(
+        ["law", "parameters = default [unit]"],
+        [
+            (
+                name,
+                ", ".join(
+                    f"{p.name} = {output.number(p.default)} [{p.unit}]"
+                    for p in parameters(law).values()
+                ),
+            )
+            for name, law in chosen.items()
+        ],
+    )
+    codes = "\n".join(f"  {code:<3} {meaning}" for code, meaning in PHENOMENA.items())
+    output.show(
+        f"\nshows:\n{codes}\ninstr.: CasADi instructions for force and rate together\n"
+        "Sums are written coulomb+viscous, wrappers asymmetric(lugre), load_dependent(lugre)."
+    )
+
+
+def show_law(name: str, law: Law) -> None:
+    """Docstring, facts and parameters of one law."""
+    for part in parts(law):
+        output.show_doc(getdoc(part) or "")
+    shown = ", ".join(PHENOMENA[code] for code in phenomena(law))
+    output.show(
+        f"{name} shows {shown}.\n"
+        f"Smoothness: {law.facts.smoothness}.\nFormula confirmed by: {law.facts.confidence}.\n"
+        f"Cost: {instructions(law)} CasADi instructions for force and rate.\n"
+    )
+    output.show_table(
+        ["parameter", "value", "unit", "lower", "upper", "meaning"],
+        [
+            (p.name, float(p.value), p.unit, p.lower, p.upper, p.doc)
+            for p in parameters(law).values()
+        ],
+    )

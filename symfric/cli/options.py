@@ -1,0 +1,95 @@
+"""Options that several commands share, and what their texts mean."""
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from symfric import Law, law_from_text, parameters, with_values
+from symfric.model import finite
+from symfric.parameters import check_names
+
+JsonOption = Annotated[
+    str | None,
+    typer.Option("--json", metavar="FILE|-", help="Write JSON; - prints it and nothing else."),
+]
+PlotOption = Annotated[
+    Path | None, typer.Option("--plot", metavar="FILE.png", help="Write a picture.")
+]
+LawOption = Annotated[
+    str,
+    typer.Option("--law", metavar="NAME", help="Friction law, such as lugre or coulomb+viscous."),
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter; may be repeated."),
+]
+
+
+def assignments(option: str, texts: Iterable[str] | None) -> dict[str, str]:
+    """`NAME=VALUE` texts by name.
+
+    Raises:
+        ValueError: a text without name or value, or a name given twice.
+    """
+    found: dict[str, str] = {}
+    for text in texts or ():
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not (name and equals and value):
+            raise ValueError(f"{option}: expected NAME=VALUE, got '{text}'; such as mu_s=0.2")
+        if name in found:
+            raise ValueError(f"{option}: expected every name once, got {name} twice")
+        found[name] = value
+    return found
+
+
+def numbers(option: str, texts: Iterable[str] | None) -> dict[str, float]:
+    """`NAME=NUMBER` texts by name."""
+    given = assignments(option, texts)
+    return {name: finite(f"{option} {name}", value) for name, value in given.items()}
+
+
+def law_with(text: str, settings: Iterable[str] | None) -> Law:
+    """The law that `text` names, with the parameters of `--set`."""
+    law, values = law_from_text(text), numbers("--set", settings)
+    check_names(f"--set of law {text}", values, parameters(law))
+    return with_values(law, values)
+
+
+PICTURES = (".png", ".pdf", ".svg", ".jpg")
+
+
+def check_outputs(*paths: str | Path | None, picture: Path | None = None) -> None:
+    """Refuse output places that cannot be written, before any work is spent on them.
+
+    Raises:
+        ValueError: a folder in the place of a file, a place without permission, or a kind of
+            picture that is not drawn.
+    """
+    if picture and picture.suffix.lower() not in PICTURES:
+        raise ValueError(
+            f"output '{picture}': expected a picture ending in {', '.join(PICTURES)}, "
+            f"got '{picture.suffix}'"
+        )
+    for path in (*paths, picture):
+        if path is None or str(path) == "-":
+            continue
+        target = Path(path)
+        if target.is_dir():
+            raise ValueError(f"output '{path}': expected a file name, got a folder")
+        check_folder(target.parent)
+
+
+def check_folder(folder: Path) -> None:
+    """Refuse an output folder that can neither be written nor made.
+
+    Raises:
+        ValueError: it, or the nearest folder above it, is a file or without permission.
+    """
+    existing = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not existing.is_dir():
+        raise ValueError(f"output '{folder}': expected a folder, got the file '{existing}'")
+    if not os.access(existing, os.W_OK):
+        raise ValueError(f"output '{folder}': expected a writable place, got no permission")

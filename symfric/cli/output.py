@@ -1,0 +1,111 @@
+"""What the commands print: tables and notes for people, JSON for programs."""
+
+import json
+import math
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+from rich.text import Text
+
+from symfric.files import write_text
+
+
+def number(value: float) -> str:
+    """Six significant digits; a dash for an absent bound."""
+    return f"{value:.6g}" if math.isfinite(value) else "-"
+
+
+def show_table(
+    columns: Sequence[str], rows: Iterable[Sequence[str | float]], title: str = ""
+) -> None:
+    """Print a table on standard output; numbers stand at the right."""
+    rows = [list(row) for row in rows]
+    table = Table(
+        title=Text(title) if title else None,
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        pad_edge=False,
+        show_edge=False,
+    )
+    for index, name in enumerate(columns):
+        numeric = bool(rows) and all(isinstance(row[index], int | float) for row in rows)
+        table.add_column(
+            Text(name), justify="right" if numeric else "left", no_wrap=numeric, overflow="fold"
+        )
+    for row in rows:
+        table.add_row(*(Text(c if isinstance(c, str) else number(c)) for c in row))
+    Console(highlight=False).print(table)
+
+
+def show(text: str = "") -> None:
+    """Print `text` on standard output, wrapped at the width of the terminal."""
+    Console(highlight=False, markup=False).print(text)
+
+
+def show_doc(text: str) -> None:
+    """Print a docstring: equations as they stand, sentences wrapped anew."""
+    paragraph: list[str] = []
+    for line in [*text.splitlines(), ""]:
+        kept = not line or line.startswith(" ")
+        if paragraph and (kept or line.startswith(("Limits:", "Source:"))):
+            show(" ".join(paragraph))
+            paragraph = []
+        if kept:
+            typer.echo(line)
+        else:
+            paragraph.append(line)
+
+
+@contextmanager
+def progress(text: str) -> Generator[Callable[[float], None]]:
+    """A bar on standard error where that is a terminal; takes the fraction done."""
+    console = Console(stderr=True)
+    bar = Progress(console=console, transient=True, disable=not console.is_terminal)
+    with bar:
+        task = bar.add_task(text, total=1.0)
+
+        def tell(fraction: float) -> None:
+            bar.update(task, completed=fraction)
+
+        yield tell
+
+
+def note(text: str) -> None:
+    """Say `text` on standard error, where it disturbs no result."""
+    typer.echo(text, err=True)
+
+
+def emit_json(content: Mapping[str, Any], destination: str | None) -> None:
+    """Write `content` as one JSON object to a file, or to standard output for "-"."""
+    if destination is None:
+        return
+    text = json.dumps(plain(content), indent=2, allow_nan=False, ensure_ascii=False)
+    if destination == "-":
+        typer.echo(text)
+    else:
+        write_text(destination, text + "\n")
+
+
+def say_written(*paths: str | Path | None) -> None:
+    """Name the files written, on standard error."""
+    names = [str(path) for path in paths if path is not None and str(path) != "-"]
+    if names:
+        note(f"wrote {', '.join(names)}")
+
+
+def plain(value: Any) -> Any:
+    """`value` as JSON can hold it: infinity and NaN become null."""
+    if isinstance(value, Mapping):
+        return {str(name): plain(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value

@@ -1,0 +1,192 @@
+"""`symfric run`: simulate a scene with one friction law, or compare several."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import casadi as ca
+import numpy as np
+import typer
+
+from symfric import SolveError, Trajectory, law_from_text, parameters, simulate, with_values
+from symfric.cli import output
+from symfric.cli.inputs import input_from_text
+from symfric.cli.options import (
+    JsonOption,
+    PlotOption,
+    SetOption,
+    assignments,
+    check_outputs,
+    numbers,
+)
+from symfric.integrator import Input
+from symfric.integrator.inputs import Sampled
+from symfric.parameters import check_names
+from symfric.scenes import ALL_SCENES, Scene
+
+DEFAULT_T_END = {"rabinowicz": 20.0, "drive": 4.0}
+"""Times [s] that show what the scene is about: three stick-slip periods, two reversals."""
+
+
+def sine(t: ca.SX) -> ca.SX:
+    """Force 2 sin(pi t) N: beyond the default break-away force of 1.18 N in both directions."""
+    return 2 * ca.sin(ca.pi * t)
+
+
+DEFAULT_INPUT: dict[str, tuple[str, str, Callable[[ca.SX], ca.SX]]] = {
+    "drive": ("force", "2 sin(pi t)", sine)
+}
+"""Input of a scene that is given none: name, text and function of time."""
+
+
+def run(
+    scene: Annotated[str, typer.Argument(metavar="SCENE", help="rabinowicz or drive.")],
+    law: Annotated[
+        list[str],
+        typer.Option("--law", metavar="NAME", help="Friction law; repeat it to compare several."),
+    ],
+    settings: SetOption = None,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--input",
+            metavar="NAME=VALUE",
+            help="Input: a number, or FILE.csv:COLUMN over its column t. "
+            "The drive's default is force = 2 sin(pi t) N.",
+        ),
+    ] = None,
+    x0: Annotated[
+        list[str] | None,
+        typer.Option("--x0", metavar="NAME=VALUE", help="Start value of a state."),
+    ] = None,
+    t_end: Annotated[
+        float | None,
+        typer.Option(
+            "--t-end", help="Last time [s]; default 20 (rabinowicz), 4 or the last sample (drive)."
+        ),
+    ] = None,
+    rtol: Annotated[float, typer.Option("--rtol", help="Relative tolerance of a step.")] = 1e-6,
+    method: Annotated[
+        str, typer.Option("--method", help="rodas5p, rodas4p or rodas3.")
+    ] = "rodas5p",
+    backend: Annotated[
+        str,
+        typer.Option("--backend", help="auto, vm, compiled, or CasADi's rosenbrock, sundials."),
+    ] = "auto",
+    samples: Annotated[
+        int, typer.Option("--samples", help="Number of equally spaced times of the result.")
+    ] = 2001,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE.csv", help="Write the signals.")
+    ] = None,
+    plot: PlotOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Simulate SCENE with a friction law; --set takes parameters of both.
+
+    Example: symfric run rabinowicz --law lugre --set mu_s=0.2 --plot stick_slip.png
+    """
+    check_names("scene", [scene], ALL_SCENES)
+    if len(law) > 1 and (out or json):
+        raise ValueError(
+            f"--out and --json: expected one --law, got {len(law)}; compare several with --plot"
+        )
+    check_outputs(out, json, picture=plot)
+    machines = scenes_with(scene, law, numbers("--set", settings))
+    signals, described = _inputs(scene, inputs)
+    until = _default_t_end(scene, signals) if t_end is None else t_end
+    start = numbers("--x0", x0)
+    found: dict[str, Trajectory] = {}
+    for name, machine in machines.items():
+        with output.progress(f"{scene} with {name}") as tell:
+            found[name] = simulate(
+                machine.model(),
+                until,
+                x0=start,
+                u=signals,
+                rtol=rtol,
+                method=method,
+                backend=backend,
+                samples=samples,
+                progress=tell,
+                throw=False,
+            )
+    if out:
+        next(iter(found.values())).to_csv(out)
+    if plot:
+        from symfric.plotting import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
+
+        plot_trajectories(found, path=plot)
+    for name, trajectory in found.items():
+        output.emit_json(to_dict(name, machines[name], trajectory) | {"inputs": described}, json)
+        if json != "-":
+            show_trajectory(name, trajectory)
+    output.say_written(out, plot, json)
+    for trajectory in found.values():
+        if not trajectory.status.ok:
+            raise SolveError(trajectory.message, trajectory.status, trajectory)
+
+
+def scenes_with(scene: str, laws: list[str], values: dict[str, float]) -> dict[str, Scene]:
+    """The scene with each of the laws by name, parameters set wherever they occur.
+
+    Raises:
+        ValueError: unknown law, a law given twice, a parameter that none of the scenes has.
+    """
+    if len(set(laws)) != len(laws):
+        raise ValueError(f"--law: expected every law once, got {', '.join(laws)}")
+    machines = {text: ALL_SCENES[scene](law_from_text(text)) for text in laws}
+    known = {text: parameters(machine) for text, machine in machines.items()}
+    check_names(f"--set of {scene}", values, {n: None for names in known.values() for n in names})
+    return {
+        text: with_values(machine, {n: v for n, v in values.items() if n in known[text]})
+        for text, machine in machines.items()
+    }
+
+
+def _inputs(scene: str, texts: list[str] | None) -> tuple[dict[str, Input], dict[str, str]]:
+    """Inputs by name, and the texts that describe them."""
+    given = assignments("--input", texts)
+    signals = {name: input_from_text(name, text) for name, text in given.items()}
+    if not given and scene in DEFAULT_INPUT:
+        name, text, function = DEFAULT_INPUT[scene]
+        return {name: function}, {name: text}
+    return signals, given
+
+
+def _default_t_end(scene: str, signals: dict[str, Input]) -> float:
+    """The last sample of the inputs, else what shows the scene."""
+    ends = [float(np.max(s.t)) for s in signals.values() if isinstance(s, Sampled)]
+    return max(ends, default=DEFAULT_T_END[scene])
+
+
+def to_dict(law: str, scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
+    """What `--json` holds."""
+    return {
+        "scene": trajectory.scene,
+        "law": law,
+        "parameters": {name: p.value for name, p in parameters(scene).items()},
+        "status": trajectory.status.name,
+        "message": trajectory.message,
+        "statistics": trajectory.statistics.to_dict(),
+        "t_end": float(trajectory.t[-1]),
+        "final": trajectory.final,
+    }
+
+
+def show_trajectory(law: str, trajectory: Trajectory) -> None:
+    """Print the range of every signal, how the simulation ended and what it cost."""
+    s = trajectory.statistics
+    output.show_table(
+        ["signal", "final", "least", "greatest", "unit"],
+        [
+            (name, float(y[-1]), float(y.min()), float(y.max()), trajectory.units[name])
+            for name, y in trajectory.signals.items()
+        ],
+        title=f"{trajectory.scene} with {law}, 0 ... {trajectory.t[-1]:g} s",
+    )
+    output.show(
+        f"{trajectory.message}\n{s.method} ({s.backend}): {s.steps} steps, "
+        f"{s.rejections} rejected, built in {s.build_time + s.compile_time:.2f} s, "
+        f"run in {s.run_time:.2f} s\n"
+    )
