@@ -42,7 +42,7 @@ class Coordinates:
     low_of: dict[int, ca.SX]
 
     def values(self, w: Array) -> Array:
-        """p at w, shape (n,)."""
+        """The parameters at w, shape (n,)."""
         return np.asarray(ca.Function("p", [self.w], [self.p])(w).full()).ravel()
 
     def slope(self, w: Array) -> Array:
@@ -51,7 +51,7 @@ class Coordinates:
         return np.asarray(found.full())
 
     def of(self, values: Mapping[str, float]) -> Array:
-        """w of parameters by name, moved inside the bounds."""
+        """Coordinates of parameters by name, moved inside the bounds."""
         p = np.array([values[name] for name in self.names])
         symbols = self.model.vector("p")
         w = np.empty(p.size)

@@ -8,6 +8,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from identification.filters import Filter
 from identification.loop import PositionLoop
 from symfric.files import written
 
@@ -34,6 +35,7 @@ class Dataset:
         force: measured or commanded driving force [N], shape (n,).
         v: measured velocity [m/s], shape (n,), or None: it is then taken from the position.
         loop: the position controller of the experiment, where it is known.
+        filter: the filter this record is best used with; None lets the data choose.
         benchmark: name of the public benchmark this is, or "".
         first_row: row of the first sample in its file, for messages; 0 counts samples instead.
 
@@ -48,6 +50,7 @@ class Dataset:
     force: Array
     v: Array | None = None
     loop: PositionLoop | None = None
+    filter: Filter | None = None
     benchmark: str = ""
     first_row: int = 0
 
@@ -106,7 +109,7 @@ class Dataset:
         return float(self.t[-1] - self.t[0]) / (self.t.size - 1)
 
     def uniform(self) -> "Dataset":
-        """This record, if its samples are equally spaced to 1 % of the interval.
+        """The record itself, if its samples are equally spaced to 1 % of the interval.
 
         Raises:
             ValueError: they are not. Filters and differences need equal intervals, and whether
@@ -142,6 +145,7 @@ class Dataset:
             force=np.interp(t, self.t, self.force),
             v=None if self.v is None else _hermite(t, self.t, self.v),
             loop=None,
+            filter=None,
             first_row=0,
         )
 

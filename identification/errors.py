@@ -64,19 +64,21 @@ def predicted_force(drive: Drive, v: Array, a: Array) -> Array:
 
 def residual_force(drive: Drive, signals: Signals) -> Array:
     """Measured minus predicted force of the decimated equations [N]."""
-    return signals.decimation(signals.force - predicted_force(drive, signals.v, signals.a))
+    return signals.equations(signals.force - predicted_force(drive, signals.v, signals.a))
 
 
 def evaluate(drive: Drive, data: Dataset, filter: Filter) -> Errors:
     """Force, open-loop and, where the controller is known, closed-loop errors on `data`."""
     signals = differentiate(data, filter)
     error = residual_force(drive, signals)
-    force = signals.decimated["force"]
+    force = signals.equations(signals.force)
     return Errors(
         data=data.name,
         force_relative=_relative(force, error),
         force_rms=float(np.sqrt(np.mean(error**2))),
-        position_rms=float(np.sqrt(np.mean((simulated(drive, data, filter) - data.x)[LEFT_OUT:] ** 2))),
+        position_rms=float(
+            np.sqrt(np.mean((simulated(drive, data, filter) - data.x)[LEFT_OUT:] ** 2))
+        ),
         closed_loop=None if data.loop is None else _closed_loop_errors(drive, data, filter),
     )
 

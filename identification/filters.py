@@ -8,7 +8,7 @@ Source: Gautier, Janot and Vandanjon, IEEE Trans. Control Syst. Technol. 21(2), 
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil, floor, log10
-from typing import final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
@@ -32,11 +32,14 @@ class Filter:
             is 1/2, since the filter runs forward and backward.
         decimation: every this many samples one equation, after a low pass on all its terms.
         order: order of the Butterworth filter.
+        v_min: equations near samples slower than this are left out [m/s]. Filtering blurs the
+            switch of friction at standstill, which a static law does not describe anyway.
     """
 
     cutoff: float
     decimation: int = 1
     order: int = 4
+    v_min: float = 0.0
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.cutoff) and self.cutoff > 0):
@@ -44,6 +47,8 @@ class Filter:
         for name, value in (("decimation", self.decimation), ("order", self.order)):
             if value < 1 or value != int(value):
                 raise ValueError(f"Filter: {name}: expected a whole number >= 1, got {value}")
+        if not (np.isfinite(self.v_min) and self.v_min >= 0):
+            raise ValueError(f"Filter: v_min: expected a speed >= 0 [m/s], got {self.v_min}")
 
     def trim(self, step: float) -> int:
         """Samples to leave out at each end, where reflection and differences are not the data."""
@@ -114,10 +119,10 @@ class Decimation:
         """Number of values left; zero when the window is longer than the data."""
         return max(0, (self.samples - self.taps.size) // self.factor + 1)
 
-    def centres(self, times: Array) -> Array:
-        """The times the rows belong to."""
+    def centres(self, samples: NDArray[Any]) -> NDArray[Any]:
+        """The samples in the middle of the rows, shape (rows,)."""
         half = self.taps.size // 2
-        return times[half : half + self.rows * self.factor : self.factor]
+        return samples[half : half + self.rows * self.factor : self.factor]
 
     def __call__(self, signal: Array) -> Array:
         """D applied to `signal`, shape (samples,)."""
@@ -133,11 +138,17 @@ class Decimation:
         return ca.DM.triplet(row.tolist(), column.tolist(), weights, self.rows, self.samples)
 
 
-def bandwidth(force: Array, step: float, share: float = 0.99) -> float:
-    """Frequency [Hz] below which `share` of the variance of `force` lies."""
+def bandwidth(force: Array, step: float, share: float = 0.999) -> float:
+    """Frequency [Hz] below which `share` of the variance of `force` lies, white noise apart.
+
+    The level of the noise is taken from the upper half of the spectrum (a median, so that lines
+    do not count; the power of white noise has the median ln 2 times its mean).
+    """
     power = np.abs(np.fft.rfft(force - force.mean())) ** 2
     frequency = np.fft.rfftfreq(force.size, step)
-    return float(frequency[np.searchsorted(np.cumsum(power), share * power.sum())])
+    noise = np.median(power[frequency > 0.25 / step]) / np.log(2)
+    total = np.cumsum(power - noise)
+    return float(frequency[np.argmax(total >= share * total.max())])
 
 
 def choose_filter(force: Array, step: float, rows: int = 100) -> Filter:
@@ -145,8 +156,8 @@ def choose_filter(force: Array, step: float, rows: int = 100) -> Filter:
 
         cut-off 5 f_b (at most half the Nyquist frequency), decimation 0.8 Nyquist / (2 f_b)
 
-    f_b is rounded to one digit. The factors are those of the EMPS reference (f_b = 20 Hz at
-    1 kHz: 100 Hz, 10). The decimation leaves at least `rows` equations where it can.
+    f_b is rounded to one digit. The factors are those of the EMPS reference (there
+    f_b = 20 Hz by hand). The decimation leaves at least `rows` equations where it can.
     """
     nyquist = 0.5 / step
     found = max(bandwidth(force, step), 1 / (force.size * step))

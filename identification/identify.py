@@ -75,17 +75,17 @@ def identify(
     """
     if folds < 0 or folds == 1:
         raise ValueError(f"identify: folds: expected 0 or at least 2, got {folds}")
-    tell = progress or (lambda text, fraction: None)
+    tell = progress or _silent
     law = law_from_text(law) if isinstance(law, str) else law
     signals = differentiate(data, filter)
     v_max = float(np.abs(signals.v).max())
     choice = choose(law, v_max, finite("identify: normal_force", normal_force), free, fixed)
     if not choice.free:
         raise ValueError("identify: expected at least one free parameter, got all fixed")
-    if signals.decimation.rows < 3 * len(choice.free):
+    if signals.kept.size < 3 * len(choice.free):
         raise ValueError(
             f"data '{data.name}': expected at least {3 * len(choice.free)} equations for "
-            f"{len(choice.free)} parameters, got {signals.decimation.rows}; lower the decimation"
+            f"{len(choice.free)} parameters, got {signals.kept.size}; lower the decimation"
         )
     tell("start values", 0.1)
     linear = linear_regression(signals)
@@ -129,6 +129,11 @@ def identify(
     return result
 
 
+def _silent(text: str, fraction: float) -> None:
+    """No progress shown."""
+    del text, fraction
+
+
 def _values(task: Problem, w: Array) -> dict[str, float]:
     values = task.coordinates.values(w).tolist()
     return dict(zip(task.coordinates.names, values, strict=True))
@@ -163,7 +168,7 @@ def _estimates(
 
 def _cross_validation(task: Problem, fit: Fit, signals: Signals, folds: int) -> dict[str, float]:
     """Force errors on each of `folds` pieces with parameters fitted to the others."""
-    force = signals.decimated["force"]
+    force = signals.equations(signals.force)
     pieces = np.array_split(np.arange(task.rows), folds)
     error = np.zeros(task.rows)
     for piece in pieces:

@@ -7,10 +7,13 @@ from typing import Any
 import numpy as np
 
 from identification.data import Array, Dataset
+from identification.filters import Filter
 from identification.loop import PositionLoop
 
 EMPS = ("t", "qm", "vir", "gtau")
 """Variables that tell an EMPS file."""
+EMPS_FILTER = Filter(cutoff=100.0, decimation=10)
+"""The published cut-off and decimation, so that force errors compare with the published ones."""
 
 
 def read_mat(file: Path, names: Mapping[str, tuple[str, ...]]) -> Dataset:
@@ -29,9 +32,8 @@ def read_mat(file: Path, names: Mapping[str, tuple[str, ...]]) -> Dataset:
             f"read '{file.name}': expected variables {', '.join(missing)}, got "
             f"{', '.join(sorted(variables)) or 'none'}; name them with columns="
         )
-    return Dataset(
-        file.name, **{key: _vector(file.name, variables, hit[0]) for key, hit in found.items() if hit}
-    )
+    signals = {k: _vector(file.name, variables, hit[0]) for k, hit in found.items() if hit}
+    return Dataset(file.name, signals["t"], signals["x"], signals["force"], signals.get("v"))
 
 
 def _load(file: Path) -> dict[str, Any]:
@@ -80,4 +82,4 @@ def _emps(where: str, variables: Mapping[str, Any]) -> Dataset:
             reference=_vector(where, variables, "qg"),
             disturbance=_vector(where, variables, "pulses_N") if pulses else np.zeros(t.size),
         )
-    return Dataset(where, t, x, gain * command, loop=loop, benchmark="EMPS")
+    return Dataset(where, t, x, gain * command, loop=loop, filter=EMPS_FILTER, benchmark="EMPS")

@@ -90,10 +90,10 @@ def problem(coordinates: Coordinates, signals: Signals, scale: float) -> Problem
     model, w = coordinates.model, coordinates.w
     motion = ca.vertcat(model.x[1].symbol, model.xdot[1])
     f = ca.substitute(inverse_force(model), model.vector("p"), coordinates.p)
-    n, D = signals.v.size, signals.decimation.matrix
+    n, D = signals.v.size, signals.matrix
     rows = D.shape[0]
     known = ca.DM(np.vstack([signals.v, signals.a]))
-    measured = ca.DM(signals.decimation(signals.force))
+    measured = ca.DM(signals.equations(signals.force))
 
     W, c = ca.MX.sym("W", w.numel()), ca.MX.sym("c", rows)
     force = ca.Function("force", [motion, w], [f]).map("forces", "serial", n, [1], [])

@@ -78,7 +78,9 @@ def _read_csv(file: Path, columns: Mapping[str, str]) -> Dataset:
             problems.append(f"column '{header[index]}', {bad}")
     if problems:
         raise ValueError(f"read '{file.name}': " + "; ".join(problems))
-    return Dataset(file.name, first_row=rows[1][0] if len(rows) > 1 else 0, **values)
+    first = rows[1][0] if len(rows) > 1 else 0
+    x, force, v = values["x"], values["force"], values.get("v")
+    return Dataset(file.name, values["t"], x, force, v, first_row=first)
 
 
 def _rows(file: Path) -> list[tuple[int, list[str]]]:

@@ -11,6 +11,7 @@ from typing import final
 import numpy as np
 
 from identification.data import Array
+from identification.precision import precision
 from identification.signals import Signals
 
 
@@ -21,13 +22,14 @@ class LinearFit:
 
     Attributes:
         values: m [kg], F_v [N s/m], F_c [N], offset [N]; with directions F_v_pos, F_v_neg, ...
-        standard_errors: of the same names; they assume residuals that are white after decimation.
+        standard_errors: of the same names, for residuals that are white after decimation; None
+            where the data cannot tell the value.
         force_relative: norm of the force error over norm of the force [%].
         force_rms: root mean square force error [N].
     """
 
     values: dict[str, float]
-    standard_errors: dict[str, float]
+    standard_errors: dict[str, float | None]
     force_relative: float
     force_rms: float
 
@@ -39,8 +41,8 @@ def linear_regression(signals: Signals, directions: bool = False) -> LinearFit:
         signals: differentiated record.
         directions: separate F_v and F_c for the two directions, and no offset.
 
-    Raises:
-        ValueError: columns that depend on each other, as when the drive moves one way only.
+    A drive that moves one way only cannot tell Coulomb friction from an offset: the smallest values
+    that fit are returned, without standard errors.
     """
     v, a = signals.v, signals.a
     sign = np.sign(v)
@@ -50,21 +52,14 @@ def linear_regression(signals: Signals, directions: bool = False) -> LinearFit:
             columns |= {f"F_v_{side}": v * mask, f"F_c_{side}": sign * mask}
     else:
         columns |= {"F_v": v, "F_c": sign, "offset": np.ones_like(v)}
-    X = np.column_stack([signals.decimation(column) for column in columns.values()])
-    y = signals.decimation(signals.force)
-    scale = np.linalg.norm(X, axis=0)
-    rank = np.linalg.matrix_rank(X / np.where(scale > 0, scale, 1.0), tol=1e-8)
-    if rank < X.shape[1]:
-        raise ValueError(
-            f"data '{signals.name}': expected independent motion in both directions, got rank "
-            f"{rank} for {', '.join(columns)}; the drive must accelerate and move both ways"
-        )
+    X = np.column_stack([signals.equations(column) for column in columns.values()])
+    y = signals.equations(signals.force)
     values = np.linalg.lstsq(X, y, rcond=None)[0]
     error = y - X @ values
-    spread = error.std(ddof=X.shape[1]) * np.sqrt(np.diag(np.linalg.inv(X.T @ X)))
+    spread = precision(X, error, np.zeros(len(columns), dtype=bool)).standard_errors
     return LinearFit(
         dict(zip(columns, values.tolist(), strict=True)),
-        dict(zip(columns, spread.tolist(), strict=True)),
+        {n: float(e) if np.isfinite(e) else None for n, e in zip(columns, spread, strict=True)},
         100 * float(np.linalg.norm(error) / np.linalg.norm(y)),
         float(np.sqrt(np.mean(error**2))),
     )

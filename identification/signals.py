@@ -4,6 +4,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import final
 
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
 from identification.data import Array, Dataset
 from identification.filters import Decimation, Filter, central_difference, choose_filter, lowpass
 
@@ -17,7 +21,6 @@ class Signals:
         name: of the record.
         t, x, v, a: time [s], filtered position [m], velocity [m/s], acceleration [m/s^2].
         force: measured force [N], as measured.
-        decimation: turns any of these into equations.
         filter: what was used.
     """
 
@@ -27,20 +30,39 @@ class Signals:
     v: Array
     a: Array
     force: Array
-    decimation: Decimation
     filter: Filter
 
     @cached_property
-    def decimated(self) -> "dict[str, Array]":
-        """Times and thinned v, a, force of the equations."""
-        signals = {"v": self.v, "a": self.a, "force": self.force}
-        thinned = {name: self.decimation(values) for name, values in signals.items()}
-        return {"t": self.decimation.centres(self.t), **thinned}
+    def decimation(self) -> Decimation:
+        """The low pass that thins samples to equations."""
+        return Decimation(self.t.size, self.filter.decimation)
+
+    @cached_property
+    def kept(self) -> NDArray[np.int64]:
+        """Rows of the decimation that are used: those two rows or more away from |v| < v_min."""
+        slow = (np.abs(self.v) < self.filter.v_min).astype(float)
+        reach = np.ones(4 * self.filter.decimation + 1)
+        touched = np.convolve(slow, reach, mode="same") > 0.5
+        return np.flatnonzero(~self.decimation.centres(touched))
+
+    def equations(self, signal: Array) -> Array:
+        """`signal` thinned to the equations in use, shape (rows,)."""
+        return self.decimation(signal)[self.kept]
+
+    @cached_property
+    def matrix(self) -> ca.DM:
+        """The same as a sparse matrix, shape (rows, samples)."""
+        return self.decimation.matrix[self.kept.tolist(), :]
+
+    @property
+    def times(self) -> Array:
+        """Times of the equations [s]."""
+        return self.decimation.centres(self.t)[self.kept]
 
 
 def filter_of(data: Dataset) -> Filter:
-    """The filter chosen from the force of `data`."""
-    return choose_filter(data.force, data.uniform().step)
+    """The filter `data` comes with, or the one chosen from its force."""
+    return data.filter or choose_filter(data.force, data.uniform().step)
 
 
 def differentiate(data: Dataset, filter: Filter | None = None) -> Signals:
@@ -51,7 +73,7 @@ def differentiate(data: Dataset, filter: Filter | None = None) -> Signals:
 
     Args:
         data: equally spaced samples.
-        filter: cut-off and decimation; chosen from the data if none is given.
+        filter: cut-off and decimation; `filter_of(data)` if none is given.
 
     Raises:
         ValueError: unequal intervals, a cut-off above the Nyquist frequency, too short a record.
@@ -66,13 +88,14 @@ def differentiate(data: Dataset, filter: Filter | None = None) -> Signals:
     )
     a = central_difference(v, step)
     cut = chosen.trim(step)
-    inside = slice(cut, data.t.size - cut)
-    decimation = Decimation(max(0, data.t.size - 2 * cut), chosen.decimation)
-    if decimation.rows < 10:
+    inside = slice(cut, max(cut, data.t.size - cut))
+    signals = Signals(
+        data.name, data.t[inside], x[inside], v[inside], a[inside], data.force[inside], chosen
+    )
+    if signals.decimation.rows == 0 or signals.kept.size < 10:
         raise ValueError(
             f"data '{data.name}': expected enough samples for the filter ({chosen.cutoff:g} Hz, "
-            f"decimation {chosen.decimation}), got {data.t.size} samples for {decimation.rows} "
-            "equations; raise the cut-off or lower the decimation"
+            f"decimation {chosen.decimation}, v_min {chosen.v_min:g} m/s), got {data.t.size}; "
+            "raise the cut-off, lower the decimation or v_min"
         )
-    columns = (data.t, x, v, a, data.force)
-    return Signals(data.name, *(c[inside] for c in columns), decimation, chosen)
+    return signals

@@ -110,7 +110,7 @@ def open_loop(model: Model, force: Array, step: float, x0: float, v0: float) -> 
 def motion_of(states: Array, force: Array, step: float) -> Motion:
     """A `Motion` from states (x, v) at n + 1 samples and the n forces held between them."""
     return Motion(
-        t=step * np.arange(force.size),
+        t=np.arange(force.size, dtype=float) * step,
         x=states[0, :-1],
         v=states[1, :-1],
         a=np.diff(states[1]) / step,

@@ -46,7 +46,7 @@ def synthetic_drive_data(
     normal_force: float = 1.0,
     speeds: Sequence[float] = SPEEDS,
     dwell: float = 0.6,
-    ramp: float = 0.15,
+    ramp: float = 0.25,
     rate: float = 1000.0,
     position_noise: float = 1e-7,
     force_noise: float = 0.5,
@@ -55,7 +55,9 @@ def synthetic_drive_data(
     """A record of a drive moved back and forth by its position controller, with noise.
 
     The controller is that of `PositionLoop` with a bandwidth of 5 Hz in position and 40 Hz in
-    velocity. White Gaussian noise is added to the finished record; it does not enter the loop.
+    velocity. Its force is held between the samples; the record has the mean of the two forces that
+    meet at a sample, as a force sensor sees it. White Gaussian noise is added to the finished
+    record; it does not enter the loop.
 
     Args:
         law: a static friction law; default Stribeck with 28 N static and 20 N dynamic friction.
@@ -84,11 +86,12 @@ def synthetic_drive_data(
         disturbance=np.zeros(reference.size),
     )
     motion = closed_loop(drive.model(), loop, 1 / rate, 0.0)
+    mean = np.append(motion.force[0], (motion.force[1:] + motion.force[:-1]) / 2)
     noise = np.random.default_rng(seed)
     return Dataset(
         f"synthetic drive, seed {seed}",
         motion.t,
         motion.x + position_noise * noise.standard_normal(motion.x.size),
-        motion.force + force_noise * noise.standard_normal(motion.x.size),
+        mean + force_noise * noise.standard_normal(motion.x.size),
         loop=loop,
     )
