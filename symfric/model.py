@@ -124,7 +124,8 @@ class Model:
         elif self.residual.numel() != nx + nz:
             problems.append(f"residual: expected {nx + nz} rows, got {self.residual.numel()}")
         declared = {e.__hash__() for e in ca.symvar(self._symbols())}
-        expressions = [self.residual, *(ca.SX(o.expression) for o in self.outputs.values())]
+        equations = self.residual if self.ode is None else ca.veccat(self.ode, self.alg)
+        expressions = [equations, *(ca.SX(o.expression) for o in self.outputs.values())]
         expressions += [ca.SX(m.expression) for m in self.monitors]
         for event in self.events:
             expressions += map(ca.SX, (event.expression, *event.reset.values()))
@@ -238,36 +239,64 @@ class Model:
         """
         if not given and not p:
             return self._default_state.copy()
+        return self._checked(self._start(*self._start_arguments(given, p)))
+
+    def _checked(self, start: ca.DM) -> NDArray[np.float64]:
+        named = zip(self.x, start.full().ravel().tolist(), strict=True)
+        return np.array([finite(f"{self.name}.{v.name}", x) for v, x in named], float)
+
+    def initial_states(
+        self,
+        given: Mapping[str, NDArray[np.float64]],
+        p: Mapping[str, NDArray[np.float64]],
+        count: int,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Start values (count, nx) and parameters (count, n_p) of many members at once."""
+        check_names(f"model '{self.name}' x0", given, [v.name for v in self.x])
+        check_names(f"model '{self.name}' p", p, [v.name for v in self.p])
+        parameters = np.tile(self.values("p")[:, None], (1, count))
+        for i, v in enumerate(self.p):
+            parameters[i] = p.get(v.name, parameters[i])
+        known = np.zeros((len(self.x), count))
+        chosen = np.array([float(v.name in given) for v in self.x])
+        for i, v in enumerate(self.x):
+            known[i] = given.get(v.name, known[i])
+        every = np.tile(chosen[:, None], (1, count))
+        inputs = np.tile(self.values("u")[:, None], (1, count))
+        start = self._start.map(count)(known, every, inputs, parameters).full()
+        return start.T, parameters.T
+
+    def start_by_parameters(
+        self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None
+    ) -> NDArray[np.float64]:
+        """Derivative of `initial_state` with respect to p, shape (nx, n_p)."""
+        jacobian = self._start.factory("by_p", ["known", "chosen", "u", "p"], ["jac:x:p"])
+        return jacobian(*self._start_arguments(given, p)).full()
+
+    def _start_arguments(
+        self, given: Mapping[str, float] | None, p: Mapping[str, float] | None
+    ) -> tuple[NDArray[np.float64], ...]:
         given = {name: finite(f"{self.name}.{name}", x) for name, x in (given or {}).items()}
         check_names(f"model '{self.name}' x0", given, [v.name for v in self.x])
-        return self._evaluate_start(given, p)
+        known = np.array([given.get(v.name, 0.0) for v in self.x])
+        chosen = np.array([float(v.name in given) for v in self.x])
+        return known, chosen, self.values("u"), self.values("p", p)
 
     @cached_property
     def _default_state(self) -> NDArray[np.float64]:
-        return self._evaluate_start({}, None)
-
-    def _evaluate_start(
-        self, given: Mapping[str, float], p: Mapping[str, float] | None
-    ) -> NDArray[np.float64]:
-        known = np.array([given.get(v.name, 0.0) for v in self.x])
-        chosen = np.array([float(v.name in given) for v in self.x])
-        arguments = (known, chosen, self.values("u"), self.values("p", p))
-        numbers = self._start(*arguments).full().ravel()
-        named = zip(self.x, numbers, strict=True)
-        return np.array([finite(f"{self.name}.{v.name}", x) for v, x in named], float)
+        return self._checked(self._start(*self._start_arguments(None, None)))
 
     @cached_property
     def _start(self) -> ca.Function:
         """Start values as a Function of (values given, which are given, u, p)."""
         n, x = len(self.x), self.vector("x")
         known, chosen = ca.SX.sym("known", n), ca.SX.sym("chosen", n)
-        rows = [
-            ca.if_else(chosen[i], known[i], variable.start) for i, variable in enumerate(self.x)
-        ]
+        rows = [ca.if_else(chosen[i], known[i], v.start) for i, v in enumerate(self.x)]
         values = ca.vertcat(ca.SX(0, 1), *rows)
         for _ in range(2):
             values = ca.substitute(values, x, values)
-        return ca.Function("start", [known, chosen, self.vector("u"), self.vector("p")], [values])
+        arguments = [known, chosen, self.vector("u"), self.vector("p")]
+        return ca.Function("start", arguments, [values], ["known", "chosen", "u", "p"], ["x"])
 
 
 def finite(where: str, value: Any) -> float:

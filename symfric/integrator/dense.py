@@ -63,13 +63,12 @@ def from_records(records: Array, n: int, slope: ca.Function | None, d: Array) ->
     k = records.shape[0]
     t0, t1 = records[:, 0].copy(), records[:, 1].copy()
     y0, y1 = records[:, 2 : 2 + n].copy(), records[:, 2 + n : 2 + 2 * n].copy()
-    D = records[:, 2 + 2 * n :].reshape(k, -1, n).copy()
-    if slope is not None and k:
-        both = slope.map(2 * k)(np.vstack([y0, y1]).T, np.tile(d[:, None], (1, 2 * k))).full()
-        h, rise = (t1 - t0)[:, None], y1 - y0
-        first = h * both[:, :k].T - rise
-        D = np.stack([first, rise - h * both[:, k:].T - first], axis=1)
-    return Dense(t0, t1, y0, y1, D)
+    if slope is None or not k:
+        return Dense(t0, t1, y0, y1, records[:, 2 + 2 * n :].reshape(k, -1, n).copy())
+    both = slope.map(2 * k)(np.vstack([y0, y1]).T, np.tile(d[:, None], (1, 2 * k))).full()
+    h, rise = (t1 - t0)[:, None], y1 - y0
+    first = h * both[:, :k].T - rise
+    return Dense(t0, t1, y0, y1, np.stack([first, rise - h * both[:, k:].T - first], axis=1))
 
 
 def join(pieces: list[Dense]) -> Dense:

@@ -106,7 +106,7 @@ def drivers(
 ) -> Drivers:
     """Collect the inputs `given` by name; the others keep their start value.
 
-    Only sampled inputs add intervals and data; constants and expressions go into the equations.
+    Numbers and samples become data, expressions go into the equations.
 
     Raises:
         ValueError: unknown name or a value of another kind.
@@ -126,6 +126,9 @@ def drivers(
     key: list[object] = []
     for variable in model.u:
         signal = given.get(variable.name, variable.start)
+        if not callable(signal) and not isinstance(signal, Sampled):
+            # a number is data too: another value must not mean another integrator
+            signal = Hold([t_start], [finite(f"input '{variable.name}'", signal)])
         if isinstance(signal, Sampled):
             c, slope = ca.SX.sym(f"{variable.name}_k"), ca.SX.sym(f"{variable.name}_dot")
             value, rise = signal.coefficients(breaks)
@@ -136,12 +139,9 @@ def drivers(
                 symbols, values = [*symbols, slope], [*values, rise]
             else:
                 rows.append(c)
-        elif callable(signal):
+        else:
             rows.append(ca.SX(signal(model.t)))
             key.append(signal)
-        else:
-            rows.append(ca.SX(finite(f"input '{variable.name}'", signal)))
-            key.append(float(signal))
     expression = ca.vertcat(ca.SX(0, 1), *rows)
     if ca.depends_on(expression, start):
         symbols, values = [*symbols, start], [*values, breaks[:-1]]

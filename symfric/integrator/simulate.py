@@ -1,7 +1,7 @@
 """Simulate a model: one call for every method and backend."""
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from time import perf_counter
 from weakref import WeakKeyDictionary
@@ -9,6 +9,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from symfric.integrator import sensitivity
 from symfric.integrator.casadi_backend import integrate_by_peer
 from symfric.integrator.dense import Dense
 from symfric.integrator.inputs import Drivers, Input, drivers
@@ -18,12 +19,15 @@ from symfric.integrator.tableaux import ROSENBROCK
 from symfric.integrator.trajectory import Statistics, Trajectory
 from symfric.model import Model, finite
 from symfric.parameters import check_names
-from symfric.status import SolveError
+from symfric.status import SolveError, Status
 
 Array = NDArray[np.float64]
 LOOSE = 1e-5
 """Above this relative tolerance whole stick phases may be lost without a sign of it."""
-BACKENDS = ("auto", "vm", "compiled", "rosenbrock", "sundials")
+PEERS = ("rosenbrock", "sundials")
+BACKENDS = ("auto", "vm", "compiled", *PEERS)
+REMEMBERED = 16
+"""Integrators kept per model; the oldest goes first."""
 _BUILT: WeakKeyDictionary[Model, dict[object, Integrator]] = WeakKeyDictionary()
 
 
@@ -43,6 +47,7 @@ def simulate(
     backend: str = "auto",
     event_tolerance: float = 1e-10,
     max_steps: int = 10_000_000,
+    sensitivities: Sequence[str] = (),
     measure_error: bool = False,
     progress: Callable[[float], None] | None = None,
     throw: bool = True,
@@ -67,6 +72,8 @@ def simulate(
             predicted to pay; "rosenbrock" and "sundials" are CasADi's own integrators.
         event_tolerance: how sharply events are located [s].
         max_steps: attempts allowed.
+        sensitivities: free parameters by name and start values as "x0.v"; the trajectory then
+            holds the derivatives of all signals, exact for the steps that were taken.
         measure_error: run again at rtol/100 and report the difference in the statistics.
         progress: called with the fraction done every few tens of milliseconds.
         throw: raise `SolveError` on failure; with False the partial trajectory is returned.
@@ -83,30 +90,60 @@ def simulate(
     """
     _check(t_start, t_end, rtol, method, backend)
     times = _times(t_start, t_end, t_eval, samples)
-    built = perf_counter()
+    begin = perf_counter()
     inputs = drivers(model, u, float(t_start), float(t_end))
     integrator, fresh = _integrator(model, inputs, method)
-    build_time = perf_counter() - built if fresh else 0.0
-    tolerances = Tolerances(
-        rtol,
-        (0.1 * rtol if atol is None else atol) * integrator.system.nominal,
-        event_tolerance,
-        max_steps,
-    )
+    build_time = perf_counter() - begin if fresh else 0.0
+    seeds = sensitivity.seeds(model, sensitivities) if sensitivities else None
+    relative = 0.1 * rtol if atol is None else atol
+    tolerances = Tolerances(rtol, relative * integrator.system.nominal, event_tolerance, max_steps)
     y0, values = _start(integrator, model, x0, p, t_start), model.values("p", p)
+    run, dense, statistics = _solve(
+        integrator, inputs, y0, values, times, tolerances, backend, progress
+    )
+    trajectory = _trajectory(
+        integrator, inputs, run, dense, values, times, replace(statistics, build_time=build_time)
+    )
+    if throw and not trajectory.status.ok and trajectory.status is not Status.INTERRUPTED:
+        raise SolveError(trajectory.message, trajectory.status, trajectory)
+    if seeds is not None:
+        by_p = model.start_by_parameters(x0, p)
+        trajectory = _differentiated(integrator, seeds, trajectory, dense, by_p, inputs, values)
+    if measure_error and trajectory.status.ok:
+        finer = simulate(
+            model, t_end, t_start=t_start, x0=x0, u=u, p=p, rtol=max(rtol / 100, 1e-13),
+            t_eval=trajectory.t, method=method, backend=backend,
+        )  # fmt: skip
+        error = _difference(model, trajectory, finer)
+        trajectory = replace(trajectory, statistics=replace(trajectory.statistics, error=error))
+    return trajectory
+
+
+def _solve(
+    integrator: Integrator,
+    inputs: Drivers,
+    y0: Array,
+    p: Array,
+    times: Array,
+    tolerances: Tolerances,
+    backend: str,
+    progress: Callable[[float], None] | None,
+) -> tuple[Run, Dense, Statistics]:
+    """Run the chosen backend."""
     compiled_before, begin = integrator.compile_time, perf_counter()
-    if backend in ("rosenbrock", "sundials"):
-        if model.events:
+    if backend in PEERS:
+        if integrator.model.events:
             raise ValueError(
                 f"simulate: backend: expected auto, vm or compiled for a model with events, "
                 f"got {backend}"
             )
         run, dense, counts = integrate_by_peer(
-            integrator.system, inputs, y0, values, times, tolerances, backend
+            integrator.system, inputs, y0, p, times, tolerances, backend
         )
-        name = "Rosenbrock 5(4)" if backend == "rosenbrock" else "BDF"
+        method = "Rosenbrock 5(4)" if backend == "rosenbrock" else "BDF"
     else:
-        run, dense = integrate(integrator, inputs, y0, values, tolerances, backend, progress)
+        run, dense = integrate(integrator, inputs, y0, p, tolerances, backend, progress)
+        method = integrator.tableau.name
         counts = {
             "steps": run.steps,
             "rejections": run.attempts - run.steps,
@@ -114,30 +151,18 @@ def simulate(
             "jacobians": run.attempts,
             "factorisations": run.attempts,
         }
-        name = integrator.tableau.name
-    elapsed = perf_counter() - begin
     compile_time = integrator.compile_time - compiled_before
     statistics = Statistics(
         backend=run.engine,
-        method=name,
+        method=method,
         events=len(run.happened),
         smallest_step=run.smallest if run.steps else float(np.min(dense.t1 - dense.t0)),
-        build_time=build_time,
+        build_time=0.0,
         compile_time=compile_time,
-        run_time=elapsed - compile_time,
+        run_time=perf_counter() - begin - compile_time,
         **counts,
     )
-    trajectory = _trajectory(integrator, inputs, run, dense, values, times, statistics)
-    if throw and not trajectory.status.ok and trajectory.status.name != "INTERRUPTED":
-        raise SolveError(trajectory.message, trajectory.status, trajectory)
-    if measure_error and trajectory.status.ok:
-        finer = simulate(
-            model, t_end, t_start=t_start, x0=x0, u=u, p=p, rtol=max(rtol / 100, 1e-13),
-            t_eval=trajectory.t, method=method, backend=backend,
-        )  # fmt: skip
-        error = _difference(model, trajectory, finer)
-        trajectory = replace(trajectory, statistics=replace(statistics, error=error))
-    return trajectory
+    return run, dense, statistics
 
 
 def _check(t_start: float, t_end: float, rtol: float, method: str, backend: str) -> None:
@@ -181,6 +206,8 @@ def _integrator(model: Model, inputs: Drivers, method: str) -> tuple[Integrator,
     key = (method, inputs.key)
     fresh = key not in known
     if fresh:
+        while len(known) >= REMEMBERED:
+            del known[next(iter(known))]
         known[key] = Integrator(model, inputs, ROSENBROCK[method])
     return known[key], fresh
 
@@ -234,6 +261,32 @@ def _trajectory(
         evaluate,
         tuple(run.happened),
     )
+
+
+def _differentiated(
+    integrator: Integrator,
+    seeds: sensitivity.Seeds,
+    trajectory: Trajectory,
+    dense: Dense,
+    by_p: Array,
+    inputs: Drivers,
+    p: Array,
+) -> Trajectory:
+    """The trajectory with the derivatives of its signals."""
+    first = np.concatenate([p, inputs.values[:, 0]])
+    S = sensitivity.start(integrator, seeds, dense.y0[0], first, by_p)
+    derivatives = sensitivity.forward(integrator, seeds, dense, S, inputs, p)
+    names, n = list(integrator.model.signals), integrator.system.n
+
+    def evaluate(at: Array) -> dict[str, dict[str, Array]]:
+        d = np.vstack([np.tile(p[:, None], (1, at.size)), inputs.values[:, inputs.interval(at)]])
+        S = derivatives(at).reshape(n, len(seeds.names), at.size)
+        values = sensitivity.of_signals(integrator, seeds, at, dense(at), d, S)
+        return {
+            seed: dict(zip(names, values[:, k], strict=True)) for k, seed in enumerate(seeds.names)
+        }
+
+    return replace(trajectory, differentiate=evaluate)
 
 
 def _difference(model: Model, one: Trajectory, other: Trajectory) -> float:

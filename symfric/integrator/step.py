@@ -97,6 +97,23 @@ def build_fixed(system: System, tableau: Rosenbrock, kind: Any = ca.SX) -> ca.Fu
     return ca.Function("fixed", [y, h, d], [end], ["y", "h", "d"], ["y_next"], {"cse": True})
 
 
+def build_dense_step(system: System, tableau: Rosenbrock) -> ca.Function:
+    """The bare step with its dense output, (y, h, d) -> all = (y_next, D), for sensitivities.
+
+    A method without dense coefficients gets the cubic ones from its slopes.
+    """
+    y, d = ca.SX.sym("y", system.n), ca.SX.sym("d", system.d.numel())
+    h = ca.SX.sym("h")
+    block = blocks(system, tableau)
+    end, _, dense = stages(block, tableau, y, h, d)
+    if not dense:
+        first = h * block.f(y, d) - (end - y)
+        dense = [first, end - y - h * block.f(end, d) - first]
+    return ca.Function(
+        "dense", [y, h, d], [ca.vertcat(end, *dense)], ["y", "h", "d"], ["all"], {"cse": True}
+    )
+
+
 def error_norm(
     block: Blocks, system: System, y: Any, y_new: Any, error: Any, atol: Any, rtol: Any, d: Any
 ) -> Any:

@@ -84,11 +84,26 @@ class Trajectory:
     steps: Array
     evaluate: Callable[[Array], dict[str, Array]]
     happened: tuple[tuple[float, str], ...] = ()
+    differentiate: Callable[[Array], dict[str, dict[str, Array]]] | None = None
 
     @cached_property
     def signals(self) -> dict[str, Array]:
         """Name -> values at `t`, shape (n,): states, algebraic variables, inputs, outputs."""
         return self.evaluate(self.t)
+
+    @cached_property
+    def sensitivities(self) -> dict[str, dict[str, Array]]:
+        """Derivatives at `t`: name as given to `simulate` -> signal -> values, shape (n,).
+
+        Raises:
+            ValueError: none were asked for.
+        """
+        if self.differentiate is None:
+            raise ValueError(
+                f"trajectory of '{self.scene}': expected sensitivities, got none; ask for them by "
+                "simulate(..., sensitivities=[...])"
+            )
+        return self.differentiate(self.t)
 
     def __getitem__(self, name: str) -> Array:
         if name == "t":
