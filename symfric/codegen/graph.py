@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import casadi as ca
 
@@ -27,11 +26,6 @@ class Node:
     args: tuple[int, ...] = ()
     entry: tuple[int, int] = (0, 0)
     value: float = 0.0
-
-    @property
-    def key(self) -> tuple[Any, ...]:
-        """Equal for nodes with equal values, to the bit (0.0 and -0.0 differ)."""
-        return self.op, self.args, self.entry, self.value.hex()
 
 
 @dataclass(frozen=True)
@@ -58,12 +52,12 @@ class Graph:
 @dataclass
 class _Builder:
     nodes: list[Node] = field(default_factory=list[Node])
-    known: dict[tuple[Any, ...], int] = field(default_factory=dict[tuple[Any, ...], int])
+    known: dict[Node, int] = field(default_factory=dict[Node, int])
 
     def add(self, node: Node) -> int:
         if node.op == ca.OP_ADD:
             node = self._if_else(*node.args) or self._if_else(*reversed(node.args)) or node
-        number = self.known.setdefault(node.key, len(self.nodes))
+        number = self.known.setdefault(node, len(self.nodes))
         if number == len(self.nodes):
             self.nodes.append(node)
         return number
@@ -73,7 +67,7 @@ class _Builder:
         yes, no = self.nodes[a], self.nodes[b]
         if not yes.op == no.op == ca.OP_IF_ELSE_ZERO:
             return None
-        if self.nodes[no.args[0]].key != Node(ca.OP_NOT, (yes.args[0],)).key:
+        if self.nodes[no.args[0]] != Node(ca.OP_NOT, (yes.args[0],)):
             return None
         return Node(SELECT, (yes.args[0], yes.args[1], no.args[1]))
 

@@ -1,0 +1,219 @@
+"""The exact step of bristle laws: closed forms, bounds, impulse, convergence; what is refused."""
+
+from math import exp
+
+import casadi as ca
+import numpy as np
+import pytest
+from law_cases import CASES
+from rigs import prescribed_motion
+
+from symfric import Dahl, LoadDependent, LuGre, Stribeck, law_from_text, parameters, simulate
+from symfric.codegen import law_block
+from symfric.codegen.graph import graph
+
+LOAD = 8.0
+BRISTLE = ["lugre", "dahl", "lugre, delta 0.78, viscous", "lugre+dahl", "asymmetric(lugre)"]
+
+
+def rolled(block, velocities, h, load=LOAD, state=None):
+    """States after each step and forces, columns."""
+    p = [float(v.start) for v in block.parameters if v.name != "h"] + [h]
+    z = ca.DM.zeros(len(block.states)) if state is None else ca.DM(state)
+    states, forces = [], []
+    for v in velocities:
+        z, F = block.step(z, p, [v, load])
+        states.append(z.full().ravel())
+        forces.append(float(F))
+    return np.array(states), np.array(forces)
+
+
+def level(v, mu_s=0.15, mu_d=0.1, v_s=1e-3, load=LOAD):
+    return load * (mu_d + (mu_s - mu_d) * exp(-((v / v_s) ** 2)))
+
+
+@pytest.mark.parametrize("v", [2e-5, -1e-3, 0.1, -3.0])
+@pytest.mark.parametrize("steps", [1, 7, 100])
+def test_lugre_follows_the_exact_solution_whatever_the_step(v, steps):
+    t_end = 2e-4
+    steady, rate = level(v) / 1e5, 1e5 * abs(v) / level(v)
+    states, _ = rolled(law_block(LuGre()), [v] * steps, t_end / steps)
+    exact = np.sign(v) * steady * (1 - exp(-rate * t_end))
+    assert states[-1, 0] == pytest.approx(exact, rel=1e-12)
+
+
+@pytest.mark.parametrize("v", [2e-5, -1e-3, 0.1, -3.0])
+def test_lugre_force_is_the_mean_over_the_step(v):
+    h, sigma_1, sigma_2 = 2e-4, 190.0, 0.4
+    steady, rate = np.sign(v) * level(v) / 1e5, 1e5 * abs(v) / level(v)
+    end = steady * (1 - exp(-rate * h))
+    mean_state = steady - end / (rate * h)
+    _, forces = rolled(law_block(LuGre(sigma_2=sigma_2)), [v], h)
+    assert forces[0] == pytest.approx(1e5 * mean_state + sigma_1 * end / h + sigma_2 * v, rel=1e-11)
+
+
+@pytest.mark.parametrize("name", BRISTLE)
+@pytest.mark.parametrize("v", [0.0, 1e-7, 4e-4, -0.02, 1.0])
+def test_impulse_of_one_long_step_is_that_of_many_short_ones(name, v):
+    block = law_block(CASES[name])
+    start = rolled(block, [3e-4, -2e-3], 1e-3)[0][-1]
+    one, F = rolled(block, [v], 5e-3, state=start)
+    many, parts = rolled(block, [v] * 50, 1e-4, state=start)
+    assert one[-1] == pytest.approx(many[-1], rel=1e-10, abs=1e-17)
+    assert F[0] == pytest.approx(parts.mean(), rel=1e-10)
+
+
+@pytest.mark.parametrize("h", [1e-6, 1e-3, 1.0, 1e3])
+def test_the_bristle_never_leaves_its_bound(h):
+    random = np.random.default_rng(0)
+    velocities = 10.0 ** random.uniform(-6, 3, 500) * random.choice([-1.0, 1.0], 500)
+    states, _ = rolled(law_block(LuGre()), velocities, h)
+    assert np.abs(states).max() <= 0.15 * LOAD / 1e5 * (1 + 1e-12)
+    assert np.abs(states).max() > 0.6 * 0.15 * LOAD / 1e5
+
+
+def test_explicit_euler_would_leave_it_at_the_same_step():
+    z, v, h = 0.0, 0.1, 1e-3
+    for _ in range(60):
+        z += h * (v - 1e5 * abs(v) / level(v) * z)
+    assert abs(z) > 1e3
+
+
+def test_force_after_a_jump_is_bounded_by_the_travel_of_the_bristle():
+    h, v = 1e-3, 10.0
+    _, forces = rolled(law_block(LuGre()), [v], h)
+    travel = level(v) / 1e5
+    assert 0 < forces[0] <= level(v) + 190.0 * travel / h
+    assert forces[0] < 0.01 * 190.0 * v
+
+
+@pytest.mark.parametrize("name", BRISTLE)
+@pytest.mark.parametrize("v", [0.05, -2e-3])
+def test_long_sliding_is_where_the_reset_starts(name, v):
+    law = CASES[name]
+    block = law_block(law)
+    p = [float(q.start) for q in block.parameters]
+    start = block.reset("init_sliding")(0.0, p, [v, LOAD])
+    after, F = block.step(start, p, [v, LOAD])
+    assert (after / start).full() == pytest.approx(1.0, rel=1e-12)
+    assert float(F) == pytest.approx(float(law.force(v, LOAD, start)), rel=1e-9)
+
+
+def test_at_rest_nothing_moves():
+    block = law_block(LuGre())
+    states, forces = rolled(block, [0.0] * 10, 1e-3, state=[5e-6])
+    assert (states == 5e-6).all()
+    assert forces == pytest.approx(1e5 * 5e-6)
+
+
+def errors_along_a_motion(law, steps):
+    """Largest error of the states and error of the work, velocities taken at mid-step."""
+    motion = prescribed_motion(law, LOAD, lambda t: 2e-3 * (1.2 + ca.sin(20 * t)))
+    t = np.linspace(0.0, 0.5, steps + 1)
+    reference = simulate(motion, 0.5, t_eval=t, rtol=1e-11)
+    middle = 2e-3 * (1.2 + np.sin(20 * (t[1:] + t[:-1]) / 2))
+    h = t[1]
+    states, forces = rolled(law_block(law), middle, h)
+    work = np.sum(forces * middle) * h
+    return np.abs(states[:, 0] - reference["z"][1:]).max(), abs(work - reference["work"][-1])
+
+
+@pytest.mark.parametrize("law", [LuGre(sigma_2=0.4), Dahl()], ids=["lugre", "dahl"])
+def test_second_order_along_a_motion(law):
+    coarse, fine = (np.array(errors_along_a_motion(law, n)) for n in (500, 1000))
+    assert fine[0] < 1e-8
+    assert (coarse / fine > 3.6).all()
+    assert (coarse / fine < 4.4).all()
+
+
+def test_a_static_law_is_one_function_of_v_and_N():
+    block = law_block(Stribeck(sigma_2=0.4))
+    assert block.is_function
+    p = [float(q.start) for q in block.parameters]
+    _, F = block.step([], p, [3e-4, LOAD])
+    assert float(F) == pytest.approx(float(Stribeck(sigma_2=0.4).force(3e-4, LOAD)), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("lugre", "lugre"),
+        ("coulomb+viscous", "coulomb_viscous"),
+        ("asymmetric(coulomb+viscous)", "asymmetric_coulomb_viscous"),
+    ],
+)
+def test_the_name_is_that_of_the_law_as_an_identifier(text, name):
+    assert law_block(law_from_text(text)).name == name
+
+
+def test_the_text_holds_the_equations_of_all_parts_once():
+    doc = law_block(law_from_text("asymmetric(coulomb+viscous)")).doc
+    assert doc.count("F = mu_d N tanh(v / v_eps)") == 1
+    assert doc.count("F = sigma_2 v") == 1
+    assert doc.startswith("One law with different parameters")
+
+
+def operations(**options) -> int:
+    return graph(law_block(LuGre(), **options).step).operations
+
+
+def test_folded_parameters_save_operations():
+    everything = operations(free=tuple(parameters(LuGre())))
+    default, few, none = operations(), operations(free=("mu_s",)), operations(free=(), h=1e-3)
+    assert everything > default > few > none
+    assert everything - none >= 8
+
+
+def test_a_constant_exponent_spares_the_power():
+    def powers(free) -> int:
+        source = graph(law_block(Stribeck(), free=free).step)
+        return sum(node.op in (ca.OP_POW, ca.OP_CONSTPOW) for node in source.nodes)
+
+    assert powers(None) == 0
+    assert powers(("delta",)) > 0
+
+
+def test_free_keeps_exactly_the_named_parameters():
+    block = law_block(LuGre(), free=("mu_s", "delta"), h=2e-3)
+    assert [p.name for p in block.parameters] == ["mu_s", "delta"]
+    assert block.constants["h"] == 2e-3
+    assert set(block.constants) == {"h", *parameters(LuGre())} - {"mu_s", "delta"}
+
+
+def test_parameters_without_effect_do_not_appear():
+    assert "rho_eps" not in [p.name for p in law_block(Dahl()).parameters]
+
+
+@pytest.mark.parametrize(
+    ("law", "options", "message"),
+    [
+        (Dahl(n=2.0), {}, "dahl.*rates affine in the states"),
+        (Dahl(n=0.5), {}, "dahl.*rates affine in the states"),
+        (Dahl(), {"free": tuple(parameters(Dahl()))}, "rates affine in the states"),
+        (Dahl(), {"free": ("rho_eps",)}, "free: expected parameters that have an effect"),
+        (LuGre(), {"free": ("mu_x",)}, "got mu_x; did you mean mu_"),
+        (LuGre(), {"free": ("mu_s", "mu_s")}, "every name once"),
+        (LuGre(v_eps=0.0), {"free": ("v_eps",)}, "finite force at rest"),
+        (LuGre(mu_s=ca.SX.sym("mu_s")), {}, "numbers as parameters, got symbols .'mu_s'"),
+        (LuGre(), {"h": 0.0}, "h: expected a step size > 0"),
+        (LuGre(), {"h": float("nan")}, "h: expected a finite number"),
+        (LuGre(), {"name": "my law"}, "C identifier, got 'my law'"),
+    ],
+)
+def test_what_has_no_exact_step_or_makes_no_sense_is_refused(law, options, message):
+    with pytest.raises(ValueError, match=message):
+        law_block(law, **options)
+
+
+def test_original_laws_without_smoothing_have_a_step():
+    v, steady = 1e-3, level(1e-3) / 1e5
+    states, _ = rolled(law_block(LuGre(v_eps=0.0)), [0.0, v, v], 1e-3)
+    assert states[0, 0] == 0.0
+    assert states[-1, 0] == pytest.approx(steady * (1 - exp(-v / steady * 2e-3)), rel=1e-12)
+
+
+def test_a_preload_keeps_the_step_finite_without_load():
+    block = law_block(LoadDependent(LuGre(), N_0=2.0))
+    states, forces = rolled(block, [1e-3, 0.0, -1e-3], 1e-3, load=0.0)
+    assert np.isfinite(states).all()
+    assert np.isfinite(forces).all()
