@@ -34,7 +34,7 @@ $(BIN)/python:
 
 $(VENV)/.runtime: pyproject.toml | $(BIN)/python
 	@echo "installing symfric into $(VENV)"
-	$(BIN)/python -m pip install --quiet --editable .
+	$(BIN)/python -m pip install --quiet --editable ".[mat]"
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.runtime

@@ -12,6 +12,7 @@ import typer
 
 from symfric import SolveError, Status, __version__
 from symfric.cli.codegen import codegen
+from symfric.cli.demo import demo
 from symfric.cli.identify import identify
 from symfric.cli.laws import laws
 from symfric.cli.run import run
@@ -27,7 +28,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for function in (laws, run, identify, codegen):
+for function in (laws, run, identify, codegen, demo):
     app.command()(function)
 
 

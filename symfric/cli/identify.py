@@ -110,5 +110,5 @@ def show_identification(found: Identification) -> None:
     output.show(f"\n{found.message} {found.iterations} iterations.")
 
 
-def _errors(e: Errors) -> tuple[float, float, float]:
-    return e.force_relative, e.force_rms, 1e3 * e.position_rms
+def _errors(e: Errors) -> tuple[str, str, str]:
+    return f"{e.force_relative:.3g}", f"{e.force_rms:.3g}", f"{1e3 * e.position_rms:.3g}"

@@ -37,7 +37,10 @@ def show_table(
     for index, name in enumerate(columns):
         numeric = bool(rows) and all(isinstance(row[index], int | float) for row in rows)
         table.add_column(
-            Text(name), justify="right" if numeric else "left", no_wrap=numeric, overflow="fold"
+            Text(name),
+            justify="right" if numeric else "left",
+            no_wrap=numeric or index == 0,
+            overflow="fold",
         )
     for row in rows:
         table.add_row(*(Text(c if isinstance(c, str) else number(c)) for c in row))

@@ -1,0 +1,253 @@
+"""`symfric demo`: one friction law from formula through data, simulation and control to C."""
+
+import json
+from dataclasses import dataclass, replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from identification import Dataset, Identification, identify, read_data, synthetic_drive_data
+from ocp import Free, Solution, rest_to_rest, solve
+from symfric import ALL_LAWS, LuGre, simulate
+from symfric.cli import output
+from symfric.cli.codegen import show_verification
+from symfric.cli.identify import show_identification
+from symfric.cli.options import check_folder
+from symfric.cli.run import show_trajectory
+from symfric.codegen import generate, verify
+from symfric.files import write_text
+from symfric.laws import Law, law_name
+from symfric.scenes import Rabinowicz
+
+STAGE = Path("..", "shared", "data", "EMPS")
+"""Where the measured stage is looked for: the EMPS benchmark beside the working folder."""
+
+RECORDS = "DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"
+"""Record to identify from and record to validate on."""
+
+DISTANCE, LIMIT = 0.05, 200.0
+"""Optimal move [m] and largest force [N]."""
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """What one part of the demo left behind."""
+
+    title: str
+    says: str
+    files: tuple[Path, ...]
+    numbers: dict[str, Any]
+
+
+def demo(
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")
+    ] = Path("out"),
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            "--data",
+            metavar="FOLDER",
+            help="Folder of the EMPS benchmark; without it, and without ../shared/data/EMPS, "
+            "a simulated record is identified.",
+        ),
+    ] = None,
+) -> None:
+    """Run the whole line: simulate, identify, optimise, generate C; leave everything in DIR.
+
+    Example: symfric demo --out out
+    """
+    check_folder(out)
+    records, laws, origin = load_records(data)
+    output.note("1/4 stick-slip with two laws")
+    chapters = [stick_slip(out / "rabinowicz")]
+    output.note(f"2/4 identification from {origin}")
+    found = [identified(records, law) for law in laws]
+    chapters.append(identification(out / "identification", found, origin, records))
+    output.note("3/4 optimal moves of the identified drive")
+    chapters.append(optimal_moves(out / "optimal_move", found[0]))
+    output.note("4/4 C for embedded controllers")
+    chapters.append(generated_c(out / "c", found[0].fitted_law))
+    write_text(out / "README.md", index(out, chapters))
+    summary = {c.title: c.numbers for c in chapters}
+    write_text(out / "summary.json", json.dumps(output.plain(summary), indent=2) + "\n")
+    output.note(f"wrote {out / 'README.md'}, which lists what is there")
+    if chapters[-1].numbers["failed"]:
+        raise typer.Exit(1)
+
+
+def load_records(data: Path | None) -> tuple[tuple[Dataset, Dataset], tuple[str, ...], str]:
+    """Two records, the laws to identify from them, and where they come from."""
+    folder = data or (STAGE if STAGE.is_dir() else None)
+    if folder is not None and (data or find_spec("scipy")):
+        one, other = (read_data(folder / name) for name in RECORDS)
+        laws = ("coulomb+viscous", "asymmetric(coulomb+viscous)")
+        return (one, other), laws, f"the measured EMPS stage in {folder}"
+    if folder is not None:
+        output.note(f"{folder} is there, but MATLAB files need scipy: pip install symfric[mat]")
+    other = synthetic_drive_data(seed=1, speeds=(0.003, 0.02, 0.09))
+    origin = "a simulated record (no measured one found; --data FOLDER takes the EMPS benchmark)"
+    return (synthetic_drive_data(), other), ("stribeck",), origin
+
+
+def stick_slip(folder: Path) -> Chapter:
+    """Block on a belt with a smooth law and a bristle law."""
+    from symfric.plotting import plot_laws, plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
+
+    laws = {name: ALL_LAWS[name]() for name in ("brown_mcphee", "lugre")}
+    motions = {name: simulate(Rabinowicz(law).model(), 20.0) for name, law in laws.items()}
+    picture, curves = folder / "rabinowicz.png", folder / "laws.png"
+    plot_trajectories(motions, ("x", "v", "friction"), picture)
+    plot_laws(laws, path=curves)
+    tables = {name: folder / f"{name}.csv" for name in motions}
+    for name, motion in motions.items():
+        motion.to_csv(tables[name])
+        show_trajectory(name, motion)
+    return Chapter(
+        "Stick-slip of a block on a belt",
+        "Position, velocity and friction with Brown-McPhee and LuGre friction over 20 s.",
+        (picture, curves, *tables.values()),
+        {
+            name: {"final": motion.final, "statistics": motion.statistics.to_dict()}
+            for name, motion in motions.items()
+        },
+    )
+
+
+def identified(records: tuple[Dataset, Dataset], law: str) -> Identification:
+    """The drive identified from the first record, with errors on both."""
+    with output.progress(f"identify {law}") as tell:
+        found = identify(
+            records[0],
+            law,
+            validate=records[1],
+            progress=lambda _, fraction: tell(fraction),
+        )
+    show_identification(found)
+    output.show()
+    return found
+
+
+def identification(
+    folder: Path, found: list[Identification], origin: str, records: tuple[Dataset, Dataset]
+) -> Chapter:
+    """Reports, numbers and pictures; the records too where they were simulated."""
+    files: list[Path] = []
+    for result in found:
+        stem = result.law.replace("+", "_").replace("(", "_").replace(")", "")
+        report, numbers, picture = (folder / f"{stem}.{kind}" for kind in ("md", "json", "png"))
+        write_text(report, result.report())
+        result.to_json(numbers)
+        result.plot(picture)
+        files += [report, numbers, picture]
+    if not records[0].benchmark:
+        for name, record in zip(("record", "validation"), records, strict=True):
+            record.to_csv(folder / f"{name}.csv")
+            files.append(folder / f"{name}.csv")
+    return Chapter(
+        "Identification of a positioning drive",
+        f"Mass, offset and friction from {origin}.",
+        tuple(files),
+        {result.law: result.to_dict() for result in found} | {"data": origin},
+    )
+
+
+def optimal_moves(folder: Path, found: Identification) -> Chapter:
+    """The fastest move of the drive, and the one of least effort in half as much time again.
+
+    The speed is bounded by the largest one in the record: beyond it friction is a guess.
+    """
+    from ocp.picture import plot_solutions  # noqa: PLC0415  (matplotlib is slow)
+
+    speed = float(abs(found.signals.v).max())
+
+    def move(T: float | Free) -> Solution:
+        problem = rest_to_rest(found.drive.model(), DISTANCE, T, limit=LIMIT)
+        return solve(replace(problem, bounds={**problem.bounds, "v": (-speed, speed)}))
+
+    fastest = move(Free(0.05, 10.0, guess=0.5))
+    moves = {"minimum time": fastest, "minimum effort": move(1.5 * fastest.T)}
+    picture = folder / "moves.png"
+    plot_solutions(moves, ("x", "v", "force", "friction"), picture)
+    files = [picture]
+    for name, solution in moves.items():
+        table, numbers = (folder / f"{name.replace(' ', '_')}.{kind}" for kind in ("csv", "json"))
+        solution.to_csv(table)
+        solution.to_json(numbers)
+        files += [table, numbers]
+    show_moves(moves)
+    return Chapter(
+        "Optimal moves of the identified drive",
+        f"{DISTANCE:g} m from rest to rest with at most {LIMIT:g} N and {speed:.3g} m/s, the "
+        "largest speed in the record: the fastest one, and the one of least effort (integral of "
+        "force^2) in 1.5 times that time; each control re-simulated.",
+        tuple(files),
+        {
+            name: {
+                "status": solution.status.name,
+                "T": solution.T,
+                "cost": solution.cost,
+                "terminal_miss": solution.terminal_miss,
+                "iterations": solution.iterations,
+            }
+            for name, solution in moves.items()
+        },
+    )
+
+
+def show_moves(moves: dict[str, Solution]) -> None:
+    """Print duration, effort and how far the simulated move misses its target."""
+    output.show_table(
+        ["move", "status", "iterations", "T [s]", "peak [N]", "simulated miss [mm]"],
+        [
+            (
+                name,
+                move.status.name.lower(),
+                move.iterations,
+                move.T,
+                float(abs(move["force"]).max()),
+                f"{1e3 * move.terminal_miss['x']:.2g}",
+            )
+            for name, move in moves.items()
+        ],
+        title=f"{DISTANCE:g} m from rest to rest, |force| <= {LIMIT:g} N",
+    )
+    output.show()
+
+
+def generated_c(folder: Path, stage: Law) -> Chapter:
+    """LuGre with its exact step, and the identified law as friction compensation."""
+    files: list[Path] = []
+    numbers: dict[str, Any] = {"failed": False}
+    for name, law in {"lugre": LuGre(), "stage_friction": stage}.items():
+        generated = generate(law, folder / name, name=name)
+        verification = verify(generated)
+        findings = folder / name / "verification.json"
+        write_text(findings, json.dumps(output.plain(verification.to_dict()), indent=2) + "\n")
+        show_verification(verification)
+        output.show()
+        files += [*generated.files, findings]
+        numbers[name] = {"law": law_name(law), **verification.to_dict()}
+        numbers["failed"] |= bool(verification.checks) and not verification.ok
+    return Chapter(
+        "C for embedded controllers",
+        "LuGre with its exact exponential update, and the identified friction for feed-forward "
+        "compensation; both compared with CasADi where there is a C compiler.",
+        tuple(files),
+        numbers,
+    )
+
+
+def index(out: Path, chapters: list[Chapter]) -> str:
+    """The contents of the folder as Markdown."""
+    lines = ["# What `symfric demo` left here", ""]
+    for chapter in chapters:
+        lines += [f"## {chapter.title}", "", chapter.says, ""]
+        for path in sorted(chapter.files, key=lambda path: path.suffix != ".png"):
+            place = path.relative_to(out).as_posix()
+            picture = path.suffix == ".png"
+            lines.append(f"![{path.stem}]({place})\n" if picture else f"- [{place}]({place})")
+        lines.append("")
+    return "\n".join([*lines, "`summary.json` holds the key numbers of all of them.", ""])
