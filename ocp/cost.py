@@ -54,7 +54,9 @@ class Cost:
     running: tuple[tuple[float, Expression], ...] = ()
     end: tuple[tuple[float, Expression], ...] = ()
 
-    def __add__(self, other: "Cost") -> "Cost":
+    def __add__(self, other: object) -> "Cost":
+        if not isinstance(other, Cost):
+            return NotImplemented
         return Cost(self.running + other.running, self.end + other.end)
 
     def __mul__(self, weight: float) -> "Cost":
@@ -75,14 +77,23 @@ class Cost:
         return _total(self.running, signals), _total(self.end, signals)
 
 
+def _checked(where: str, expression: Expression) -> Expression:
+    if not callable(expression):
+        raise ValueError(
+            f"{where}: expected a function of the signals such as lambda s: s.x**2, "
+            f"got {expression!r}"
+        )
+    return expression
+
+
 def integral(expression: Expression) -> Cost:
     """Cost: the integral over the motion, such as `integral(lambda s: s.force**2)`."""
-    return Cost(running=((1.0, expression),))
+    return Cost(running=((1.0, _checked("integral", expression)),))
 
 
 def at_end(expression: Expression) -> Cost:
-    """Cost: the value of `expression` at the end, where `s.t` is the duration T."""
-    return Cost(end=((1.0, expression),))
+    """Cost: the value at the end, where `s.t` is the duration T."""
+    return Cost(end=((1.0, _checked("at_end", expression)),))
 
 
 TIME = at_end(lambda s: s.t)

@@ -1,5 +1,6 @@
 """Ipopt through CasADi: options, progress, interrupts, and what its answers mean."""
 
+import re
 import signal
 import threading
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -33,12 +34,12 @@ ANSWERS: dict[str, Status] = {
 QUIET: dict[str, Option] = {"print_level": 0, "sb": "yes"}
 WARM: dict[str, Option] = {
     "warm_start_init_point": "yes",
-    "mu_init": 1e-4,
-    "warm_start_bound_push": 1e-6,
-    "warm_start_bound_frac": 1e-6,
-    "warm_start_slack_bound_push": 1e-6,
-    "warm_start_slack_bound_frac": 1e-6,
-    "warm_start_mult_bound_push": 1e-6,
+    "mu_init": 1e-6,
+    "warm_start_bound_push": 1e-9,
+    "warm_start_bound_frac": 1e-9,
+    "warm_start_slack_bound_push": 1e-9,
+    "warm_start_slack_bound_frac": 1e-9,
+    "warm_start_mult_bound_push": 1e-9,
 }
 
 
@@ -131,11 +132,11 @@ def optimise(
             "solver",
             "ipopt",
             program.nlp,
-            {"print_time": False, "iteration_callback": watch}
+            {"print_time": False, "show_eval_warnings": False, "iteration_callback": watch}
             | {f"ipopt.{name}": value for name, value in (QUIET | dict(options)).items()},
         )
     except RuntimeError as error:
-        reason = str(error).strip().splitlines()[-1]
+        reason = re.sub(r"^\S*:\d+: ", "", str(error).strip().splitlines()[-1])
         raise ValueError(f"options: expected options of Ipopt, got {options!r}; {reason}") from None
     built = perf_counter()
     (lower_w, upper_w), (lower_g, upper_g) = program.bounds(), program.constraint_bounds()
@@ -152,22 +153,37 @@ def optimise(
         )
     if watch.error is not None:
         raise watch.error
-    return _outcome(program, solver, watch, result, built - begin, perf_counter() - built)
+    last = _last(program, solver, watch, result, start, p)
+    return _outcome(program, solver, last, built - begin, perf_counter() - built)
+
+
+def _last(
+    program: Transcription,
+    solver: ca.Function,
+    watch: "_Watch",
+    result: Mapping[str, ca.DM],
+    start: Iterate,
+    p: Array,
+) -> Mapping[str, ca.DM]:
+    """The last iterate: after some errors Ipopt returns zeros, then it is the last one seen."""
+    if ANSWERS.get(solver.stats()["return_status"], Status.SOLVER_FAILED).ok:
+        return result
+    if watch.last:
+        return watch.last
+    g = ca.Function("g", [program.w, program.p], [program.g])(start.w, p)
+    values = {"x": start.w, "f": np.nan, "g": g, "lam_x": start.lam_w, "lam_g": start.lam_g}
+    return {name: ca.DM(value) for name, value in values.items()}
 
 
 def _outcome(
     program: Transcription,
     solver: ca.Function,
-    watch: "_Watch",
-    result: Mapping[str, ca.DM],
+    last: Mapping[str, ca.DM],
     build_time: float,
     solve_time: float,
 ) -> Outcome:
     stats = solver.stats()
     answer = str(stats["return_status"])
-    status = ANSWERS.get(answer, Status.SOLVER_FAILED)
-    # After an internal error Ipopt returns zeros; the last iterate seen is worth more.
-    last = result if status.ok or not watch.last else watch.last
     w, g, lam_w, lam_g = (last[name].full().ravel() for name in ("x", "g", "lam_x", "lam_g"))
     statistics = Statistics(
         unknowns=w.size,
@@ -182,7 +198,7 @@ def _outcome(
         Iterate(w, lam_w, lam_g),
         float(last["f"]),
         violations(program, g),
-        status,
+        ANSWERS.get(answer, Status.SOLVER_FAILED),
         answer,
         statistics,
     )

@@ -76,14 +76,7 @@ class Transcription:
 
     def constraint_bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds of g: zero for the defects."""
-        problem, d = self.problem, self.scheme.degree
-        defects = np.zeros(d * (len(problem.model.x) + len(problem.model.z)))
-        boxes = [problem.box(name) for name in problem.bounded_outputs]
-        lower, upper = (
-            np.tile(np.concatenate([defects, np.tile([b[side] for b in boxes], d)]), N)
-            for side, N in ((0, self.layout.intervals), (1, self.layout.intervals))
-        )
-        return lower, upper
+        return self._constraint_bound(0), self._constraint_bound(1)
 
     def constraint_names(self) -> list[tuple[str, float]]:
         """What each row of g is about, and at which fraction of T."""
@@ -98,6 +91,12 @@ class Transcription:
             for fraction in interval
             for name in names
         ]
+
+    def _constraint_bound(self, side: int) -> Array:
+        problem, d = self.problem, self.scheme.degree
+        defects = np.zeros(d * (self.layout.nx + self.layout.nz))
+        paths = np.tile([problem.box(name)[side] for name in problem.bounded_outputs], d)
+        return np.tile(np.concatenate([defects, paths]), self.layout.intervals)
 
     def _bound(self, side: int) -> Points:
         problem, model = self.problem, self.problem.model
@@ -207,9 +206,9 @@ def _interval(problem: Problem, d: int) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     model = problem.model
     nx, nz, nu = len(model.x), len(model.z), len(model.u)
     block = ca.SX.sym("block", nu + d * (nx + nz))
-    xz = ca.reshape(block[nu:], nx + nz, d)
+    xz = ca.reshape(block[nu:, :], nx + nz, d)
     z = xz[nx:, :] * ca.repmat(ca.DM(model.nominal("z")), 1, d)
-    return block, xz[:nx, :], z, block[:nu] * ca.DM(model.nominal("u"))
+    return block, xz[:nx, :], z, block[:nu, :] * ca.DM(model.nominal("u"))
 
 
 def _point(problem: Problem) -> ca.Function:

@@ -26,7 +26,7 @@ def verified(solution: Solution, tolerance: float) -> Solution:
         throw=False,
     )
     statistics = replace(solution.statistics, verify_time=perf_counter() - begin)
-    checked = replace(solution, trajectory=trajectory, statistics=statistics)
+    checked = replace(solution, trajectory=trajectory, terminal_miss={}, statistics=statistics)
     if not trajectory.status.ok:
         return replace(
             checked,
