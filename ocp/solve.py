@@ -56,6 +56,10 @@ def solve(
         ValueError: bad input.
         SolveError: not solved, interrupted, or missed the target; its `partial` is the solution
             with the last iterate.
+
+    Limits: a local minimum. Where friction makes the body stick or reverse on the way, one solve
+    on an even mesh needs many intervals (1 m out and back in 2 s: 800 for a miss of 1 mm) and may
+    settle for a motion that is a third too expensive.
     """
     if not tolerance > 0:
         raise ValueError(f"solve: expected tolerance > 0, got {tolerance!r}")
