@@ -58,7 +58,8 @@ def generate(
     For each type `NAME_f64.h`, `NAME_f64.c` (float: `f32`), and `manifest.json` with names, units,
     sizes and operation counts. The C allocates nothing, includes only math.h and stdbool.h, has no
     data but the constant defaults, and compiles without warnings under -Wall -Wextra -Wpedantic
-    -Wconversion -Wdouble-promotion, also as C++.
+    -Wconversion -Wdouble-promotion, also as C++. The C of several blocks may share a folder and
+    a program; the manifest is then that of the last one.
 
     Args:
         law: a friction law, see `law_block`; or a block.

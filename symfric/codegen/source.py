@@ -19,7 +19,7 @@ from symfric.codegen.c99 import TRANSCENDENTAL, Real, macro
 from symfric.codegen.emitter import emit
 from symfric.codegen.graph import graph
 
-WIDTH = 96
+WIDTH = 100
 
 
 @dataclass(frozen=True)
