@@ -37,7 +37,7 @@ class Rosenbrock:
         H: dense output, shape (r, s).
         order: of the solution, for ODEs and index-1 DAEs.
         embedded: order of the solution behind the error estimate.
-        dense: order of the dense output.
+        dense: order of the dense output, for index-1 DAEs (for ODEs that of the solution).
     """
 
     name: str
@@ -212,10 +212,12 @@ RODAS3 = Rosenbrock(
     gamma=0.5,
     A=_lower([[], [0.0], [2.0, 0.0], [2.0, 0.0, 1.0]]),
     C=_lower([[], [4.0], [1.0, -1.0], [1.0, -1.0, -8.0 / 3.0]]),
-    H=np.zeros((0, 4)),
+    # ours: the cubic in theta that meets the order conditions up to 2, that of f''(f, f), and that
+    # of order 2 of the algebraic variables
+    H=np.array([[3.0, -1.0, -1.0, -1.0], [0.0, 0.0, 0.0, 2.0]]),
     order=3,
     embedded=2,
-    dense=2,
+    dense=3,
     source="Sandu et al., Benchmarking stiff ODE solvers II, Atmos. Environ. 31, 1997",
 )
 
