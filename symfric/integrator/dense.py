@@ -64,7 +64,9 @@ def from_records(records: Array, n: int, slope: ca.Function | None, d: Array) ->
     t0, t1 = records[:, 0].copy(), records[:, 1].copy()
     y0, y1 = records[:, 2 : 2 + n].copy(), records[:, 2 + n : 2 + 2 * n].copy()
     if slope is None or not k:
-        return Dense(t0, t1, y0, y1, records[:, 2 + 2 * n :].reshape(k, -1, n).copy())
+        D = records[:, 2 + 2 * n :]
+        rows = D.shape[1] // n  # not -1: a failure at the first step leaves no records
+        return Dense(t0, t1, y0, y1, D.reshape(k, rows, n).copy())
     both = slope.map(2 * k)(np.vstack([y0, y1]).T, np.tile(d[:, None], (1, 2 * k))).full()
     h, rise = (t1 - t0)[:, None], y1 - y0
     first = h * both[:, :k].T - rise

@@ -1,0 +1,49 @@
+"""What the commands print."""
+
+import json
+from math import inf, nan
+
+import pytest
+
+from symfric.cli import output
+
+
+def test_tables_align_numbers_and_stay_within_80_columns(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    output.show_table(["name", "value", "note"], [("a", 1.0, "long " * 40), ("b", 123456.0, "")])
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert lines[2].index("1") + 1 == lines[-1].index("123456") + 6
+
+
+def test_brackets_of_units_are_not_taken_for_markup(capsys: pytest.CaptureFixture[str]) -> None:
+    output.show_table(["v [m/s]"], [("[bold]x",)], title="t [s]")
+    output.show("friction [N]")
+    out = capsys.readouterr().out
+    assert all(text in out for text in ("v [m/s]", "[bold]x", "t [s]", "friction [N]"))
+
+
+def test_json_has_null_for_what_is_not_finite(capsys: pytest.CaptureFixture[str]) -> None:
+    output.emit_json({"a": [inf, nan, 1.5], "b": {"c": -inf}}, "-")
+    assert json.loads(capsys.readouterr().out) == {"a": [None, None, 1.5], "b": {"c": None}}
+
+
+def test_docstrings_keep_equations_and_wrap_sentences_anew(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    output.show_doc("Name.\n\n    F = a\n      + b\n\nOne\nsentence.\nLimits: none.\nSource: me.")
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:5] == ["Name.", "", "    F = a", "      + b", ""]
+    assert lines[5:8] == ["One sentence.", "Limits: none.", "Source: me."]
+
+
+def test_only_files_are_named_as_written(capsys: pytest.CaptureFixture[str]) -> None:
+    output.say_written("a.csv", None, "-")
+    assert capsys.readouterr().err == "wrote a.csv\n"
+
+
+def test_progress_is_silent_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    with output.progress("work") as tell:
+        tell(0.5)
+    assert capsys.readouterr().err == ""

@@ -1,0 +1,130 @@
+"""`symfric run`: the same numbers as in Python, in every form of output."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from symfric import Linear, LuGre, drive, rabinowicz, simulate
+from symfric.cli import main
+from symfric.scenes import ALL_SCENES
+
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def found(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
+    assert main(["run", *arguments, "--json", "-"]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    return json.loads(out)
+
+
+def test_json_has_the_numbers_of_python(capsys: pytest.CaptureFixture[str]) -> None:
+    result = found(capsys, "rabinowicz", "--law", "lugre")
+    expected = simulate(rabinowicz(LuGre()), t_end=20.0)
+    assert result["final"] == expected.final
+    assert result["scene"] == "rabinowicz"
+    assert result["law"] == "lugre"
+    assert result["status"] == "SUCCESS"
+    assert result["parameters"]["v_belt"] == 0.1
+    assert result["parameters"]["sigma_0"] == 1e5
+    assert result["statistics"]["steps"] == expected.statistics.steps
+    assert result["t_end"] == 20.0
+
+
+def test_parameters_of_law_and_scene_and_start_values_are_set(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    line = "rabinowicz --law lugre --set mu_s=0.2 --set k=3 --x0 x=0.1 --t-end 2 --rtol 1e-8"
+    result = found(capsys, *line.split())
+    model = rabinowicz(LuGre(mu_s=0.2), k=3.0)
+    expected = simulate(model, 2.0, x0={"x": 0.1}, rtol=1e-8)
+    assert result["final"] == expected.final
+    assert result["parameters"]["mu_s"] == 0.2
+    assert result["parameters"]["k"] == 3.0
+
+
+def test_a_constant_input_drives_the_drive(capsys: pytest.CaptureFixture[str]) -> None:
+    result = found(capsys, *"drive --law viscous --set m=2 --input force=3 --t-end 60".split())
+    assert result["inputs"] == {"force": "3"}
+    assert result["final"]["v"] == pytest.approx(3 / 0.4, rel=1e-4)  # force / sigma_2
+
+
+def test_the_default_input_of_the_drive_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    result = found(capsys, "drive", "--law", "lugre", "--t-end", "0.5")
+    assert result["inputs"] == {"force": "2 sin(pi t)"}
+    assert result["final"]["force"] == pytest.approx(2.0)
+
+
+def test_a_sampled_input_is_linear_and_ends_the_simulation(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "force.csv"
+    path.write_text("t [s],force [N]\n0,0\n1,3\n2.5,1\n")
+    result = found(capsys, "drive", "--law", "lugre", "--input", f"force={path}:force")
+    force = Linear([0.0, 1.0, 2.5], [0.0, 3.0, 1.0])
+    assert result["t_end"] == 2.5
+    assert result["final"] == simulate(drive(LuGre()), 2.5, u={"force": force}).final
+
+
+def test_csv_has_names_with_units_and_the_values(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    line = "run rabinowicz --law brown_mcphee --t-end 1 --samples 11 --out"
+    assert main([*line.split(), str(path)]) == 0
+    with path.open(newline="") as file:
+        header, *rows = csv.reader(file)
+    assert header[:3] == ["t [s]", "x [m]", "v [m/s]"]
+    assert "friction [N]" in header
+    np.testing.assert_allclose([float(row[0]) for row in rows], np.arange(11) / 10, atol=1e-15)
+
+
+def test_the_table_fits_80_columns_and_files_are_named_beside_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    paths = [str(tmp_path / name) for name in ("x.csv", "x.png", "x.json")]
+    options = [word for pair in zip(("--out", "--plot", "--json"), paths, strict=True) for word in pair]
+    assert main(["run", "rabinowicz", "--law", "lugre", *options]) == 0
+    out, err = capsys.readouterr()
+    assert max(map(len, out.splitlines())) <= 80
+    assert "friction" in out
+    assert err == f"wrote {', '.join(paths)}\n"
+    assert Path(paths[1]).read_bytes().startswith(PNG)
+    assert json.loads(Path(paths[2]).read_text())["status"] == "SUCCESS"
+
+
+def test_several_laws_share_the_parameters_they_have_and_one_picture(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "x.png"
+    line = "run rabinowicz --law lugre --law brown_mcphee --set v_t=2e-3 --set mu_s=0.2 --plot"
+    assert main([*line.split(), str(path)]) == 0
+    out = capsys.readouterr().out
+    assert "rabinowicz with lugre" in out
+    assert "rabinowicz with brown_mcphee" in out
+    assert path.read_bytes().startswith(PNG)
+
+
+def test_a_failed_solve_has_status_1_and_keeps_what_there_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    # an input that leaves the range of double while time goes on
+    line = "run drive --law viscous --input force=f.csv:force --t-end 2 --out x.csv --json x.json"
+    (tmp_path / "f.csv").write_text("t [s],force [N]\n0,0\n1,0\n1.5,1e300\n2,1e300\n")
+    assert main([*line.split(), "--set", "m=1e-12"]) == 1
+    err = capsys.readouterr().err.splitlines()
+    assert err[0] == "wrote x.csv, x.json"
+    assert err[1].startswith("symfric: ")
+    assert len(err) == 2
+    result = json.loads((tmp_path / "x.json").read_text())
+    assert result["status"] != "SUCCESS"
+    assert 1.0 <= result["t_end"] < 2.0
+    assert (tmp_path / "x.csv").read_text().startswith("t [s],x [m]")
+
+
+@pytest.mark.parametrize("scene", ALL_SCENES)
+def test_every_scene_runs_with_its_defaults(scene: str) -> None:
+    assert main(["run", scene, "--law", "coulomb+viscous"]) == 0
