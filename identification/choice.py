@@ -7,7 +7,14 @@ from typing import final
 
 from symfric.laws import Asymmetric, Law
 from symfric.numeric import is_symbolic
-from symfric.parameters import Parameter, Parametric, check_names, parameters, with_values
+from symfric.parameters import (
+    Parameter,
+    Parametric,
+    check_names,
+    parameters,
+    symbolise,
+    with_values,
+)
 from symfric.scenes import Drive
 
 VELOCITY_SCALES = ("m/s", "s/m")
@@ -67,8 +74,21 @@ def choose(
             held[name], reasons[name] = float(fixed[name]), "given"
         elif name not in free and (reason := _reason(parameter, directions)):
             held[name], reasons[name] = _held(parameter, v_max), reason
-    drive = with_values(drive, held)
+    drive = with_values(drive, held | _starts(drive, held))
     return Choice(drive, tuple(n for n in known if n not in reasons), reasons, v_max)
+
+
+def _starts(drive: Drive, held: Mapping[str, float]) -> dict[str, float]:
+    """Start values of free parameters that a held one would put in the wrong order."""
+    values = {name: float(p.value) for name, p in parameters(drive).items()} | dict(held)
+    starts: dict[str, float] = {}
+    for part in parts(symbolise(drive, *values)[0]):
+        for pair in type(part).ordered:
+            low, high = (getattr(part, field).name() for field in pair)
+            if values[low] > values[high] and not {low, high} <= set(held):
+                free, other = (low, high) if high in held else (high, low)
+                starts[free] = values[other]
+    return starts
 
 
 def _check_law(law: Law) -> None:

@@ -69,9 +69,12 @@ def identify(
         ValueError: a law with states, unknown names, data that cannot be used.
         SolveError: the fit failed.
 
-    Limits: noise in v biases the slope of a law near rest, since v is taken as known; samples at
-    rest count as sliding at v = 0, where a static law gives no force. A Stribeck part needs motion
-    at speeds around its velocity scale, or its standard errors say so.
+    Limits: force is taken at the sample instants; a command that is held for a sample leads by
+    half of it, which lowers the viscous coefficient by about m w^2 h / 2 for motion at w [rad/s].
+    Filtering blurs the switch of friction at standstill, which raises the mass by some tenths of a
+    per cent; `Filter(v_min=...)` leaves those equations out. Noise in v biases the slope of a law
+    near rest, since v is taken as known. A Stribeck part needs motion at speeds around its velocity
+    scale, or its standard errors say so.
     """
     if folds < 0 or folds == 1:
         raise ValueError(f"identify: folds: expected 0 or at least 2, got {folds}")
@@ -104,11 +107,7 @@ def identify(
         law=law_name(law),
         drive=drive,
         parameters=estimates,
-        levels={
-            name: estimates[name].times(float(drive.N), "N")
-            for name, p in parameters(drive).items()
-            if is_coefficient(p)
-        },
+        levels=_levels(drive, estimates),
         names=choice.free,
         correlation=correlation,
         undetermined=undetermined,
@@ -132,6 +131,12 @@ def identify(
 def _silent(text: str, fraction: float) -> None:
     """No progress shown."""
     del text, fraction
+
+
+def _levels(drive: Drive, estimates: Mapping[str, Estimate]) -> dict[str, Estimate]:
+    """The force levels mu N [N] of the friction coefficients."""
+    coefficients = [n for n, p in parameters(drive).items() if is_coefficient(p)]
+    return {name: estimates[name].times(float(drive.N), "N") for name in coefficients}
 
 
 def _values(task: Problem, w: Array) -> dict[str, float]:
