@@ -75,19 +75,20 @@ def test_bad_input_is_one_sentence_and_status_2(
 
 
 def test_bad_input_leaves_no_files_behind(tmp_path: Path) -> None:
-    assert main("run drive --law lugr --out x.csv --plot x.png --json x.json".split()) == 2
+    files = ["--out", "x.csv", "--plot", "x.png", "--json", "x.json"]
+    assert main(["run", "drive", "--law", "lugr", *files]) == 2
     assert list(tmp_path.iterdir()) == []
 
 
 def test_an_operating_system_error_names_the_file(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main("run drive --law lugre --input force=none.csv:f".split()) == 2
+    assert main(["run", "drive", "--law", "lugre", "--input", "force=none.csv:f"]) == 2
     assert capsys.readouterr().err == "symfric: 'none.csv': No such file or directory\n"
 
 
 def test_debug_shows_where_an_error_comes_from(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SYMFRIC_DEBUG", "1")
     with pytest.raises(ValueError, match="did you mean lugre"):
-        main("laws lugr".split())
+        main(["laws", "lugr"])
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
@@ -101,11 +102,13 @@ def test_without_a_command_the_help_lists_them(capsys: pytest.CaptureFixture[str
     assert all(name in out for name in ("laws", "run", "identify", "codegen", "demo"))
 
 
+START = "import sys; from symfric.cli import main; sys.exit(main())"
+
+
 def run(*arguments: str) -> subprocess.CompletedProcess[str]:
     """The installed command, as users run it."""
     return subprocess.run(
-        [sys.executable, "-c", "import sys; from symfric.cli import main; sys.exit(main())"]
-        + list(arguments),
+        [sys.executable, "-c", START, *arguments],
         capture_output=True,
         text=True,
         stdin=subprocess.DEVNULL,
@@ -130,9 +133,7 @@ def test_as_a_process_a_warning_is_one_line_and_json_stays_pure() -> None:
 
 
 def test_a_defect_is_one_line_too() -> None:
-    code = (
-        "import sys, symfric.cli.app as app; app._prepare_process(); raise RuntimeError('a\\nb')"
-    )
+    code = "import sys, symfric.cli.app as app; app._prepare_process(); raise RuntimeError('a\\nb')"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert done.stderr.startswith("symfric: internal error, RuntimeError: a b;")
@@ -141,7 +142,7 @@ def test_a_defect_is_one_line_too() -> None:
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 def test_an_interrupt_ends_with_status_130_and_keeps_what_there_is(tmp_path: Path) -> None:
-    code = "import sys; from symfric.cli import main; sys.exit(main())"
+    code = START.replace("sys.exit", "print('ready', flush=True); sys.exit")
     line = "run rabinowicz --law lugre --t-end 1e7 --backend vm --out part.csv --json part.json"
     process = subprocess.Popen(
         [sys.executable, "-c", code, *line.split()],
@@ -149,7 +150,9 @@ def test_an_interrupt_ends_with_status_130_and_keeps_what_there_is(tmp_path: Pat
         stderr=subprocess.PIPE,
         text=True,
     )
-    time.sleep(2.0)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    time.sleep(1.0)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130

@@ -50,5 +50,5 @@ def test_files_that_cannot_be_used_are_refused_with_the_place(
 
 @pytest.mark.parametrize("text", ["two", "file.csv", "file.csv:", ":force"])
 def test_other_texts_are_refused(text: str) -> None:
-    with pytest.raises(ValueError, match="expected a number or FILE.csv:COLUMN"):
+    with pytest.raises(ValueError, match=r"expected a number or FILE\.csv:COLUMN"):
         input_from_text("force", text)

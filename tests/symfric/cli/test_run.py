@@ -48,7 +48,8 @@ def test_parameters_of_law_and_scene_and_start_values_are_set(
 
 
 def test_a_constant_input_drives_the_drive(capsys: pytest.CaptureFixture[str]) -> None:
-    result = found(capsys, *"drive --law viscous --set m=2 --input force=3 --t-end 60".split())
+    line = "drive --law viscous --set m=2 --input force=3 --t-end 60"
+    result = found(capsys, *line.split())
     assert result["inputs"] == {"force": "3"}
     assert result["final"]["v"] == pytest.approx(3 / 0.4, rel=1e-4)  # force / sigma_2
 
@@ -85,7 +86,9 @@ def test_the_table_fits_80_columns_and_files_are_named_beside_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     paths = [str(tmp_path / name) for name in ("x.csv", "x.png", "x.json")]
-    options = [word for pair in zip(("--out", "--plot", "--json"), paths, strict=True) for word in pair]
+    options = [
+        word for pair in zip(("--out", "--plot", "--json"), paths, strict=True) for word in pair
+    ]
     assert main(["run", "rabinowicz", "--law", "lugre", *options]) == 0
     out, err = capsys.readouterr()
     assert max(map(len, out.splitlines())) <= 80

@@ -1,0 +1,63 @@
+"""`symfric codegen`."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from symfric.cli import main
+from symfric.cli.codegen import bits
+
+compiled = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+
+
+@compiled
+def test_files_are_written_and_proved_equal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["codegen", "--law", "lugre", "--out", str(tmp_path / "c"), "--json", "-"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    names = {Path(file).name for file in result["files"]}
+    assert names == {path.name for path in (tmp_path / "c").iterdir()}
+    assert {"lugre_f64.c", "lugre_f64.h", "lugre_f32.c", "lugre_f32.h"} < names
+    double, single = result["verification"]["checks"]
+    assert (double["real"], double["ulp"], double["warnings"]) == ("double", 0, [])
+    assert single["real"] == "float"
+    assert result["verification"]["ok"]
+
+
+@compiled
+def test_the_table_shows_every_type(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    line = f"codegen --law coulomb+viscous --out {tmp_path} --real double --name stage"
+    assert main(line.split()) == 0
+    out = capsys.readouterr().out
+    assert "stage: verified" in out
+    assert "bit for bit equal" in out
+    assert "float " not in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_set_parameters_and_a_fixed_step_become_constants(tmp_path: Path) -> None:
+    line = f"codegen --law dahl --out {tmp_path} --set sigma_0=12345 --step-size 0.002"
+    assert main(f"{line} --free mu_d --real double".split()) == 0
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert [p["name"] for p in manifest["parameters"]] == ["mu_d"]
+    assert manifest["constants"]["sigma_0"] == 12345.0
+
+
+def test_without_a_compiler_the_files_are_written_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    assert main(["codegen", "--law", "viscous", "--out", str(tmp_path / "c")]) == 0
+    assert "no C compiler found" in capsys.readouterr().out
+    assert (tmp_path / "c" / "viscous_f64.c").is_file()
+
+
+@pytest.mark.parametrize(
+    ("ulp", "words"), [(None, "within rounding"), (0, "bit for bit equal"), (3, "3 ulp apart")]
+)
+def test_distance_in_words(ulp: int | None, words: str) -> None:
+    assert bits(ulp) == words

@@ -1,0 +1,57 @@
+"""`symfric demo`: everything is left behind and listed."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from symfric.cli import main
+
+EMPS = Path(__file__).parents[4] / "shared" / "data" / "EMPS"
+
+
+def check_folder(out: Path) -> None:
+    """Every file is listed, every listed file is there, every picture is one."""
+    listed = set(re.findall(r"\]\(([^)]+)\)", (out / "README.md").read_text()))
+    present = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
+    assert present == listed | {"README.md", "summary.json"}
+    pictures = [out / name for name in present if name.endswith(".png")]
+    assert len(pictures) >= 4
+    assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in pictures)
+
+
+def test_without_data_it_simulates_its_own_and_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["demo"]) == 0
+    out, err = capsys.readouterr()
+    assert "a simulated record (no measured one found" in err
+    assert max(map(len, out.splitlines())) <= 80
+    check_folder(tmp_path / "out")
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    identified = summary["Identification of a positioning drive"]["stribeck"]["parameters"]
+    # the record was made with 28 N static, 20 N dynamic friction and 95 kg
+    assert identified["mu_s"]["value"] == pytest.approx(28.0, rel=0.01)
+    assert identified["mu_d"]["value"] == pytest.approx(20.0, rel=0.01)
+    assert identified["m"]["value"] == pytest.approx(95.0, rel=0.01)
+    moves = summary["Optimal moves of the identified drive"]
+    assert {move["status"] for move in moves.values()} == {"SOLVED"}
+    assert all(abs(move["terminal_miss"]["x"]) < 1e-4 for move in moves.values())
+    assert moves["minimum time"]["T"] < moves["minimum effort"]["T"]
+
+
+@pytest.mark.skipif(not EMPS.is_dir(), reason="needs the EMPS benchmark in ../shared/data")
+def test_with_data_it_identifies_the_measured_stage(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["demo", "--out", str(tmp_path / "o"), "--data", str(EMPS)]) == 0
+    assert f"the measured EMPS stage in {EMPS}" in capsys.readouterr().err
+    check_folder(tmp_path / "o")
+    summary = json.loads((tmp_path / "o" / "summary.json").read_text())
+    found = summary["Identification of a positioning drive"]["coulomb+viscous"]["parameters"]
+    # published least squares: value and standard error
+    assert abs(found["m"]["value"] - 95.1089) < 3 * 0.109
+    assert abs(found["mu_d"]["value"] - 20.3935) < 3 * 0.101
+    assert abs(found["sigma_2"]["value"] - 203.5034) < 3 * 1.146
