@@ -1,0 +1,337 @@
+"""Simulation as a user sees it: named signals, inputs, files, errors, against closed forms."""
+
+import csv
+import json
+from math import exp
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from oracles import viscous_ramp, viscous_sine
+
+from symfric import (
+    BrownMcPhee,
+    Hold,
+    Linear,
+    LuGre,
+    Model,
+    Output,
+    SolveError,
+    Status,
+    Trajectory,
+    Variable,
+    Viscous,
+    drive,
+    rabinowicz,
+    simulate,
+)
+
+M, C = 0.8, 2.0
+BACKENDS = ["auto", "rosenbrock", "sundials"]
+
+each_backend = pytest.mark.parametrize("backend", BACKENDS)
+
+
+def cart() -> Model:
+    """m v' = force - c v."""
+    return drive(Viscous(sigma_2=C), m=M)
+
+
+@pytest.fixture(scope="module")
+def run() -> Trajectory:
+    return simulate(rabinowicz(LuGre()), 1.0, samples=11)
+
+
+def test_signals_have_names_units_and_the_length_of_time(run: Trajectory) -> None:
+    assert run.scene == "rabinowicz"
+    assert run.t == pytest.approx(np.linspace(0, 1, 11))
+    assert list(run.signals) == ["x", "v", "z", "v_rel", "friction", "power"]
+    assert run.units == {
+        "x": "m",
+        "v": "m/s",
+        "z": "m",
+        "v_rel": "m/s",
+        "friction": "N",
+        "power": "W",
+    }
+    assert all(signal.shape == (11,) for signal in run.signals.values())
+    np.testing.assert_array_equal(run["v"], run.signals["v"])
+    np.testing.assert_array_equal(run["t"], run.t)
+
+
+def test_success_is_said_and_counted(run: Trajectory) -> None:
+    assert run.status is Status.SUCCESS
+    assert run.message == Status.SUCCESS.value
+    assert run.statistics.steps > 10
+    assert run.statistics.evaluations >= run.statistics.steps
+    assert run.statistics.to_dict()["steps"] == run.statistics.steps
+
+
+def test_final_values_are_the_last_ones(run: Trajectory) -> None:
+    assert run.final == pytest.approx({n: s[-1] for n, s in run.signals.items()})
+
+
+def test_dense_output_meets_the_samples_and_is_accurate_between_them() -> None:
+    run = simulate(cart(), 2.0, u={"force": 3.0}, rtol=1e-8, samples=201)
+    assert run.at(run.t)["v"] == pytest.approx(run["v"], rel=1e-9)
+    t = np.linspace(0, 2, 777)
+    exact = [viscous_ramp(s, M, C, 0.0, 3.0, 0.0) for s in t]
+    assert run.at(t)["v"] == pytest.approx(exact, abs=1e-6)
+    assert run.at(0.5)["v"].shape == (1,)
+    assert set(run.at(0.5)) == set(run.signals)
+
+
+def test_times_asked_for_do_not_change_the_steps() -> None:
+    few, many = (simulate(rabinowicz(LuGre()), 5.0, samples=n) for n in (2, 5001))
+    assert few.statistics.steps == many.statistics.steps
+    assert few.final["x"] == pytest.approx(many.final["x"], rel=1e-9)
+
+
+def test_times_of_the_result_may_be_given() -> None:
+    times = [0.5, 0.7, 1.9]
+    run = simulate(cart(), 2.0, u={"force": 3.0}, t_eval=times, rtol=1e-8)
+    assert run.t.tolist() == times
+    assert run["v"] == pytest.approx([viscous_ramp(t, M, C, 0, 3.0, 0) for t in times], rel=1e-6)
+
+
+@each_backend
+def test_constant_input(backend: str) -> None:
+    run = simulate(cart(), 2.0, u={"force": 3.0}, x0={"v": 0.5}, rtol=1e-8, backend=backend)
+    exact = [viscous_ramp(t, M, C, 0.5, 3.0, 0.0) for t in run.t]
+    assert run["v"] == pytest.approx(exact, abs=1e-6)
+    assert (run["force"] == 3.0).all()
+    assert run["friction"] == pytest.approx(C * run["v"])
+
+
+@each_backend
+def test_input_as_a_function_of_time(backend: str) -> None:
+    force = {"force": lambda t: 2.0 * ca.sin(5.0 * t)}
+    run = simulate(cart(), 3.0, u=force, rtol=1e-8, backend=backend)
+    exact = [viscous_sine(t, M, C, 2.0, 5.0) for t in run.t]
+    assert run["v"] == pytest.approx(exact, abs=1e-6)
+
+
+@each_backend
+def test_held_input_jumps_exactly_at_its_samples(backend: str) -> None:
+    force = Hold(t=[0.0, 0.3, 1.1], values=[1.0, -2.0, 4.0])
+    run = simulate(
+        cart(), 1.5, u={"force": force}, rtol=1e-8, t_eval=[0.3, 1.1, 1.5], backend=backend
+    )
+    v = [viscous_ramp(0.3, M, C, 0.0, 1.0, 0.0)]
+    v.append(viscous_ramp(0.8, M, C, v[-1], -2.0, 0.0))
+    v.append(viscous_ramp(0.4, M, C, v[-1], 4.0, 0.0))
+    assert run["v"] == pytest.approx(v, abs=1e-7)
+    assert run["force"].tolist() == [-2.0, 4.0, 4.0]
+
+
+@each_backend
+def test_linear_input_bends_at_its_samples_and_holds_beyond(backend: str) -> None:
+    force = Linear(t=[0.0, 0.5, 1.0], values=[0.0, 2.0, -1.0])
+    run = simulate(
+        cart(), 1.5, u={"force": force}, rtol=1e-8, t_eval=[0.5, 1.0, 1.5], backend=backend
+    )
+    v = [viscous_ramp(0.5, M, C, 0.0, 0.0, 4.0)]
+    v.append(viscous_ramp(0.5, M, C, v[-1], 2.0, -6.0))
+    v.append(viscous_ramp(0.5, M, C, v[-1], -1.0, 0.0))
+    assert run["v"] == pytest.approx(v, abs=1e-7)
+    assert run["force"] == pytest.approx([2.0, -1.0, -1.0])
+
+
+def test_input_that_is_not_given_keeps_its_start_value() -> None:
+    assert simulate(cart(), 1.0).final["v"] == 0.0
+
+
+def test_start_time_shifts_a_function_of_time() -> None:
+    run = simulate(cart(), 3.0, t_start=1.0, u={"force": lambda t: 4.0 * (t - 1.0)}, rtol=1e-8)
+    assert run.final["v"] == pytest.approx(viscous_ramp(2.0, M, C, 0.0, 0.0, 4.0), rel=1e-6)
+
+
+def test_parameters_are_taken_by_name_without_a_new_model() -> None:
+    model = drive(Viscous(), free=["sigma_2", "m"])
+    for c, m in ((2.0, 0.8), (0.5, 3.0)):
+        run = simulate(model, 1.0, u={"force": 1.0}, p={"sigma_2": c, "m": m}, rtol=1e-8)
+        assert run.final["v"] == pytest.approx(viscous_ramp(1.0, m, c, 0.0, 1.0, 0.0), rel=1e-6)
+
+
+x = Variable("x", "m", start=1.0)
+
+
+@each_backend
+def test_differential_algebraic_model(backend: str) -> None:
+    """x' = -z with z^3 = x: x = (1 - 2t/3)^(3/2)."""
+    z = Variable("z", "m/s", start=0.5)
+    equation = z.symbol**3 - x.symbol
+    model = Model("root", x=(x,), z=(z,), ode=-z.symbol, alg=equation)
+    run = simulate(model, 1.0, rtol=1e-8, backend=backend)
+    assert run["x"] == pytest.approx((1 - 2 * run.t / 3) ** 1.5, abs=1e-6)
+    assert run["z"] == pytest.approx((1 - 2 * run.t / 3) ** 0.5, abs=1e-6)
+
+
+@pytest.mark.parametrize("backend", ["auto", "sundials"])
+def test_implicit_model(backend: str) -> None:
+    """2 x' + x = 0."""
+    rate = ca.SX.sym("rate")
+    model = Model("implicit", x=(x,), xdot=rate, residual=2 * rate + x.symbol)
+    run = simulate(model, 3.0, rtol=1e-8, backend=backend)
+    assert run["x"] == pytest.approx(np.exp(-run.t / 2), abs=1e-6)
+
+
+def test_implicit_model_with_coupled_nonlinear_rates() -> None:
+    """x' + y' = -x - y and x'^3 = -x^3 have the solution x = exp(-t), y = 2 exp(-t)."""
+    y, rates = Variable("y", "m", start=2.0), ca.SX.sym("rates", 2)
+    first = rates[0] + rates[1] + x.symbol + y.symbol
+    second = rates[0] + rates[0] ** 3 + x.symbol + x.symbol**3
+    model = Model("implicit", x=(x, y), xdot=rates, residual=ca.vertcat(first, second))
+    run = simulate(model, 2.0, rtol=1e-8)
+    assert run["x"] == pytest.approx(np.exp(-run.t), abs=1e-6)
+    assert run["y"] == pytest.approx(2 * np.exp(-run.t), abs=1e-6)
+
+
+@each_backend
+def test_outputs_may_depend_on_everything(backend: str) -> None:
+    u, p, t = Variable("u", "1", start=2.0), Variable("p", "1", start=3.0), ca.SX.sym("t")
+    out = Output(t + 10 * x.symbol + 100 * u.symbol + 1000 * p.symbol, "1")
+    model = Model("all", x=(x,), u=(u,), p=(p,), ode=ca.SX(0.0), outputs={"out": out}, t=t)
+    run = simulate(model, 0.5, samples=2, backend=backend)
+    assert run["out"] == pytest.approx([3210.0, 3210.5])
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1.1e-5])
+def test_loose_tolerance_warns(rtol: float) -> None:
+    with pytest.warns(UserWarning, match=f"rtol = {rtol:g} is above 1e-05; whole stick phases"):
+        simulate(cart(), 0.1, rtol=rtol)
+
+
+@pytest.mark.parametrize("rtol", [1e-5, 1e-6])
+def test_tight_tolerance_does_not_warn(rtol: float) -> None:
+    assert simulate(cart(), 0.1, rtol=rtol).status.ok
+
+
+@pytest.mark.parametrize("rtol", [1e-5, 1e-7, 1e-9])
+@each_backend
+def test_error_follows_the_tolerance(backend: str, rtol: float) -> None:
+    run = simulate(cart(), 2.0, u={"force": lambda t: ca.sin(9 * t)}, rtol=rtol, backend=backend)
+    exact = np.array([viscous_sine(t, M, C, 1.0, 9.0) for t in run.t])
+    assert np.abs(run["v"] - exact).max() < 20 * rtol
+
+
+def blow_up() -> Model:
+    """x' = x^2 from 1, infinite at t = 1."""
+    return Model("blow_up", x=(x,), ode=x.symbol**2)
+
+
+@pytest.mark.parametrize("backend", ["auto", "rosenbrock"])
+def test_failed_solve_says_where_and_keeps_what_there_is(backend: str) -> None:
+    with pytest.raises(SolveError, match=r"stopped .*t = (0\.9|1)") as caught:
+        simulate(blow_up(), 2.0, backend=backend)
+    error = caught.value
+    assert not error.status.ok
+    partial = error.partial
+    assert isinstance(partial, Trajectory)
+    assert partial.status is error.status
+    assert 0.9 < partial.t[-1] <= 1.0
+    early = partial.t < 0.9
+    assert partial["x"][early] == pytest.approx(1 / (1 - partial.t[early]), rel=1e-4)
+
+
+def test_failed_solve_is_returned_where_nothing_is_to_be_thrown() -> None:
+    run = simulate(blow_up(), 2.0, throw=False)
+    assert not run.status.ok
+    assert run.message
+    assert run.final["x"] > 10
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"t_end": 0.0}, r"expected t_end > t_start = 0 s, got 0 s"),
+        ({"t_end": np.nan}, r"t_end: expected a finite number"),
+        ({"t_start": "soon"}, r"t_start: expected a finite number, got 'soon'"),
+        ({"rtol": 0.0}, r"expected 1e-13 <= rtol <= 0.1, got 0"),
+        ({"rtol": 1.0}, r"expected 1e-13 <= rtol <= 0.1, got 1"),
+        ({"backend": "matlab"}, r"backend: expected .*auto, .* got '?matlab"),
+        ({"x0": {"vel": 1.0}}, r"model 'drive' x0: .* got vel"),
+        ({"x0": {"v": np.inf}}, r"drive.v: expected a finite number, got inf"),
+        ({"u": {"torque": 1.0}}, r"model 'drive' u: expected one of force, got torque"),
+        ({"p": {"m": 1.0}}, r"model 'drive' p: expected one of no parameters, got m"),
+        ({"t_eval": [0.0, 0.5, 0.5]}, r"t_eval: expected increasing times in \[0, 1\] s"),
+        ({"t_eval": [0.0, 2.0]}, r"t_eval: expected increasing times in \[0, 1\] s"),
+        ({"t_eval": []}, r"t_eval: expected increasing times"),
+        ({"t_eval": [[0.0, 1.0]]}, r"t_eval: expected increasing times .* shape \(1, 2\)"),
+    ],
+)
+def test_bad_input_is_refused_saying_where(arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        simulate(cart(), **{"t_end": 1.0, **arguments})
+
+
+@pytest.mark.parametrize(
+    ("t", "values", "message"),
+    [
+        ([0.0, 1.0], [1.0], r"expected t and values of one length, got \(2,\) and \(1,\)"),
+        ([], [], r"expected t and values of one length"),
+        ([0.0, 1.0, 1.0], [1.0, 2.0, 3.0], r"increasing times, got t\[2\] = 1 after t\[1\] = 1"),
+        ([0.0, np.nan], [1.0, 2.0], r"expected finite samples, got NaN or infinity"),
+        ([0.0, 1.0], [1.0, np.inf], r"expected finite samples, got NaN or infinity"),
+    ],
+)
+@pytest.mark.parametrize("kind", [Hold, Linear])
+def test_bad_samples_are_refused(
+    kind: type[Hold | Linear], t: list[float], values: list[float], message: str
+) -> None:
+    with pytest.raises(ValueError, match=f"{kind.__name__}: .*{message}"):
+        kind(t, values)
+
+
+def test_input_of_another_kind_is_refused_by_name() -> None:
+    with pytest.raises(ValueError, match="force"):
+        simulate(cart(), 1.0, u={"force": "strong"})  # type: ignore[dict-item]
+
+
+def test_algebraic_equation_without_a_solution_is_reported() -> None:
+    z = Variable("z", "1", start=1.0)
+    model = Model("none", x=(x,), z=(z,), ode=-z.symbol, alg=z.symbol**2 + 1)
+    with pytest.raises((ValueError, SolveError), match=r"consistent|stopped at t = 0 s"):
+        simulate(model, 1.0)
+
+
+def test_unknown_signal_and_time_outside_are_refused(run: Trajectory) -> None:
+    with pytest.raises(ValueError, match=r"trajectory of 'rabinowicz': .* got vrel; did you mean"):
+        run["vrel"]
+    with pytest.raises(ValueError, match=r"expected times in \[0, 1\] s, got 0.5 ... 1.5 s"):
+        run.at([0.5, 1.5])
+
+
+def test_table_has_units_in_its_header_and_every_digit(run: Trajectory, tmp_path: Path) -> None:
+    run.to_csv(tmp_path / "run.csv")
+    with (tmp_path / "run.csv").open(encoding="utf-8", newline="") as file:
+        header, *rows = csv.reader(file)
+    assert header[:4] == ["t [s]", "x [m]", "v [m/s]", "z [m]"]
+    assert header[-2:] == ["friction [N]", "power [W]"]
+    numbers = np.array(rows, dtype=float)
+    assert numbers.shape == (11, 7)
+    np.testing.assert_array_equal(numbers[:, 2], run["v"])
+
+
+def test_json_holds_everything_as_plain_data(run: Trajectory, tmp_path: Path) -> None:
+    run.to_json(tmp_path / "run.json")
+    data = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))
+    assert (data["scene"], data["status"]) == ("rabinowicz", "SUCCESS")
+    assert data["units"]["t"] == "s"
+    assert data["units"]["v"] == "m/s"
+    assert data["t"] == run.t.tolist()
+    assert data["signals"]["v"] == run["v"].tolist()
+    assert data["statistics"]["steps"] == run.statistics.steps
+
+
+def test_run_is_the_same_each_time() -> None:
+    one, other = (simulate(rabinowicz(BrownMcPhee()), 3.0) for _ in range(2))
+    np.testing.assert_array_equal(one["x"], other["x"])
+
+
+def test_nominal_values_scale_the_absolute_tolerance() -> None:
+    """In micrometres the same model must not be solved a million times worse."""
+    slow = Variable("s", "um", start=1e6, nominal=1e6)
+    model = Model("scaled", x=(slow,), ode=-slow.symbol)
+    assert simulate(model, 1.0, rtol=1e-8).final["s"] == pytest.approx(1e6 * exp(-1), rel=1e-7)
