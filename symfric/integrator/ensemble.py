@@ -25,7 +25,7 @@ from symfric.integrator.chunk import Chunk, Job, Solved, solve_chunk
 from symfric.integrator.initial import consistent, first_step
 from symfric.integrator.inputs import Drivers, Input, drivers
 from symfric.integrator.integrator import Integrator
-from symfric.integrator.step import E_MEMORY
+from symfric.integrator.step import GROWTH_MEMORY
 from symfric.integrator.tableaux import ROSENBROCK
 from symfric.model import Model
 from symfric.parameters import check_names
@@ -207,11 +207,10 @@ def _chunk(
     if system.algebraic[0]:
         where = f"simulate_many of '{model.name}'"
         y = np.vstack([consistent(system, where, y[i], d[i]) for i in range(size)])
-    f = integrator.f.map(size)(y.T, d.T).full().T
-    h = [first_step(system, f[i], y[i], atol, rtol, t_end - t_start) for i in range(size)]
-    column = np.array(h)[:, None]
+    column = np.full((size, 1), first_step(t_end - t_start))
     start = np.full((size, 1), t_start)
-    S = np.hstack([start, column, column, np.full((size, 1), E_MEMORY), np.zeros((size, 1)), y])
+    growth = np.full((size, 1), GROWTH_MEMORY)
+    S = np.hstack([start, column, column, growth, np.zeros((size, 1)), y])
     R = np.hstack(
         [np.full((size, 1), t_end), np.full((size, 1), rtol), np.tile(atol, (size, 1)), d]
     )

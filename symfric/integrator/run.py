@@ -15,7 +15,7 @@ from symfric.integrator.events import Crossing, EventStorm, first_crossing, rese
 from symfric.integrator.initial import consistent, first_step
 from symfric.integrator.inputs import Drivers
 from symfric.integrator.integrator import Integrator
-from symfric.integrator.step import E_MEMORY, MEMORY
+from symfric.integrator.step import GROWTH_MEMORY, MEMORY
 from symfric.status import Status
 
 Array = NDArray[np.float64]
@@ -82,9 +82,8 @@ def integrate(
     t_start, t_end = float(inputs.breaks[0]), float(inputs.breaks[-1])
     d = np.concatenate([p, inputs.values[:, 0]])
     y = consistent(integrator.system, f"model '{integrator.model.name}'", y0, d)
-    f = integrator.f(y, d).full().ravel()
-    h = first_step(integrator.system, f, y, tolerances.atol, tolerances.rtol, t_end - t_start)
-    S = np.concatenate([[t_start, h, h, E_MEMORY, 0.0], y])
+    h = first_step(t_end - t_start)
+    S = np.concatenate([[t_start, h, h, GROWTH_MEMORY, 0.0], y])
     storm = EventStorm(t_end - t_start, tolerances.event)
     try:
         for k in range(inputs.breaks.size - 1):
@@ -186,5 +185,5 @@ def _happen(
     S[MEMORY:] = consistent(integrator.system, f"model '{integrator.model.name}'", y, d)
     # the old step size is a guess only: what follows may be faster
     S[1] = max(min(S[1], tolerances.event * 1e3), 1e-3 * S[1])
-    S[2], S[3] = S[1], E_MEMORY
+    S[2], S[3] = S[1], GROWTH_MEMORY
     return frozenset(crossing.which)

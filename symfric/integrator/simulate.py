@@ -244,6 +244,9 @@ def _trajectory(
     names = list(model.signals)
     signals = integrator.signals
 
+    def states(at: Array) -> dict[str, Array]:
+        return dict(zip(names, dense(at)[: len(model.x)], strict=False))
+
     def evaluate(at: Array) -> dict[str, Array]:
         d = np.vstack([np.tile(p[:, None], (1, at.size)), inputs.values[:, inputs.interval(at)]])
         values = signals.map(max(1, at.size))(at[None, :], dense(at), d).full()
@@ -258,6 +261,7 @@ def _trajectory(
         run.message,
         statistics,
         np.append(dense.t0, dense.t1[-1]),
+        states,
         evaluate,
         tuple(run.happened),
     )

@@ -2,7 +2,7 @@
 
 State and run data are columns:
 
-    S = (t, h, h_old, e_old, rejected, y)      what an attempt changes
+    S = (t, h, h_old, growth_old, rejected, y)      what an attempt changes
     R = (t_end, rtol, atol[nx], d)             what it does not
 
 `step(S, R) -> (S_next, D)` tries h, and either accepts (t, y advance; D holds the dense output)
@@ -19,11 +19,11 @@ from symfric.integrator.system import System
 from symfric.integrator.tableaux import Rosenbrock
 
 MEMORY = 5
-"""Rows of S before y: t, h, h_old, e_old, rejected."""
+"""Rows of S before y: t, h, h_old, growth_old, rejected."""
 
 SAFETY, GROW, SHRINK = 0.9, 5.0, 0.2
-E_FLOOR, E_MEMORY = 1e-6, 1e-2
-"""Smallest error the controller believes, and remembers."""
+E_FLOOR, GROWTH_MEMORY = 1e-6, 2.5
+"""Smallest error the controller believes, and largest growth it remembers."""
 
 
 @final
@@ -71,7 +71,7 @@ def stages(
     block: Blocks, tableau: Rosenbrock, y: Any, h: Any, d: Any
 ) -> tuple[Any, Any, list[Any]]:
     """End value, error estimate and dense output of one step from y; SX or MX."""
-    lu = block.factor(y, h, d)
+    lu, per_h = block.factor(y, h, d), 1 / h
     k: list[Any] = []
     argument = y
     for i in range(tableau.stages):
@@ -80,8 +80,8 @@ def stages(
             if tableau.A[i, j] != 0:
                 argument = argument + tableau.A[i, j] * k[j]
             if tableau.C[i, j] != 0:
-                memory = memory + (tableau.C[i, j] / h) * k[j]
-        k.append(block.solve(lu, block.f(argument, d), memory))
+                memory = memory + tableau.C[i, j] * k[j]
+        k.append(block.solve(lu, block.f(argument, d), memory * per_h))
     dense = [
         sum((float(c) * kj for c, kj in zip(row, k, strict=True) if c != 0.0), start=type(y)(0))
         for row in tableau.H
@@ -114,10 +114,10 @@ def build_dense_step(system: System, tableau: Rosenbrock) -> ca.Function:
     )
 
 
-def error_norm(
+def error_square(
     block: Blocks, system: System, y: Any, y_new: Any, error: Any, atol: Any, rtol: Any, d: Any
 ) -> Any:
-    """Root mean square of the error of the states and of the monitored outputs, scaled.
+    """Mean square of the error of the states and of the monitored expressions, scaled.
 
     A state is scaled by atol + rtol max|x|, a monitored output m by rtol (nominal + min|m|): where
     a contact sticks, its sliding velocity is resolved relative to the velocity scale of the law
@@ -131,7 +131,7 @@ def error_norm(
         smallest = ca.fmin(ca.fabs(block.monitor(y, d)), ca.fabs(block.monitor(y_new, d)))
         slip = block.monitor_error(y_new, error, d) / (rtol * (nominal + smallest))
         total = total + ca.sumsqr(slip)
-    return ca.sqrt(total / (nx + watched))
+    return total / (nx + watched)
 
 
 def build_step(system: System, tableau: Rosenbrock, kind: Any = ca.SX) -> ca.Function:
@@ -146,7 +146,7 @@ def build_step(system: System, tableau: Rosenbrock, kind: Any = ca.SX) -> ca.Fun
     n, nx = system.n, system.nx
     S = kind.sym("S", MEMORY + n)
     R = kind.sym("R", 2 + nx + system.d.numel())
-    t, h_wish, h_old, e_old, rejected = (S[i] for i in range(MEMORY))
+    t, h_wish, h_old, growth_old, rejected = (S[i] for i in range(MEMORY))
     y, t_end, rtol = S[MEMORY:], R[0], R[1]
     atol, d = R[2 : 2 + nx], R[2 + nx :]
 
@@ -154,26 +154,26 @@ def build_step(system: System, tableau: Rosenbrock, kind: Any = ca.SX) -> ca.Fun
     h = ca.fmax(ca.fmin(h_wish, left), 1e-300)
     block = blocks(system, tableau)
     y_new, error, dense = stages(block, tableau, y, h, d)
-    e = error_norm(block, system, y, y_new, error, atol, rtol, d)
-    e = ca.if_else(e <= 1e10, e, 1e10)
-    accept = ca.logic_and(e <= 1, left > 0)
+    e2 = error_square(block, system, y, y_new, error, atol, rtol, d)
+    e2 = ca.if_else(e2 <= 1e20, e2, 1e20)
+    accept = ca.logic_and(e2 <= 1, left > 0)
 
-    # Gustafsson's predictive controller (Hairer and Wanner, IV.8)
+    # Gustafsson's predictive controller (Hairer and Wanner, IV.8), with growth = e^(-1/order) as
+    # its memory, so that one power an attempt is enough
     order = tableau.embedded + 1
-    believed = ca.fmax(e, E_FLOOR)
-    plain = believed ** (-1 / order)
-    predicted = (h / h_old) * (e_old / (believed * believed)) ** (1 / order)
-    factor = ca.fmin(GROW, ca.fmax(SHRINK, SAFETY * ca.fmin(plain, predicted)))
+    growth = ca.fmax(e2, E_FLOOR**2) ** (-0.5 / order)
+    predicted = (h / h_old) * (growth * growth / growth_old)
+    factor = ca.fmin(GROW, ca.fmax(SHRINK, SAFETY * ca.fmin(growth, predicted)))
     factor = ca.if_else(rejected > 0, ca.fmin(factor, 1), factor)
     # a step cut by t_end must not forget the step size it could have had
     h_next = ca.if_else(h < h_wish, ca.fmax(h_wish, h * factor), h * factor)
-    h_less = h * ca.fmax(SHRINK, SAFETY * plain)
+    h_less = h * ca.fmax(SHRINK, SAFETY * growth)
 
     memory = ca.vertcat(
         ca.if_else(accept, ca.if_else(h < h_wish, t_end, t + h), t),
         ca.if_else(accept, h_next, ca.if_else(left > 0, h_less, h_wish)),
         ca.if_else(accept, h, h_old),
-        ca.if_else(accept, ca.fmax(believed, E_MEMORY), e_old),
+        ca.if_else(accept, ca.fmin(growth, GROWTH_MEMORY), growth_old),
         ca.if_else(ca.logic_or(accept, left <= 0), 0, 1),
     )
     S_next = ca.vertcat(memory, ca.if_else(accept, y_new, y))

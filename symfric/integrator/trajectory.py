@@ -73,6 +73,8 @@ class Trajectory:
         statistics: steps, evaluations, times.
         happened: (time [s], name) of every event.
         steps: ends of the accepted steps [s], shape (steps + 1,).
+        states: the states alone, at any times; cheaper than all signals.
+        evaluate: all signals at any times.
     """
 
     scene: str
@@ -82,6 +84,7 @@ class Trajectory:
     message: str
     statistics: Statistics
     steps: Array
+    states: Callable[[Array], dict[str, Array]]
     evaluate: Callable[[Array], dict[str, Array]]
     happened: tuple[tuple[float, str], ...] = ()
     differentiate: Callable[[Array], dict[str, dict[str, Array]]] | None = None
@@ -90,6 +93,10 @@ class Trajectory:
     def signals(self) -> dict[str, Array]:
         """Name -> values at `t`, shape (n,): states, algebraic variables, inputs, outputs."""
         return self.evaluate(self.t)
+
+    @cached_property
+    def _own_states(self) -> dict[str, Array]:
+        return self.states(self.t)
 
     @cached_property
     def sensitivities(self) -> dict[str, dict[str, Array]]:
@@ -109,7 +116,8 @@ class Trajectory:
         if name == "t":
             return self.t
         check_names(f"trajectory of '{self.scene}'", [name], self.units)
-        return self.signals[name]
+        states = self._own_states
+        return states[name] if name in states else self.signals[name]
 
     def at(self, times: ArrayLike) -> dict[str, Array]:
         """All signals at `times` [s] inside the simulated span, by dense output.
