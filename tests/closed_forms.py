@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import cos, exp, sin
+from math import exp, sin
 
 import casadi as ca
 import numpy as np
@@ -65,14 +65,14 @@ def prothero_robinson(rate: float) -> ClosedForm:
     return ClosedForm(Model("stiff", x=(x,), ode=slope, t=t), lambda s: (sin(s + 0.5), s))
 
 
-def fixed_steps(case: ClosedForm, tableau: Rosenbrock, count: int) -> Array:
+def fixed_steps(case: ClosedForm, tableau: Rosenbrock, count: int) -> float:
     """Largest error of any unknown at T after `count` equal steps."""
     step = build_fixed(assemble(case.model), tableau).mapaccum(count)
     y = step(case.exact(0.0), T / count, np.zeros(0)).full()[:, -1]
-    return np.abs(y - case.exact(T)).max()
+    return float(np.abs(y - case.exact(T)).max())
 
 
-def between_fixed_steps(case: ClosedForm, tableau: Rosenbrock, count: int) -> Array:
+def between_fixed_steps(case: ClosedForm, tableau: Rosenbrock, count: int) -> float:
     """Largest error of any unknown between `count` equal steps."""
     step, h = build_dense_step(assemble(case.model), tableau), T / count
     theta = np.linspace(0.0, 1.0, 11)
@@ -82,9 +82,9 @@ def between_fixed_steps(case: ClosedForm, tableau: Rosenbrock, count: int) -> Ar
         ends = np.array([k * h]), np.array([(k + 1) * h])
         piece = Dense(*ends, y[None], rows[:1], rows[None, 1:])
         exact = [case.exact((k + s) * h) for s in theta]
-        worst = max(worst, np.abs(piece.piece(np.zeros(11, int), theta) - exact).max())
+        worst = max(worst, float(np.abs(piece.piece(np.zeros(11, int), theta) - exact).max()))
         y = rows[0]
-    return np.float64(worst)
+    return worst
 
 
 def observed_order(counts: Sequence[int], errors: Sequence[float]) -> float:

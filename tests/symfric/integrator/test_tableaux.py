@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from itertools import combinations_with_replacement
 from math import prod
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -24,7 +25,7 @@ from symfric import Model, Variable
 from symfric.integrator.step import blocks, build_fixed, stages
 from symfric.integrator.tableaux import ROSENBROCK, Rosenbrock
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 Tree = tuple["Tree", ...]
 
 each_method = pytest.mark.parametrize("name", ROSENBROCK)
