@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from symfric import Model, Output, Variable
-from symfric.model import finite
+from symfric.model import Event, Monitor, finite
 
 x, y = Variable("x", "m", start=1.0, nominal=0.1), Variable("y", "m/s")
 w, u, k = Variable("w", "N"), Variable("u", "N", start=2.0), Variable("k", "N/m", start=3.0)
@@ -106,6 +106,22 @@ BAD = {
     "name that C does not take": (
         {"x": (Variable("v rel", "m/s"),), "ode": ca.SX(1, 1)},
         r"C identifiers, got v rel",
+    ),
+    "reset of an unknown state": (
+        {"x": (x,), "ode": x.symbol, "events": (Event("hit", x.symbol, reset={"q": 0.0}),)},
+        r"event 'hit': expected resets of x, got q",
+    ),
+    "direction of an event": (
+        {"x": (x,), "ode": x.symbol, "events": (Event("hit", x.symbol, direction=2),)},
+        r"event 'hit': expected direction -1, 0 or 1, got 2",
+    ),
+    "undeclared in an event": (
+        {"x": (x,), "ode": x.symbol, "events": (Event("hit", x.symbol - stray),)},
+        r"got stray",
+    ),
+    "undeclared in a monitor": (
+        {"x": (x,), "ode": x.symbol, "monitors": (Monitor(stray, 1.0),)},
+        r"got stray",
     ),
     "vector output": (
         {"x": (x,), "ode": x.symbol, "outputs": {"two": Output(ca.SX(2, 1), "1")}},

@@ -76,6 +76,14 @@ def test_column_stacks_floats_arrays_and_matrices() -> None:
     assert numeric.column().shape == (0,)
 
 
+def test_smallest_of_floats_arrays_and_symbols() -> None:
+    assert numeric.smallest(3.0, 1.0, 2.0) == 1.0
+    assert numeric.smallest(np.array([1.0, 5.0]), 3.0).tolist() == [1.0, 3.0]
+    s = ca.SX.sym("s")
+    least = ca.Function("least", [s], [numeric.smallest(2.0, s)])
+    assert [float(least(x)) for x in (1.0, 3.0)] == [1.0, 2.0]
+
+
 def test_empty_has_no_rows_and_joins_without_a_trace() -> None:
     assert numeric.empty(1.0).shape == (0,)
     assert numeric.empty(np.ones(4)).shape == (0, 4)

@@ -1,5 +1,7 @@
 """Laws made of laws: names, states, values, and what they refuse."""
 
+from math import inf
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -176,6 +178,20 @@ def test_nested_wrappers_act_in_order() -> None:
     law = LoadDependent(Asymmetric(side, with_values(side, {"mu_d": 0.3})), N_0=10.0, c=0.0)
     assert law.force(1.0, 99.0) == pytest.approx(7.0)
     assert law.force(-1.0, 99.0) == pytest.approx(-5.0)
+
+
+@pytest.mark.parametrize(
+    ("law", "scale"),
+    [
+        (Sum((Stribeck(v_eps=2e-4), Coulomb(v_eps=1e-3), Viscous())), 2e-4),
+        (Sum((Viscous(), Dahl())), inf),
+        (Asymmetric(Coulomb(v_eps=1e-3), Coulomb(v_eps=3e-4)), 3e-4),
+        (LoadDependent(BrownMcPhee(v_t=0.02)), 0.02),
+        (SelfTuning(B=500.0), 2e-3),
+    ],
+)
+def test_velocity_scale_is_the_smallest_one_inside(law: Law, scale: float) -> None:
+    assert law.velocity_scale == pytest.approx(scale)
 
 
 def test_sum_of_sums_is_one_sum() -> None:

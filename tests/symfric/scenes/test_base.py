@@ -70,6 +70,19 @@ def test_friction_states_start_in_steady_sliding_at_the_given_velocity() -> None
     assert float(start(-0.3)) == pytest.approx(-0.5 / 1e5)
 
 
+@each_scene
+@pytest.mark.parametrize(("law", "scale"), [(Coulomb(v_eps=2e-3), [2e-3]), (Viscous(), [])])
+def test_error_control_watches_the_sliding_velocity_on_the_scale_of_the_law(
+    kind: type[Scene], law: Coulomb | Viscous, scale: list[float]
+) -> None:
+    assert [m.nominal for m in kind(law).model().monitors] == scale
+
+
+def test_scale_of_a_free_parameter_is_its_start_value() -> None:
+    (monitor,) = rabinowicz(Coulomb(v_eps=2e-3), free=["v_eps", "mu_d"]).monitors
+    assert monitor.nominal == 2e-3
+
+
 def test_bristle_starts_loaded_for_the_given_start_velocity() -> None:
     model = drive(LuGre())
     assert model.initial_state()[2] == 0.0
