@@ -26,6 +26,7 @@ app = typer.Typer(
     help="Friction laws from formula to simulation, identification, optimal control and C.",
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # units in brackets are not markup
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for function in (laws, run, identify, codegen, demo):

@@ -55,7 +55,9 @@ def demo(
         ),
     ] = None,
 ) -> None:
-    """Run the whole line: simulate, identify, optimise, generate C; leave everything in DIR.
+    """Simulate, identify, optimise and generate C.
+
+    Everything is left in DIR, with a README.md that lists it.
 
     Example: symfric demo --out out
     """

@@ -51,7 +51,9 @@ def identify(
     plot: PlotOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Identify the friction of a drive from measured force and position.
+    """Identify mass, offset and friction of a drive.
+
+    From measured force and position, with uncertainty and errors on a second record.
 
     Example: symfric identify record.csv --law asymmetric(coulomb+viscous) --plot friction.png
     """

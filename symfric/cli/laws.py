@@ -25,7 +25,9 @@ def laws(
     ] = 1.0,
     json: JsonOption = None,
 ) -> None:
-    """List the friction laws, or show one: equation, limits, source, parameters, picture.
+    """List the friction laws, or show one in full.
+
+    In full: equation, limits, source, parameters with units and bounds, and a picture.
 
     Example: symfric laws lugre --plot lugre.png
     """

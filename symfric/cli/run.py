@@ -82,7 +82,9 @@ def run(
     plot: PlotOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Simulate SCENE with a friction law; --set takes parameters of both.
+    """Simulate SCENE with a friction law.
+
+    --set takes parameters of the scene and of the law.
 
     Example: symfric run rabinowicz --law lugre --set mu_s=0.2 --plot stick_slip.png
     """
