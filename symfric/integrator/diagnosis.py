@@ -1,10 +1,13 @@
 """Why an integration could not go on, in one sentence."""
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.integrator.initial import consistent
 from symfric.integrator.integrator import Integrator
 from symfric.integrator.step import blocks
+from symfric.integrator.system import System
 from symfric.status import Status
 
 Array = NDArray[np.float64]
@@ -13,15 +16,7 @@ Array = NDArray[np.float64]
 def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> tuple[Status, str]:
     """Status and sentence for a step that shrank to nothing at time `t`."""
     system, name = integrator.system, integrator.model.name
-    f = integrator.f(y, d).full().ravel()
     where = f"simulate '{name}': stopped at t = {t:.9g} s"
-    broken = [system.names[i] for i in np.flatnonzero(~np.isfinite(f))]
-    if broken:
-        return (
-            Status.NOT_FINITE,
-            f"{where}: the equation of {', '.join(broken)} returned NaN or infinity; "
-            "look for a division by zero or a root of a negative number there",
-        )
     large = np.flatnonzero(np.abs(y[: system.nx]) > 1e10 * system.nominal)
     if large.size:
         grown = ", ".join(f"{system.names[i]} = {y[i]:.3g}" for i in large)
@@ -29,18 +24,71 @@ def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> t
             Status.STEP_TOO_SMALL,
             f"{where}: {grown} grows without bound; check signs and parameters",
         )
-    factors = blocks(system, integrator.tableau).factor(y, max(h, 1e-12), d).full()
-    if not np.isfinite(factors).all():
-        _, unknowns = system.algebraic
-        names = ", ".join(system.names[i] for i in unknowns) or "the states"
-        return (
-            Status.SINGULAR,
-            f"{where}: the iteration matrix is singular in {names}; the constraints may be "
-            "redundant or the configuration singular",
-        )
+    for status, cause in (
+        (Status.NOT_FINITE, _not_finite(integrator, y, d, h)),
+        (Status.NOT_FINITE, _steep(system, y, d)),
+        (Status.SINGULAR, _singular(integrator, y, d, h)),
+    ):
+        if cause:
+            return status, f"{where}: {cause}"
+    f = integrator.f(y, d).full().ravel()
     fastest = system.names[int(np.argmax(np.abs(f[: system.nx]) / system.nominal))]
     return (
         Status.STEP_TOO_SMALL,
         f"{where}: the step fell to {h:.1e} s, fastest equation {fastest}; a discontinuity is "
         "near, give the law a smooth form or the model an event there",
     )
+
+
+def _not_finite(integrator: Integrator, y: Array, d: Array, h: float) -> str:
+    """Equations that are not finite here, or along the slope a few of the last steps ahead."""
+    system = integrator.system
+    f = integrator.f(y, d).full().ravel()
+    rates = np.linalg.pinv(ca.DM(system.mass).full()) @ np.nan_to_num(f)
+    for ahead in (0.0, *(10.0**k * h for k in range(5))):
+        f = integrator.f(y + ahead * rates, d).full().ravel()
+        broken = _named(system, np.flatnonzero(~np.isfinite(f)))
+        if broken:
+            when = "returned" if ahead == 0.0 else "is about to return"
+            return (
+                f"the equation of {broken} {when} NaN or infinity; "
+                "look for a division by zero or a root of a negative number there"
+            )
+    return ""
+
+
+def _steep(system: System, y: Array, d: Array) -> str:
+    """Derivatives of equations that are not finite."""
+    J = ca.Function("J", [system.y, system.d], [ca.jacobian(system.f, system.y)])(y, d).full()
+    rows, columns = np.nonzero(~np.isfinite(J))
+    if not rows.size:
+        return ""
+    return (
+        f"the derivative of the equation of {_named(system, rows[:1])} with respect to "
+        f"{_named(system, columns[:1])} is NaN or infinite; give the root or power there a "
+        "smooth form"
+    )
+
+
+def _singular(integrator: Integrator, y: Array, d: Array, h: float) -> str:
+    """Algebraic equations that cannot be solved, or do not determine their unknowns."""
+    system = integrator.system
+    names = _named(system, np.array(system.algebraic[1], dtype=int))
+    factors = blocks(system, integrator.tableau).factor(y, max(h, 1e-12), d).full()
+    if not np.isfinite(factors).all():
+        return (
+            f"the iteration matrix is singular in {names or 'the states'}; the constraints may be "
+            "redundant or the configuration singular"
+        )
+    try:
+        consistent(system, "", y, d)
+    except ValueError:
+        return (
+            f"the algebraic equations for {names} have no solution near their last one; "
+            "the configuration is singular or jams there"
+        )
+    return ""
+
+
+def _named(system: System, rows: NDArray[np.intp]) -> str:
+    return ", ".join(system.names[i] for i in rows)

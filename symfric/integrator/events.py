@@ -83,11 +83,7 @@ def first_crossing(
     for i in fired:
         y = piece.piece(np.array([0]), np.array([soon]))[0]
         g[i, 0, 0] = float(integrator.events(piece.t0[0], y, d)[i])
-    directions = np.array([e.direction for e in integrator.model.events])
-    before, after = g[:, :, :-1], g[:, :, 1:]
-    rising = (before < 0) & (after >= 0) & (directions >= 0)[:, None, None]
-    falling = (before > 0) & (after <= 0) & (directions <= 0)[:, None, None]
-    hits = rising | falling
+    hits = passed(integrator, g[:, :, :-1], g[:, :, 1:])
     if not hits.any():
         return None
     order = hits.any(axis=0).reshape(-1)
@@ -106,6 +102,14 @@ def first_crossing(
     )
     y = piece.piece(np.array([step]), np.array([theta]))[0]
     return Crossing(float(piece.t0[step] + theta * h), step, y, together)
+
+
+def passed(integrator: Integrator, before: Array, after: Array) -> NDArray[np.bool_]:
+    """Where events, numbered along the first axis, go through zero in their direction."""
+    directions = np.array([e.direction for e in integrator.model.events])
+    directions = directions.reshape(-1, *[1] * (before.ndim - 1))
+    rising = (before < 0) & (after >= 0) & (directions >= 0)
+    return rising | ((before > 0) & (after <= 0) & (directions <= 0))
 
 
 def _values(integrator: Integrator, piece: Dense, d: Array) -> Array:
@@ -161,14 +165,19 @@ def _locate(
     return b
 
 
-def resets(integrator: Integrator, crossing: Crossing, d: Array) -> Array:
-    """Values after the events of a crossing; all resets read the values before it."""
-    y = crossing.y.copy()
+def values(integrator: Integrator, t: float, y: Array, d: Array) -> Array:
+    """Event expressions at one point, shape (events,)."""
+    return integrator.events(t, y, d).full().ravel()
+
+
+def resets(integrator: Integrator, t: float, y: Array, d: Array, which: tuple[int, ...]) -> Array:
+    """Values after the events `which`; all resets read the values `y` before them."""
+    after = y.copy()
     names = [v.name for v in integrator.model.x]
-    for i in crossing.which:
+    for i in which:
         for state, function in integrator.resets[i].items():
-            y[names.index(state)] = float(function(crossing.t, crossing.y, d))
-    return y
+            after[names.index(state)] = float(function(t, y, d))
+    return after
 
 
 @final

@@ -1,6 +1,5 @@
 """Consistent start values: algebraic variables that satisfy their equations, a first step size."""
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,22 +14,12 @@ def consistent(system: System, where: str, y: Array, d: Array) -> Array:
     Raises:
         ValueError: no solution near the guess.
     """
-    rows, columns = system.algebraic
+    columns = system.algebraic[1]
     if not columns:
         return y
     known = [i for i in range(system.n) if i not in columns]
-    solve = ca.rootfinder(
-        "consistent",
-        "newton",
-        {
-            "x": system.y[columns],
-            "p": ca.vertcat(system.y[known], system.d),
-            "g": system.f[rows],
-        },
-        {"error_on_fail": True},
-    )
     try:
-        found = solve(y[columns], np.concatenate([y[known], d])).full().ravel()
+        found = system.constraints(y[columns], np.concatenate([y[known], d])).full().ravel()
     except RuntimeError:
         names = ", ".join(system.names[i] for i in columns)
         raise ValueError(

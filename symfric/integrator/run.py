@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 from symfric.integrator.dense import Dense, from_records, join
 from symfric.integrator.diagnosis import explain
 from symfric.integrator.engine import Stop
-from symfric.integrator.events import Crossing, EventStorm, first_crossing, resets
+from symfric.integrator.events import (
+    Crossing,
+    EventStorm,
+    first_crossing,
+    passed,
+    resets,
+    values,
+)
 from symfric.integrator.initial import consistent, first_step
 from symfric.integrator.inputs import Drivers
 from symfric.integrator.integrator import Integrator
@@ -87,10 +94,24 @@ def integrate(
     storm = EventStorm(t_end - t_start, tolerances.event)
     try:
         for k in range(inputs.breaks.size - 1):
-            d = np.concatenate([p, inputs.values[:, k]])
+            before, d = d, np.concatenate([p, inputs.values[:, k]])
+            fired = _jump(integrator, run, S, before, d, storm) if k else frozenset()
+            if run.status is not Status.SUCCESS:
+                break
             R = np.concatenate([[inputs.breaks[k + 1], tolerances.rtol], tolerances.atol, d])
             _interval(
-                integrator, run, S, R, d, tolerances, backend, storm, t_start, t_end, progress
+                integrator,
+                run,
+                S,
+                R,
+                d,
+                tolerances,
+                backend,
+                storm,
+                t_start,
+                t_end,
+                progress,
+                fired,
             )
             if run.status is not Status.SUCCESS or S[0] < inputs.breaks[k + 1]:
                 break
@@ -115,11 +136,11 @@ def _interval(
     t_start: float,
     t_end: float,
     progress: Callable[[float], None] | None,
+    fired: frozenset[int],
 ) -> None:
     """Integrate over one input interval, on which `d` is constant."""
     eventful = bool(integrator.model.events)
     n = integrator.system.n
-    fired: frozenset[int] = frozenset()
     h_min = 1e-15 * max(abs(t_start), abs(t_end), 1e-3)
     left = 0.0
     while S[0] < R[0]:
@@ -148,8 +169,8 @@ def _interval(
                 run.stop(*explain(integrator, S[0], S[MEMORY:], d, S[1]))
                 return
         else:
-            fired = _happen(integrator, run, S, R, d, piece, crossing, tolerances, storm)
-            if run.status is not Status.SUCCESS or not fired:
+            fired = _happen(integrator, run, S, d, piece, crossing, tolerances, storm)
+            if run.status is not Status.SUCCESS:
                 return
         if progress is not None:
             progress((S[0] - t_start) / (t_end - t_start))
@@ -159,31 +180,82 @@ def _happen(
     integrator: Integrator,
     run: Run,
     S: Array,
-    R: Array,
     d: Array,
     piece: Dense,
     crossing: Crossing,
     tolerances: Tolerances,
     storm: EventStorm,
 ) -> frozenset[int]:
-    """Cut the run at an event, apply its reset and go on from there; empty when it is the end."""
-    events = integrator.model.events
+    """Cut the run at an event, carry it out and go on from there."""
     run.keep(crossing.before(piece))
-    y = resets(integrator, crossing, d)
-    run.happened += [(crossing.t, events[i].name) for i in crossing.which]
-    S[0], S[4], S[MEMORY:] = crossing.t, 0.0, y
-    if any(events[i].terminal for i in crossing.which):
-        run.stop(Status.TERMINATED)
+    # steps beyond the event say nothing; its own is a guess only, what follows may be faster
+    h = float(piece.t1[crossing.step] - piece.t0[crossing.step])
+    h = max(min(h, tolerances.event * 1e3), 1e-3 * h)
+    S[:MEMORY] = crossing.t, h, h, GROWTH_MEMORY, 0.0
+    S[MEMORY:] = crossing.y
+    return _carry_out(integrator, run, S, d, crossing.which, storm)
+
+
+def _jump(
+    integrator: Integrator,
+    run: Run,
+    S: Array,
+    before: Array,
+    d: Array,
+    storm: EventStorm,
+) -> frozenset[int]:
+    """Take over new input data: algebraic unknowns follow, and expressions may jump past zero."""
+    t, old = float(S[0]), S[MEMORY:].copy()
+    _make_consistent(integrator, run, S, d)
+    if not integrator.model.events or run.status is not Status.SUCCESS:
         return frozenset()
-    if storm.raged_at(crossing.t, crossing.which):
-        run.stop(
-            Status.EVENT_STORM,
-            f"{Status.EVENT_STORM.value} It stands at t = {crossing.t:.9g} s, "
-            f"event '{events[crossing.which[0]].name}'.",
-        )
-        return frozenset()
-    S[MEMORY:] = consistent(integrator.system, f"model '{integrator.model.name}'", y, d)
-    # the old step size is a guess only: what follows may be faster
-    S[1] = max(min(S[1], tolerances.event * 1e3), 1e-3 * S[1])
-    S[2], S[3] = S[1], GROWTH_MEMORY
-    return frozenset(crossing.which)
+    new = values(integrator, t, S[MEMORY:], d)
+    hits = passed(integrator, values(integrator, t, old, before), new)
+    which = tuple(np.flatnonzero(hits).tolist())
+    return _carry_out(integrator, run, S, d, which, storm)
+
+
+def _carry_out(
+    integrator: Integrator,
+    run: Run,
+    S: Array,
+    d: Array,
+    which: tuple[int, ...],
+    storm: EventStorm,
+) -> frozenset[int]:
+    """Apply the resets of the events `which`, and of those whose expressions they carry past zero.
+
+    Returns all events that happened; the run is stopped where one is terminal or a storm rages.
+    """
+    events, t = integrator.model.events, float(S[0])
+    fired: frozenset[int] = frozenset()
+    while which:
+        fired |= set(which)
+        before = values(integrator, t, S[MEMORY:], d)
+        S[MEMORY:] = resets(integrator, t, S[MEMORY:], d, which)
+        run.happened += [(t, events[i].name) for i in which]
+        if any(events[i].terminal for i in which):
+            run.stop(Status.TERMINATED)
+            break
+        if storm.raged_at(t, which):
+            run.stop(
+                Status.EVENT_STORM,
+                f"{Status.EVENT_STORM.value} It stands at t = {t:.9g} s, "
+                f"event '{events[which[0]].name}'.",
+            )
+            break
+        _make_consistent(integrator, run, S, d)
+        if run.status is not Status.SUCCESS:
+            break
+        hits = passed(integrator, before, values(integrator, t, S[MEMORY:], d))
+        which = tuple(i for i in np.flatnonzero(hits).tolist() if i not in which)
+    return fired
+
+
+def _make_consistent(integrator: Integrator, run: Run, S: Array, d: Array) -> None:
+    """Let the algebraic unknowns follow a jump, or stop the run where they cannot."""
+    where = f"simulate '{integrator.model.name}' at t = {S[0]:.9g} s"
+    try:
+        S[MEMORY:] = consistent(integrator.system, where, S[MEMORY:], d)
+    except ValueError as error:
+        run.stop(Status.SINGULAR, str(error))

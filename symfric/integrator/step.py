@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import casadi as ca
+import numpy as np
 
 from symfric.integrator.lu import factorise
 from symfric.integrator.system import System
@@ -51,7 +52,8 @@ def blocks(system: System, tableau: Rosenbrock) -> Blocks:
     h = ca.SX.sym("h")
     right, memory = ca.SX.sym("right", system.n), ca.SX.sym("memory", system.n)
     W = ca.sparsify(system.mass / (tableau.gamma * h) - ca.jacobian(system.f, system.y))
-    lu = factorise(W, safe=tuple(range(system.nx)))
+    diagonal = [i for i in range(system.nx) if system.mass.sparsity().has_nz(i, i)]
+    lu = factorise(W, safe=tuple(diagonal))
     return Blocks(
         ca.Function("f", [system.y, system.d], [system.f], {"cse": True}),
         ca.Function("factor", [system.y, h, system.d], [lu.packed], {"cse": True}),
@@ -155,7 +157,10 @@ def build_step(system: System, tableau: Rosenbrock, kind: Any = ca.SX) -> ca.Fun
     block = blocks(system, tableau)
     y_new, error, dense = stages(block, tableau, y, h, d)
     e2 = error_square(block, system, y, y_new, error, atol, rtol, d)
-    e2 = ca.if_else(e2 <= 1e20, e2, 1e20)
+    sound = e2 <= 1e20
+    if unwatched := system.algebraic[1]:
+        sound = ca.logic_and(sound, ca.sumsqr(y_new[unwatched]) < np.inf)
+    e2 = ca.if_else(sound, e2, 1e20)
     accept = ca.logic_and(e2 <= 1, left > 0)
 
     # Gustafsson's predictive controller (Hairer and Wanner, IV.8), with growth = e^(-1/order) as

@@ -57,6 +57,18 @@ class System:
         columns = [int(i) for i in np.flatnonzero(~pattern.any(axis=0))]
         return rows, columns
 
+    @cached_property
+    def constraints(self) -> ca.Function:
+        """Newton's method for the algebraic unknowns: (guess, the others and d) -> solution."""
+        rows, columns = self.algebraic
+        known = [i for i in range(self.n) if i not in columns]
+        problem = {
+            "x": self.y[columns],
+            "p": ca.vertcat(self.y[known], self.d),
+            "g": self.f[rows],
+        }
+        return ca.rootfinder("constraints", "newton", problem, {"error_on_fail": True})
+
 
 def system(model: Model, inputs: Drivers) -> System:
     """Put the inputs into the model and bring it into the form M y' = f(y, d).
