@@ -16,6 +16,14 @@ def test_text_is_written_and_replaced(tmp_path: Path) -> None:
     assert [p.name for p in target.parent.iterdir()] == ["a.txt"]
 
 
+def test_reader_of_the_old_file_sees_it_whole(tmp_path: Path) -> None:
+    target = tmp_path / "a.txt"
+    target.write_text("old")
+    with target.open() as reader:
+        write_text(target, "new and longer")
+        assert reader.read() == "old"
+
+
 class Stop(BaseException):
     """Such as KeyboardInterrupt."""
 

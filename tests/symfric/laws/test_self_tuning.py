@@ -5,7 +5,7 @@ from math import atan, inf, pi, sin, tan
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from symfric import SelfTuning, symbolise
@@ -32,6 +32,16 @@ def test_peak_lies_exactly_at_the_velocity_asked_for(ratio: float, v_p: float) -
     assert law.force(v_p, 5.0) == pytest.approx(2.0, rel=1e-15)
     assert law.force(0.99 * v_p, 5.0) < 2.0
     assert law.force(1.01 * v_p, 5.0) < 2.0
+
+
+@given(ratio=st.floats(0.1, 0.9), y_p=st.floats(1.1, 3.0))
+def test_curvature_factor_moves_the_peak_as_published(ratio: float, y_p: float) -> None:
+    """Stiffness and peak velocity given: E = (B v_p - tan(pi/2C)) / (B v_p - atan(B v_p))."""
+    peak = tan(pi / (2 * shape_factor(ratio)))
+    E = (y_p - peak) / (y_p - atan(y_p))
+    assume(E < 0.99)
+    law = SelfTuning(mu_s=0.4, mu_d=0.4 * ratio, B=200.0, E=E)
+    assert law.force(y_p / 200.0, 5.0) == pytest.approx(2.0, rel=1e-14)
 
 
 @pytest.mark.parametrize(("rho", "expected"), [(0.5, 1.376), (0.8, 2.036), (0.9, 2.736)])
