@@ -35,6 +35,8 @@ class Crossing:
     def before(self, piece: Dense) -> Dense:
         """The pieces up to the crossing; the last one keeps its polynomial, rescaled."""
         k = self.step
+        if self.t == piece.t0[k]:
+            return Dense(piece.t0[:k], piece.t1[:k], piece.y0[:k], piece.y1[:k], piece.D[:k])
         cut = _shorten(piece, k, self.t)
         return Dense(
             np.append(piece.t0[:k], cut.t0),
@@ -68,21 +70,23 @@ def _shorten(piece: Dense, k: int, t: float) -> Dense:
 
 
 def first_crossing(
-    integrator: Integrator, piece: Dense, d: Array, fired: frozenset[int], tolerance: float
+    integrator: Integrator, piece: Dense, d: Array, old: Array | None, tolerance: float
 ) -> Crossing | None:
     """The earliest crossing in `piece`, or None.
 
-    An event in `fired` has just happened at the very start, where its expression is zero; its sign
-    there is that two tolerances later.
+    Just after a jump, `old` holds the event values before it: an expression that the jump carries
+    through zero is an event at the very start. NaN stands for events that happened there; their
+    expressions are zero, and their signs are those two tolerances later.
     """
     steps = piece.t0.size
     if not steps:
         return None
     g = _values(integrator, piece, d)
     soon = min(0.1, 2 * tolerance / (piece.t1[0] - piece.t0[0]))
-    for i in fired:
+    if old is not None:
         y = piece.piece(np.array([0]), np.array([soon]))[0]
-        g[i, 0, 0] = float(integrator.events(piece.t0[0], y, d)[i])
+        new = values(integrator, piece.t0[0] + soon * (piece.t1[0] - piece.t0[0]), y, d)
+        g[:, 0, 0] = np.where(np.isnan(old), new, old)
     hits = passed(integrator, g[:, :, :-1], g[:, :, 1:])
     if not hits.any():
         return None
@@ -91,10 +95,10 @@ def first_crossing(
     step, look = divmod(first, LOOKS.size - 1)
     candidates = np.flatnonzero(hits[:, step, look])
     h = piece.t1[step] - piece.t0[step]
-    starts = [soon if first == 0 and i in fired else LOOKS[look] for i in candidates]
+    low = LOOKS[look] if first or old is None else soon
     roots = [
         _locate(integrator, piece, d, int(i), step, low, LOOKS[look + 1], tolerance / h)
-        for i, low in zip(candidates, starts, strict=True)
+        for i in candidates
     ]
     theta = min(roots)
     together = tuple(
@@ -134,7 +138,10 @@ def _locate(
     high: float,
     tolerance: float,
 ) -> float:
-    """Root in theta of one event on one step, by the Illinois method; the side after the root."""
+    """Root in theta of one event on one step, by the Illinois method; the side after the root.
+
+    Without a change of sign the jump at the start is what carried it through zero.
+    """
     index = np.array([step])
     h = piece.t1[step] - piece.t0[step]
 
@@ -145,6 +152,8 @@ def _locate(
     a, b, fa, fb = low, high, value(low), value(high)
     if fa == 0.0 or fb == 0.0:
         return b if fb == 0.0 else a
+    if (fa > 0) == (fb > 0):
+        return 0.0
     side = 0
     for _ in range(100):
         if b - a <= max(tolerance, 1e-15):

@@ -15,7 +15,6 @@ from symfric.integrator.events import (
     Crossing,
     EventStorm,
     first_crossing,
-    passed,
     resets,
     values,
 )
@@ -95,7 +94,7 @@ def integrate(
     try:
         for k in range(inputs.breaks.size - 1):
             before, d = d, np.concatenate([p, inputs.values[:, k]])
-            fired = _jump(integrator, run, S, before, d, storm) if k else frozenset()
+            old = _jump(integrator, run, S, before, d) if k else None
             if run.status is not Status.SUCCESS:
                 break
             R = np.concatenate([[inputs.breaks[k + 1], tolerances.rtol], tolerances.atol, d])
@@ -111,7 +110,7 @@ def integrate(
                 t_start,
                 t_end,
                 progress,
-                fired,
+                old,
             )
             if run.status is not Status.SUCCESS or S[0] < inputs.breaks[k + 1]:
                 break
@@ -136,9 +135,12 @@ def _interval(
     t_start: float,
     t_end: float,
     progress: Callable[[float], None] | None,
-    fired: frozenset[int],
+    old: Array | None,
 ) -> None:
-    """Integrate over one input interval, on which `d` is constant."""
+    """Integrate over one input interval, on which `d` is constant.
+
+    `old` holds the values of the event expressions before the jump that led here, if one did.
+    """
     eventful = bool(integrator.model.events)
     n = integrator.system.n
     h_min = 1e-15 * max(abs(t_start), abs(t_end), 1e-3)
@@ -159,17 +161,15 @@ def _interval(
             advance = S[0] - from_t
             left = spent * (t_end - S[0]) / advance if advance > 0 else left
         piece = from_records(records, n, integrator.slope, d)
-        crossing = (
-            first_crossing(integrator, piece, d, fired, tolerances.event) if eventful else None
-        )
+        crossing = first_crossing(integrator, piece, d, old, tolerances.event) if eventful else None
         if crossing is None:
             run.keep(piece)
-            fired = frozenset() if piece.t0.size else fired
+            old = None if piece.t0.size else old
             if reason is Stop.STEP_TOO_SMALL:
                 run.stop(*explain(integrator, S[0], S[MEMORY:], d, S[1]))
                 return
         else:
-            fired = _happen(integrator, run, S, d, piece, crossing, tolerances, storm)
+            old = _happen(integrator, run, S, d, piece, crossing, tolerances, storm)
             if run.status is not Status.SUCCESS:
                 return
         if progress is not None:
@@ -185,7 +185,7 @@ def _happen(
     crossing: Crossing,
     tolerances: Tolerances,
     storm: EventStorm,
-) -> frozenset[int]:
+) -> Array:
     """Cut the run at an event, carry it out and go on from there."""
     run.keep(crossing.before(piece))
     # steps beyond the event say nothing; its own is a guess only, what follows may be faster
@@ -196,60 +196,33 @@ def _happen(
     return _carry_out(integrator, run, S, d, crossing.which, storm)
 
 
-def _jump(
-    integrator: Integrator,
-    run: Run,
-    S: Array,
-    before: Array,
-    d: Array,
-    storm: EventStorm,
-) -> frozenset[int]:
-    """Take over new input data: algebraic unknowns follow, and expressions may jump past zero."""
-    t, old = float(S[0]), S[MEMORY:].copy()
+def _jump(integrator: Integrator, run: Run, S: Array, before: Array, d: Array) -> Array | None:
+    """Take over new input data, which algebraic unknowns follow; event values before them."""
+    old = values(integrator, S[0], S[MEMORY:], before) if integrator.model.events else None
     _make_consistent(integrator, run, S, d)
-    if not integrator.model.events or run.status is not Status.SUCCESS:
-        return frozenset()
-    new = values(integrator, t, S[MEMORY:], d)
-    hits = passed(integrator, values(integrator, t, old, before), new)
-    which = tuple(np.flatnonzero(hits).tolist())
-    return _carry_out(integrator, run, S, d, which, storm)
+    return old
 
 
 def _carry_out(
-    integrator: Integrator,
-    run: Run,
-    S: Array,
-    d: Array,
-    which: tuple[int, ...],
-    storm: EventStorm,
-) -> frozenset[int]:
-    """Apply the resets of the events `which`, and of those whose expressions they carry past zero.
-
-    Returns all events that happened; the run is stopped where one is terminal or a storm rages.
-    """
+    integrator: Integrator, run: Run, S: Array, d: Array, which: tuple[int, ...], storm: EventStorm
+) -> Array:
+    """Apply the resets of the events `which`; event values before them, NaN for themselves."""
     events, t = integrator.model.events, float(S[0])
-    fired: frozenset[int] = frozenset()
-    while which:
-        fired |= set(which)
-        before = values(integrator, t, S[MEMORY:], d)
-        S[MEMORY:] = resets(integrator, t, S[MEMORY:], d, which)
-        run.happened += [(t, events[i].name) for i in which]
-        if any(events[i].terminal for i in which):
-            run.stop(Status.TERMINATED)
-            break
-        if storm.raged_at(t, which):
-            run.stop(
-                Status.EVENT_STORM,
-                f"{Status.EVENT_STORM.value} It stands at t = {t:.9g} s, "
-                f"event '{events[which[0]].name}'.",
-            )
-            break
+    old = values(integrator, t, S[MEMORY:], d)
+    old[list(which)] = np.nan
+    S[MEMORY:] = resets(integrator, t, S[MEMORY:], d, which)
+    run.happened += [(t, events[i].name) for i in which]
+    if any(events[i].terminal for i in which):
+        run.stop(Status.TERMINATED)
+    elif storm.raged_at(t, which):
+        run.stop(
+            Status.EVENT_STORM,
+            f"{Status.EVENT_STORM.value} It stands at t = {t:.9g} s, "
+            f"event '{events[which[0]].name}'.",
+        )
+    else:
         _make_consistent(integrator, run, S, d)
-        if run.status is not Status.SUCCESS:
-            break
-        hits = passed(integrator, before, values(integrator, t, S[MEMORY:], d))
-        which = tuple(i for i in np.flatnonzero(hits).tolist() if i not in which)
-    return fired
+    return old
 
 
 def _make_consistent(integrator: Integrator, run: Run, S: Array, d: Array) -> None:
