@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.numeric import Scalar
+from symfric.numeric import Scalar, evaluate
 from symfric.parameters import Variable, check_names
 
 Variables = tuple[Variable, ...]
@@ -239,10 +239,10 @@ class Model:
         """
         if not given and not p:
             return self._default_state.copy()
-        return self._checked(self._start(*self._start_arguments(given, p)))
+        return self._checked(evaluate(self._start, *self._start_arguments(given, p)))
 
-    def _checked(self, start: ca.DM) -> NDArray[np.float64]:
-        named = zip(self.x, start.full().ravel().tolist(), strict=True)
+    def _checked(self, start: NDArray[np.float64]) -> NDArray[np.float64]:
+        named = zip(self.x, start.tolist(), strict=True)
         return np.array([finite(f"{self.name}.{v.name}", x) for v, x in named], float)
 
     def initial_states(
@@ -284,7 +284,7 @@ class Model:
 
     @cached_property
     def _default_state(self) -> NDArray[np.float64]:
-        return self._checked(self._start(*self._start_arguments(None, None)))
+        return self._checked(evaluate(self._start, *self._start_arguments(None, None)))
 
     @cached_property
     def _start(self) -> ca.Function:

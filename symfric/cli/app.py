@@ -11,6 +11,7 @@ from typing import Annotated, cast
 import typer
 
 from symfric import SolveError, Status, __version__
+from symfric.cli.bench import bench
 from symfric.cli.codegen import codegen
 from symfric.cli.demo import demo
 from symfric.cli.identify import identify
@@ -29,7 +30,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # units in brackets are not markup
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for function in (laws, run, identify, codegen, demo):
+for function in (laws, run, identify, codegen, demo, bench):
     app.command()(function)
 
 

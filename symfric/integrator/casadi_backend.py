@@ -16,6 +16,8 @@ from symfric.status import Status
 
 Array = NDArray[np.float64]
 CHUNKS = 32
+STEPS_PER_INTERVAL = 100_000
+"""SUNDIALS would otherwise spend minutes in front of a singularity."""
 
 
 @final
@@ -72,7 +74,7 @@ def peer(system: System, inputs: Drivers, p: Array, tolerances: Tolerances, back
     options: dict[str, Any] = {
         "reltol": tolerances.rtol,
         "abstol": float(np.min(tolerances.atol / system.nominal)),
-        "max_num_steps": tolerances.max_steps,
+        "max_num_steps": min(tolerances.max_steps, STEPS_PER_INTERVAL),
     }
     if plugin != "rosenbrock":
         # without it SUNDIALS adjoints of several parameters are silently wrong (casadi#4383)

@@ -13,7 +13,9 @@ from pathlib import Path
 
 from symfric.files import written
 
-FLAGS = ("-O2", "-march=native", "-fPIC", "-shared")
+FLAGS = ("-O2", "-march=native", "-fno-math-errno", "-freciprocal-math", "-fPIC", "-shared")
+"""Reciprocals instead of repeated divisions save a fifth of a step. Nothing here lets the compiler
+assume finite numbers: rejecting a step that returned NaN relies on them."""
 
 
 @cache

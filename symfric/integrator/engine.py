@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from symfric.integrator.compiler import load
 from symfric.integrator.step import MEMORY
+from symfric.numeric import flat_view
 
 Array = NDArray[np.float64]
 
@@ -73,11 +74,11 @@ class VmEngine:
         S_out, D = np.zeros((size, S.size)), np.zeros((size, self.step.numel_out(1)))
         every = np.tile(R, size)
         buffer, evaluate = cast(tuple[Any, Any], self.batch.buffer())
-        buffer.set_arg(0, _view(S))
-        buffer.set_arg(1, _view(every))
-        buffer.set_res(0, _view(S_out))
+        buffer.set_arg(0, flat_view(S))
+        buffer.set_arg(1, flat_view(every))
+        buffer.set_res(0, flat_view(S_out))
         if D.size:
-            buffer.set_res(1, _view(D))
+            buffer.set_res(1, flat_view(D))
         found: list[Array] = []
         count = made = 0
         while S[0] < R[0] and count < rows and made < attempts and S[1] >= h_min:
@@ -101,11 +102,6 @@ class VmEngine:
             S[:] = S_out[-1]
         records = np.vstack(found) if found else np.zeros((0, width(n, D.shape[1] // n)))
         return records, made, _reason(S, R, count >= rows, h_min)
-
-
-def _view(array: Array) -> Any:
-    """The memory of a contiguous array, flat, as CasADi's buffers take it."""
-    return memoryview(array.reshape(-1))  # pyright: ignore[reportArgumentType, reportCallIssue]
 
 
 def _reason(S: Array, R: Array, full: bool, h_min: float) -> Stop:

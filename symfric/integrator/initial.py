@@ -32,5 +32,5 @@ def consistent(system: System, where: str, y: Array, d: Array) -> Array:
 
 
 def first_step(span: float) -> float:
-    """A first step [s] so small that the controller decides: it grows fivefold per step."""
+    """A first step [s] so small that the controller decides: it grows eightfold per step."""
     return 1e-8 * span

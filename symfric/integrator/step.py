@@ -22,7 +22,7 @@ from symfric.integrator.tableaux import Rosenbrock
 MEMORY = 5
 """Rows of S before y: t, h, h_old, growth_old, rejected."""
 
-SAFETY, GROW, SHRINK = 0.9, 5.0, 0.2
+SAFETY, GROW, SHRINK = 0.85, 8.0, 0.2
 E_FLOOR, GROWTH_MEMORY = 1e-6, 2.5
 """Smallest error the controller believes, and largest growth it remembers."""
 

@@ -1,0 +1,123 @@
+"""Other integrators on the same model: CasADi's own, compiled or not, and SciPy's."""
+
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, cast
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.integrator.casadi_backend import peer
+from symfric.integrator.compiler import load
+from symfric.integrator.inputs import drivers
+from symfric.integrator.run import Tolerances
+from symfric.integrator.simulate import simulate
+from symfric.integrator.system import system
+from symfric.model import Model
+from symfric.numeric import flat_view
+
+Array = NDArray[np.float64]
+Solve = Callable[[float], tuple[Array, int]]
+"""Start velocity [m/s] -> position at the times [m], steps."""
+
+
+def ours(model: Model, times: Array, rtol: float, backend: str, method: str) -> Solve:
+    """`simulate`, with everything a user pays for on a call."""
+
+    def solve(v: float) -> tuple[Array, int]:
+        result = simulate(
+            model,
+            float(times[-1]),
+            x0={"v": v},
+            rtol=rtol,
+            t_eval=times,
+            backend=backend,
+            method=method,
+        )
+        return result["x"], result.statistics.steps
+
+    return solve
+
+
+def casadi(model: Model, times: Array, rtol: float, plugin: str, compiled: bool) -> Solve:
+    """CasADi's integrator `plugin`, its states scaled by nominal values as ours are."""
+    inputs = drivers(model, None, 0.0, float(times[-1]))
+    whole = system(model, inputs)
+    tolerances = Tolerances(rtol, 0.1 * rtol * whole.nominal, 0.0, 10_000_000)
+    problem = peer(whole, inputs, np.zeros(0), tolerances, "rosenbrock")
+    name = f"peer_{plugin}"
+    options: dict[str, Any] = dict(problem.options)
+    if plugin != "rosenbrock":
+        options["quad_err_con"] = True
+    solver = ca.integrator(name, plugin, problem.dae, 0.0, times.tolist(), options)
+    run = _external(solver, name) if compiled else solver
+
+    def solve(v: float) -> tuple[Array, int]:
+        x0 = model.initial_state({"v": v})
+        states = run(x0=x0 / whole.nominal)["xf"]
+        x = states[0, :].full().ravel() * whole.nominal[0]
+        stats = solver.stats() if not compiled else {}
+        return x, int(stats.get("n_steps", stats.get("nsteps", 0)))
+
+    return solve
+
+
+def _external(solver: ca.Function, name: str) -> ca.Function:
+    with TemporaryDirectory() as folder:
+        generator = ca.CodeGenerator(f"{name}.c")
+        generator.add(solver)
+        generator.generate(folder + "/")
+        library = load((Path(folder) / f"{name}.c").read_text(encoding="utf-8"))
+    return ca.external(name, library._name)
+
+
+def scipy(model: Model, times: Array, rtol: float, method: str) -> Solve:
+    """SciPy's `solve_ivp` with right-hand side and exact Jacobian from CasADi buffers.
+
+    Raises:
+        ModuleNotFoundError: SciPy is not installed.
+    """
+    from scipy.integrate import solve_ivp  # noqa: PLC0415  (an extra, only some users need it)
+
+    whole = system(model, drivers(model, None, 0.0, float(times[-1])))
+    n = whole.n
+    f = ca.Function("f", [whole.y], [ca.densify(whole.f)])
+    jacobian = ca.Function("j", [whole.y], [ca.densify(ca.jacobian(whole.f, whole.y))])
+    y, f_call, slope = _buffered(f)
+    y_too, j_call, matrix = _buffered(jacobian)
+
+    def right(_: float, state: Array) -> Array:
+        y[:] = state
+        f_call()
+        return slope.copy()
+
+    def derivative(_: float, state: Array) -> Array:
+        y_too[:] = state
+        j_call()
+        return matrix.reshape(n, n).T.copy()
+
+    def solve(v: float) -> tuple[Array, int]:
+        found = solve_ivp(
+            right,
+            (0.0, float(times[-1])),
+            model.initial_state({"v": v}),
+            method=method,
+            rtol=rtol,
+            atol=0.1 * rtol * whole.nominal,
+            t_eval=times,
+            jac=derivative,
+        )
+        return found.y[0], int(found.nfev)
+
+    return solve
+
+
+def _buffered(function: ca.Function) -> tuple[Array, Callable[[], None], Array]:
+    """Argument, call and result of a Function of one argument, without conversions."""
+    argument, result = np.zeros(function.numel_in(0)), np.zeros(function.numel_out(0))
+    buffer, call = cast(tuple[Any, Any], function.buffer())
+    buffer.set_arg(0, flat_view(argument))
+    buffer.set_res(0, flat_view(result))
+    return argument, call, result
