@@ -8,6 +8,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -72,25 +73,40 @@ def _processor() -> bytes:
 def load(source: str) -> ctypes.CDLL:
     """The shared library of `source`, compiled unless the cache holds it.
 
-    Several processes may do this at once: the file appears whole, under its final name.
+    Several processes may do this at once: the file appears whole, under its final name. A damaged
+    one is compiled again.
 
     Raises:
-        RuntimeError: no compiler, or it refused the source; its first message is quoted.
+        RuntimeError: no compiler, no place for its result, or it refused the source; its first
+            error is quoted.
     """
     path, compiler = library_path(source), find_compiler()
     if path is None or compiler is None:
         raise RuntimeError(
             "compile: expected a C compiler ($CC, gcc, clang or cc), found none; use backend='vm'"
         )
-    if not path.exists():
+    if path.exists():
+        with suppress(OSError):
+            return ctypes.CDLL(str(path))
+    try:
         with written(path) as temporary:
-            done = subprocess.run(
-                [*compiler, *FLAGS, "-x", "c", "-", "-o", str(temporary), "-lm"],
-                input=source.encode(),
-                capture_output=True,
-                check=False,
-            )
-            if done.returncode:
-                first = done.stderr.decode(errors="replace").strip().splitlines()[:1]
-                raise RuntimeError(f"compile: {compiler[0]} failed: {' '.join(first)}")
-    return ctypes.CDLL(str(path))
+            _compile(source, compiler, temporary)
+        return ctypes.CDLL(str(path))
+    except (ValueError, OSError) as error:
+        raise RuntimeError(
+            f"compile: expected to keep compiled code in {path.parent} and run it, got {error}; "
+            "set SYMFRIC_CACHE to a folder where that is allowed, or use backend='vm'"
+        ) from None
+
+
+def _compile(source: str, compiler: tuple[str, ...], target: Path) -> None:
+    done = subprocess.run(
+        [*compiler, *FLAGS, "-x", "c", "-", "-o", str(target), "-lm"],
+        input=source.encode(),
+        capture_output=True,
+        check=False,
+    )
+    if done.returncode:
+        lines = done.stderr.decode(errors="replace").strip().splitlines()
+        said = next((line for line in lines if "error" in line), "".join(lines[:1]))
+        raise RuntimeError(f"compile: {compiler[0]} failed: {said}")

@@ -27,8 +27,8 @@ INLINE = 6000
 class Integrator:
     """System, step and Functions of a model with one structure of inputs.
 
-    Mutable only in what it remembers: its engines, and the time spent in the virtual machine,
-    from which it decides when compiling pays.
+    Mutable only in what it remembers: its engines, the time spent in the virtual machine, from
+    which it decides when compiling pays, and whether compiling failed.
     """
 
     model: Model
@@ -37,6 +37,7 @@ class Integrator:
     build_time: float = 0.0
     compile_time: float = 0.0
     vm_time: float = 0.0
+    compiles: bool = True
     _engines: dict[str, Engine] = field(default_factory=dict[str, Engine])
 
     def __post_init__(self) -> None:
@@ -111,10 +112,18 @@ class Integrator:
         """
         if backend == "compiled":
             return self.compiled()
-        if backend == "vm" or find_compiler() is None:
+        if backend == "vm" or not self.compiles or find_compiler() is None:
             return self.vm()
         if "compiled" in self._engines:
             return self._engines["compiled"]
+        try:
+            return self._best(left)
+        except RuntimeError:  # a broken compiler is no reason not to simulate
+            self.compiles = False
+            return self.vm()
+
+    def _best(self, left: float) -> Engine:
+        """The compiled engine where it pays or lies in the cache, else the virtual machine."""
         n = self.step.n_instructions()
         look_up, compile_ = 2e-3 + 1e-5 * n, 0.1 + 1.5e-4 * n
         expected = max(left, self.vm_time)
