@@ -2,11 +2,14 @@
 
 from importlib.metadata import version as _version
 
+from symfric.integrator import Ensemble as Ensemble
 from symfric.integrator import Hold as Hold
 from symfric.integrator import Linear as Linear
 from symfric.integrator import Statistics as Statistics
 from symfric.integrator import Trajectory as Trajectory
+from symfric.integrator import flow as flow
 from symfric.integrator import simulate as simulate
+from symfric.integrator import simulate_many as simulate_many
 from symfric.laws import ALL_LAWS as ALL_LAWS
 from symfric.laws import Asymmetric as Asymmetric
 from symfric.laws import BrownMcPhee as BrownMcPhee
@@ -21,7 +24,9 @@ from symfric.laws import Stribeck as Stribeck
 from symfric.laws import Sum as Sum
 from symfric.laws import Viscous as Viscous
 from symfric.laws import law_from_text as law_from_text
+from symfric.model import Event as Event
 from symfric.model import Model as Model
+from symfric.model import Monitor as Monitor
 from symfric.model import Output as Output
 from symfric.parameters import Parameter as Parameter
 from symfric.parameters import Variable as Variable
