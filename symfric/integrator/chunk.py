@@ -142,7 +142,7 @@ def _solve_vm(job: Job, S: Array, R: Array) -> Solved:
                 records, count, stop = engine.run(state, run, ROWS, ATTEMPTS, job.h_min)
                 made[m] += count
                 if records.shape[0]:
-                    dense = from_records(records, job.n, None, run[:0])
+                    dense = from_records(records, job.n)
                     inside = (job.times > dense.t0[0]) & (job.times <= dense.t1[-1])
                     y[m, inside] = dense(job.times[inside]).T
             reason[m] = stop

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import final
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,22 +54,16 @@ def hermite(t: Array, y: Array, slope: Array) -> Dense:
     return Dense(t[:-1], t[1:], y[:, :-1].T, y[:, 1:].T, D)
 
 
-def from_records(records: Array, n: int, slope: ca.Function | None, d: Array) -> Dense:
-    """Pieces from the rows (t0, t1, y0, y1, D) that a step engine writes.
-
-    A method without dense output coefficients gets cubic ones from its slopes (y, d) -> y'.
-    """
-    k = records.shape[0]
-    t0, t1 = records[:, 0].copy(), records[:, 1].copy()
-    y0, y1 = records[:, 2 : 2 + n].copy(), records[:, 2 + n : 2 + 2 * n].copy()
-    if slope is None or not k:
-        D = records[:, 2 + 2 * n :]
-        rows = D.shape[1] // n  # not -1: a failure at the first step leaves no records
-        return Dense(t0, t1, y0, y1, D.reshape(k, rows, n).copy())
-    both = slope.map(2 * k)(np.vstack([y0, y1]).T, np.tile(d[:, None], (1, 2 * k))).full()
-    h, rise = (t1 - t0)[:, None], y1 - y0
-    first = h * both[:, :k].T - rise
-    return Dense(t0, t1, y0, y1, np.stack([first, rise - h * both[:, k:].T - first], axis=1))
+def from_records(records: Array, n: int) -> Dense:
+    """Pieces from the rows (t0, t1, y0, y1, D) that a step engine writes."""
+    k, rows = records.shape[0], (records.shape[1] - 2) // n - 2
+    return Dense(
+        records[:, 0].copy(),
+        records[:, 1].copy(),
+        records[:, 2 : 2 + n].copy(),
+        records[:, 2 + n : 2 + 2 * n].copy(),
+        records[:, 2 + 2 * n :].reshape(k, rows, n).copy(),
+    )
 
 
 def join(pieces: list[Dense]) -> Dense:

@@ -73,11 +73,6 @@ class Integrator:
         stacked = ca.vertcat(m.vector("x"), m.vector("z"), m.vector("u"), *outputs)
         return self.of_time("signals", stacked)
 
-    @property
-    def slope(self) -> ca.Function | None:
-        """(y, d) -> y' for cubic dense output; None where the method has its own."""
-        return None if self.tableau.H.shape[0] else self.f
-
     def vm(self) -> Engine:
         """The engine that needs no compiler."""
         if "vm" not in self._engines:

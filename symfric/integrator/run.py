@@ -117,7 +117,7 @@ def integrate(
     except KeyboardInterrupt:
         run.stop(Status.INTERRUPTED, f"{Status.INTERRUPTED.value} It reaches t = {S[0]:g} s.")
     if not run.dense:
-        empty = np.zeros((1, integrator.tableau.H.shape[0] or 2, y.size))
+        empty = np.zeros((1, integrator.tableau.H.shape[0], y.size))
         start = np.array([t_start])
         run.dense.append(Dense(start, start + 1e-300, y[None], y[None], empty))
     return run, join(run.dense)
@@ -160,7 +160,7 @@ def _interval(
             integrator.vm_time += spent
             advance = S[0] - from_t
             left = spent * (t_end - S[0]) / advance if advance > 0 else left
-        piece = from_records(records, n, integrator.slope, d)
+        piece = from_records(records, n)
         crossing = first_crossing(integrator, piece, d, old, tolerances.event) if eventful else None
         if crossing is None:
             run.keep(piece)

@@ -100,17 +100,10 @@ def build_fixed(system: System, tableau: Rosenbrock, kind: Any = ca.SX) -> ca.Fu
 
 
 def build_dense_step(system: System, tableau: Rosenbrock) -> ca.Function:
-    """The bare step with its dense output, (y, h, d) -> all = (y_next, D), for sensitivities.
-
-    A method without dense coefficients gets the cubic ones from its slopes.
-    """
+    """The bare step with its dense output, (y, h, d) -> all = (y_next, D), for sensitivities."""
     y, d = ca.SX.sym("y", system.n), ca.SX.sym("d", system.d.numel())
     h = ca.SX.sym("h")
-    block = blocks(system, tableau)
-    end, _, dense = stages(block, tableau, y, h, d)
-    if not dense:
-        first = h * block.f(y, d) - (end - y)
-        dense = [first, end - y - h * block.f(end, d) - first]
+    end, _, dense = stages(blocks(system, tableau), tableau, y, h, d)
     return ca.Function(
         "dense", [y, h, d], [ca.vertcat(end, *dense)], ["y", "h", "d"], ["all"], {"cse": True}
     )
