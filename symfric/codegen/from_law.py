@@ -8,9 +8,9 @@ from re import sub
 import casadi as ca
 
 from symfric.codegen.block import Block
-from symfric.codegen.exponential import phi1_phi2
 from symfric.codegen.folding import runtime_parameters
 from symfric.codegen.graph import LEAVES, graph, rebuild
+from symfric.integrator.exponential import phi1_phi2
 from symfric.laws import Law, law_name
 from symfric.model import Output, Variables, finite
 from symfric.numeric import is_casadi

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symfric.codegen.exponential import SMALL, phi1_phi2
+from symfric.integrator.exponential import SMALL, phi1_phi2
 
 x = ca.SX.sym("x")
 VALUES = ca.Function("values", [x], phi1_phi2(x))
