@@ -74,20 +74,23 @@ def first_crossing(
 ) -> Crossing | None:
     """The earliest crossing in `piece`, or None.
 
-    Just after a jump, `old` holds the event values before it: an expression that the jump carries
-    through zero is an event at the very start. NaN stands for events that happened there; their
-    expressions are zero, and their signs are those two tolerances later.
+    Just after a jump, `old` holds the event values before it, with NaN for events that happened
+    there. The signs after it are those two tolerances later; an expression that the jump carried
+    through zero, not just to zero, is an event at the very start.
     """
     steps = piece.t0.size
     if not steps:
         return None
     g = _values(integrator, piece, d)
     soon = min(0.1, 2 * tolerance / (piece.t1[0] - piece.t0[0]))
+    jumped = np.zeros(g.shape[0], dtype=bool)
     if old is not None:
         y = piece.piece(np.array([0]), np.array([soon]))[0]
         new = values(integrator, piece.t0[0] + soon * (piece.t1[0] - piece.t0[0]), y, d)
-        g[:, 0, 0] = np.where(np.isnan(old), new, old)
+        jumped = passed(integrator, old, new) & (new != 0)
+        g[:, 0, 0] = new
     hits = passed(integrator, g[:, :, :-1], g[:, :, 1:])
+    hits[jumped, 0, 0] = True
     if not hits.any():
         return None
     order = hits.any(axis=0).reshape(-1)
@@ -97,7 +100,9 @@ def first_crossing(
     h = piece.t1[step] - piece.t0[step]
     low = LOOKS[look] if first or old is None else soon
     roots = [
-        _locate(integrator, piece, d, int(i), step, low, LOOKS[look + 1], tolerance / h)
+        0.0
+        if first == 0 and jumped[i]
+        else _locate(integrator, piece, d, int(i), step, low, LOOKS[look + 1], tolerance / h)
         for i in candidates
     ]
     theta = min(roots)
@@ -138,10 +143,7 @@ def _locate(
     high: float,
     tolerance: float,
 ) -> float:
-    """Root in theta of one event on one step, by the Illinois method; the side after the root.
-
-    Without a change of sign the jump at the start is what carried it through zero.
-    """
+    """Root in theta of one event on one step, by the Illinois method; the side after the root."""
     index = np.array([step])
     h = piece.t1[step] - piece.t0[step]
 
@@ -152,8 +154,6 @@ def _locate(
     a, b, fa, fb = low, high, value(low), value(high)
     if fa == 0.0 or fb == 0.0:
         return b if fb == 0.0 else a
-    if (fa > 0) == (fb > 0):
-        return 0.0
     side = 0
     for _ in range(100):
         if b - a <= max(tolerance, 1e-15):
