@@ -28,7 +28,7 @@ class System:
         nx: number of differential states, the first rows of y.
         timed: whether y ends with time.
         names: of the unknowns, for messages.
-        magnitude: typical one of each unknown, shape (n,).
+        nominal: typical magnitude of each differential state, shape (nx,).
         monitors: SX (m, 1), expressions whose relative error is controlled too: those of the model
             and its algebraic variables.
         monitor_nominal: their typical magnitudes, shape (m,).
@@ -41,7 +41,7 @@ class System:
     nx: int
     timed: bool
     names: tuple[str, ...]
-    magnitude: NDArray[np.float64]
+    nominal: NDArray[np.float64]
     monitors: ca.SX
     monitor_nominal: NDArray[np.float64]
 
@@ -49,11 +49,6 @@ class System:
     def n(self) -> int:
         """Number of unknowns."""
         return self.y.numel()
-
-    @property
-    def nominal(self) -> NDArray[np.float64]:
-        """Typical magnitude of each differential state, shape (nx,)."""
-        return self.magnitude[: self.nx]
 
     @cached_property
     def diagonal(self) -> tuple[int, ...]:
@@ -95,7 +90,6 @@ def system(model: Model, inputs: Drivers) -> System:
     x, z = model.vector("x"), model.vector("z")
     nx = x.numel()
     names = [v.name for v in (*model.x, *model.z)]
-    magnitude = np.concatenate([model.nominal("x"), model.nominal("z")])
     if model.ode is not None:
         unknowns, f = ca.vertcat(x, z), ca.vertcat(model.ode, model.alg)
         mass = ca.diagcat(ca.SX.eye(nx), ca.SX(z.numel(), z.numel()))
@@ -110,14 +104,12 @@ def system(model: Model, inputs: Drivers) -> System:
             f = ca.vertcat(model.xdot, model.residual)
             mass = ca.diagcat(ca.SX.eye(nx), ca.SX(f.numel() - nx, f.numel() - nx))
             names = [*names[:nx], *(f"{v.name}_dot" for v in model.x), *names[nx:]]
-            magnitude = np.concatenate([magnitude[:nx], magnitude])
     f = ca.substitute(f, model.vector("u"), inputs.expression)
     timed = bool(ca.depends_on(f, model.t))
     if timed:
         unknowns, f = ca.vertcat(unknowns, model.t), ca.vertcat(f, 1)
         mass = ca.diagcat(mass, 1)
         names.append("t")
-        magnitude = np.append(magnitude, 1.0)
     # an algebraic unknown without influence on the states would be free to be anything
     watched = [*((m.expression, m.nominal) for m in model.monitors)]
     watched += [(v.symbol, v.nominal) for v in model.z]
@@ -130,7 +122,7 @@ def system(model: Model, inputs: Drivers) -> System:
         nx,
         timed,
         tuple(names),
-        magnitude,
+        model.nominal("x"),
         ca.substitute(monitors, model.vector("u"), inputs.expression),
         np.array([nominal for _, nominal in watched], dtype=float),
     )
