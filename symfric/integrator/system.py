@@ -70,15 +70,12 @@ class System:
 
     @cached_property
     def constraints(self) -> ca.Function:
-        """Newton's method for the algebraic unknowns: (guess, the others and d) -> solution."""
+        """(y, d) -> algebraic equations, and their derivatives by the algebraic unknowns."""
         rows, columns = self.algebraic
-        known = [i for i in range(self.n) if i not in columns]
-        problem = {
-            "x": self.y[columns],
-            "p": ca.vertcat(self.y[known], self.d),
-            "g": self.f[rows],
-        }
-        return ca.rootfinder("constraints", "newton", problem, {"error_on_fail": True})
+        g = self.f[rows]
+        return ca.Function(
+            "constraints", [self.y, self.d], [g, ca.jacobian(g, self.y[columns])], {"cse": True}
+        )
 
 
 def system(model: Model, inputs: Drivers) -> System:
