@@ -15,13 +15,11 @@ def test_every_python_block_shows_its_result() -> None:
     assert len(BLOCKS) == README.read_text("utf-8").count("```python\n") >= 5
 
 
-def test_blocks_print_what_the_readme_says(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_blocks_print_what_the_readme_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
     for code, expected in BLOCKS:
         printed = StringIO()
         with redirect_stdout(printed):
-            exec(code, names)  # noqa: S102  (our own README)
+            exec(code, names)
         assert printed.getvalue() == expected
