@@ -17,27 +17,32 @@ def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> t
     """Status and sentence for a step that shrank to nothing at time `t`."""
     system, name = integrator.system, integrator.model.name
     where = f"simulate '{name}': stopped at t = {t:.9g} s"
-    large = np.flatnonzero(np.abs(y[: system.nx]) > 1e10 * system.nominal)
-    if large.size:
-        grown = ", ".join(f"{system.names[i]} = {y[i]:.3g}" for i in large)
-        return (
-            Status.STEP_TOO_SMALL,
-            f"{where}: {grown} grows without bound; check signs and parameters",
-        )
+    f = integrator.f(y, d).full().ravel()
     for status, cause in (
+        (Status.STEP_TOO_SMALL, _unbounded(system, y, f, h)),
         (Status.NOT_FINITE, _not_finite(integrator, y, d, h)),
         (Status.NOT_FINITE, _steep(system, y, d)),
         (Status.SINGULAR, _singular(integrator, y, d, h)),
     ):
         if cause:
             return status, f"{where}: {cause}"
-    f = integrator.f(y, d).full().ravel()
     fastest = system.names[int(np.argmax(np.abs(f[: system.nx]) / system.nominal))]
     return (
         Status.STEP_TOO_SMALL,
         f"{where}: the step fell to {h:.1e} s, fastest equation {fastest}; a discontinuity is "
         "near, give the law a smooth form or the model an event there",
     )
+
+
+def _unbounded(system: System, y: Array, f: Array, h: float) -> str:
+    """States that are huge, or large and growing ever faster."""
+    x, rate = y[: system.nx], np.nan_to_num(f[: system.nx], posinf=0.0, neginf=0.0)
+    huge = np.abs(x) > 1e10 * system.nominal
+    runaway = (
+        (np.abs(x) > 1e3 * system.nominal) & (x * rate > 0) & (np.abs(x) < 1e3 * h * abs(rate))
+    )
+    grown = ", ".join(f"{system.names[i]} = {x[i]:.3g}" for i in np.flatnonzero(huge | runaway))
+    return f"{grown} grows without bound; check signs and parameters" if grown else ""
 
 
 def _not_finite(integrator: Integrator, y: Array, d: Array, h: float) -> str:
