@@ -1,7 +1,8 @@
 """What a friction law is: parameters, a force and the rate of its internal states."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 from symfric.numeric import Scalar, empty
@@ -13,8 +14,11 @@ PHENOMENA = {
     "St": "Stribeck effect",
     "V": "viscous friction",
     "P": "pre-sliding displacement",
+    "M": "non-local memory (hysteresis loops inside loops close)",
     "L": "frictional lag",
     "B": "break-away force depends on the loading rate",
+    "N": "no drift under vibration below break-away",
+    "T": "static friction grows with the dwell time",
 }
 """What a law can show, by the codes in `Facts.phenomena`."""
 
@@ -38,11 +42,47 @@ class Facts:
 
 @dataclass(frozen=True)
 class State:
-    """An internal state of a law: name, unit and typical magnitude."""
+    """An internal state of a law: name, unit and typical magnitude.
+
+    `even` states (a mode, an age) keep their value when the motion is mirrored; the others, such
+    as deflections and forces, change sign with it.
+    """
 
     name: str
     unit: str
     nominal: float
+    even: bool = False
+
+
+@dataclass(frozen=True)
+class Input:
+    """What a law takes besides v and N, as a keyword-only argument of its methods."""
+
+    name: str
+    unit: str
+    doc: str
+
+
+APPLIED_FORCE = Input("F_e", "N", "force that keeps the sliding velocity constant")
+"""What the contact must carry for no acceleration: m dv/dt = F_e - F."""
+
+
+@dataclass(frozen=True, eq=False)
+class Switch:
+    """A change of mode: the states in `reset` jump when `expression` passes through zero.
+
+    Attributes:
+        expression: in v, N, z and the further inputs of the law.
+        direction: +1 only rising, -1 only falling, 0 both.
+        reset: state -> its value afterwards, in terms of the values before.
+        halts: the sliding velocity, zero at this instant, becomes zero without rounding.
+    """
+
+    name: str
+    expression: Scalar
+    direction: int = 0
+    reset: Mapping[str, Scalar] = field(default_factory=dict[str, Scalar])
+    halts: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +95,9 @@ class Law(Parametric, ABC):
     `v` is the sliding velocity [m/s], `N` >= 0 the normal force [N], `z` the column of internal
     states, shape (n, 1) for CasADi types and (n, ...) for arrays, n = len(states). Any of them may
     be a float, a NumPy array, SX, MX or DM. A law that needs another input, such as the applied
-    tangential force, takes it as a keyword-only argument of `force` and `rate`.
+    tangential force, names it in `inputs` and takes it as a keyword-only argument with default 0.
+
+    A law with modes (stick, slip) keeps them in states of rate zero, which jump at its `switches`.
     """
 
     facts: ClassVar[Facts]
@@ -64,6 +106,11 @@ class Law(Parametric, ABC):
     @abstractmethod
     def states(self) -> tuple[State, ...]:
         """The internal states, in the order of the rows of `z`."""
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """Further inputs of `force`, `rate` and `switches`, by keyword."""
+        return ()
 
     @property
     @abstractmethod
@@ -84,6 +131,19 @@ class Law(Parametric, ABC):
 
         With a smoothing velocity the rate vanishes there to rounding beyond 20 v_eps.
         """
+
+    def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
+        """The changes of mode; none for a law whose rate says it all."""
+        return ()
+
+    def warnings(self) -> tuple[str, ...]:
+        """What the present numbers give away, such as passivity, one sentence each."""
+        return ()
+
+
+def chosen(law: Law, inputs: Mapping[str, Scalar]) -> dict[str, Scalar]:
+    """Those of `inputs` that `law` takes."""
+    return {i.name: inputs[i.name] for i in law.inputs if i.name in inputs}
 
 
 def check_law(where: str, law: object) -> None:

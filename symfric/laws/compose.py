@@ -5,7 +5,7 @@ from itertools import pairwise
 from typing import ClassVar, final
 
 from symfric.laws import smooth
-from symfric.laws.base import Facts, Law, State, check_law
+from symfric.laws.base import Facts, Input, Law, State, Switch, check_law, chosen
 from symfric.numeric import Scalar, column, empty, is_casadi, smallest
 from symfric.parameters import distinct, param, parameters, with_values
 
@@ -46,28 +46,55 @@ class Sum(Law):
             for state, name in zip(law.states, group, strict=True)
         )
 
-    def _split(self, z: Scalar) -> list[Scalar]:
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """The further inputs of all terms, each once."""
+        return tuple(dict.fromkeys(i for law in self.laws for i in law.inputs))
+
+    def _split(self, z: Scalar) -> list[tuple[Law, Scalar]]:
         ends = [0]
         for law in self.laws:
             ends.append(ends[-1] + len(law.states))
-        return [z[a:b] for a, b in pairwise(ends)]
+        parts = [z[a:b] for a, b in pairwise(ends)]
+        return list(zip(self.laws, parts, strict=True))
 
     @property
     def velocity_scale(self) -> Scalar:
         """The smallest one of the terms [m/s]."""
         return smallest(*(law.velocity_scale for law in self.laws))
 
-    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+    def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Friction force [N]."""
         first, *rest = [
-            law.force(v, N, part) for law, part in zip(self.laws, self._split(z), strict=True)
+            law.force(v, N, part, **chosen(law, inputs)) for law, part in self._split(z)
         ]
         return sum(rest, start=first)
 
-    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Rates of all states."""
-        parts = zip(self.laws, self._split(z), strict=True)
-        return _join(v, [law.rate(v, N, part) for law, part in parts if law.states])
+        rates = [
+            law.rate(v, N, part, **chosen(law, inputs))
+            for law, part in self._split(z)
+            if law.states
+        ]
+        return _join(v, rates)
+
+    def switches(
+        self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
+    ) -> tuple[Switch, ...]:
+        """The changes of mode of all terms, by the names of the states of the sum."""
+        names = iter(state.name for state in self.states)
+        found: list[Switch] = []
+        for law, part in self._split(z):
+            new = {state.name: next(names) for state in law.states}
+            for switch in law.switches(v, N, part, **chosen(law, inputs)):
+                reset = {new[name]: value for name, value in switch.reset.items()}
+                found.append(replace(switch, reset=reset))
+        return tuple(found)
+
+    def warnings(self) -> tuple[str, ...]:
+        """Those of the terms."""
+        return tuple(warning for law in self.laws for warning in law.warnings())
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Steady states of all terms."""
@@ -123,17 +150,32 @@ class Asymmetric(Law):
         return with_values(self.positive, blended)
 
     @property
+    def inputs(self) -> tuple[Input, ...]:
+        """The further inputs of the law."""
+        return self.positive.inputs
+
+    @property
     def velocity_scale(self) -> Scalar:
         """The smaller one of the sides [m/s]."""
         return smallest(self.positive.velocity_scale, self.negative.velocity_scale)
 
-    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+    def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Friction force [N]."""
-        return self._at(v).force(v, N, z)
+        return self._at(v).force(v, N, z, **inputs)
 
-    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Rates of the states of the law."""
-        return self._at(v).rate(v, N, z)
+        return self._at(v).rate(v, N, z, **inputs)
+
+    def switches(
+        self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
+    ) -> tuple[Switch, ...]:
+        """The changes of mode of the law."""
+        return self._at(v).switches(v, N, z, **inputs)
+
+    def warnings(self) -> tuple[str, ...]:
+        """Those of the law."""
+        return self.positive.warnings() + self.negative.warnings()
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Steady states of the law."""
@@ -176,17 +218,32 @@ class LoadDependent(Law):
         return self.law.states
 
     @property
+    def inputs(self) -> tuple[Input, ...]:
+        """The further inputs of the law."""
+        return self.law.inputs
+
+    @property
     def velocity_scale(self) -> Scalar:
         """That of the law [m/s]."""
         return self.law.velocity_scale
 
-    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+    def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Friction force [N]."""
-        return self.law.force(v, self._load(N), z)
+        return self.law.force(v, self._load(N), z, **inputs)
 
-    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Rates of the states of the law."""
-        return self.law.rate(v, self._load(N), z)
+        return self.law.rate(v, self._load(N), z, **inputs)
+
+    def switches(
+        self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
+    ) -> tuple[Switch, ...]:
+        """The changes of mode of the law."""
+        return self.law.switches(v, self._load(N), z, **inputs)
+
+    def warnings(self) -> tuple[str, ...]:
+        """Those of the law."""
+        return self.law.warnings()
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Steady states of the law."""

@@ -1,15 +1,16 @@
 """A scene: a parametric machine that takes a friction law and gives a `Model`."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import isfinite
+from typing import final
 
 import casadi as ca
 
 from symfric.laws import Law
-from symfric.laws.base import check_law
-from symfric.model import Model, Monitor, Variables
+from symfric.laws.base import check_law, chosen
+from symfric.model import Event, Model, Monitor, Variables
 from symfric.numeric import Scalar
 from symfric.parameters import Parametric, Variable, symbolise
 
@@ -35,6 +36,64 @@ class Scene(Parametric, ABC):
         """
         scene, p = symbolise(self, *free)
         return scene.equations(p)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """A friction law at work in a machine.
+
+    Attributes:
+        states: the internal states of the law as model variables.
+        force: friction force [N] opposing the sliding velocity.
+        rate: rates of the states, (n, 1).
+        monitors, events: what goes into the model beside them.
+    """
+
+    states: Variables
+    force: Scalar
+    rate: Scalar
+    monitors: tuple[Monitor, ...]
+    events: tuple[Event, ...]
+
+
+def contact(
+    law: Law, v: Scalar, N: Scalar, p: Variables, rest: Mapping[str, Scalar], **inputs: Scalar
+) -> Contact:
+    """`law` between bodies that slide at `v` under `N`, in a model with parameters `p`.
+
+    Args:
+        rest: state of the model -> its value at which `v` is exactly zero.
+        inputs: what the machine offers to laws besides v and N.
+
+    Raises:
+        ValueError: the law needs an input that the machine does not offer.
+    """
+    missing = [f"{i.name} ({i.doc})" for i in law.inputs if i.name not in inputs]
+    if missing:
+        raise ValueError(
+            f"{type(law).__name__}: expected a law that needs no more than v, N"
+            f"{''.join(f', {name}' for name in inputs)} here, got one that needs "
+            f"{', '.join(missing)}"
+        )
+    given = chosen(law, inputs)
+    states, z = friction_states(law, v, N)
+    events = tuple(
+        Event(
+            s.name,
+            s.expression,
+            s.direction,
+            reset=dict(s.reset) | (dict(rest) if s.halts else {}),
+        )
+        for s in law.switches(v, N, z, **given)
+    )
+    return Contact(
+        states,
+        law.force(v, N, z, **given),
+        law.rate(v, N, z, **given),
+        slip_monitor(law, v, p),
+        events,
+    )
 
 
 def slip_monitor(law: Law, v: Scalar, p: Variables) -> tuple[Monitor, ...]:

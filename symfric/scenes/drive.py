@@ -8,7 +8,7 @@ import casadi as ca
 from symfric.model import Model, Output, Variables
 from symfric.numeric import Scalar
 from symfric.parameters import Variable, param
-from symfric.scenes.base import Scene, friction_states, slip_monitor
+from symfric.scenes.base import Scene, contact
 
 
 @final
@@ -32,21 +32,18 @@ class Drive(Scene):
         x = Variable("x", "m", nominal=0.1, doc="position")
         v = Variable("v", "m/s", nominal=0.1, doc="velocity")
         force = Variable("force", "N", nominal=1.0, doc="driving force")
-        bristles, z = friction_states(self.law, v.symbol, self.N)
-        F = self.law.force(v.symbol, self.N, z)
+        applied = force.symbol - self.offset
+        slip = contact(self.law, v.symbol, self.N, p, rest={"v": 0.0}, F_e=applied)
         return Model(
             name="drive",
-            x=(x, v, *bristles),
+            x=(x, v, *slip.states),
             u=(force,),
             p=p,
-            ode=ca.vertcat(
-                v.symbol,
-                (force.symbol - F - self.offset) / self.m,
-                self.law.rate(v.symbol, self.N, z),
-            ),
-            monitors=slip_monitor(self.law, v.symbol, p),
+            ode=ca.vertcat(v.symbol, (applied - slip.force) / self.m, slip.rate),
+            monitors=slip.monitors,
+            events=slip.events,
             outputs={
-                "friction": Output(F, "N", "friction force opposing v"),
-                "power": Output(F * v.symbol, "W", "power taken by friction"),
+                "friction": Output(slip.force, "N", "friction force opposing v"),
+                "power": Output(slip.force * v.symbol, "W", "power taken by friction"),
             },
         )

@@ -8,7 +8,7 @@ import casadi as ca
 from symfric.model import Model, Output, Variables
 from symfric.numeric import Scalar
 from symfric.parameters import Variable, param
-from symfric.scenes.base import Scene, friction_states, slip_monitor
+from symfric.scenes.base import Scene, contact
 
 
 @final
@@ -36,17 +36,18 @@ class Rabinowicz(Scene):
         x = Variable("x", "m", nominal=0.1, doc="spring elongation")
         v = Variable("v", "m/s", nominal=0.1, doc="velocity of the block")
         N, v_rel = self.m * self.g, v.symbol - self.v_belt
-        bristles, z = friction_states(self.law, v_rel, N)
-        F = self.law.force(v_rel, N, z)
+        pull = -self.k * x.symbol
+        slip = contact(self.law, v_rel, N, p, rest={"v": self.v_belt}, F_e=pull)
         return Model(
             name="rabinowicz",
-            x=(x, v, *bristles),
+            x=(x, v, *slip.states),
             p=p,
-            ode=ca.vertcat(v.symbol, (-self.k * x.symbol - F) / self.m, self.law.rate(v_rel, N, z)),
-            monitors=slip_monitor(self.law, v_rel, p),
+            ode=ca.vertcat(v.symbol, (pull - slip.force) / self.m, slip.rate),
+            monitors=slip.monitors,
+            events=slip.events,
             outputs={
                 "v_rel": Output(v_rel, "m/s", "velocity of the block relative to the belt"),
-                "friction": Output(F, "N", "friction force opposing v_rel"),
-                "power": Output(F * v_rel, "W", "power taken by the contact"),
+                "friction": Output(slip.force, "N", "friction force opposing v_rel"),
+                "power": Output(slip.force * v_rel, "W", "power taken by the contact"),
             },
         )
