@@ -61,6 +61,32 @@ def positive(x: Scalar, eps: Scalar) -> Scalar:
     return (x + sqrt(x * x + eps * eps)) / 2
 
 
+def clip(x: Scalar, low: Scalar, high: Scalar) -> Scalar:
+    """`x` held between `low` and `high`; kinks at both."""
+    if is_casadi(x, low, high):
+        return ca.fmin(ca.fmax(x, low), high)
+    return np.minimum(np.maximum(x, low), high)
+
+
+def step3(x: Scalar) -> Scalar:
+    """The cubic step 3x^2 - 2x^3 from 0 at x <= 0 to 1 at x >= 1, C1."""
+    t = clip(x, 0.0, 1.0)
+    return t * t * (3 - 2 * t)
+
+
+def step5(x: Scalar) -> Scalar:
+    """The quintic step 10x^3 - 15x^4 + 6x^5 from 0 at x <= 0 to 1 at x >= 1, C2."""
+    t = clip(x, 0.0, 1.0)
+    return t * t * t * (10 - t * (15 - 6 * t))
+
+
+def choose(condition: Scalar, yes: Scalar, no: Scalar) -> Scalar:
+    """`yes` where the condition holds, else `no`: for modes and switches, never for forces."""
+    if is_casadi(condition, yes, no):
+        return ca.if_else(condition, yes, no)
+    return np.where(condition, yes, no)[()]
+
+
 def stribeck(v: Scalar, v_s: Scalar, delta: Scalar, eps: Scalar) -> Scalar:
     """The Stribeck weight exp(-|v / v_s|^delta): 1 at rest, 0 far above v_s."""
     return exp(-power(v / v_s, delta, eps / v_s))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from symfric.laws import smooth
+from symfric.numeric import Scalar
 
 EPS = 1e-3
 AT_ZERO: dict[str, tuple[Callable[[ca.SX], ca.SX], float, float, float]] = {
@@ -127,3 +128,32 @@ def test_phi1_takes_arrays() -> None:
 def test_positive_keeps_a_load_above_zero_down_to_the_stated_depth() -> None:
     assert smooth.positive(-1e7 * EPS, EPS) > 0
     assert smooth.positive(-1e9 * EPS, EPS) == 0
+
+
+@pytest.mark.parametrize(("step", "order"), [(smooth.step3, 1), (smooth.step5, 2)])
+@pytest.mark.parametrize("knot", [0.0, 1.0])
+def test_step_is_as_smooth_at_its_knots_as_stated(
+    step: Callable[[ca.SX], ca.SX], order: int, knot: float
+) -> None:
+    x = ca.SX.sym("x")
+    derivatives = [step(x)]
+    for _ in range(order + 1):
+        derivatives.append(ca.gradient(derivatives[-1], x))
+    f = ca.Function("f", [x], [ca.vertcat(*derivatives)])
+    left, right = f(knot - 1e-9).full().ravel(), f(knot + 1e-9).full().ravel()
+    assert right[: order + 1] == pytest.approx(left[: order + 1], abs=1e-6)
+    assert abs(right[order + 1] - left[order + 1]) > 1
+
+
+@pytest.mark.parametrize("step", [smooth.step3, smooth.step5])
+def test_step_is_flat_outside_and_passes_the_middle(step: Callable[[Scalar], Scalar]) -> None:
+    x = np.array([-2.0, 0.0, 0.5, 1.0, 3.0])
+    np.testing.assert_allclose(step(x), [0.0, 0.0, 0.5, 1.0, 1.0], atol=1e-15)
+    np.testing.assert_allclose(np.ravel(step(ca.DM(x)).full()), [0, 0, 0.5, 1, 1], atol=1e-15)
+
+
+def test_choose_and_clip_take_numbers_arrays_and_matrices() -> None:
+    assert smooth.choose(True, 1.0, 2.0) == 1.0
+    assert float(smooth.choose(ca.DM(0), 1.0, 2.0)) == 2.0
+    np.testing.assert_array_equal(smooth.clip(np.array([-3.0, 0.2, 3.0]), -1, 1), [-1, 0.2, 1])
+    assert float(smooth.clip(ca.DM(3), -1, 1)) == 1.0
