@@ -270,8 +270,18 @@ class Model:
         self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None
     ) -> NDArray[np.float64]:
         """Derivative of `initial_state` with respect to p, shape (nx, n_p)."""
-        jacobian = self._start.factory("by_p", ["known", "chosen", "u", "p"], ["jac:x:p"])
-        return jacobian(*self._start_arguments(given, p)).full()
+        return self._start_slopes(*self._start_arguments(given, p))[0].full()
+
+    def start_by_state(
+        self,
+        name: str,
+        given: Mapping[str, float] | None = None,
+        p: Mapping[str, float] | None = None,
+    ) -> NDArray[np.float64]:
+        """Derivative of `initial_state` with respect to the start value of a state, shape (nx,)."""
+        i = [v.name for v in self.x].index(name)
+        chosen = dict(given or {}) | {name: float(self.initial_state(given, p)[i])}
+        return self._start_slopes(*self._start_arguments(chosen, p))[1].full()[:, i]
 
     def _start_arguments(
         self, given: Mapping[str, float] | None, p: Mapping[str, float] | None
@@ -297,6 +307,11 @@ class Model:
             values = ca.substitute(values, x, values)
         arguments = [known, chosen, self.vector("u"), self.vector("p")]
         return ca.Function("start", arguments, [values], ["known", "chosen", "u", "p"], ["x"])
+
+    @cached_property
+    def _start_slopes(self) -> ca.Function:
+        """Derivatives of `_start` by p and by the values given."""
+        return self._start.factory("slopes", self._start.name_in(), ["jac:x:p", "jac:x:known"])
 
 
 def finite(where: str, value: Any) -> float:

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.integrator.columns import Columns
 from symfric.integrator.compiler import find_compiler, library_path
 from symfric.integrator.engine import CompiledEngine, Engine, VmEngine, c_source
 from symfric.integrator.inputs import Drivers
@@ -72,6 +73,11 @@ class Integrator:
         outputs = (ca.SX(o.expression) for o in m.outputs.values())
         stacked = ca.vertcat(m.vector("x"), m.vector("z"), m.vector("u"), *outputs)
         return self.of_time("signals", stacked)
+
+    @cached_property
+    def signal_columns(self) -> Columns:
+        """The signals at many times."""
+        return Columns(self.signals)
 
     def vm(self) -> Engine:
         """The engine that needs no compiler."""

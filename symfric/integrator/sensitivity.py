@@ -4,20 +4,23 @@ The step-size controller takes no part (internal numerical differentiation), so 
 those of the discrete solution and exact to rounding.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from typing import final
+from weakref import WeakKeyDictionary
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.integrator.columns import Columns
 from symfric.integrator.dense import Dense
 from symfric.integrator.inputs import Drivers
 from symfric.integrator.integrator import Integrator
-from symfric.integrator.step import build_dense_step, build_fixed
-from symfric.integrator.system import system
-from symfric.integrator.tableaux import ROSENBROCK
+from symfric.integrator.step import build_dense_step
+from symfric.integrator.system import System
 from symfric.model import Model
 from symfric.parameters import check_names
 
@@ -31,163 +34,231 @@ class Seeds:
 
     Attributes:
         names: as the user wrote them: a parameter, or "x0.v" for the start value of a state.
-        parameters: row in d of each name, -1 for a start value.
-        states: row in y of each name, -1 for a parameter.
+        parameters: row in p of each name, -1 for a start value.
+        start: derivative of the start values of x by each name, shape (nx, names).
     """
 
     names: tuple[str, ...]
     parameters: tuple[int, ...]
-    states: tuple[int, ...]
+    start: Array
+
+    def of_data(self, n_d: int) -> Array:
+        """Derivative of the run data d by each name, shape (n_d, names)."""
+        selector = np.zeros((n_d, len(self.names)))
+        for column, row in enumerate(self.parameters):
+            if row >= 0:
+                selector[row, column] = 1.0
+        return selector
 
 
-def seeds(model: Model, names: Sequence[str]) -> Seeds:
-    """Look the names up.
+def seeds(
+    model: Model,
+    names: Sequence[str],
+    x0: Mapping[str, float] | None,
+    p: Mapping[str, float] | None,
+) -> Seeds:
+    """Look the names up; `x0` and `p` as in `simulate`.
+
+    A start value that follows from others, as a bristle's in steady sliding does, is differentiated
+    along with them.
 
     Raises:
         ValueError: a name that is neither a free parameter nor "x0." and a state; a model with
             events, whose jumps are not differentiated.
     """
-    p, x = [v.name for v in model.p], [v.name for v in model.x]
-    known = [*p, *(f"x0.{name}" for name in x)]
+    free, states = [v.name for v in model.p], [v.name for v in model.x]
+    known = [*free, *(f"x0.{name}" for name in states)]
     check_names(f"sensitivities of '{model.name}' (parameters must be free)", names, known)
     if model.events:
         raise ValueError(
             f"sensitivities of '{model.name}': expected a model without events, got "
             f"{len(model.events)}; use a smooth or bristle law"
         )
-    return Seeds(
-        tuple(names),
-        tuple(p.index(n) if n in p else -1 for n in names),
-        tuple(x.index(n[3:]) if n not in p else -1 for n in names),
-    )
+    by_p = model.start_by_parameters(x0, p)
+    columns = [
+        by_p[:, free.index(n)] if n in free else model.start_by_state(n[3:], x0, p) for n in names
+    ]
+    rows = tuple(free.index(n) if n in free else -1 for n in names)
+    return Seeds(tuple(names), rows, np.column_stack(columns))
 
 
-def start(integrator: Integrator, which: Seeds, y: Array, d: Array, p_of_start: Array) -> Array:
-    """Derivatives of the consistent start values, shape (n, names).
+@final
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The accepted steps of a run, and the numbers they were made with."""
 
-    Args:
-        integrator: of the model.
-        which: what to differentiate with respect to.
-        y, d: start values and run data.
-        p_of_start: derivative of the start values of x by p, shape (nx, n_p).
-    """
-    s = integrator.system
-    S = np.zeros((s.n, len(which.names)))
-    for column, (parameter, state) in enumerate(zip(which.parameters, which.states, strict=True)):
-        if state >= 0:
-            S[state, column] = 1.0
-        else:
-            S[: s.nx, column] = p_of_start[:, parameter]
-    rows, columns = s.algebraic
-    if rows:
-        by_y = ca.Function("by_y", [s.y, s.d], [ca.jacobian(s.f[rows], s.y)])(y, d).full()
-        by_d = ca.Function("by_d", [s.y, s.d], [ca.jacobian(s.f[rows], s.d)])(y, d).full()
-        others = [i for i in range(s.n) if i not in columns]
-        right = by_y[:, others] @ S[others] + by_d @ _of_data(which, d.size)
-        S[columns] = -np.linalg.solve(by_y[:, columns], right)
-    return S
+    integrator: Integrator
+    dense: Dense
+    inputs: Drivers
+    p: Array
+    backend: str
 
+    def data(self, interval: NDArray[np.intp]) -> Array:
+        """Run data d on input intervals, shape (intervals, n_d)."""
+        p = np.tile(self.p, (interval.size, 1))
+        return np.hstack([p, self.inputs.values[:, interval].T])
 
-def _of_data(which: Seeds, n_d: int) -> Array:
-    """Derivative of the run data by the seeds, shape (n_d, names)."""
-    selector = np.zeros((n_d, len(which.names)))
-    for column, parameter in enumerate(which.parameters):
-        if parameter >= 0:
-            selector[parameter, column] = 1.0
-    return selector
+    def data_at(self, times: Array) -> Array:
+        """Run data d at times, shape (times, n_d)."""
+        return self.data(self.inputs.interval(times))
 
+    @cached_property
+    def interval(self) -> NDArray[np.intp]:
+        """Input interval of every step."""
+        return self.inputs.interval((self.dense.t0 + self.dense.t1) / 2)
 
-def forward(
-    integrator: Integrator, which: Seeds, dense: Dense, S: Array, inputs: Drivers, p: Array
-) -> Dense:
-    """Derivatives of the solution as dense output with n * names columns.
+    @cached_property
+    def steps(self) -> list[Array]:
+        """Start y, size h and run data d of every step."""
+        return [self.dense.y0, self.dense.t1 - self.dense.t0, self.data(self.interval)]
 
-    Every accepted step is differentiated once, all of them in one mapped call; the rest is a
-    product of small matrices.
-    """
-    s, count = integrator.system, dense.t0.size
-    names = len(which.names)
-    middle = (dense.t0 + dense.t1) / 2
-    d = np.vstack([np.tile(p[:, None], (1, count)), inputs.values[:, inputs.interval(middle)]])
-    step = build_dense_step(s, integrator.tableau)
-    both = step.factory("derivatives", ["y", "h", "d"], ["jac:all:y", "jac:all:d"])
-    by_y, by_d = both.map(count)(dense.y0.T, (dense.t1 - dense.t0)[None, :], d)
-    rows = step.numel_out(0)
-    by_y = by_y.full().reshape(rows, count, s.n).transpose(1, 0, 2)
-    by_d = by_d.full().reshape(rows, count, s.d.numel()).transpose(1, 0, 2)
-    pushed = by_d @ _of_data(which, s.d.numel())
-    begin, end = np.zeros((count, s.n, names)), np.zeros((count, s.n, names))
-    bend = np.zeros((count, rows - s.n, names))
-    for k in range(count):
-        begin[k] = end[k - 1] if k else S
-        after = by_y[k] @ begin[k] + pushed[k]
-        end[k], bend[k] = after[: s.n], after[s.n :]
-    width = s.n * names
-    return Dense(
-        dense.t0,
-        dense.t1,
-        begin.reshape(count, width),
-        end.reshape(count, width),
-        bend.reshape(count, -1, width),
-    )
+    @cached_property
+    def pieces(self) -> list[slice]:
+        """Steps between two jumps of the inputs, which algebraic unknowns follow."""
+        cuts = [0, self.dense.t0.size]
+        if self.integrator.system.algebraic[1]:
+            cuts[1:1] = [int(k) + 1 for k in np.flatnonzero(np.diff(self.interval))]
+        return [slice(a, b) for a, b in pairwise(cuts)]
 
 
-def of_signals(
-    integrator: Integrator, which: Seeds, t: Array, y: Array, d: Array, S: Array
-) -> Array:
-    """Derivatives of all signals at times t (m,), shape (signals, names, m).
+@final
+@dataclass(eq=False)
+class Derivatives:
+    """Functions that differentiate the steps of one integrator, made when first needed."""
 
-    Args:
-        integrator: of the model.
-        which: what to differentiate with respect to.
-        t, y, d: times, solution (n, m) and run data (n_d, m).
-        S: derivatives of the solution, shape (n, names, m).
-    """
-    count, size = t.size, integrator.system.n
-    signals = integrator.signals
-    names = signals.name_in()
-    both = signals.factory("signals", names, [f"jac:{signals.name_out(0)}:{n}" for n in names[1:]])
-    by_y, by_d = both.map(count)(t[None, :], y, d)
-    rows = signals.numel_out(0)
-    by_y = by_y.full().reshape(rows, count, size)
-    by_d = by_d.full().reshape(rows, count, d.shape[0])
-    through_y = np.einsum("rmn,nsm->rsm", by_y, S)
-    return through_y + np.einsum("rmd,ds->rsm", by_d, _of_data(which, d.shape[0]))
+    system: System
+    step: ca.Function
+    signals: ca.Function
 
+    def __post_init__(self) -> None:
+        self._forward: dict[tuple[int, ...], Columns] = {}
 
-def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Function:
-    """The flow of a model as a CasADi Function (x0, u, p, T) -> xf, for the user's own NLP.
+    @property
+    def symbols(self) -> list[ca.SX]:
+        """Arguments y, h, d of the step."""
+        return [ca.SX.sym(name, self.step.numel_in(i)) for i, name in enumerate("yhd")]
 
-        xf = x(T),   x(0) = x0,   u and p constant
+    def forward(self, which: Seeds) -> Columns:
+        """(S, y, h, d) -> (S after the step, that of its dense output), S of shape (n, names)."""
+        if which.parameters not in self._forward:
+            n, names = self.system.n, len(which.names)
+            y, h, d = self.symbols
+            S, of_d = ca.SX.sym("S", n, names), ca.DM(which.of_data(d.numel()))
+            pushed = self.step.forward(names)(
+                y, h, d, self.step(y, h, d), S, ca.SX(1, names), ca.SX(ca.sparsify(of_d))
+            )
+            results = ca.cse([ca.densify(pushed[:n, :]), ca.densify(pushed[n:, :])])
+            function = ca.Function("forward", [S, y, h, d], results)
+            self._forward[which.parameters] = Columns(function, chained=True)
+        return self._forward[which.parameters]
 
-    `steps` equal steps of the method; derivatives of any order by CasADi, exact for the discrete
-    map. Time in the equations counts from 0. Compare a result with `simulate`: fixed steps have no
-    error control.
+    @cached_property
+    def reverse(self) -> Columns:
+        """(adjoint of the end, y, h, d, weights) -> (adjoint of y, of d).
 
-    Args:
-        model: explicit or implicit model without events and algebraic variables.
-        steps: number of steps; choose it so that h = T/steps resolves the transition velocity.
-        method: as in `simulate`.
+        `weights` are those of the start and of all results of the step, end first.
+        """
+        n, (y, h, d) = self.system.n, self.symbols
+        every = self.step(y, h, d)
+        after, weights = ca.SX.sym("after", n), ca.SX.sym("weights", n + every.numel())
+        inner = weights[n:] + ca.vertcat(after, ca.SX(every.numel() - n, 1))
+        by_y, _, by_d = self.step.reverse(1)(y, h, d, every, inner)
+        results = ca.cse([ca.densify(by_y + weights[:n]), ca.densify(by_d)])
+        return Columns(ca.Function("reverse", [after, y, h, d, weights], results), chained=True)
 
-    Raises:
-        ValueError: unknown method, events or algebraic variables, fewer than one step.
-    """
-    check_names("flow: method", [method], ROSENBROCK)
-    if steps < 1:
-        raise ValueError(f"flow: expected steps >= 1, got {steps}")
-    if model.events or model.z or model.ode is None:
-        raise ValueError(
-            f"flow: expected an explicit model without events and algebraic variables, got "
-            f"'{model.name}' with {len(model.events)} events and {len(model.z)} algebraic variables"
+    @cached_property
+    def constraints(self) -> ca.Function:
+        """Derivatives of the algebraic equations (y, d) -> (by y, by d)."""
+        s = self.system
+        alg = s.f[s.algebraic[0]]
+        return ca.Function(
+            "constraints", [s.y, s.d], [ca.jacobian(alg, s.y), ca.jacobian(alg, s.d)]
         )
-    u = model.vector("u")
-    whole = system(model, Drivers(u, u, np.zeros(2), np.zeros((len(model.u), 1)), ("flow",)))
-    fixed = build_fixed(whole, ROSENBROCK[method])
-    x0, inputs = ca.MX.sym("x0", len(model.x)), ca.MX.sym("u", len(model.u))
-    p, T = ca.MX.sym("p", len(model.p)), ca.MX.sym("T")
-    y0 = ca.vertcat(x0, ca.MX(0)) if whole.timed else x0
-    data = ca.vertcat(p, inputs)
-    chain = fixed.mapaccum("chain", steps)
-    all_y = chain(y0, ca.repmat(T / steps, 1, steps), ca.repmat(data, 1, steps))
-    xf = all_y[: len(model.x), -1]
-    return ca.Function("flow", [x0, inputs, p, T], [xf], ["x0", "u", "p", "T"], ["xf"])
+
+    @cached_property
+    def of_signals(self) -> Columns:
+        """Derivatives of the signals (t, y, d) -> (by y, by d)."""
+        t, y, d = (ca.SX.sym(n, self.signals.numel_in(i)) for i, n in enumerate("tyd"))
+        values = self.signals(t, y, d)
+        return Columns(
+            ca.Function("of_signals", [t, y, d], [ca.jacobian(values, y), ca.jacobian(values, d)])
+        )
+
+
+_MADE: WeakKeyDictionary[Integrator, Derivatives] = WeakKeyDictionary()
+
+
+def derivatives(integrator: Integrator) -> Derivatives:
+    """The Functions for `integrator`."""
+    if integrator not in _MADE:
+        step = build_dense_step(integrator.system, integrator.tableau)
+        _MADE[integrator] = Derivatives(integrator.system, step, integrator.signals)
+    return _MADE[integrator]
+
+
+def following(made: Derivatives, y: Array, d: Array) -> tuple[Array, Array]:
+    """How algebraic unknowns follow at (y, d): dz = A dx + B dd for the others x of y."""
+    columns = made.system.algebraic[1]
+    others = [i for i in range(made.system.n) if i not in columns]
+    by_y, by_d = (m.full() for m in made.constraints(y, d))
+    return (
+        -np.linalg.solve(by_y[:, columns], by_y[:, others]),
+        -np.linalg.solve(by_y[:, columns], by_d),
+    )
+
+
+def forward(path: Path, which: Seeds) -> Dense:
+    """Derivatives of the solution as dense output of names * n columns, those of a name together.
+
+    All directions go along in one sweep over the steps.
+    """
+    s, names, made = path.integrator.system, len(which.names), derivatives(path.integrator)
+    columns = s.algebraic[1]
+    others = [i for i in range(s.n) if i not in columns]
+    moved = np.zeros((s.n, names))
+    moved[: s.nx] = which.start
+    begin, end, bend = [], [], []
+    for piece in path.pieces:
+        steps = [a[piece] for a in path.steps]
+        if columns:
+            by_others, by_d = following(made, steps[0][0], steps[2][0])
+            moved[columns] = by_others @ moved[others] + by_d @ which.of_data(s.d.numel())
+        after, inner = made.forward(which)(steps, moved.T, path.backend)
+        begin.append(np.vstack([moved.T.reshape(1, -1), after[:-1]]))
+        end.append(after)
+        bend.append(inner)
+        moved = after[-1].reshape(names, s.n).T.copy()
+    count = path.dense.t0.size
+    D = np.vstack(bend).reshape(count, names, -1, s.n).transpose(0, 2, 1, 3)
+    return Dense(
+        path.dense.t0,
+        path.dense.t1,
+        np.vstack(begin),
+        np.vstack(end),
+        D.reshape(count, -1, names * s.n),
+    )
+
+
+def signal_slopes(path: Path, times: Array) -> tuple[Array, Array]:
+    """Derivatives of all signals at times by y and by d, shapes (times, signals, n or n_d)."""
+    arguments = [times, path.dense(times).T, path.data_at(times)]
+    by_y, by_d = derivatives(path.integrator).of_signals(arguments, backend=path.backend)
+    signals, n_d = path.integrator.signals.numel_out(0), path.integrator.system.d.numel()
+    # CasADi stores column by column
+    by_y = by_y.reshape(times.size, path.integrator.system.n, signals).transpose(0, 2, 1)
+    return by_y, by_d.reshape(times.size, n_d, signals).transpose(0, 2, 1)
+
+
+def of_signals(path: Path, which: Seeds, solution: Dense, times: Array) -> Array:
+    """Derivatives of all signals at times, shape (names, signals, times).
+
+    Args:
+        path: the run.
+        which: what to differentiate with respect to.
+        solution: derivatives of the solution, from `forward`.
+        times: where [s].
+    """
+    by_y, by_d = signal_slopes(path, times)
+    S = solution(times).reshape(len(which.names), -1, times.size)
+    through_y = np.einsum("mrn,snm->srm", by_y, S)
+    return through_y + np.einsum("mrd,ds->srm", by_d, which.of_data(by_d.shape[2]))

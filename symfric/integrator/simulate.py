@@ -3,18 +3,20 @@
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from time import perf_counter
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symfric.integrator import sensitivity
+from symfric.integrator.adjoint import gradient
 from symfric.integrator.casadi_backend import integrate_by_peer
 from symfric.integrator.dense import Dense
 from symfric.integrator.inputs import Drivers, Input, drivers
 from symfric.integrator.integrator import Integrator
 from symfric.integrator.run import Run, Tolerances, integrate
+from symfric.integrator.sensitivity import Path, Seeds, forward, of_signals, seeds
 from symfric.integrator.tableaux import ROSENBROCK
 from symfric.integrator.trajectory import Statistics, Trajectory
 from symfric.model import Model, finite
@@ -73,7 +75,8 @@ def simulate(
         event_tolerance: how sharply events are located [s].
         max_steps: attempts allowed.
         sensitivities: free parameters by name and start values as "x0.v"; the trajectory then
-            holds the derivatives of all signals, exact for the steps that were taken.
+            gives the derivatives of all signals (`Trajectory.sensitivities`) and gradients of
+            sums of them (`Trajectory.gradient`), exact for the steps that were taken.
         measure_error: run again at rtol/100 and report the difference in the statistics.
         progress: called with the fraction done every few tens of milliseconds.
         throw: raise `SolveError` on failure; with False the partial trajectory is returned.
@@ -89,12 +92,16 @@ def simulate(
         UserWarning: rtol above 1e-5, where stick phases may get lost.
     """
     _check(t_start, t_end, rtol, method, backend)
+    if sensitivities and backend in PEERS:
+        raise ValueError(
+            f"simulate: sensitivities: expected backend auto, vm or compiled, got {backend}"
+        )
     times = _times(t_start, t_end, t_eval, samples)
     begin = perf_counter()
     inputs = drivers(model, u, float(t_start), float(t_end))
     integrator, fresh = _integrator(model, inputs, method)
     build_time = perf_counter() - begin if fresh else 0.0
-    seeds = sensitivity.seeds(model, sensitivities) if sensitivities else None
+    which = seeds(model, sensitivities, x0, p) if sensitivities else None
     relative = 0.1 * rtol if atol is None else atol
     tolerances = Tolerances(rtol, relative * integrator.system.nominal, event_tolerance, max_steps)
     y0, values = _start(integrator, model, x0, p, t_start), model.values("p", p)
@@ -106,9 +113,9 @@ def simulate(
     )
     if throw and not trajectory.status.ok and trajectory.status is not Status.INTERRUPTED:
         raise SolveError(trajectory.message, trajectory.status, trajectory)
-    if seeds is not None:
-        by_p = model.start_by_parameters(x0, p)
-        trajectory = _differentiated(integrator, seeds, trajectory, dense, by_p, inputs, values)
+    if which is not None and run.steps:
+        path = Path(integrator, dense, inputs, values, backend)
+        trajectory = _differentiated(trajectory, path, which)
     if measure_error and trajectory.status.ok:
         finer = simulate(
             model, t_end, t_start=t_start, x0=x0, u=u, p=p, rtol=max(rtol / 100, 1e-13),
@@ -242,15 +249,14 @@ def _trajectory(
 ) -> Trajectory:
     model = integrator.model
     names = list(model.signals)
-    signals = integrator.signals
 
     def states(at: Array) -> dict[str, Array]:
         return dict(zip(names, dense(at)[: len(model.x)], strict=False))
 
     def evaluate(at: Array) -> dict[str, Array]:
-        d = np.vstack([np.tile(p[:, None], (1, at.size)), inputs.values[:, inputs.interval(at)]])
-        values = signals.map(max(1, at.size))(at[None, :], dense(at), d).full()
-        return dict(zip(names, values, strict=True))
+        d = np.hstack([np.tile(p, (at.size, 1)), inputs.values[:, inputs.interval(at)].T])
+        (values,) = integrator.signal_columns([at, dense(at).T, d])
+        return dict(zip(names, np.ascontiguousarray(values.T), strict=True))
 
     reached = times[(times >= dense.t0[0]) & (times <= dense.t1[-1])]
     return Trajectory(
@@ -267,30 +273,27 @@ def _trajectory(
     )
 
 
-def _differentiated(
-    integrator: Integrator,
-    seeds: sensitivity.Seeds,
-    trajectory: Trajectory,
-    dense: Dense,
-    by_p: Array,
-    inputs: Drivers,
-    p: Array,
-) -> Trajectory:
-    """The trajectory with the derivatives of its signals."""
-    first = np.concatenate([p, inputs.values[:, 0]])
-    S = sensitivity.start(integrator, seeds, dense.y0[0], first, by_p)
-    derivatives = sensitivity.forward(integrator, seeds, dense, S, inputs, p)
-    names, n = list(integrator.model.signals), integrator.system.n
+def _differentiated(trajectory: Trajectory, path: Path, which: Seeds) -> Trajectory:
+    """The trajectory with the derivatives of its signals, computed when asked for."""
+    names = list(trajectory.units)
 
-    def evaluate(at: Array) -> dict[str, dict[str, Array]]:
-        d = np.vstack([np.tile(p[:, None], (1, at.size)), inputs.values[:, inputs.interval(at)]])
-        S = derivatives(at).reshape(n, len(seeds.names), at.size)
-        values = sensitivity.of_signals(integrator, seeds, at, dense(at), d, S)
+    @cache
+    def solution() -> Dense:
+        return forward(path, which)
+
+    def differentiate(at: Array) -> dict[str, dict[str, Array]]:
+        values = of_signals(path, which, solution(), at)
         return {
-            seed: dict(zip(names, values[:, k], strict=True)) for k, seed in enumerate(seeds.names)
+            seed: dict(zip(names, rows, strict=True))
+            for seed, rows in zip(which.names, values, strict=True)
         }
 
-    return replace(trajectory, differentiate=evaluate)
+    def pull_back(weights: Mapping[str, Array]) -> dict[str, float]:
+        zero = np.zeros(trajectory.t.size)
+        every = np.vstack([weights.get(name, zero) for name in names])
+        return gradient(path, which, trajectory.t, every)
+
+    return replace(trajectory, differentiate=differentiate, pull_back=pull_back)
 
 
 def _difference(model: Model, one: Trajectory, other: Trajectory) -> float:

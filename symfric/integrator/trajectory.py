@@ -2,7 +2,7 @@
 
 import csv
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -75,6 +75,8 @@ class Trajectory:
         steps: ends of the accepted steps [s], shape (steps + 1,).
         states: the states alone, at any times; cheaper than all signals.
         evaluate: all signals at any times.
+        differentiate: derivatives of all signals at any times, where they were asked for.
+        pull_back: gradient of a weighted sum of signals at `t`, likewise.
     """
 
     scene: str
@@ -88,6 +90,7 @@ class Trajectory:
     evaluate: Callable[[Array], dict[str, Array]]
     happened: tuple[tuple[float, str], ...] = ()
     differentiate: Callable[[Array], dict[str, dict[str, Array]]] | None = None
+    pull_back: Callable[[Mapping[str, Array]], dict[str, float]] | None = None
 
     @cached_property
     def signals(self) -> dict[str, Array]:
@@ -106,11 +109,43 @@ class Trajectory:
             ValueError: none were asked for.
         """
         if self.differentiate is None:
-            raise ValueError(
-                f"trajectory of '{self.scene}': expected sensitivities, got none; ask for them by "
-                "simulate(..., sensitivities=[...])"
-            )
+            raise self._without_derivatives
         return self.differentiate(self.t)
+
+    def gradient(self, weights: Mapping[str, ArrayLike]) -> dict[str, float]:
+        """Derivatives of the sum over signals s and times t_i of weights[s][i] s(t_i).
+
+        One sweep backwards over the steps, at a cost that does not grow with the number of names
+        given to `simulate`. For a cost J of the signals at `t`, the weights are dJ/ds(t_i).
+
+        Args:
+            weights: signal -> a number for every time of `t`, or one for all.
+
+        Returns:
+            Name as given to `simulate` -> derivative.
+
+        Raises:
+            ValueError: no sensitivities were asked for, an unknown signal, another length.
+        """
+        if self.pull_back is None:
+            raise self._without_derivatives
+        where = f"trajectory of '{self.scene}'"
+        check_names(f"{where}: gradient", weights, self.units)
+        given = {name: np.asarray(w, dtype=float) for name, w in weights.items()}
+        odd = {name: w.shape for name, w in given.items() if w.shape not in ((), self.t.shape)}
+        if odd:
+            raise ValueError(
+                f"{where}: gradient: expected numbers or arrays of {self.t.size} weights, got "
+                + ", ".join(f"{name} of shape {shape}" for name, shape in odd.items())
+            )
+        return self.pull_back({n: np.broadcast_to(w, self.t.shape) for n, w in given.items()})
+
+    @property
+    def _without_derivatives(self) -> ValueError:
+        return ValueError(
+            f"trajectory of '{self.scene}': expected sensitivities, got none; ask for them by "
+            "simulate(..., sensitivities=[...])"
+        )
 
     def __getitem__(self, name: str) -> Array:
         if name == "t":

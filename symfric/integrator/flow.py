@@ -1,0 +1,64 @@
+"""The flow of a model over a time as one differentiable CasADi Function."""
+
+import casadi as ca
+import numpy as np
+
+from symfric.integrator.inputs import Drivers
+from symfric.integrator.step import build_fixed
+from symfric.integrator.system import System, system
+from symfric.integrator.tableaux import ROSENBROCK
+from symfric.model import Model
+from symfric.parameters import check_names
+
+
+def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Function:
+    """The flow of a model as a CasADi Function (x0, u, p, T) -> xf, for the user's own NLP.
+
+        xf = x(T),   x(0) = x0,   u and p constant
+
+    `steps` equal steps of the method; derivatives of any order by CasADi, exact for the discrete
+    map. Time in the equations counts from 0. Algebraic variables start where their equations hold,
+    by Newton's method from their start values. Compare a result with `simulate`: fixed steps have
+    no error control.
+
+    Args:
+        model: explicit or implicit model without events.
+        steps: number of steps; choose it so that h = T/steps resolves the transition velocity.
+        method: as in `simulate`.
+
+    Raises:
+        ValueError: unknown method, events, fewer than one step.
+    """
+    check_names("flow: method", [method], ROSENBROCK)
+    if steps < 1:
+        raise ValueError(f"flow: expected steps >= 1, got {steps}")
+    if model.events:
+        raise ValueError(
+            f"flow: expected a model without events, got {len(model.events)} in '{model.name}'; "
+            "use a smooth or bristle law"
+        )
+    u = model.vector("u")
+    whole = system(model, Drivers(u, u, np.zeros(2), np.zeros((len(model.u), 1)), ("flow",)))
+    fixed = build_fixed(whole, ROSENBROCK[method])
+    x0, inputs = ca.MX.sym("x0", len(model.x)), ca.MX.sym("u", len(model.u))
+    p, T = ca.MX.sym("p", len(model.p)), ca.MX.sym("T")
+    data = ca.vertcat(p, inputs)
+    chain = fixed.mapaccum("chain", steps)
+    start = _start(model, whole, x0, data)
+    all_y = chain(start, ca.repmat(T / steps, 1, steps), ca.repmat(data, 1, steps))
+    xf = all_y[: len(model.x), -1]
+    return ca.Function("flow", [x0, inputs, p, T], [xf], ["x0", "u", "p", "T"], ["xf"])
+
+
+def _start(model: Model, whole: System, x0: ca.MX, data: ca.MX) -> ca.MX:
+    """All unknowns at time 0, the algebraic ones consistent."""
+    columns = whole.algebraic[1]
+    unknowns = [x0[i] if i < whole.nx else ca.MX(0) for i in range(whole.n)]
+    if columns:
+        guesses = {v.name: float(v.start) for v in model.z}
+        known = [unknowns[i] for i in range(whole.n) if i not in columns]
+        guess = ca.DM([guesses.get(whole.names[i], 0.0) for i in columns])
+        found = whole.constraints(guess, ca.vertcat(*known, data))
+        for row, i in enumerate(columns):
+            unknowns[i] = found[row]
+    return ca.vertcat(*unknowns)
