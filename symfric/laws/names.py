@@ -3,13 +3,13 @@
 from re import fullmatch
 
 from symfric.laws.base import Law
-from symfric.laws.brown_mcphee import BrownMcPhee
 from symfric.laws.compose import Asymmetric, LoadDependent, Sum
-from symfric.laws.coulomb import Coulomb, Viscous
 from symfric.laws.dahl import Dahl
 from symfric.laws.lugre import LuGre
-from symfric.laws.self_tuning import SelfTuning
-from symfric.laws.stribeck import Stribeck
+from symfric.laws.static.brown_mcphee import BrownMcPhee
+from symfric.laws.static.coulomb import Coulomb, Viscous
+from symfric.laws.static.self_tuning import SelfTuning
+from symfric.laws.static.stribeck import Stribeck
 from symfric.parameters import check_names
 
 ALL_LAWS: dict[str, type[Law]] = {

@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from symfric import SelfTuning, symbolise
-from symfric.laws.self_tuning import brittleness, corrected_shape_factor, shape_factor
+from symfric.laws.static.self_tuning import brittleness, corrected_shape_factor, shape_factor
 
 ratios = st.floats(0.0, 0.999)
 

@@ -1,0 +1,1 @@
+"""Memoryless laws F(v, N): one family a file."""
