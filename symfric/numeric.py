@@ -5,6 +5,7 @@ a law written with these keeps the type it was given.
 """
 
 from collections.abc import Callable
+from math import erf as erf_of_float
 from numbers import Real
 from typing import Any, cast
 
@@ -63,6 +64,13 @@ atan = _dispatch("atan", "arctan")
 asin = _dispatch("asin", "arcsin")
 tanh = _dispatch("tanh")
 expm1 = _dispatch("expm1")
+
+_erf_of_numbers = np.vectorize(erf_of_float, otypes=[float])
+
+
+def erf(x: Scalar) -> Scalar:
+    """The error function of floats, arrays, SX, MX or DM."""
+    return ca.erf(x) if is_casadi(x) else _erf_of_numbers(x)[()]
 
 
 def column(*rows: Scalar) -> Scalar:

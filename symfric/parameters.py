@@ -32,6 +32,14 @@ def param(default: float, *, unit: str, doc: str, lower: float = -inf, upper: fl
     )
 
 
+def option(default: str, *, choices: tuple[str, ...], doc: str) -> Any:
+    """Declare a field of a `Parametric` dataclass that names one of several forms of it.
+
+    A form is chosen when the object is made and leaves no switch in the expressions.
+    """
+    return field(default=default, metadata={"choices": choices, "doc": doc})
+
+
 @dataclass(frozen=True, eq=False)
 class Parameter:
     """One parameter as a user sees it."""
@@ -80,6 +88,9 @@ class Parametric:
     ordered: ClassVar[tuple[tuple[str, str], ...]] = ()
     """Pairs of fields (a, b) that must satisfy a <= b."""
 
+    strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = ()
+    """Pairs of fields (a, b) that must satisfy a < b."""
+
     suffixes: ClassVar[tuple[str, ...]] = ()
     """Fixed name endings of the children; without them a child is renamed only on a clash."""
 
@@ -94,9 +105,11 @@ P = TypeVar("P", bound=Parametric)
 
 def _problems(obj: Parametric) -> Iterator[str]:
     for item in fields(obj):
-        if "unit" not in item.metadata:
-            continue
         value, meta = getattr(obj, item.name), item.metadata
+        if "choices" in meta and value not in meta["choices"]:
+            yield f"{item.name}: expected one of {', '.join(meta['choices'])}, got {value!r}"
+        if "unit" not in meta:
+            continue
         if is_casadi(value) or isinstance(value, np.ndarray):
             continue
         if not is_number(value) or not isfinite(value):
@@ -112,6 +125,10 @@ def _problems(obj: Parametric) -> Iterator[str]:
         a, b = getattr(obj, low), getattr(obj, high)
         if is_number(a) and is_number(b) and a > b:
             yield f"expected {low} <= {high}, got {low} = {a:g} and {high} = {b:g}"
+    for low, high in obj.strictly_ordered:
+        a, b = getattr(obj, low), getattr(obj, high)
+        if is_number(a) and is_number(b) and a >= b:
+            yield f"expected {low} < {high}, got {low} = {a:g} and {high} = {b:g}"
 
 
 def _children(obj: Parametric) -> list[tuple[str, int | None, Parametric]]:
@@ -180,6 +197,32 @@ def parameters(obj: Parametric) -> dict[str, Parameter]:
         else:
             found[flat] = replace(children[child][name], name=flat)
     return found
+
+
+@dataclass(frozen=True)
+class Option:
+    """One option as a user sees it."""
+
+    name: str
+    value: str
+    default: str
+    choices: tuple[str, ...]
+    doc: str
+
+
+def options(obj: Parametric) -> dict[str, Option]:
+    """The options of `obj` itself, by name."""
+    return {
+        item.name: Option(
+            item.name,
+            getattr(obj, item.name),
+            item.default,  # pyright: ignore[reportArgumentType]
+            item.metadata["choices"],
+            item.metadata["doc"],
+        )
+        for item in fields(obj)
+        if "choices" in item.metadata
+    }
 
 
 def with_values(obj: P, values: Mapping[str, Scalar]) -> P:

@@ -32,12 +32,19 @@ class Facts:
         smoothness: differentiability class in the velocity, and where it breaks.
         confidence: how the formula was confirmed.
         source: the publication.
+        odd: the force changes sign with v, states and further inputs together.
+        dissipative: F v >= 0 in steady sliding, without further inputs.
+        load: how the dry force follows the normal force: "proportional", "independent" or in
+            words.
     """
 
     phenomena: tuple[str, ...]
     smoothness: str
     confidence: str
     source: str
+    odd: bool = True
+    dissipative: bool = True
+    load: str = "proportional"
 
 
 @dataclass(frozen=True)

@@ -68,6 +68,22 @@ def clip(x: Scalar, low: Scalar, high: Scalar) -> Scalar:
     return np.minimum(np.maximum(x, low), high)
 
 
+def hold(x: Scalar, top: Scalar, eps: Scalar) -> Scalar:
+    """`x` held within +-`top`: exactly x up to top - eps, exactly +-top from top + eps on, C2.
+
+    A contact that carries hold(F_e) in full does not creep under a load below top - eps, as it
+    would under tanh. The float `eps = 0.0` gives the kinks.
+    """
+    if equals(eps, 0.0):
+        return clip(x, -top, top)
+
+    def corner(y: Scalar) -> Scalar:
+        t = clip((y - top) / (2 * eps) + 0.5, 0.0, 1.0)
+        return t * t * t * (2 - t) * eps
+
+    return clip(x, -top - eps, top + eps) - corner(x) + corner(-x)
+
+
 def step3(x: Scalar) -> Scalar:
     """The cubic step 3x^2 - 2x^3 from 0 at x <= 0 to 1 at x >= 1, C1."""
     t = clip(x, 0.0, 1.0)
@@ -81,15 +97,19 @@ def step5(x: Scalar) -> Scalar:
 
 
 def choose(condition: Scalar, yes: Scalar, no: Scalar) -> Scalar:
-    """`yes` where the condition holds, else `no`: for modes and switches, never for forces."""
+    """`yes` where the condition holds, else `no`: for modes and for originals that jump."""
     if is_casadi(condition, yes, no):
         return ca.if_else(condition, yes, no)
     return np.where(condition, yes, no)[()]
 
 
 def stribeck(v: Scalar, v_s: Scalar, delta: Scalar, eps: Scalar) -> Scalar:
-    """The Stribeck weight exp(-|v / v_s|^delta): 1 at rest, 0 far above v_s."""
-    return exp(-power(v / v_s, delta, eps / v_s))
+    """The Stribeck weight exp(-|v / v_s|^delta): 1 at rest, 0 far above v_s.
+
+    The float `eps = 0.0` gives the original, for delta < 2 with a kink at rest.
+    """
+    width = 0.0 if equals(eps, 0.0) else eps / v_s
+    return exp(-power(v / v_s, delta, width))
 
 
 def phi1(x: Scalar) -> Scalar:

@@ -18,6 +18,7 @@ FUNCTIONS = {
     "atan": (numeric.atan, 1.0, pi / 4),
     "asin": (numeric.asin, 0.5, pi / 6),
     "tanh": (numeric.tanh, 0.5, (e - 1) / (e + 1)),
+    "erf": (numeric.erf, 0.5, 0.5204998778130465),
     "expm1": (numeric.expm1, 1e-20, 1e-20),
 }
 

@@ -14,6 +14,8 @@ from symfric.parameters import (
     Variable,
     check_names,
     distinct,
+    option,
+    options,
     param,
     parameters,
     symbolise,
@@ -166,3 +168,34 @@ def test_variable_makes_its_symbol_once() -> None:
     assert v.symbol is v.symbol
     given = ca.SX.sym("w")
     assert Variable("v", "m/s", symbol=given).symbol is given
+
+
+@dataclass(frozen=True, eq=False)
+class Window(Parametric):
+    strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = (("low", "high"),)
+
+    low: Scalar = param(0.0, unit="m", doc="lower edge")
+    high: Scalar = param(1.0, unit="m", doc="upper edge")
+    form: str = option("smooth", choices=("smooth", "original"), doc="edges")
+
+
+@pytest.mark.parametrize("low", [1.0, 2.0])
+def test_strict_order_refuses_equal_values_too(low: float) -> None:
+    with pytest.raises(ValueError, match=rf"low < high, got low = {low:g} and high = 1"):
+        Window(low=low)
+
+
+def test_strict_order_is_left_open_for_symbols() -> None:
+    assert Window(low=ca.SX.sym("low")).high == 1.0
+
+
+def test_option_is_one_of_its_choices() -> None:
+    assert options(Window(form="original"))["form"].value == "original"
+    with pytest.raises(ValueError, match=r"form: expected one of smooth, original, got 'sharp'"):
+        Window(form="sharp")
+
+
+def test_option_is_no_parameter_and_stays_when_values_change() -> None:
+    window = Window(form="original")
+    assert list(parameters(window)) == ["low", "high"]
+    assert with_values(window, {"high": 3.0}).form == "original"

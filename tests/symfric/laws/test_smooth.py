@@ -157,3 +157,37 @@ def test_choose_and_clip_take_numbers_arrays_and_matrices() -> None:
     assert float(smooth.choose(ca.DM(0), 1.0, 2.0)) == 2.0
     np.testing.assert_array_equal(smooth.clip(np.array([-3.0, 0.2, 3.0]), -1, 1), [-1, 0.2, 1])
     assert float(smooth.clip(ca.DM(3), -1, 1)) == 1.0
+
+
+@pytest.mark.parametrize("x", [-1.79, -0.3, 0.0, 1e-300, 1.0, 1.8])
+def test_hold_is_the_identity_below_its_corner(x: float) -> None:
+    assert smooth.hold(x, 2.0, 0.2) == x
+
+
+@pytest.mark.parametrize(("x", "top"), [(2.2, 2.0), (7.0, 2.0), (1e9, 2.0), (0.3, 0.1), (1.0, 0.0)])
+def test_hold_is_constant_beyond_its_corner(x: float, top: float) -> None:
+    assert smooth.hold(x, top, 0.2) == pytest.approx(top, abs=1e-15)
+    assert smooth.hold(-x, top, 0.2) == pytest.approx(-top, abs=1e-15)
+
+
+@pytest.mark.parametrize("knot", [1.8, 2.2, -1.8, -2.2])
+def test_hold_has_two_continuous_derivatives(knot: float) -> None:
+    block = with_derivatives(lambda x: smooth.hold(x, 2.0, 0.2))
+    left, right = ([float(r) for r in block(knot + s)] for s in (-1e-9, 1e-9))
+    assert left == pytest.approx(right, abs=1e-6)
+
+
+def test_hold_never_leaves_its_limits_and_never_falls() -> None:
+    x = np.linspace(-4.0, 4.0, 100_001)
+    for top in (2.0, 0.1, 0.0):
+        held = smooth.hold(x, top, 0.2)
+        assert np.abs(held).max() <= top + 1e-15
+        assert np.diff(held).min() >= -1e-15
+
+
+@pytest.mark.parametrize("exponent", [0.78, 1.0, 3.2])
+def test_stribeck_weight_of_width_zero_is_the_original(exponent: float) -> None:
+    v_s = ca.SX.sym("v_s")
+    weight = ca.Function("w", [v_s], [smooth.stribeck(-2e-3, v_s, exponent, 0.0)])
+    assert float(weight(1e-3)) == pytest.approx(np.exp(-(2.0**exponent)), rel=1e-14)
+    assert smooth.stribeck(0.0, 1e-3, exponent, 0.0) == 1.0
