@@ -11,8 +11,11 @@ from symfric.laws.base import StaticLaw as StaticLaw
 from symfric.laws.compose import Asymmetric as Asymmetric
 from symfric.laws.compose import LoadDependent as LoadDependent
 from symfric.laws.compose import Sum as Sum
-from symfric.laws.dahl import Dahl as Dahl
-from symfric.laws.lugre import LuGre as LuGre
+from symfric.laws.dynamic.dahl import Dahl as Dahl
+from symfric.laws.dynamic.elasto_plastic import ElastoPlastic as ElastoPlastic
+from symfric.laws.dynamic.lugre import LuGre as LuGre
+from symfric.laws.dynamic.lugre import LuGreNormalised as LuGreNormalised
+from symfric.laws.dynamic.lugre import LuGrePassive as LuGrePassive
 from symfric.laws.names import ALL_LAWS as ALL_LAWS
 from symfric.laws.names import law_from_text as law_from_text
 from symfric.laws.names import law_name as law_name

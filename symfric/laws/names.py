@@ -4,8 +4,9 @@ from re import fullmatch
 
 from symfric.laws.base import Law
 from symfric.laws.compose import Asymmetric, LoadDependent, Sum
-from symfric.laws.dahl import Dahl
-from symfric.laws.lugre import LuGre
+from symfric.laws.dynamic.dahl import Dahl
+from symfric.laws.dynamic.elasto_plastic import ElastoPlastic
+from symfric.laws.dynamic.lugre import LuGre, LuGreNormalised, LuGrePassive
 from symfric.laws.static.brown_mcphee import BrownMcPhee
 from symfric.laws.static.coulomb import Coulomb, Viscous
 from symfric.laws.static.self_tuning import SelfTuning
@@ -20,6 +21,9 @@ ALL_LAWS: dict[str, type[Law]] = {
     "self_tuning": SelfTuning,
     "dahl": Dahl,
     "lugre": LuGre,
+    "lugre_normalised": LuGreNormalised,
+    "lugre_passive": LuGrePassive,
+    "elasto_plastic": ElastoPlastic,
 }
 """Every law that stands alone, by name; the contract tests run over it."""
 
