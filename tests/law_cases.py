@@ -50,6 +50,14 @@ def state_symbols(law: Law) -> ca.SX:
     return ca.vertcat(ca.SX(0, 1), *(ca.SX.sym(s.name) for s in law.states))
 
 
+def has_exact_step(law: Law) -> bool:
+    """Whether no state acts on another's rate and each enters its own linearly, without modes."""
+    v, N, z = ca.SX.sym("v"), ca.SX.sym("N"), state_symbols(law)
+    slope = ca.jacobian(ca.SX(law.rate(v, N, z)), z)
+    affine = not ca.depends_on(slope, z) and slope.sparsity().is_diag()
+    return affine and not law.switches(v, N, z)
+
+
 @cache
 def compiled(name: str) -> ca.Function:
     """(v, N, z) -> force, rate of a case."""
