@@ -52,13 +52,19 @@ def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Functi
 
 def _start(model: Model, whole: System, x0: ca.MX, data: ca.MX) -> ca.MX:
     """All unknowns at time 0, the algebraic ones consistent."""
-    columns = whole.algebraic[1]
+    rows, columns = whole.algebraic
     unknowns = [x0[i] if i < whole.nx else ca.MX(0) for i in range(whole.n)]
     if columns:
         guesses = {v.name: float(v.start) for v in model.z}
-        known = [unknowns[i] for i in range(whole.n) if i not in columns]
+        known = [i for i in range(whole.n) if i not in columns]
+        problem = {
+            "x": whole.y[columns],
+            "p": ca.vertcat(whole.y[known], whole.d),
+            "g": whole.f[rows],
+        }
+        newton = ca.rootfinder("consistent", "newton", problem, {"error_on_fail": True})
         guess = ca.DM([guesses.get(whole.names[i], 0.0) for i in columns])
-        found = whole.constraints(guess, ca.vertcat(*known, data))
+        found = newton(guess, ca.vertcat(*(unknowns[i] for i in known), data))
         for row, i in enumerate(columns):
             unknowns[i] = found[row]
     return ca.vertcat(*unknowns)

@@ -167,13 +167,11 @@ class Derivatives:
         return Columns(ca.Function("reverse", [after, y, h, d, weights], results), chained=True)
 
     @cached_property
-    def constraints(self) -> ca.Function:
+    def algebraic(self) -> ca.Function:
         """Derivatives of the algebraic equations (y, d) -> (by y, by d)."""
         s = self.system
         alg = s.f[s.algebraic[0]]
-        return ca.Function(
-            "constraints", [s.y, s.d], [ca.jacobian(alg, s.y), ca.jacobian(alg, s.d)]
-        )
+        return ca.Function("algebraic", [s.y, s.d], [ca.jacobian(alg, s.y), ca.jacobian(alg, s.d)])
 
     @cached_property
     def of_signals(self) -> Columns:
@@ -200,7 +198,7 @@ def following(made: Derivatives, y: Array, d: Array) -> tuple[Array, Array]:
     """How algebraic unknowns follow at (y, d): dz = A dx + B dd for the others x of y."""
     columns = made.system.algebraic[1]
     others = [i for i in range(made.system.n) if i not in columns]
-    by_y, by_d = (m.full() for m in made.constraints(y, d))
+    by_y, by_d = (m.full() for m in made.algebraic(y, d))
     return (
         -np.linalg.solve(by_y[:, columns], by_y[:, others]),
         -np.linalg.solve(by_y[:, columns], by_d),

@@ -1,0 +1,46 @@
+"""Models with closed forms whose derivatives the tests know."""
+
+import casadi as ca
+
+from symfric import Model, Output, Variable
+
+
+def oscillator() -> Model:
+    """x'' = -k x - c x' + u."""
+    x, v = Variable("x", "m", start=1.0), Variable("v", "m/s", start=0.5)
+    k, c = Variable("k", "1/s^2", start=4.0), Variable("c", "1/s", start=0.3)
+    u = Variable("u", "m/s^2", start=0.0)
+    force = u.symbol - k.symbol * x.symbol - c.symbol * v.symbol
+    energy = Output(k.symbol * x.symbol**2 / 2 + v.symbol**2 / 2, "J")
+    return Model(
+        "oscillator",
+        x=(x, v),
+        u=(u,),
+        p=(k, c),
+        ode=ca.vertcat(v.symbol, force),
+        outputs={"energy": energy},
+    )
+
+
+def root() -> Model:
+    """x' = -z, z^3 = p x: x = (1 - 2/3 p^(1/3) t)^(3/2) from x = 1."""
+    x, z = Variable("x", "m", start=1.0), Variable("z", "m/s", start=0.5)
+    p = Variable("p", "m^2/s^3", start=0.7)
+    return Model(
+        "root", x=(x,), z=(z,), p=(p,), ode=-z.symbol, alg=z.symbol**3 - p.symbol * x.symbol
+    )
+
+
+def switched() -> Model:
+    """x' = -z with z = p u x: x = exp(-p int u), z jumps with u."""
+    x, z = Variable("x", "m", start=1.0), Variable("z", "m/s", start=0.0)
+    p, u = Variable("p", "1", start=0.8), Variable("u", "1/s", start=0.0)
+    return Model(
+        "switched",
+        x=(x,),
+        z=(z,),
+        p=(p,),
+        u=(u,),
+        ode=-z.symbol,
+        alg=z.symbol - p.symbol * u.symbol * x.symbol,
+    )

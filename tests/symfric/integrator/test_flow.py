@@ -1,0 +1,148 @@
+"""The flow of a model as a Function: values, derivatives of both orders, inside an optimisation."""
+
+from collections.abc import Callable
+
+import casadi as ca
+import numpy as np
+import pytest
+from differentiable import oscillator, root
+from scipy.linalg import expm
+
+from symfric import BrownMcPhee, LuGre, Model, Variable, Viscous, drive, flow, rabinowicz, simulate
+from symfric.integrator.tableaux import ROSENBROCK
+from symfric.model import Event
+
+K, C, START = 4.0, 0.3, np.array([1.0, 0.5])
+
+
+def exact(t: float, k: float = K) -> np.ndarray:
+    return expm(t * np.array([[0.0, 1.0], [-k, -C]])) @ START
+
+
+def test_arguments_and_result_have_names() -> None:
+    step = flow(rabinowicz(LuGre(), free=["mu_s"]))
+    assert step.name_in() == ["x0", "u", "p", "T"]
+    assert step.name_out() == ["xf"]
+    assert step.size_in("u") == (0, 1)
+    assert step.size_out("xf") == (3, 1)
+
+
+@pytest.mark.parametrize("method", ROSENBROCK)
+def test_flow_of_a_linear_system_is_the_matrix_exponential(method: str) -> None:
+    step = flow(oscillator(), steps=200, method=method)
+    found = step(x0=START, u=0.0, p=[K, C], T=2.0)["xf"].full().ravel()
+    assert found == pytest.approx(exact(2.0), rel=1e-4)
+
+
+def test_constant_input_pushes() -> None:
+    """m v' = u - c v from rest."""
+    step = flow(drive(Viscous(sigma_2=2.0), m=0.8), steps=50)
+    v = step(x0=[0.0, 0.0], u=3.0, T=1.5)["xf"][1]
+    assert float(v) == pytest.approx(1.5 * (1 - np.exp(-1.5 * 2.0 / 0.8)), rel=1e-7)
+
+
+def test_time_counts_from_zero() -> None:
+    """x' = cos(t)."""
+    x, t = Variable("x", "m", start=0.0), ca.SX.sym("t")
+    step = flow(Model("swing", x=(x,), ode=ca.cos(t), t=t))
+    assert float(step(x0=1.0, T=2.0)["xf"]) == pytest.approx(1.0 + np.sin(2.0), rel=1e-7)
+
+
+def test_algebraic_variables_are_solved_for() -> None:
+    """x = (1 - 2/3 p^(1/3) T)^(3/2), and its derivative by p."""
+    p = ca.MX.sym("p")
+    xf = flow(root(), steps=40)(x0=1.0, p=p, T=1.0)["xf"]
+    value, slope = ca.Function("both", [p], [xf, ca.jacobian(xf, p)])(0.7)
+    q = 0.7 ** (1 / 3)
+    assert float(value) == pytest.approx((1 - 2 / 3 * q) ** 1.5, rel=1e-7)
+    assert float(slope) == pytest.approx(-np.sqrt(1 - 2 / 3 * q) * q / (3 * 0.7), rel=1e-6)
+
+
+def test_implicit_model_flows() -> None:
+    """(1 + r^2) (r + x) = 0 for the rate r."""
+    x, r = Variable("x", "m", start=1.0), ca.SX.sym("r")
+    model = Model("implicit", x=(x,), xdot=r, residual=(1 + r**2) * (r + x.symbol))
+    assert float(flow(model)(x0=2.0, T=1.0)["xf"]) == pytest.approx(2 * np.exp(-1.0), rel=1e-6)
+
+
+@pytest.mark.parametrize("law", [BrownMcPhee(), LuGre()], ids=["brown_mcphee", "lugre"])
+def test_friction_flows_as_it_is_simulated(law: BrownMcPhee | LuGre) -> None:
+    """Sticking on the belt, where equal steps are no burden; first derivatives too."""
+    model = rabinowicz(law, free=["k"])
+    x0 = model.initial_state({"v": 0.1})
+    start = dict(zip([v.name for v in model.x], x0, strict=True))
+    run = simulate(model, 1.0, x0=start, rtol=1e-10, t_eval=[1.0], sensitivities=["k", "x0.x"])
+    step = flow(model, steps=100)
+    slopes = step.factory("slopes", step.name_in(), ["xf", "jac:xf:p", "jac:xf:x0"])
+    xf, by_p, by_x0 = slopes(x0, [], 2.1, 1.0)
+    assert float(xf[0]) == pytest.approx(run["x"][0], rel=1e-8)
+    assert float(by_p[0]) == pytest.approx(run.sensitivities["k"]["x"][0], rel=1e-4)
+    assert float(by_x0[0, 0]) == pytest.approx(run.sensitivities["x0.x"]["x"][0], rel=1e-6)
+
+
+def test_derivatives_of_both_orders_meet_the_matrix_exponential() -> None:
+    """By k twice, from the exponential of a block triangular matrix, and by T, where x' = A x."""
+    k, T = ca.MX.sym("k"), ca.MX.sym("T")
+    x = flow(oscillator(), steps=100)(x0=START, u=0.0, p=ca.vertcat(k, C), T=T)["xf"][0]
+    first = ca.gradient(x, k)
+    functions = ca.Function("f", [k, T], [first, ca.jacobian(x, T), ca.jacobian(first, k)])
+    by_k, by_T, by_kk = (float(value) for value in functions(K, 2.0))
+    A, by = np.array([[0.0, 1.0], [-K, -C]]), np.array([[0.0, 0.0], [-1.0, 0.0]])
+    none = np.zeros((2, 2))
+    tower = expm(2.0 * np.block([[A, by, none], [none, A, by], [none, none, A]]))
+    assert by_k == pytest.approx((tower[:2, 2:4] @ START)[0], rel=1e-6)
+    assert by_kk == pytest.approx(2 * (tower[:2, 4:] @ START)[0], rel=1e-5)
+    assert by_T == pytest.approx(exact(2.0)[1], rel=1e-6)
+
+
+def test_flow_inside_an_optimisation_of_the_user() -> None:
+    """Multiple shooting in Opti: push a mass with friction 1 m in 1 s, at rest at both ends."""
+    intervals, T = 20, 1.0
+    step = flow(drive(Viscous(sigma_2=0.5), m=0.8), steps=2)
+    opti = ca.Opti()
+    X, U = opti.variable(2, intervals + 1), opti.variable(1, intervals)
+    for k in range(intervals):
+        ahead = step(x0=X[:, k], u=U[k], T=T / intervals)["xf"]
+        opti.subject_to(X[:, k + 1] == ahead)
+    opti.subject_to(X[:, 0] == 0)
+    opti.subject_to(X[:, -1] == ca.vertcat(1.0, 0.0))
+    opti.minimize(ca.sumsqr(U) * T / intervals)
+    opti.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes"})
+    found = opti.solve()
+    # linear dynamics, quadratic cost: one Newton step with exact second derivatives
+    assert found.stats()["iter_count"] <= 2
+    run = np.zeros(2)
+    A = expm(np.array([[0, 1, 0], [0, -0.5 / 0.8, 1 / 0.8], [0, 0, 0]]) * T / intervals)
+    for k in range(intervals):
+        run = (A @ [*run, found.value(U)[k]])[:2]
+    assert run == pytest.approx([1.0, 0.0], abs=1e-6)
+
+
+def test_identification_inside_an_optimisation_of_the_user() -> None:
+    """k of the oscillator from one position, by an NLP with exact second derivatives."""
+    k = ca.MX.sym("k")
+    x = flow(oscillator(), steps=40)(x0=START, u=0.0, p=ca.vertcat(k, C), T=0.5)["xf"][0]
+    nlp = {"x": k, "f": (x - exact(0.5, k=3.3)[0]) ** 2}
+    options = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-14}}
+    found = ca.nlpsol("fit", "ipopt", nlp, options)(x0=K)
+    assert float(found["x"]) == pytest.approx(3.3, rel=1e-5)
+
+
+def falling() -> Model:
+    x = Variable("x", "m", start=1.0)
+    return Model("falling", x=(x,), ode=ca.SX(-1.0), events=(Event("ground", x.symbol),))
+
+
+@pytest.mark.parametrize(
+    ("make", "arguments", "message"),
+    [
+        (oscillator, {"steps": 0}, "flow: expected steps >= 1, got 0"),
+        (oscillator, {"method": "euler"}, "flow: method: expected one of .*rodas5p.*, got euler"),
+        (falling, {}, "flow: expected a model without events, got 1 in 'falling'"),
+    ],
+)
+def test_bad_requests_are_refused(
+    make: Callable[[], Model], arguments: dict[str, object], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        flow(make(), **arguments)  # pyright: ignore[reportArgumentType]
