@@ -49,7 +49,7 @@ def _not_finite(integrator: Integrator, y: Array, d: Array, h: float) -> str:
     """Equations that are not finite here, or along the slope a few of the last steps ahead."""
     system = integrator.system
     f = integrator.f(y, d).full().ravel()
-    rates = np.linalg.pinv(ca.DM(system.mass).full()) @ np.nan_to_num(f)
+    rates = np.linalg.pinv(ca.DM(system.mass).full()) @ np.nan_to_num(f, posinf=0.0, neginf=0.0)
     for ahead in (0.0, *(10.0**k * h for k in range(5))):
         f = integrator.f(y + ahead * rates, d).full().ravel()
         broken = _named(system, np.flatnonzero(~np.isfinite(f)))

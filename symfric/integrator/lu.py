@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import final
 
 import casadi as ca
+import numpy as np
 
 
 @final
@@ -24,6 +25,16 @@ class SymbolicLU:
     rows: tuple[tuple[int, ...], ...]
     columns: tuple[tuple[int, ...], ...]
     packed_symbol: ca.SX
+
+    @property
+    def sign(self) -> ca.SX:
+        """Sign of the determinant, in terms of `packed`."""
+        places = np.array([row for row, _ in self.order])[np.argsort([c for _, c in self.order])]
+        sign, at = ca.SX(round(np.linalg.det(np.eye(places.size)[places]))), 0
+        for others, below in zip(self.rows, self.columns, strict=True):
+            sign = sign * ca.sign(self.packed[at])
+            at += 1 + len(others) + len(below)
+        return sign
 
     def solve(self, right: ca.SX) -> ca.SX:
         """X with A x = right, in terms of `packed_symbol` in place of the factors."""

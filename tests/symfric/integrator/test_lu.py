@@ -113,6 +113,15 @@ def test_differential_rows_with_large_diagonal_stay_accurate_for_tiny_steps() ->
     assert values @ x == pytest.approx(b, rel=1e-12)
 
 
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("n", "density"), [(1, 0.0), (3, 0.5), (8, 0.25), (20, 0.1)])
+def test_sign_is_that_of_the_determinant(n: int, density: float, seed: int) -> None:
+    values = random_sparse(n, density, seed)
+    A = symbols(values)
+    sign = ca.Function("sign", [A], [factorise(A, safe=()).sign])
+    assert float(sign(sparse(values))) == np.sign(np.linalg.det(values))
+
+
 def test_empty_matrix_has_an_empty_solution() -> None:
     lu = factorise(ca.SX(0, 0), safe=())
     assert lu.solve(ca.SX(0, 1)).shape == (0, 1)

@@ -180,6 +180,55 @@ def test_singular_iteration_matrix_is_rejected() -> None:
     assert np.isfinite(S).all()
 
 
+def rest(rate: float, kind: str) -> tuple[Model, tuple[float, ...]]:
+    """x' = rate x in several forms, at rest in x = 0: no method sees an error there."""
+    X = Variable("x", "1")
+    y, z, p, q = (Variable(name, "1") for name in "yzpq")
+    r = ca.SX.sym("r", 2)
+    models = {
+        "ode": Model("rest", x=(X,), ode=rate * X.symbol),
+        "two": Model("rest", x=(X, y), ode=ca.vertcat(rate * y.symbol, rate * X.symbol)),
+        "dae": Model("rest", x=(X,), z=(z,), ode=-z.symbol, alg=z.symbol + rate * X.symbol),
+        "dae, row negated": Model(
+            "rest", x=(X,), z=(z,), ode=-z.symbol, alg=-z.symbol - rate * X.symbol
+        ),
+        "algebraic variables swapped": Model(
+            "rest", x=(X,), z=(p, q), ode=p.symbol,
+            alg=ca.vertcat(q.symbol - X.symbol, p.symbol - rate * q.symbol),
+        ),
+        "permuted": Model(
+            "rest", x=(X, y), xdot=r, residual=ca.vertcat(y.symbol + r[1], rate * X.symbol - r[0])
+        ),
+        "algebraic row first": Model(
+            "rest", x=(X,), z=(z,), xdot=r[0],
+            residual=ca.vertcat(z.symbol - rate * X.symbol, r[0] - z.symbol),
+        ),
+        "negative mass": Model("rest", x=(X,), xdot=r[0], residual=-2 * r[0] + 2 * rate * X.symbol),
+    }  # fmt: skip
+    model = models[kind]
+    return model, (0.0,) * (len(model.x) + len(model.z))
+
+
+FORMS = ["ode", "two", "dae", "dae, row negated", "algebraic variables swapped", "permuted",
+         "algebraic row first", "negative mass"]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", FORMS)
+def test_step_too_long_for_an_unstable_mode_is_rejected_even_at_rest(kind: str) -> None:
+    """An L-stable method would damp the mode away: the contact would never break away."""
+    model, y = rest(100.0, kind)
+    limit = 1 / (RODAS5P.gamma * 100.0)
+    assert attempt(model, column(y, h=1.01 * limit))[REJECTED] == 1.0
+    assert attempt(model, column(y, h=0.99 * limit))[REJECTED] == 0.0
+
+
+@pytest.mark.parametrize("kind", [form for form in FORMS if form != "two"])
+@pytest.mark.parametrize("h", [1e-3, 1.0, 5.0])
+def test_stable_modes_of_any_speed_allow_any_step(kind: str, h: float) -> None:
+    model, y = rest(-1e4, kind)
+    assert attempt(model, column(y, h=h))[REJECTED] == 0.0
+
+
 def test_absolute_tolerance_counts_where_a_state_is_small() -> None:
     problem = smooth_ode()
     system = assemble(problem.model)
