@@ -1,0 +1,73 @@
+"""A rigid body: mass, inertia about the centre of mass, named places."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+
+from symfric.multibody.spatial import Frame, Vector, vector
+from symfric.numeric import Scalar
+
+GROUND = "ground"
+"""The name of the body that does not move."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A rigid body.
+
+    Attributes:
+        name: C identifier.
+        mass: [kg].
+        inertia: about the centre of mass, in the body's axes [kg m^2]: three principal moments, or
+            six numbers Jxx, Jyy, Jzz, Jxy, Jxz, Jyz.
+        com: centre of mass from the origin of the body [m].
+        frames: places where joints and forces act; "" is the origin.
+    """
+
+    name: str
+    mass: Scalar
+    inertia: Sequence[Any]
+    com: Vector = (0.0, 0.0, 0.0)
+    frames: dict[str, Frame] = field(default_factory=lambda: {"": Frame()})
+
+    @property
+    def J(self) -> ca.SX:
+        """Inertia about the centre of mass, shape (3, 3)."""
+        J = ca.diag(ca.SX(ca.vertcat(*self.inertia[:3])))
+        if len(self.inertia) == 6:
+            for (i, j), value in zip(((0, 1), (0, 2), (1, 2)), self.inertia[3:], strict=True):
+                J[i, j] = J[j, i] = value
+        return ca.sparsify(J)
+
+    @property
+    def c(self) -> ca.SX:
+        """Centre of mass from the origin of the body [m], shape (3, 1)."""
+        return vector(self.com)
+
+    def problems(self, p: ca.SX, values: ca.DM) -> Iterator[str]:
+        """What is wrong with the numbers, symbols `p` replaced by `values`."""
+        if len(self.inertia) not in (3, 6):
+            yield f"inertia: expected 3 or 6 numbers, got {len(self.inertia)}"
+            return
+        both = ca.substitute(ca.vertcat(self.mass, ca.vec(ca.densify(self.J))), p, ca.SX(values))
+        numbers = ca.DM(both).full().ravel()
+        if not numbers[0] > 0:
+            yield f"mass: expected > 0 kg, got {numbers[0]:g}"
+        principal = np.linalg.eigvalsh(numbers[1:].reshape(3, 3))
+        if not principal[0] > 0:
+            yield (
+                f"inertia: expected positive principal moments, got {', '.join(_short(principal))}"
+            )
+        elif principal[2] > (principal[0] + principal[1]) * (1 + 1e-9):
+            yield (
+                "inertia: expected the largest principal moment to be at most the sum of the "
+                f"others, got {', '.join(_short(principal))} kg m^2"
+            )
+
+
+def _short(numbers: Any) -> list[str]:
+    return [f"{number:g}" for number in numbers]

@@ -1,0 +1,197 @@
+"""Equations of motion by Newton and Euler: one recursion inwards from the tips of the tree.
+
+With the accelerations a of the coordinates and the multipliers lam of the loops as unknowns,
+
+    balance(q, q', a, lam) = M a + Phi_q' lam - Q = 0,   Phi_q a + gamma = 0
+
+where each row of the balance is the wrench that a joint of the tree transmits, projected on its
+motion subspace. What remains of that wrench is the reaction that presses the bearing; for a joint
+that closes a loop it follows from its multipliers. Both are wrenches on the joint's child at the
+origin of the joint's frame there.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+
+from symfric.multibody.body import GROUND
+from symfric.multibody.forces import Axial, Load
+from symfric.multibody.joints import Joint
+from symfric.multibody.kinematics import Kinematics, Relative
+from symfric.multibody.spatial import skew
+from symfric.multibody.topology import Link, body_of, frame_at
+
+Wrench = tuple[ca.SX, ca.SX]
+"""Force and moment."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """Constraints of a joint that closes a loop.
+
+    Attributes:
+        rows: its multipliers among all.
+        phi: constraints, shape (m, 1).
+        C_v, C_w: phi' = C_v v + C_w w for the relative motion in the parent frame.
+    """
+
+    joint: Joint
+    rows: slice
+    phi: ca.SX
+    C_v: ca.SX
+    C_w: ca.SX
+    relative: Relative
+
+    def reaction(self, lam: ca.SX) -> Wrench:
+        """Wrench on the child at its joint point, in world components."""
+        R, own = self.relative.R_WP, lam[self.rows]
+        return -R @ (self.C_v.T @ own), -R @ (self.C_w.T @ own)
+
+
+def loops(kin: Kinematics) -> tuple[Loop, ...]:
+    """The constraints of all joints that are not in the tree."""
+    found: list[Loop] = []
+    first = 0
+    for joint in kin.topology.loops:
+        relative = kin.relative(joint)
+        R, p, w = ca.SX.sym("R", 3, 3), ca.SX.sym("p", 3), ca.SX.sym("w", 3)
+        phi = ca.densify(joint.constraints(R, p))
+        turned = ca.jtimes(phi, ca.vec(R), ca.vec(skew(w) @ R))
+        expressions = [phi, ca.jacobian(phi, p), ca.jacobian(turned, w)]
+        values = ca.substitute(
+            expressions, [R, p], [ca.densify(relative.R), ca.densify(relative.p)]
+        )
+        m = phi.numel()
+        found.append(
+            Loop(joint, slice(first, first + m), *(ca.sparsify(v) for v in values), relative)
+        )
+        first += m
+    return tuple(found)
+
+
+def normalisations(kin: Kinematics) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Norms of the Euler parameters, (p'p - 1)/2 = 0, and what they add to the balance.
+
+    Returns:
+        Constraints (k, 1); the directions p in which the mass matrix is singular, as the columns
+        of (n, k); weights (k, 1) that make it regular: adding weight p (p'a + p''p') changes
+        nothing where the constraints hold.
+    """
+    links = [link for link in kin.topology.links if link.joint.quaternion is not None]
+    phi, along, weights = ca.SX(0, 1), ca.SX(kin.topology.n, 0), ca.SX(0, 1)
+    for link in links:
+        first = link.first + (link.joint.quaternion or 0)
+        p = kin.q[first : first + 4]
+        column = ca.SX(kin.topology.n, 1)
+        column[first : first + 4] = p
+        phi = ca.vertcat(phi, (ca.dot(p, p) - 1) / 2)
+        along = ca.horzcat(along, column)
+        weights = ca.vertcat(weights, ca.trace(kin.topology.bodies[link.body].J))
+    return phi, along, weights
+
+
+def _pairs(kin: Kinematics, axial: Axial) -> tuple[Load, Load]:
+    """An axial load of a joint that closes a loop, as loads on both bodies."""
+    relative = kin.relative(axial.joint)
+    along = relative.R_WP[:, 2] * axial.value
+    force, moment = (along, ca.SX(3, 1)) if axial.direction == "slide" else (ca.SX(3, 1), along)
+    child, parent = body_of(axial.joint.child), body_of(axial.joint.parent)
+    return (
+        Load(child, force, relative.p_WC, moment),
+        Load(parent, -force, relative.p_WC, -moment),
+    )
+
+
+def balance(
+    kin: Kinematics, applied: Iterable[Load | Axial], closed: tuple[Loop, ...], lam: ca.SX
+) -> tuple[ca.SX, dict[str, Wrench]]:
+    """Rows of the equations of motion, and the reaction in every joint.
+
+    The weight of the normalisations is not in it.
+    """
+    links = kin.topology.links
+    loads: list[Load] = []
+    axial: dict[str, list[Axial]] = {}
+    for load in applied:
+        if isinstance(load, Load):
+            loads.append(load)
+        elif load.joint.name in kin.topology.link_of:
+            axial.setdefault(load.joint.name, []).append(load)
+        else:
+            loads += _pairs(kin, load)
+    reactions = {loop.joint.name: loop.reaction(lam) for loop in closed}
+    for loop in closed:
+        force, moment = reactions[loop.joint.name]
+        at = loop.relative.p_WC
+        loads.append(Load(body_of(loop.joint.child), force, at, moment))
+        loads.append(Load(body_of(loop.joint.parent), -force, at, -moment))
+    carried = {link.body: _inertial(kin, link, loads) for link in links}
+    rows: list[ca.SX] = [ca.SX(0, 1)] * len(links)
+    for k in range(len(links) - 1, -1, -1):
+        link = links[k]
+        rows[k], reactions[link.joint.name] = _project(kin, link, carried, axial)
+    return ca.vertcat(ca.SX(0, 1), *rows), reactions
+
+
+def _inertial(kin: Kinematics, link: Link, loads: list[Load]) -> Wrench:
+    """Inertial minus applied wrench of a body, about its centre of mass."""
+    body, motion = kin.topology.bodies[link.body], kin.motion[link.body]
+    com = motion.p + motion.R @ body.c
+    w, dw = motion.R.T @ motion.w, motion.R.T @ motion.dw
+    force = body.mass * motion.acceleration(body.c)
+    moment = motion.R @ (body.J @ dw + ca.cross(w, body.J @ w))
+    for load in loads:
+        if load.body == link.body:
+            force = force - load.force
+            moment = moment - load.moment - ca.cross(load.point - com, load.force)
+    return force, moment
+
+
+def _project(
+    kin: Kinematics, link: Link, carried: dict[str, Wrench], axial: dict[str, list[Axial]]
+) -> tuple[ca.SX, Wrench]:
+    """Balance of a link's coordinates and the wrench its joint puts on the joint's child.
+
+    `carried` holds the wrench that each body needs from its joint, about its centre of mass; that
+    of the base grows by what this link passes on.
+    """
+    body, motion, base = kin.topology.bodies[link.body], kin.motion[link.body], link.base
+    force, moment = carried[link.body]
+    com, at = motion.p + motion.R @ body.c, motion.point(link.at_body.p)[0]
+    about = moment + ca.cross(com - at, force)
+    if base != GROUND:
+        other = kin.topology.bodies[base]
+        base_com = kin.motion[base].p + kin.motion[base].R @ other.c
+        f, m = carried[base]
+        carried[base] = f + force, m + about + ca.cross(at - base_com, force)
+    q = kin.q[link.rows]
+    R_WP = kin.motion[base].R @ link.at_base.R
+    H_w, H_v = link.subspace(q)
+    rows = H_w.T @ (R_WP.T @ about) + H_v.T @ (R_WP.T @ force)
+    for load in axial.get(link.joint.name, ()):
+        k = 1 if link.n == 2 and load.direction == "turn" else 0
+        rows[k] -= load.value
+    if not link.reverse:
+        return rows, (force, about)
+    far = kin.motion[base].point(link.at_base.p)[0]
+    return rows, (-force, -about - ca.cross(at - far, force))
+
+
+def in_child_frame(kin: Kinematics, joint: Joint, wrench: Wrench) -> Wrench:
+    """The components of a reaction in the child's joint frame."""
+    R = kin.motion[body_of(joint.child)].R @ frame_at(kin.topology.bodies, joint.child).R
+    return R.T @ wrench[0], R.T @ wrench[1]
+
+
+def kinetic_energy(kin: Kinematics) -> ca.SX:
+    """Kinetic energy of all bodies [J]."""
+    total = ca.SX(0)
+    for link in kin.topology.links:
+        body, motion = kin.topology.bodies[link.body], kin.motion[link.body]
+        _, v = motion.point(body.c)
+        w = motion.R.T @ motion.w
+        total += body.mass * ca.dot(v, v) / 2 + ca.dot(w, body.J @ w) / 2
+    return total

@@ -1,0 +1,166 @@
+"""All expressions of a mechanism in one choice of coordinates."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+
+from symfric.multibody.dynamics import (
+    Loop,
+    Wrench,
+    balance,
+    in_child_frame,
+    kinetic_energy,
+    loops,
+    normalisations,
+)
+from symfric.multibody.forces import Axial, Force, Load
+from symfric.multibody.friction import Contact
+from symfric.multibody.joints import Joint
+from symfric.multibody.kinematics import Kinematics, kinematics
+from symfric.multibody.topology import Topology
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """Equations of motion with accelerations, multipliers and friction forces as symbols.
+
+    Attributes:
+        q, qd, a: coordinates, rates, accelerations, shape (n, 1).
+        lam: multipliers of the loops, then of the Euler parameters, shape (m, 1).
+        F: friction forces of the contacts [N].
+        phi, phi_dot, phi_ddot: constraints on three levels, shape (m, 1).
+        balance: M a + Phi_q' lam - Q, shape (n, 1), affine in a, lam and F.
+        contacts: where friction acts.
+        normals: normal force of each contact [N], in terms of q, qd, a, lam.
+        kinetic, potential: energies [J].
+        power: power of all applied forces and of friction on the bodies [W].
+        reactions: wrench on the child of each joint at its joint point, in the child's joint frame.
+    """
+
+    kin: Kinematics
+    loops: tuple[Loop, ...]
+    q: ca.SX
+    qd: ca.SX
+    a: ca.SX
+    lam: ca.SX
+    F: ca.SX
+    phi: ca.SX
+    phi_dot: ca.SX
+    phi_ddot: ca.SX
+    balance: ca.SX
+    contacts: tuple[Contact, ...]
+    normals: tuple[ca.SX, ...]
+    kinetic: ca.SX
+    potential: ca.SX
+    power: ca.SX
+    reactions: dict[str, Wrench]
+
+    @property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return self.q.numel()
+
+    @property
+    def m(self) -> int:
+        """Number of constraints."""
+        return self.phi.numel()
+
+    @property
+    def Phi_q(self) -> ca.SX:
+        """Constraint Jacobian, shape (m, n)."""
+        return ca.jacobian(self.phi, self.q)
+
+    @property
+    def mass(self) -> ca.SX:
+        """Mass matrix M, shape (n, n)."""
+        return ca.jacobian(self.balance, self.a)
+
+
+def equations(
+    topology: Topology, joints: Sequence[Joint], forces: Sequence[Force], kept: Sequence[int] | None
+) -> Equations:
+    """Write the equations of motion of a mechanism.
+
+    Args:
+        topology: tree and loops.
+        joints: all joints.
+        forces: all applied forces.
+        kept: indices of the independent constraints; None keeps all.
+    """
+    n = topology.n
+    q, qd, a = (ca.SX.sym(name, n) for name in ("q", "qd", "a"))
+    kin = kinematics(topology, q, qd, a)
+    by_name = {joint.name: joint for joint in joints}
+    closed = loops(kin)
+    norms, along, weights = normalisations(kin)
+    phi = ca.vertcat(ca.SX(0, 1), *(loop.phi for loop in closed), norms)
+    kept = range(phi.numel()) if kept is None else kept
+    lam = ca.SX.sym("lam", len(kept))
+    every = ca.SX(phi.numel(), 1)
+    for k, row in enumerate(kept):
+        every[row] = lam[k]
+    contacts = tuple(_contacts(kin, joints))
+    loads: list[Load | Axial] = [load for f in forces for load in f.loads(kin, by_name)]
+    loads += [Axial(by_name[c.joint], c.direction, c.load) for c in contacts]
+    rows, world = balance(kin, loads, closed, every)
+    rows += along @ (every[phi.numel() - norms.numel() :])
+    pushed = along.T @ a + ca.jtimes(along.T @ qd, q, qd)
+    rows += along @ (weights * pushed)
+    phi = phi[list(kept)]
+    phi_dot = ca.jtimes(phi, q, qd)
+    reactions = {name: in_child_frame(kin, joint, world[name]) for name, joint in by_name.items()}
+    return Equations(
+        kin,
+        closed,
+        q,
+        qd,
+        a,
+        lam,
+        ca.vertcat(ca.SX(0, 1), *(c.F for c in contacts)),
+        ca.densify(phi),
+        phi_dot,
+        ca.jtimes(phi, q, a) + ca.jtimes(phi_dot, q, qd),
+        ca.densify(rows),
+        contacts,
+        tuple(_normal(c, by_name[c.joint], reactions) for c in contacts),
+        kinetic_energy(kin),
+        sum((f.energy(kin, by_name) for f in forces), ca.SX(0)),
+        _power(kin, loads),
+        reactions,
+    )
+
+
+def _contacts(kin: Kinematics, joints: Sequence[Joint]) -> list[Contact]:
+    """Contacts of all joints with friction."""
+    found: list[Contact] = []
+    for joint in joints:
+        if joint.friction is None:
+            continue
+        directions = [d for d, has in (("slide", joint.slides), ("turn", joint.turns)) if has]
+        for direction in directions:
+            name = joint.name if len(directions) == 1 else f"{joint.name}_{direction}"
+            slip = kin.along(joint, direction)[1]
+            if direction == "turn":
+                slip = joint.friction.radius * slip
+            symbol = ca.SX.sym(f"{name}_friction")
+            found.append(Contact(name, joint.name, direction, joint.friction, slip, symbol))
+    return found
+
+
+def _normal(contact: Contact, joint: Joint, reactions: dict[str, Wrench]) -> ca.SX:
+    F, T = reactions[joint.name]
+    return contact.friction.normal_force(joint.slides, joint.turns, F, T)
+
+
+def _power(kin: Kinematics, loads: Sequence[Load | Axial]) -> ca.SX:
+    """Power of loads on the bodies [W]."""
+    total = ca.SX(0)
+    for load in loads:
+        if isinstance(load, Load):
+            total += load.power(kin)
+        else:
+            total += load.value * kin.along(load.joint, load.direction)[1]
+    return total

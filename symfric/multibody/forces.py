@@ -1,0 +1,202 @@
+"""Applied forces: gravity, springs, dampers, actuators, user expressions.
+
+A force says which loads it puts on which bodies and what potential energy it has. The power of a
+load is force times velocity of its point plus moment times angular velocity; where the energy is
+conservative, power = -dV/dt (a test checks it for every force).
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+
+from symfric.multibody.body import GROUND
+from symfric.multibody.joints import Joint
+from symfric.multibody.kinematics import Kinematics
+from symfric.multibody.spatial import Vector, vector
+from symfric.multibody.topology import body_of
+from symfric.numeric import Scalar, equals
+
+ZERO = ca.SX(3, 1)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Load:
+    """A force [N] at a point and a moment [N m] on a body, in world components."""
+
+    body: str
+    force: ca.SX
+    point: ca.SX
+    moment: ca.SX = ZERO
+
+    def power(self, kin: Kinematics) -> ca.SX:
+        """Power on the body [W]."""
+        motion = kin.motion[self.body]
+        v = motion.v + ca.cross(motion.w, self.point - motion.p)
+        return ca.dot(self.force, v) + ca.dot(self.moment, motion.w)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Axial:
+    """A force [N] or moment [N m] on the child of a joint along its axis, with its reaction."""
+
+    joint: Joint
+    direction: str
+    value: ca.SX
+
+
+@dataclass(frozen=True, eq=False)
+class Force(ABC):
+    """Something that loads bodies."""
+
+    name: str
+
+    def places(self) -> Iterable[str]:
+        """The "body.frame" texts it names."""
+        return ()
+
+    def joints(self) -> Iterable[str]:
+        """The joints it names."""
+        return ()
+
+    @abstractmethod
+    def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
+        """What it puts on the bodies."""
+
+    def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
+        """Potential energy [J]; zero where it has none."""
+        return ca.SX(0)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Gravity(Force):
+    """The weight m g of every body at its centre of mass; g [m/s^2] in world components."""
+
+    g: Vector = (0.0, 0.0, -9.81)
+
+    def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
+        """Weights."""
+        for name, body in kin.topology.bodies.items():
+            if name != GROUND:
+                yield Load(name, body.mass * vector(self.g), kin.motion[name].point(body.c)[0])
+
+    def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
+        """-m g . p."""
+        weights = self.loads(kin, joints)
+        return sum((-ca.dot(w.force, w.point) for w in weights if isinstance(w, Load)), ca.SX(0))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class SpringDamper(Force):
+    """Spring, damper and actuator along the line between two points.
+
+        l = |p_b - p_a|,   f = stiffness (l - free_length) + damping l' + actuator
+
+    f > 0 pulls the points together. Not defined at l = 0, unless spring and damper reduce to
+    f (p_b - p_a) / l = stiffness (p_b - p_a) because free_length, damping and actuator are zero.
+    """
+
+    a: str
+    b: str
+    stiffness: Scalar = 0.0
+    free_length: Scalar = 0.0
+    damping: Scalar = 0.0
+    actuator: Scalar = 0.0
+
+    def places(self) -> Iterable[str]:
+        """Both ends."""
+        return (self.a, self.b)
+
+    @property
+    def _linear(self) -> bool:
+        return all(equals(x, 0.0) for x in (self.free_length, self.damping, self.actuator))
+
+    def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
+        """Opposite forces on the line between the points."""
+        (p_a, v_a), (p_b, v_b) = kin.point(self.a), kin.point(self.b)
+        d = p_b - p_a
+        if self._linear:
+            pull = self.stiffness * d
+        else:
+            length = ca.sqrt(ca.dot(d, d))
+            f = self.stiffness * (length - self.free_length) + self.actuator
+            if not equals(self.damping, 0.0):
+                f += self.damping * ca.dot(d, v_b - v_a) / length
+            pull = f / length * d
+        yield Load(body_of(self.a), pull, p_a)
+        yield Load(body_of(self.b), -pull, p_b)
+
+    def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
+        """stiffness (l - free_length)^2 / 2."""
+        d = kin.point(self.b)[0] - kin.point(self.a)[0]
+        if equals(self.free_length, 0.0):
+            return self.stiffness * ca.dot(d, d) / 2
+        return self.stiffness * (ca.sqrt(ca.dot(d, d)) - self.free_length) ** 2 / 2
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class JointSpringDamper(Force):
+    """Spring, damper and actuator along ("slide") or about ("turn") the axis of a joint.
+
+        f = -stiffness (s - rest) - damping s' + actuator
+
+    with s the displacement [m] or angle [rad]; f acts on the child, its opposite on the parent.
+    The angle of a joint that closes a loop lies between -pi and pi.
+    """
+
+    joint: str
+    direction: str = "turn"
+    stiffness: Scalar = 0.0
+    rest: Scalar = 0.0
+    damping: Scalar = 0.0
+    actuator: Scalar = 0.0
+
+    def joints(self) -> Iterable[str]:
+        """Its joint."""
+        return (self.joint,)
+
+    def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
+        """One axial load."""
+        joint = joints[self.joint]
+        f = ca.SX(self.actuator)
+        if not (equals(self.stiffness, 0.0) and equals(self.damping, 0.0)):
+            s, rate = kin.along(joint, self.direction)
+            f = f - self.stiffness * (s - self.rest) - self.damping * rate
+        yield Axial(joint, self.direction, f)
+
+    def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
+        """stiffness (s - rest)^2 / 2."""
+        if equals(self.stiffness, 0.0):
+            return ca.SX(0)
+        s, _ = kin.along(joints[self.joint], self.direction)
+        return self.stiffness * (s - self.rest) ** 2 / 2
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class UserForce(Force):
+    """A force [N] and a moment [N m] on a place, expressions of any body's motion.
+
+    `expression` takes the kinematics, which answers `point("body.frame")` with position and
+    velocity and `motion["body"]` with R, p, w, v, and returns force and moment in world
+    components.
+    """
+
+    place: str
+    expression: Callable[[Kinematics], tuple[Vector, Vector]]
+
+    def places(self) -> Iterable[str]:
+        """Where it acts."""
+        return (self.place,)
+
+    def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
+        """The expression."""
+        force, moment = self.expression(kin)
+        yield Load(body_of(self.place), vector(force), kin.point(self.place)[0], vector(moment))

@@ -1,0 +1,122 @@
+"""Where friction laws meet bodies, and the only minus sign.
+
+The reaction of a joint on its child, force F and moment T about the joint point in the axes of the
+child's frame, presses the bearing at two stations a apart on z:
+
+    f_x2 = -T_y / a,  f_y2 = T_x / a,  f_x1 = -F_x - f_x2,  f_y1 = -F_y - f_y2
+
+    cylindrical: N = |f_1| + |f_2|
+    revolute:    N = |f_1| + |f_2| + |F_z|                   (thrust face)
+    prismatic:   N = |f_x1 + T_z/b| + |f_y1| + |f_x2| + |f_y2| + |T_z/b|    (guide of width b)
+
+Friction opposes sliding with -F(v, N) along z, and with the moment -R F(R w, N) about it.
+Source: Haug, Mech. Based Des. Struct. Mach., 2018, joint friction from multipliers.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+
+from symfric.laws import Law
+from symfric.laws.base import check_law
+from symfric.numeric import Scalar, is_number, is_symbolic
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class JointFriction:
+    """A friction law in a joint.
+
+    Attributes:
+        law: any friction law.
+        radius: of the bearing [m], for friction about z.
+        length: distance a of the two bearing stations [m]; None: moments do not load the bearing.
+        width: width b of a guide that takes the moment about z [m]; None: it does not load it.
+        preload: normal force in addition to the reactions [N].
+        normal: constant normal force [N] instead of reactions; then no unknown is added.
+        eps: width of |f|, sqrt(f^2 + eps^2) - eps [N]. Laws that divide by the normal force
+            (bristles) need a preload above zero if the reactions can vanish.
+    """
+
+    law: Law
+    radius: Scalar | None = None
+    length: Scalar | None = None
+    width: Scalar | None = None
+    preload: Scalar = 0.0
+    normal: Scalar | None = None
+    eps: float = 1e-4
+
+    def __post_init__(self) -> None:
+        check_law("friction", self.law)
+
+    def problems(self, slides: bool, turns: bool) -> Iterator[str]:
+        """What is wrong for a joint that slides along or turns about z."""
+        if not (slides or turns):
+            yield "expected a revolute, prismatic or cylindrical joint"
+        if turns and self.radius is None:
+            yield "radius: expected the bearing's radius [m], got none"
+        limits = {
+            "radius": (self.radius, True), "length": (self.length, True),
+            "width": (self.width, True), "preload": (self.preload, False),
+            "normal": (self.normal, False), "eps": (self.eps, True),
+        }  # fmt: skip
+        for name, (value, strict) in limits.items():
+            if value is None or is_symbolic(value):
+                continue
+            if not is_number(value) or not (value > 0 or (value == 0 and not strict)):
+                yield f"{name}: expected a number {'>' if strict else '>='} 0, got {value!r}"
+
+    def magnitude(self, *components: ca.SX) -> ca.SX:
+        """Smooth length of a force with these components [N]."""
+        squares = sum((f * f for f in components), start=self.eps * self.eps)
+        return ca.sqrt(squares) - self.eps
+
+    def stations(self, F: ca.SX, T: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+        """Bearing forces f_x1, f_y1, f_x2, f_y2 [N]."""
+        if self.length is None:
+            return -F[0], -F[1], ca.SX(0), ca.SX(0)
+        fx2, fy2 = -T[1] / self.length, T[0] / self.length
+        return -F[0] - fx2, -F[1] - fy2, fx2, fy2
+
+    def normal_force(self, slides: bool, turns: bool, F: ca.SX, T: ca.SX) -> ca.SX:
+        """Sum of the bearing forces under the reaction F, T in the child's frame [N]."""
+        if self.normal is not None:
+            return ca.SX(self.normal)
+        fx1, fy1, fx2, fy2 = self.stations(F, T)
+        forces = [(fx1, fy1), (fx2, fy2)] if turns else [(fx1,), (fy1,), (fx2,), (fy2,)]
+        if turns and not slides:
+            forces.append((F[2],))
+        if not turns and self.width is not None:
+            f3 = T[2] / self.width
+            forces = [(fx1 + f3,), *forces[1:], (f3,)]
+        pressing = [f for f in forces if not ca.vertcat(*f).is_zero()]
+        return sum((self.magnitude(*f) for f in pressing), start=ca.SX(self.preload))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Friction of a joint in one direction: along z ("slide") or about z ("turn").
+
+    Attributes:
+        name: of its results.
+        joint: the joint it belongs to.
+        direction: "slide" or "turn".
+        friction: law and geometry.
+        slip: sliding velocity [m/s].
+        F: symbol of the friction force [N].
+    """
+
+    name: str
+    joint: str
+    direction: str
+    friction: JointFriction
+    slip: ca.SX
+    F: ca.SX
+
+    @property
+    def load(self) -> ca.SX:
+        """Force [N] along z or moment [N m] about z on the child."""
+        return -self.F if self.direction == "slide" else -self.friction.radius * self.F

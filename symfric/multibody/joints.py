@@ -1,0 +1,340 @@
+"""Joints: for each its pose and motion subspace (joint coordinates) and its constraints (loops).
+
+A joint connects a frame P on its parent body with a frame C on its child body. Its pose (R_PC,
+p_PC) is a function of the joint coordinates q; its motion subspace (H_w, H_v) gives the relative
+angular velocity w_PC = H_w q' and the velocity p_PC' = H_v q', both in P. The constraints are
+expressions of the pose that vanish for every q; they close a loop, where the joint has no
+coordinates. The axis of a joint is z of both frames.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar, final
+
+import casadi as ca
+
+from symfric.multibody.friction import JointFriction
+from symfric.multibody.spatial import (
+    euler_e,
+    rotation,
+    rotation_x,
+    rotation_y,
+    rotation_z,
+)
+from symfric.numeric import Scalar, is_number
+
+Pair = tuple[ca.SX, ca.SX]
+NONE = ca.SX(3, 0)
+ANGLE, LENGTH = ("", "rad"), ("", "m")
+EULER = tuple((f"e{i}", "1") for i in range(4))
+
+
+def _z() -> ca.SX:
+    """Motion along or about z, shape (3, 1)."""
+    column = ca.SX(3, 1)
+    column[2] = 1
+    return column
+
+
+@dataclass(frozen=True, eq=False)
+class Joint(ABC):
+    """A joint between two bodies.
+
+    Attributes:
+        name: C identifier; coordinates and results carry it.
+        parent, child: "body" or "body.frame"; "ground" is the body that does not move.
+        start: joint coordinates at the start [m, rad]; a number where there is one coordinate.
+            What closes a loop needs none.
+        rate: their rates [m/s, rad/s].
+        friction: law and geometry of the bearing, or None.
+    """
+
+    coordinates: ClassVar[tuple[tuple[str, str], ...]] = ()
+    """Suffix and unit of each joint coordinate."""
+    constrains: ClassVar[int] = 0
+    """Number of constraints; the spanning tree keeps the joints with most."""
+    closes: ClassVar[bool] = False
+    """Whether it can only close loops, having no coordinates of its own."""
+    slides: ClassVar[bool] = False
+    """Whether friction acts along z."""
+    turns: ClassVar[bool] = False
+    """Whether friction acts about z."""
+    quaternion: ClassVar[int | None] = None
+    """Index of the first of four Euler parameters among the coordinates."""
+
+    name: str
+    parent: str
+    child: str
+    start: Scalar | tuple[Scalar, ...] | None = None
+    rate: Scalar | tuple[Scalar, ...] | None = None
+    friction: JointFriction | None = None
+
+    @abstractmethod
+    def pose(self, q: ca.SX) -> Pair:
+        """(R_PC, p_PC) at the joint coordinates q."""
+
+    @abstractmethod
+    def subspace(self, q: ca.SX) -> Pair:
+        """(H_w, H_v), shape (3, n) each."""
+
+    @abstractmethod
+    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
+        """Expressions of R_PC and p_PC that must vanish, shape (m, 1)."""
+
+    @property
+    def starts(self) -> tuple[Scalar, ...]:
+        """Joint coordinates at the start; zero, or no rotation, where none are given."""
+        return _several(self.start, len(self.coordinates), self.quaternion)
+
+    @property
+    def rates(self) -> tuple[Scalar, ...]:
+        """Their rates at the start; zero where none are given."""
+        return _several(self.rate, len(self.coordinates), None)
+
+
+def _several(given: object, n: int, quaternion: int | None) -> tuple[Scalar, ...]:
+    if given is None:
+        return tuple(1.0 if i == quaternion else 0.0 for i in range(n))
+    if isinstance(given, tuple):
+        return given
+    return (given,) if is_number(given) or n == 1 else tuple(given)  # type: ignore[arg-type]
+
+
+def _parallel(R: ca.SX) -> ca.SX:
+    """The axes z of both frames are parallel: 2 equations."""
+    return ca.vertcat(R[0, 2], R[1, 2])
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Revolute(Joint):
+    """Turns about z; 5 constraints."""
+
+    coordinates: ClassVar[tuple[tuple[str, str], ...]] = (ANGLE,)
+    constrains: ClassVar[int] = 5
+    turns: ClassVar[bool] = True
+
+    def pose(self, q: ca.SX) -> Pair:
+        """Turned by q about z."""
+        return rotation_z(q), ca.SX(3, 1)
+
+    def subspace(self, q: ca.SX) -> Pair:
+        """Rotation about z."""
+        return _z(), ca.SX(3, 1)
+
+    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
+        """One point in common, parallel axes."""
+        return ca.vertcat(p, _parallel(R))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Prismatic(Joint):
+    """Slides along z without turning; 5 constraints."""
+
+    coordinates: ClassVar[tuple[tuple[str, str], ...]] = (LENGTH,)
+    constrains: ClassVar[int] = 5
+    slides: ClassVar[bool] = True
+
+    def pose(self, q: ca.SX) -> Pair:
+        """Shifted by q along z."""
+        return ca.SX.eye(3), ca.vertcat(0, 0, q)
+
+    def subspace(self, q: ca.SX) -> Pair:
+        """Translation along z."""
+        return ca.SX(3, 1), _z()
+
+    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
+        """On one line, parallel axes, no turn."""
+        return ca.vertcat(p[0], p[1], _parallel(R), R[1, 0])
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Cylindrical(Joint):
+    """Slides along z and turns about it; 4 constraints."""
+
+    coordinates: ClassVar[tuple[tuple[str, str], ...]] = (("slide", "m"), ("angle", "rad"))
+    constrains: ClassVar[int] = 4
+    slides: ClassVar[bool] = True
+    turns: ClassVar[bool] = True
+
+    def pose(self, q: ca.SX) -> Pair:
+        """Shifted by q[0] along z and turned by q[1] about it."""
+        return rotation_z(q[1]), ca.vertcat(0, 0, q[0])
+
+    def subspace(self, q: ca.SX) -> Pair:
+        """Translation along z, rotation about z."""
+        return ca.horzcat(ca.SX(3, 1), _z()), ca.horzcat(_z(), ca.SX(3, 1))
+
+    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
+        """On one line, parallel axes."""
+        return ca.vertcat(p[0], p[1], _parallel(R))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Spherical(Joint):
+    """Turns about a point; Euler parameters as coordinates; 3 constraints."""
+
+    coordinates: ClassVar[tuple[tuple[str, str], ...]] = EULER
+    constrains: ClassVar[int] = 3
+    quaternion: ClassVar[int | None] = 0
+
+    def pose(self, q: ca.SX) -> Pair:
+        """R of the Euler parameters q."""
+        return rotation(q), ca.SX(3, 1)
+
+    def subspace(self, q: ca.SX) -> Pair:
+        """w = 2 E q'."""
+        return 2 * euler_e(q), ca.SX(3, 4)
+
+    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
+        """One point in common."""
+        return ca.SX(p)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Universal(Joint):
+    """Turns about x of the parent and about y of the child, which stay orthogonal; 4 constraints."""
+
+    coordinates: ClassVar[tuple[tuple[str, str], ...]] = (("x", "rad"), ("y", "rad"))
+    constrains: ClassVar[int] = 4
+
+    def pose(self, q: ca.SX) -> Pair:
+        """Turned by q[0] about x, then by q[1] about the new y."""
+        return rotation_x(q[0]) @ rotation_y(q[1]), ca.SX(3, 1)
+
+    def subspace(self, q: ca.SX) -> Pair:
+        """Rotation about x, and about y turned by q[0]."""
+        axes = ca.horzcat(ca.vertcat(1, 0, 0), ca.vertcat(0, ca.cos(q[0]), ca.sin(q[0])))
+        return axes, ca.SX(3, 2)
+
+    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
+        """One point in common, orthogonal axes."""
+        return ca.vertcat(p, R[0, 1])
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Planar(Joint):
+    """Moves in the plane x, y and turns about z; 3 constraints."""
+
+    coordinates: ClassVar[tuple[tuple[str, str], ...]] = (("x", "m"), ("y", "m"), ("angle", "rad"))
+    constrains: ClassVar[int] = 3
+
+    def pose(self, q: ca.SX) -> Pair:
+        """Shifted by q[0], q[1] in the plane and turned by q[2] about its normal."""
+        return rotation_z(q[2]), ca.vertcat(q[0], q[1], 0)
+
+    def subspace(self, q: ca.SX) -> Pair:
+        """Translation along x and y, rotation about z."""
+        return ca.horzcat(ca.SX(3, 2), _z()), ca.horzcat(ca.SX.eye(3)[:, :2], ca.SX(3, 1))
+
+    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
+        """In one plane, parallel normals."""
+        return ca.vertcat(p[2], _parallel(R))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Fixed(Joint):
+    """Holds two bodies together; 6 constraints."""
+
+    constrains: ClassVar[int] = 6
+
+    def pose(self, q: ca.SX) -> Pair:
+        """The frames coincide."""
+        return ca.SX.eye(3), ca.SX(3, 1)
+
+    def subspace(self, q: ca.SX) -> Pair:
+        """No motion."""
+        return NONE, NONE
+
+    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
+        """One point in common, all axes parallel."""
+        return ca.vertcat(p, _parallel(R), R[1, 0])
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Free(Joint):
+    """Lets a body move freely; Euler parameters for its rotation; no constraint."""
+
+    coordinates: ClassVar[tuple[tuple[str, str], ...]] = (
+        ("x", "m"),
+        ("y", "m"),
+        ("z", "m"),
+        *EULER,
+    )
+    quaternion: ClassVar[int | None] = 3
+
+    def pose(self, q: ca.SX) -> Pair:
+        """Shifted by q[:3], R of the Euler parameters q[3:]."""
+        return rotation(q[3:]), q[:3]
+
+    def subspace(self, q: ca.SX) -> Pair:
+        """v = q[:3]', w = 2 E q[3:]'."""
+        return (
+            ca.horzcat(ca.SX(3, 3), 2 * euler_e(q[3:])),
+            ca.horzcat(ca.SX.eye(3), ca.SX(3, 4)),
+        )
+
+    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
+        """None."""
+        return ca.SX(0, 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Closing(Joint):
+    """A joint that only closes loops."""
+
+    closes: ClassVar[bool] = True
+
+    def pose(self, q: ca.SX) -> Pair:
+        """Has no coordinates."""
+        raise NotImplementedError
+
+    def subspace(self, q: ca.SX) -> Pair:
+        """Has no coordinates."""
+        raise NotImplementedError
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Distance(Closing):
+    """A massless rod with ball joints at both ends: (d'd - length^2) / 2 = 0; 1 constraint.
+
+    Its multiplier [N/m] times the length is the force in the rod, positive under pressure.
+    """
+
+    constrains: ClassVar[int] = 1
+
+    length: Scalar = 1.0
+
+    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
+        """The squared distance."""
+        return (ca.dot(p, p) - self.length * self.length) / 2
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PointOnLine(Closing):
+    """The origin of the child's frame stays on the parent's axis z; 2 constraints.
+
+    With z normal to the plane of a planar mechanism it is the pin that closes a loop without the
+    reactions out of the plane that a revolute joint there could not determine.
+    """
+
+    constrains: ClassVar[int] = 2
+
+    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
+        """On the axis."""
+        return ca.vertcat(p[0], p[1])
+
+
+ALL_JOINTS: tuple[type[Joint], ...] = (
+    Revolute, Prismatic, Cylindrical, Spherical, Universal, Planar, Fixed, Free, Distance,
+    PointOnLine,
+)  # fmt: skip

@@ -1,0 +1,126 @@
+"""Rotations, Euler parameters, frames: pure functions of SX.
+
+Monogram notation: `R_AB` turns components in B into components in A, `p_AB` leads from A to B in
+components of A. Euler parameters p = (e0, e), |p| = 1, of the rotation R = E G':
+
+    E = [-e, e~ + e0 I],  G = [-e, -e~ + e0 I],  w = 2 E p' (in A),  w' = 2 G p' (in B)
+
+Source: Nikravesh, Computer-Aided Analysis of Mechanical Systems, 1988, chapter 6.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, final
+
+import casadi as ca
+
+Vector = Sequence[Any] | ca.SX | ca.DM
+"""Three numbers or symbols."""
+
+
+def vector(values: Vector) -> ca.SX:
+    """`values` as a column (3, 1)."""
+    return ca.SX(ca.vertcat(*(values[i] for i in range(3))))
+
+
+def skew(a: ca.SX) -> ca.SX:
+    """The matrix a~ with a~ b = a x b."""
+    return ca.vertcat(
+        ca.horzcat(0, -a[2], a[1]), ca.horzcat(a[2], 0, -a[0]), ca.horzcat(-a[1], a[0], 0)
+    )
+
+
+def rotation_x(angle: ca.SX) -> ca.SX:
+    """R of a turn by `angle` about x."""
+    c, s = ca.cos(angle), ca.sin(angle)
+    return ca.vertcat(ca.horzcat(1, 0, 0), ca.horzcat(0, c, -s), ca.horzcat(0, s, c))
+
+
+def rotation_y(angle: ca.SX) -> ca.SX:
+    """R of a turn by `angle` about y."""
+    c, s = ca.cos(angle), ca.sin(angle)
+    return ca.vertcat(ca.horzcat(c, 0, s), ca.horzcat(0, 1, 0), ca.horzcat(-s, 0, c))
+
+
+def rotation_z(angle: ca.SX) -> ca.SX:
+    """R of a turn by `angle` about z."""
+    c, s = ca.cos(angle), ca.sin(angle)
+    return ca.vertcat(ca.horzcat(c, -s, 0), ca.horzcat(s, c, 0), ca.horzcat(0, 0, 1))
+
+
+def euler_e(p: ca.SX) -> ca.SX:
+    """E(p), shape (3, 4)."""
+    return ca.horzcat(-p[1:4], skew(p[1:4]) + p[0] * ca.SX.eye(3))
+
+
+def euler_g(p: ca.SX) -> ca.SX:
+    """G(p), shape (3, 4)."""
+    return ca.horzcat(-p[1:4], -skew(p[1:4]) + p[0] * ca.SX.eye(3))
+
+
+def rotation(p: ca.SX) -> ca.SX:
+    """R(p) = E G' = (e0^2 - e'e) I + 2 e e' + 2 e0 e~."""
+    e0, e = p[0], p[1:4]
+    return (e0 * e0 - ca.dot(e, e)) * ca.SX.eye(3) + 2 * (e @ e.T) + 2 * e0 * skew(e)
+
+
+def turned(p: ca.SX, a: ca.SX) -> ca.SX:
+    """B(p, a) = d(R(p) a)/dp, shape (3, 4), for p of any length."""
+    e0, e = p[0], p[1:4]
+    first = 2 * (e0 * a + ca.cross(e, a))
+    rest = 2 * (e @ a.T + ca.dot(e, a) * ca.SX.eye(3) - a @ e.T - e0 * skew(a))
+    return ca.horzcat(first, rest)
+
+
+def euler_parameters(R: ca.DM) -> ca.DM:
+    """Euler parameters (e0, e) with e0 >= 0 of a numerical rotation matrix."""
+    trace = float(R[0, 0] + R[1, 1] + R[2, 2])
+    squares = [1 + trace] + [1 - trace + 2 * float(R[i, i]) for i in range(3)]
+    k = squares.index(max(squares))
+    e0 = (squares[0] / 4) ** 0.5
+    off = [float(R[2, 1] - R[1, 2]), float(R[0, 2] - R[2, 0]), float(R[1, 0] - R[0, 1])]
+    if k == 0:
+        return ca.DM([e0, *(x / (4 * e0) for x in off)])
+    i = k - 1
+    largest = (squares[k] / 4) ** 0.5
+    e = [float(R[i, j] + R[j, i]) / (4 * largest) for j in range(3)]
+    e[i] = largest
+    p = ca.DM([off[i] / (4 * largest), *e])
+    return -p if float(p[0]) < 0 else p
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A place on a body: position of its origin [m] and directions of its axes.
+
+    Attributes:
+        at: position from the origin of the body, in the body's components.
+        z, x: directions; z is the axis of a joint, x is made orthogonal to it, y = z x x. Without
+            x any direction orthogonal to z is taken.
+    """
+
+    at: Vector = (0.0, 0.0, 0.0)
+    z: Sequence[float] = (0.0, 0.0, 1.0)
+    x: Sequence[float] | None = None
+    R: ca.SX = field(init=False)
+    p: ca.SX = field(init=False)
+
+    def __post_init__(self) -> None:
+        z = _unit("z", ca.DM(self.z))
+        if self.x is None:
+            smallest = min(range(3), key=lambda i: abs(float(z[i])))
+            # cyclic, so that the axes of the body stay the axes of a frame without directions
+            x = ca.DM([float(i == (smallest if abs(float(z[2])) < 1 else 0)) for i in range(3)])
+        else:
+            x = ca.DM(self.x)
+        x = _unit("x", x - ca.dot(x, z) * z)
+        object.__setattr__(self, "R", ca.SX(ca.sparsify(ca.horzcat(x, ca.cross(z, x), z))))
+        object.__setattr__(self, "p", vector(self.at))
+
+
+def _unit(name: str, a: ca.DM) -> ca.DM:
+    length = float(ca.norm_2(a)) if a.numel() == 3 else 0.0
+    if not length > 1e-12:
+        raise ValueError(f"frame: {name}: expected three numbers, not parallel to z, got {a}")
+    return a / length

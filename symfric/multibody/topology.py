@@ -1,0 +1,141 @@
+"""Which joints carry coordinates: a spanning tree of the mechanism, and the loops that are left."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import final
+
+import casadi as ca
+
+from symfric.multibody.body import GROUND, Body
+from symfric.multibody.joints import Free, Joint, Pair
+from symfric.multibody.spatial import Frame, skew
+
+
+def body_of(place: str) -> str:
+    """The body in "body.frame"."""
+    return place.partition(".")[0]
+
+
+def frame_at(bodies: Mapping[str, Body], place: str) -> Frame:
+    """The frame "body.frame"; the origin of the body where no frame is named."""
+    body, _, frame = place.partition(".")
+    return bodies[body].frames[frame]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A body and the joint that hangs it on a body nearer to the ground.
+
+    Attributes:
+        base, body: names; the body moves relative to the base.
+        joint: the joint between them.
+        reverse: whether the joint's child is the base.
+        at_base, at_body: the joint's frames there.
+        first: index of its first coordinate.
+    """
+
+    base: str
+    body: str
+    joint: Joint
+    reverse: bool
+    at_base: Frame
+    at_body: Frame
+    first: int = 0
+
+    @property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return len(self.joint.coordinates)
+
+    @property
+    def rows(self) -> slice:
+        """Its coordinates among all."""
+        return slice(self.first, self.first + self.n)
+
+    def pose(self, q: ca.SX) -> Pair:
+        """Pose of the frame on the body in the frame on the base."""
+        R, p = self.joint.pose(q)
+        return (R.T, -R.T @ p) if self.reverse else (R, p)
+
+    def subspace(self, q: ca.SX) -> Pair:
+        """Motion subspace, as seen from the base."""
+        H_w, H_v = self.joint.subspace(q)
+        if not self.reverse:
+            return H_w, H_v
+        R, p = self.joint.pose(q)
+        return -R.T @ H_w, -R.T @ (H_v + skew(p) @ H_w)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Topology:
+    """Links in the order from the ground outwards, and the joints that close loops."""
+
+    bodies: Mapping[str, Body]
+    links: tuple[Link, ...]
+    loops: tuple[Joint, ...]
+
+    @property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return sum(link.n for link in self.links)
+
+    @cached_property
+    def link_of(self) -> dict[str, Link]:
+        """Links by the name of their joint."""
+        return {link.joint.name: link for link in self.links}
+
+
+def spanning_tree(bodies: Mapping[str, Body], joints: Sequence[Joint]) -> Topology:
+    """Hang every body on the ground, over the joints with the most constraints.
+
+    Every joint in the tree removes its constraints from the equations; those left close loops.
+    Bodies that no joint with coordinates connects to the ground are left out.
+    """
+    depth = {GROUND: 0}
+    links: list[Link] = []
+    rest = list(joints)
+    while True:
+        ends = {id(j): (body_of(j.parent), body_of(j.child)) for j in rest}
+        ready = [j for j in rest if not j.closes and sum(e in depth for e in ends[id(j)]) == 1]
+        if not ready:
+            break
+        best = max(ready, key=lambda j: (j.constrains, -max(depth.get(e, 0) for e in ends[id(j)])))
+        parent, child = ends[id(best)]
+        reverse = parent not in depth
+        base, body = (child, parent) if reverse else (parent, child)
+        here, there = (best.child, best.parent) if reverse else (best.parent, best.child)
+        depth[body] = depth[base] + 1
+        at_base, at_body = frame_at(bodies, here), frame_at(bodies, there)
+        links.append(Link(base, body, best, reverse, at_base, at_body))
+        rest.remove(best)
+    return Topology(bodies, _numbered(links), tuple(rest))
+
+
+def absolute(
+    bodies: Mapping[str, Body], joints: Sequence[Joint], names: Sequence[str]
+) -> Topology:
+    """Every body free, with Euler parameters at its centre of mass; every joint closes a loop."""
+    links = [
+        Link(
+            GROUND,
+            name,
+            Free(name, GROUND, name),
+            False,
+            Frame(),
+            Frame(at=bodies[name].c),
+        )
+        for name in names
+    ]
+    return Topology(bodies, _numbered(links), tuple(joints))
+
+
+def _numbered(links: Sequence[Link]) -> tuple[Link, ...]:
+    found: list[Link] = []
+    first = 0
+    for link in links:
+        found.append(replace(link, first=first))
+        first += link.n
+    return tuple(found)
