@@ -5,7 +5,7 @@ Nothing here imports symfric, so that a mistake cannot stand on both sides of a 
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import atan, cos, exp, hypot, inf, pi, sin, sqrt
+from math import atan, cos, exp, hypot, inf, pi, sin, sqrt, tanh
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,26 @@ def rabinowicz_coulomb(
     amplitude = hypot(excess, v_belt / w)
     stick, slip = 2 * excess / v_belt, 2 / w * (pi - atan(excess * w / v_belt))
     return StickSlip(stick + slip, stick, slip, centre + amplitude, centre - amplitude, centre)
+
+
+def rabinowicz_brown_mcphee(
+    m: float = 0.8,
+    k: float = 2.1,
+    v_belt: float = 0.1,
+    g: float = 9.81,
+    mu_s: float = 0.15,
+    mu_d: float = 0.1,
+    v_t: float = 1e-3,
+) -> Callable[[float, list[float]], list[float]]:
+    """Right-hand side of (x, v) for the block on a belt with Brown-McPhee friction."""
+
+    def rates(t: float, y: list[float]) -> list[float]:
+        x, v = y
+        s = (v - v_belt) / v_t
+        mu = mu_d * tanh(4 * s) + (mu_s - mu_d) * s / (s * s / 4 + 0.75) ** 2
+        return [v, -(k * x + mu * m * g) / m]
+
+    return rates
 
 
 def rabinowicz_lugre(
