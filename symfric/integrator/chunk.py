@@ -1,7 +1,7 @@
 """A part of an ensemble as plain data, so that it can be sent to any worker."""
 
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, fields
+from functools import lru_cache
 from hashlib import sha256
 from typing import final
 
@@ -9,15 +9,26 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.integrator.columns import Columns
 from symfric.integrator.compiler import find_compiler
-from symfric.integrator.dense import from_records
-from symfric.integrator.engine import CompiledEngine, Stop, VmEngine, c_source
+from symfric.integrator.engine import Stop
+from symfric.integrator.initial import Equations, consistent_many
 from symfric.integrator.inputs import Drivers
 from symfric.integrator.integrator import Integrator
+from symfric.integrator.members import (
+    CompiledMembers,
+    Members,
+    Stretch,
+    VmMembers,
+    many_source,
+)
 from symfric.integrator.step import MEMORY
+from symfric.status import Status
 
 Array = NDArray[np.float64]
-ROWS, ATTEMPTS = 2048, 2000
+Indices = NDArray[np.intp]
+Places = tuple[int, ...]
+WHY = {Stop.ATTEMPTS: Status.MAX_STEPS, Stop.STEP_TOO_SMALL: Status.STEP_TOO_SMALL}
 
 
 @final
@@ -32,13 +43,19 @@ class Chunk:
 @final
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Solutions y (members, times, n), stop reasons, attempts, times reached, run data d."""
+    """What became of the members of a chunk.
 
-    y: Array
-    reason: NDArray[np.int64]
-    made: NDArray[np.int64]
+    Attributes:
+        signals: shape (members, times, signals), NaN where a member did not get.
+        attempts: shape (members,).
+        reached: time [s] that each member reached.
+        failed: number in the chunk -> sentence.
+    """
+
+    signals: Array
+    attempts: NDArray[np.int64]
     reached: Array
-    p: Array
+    failed: dict[int, str]
 
 
 @final
@@ -47,18 +64,29 @@ class Job:
     """What all chunks of an ensemble share; picklable.
 
     Attributes:
-        code: C source of the step and its loop, or the serialised step for the virtual machine.
+        where: for messages.
+        code: C of steps, signals and their loop, or the serialised step for the virtual machine.
         compiled: which of the two.
-        nx, n, dense_rows: differential and all unknowns, rows of dense output.
+        signals: the serialised Function of the signals.
+        n_signals: how many there are.
+        constraints: the serialised algebraic equations, "" where there are none.
+        algebraic: their rows and columns.
+        names: of the unknowns.
+        nx: number of differential states.
         breaks, data: input intervals and the data on them.
         times: times of the results [s].
+        max_steps: attempts allowed for a member.
     """
 
+    where: str
     code: str
     compiled: bool
+    signals: str
+    n_signals: int
+    constraints: str
+    algebraic: tuple[Places, Places]
+    names: tuple[str, ...]
     nx: int
-    n: int
-    dense_rows: int
     breaks: Array
     data: Array
     times: Array
@@ -68,85 +96,123 @@ class Job:
     def of(
         cls, integrator: Integrator, inputs: Drivers, times: Array, backend: str, max_steps: int
     ) -> "Job":
-        """The job of an integrator; the virtual machine takes over where no compiler is."""
-        rows = integrator.tableau.H.shape[0]
-        compiled = backend == "compiled" and find_compiler() is not None
-        code = c_source(integrator.step, rows) if compiled else str(integrator.step.serialize())
+        """The job of an integrator; "auto" is compiled where there is a compiler."""
+        compiled = backend == "compiled" or (backend == "auto" and find_compiler() is not None)
         s = integrator.system
-        return cls(code, compiled, s.nx, s.n, rows, inputs.breaks, inputs.values, times, max_steps)
+        return cls(
+            where=f"simulate_many of '{integrator.model.name}'",
+            code=many_source(integrator.step_to_compile(), integrator.signals)
+            if compiled
+            else str(integrator.step.serialize()),
+            compiled=compiled,
+            signals=str(integrator.signals.serialize()),
+            n_signals=integrator.signals.numel_out(0),
+            constraints=str(s.constraints.serialize()) if s.algebraic[0] else "",
+            algebraic=(tuple(s.algebraic[0]), tuple(s.algebraic[1])),
+            names=s.names,
+            nx=s.nx,
+            breaks=inputs.breaks,
+            data=inputs.values,
+            times=times,
+            max_steps=max_steps,
+        )
 
     def digest(self) -> str:
         """Hash of everything in it."""
-        arrays = self.breaks.tobytes() + self.data.tobytes() + self.times.tobytes()
-        return sha256(self.code.encode() + arrays).hexdigest()
+        return digest(*(getattr(self, f.name) for f in fields(self)))
+
+    def load(self) -> Members:
+        """What runs the members; compiled once in a process."""
+        if self.compiled:
+            return _compiled(self.code, self.n_signals)
+        return _vm(self.code, self.signals)
 
     @property
-    def h_min(self) -> float:
-        """Smallest step [s]."""
-        return 1e-15 * max(float(np.abs(self.breaks).max()), 1e-3)
+    def stretches(self) -> list[tuple[int, int]]:
+        """Input intervals that members go through without a stop."""
+        intervals = self.breaks.size - 1
+        return [(k, k + 1) for k in range(intervals)] if self.constraints else [(0, intervals)]
+
+    def stretch(self, first: int, last: int) -> tuple[Stretch, Indices]:
+        """The input intervals first ... last - 1, and which of the times belong to them."""
+        breaks, h_min = self.breaks[first : last + 1], 1e-15 * np.abs(self.breaks).max()
+        ends = np.inf if last == self.breaks.size - 1 else breaks[-1]
+        inside = np.flatnonzero((self.times >= breaks[0]) & (self.times < ends))
+        data = np.ascontiguousarray(self.data[:, first:last])
+        return (
+            Stretch(breaks, data, self.times[inside], self.max_steps, max(float(h_min), 1e-18)),
+            inside,
+        )
 
 
-@cache
-def _compiled(code: str, n: int, dense_rows: int) -> CompiledEngine:
-    return CompiledEngine.of_source(code, n, dense_rows)
+def digest(*parts: object) -> str:
+    """Hash of plain data; arrays count with every digit."""
+    total = sha256()
+    for part in parts:
+        if isinstance(part, np.ndarray):
+            total.update(
+                f"{part.shape} {part.dtype}".encode() + np.ascontiguousarray(part).tobytes()
+            )
+        else:
+            total.update(repr(part).encode())
+        total.update(b"\0")
+    return total.hexdigest()
 
 
-@cache
-def _vm(code: str) -> VmEngine:
-    return VmEngine.of(ca.Function.deserialize(code))
+@lru_cache(16)
+def _equations(
+    names: tuple[str, ...], rows: Places, columns: Places, constraints: str
+) -> tuple[Equations, Columns]:
+    function = ca.Function.deserialize(constraints)
+    return Equations(names, (list(rows), list(columns)), function), Columns(function)
+
+
+@lru_cache(16)
+def _compiled(code: str, signals: int) -> CompiledMembers:
+    return CompiledMembers.of(code, signals)
+
+
+@lru_cache(16)
+def _vm(step: str, signals: str) -> VmMembers:
+    return VmMembers.of(step, signals)
 
 
 def solve_chunk(job: Job, chunk: Chunk) -> Solved:
-    """Integrate the members of a chunk one after another."""
-    S, R = np.ascontiguousarray(chunk.S), np.ascontiguousarray(chunk.R)
-    return _solve_compiled(job, S, R) if job.compiled else _solve_vm(job, S, R)
+    """Integrate the members of a chunk.
+
+    Algebraic unknowns follow the jumps of inputs, so members with such unknowns stop together at
+    the ends of the input intervals.
+    """
+    runner, S, alive = job.load(), chunk.S.copy(), np.arange(chunk.S.shape[0])
+    shape = (alive.size, job.times.size, job.n_signals)
+    signals, attempts = np.full(shape, np.nan), np.zeros(alive.size, dtype=np.int64)
+    failed: dict[int, str] = {}
+    for first, last in job.stretches:
+        stretch, inside = job.stretch(first, last)
+        if job.constraints:
+            alive = _follow(job, chunk, S, alive, first, failed)
+        part, made = S[alive], attempts[alive]
+        found, reason = runner.run(part, chunk.R[alive], made, stretch)
+        S[alive], attempts[alive] = part, made
+        signals[np.ix_(alive, inside)] = found
+        for m, why, t in zip(alive.tolist(), reason.tolist(), part[:, 0].tolist(), strict=True):
+            if why in WHY:
+                failed[m] = (
+                    f"{WHY[why].value} It stands at t = {t:g} s; simulate it alone for more."
+                )
+        alive = alive[reason == Stop.END]
+    return Solved(signals, attempts, S[:, 0].copy(), failed)
 
 
-def _solve_compiled(job: Job, S: Array, R: Array) -> Solved:
-    members = S.shape[0]
-    y = np.empty((members, job.times.size, job.n))
-    reason, made = np.zeros(members, dtype=np.int64), np.zeros(members, dtype=np.int64)
-    data = np.ascontiguousarray(job.data)
-    _compiled(job.code, job.n, job.dense_rows).library.symfric_many(
-        S.ctypes.data,
-        R.ctypes.data,
-        R.shape[1],
-        members,
-        job.breaks.ctypes.data,
-        data.ctypes.data,
-        data.shape[1],
-        data.shape[0],
-        job.times.ctypes.data,
-        job.times.size,
-        job.max_steps,
-        job.h_min,
-        y.ctypes.data,
-        reason.ctypes.data,
-        made.ctypes.data,
+def _follow(
+    job: Job, chunk: Chunk, S: Array, alive: Indices, interval: int, failed: dict[int, str]
+) -> Indices:
+    """Let algebraic unknowns follow the input data of an interval; the members that can."""
+    equations, together = _equations(job.names, *job.algebraic, job.constraints)
+    d = chunk.R[alive, 2 + job.nx :]
+    d[:, d.shape[1] - job.data.shape[0] :] = job.data[:, interval]
+    S[alive, MEMORY:], refused = consistent_many(
+        equations, together, job.where, S[alive, MEMORY:], d
     )
-    return Solved(y, reason, made, S[:, 0].copy(), R[:, 2 + job.nx :])
-
-
-def _solve_vm(job: Job, S: Array, R: Array) -> Solved:
-    members, engine = S.shape[0], _vm(job.code)
-    y = np.full((members, job.times.size, job.n), np.nan)
-    reason, made = np.zeros(members, dtype=np.int64), np.zeros(members, dtype=np.int64)
-    for m in range(members):
-        state, run = S[m].copy(), R[m].copy()
-        y[m, job.times <= state[0]] = state[MEMORY:]
-        for k in range(job.breaks.size - 1):
-            run[0] = job.breaks[k + 1]
-            run[run.size - job.data.shape[0] :] = job.data[:, k]
-            stop = Stop.FULL
-            while stop in (Stop.FULL, Stop.ATTEMPTS) and made[m] < job.max_steps:
-                records, count, stop = engine.run(state, run, ROWS, ATTEMPTS, job.h_min)
-                made[m] += count
-                if records.shape[0]:
-                    dense = from_records(records, job.n)
-                    inside = (job.times > dense.t0[0]) & (job.times <= dense.t1[-1])
-                    y[m, inside] = dense(job.times[inside]).T
-            reason[m] = stop
-            if stop is not Stop.END:
-                break
-        S[m, 0] = state[0]
-    return Solved(y, reason, made, S[:, 0].copy(), R[:, 2 + job.nx :])
+    failed |= {int(alive[m]): message for m, message in refused.items()}
+    return np.delete(alive, list(refused))

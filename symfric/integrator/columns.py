@@ -44,7 +44,7 @@ class Columns:
 
     @cached_property
     def _batch(self) -> ca.Function:
-        dense = _dense(self.function)
+        dense = densified(self.function)
         if self.chained:
             return dense.mapaccum(f"{dense.name()}_{self.size}", self.size)
         return dense.map(self.size)
@@ -103,7 +103,7 @@ class Columns:
         return found
 
 
-def _dense(function: ca.Function) -> ca.Function:
+def densified(function: ca.Function) -> ca.Function:
     """`function` with dense results, as buffers need them."""
     if all(function.sparsity_out(i).is_dense() for i in range(function.n_out())):
         return function

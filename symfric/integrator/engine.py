@@ -137,17 +137,6 @@ class CompiledEngine:
             ctypes.c_double,
             ctypes.c_void_p,
         ]
-        library.symfric_many.restype = None
-        library.symfric_many.argtypes = [
-            *[ctypes.c_void_p] * 2,
-            *[ctypes.c_longlong] * 2,
-            *[ctypes.c_void_p] * 2,
-            *[ctypes.c_longlong] * 2,
-            ctypes.c_void_p,
-            *[ctypes.c_longlong] * 2,
-            ctypes.c_double,
-            *[ctypes.c_void_p] * 3,
-        ]
         return cls(library, width(n, dense_rows))
 
     def run(
@@ -168,12 +157,16 @@ class CompiledEngine:
         return records[: counts[0]], int(counts[1]), Stop(reason)
 
 
-def c_source(step: ca.Function, dense_rows: int) -> str:
-    """C of the step as CasADi generates it, with the loop that calls it until it must stop."""
+def c_source(step: ca.Function, dense_rows: int, *others: ca.Function) -> str:
+    """C of the step as CasADi generates it, with the loop that calls it until it must stop.
+
+    `others` are Functions that further C calls by their names.
+    """
     n = step.numel_in(0) - MEMORY
     with TemporaryDirectory() as folder:
         generator = ca.CodeGenerator("symfric_step.c", {"static_aux": True})
-        generator.add(step)
+        for function in (step, *others):
+            generator.add(function)
         generator.generate(folder + "/")
         code = (Path(folder) / "symfric_step.c").read_text(encoding="utf-8")
     return code + Template(_LOOP).substitute(
@@ -224,45 +217,5 @@ int symfric_run(double *S, const double *R, double *rows, long long max_rows,
   if (S[0] >= R[0]) return 0;
   if (!(S[1] >= h_min)) return 3;
   return count >= max_rows ? 1 : 2;
-}
-
-/* Solution of `members` runs at common times, over common input intervals; no record is kept.
-   S: member-wise start, R: member-wise run data, whose last n_data entries the intervals fill. */
-void symfric_many(double *S, double *R, long long size_R, long long members, const double *breaks,
-                  const double *data, long long intervals, long long n_data, const double *times,
-                  long long n_times, long long max_attempts, double h_min, double *out,
-                  long long *reason, long long *made)
-{
-  enum { N = $n, MEM = $memory, ROWS = $dense_rows, WIDTH = $width };
-  double row[WIDTH];
-  long long m, k, i, r, count[2];
-  for (m = 0; m < members; ++m, S += MEM + N, R += size_R, out += n_times * N) {
-    long long next = 0;
-    int stop = 0;
-    made[m] = 0;
-    for (; next < n_times && times[next] <= S[0]; ++next)
-      for (i = 0; i < N; ++i) out[next * N + i] = S[MEM + i];
-    for (k = 0; k < intervals && stop != 2 && stop != 3; ++k) {
-      R[0] = breaks[k + 1];
-      for (i = 0; i < n_data; ++i) R[size_R - n_data + i] = data[i * intervals + k];
-      stop = 1;
-      while (stop == 1) {
-        stop = symfric_run(S, R, row, 1, max_attempts - made[m], h_min, count);
-        made[m] += count[1];
-        if (!count[0]) break;
-        for (; next < n_times && times[next] <= row[1]; ++next) {
-          const double s = (times[next] - row[0]) / (row[1] - row[0]);
-          for (i = 0; i < N; ++i) {
-            double bend = 0.;
-            for (r = ROWS - 1; r >= 0; --r) bend = row[2 + 2 * N + r * N + i] + s * bend;
-            out[next * N + i] = (1. - s) * row[2 + i] + s * (row[2 + N + i] + (1. - s) * bend);
-          }
-        }
-      }
-    }
-    reason[m] = stop;
-    for (; next < n_times; ++next)
-      for (i = 0; i < N; ++i) out[next * N + i] = 0. / 0.;
-  }
 }
 """

@@ -1,6 +1,6 @@
 """Many runs of one model: over arrays of parameters and start values, on one machine or many."""
 
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import (
     FIRST_COMPLETED,
     Executor,
@@ -9,23 +9,25 @@ from concurrent.futures import (
     ThreadPoolExecutor,
     wait,
 )
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
-from hashlib import sha256
 from os import cpu_count
 from pathlib import Path
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symfric.files import written
-from symfric.integrator.chunk import Chunk, Job, Solved, solve_chunk
-from symfric.integrator.initial import consistent, first_step
+from symfric.integrator.arguments import check_span, check_times
+from symfric.integrator.chunk import Chunk, Job, Solved, digest, solve_chunk
+from symfric.integrator.initial import first_step
 from symfric.integrator.inputs import Drivers, Input, drivers
 from symfric.integrator.integrator import Integrator
+from symfric.integrator.one_by_one import solve_one_by_one
+from symfric.integrator.run import Tolerances
 from symfric.integrator.step import GROWTH_MEMORY
+from symfric.integrator.store import Store
 from symfric.integrator.tableaux import ROSENBROCK
 from symfric.model import Model
 from symfric.parameters import check_names
@@ -33,6 +35,7 @@ from symfric.status import Status
 
 Array = NDArray[np.float64]
 EXECUTORS = ("serial", "threads", "processes")
+BACKENDS = ("auto", "vm", "compiled")
 
 
 @final
@@ -43,10 +46,13 @@ class Ensemble:
     Attributes:
         scene: name of the model.
         t: times [s], shape (k,).
-        signals: name -> values, shape (members, k); NaN after a member failed, and for members
-            that were not reached. Memory-mapped where the results went to a folder.
+        signals: name -> values, shape (members, k); NaN after a member failed or met a terminal
+            event, and for members that were not reached. Memory-mapped where the results went to
+            a folder.
         units: name -> unit.
         attempts: attempts of each member, shape (members,).
+        reached: time [s] each member reached, shape (members,): that of a terminal event or of
+            its failure, else `t_end`; NaN for members that were not started.
         failed: number of a failed member -> sentence.
         status: SUCCESS, or INTERRUPTED with the members that were finished.
     """
@@ -56,6 +62,7 @@ class Ensemble:
     signals: Mapping[str, Array]
     units: dict[str, str]
     attempts: NDArray[np.int64]
+    reached: Array
     failed: dict[int, str]
     status: Status
 
@@ -75,29 +82,33 @@ def simulate_many(
     t_eval: ArrayLike | None = None,
     rtol: float = 1e-6,
     method: str = "rodas5p",
-    backend: str = "compiled",
+    backend: str = "auto",
+    event_tolerance: float = 1e-10,
+    max_steps: int = 10_000_000,
     executor: str | Executor = "threads",
     workers: int | None = None,
     chunk: int = 500,
-    max_steps: int = 10_000_000,
     out: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Ensemble:
     """Integrate one model for many parameters and start values.
 
     Args:
-        model: the equations, without events.
+        model: the equations.
         t_end, t_start: span [s], common to all members.
         x0: start values by name: numbers, or arrays with an entry per member.
         u: inputs by name, common to all members.
         p: parameters by name: numbers, or arrays with an entry per member.
         t_eval: times of the results [s]; default only `t_end`.
-        rtol, method, max_steps: as in `simulate`; the absolute tolerance is 0.1 rtol nominal.
-        backend: "compiled", or "vm" where there is no compiler.
+        rtol, method, event_tolerance, max_steps: as in `simulate`; the absolute tolerance is
+            0.1 rtol nominal.
+        backend: "compiled", "vm", or "auto": compiled where there is a compiler.
         executor: "serial", "threads" (the compiled loop holds no lock), "processes", or any
             `concurrent.futures.Executor`, such as a dask client's or mpi4py's: a task is plain
-            data and the C source, so a worker needs nothing but this package.
-        workers: number of threads or processes; default all cores.
+            data and the C source, so a worker needs nothing but this package and, for compiled
+            code, a compiler. Models with events are no plain data: "serial" or "threads" only.
+        workers: number of threads or processes, or of the executor's workers; default all cores
+            of this machine. Twice as many chunks are under way at once.
         chunk: members per task.
         out: folder that takes the results chunk by chunk, so that memory stays bounded; a call
             with the same arguments resumes where an interrupted one stopped.
@@ -108,133 +119,196 @@ def simulate_many(
         an interrupt (Ctrl-C) returns what is finished.
 
     Raises:
-        ValueError: bad input; arrays of different lengths; a model with events.
+        ValueError: bad input; arrays of different lengths.
+        RuntimeError: compiled code was asked for, and there is no compiler or it failed.
+
+    Warns:
+        UserWarning: rtol above 1e-5, where stick phases may get lost.
     """
-    check_names("simulate_many: method", [method], [k for k in ROSENBROCK if k != "rodas3"])
-    check_names("simulate_many: backend", [backend], ("compiled", "vm"))
-    if isinstance(executor, str):
-        check_names("simulate_many: executor", [executor], EXECUTORS)
-    if model.events:
-        raise ValueError(
-            f"simulate_many: expected a model without events, got {len(model.events)} in "
-            f"'{model.name}'; use simulate in a loop"
-        )
-    if chunk < 1:
-        raise ValueError(f"simulate_many: expected chunk >= 1, got {chunk}")
-    times = np.atleast_1d(np.asarray(t_end if t_eval is None else t_eval, dtype=float))
-    if not (t_start <= times[0] and times[-1] <= t_end and (np.diff(times) > 0).all()):
-        raise ValueError(
-            f"simulate_many: t_eval: expected increasing times in [{t_start:g}, {t_end:g}] s"
-        )
-    values, members = _members({"x0": dict(x0 or {}), "p": dict(p or {})})
-    inputs = drivers(model, u, t_start, t_end)
+    check_span("simulate_many", t_start, t_end, rtol)
+    _check(model, method, backend, executor, workers, chunk)
+    times = check_times(
+        "simulate_many", t_start, t_end, [float(t_end)] if t_eval is None else t_eval
+    )
+    x0_of, p_of, members = _members(model, x0 or {}, p or {})
+    inputs = drivers(model, u, float(t_start), float(t_end))
     integrator = Integrator(model, inputs, ROSENBROCK[method])
+    tolerances = Tolerances(
+        rtol, 0.1 * rtol * integrator.system.nominal, event_tolerance, max_steps
+    )
+    starts = partial(_starts, integrator, float(t_start), x0_of, p_of)
     job = Job.of(integrator, inputs, times, backend, max_steps)
-    prepare = partial(_chunk, integrator, inputs, values, rtol, members)
-    store = _Store(out, model, times, members, chunk, (job.digest(), values, rtol))
-    starts = [k for k in range(0, members, chunk) if not store.has(k)]
-    done, status = members - sum(min(chunk, members - k) for k in starts), Status.SUCCESS
+    if model.events:
+        solve = partial(solve_one_by_one, integrator, inputs, tolerances, backend, times)
+        prepare = starts
+    else:
+        solve = partial(solve_chunk, job)
+        prepare = partial(_chunk, inputs, tolerances, starts)
+        if isinstance(executor, str):
+            job.load()  # or every worker would compile it
+    firsts = range(0, members, chunk)
+    picks = {first: slice(first, min(first + chunk, members)) for first in firsts}
+    folder = None
+    if out is not None:
+        folder = Path(out) / _identity(job, integrator, tolerances, starts, picks)
+    store = Store(folder, model.signals, members, times.size)
+    todo = {first: pick for first, pick in picks.items() if not store.has(first)}
+    done, status = members - sum(_size(pick) for pick in todo.values()), Status.SUCCESS
     try:
-        with _pool(executor, workers) as pool:
-            for k, result in _solved(pool, job, prepare, starts, chunk):
-                store.put(k, _evaluated(integrator, inputs, times, result), result)
-                done += result.reason.size
+        with (
+            _pool(executor, workers) as pool,
+            closing(_solved(pool, workers, solve, prepare, todo)) as results,
+        ):
+            for first, result in results:
+                store.put(first, result)
+                done += _size(picks[first])
                 if progress is not None:
                     progress(done / members)
     except KeyboardInterrupt:
         status = Status.INTERRUPTED
-    return store.ensemble(model, status)
+    return Ensemble(
+        model.name,
+        times,
+        store.signals,
+        dict(model.signals),
+        store.attempts,
+        store.reached,
+        dict(sorted(store.failed.items())),
+        status,
+    )
 
 
-def _members(given: dict[str, dict[str, ArrayLike]]) -> tuple[dict[str, dict[str, Array]], int]:
-    """Arrays by group and name, and the number of members they agree on."""
-    arrays = {
-        group: {name: np.asarray(value, dtype=float) for name, value in items.items()}
-        for group, items in given.items()
-    }
-    lengths = {
-        f"{group}.{name}": value.size
-        for group, items in arrays.items()
-        for name, value in items.items()
-        if value.ndim
-    }
-    if len(set(lengths.values())) > 1 or any(
-        v.ndim > 1 for items in arrays.values() for v in items.values()
-    ):
+def _size(pick: slice) -> int:
+    return pick.stop - pick.start
+
+
+def _check(
+    model: Model,
+    method: str,
+    backend: str,
+    executor: str | Executor,
+    workers: int | None,
+    chunk: int,
+) -> None:
+    check_names("simulate_many: method", [method], ROSENBROCK)
+    check_names("simulate_many: backend", [backend], BACKENDS)
+    if isinstance(executor, str):
+        check_names("simulate_many: executor", [executor], EXECUTORS)
+    if model.events and executor not in ("serial", "threads"):
         raise ValueError(
-            "simulate_many: expected numbers or arrays of one length, got "
-            + ", ".join(f"{name} with {size}" for name, size in lengths.items())
+            f"simulate_many: executor: expected serial or threads for a model with events "
+            f"('{model.name}' has {len(model.events)}), got {executor}"
         )
+    for name, value in (("chunk", chunk), ("workers", 1 if workers is None else workers)):
+        if value < 1:
+            raise ValueError(f"simulate_many: expected {name} >= 1, got {value}")
+
+
+Values = dict[str, Array]
+
+
+def _members(
+    model: Model, x0: Mapping[str, ArrayLike], p: Mapping[str, ArrayLike]
+) -> tuple[Values, Values, int]:
+    """Start values and parameters by name, an entry per member, and the number of members."""
+    where = "simulate_many"
+    check_names(f"{where}: x0 of '{model.name}'", x0, [v.name for v in model.x])
+    check_names(f"{where}: p of '{model.name}'", p, [v.name for v in model.p])
+    arrays = {f"x0.{name}": np.asarray(value, dtype=float) for name, value in x0.items()}
+    arrays |= {f"p.{name}": np.asarray(value, dtype=float) for name, value in p.items()}
+    lengths = {name: value.size for name, value in arrays.items() if value.ndim}
+    if len(set(lengths.values())) > 1 or any(v.ndim > 1 for v in arrays.values()):
+        shapes = ", ".join(f"{name} of shape {arrays[name].shape}" for name in lengths)
+        raise ValueError(f"{where}: expected numbers or arrays of one length, got {shapes}")
     members = next(iter(lengths.values()), 1)
     if members < 1:
-        raise ValueError("simulate_many: expected at least one member, got empty arrays")
+        raise ValueError(f"{where}: expected at least one member, got empty arrays")
+    odd = {name: np.flatnonzero(~np.isfinite(v)) for name, v in arrays.items()}
+    if bad := [f"{name} of member {rows[0]}" for name, rows in odd.items() if rows.size]:
+        raise ValueError(f"{where}: expected finite numbers, got NaN or infinity: {', '.join(bad)}")
+    every = {name: np.broadcast_to(value, (members,)) for name, value in arrays.items()}
     return (
-        {
-            group: {name: np.broadcast_to(value, (members,)) for name, value in items.items()}
-            for group, items in arrays.items()
-        },
+        {name: every[f"x0.{name}"] for name in x0},
+        {name: every[f"p.{name}"] for name in p},
         members,
     )
 
 
-def _chunk(
-    integrator: Integrator,
-    inputs: Drivers,
-    values: dict[str, dict[str, Array]],
-    rtol: float,
-    members: int,
-    first: int,
-    count: int,
-) -> Chunk:
-    """Start columns S and run data R of the members first ... first + count."""
+def _starts(
+    integrator: Integrator, t_start: float, x0: Values, p: Values, pick: slice
+) -> tuple[Array, Array]:
+    """Start values of the unknowns (members, n), algebraic ones guessed, and parameters."""
     model, system = integrator.model, integrator.system
-    pick = slice(first, min(first + count, members))
-    size = pick.stop - pick.start
-    atol = 0.1 * rtol * system.nominal
-    x, p = model.initial_states(
-        {name: v[pick] for name, v in values["x0"].items()},
-        {name: v[pick] for name, v in values["p"].items()},
-        size,
+    x, values = model.initial_states(
+        {name: v[pick] for name, v in x0.items()},
+        {name: v[pick] for name, v in p.items()},
+        _size(pick),
     )
-    t_start, t_end = float(inputs.breaks[0]), float(inputs.breaks[-1])
-    y = np.zeros((size, system.n))
-    y[:, : system.nx] = x
     guesses = {v.name: float(v.start) for v in model.z}
+    y = np.zeros((_size(pick), system.n))
+    y[:, : system.nx] = x
     for i, name in enumerate(system.names[system.nx :], start=system.nx):
-        y[:, i] = guesses.get(name, t_start if name == "t" else 0.0)
-    data = np.tile(inputs.values[:, 0], (size, 1))
-    d = np.hstack([p, data])
-    if system.algebraic[0]:
-        where = f"simulate_many of '{model.name}'"
-        y = np.vstack([consistent(system, where, y[i], d[i]) for i in range(size)])
-    column = np.full((size, 1), first_step(t_end - t_start))
-    start = np.full((size, 1), t_start)
-    growth = np.full((size, 1), GROWTH_MEMORY)
-    S = np.hstack([start, column, column, growth, np.zeros((size, 1)), y])
-    R = np.hstack(
-        [np.full((size, 1), t_end), np.full((size, 1), rtol), np.tile(atol, (size, 1)), d]
+        y[:, i] = guesses.get(name, 0.0)
+    if system.timed:
+        y[:, -1] = t_start
+    return y, values
+
+
+def _chunk(
+    inputs: Drivers,
+    tolerances: Tolerances,
+    starts: Callable[[slice], tuple[Array, Array]],
+    pick: slice,
+) -> Chunk:
+    """Start columns and run data of members."""
+    y, p = starts(pick)
+    t_start, t_end = float(inputs.breaks[0]), float(inputs.breaks[-1])
+    h = first_step(t_end - t_start)
+    memory = np.array([t_start, h, h, GROWTH_MEMORY, 0.0])
+    common = np.concatenate([[t_end, tolerances.rtol], tolerances.atol])
+    data = np.tile(inputs.values[:, 0], (y.shape[0], 1))
+    return Chunk(
+        np.hstack([np.tile(memory, (y.shape[0], 1)), y]),
+        np.hstack([np.tile(common, (y.shape[0], 1)), p, data]),
     )
-    return Chunk(S, R)
+
+
+def _identity(
+    job: Job,
+    integrator: Integrator,
+    tolerances: Tolerances,
+    starts: Callable[[slice], tuple[Array, Array]],
+    picks: dict[int, slice],
+) -> str:
+    """Hash of everything that the results depend on, and of how they are cut in chunks."""
+    parts: list[Any] = [job.digest(), tolerances.rtol, tolerances.atol, list(picks)]
+    for event, reset in zip(integrator.model.events, integrator.resets, strict=True):
+        parts += [event.name, event.direction, event.terminal, tolerances.event]
+        parts += [(name, str(function.serialize())) for name, function in reset.items()]
+    parts.append(str(integrator.events.serialize()))
+    for pick in picks.values():
+        parts.append(digest(*starts(pick)))
+    return digest(*parts)[:16]
 
 
 def _solved(
     pool: Executor | None,
-    job: Job,
-    prepare: Callable[[int, int], Chunk],
-    starts: list[int],
-    chunk: int,
-) -> Iterator[tuple[int, Solved]]:
+    workers: int | None,
+    solve: Callable[[Any], Solved],
+    prepare: Callable[[slice], Any],
+    todo: dict[int, slice],
+) -> Generator[tuple[int, Solved]]:
     """Results as they come; never more than a few chunks are under way at once."""
     if pool is None:
-        for k in starts:
-            yield k, solve_chunk(job, prepare(k, chunk))
+        for first, pick in todo.items():
+            yield first, solve(prepare(pick))
         return
     waiting: dict[Future[Solved], int] = {}
-    todo = iter(starts)
+    left, most = iter(todo.items()), 2 * (workers or cpu_count() or 1)
     try:
         while True:
-            while len(waiting) < 2 * (cpu_count() or 1) and (k := next(todo, None)) is not None:
-                waiting[pool.submit(solve_chunk, job, prepare(k, chunk))] = k
+            while len(waiting) < most and (item := next(left, None)) is not None:
+                waiting[pool.submit(solve, prepare(item[1]))] = item[0]
             if not waiting:
                 return
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
@@ -254,102 +328,3 @@ def _pool(executor: str | Executor, workers: int | None) -> Generator[Executor |
         kind = ThreadPoolExecutor if executor == "threads" else ProcessPoolExecutor
         with kind(workers or cpu_count() or 1) as pool:
             yield pool
-
-
-def _evaluated(
-    integrator: Integrator, inputs: Drivers, times: Array, result: Solved
-) -> dict[str, Array]:
-    """All signals of a chunk from its solutions (members, times, n)."""
-    size, count, n = result.y.shape
-    at = np.tile(times, size)
-    n_p = len(integrator.model.p)
-    p = np.repeat(result.p[:, :n_p], count, axis=0)
-    d = np.hstack([p, inputs.values[:, inputs.interval(at)].T])
-    values = integrator.signals.map(at.size)(at[None, :], result.y.reshape(-1, n).T, d.T).full()
-    names = list(integrator.model.signals)
-    return {name: row.reshape(size, count) for name, row in zip(names, values, strict=True)}
-
-
-@final
-class _Store:
-    """Results in memory, or in a folder of array files that fill chunk by chunk."""
-
-    def __init__(
-        self,
-        folder: str | Path | None,
-        model: Model,
-        times: Array,
-        members: int,
-        chunk: int,
-        identity: object,
-    ) -> None:
-        self._folder = None
-        self._times, self._chunk, self._members = times, chunk, members
-        shape = (members, times.size)
-        if folder is None:
-            self.signals = {name: np.full(shape, np.nan) for name in model.signals}
-        else:
-            digest = sha256(repr((identity, times.tobytes(), members, chunk)).encode())
-            self._folder = Path(folder) / digest.hexdigest()[:16]
-            self._folder.mkdir(parents=True, exist_ok=True)
-            self.signals = {
-                name: _array_file(self._folder / f"{name}.npy", shape) for name in model.signals
-            }
-        self.attempts = np.zeros(members, dtype=np.int64)
-        self.failed: dict[int, str] = {}
-
-    def _mark(self, first: int) -> Path | None:
-        return None if self._folder is None else self._folder / f"chunk-{first}.npz"
-
-    def has(self, first: int) -> bool:
-        """Whether the chunk that starts at `first` was finished before; takes it over if so."""
-        mark = self._mark(first)
-        if mark is None or not mark.exists():
-            return False
-        with np.load(mark) as saved:
-            self._note(first, saved["reason"], saved["made"], saved["reached"])
-        return True
-
-    def put(self, first: int, signals: dict[str, Array], result: Solved) -> None:
-        """Take the results of the chunk that starts at `first`."""
-        size = result.reason.size
-        for name, values in signals.items():
-            self.signals[name][first : first + size] = values
-            flush = getattr(self.signals[name], "flush", None)
-            if flush is not None:
-                flush()
-        self._note(first, result.reason, result.made, result.reached)
-        mark = self._mark(first)
-        if mark is not None:
-            with written(mark) as temporary, temporary.open("wb") as file:
-                np.savez(file, reason=result.reason, made=result.made, reached=result.reached)
-
-    def _note(
-        self, first: int, reason: NDArray[np.int64], made: NDArray[np.int64], reached: Array
-    ) -> None:
-        self.attempts[first : first + made.size] = made
-        for i in np.flatnonzero(reason):
-            status = Status.MAX_STEPS if reason[i] == 2 else Status.STEP_TOO_SMALL
-            self.failed[first + int(i)] = f"{status.value} It stands at t = {reached[i]:g} s."
-
-    def ensemble(self, model: Model, status: Status) -> Ensemble:
-        """What there is."""
-        return Ensemble(
-            model.name,
-            self._times,
-            self.signals,
-            dict(model.signals),
-            self.attempts,
-            dict(sorted(self.failed.items())),
-            status,
-        )
-
-
-def _array_file(path: Path, shape: tuple[int, int]) -> Array:
-    """Memory-mapped array file, full of NaN when it is made."""
-    if not path.exists():
-        with written(path) as temporary:
-            array = np.lib.format.open_memmap(temporary, mode="w+", dtype=float, shape=shape)
-            array[:] = np.nan
-            array.flush()
-    return np.lib.format.open_memmap(path, mode="r+")

@@ -1,8 +1,13 @@
 """Consistent start values: algebraic variables that satisfy their equations, a first step size."""
 
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.integrator.columns import Columns
 from symfric.integrator.system import System
 
 Array = NDArray[np.float64]
@@ -11,7 +16,23 @@ NEAR, CONVERGED = 1e-4, 1e-10
 """Relative Newton steps below which no damping is needed, and below which it is done."""
 
 
-def consistent(system: System, where: str, y: Array, d: Array) -> Array:
+@final
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """The algebraic equations of a system, for a worker that has nothing else of it.
+
+    Attributes:
+        names: of all unknowns.
+        algebraic: rows of the equations, columns of their unknowns.
+        constraints: as `System.constraints`.
+    """
+
+    names: tuple[str, ...]
+    algebraic: tuple[list[int], list[int]]
+    constraints: ca.Function
+
+
+def consistent(system: System | Equations, where: str, y: Array, d: Array) -> Array:
     """`y` with its algebraic unknowns solved for, by damped Newton from the given guess.
 
     Raises:
@@ -40,7 +61,56 @@ def consistent(system: System, where: str, y: Array, d: Array) -> Array:
     )
 
 
-def _newton_step(system: System, y: Array, d: Array) -> Array:
+def consistent_many(
+    system: System | Equations, together: Columns, where: str, y: Array, d: Array
+) -> tuple[Array, dict[int, str]]:
+    """Rows of `y` (members, n) with their algebraic unknowns solved for; number -> what failed.
+
+    Full Newton steps for all at once, while they shrink the residual; the others go alone.
+
+    Args:
+        system: whose algebraic equations.
+        together: its constraints, for many columns.
+        where: for messages.
+        y, d: guesses and run data, a row for each member.
+    """
+    columns, failed = system.algebraic[1], dict[int, str]()
+    if not columns:
+        return y, failed
+    guess, y, alone = y, y.copy(), list[int]()
+    todo = np.arange(y.shape[0])
+    before, last = np.full((2, todo.size), np.inf)
+    while todo.size:
+        g, J = together([y[todo], d[todo]])
+        norm = np.linalg.norm(g, axis=1)
+        step = _newton_steps(g, J)
+        size = np.max(np.abs(step) / (np.abs(y[np.ix_(todo, columns)]) + 1e-14), axis=1)
+        near = size < NEAR
+        good = np.isfinite(size) & (near | (norm < before[todo]))
+        alone += todo[~good].tolist()
+        y[np.ix_(todo[good], columns)] -= step[good]
+        done = near & ((size < CONVERGED) | (size > last[todo] / 2))
+        before[todo], last[todo] = norm, size
+        todo = todo[good & ~done]
+    for m in alone:
+        try:
+            y[m] = consistent(system, where, guess[m], d[m])
+        except ValueError as error:
+            failed[m] = str(error)
+    return y, failed
+
+
+def _newton_steps(g: Array, J: Array) -> Array:
+    """Full steps of members, NaN for all where the derivatives of one are singular."""
+    members, n = g.shape
+    matrices = J.reshape(members, n, n).transpose(0, 2, 1)  # CasADi stores column by column
+    try:
+        return np.linalg.solve(matrices, g[:, :, None])[:, :, 0].astype(float)
+    except np.linalg.LinAlgError:
+        return np.full((members, n), np.nan)
+
+
+def _newton_step(system: System | Equations, y: Array, d: Array) -> Array:
     """Full step of Newton's method, NaN where the derivatives are singular."""
     g, J = (m.full() for m in system.constraints.call([y, d]))
     try:
@@ -49,7 +119,7 @@ def _newton_step(system: System, y: Array, d: Array) -> Array:
         return np.full(g.shape[0], np.nan)
 
 
-def _descend(system: System, y: Array, d: Array, step: Array) -> bool:
+def _descend(system: System | Equations, y: Array, d: Array, step: Array) -> bool:
     """Go along `step`, in place, as far as the residual shrinks; whether it does at all."""
     columns = system.algebraic[1]
     before, start = _residual(system, y, d), y[columns].copy()
@@ -60,7 +130,7 @@ def _descend(system: System, y: Array, d: Array, step: Array) -> bool:
     return False
 
 
-def _residual(system: System, y: Array, d: Array) -> float:
+def _residual(system: System | Equations, y: Array, d: Array) -> float:
     return float(np.linalg.norm(system.constraints(y, d)[0].full()))
 
 

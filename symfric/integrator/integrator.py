@@ -94,12 +94,13 @@ class Integrator:
         if "compiled" not in self._engines:
             begin = perf_counter()
             self._engines["compiled"] = CompiledEngine.of(
-                self._step_to_compile(), self.tableau.H.shape[0]
+                self.step_to_compile(), self.tableau.H.shape[0]
             )
             self.compile_time = perf_counter() - begin
         return self._engines["compiled"]
 
-    def _step_to_compile(self) -> ca.Function:
+    def step_to_compile(self) -> ca.Function:
+        """The step in the form that compiles fast."""
         if self.step.n_instructions() <= INLINE:
             return self.step
         return build_step(self.system, self.tableau, ca.MX)
@@ -132,7 +133,7 @@ class Integrator:
             return self.compiled()
         if expected > 2 * look_up and "looked up" not in self._engines:
             self._engines["looked up"] = self.vm()
-            path = library_path(c_source(self._step_to_compile(), self.tableau.H.shape[0]))
+            path = library_path(c_source(self.step_to_compile(), self.tableau.H.shape[0]))
             if path is not None and path.exists():
                 return self.compiled()
         return self.vm()

@@ -1,6 +1,5 @@
 """Simulate a model: one call for every method and backend."""
 
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.integrator.adjoint import gradient
+from symfric.integrator.arguments import check_span, check_times
 from symfric.integrator.casadi_backend import integrate_by_peer
 from symfric.integrator.dense import Dense
 from symfric.integrator.inputs import Drivers, Input, drivers
@@ -19,13 +19,11 @@ from symfric.integrator.run import Run, Tolerances, integrate
 from symfric.integrator.sensitivity import Path, Seeds, forward, of_signals, seeds
 from symfric.integrator.tableaux import ROSENBROCK
 from symfric.integrator.trajectory import Statistics, Trajectory
-from symfric.model import Model, finite
+from symfric.model import Model
 from symfric.parameters import check_names
 from symfric.status import SolveError, Status
 
 Array = NDArray[np.float64]
-LOOSE = 1e-5
-"""Above this relative tolerance whole stick phases may be lost without a sign of it."""
 PEERS = ("rosenbrock", "sundials")
 BACKENDS = ("auto", "vm", "compiled", *PEERS)
 REMEMBERED = 16
@@ -91,7 +89,9 @@ def simulate(
     Warns:
         UserWarning: rtol above 1e-5, where stick phases may get lost.
     """
-    _check(t_start, t_end, rtol, method, backend)
+    check_span("simulate", t_start, t_end, rtol)
+    check_names("simulate: method", [method], ROSENBROCK)
+    check_names("simulate: backend", [backend], BACKENDS)
     if sensitivities and backend in PEERS:
         raise ValueError(
             f"simulate: sensitivities: expected backend auto, vm or compiled, got {backend}"
@@ -172,39 +172,12 @@ def _solve(
     return run, dense, statistics
 
 
-def _check(t_start: float, t_end: float, rtol: float, method: str, backend: str) -> None:
-    t_start, t_end = finite("simulate: t_start", t_start), finite("simulate: t_end", t_end)
-    if t_end <= t_start:
-        raise ValueError(f"simulate: expected t_end > t_start = {t_start:g} s, got {t_end:g} s")
-    if not 1e-13 <= rtol <= 0.1:
-        raise ValueError(f"simulate: expected 1e-13 <= rtol <= 0.1, got {rtol:g}")
-    check_names("simulate: method", [method], ROSENBROCK)
-    check_names("simulate: backend", [backend], BACKENDS)
-    if rtol > LOOSE:
-        warnings.warn(
-            f"simulate: rtol = {rtol:g} is above {LOOSE:g}; whole stick phases may be lost "
-            "without a sign of it, compare with a tighter run",
-            UserWarning,
-            stacklevel=3,
-        )
-
-
 def _times(t_start: float, t_end: float, t_eval: ArrayLike | None, samples: int) -> Array:
     if t_eval is None:
         if samples < 2:
             raise ValueError(f"simulate: expected samples >= 2, got {samples}")
         return np.linspace(t_start, t_end, samples)
-    times = np.asarray(t_eval, dtype=float)
-    if (
-        times.ndim != 1
-        or not times.size
-        or not (t_start <= times[0] and times[-1] <= t_end and (np.diff(times) > 0).all())
-    ):
-        raise ValueError(
-            f"simulate: t_eval: expected increasing times in [{t_start:g}, {t_end:g}] s, "
-            f"got an array of shape {times.shape}"
-        )
-    return times
+    return check_times("simulate", t_start, t_end, t_eval)
 
 
 def _integrator(model: Model, inputs: Drivers, method: str) -> tuple[Integrator, bool]:
