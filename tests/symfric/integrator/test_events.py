@@ -64,6 +64,16 @@ def test_parabola_between_two_impacts_is_right_and_the_corner_is_sharp() -> None
     assert (before, after) == pytest.approx((-sqrt(2 * G), v), rel=1e-7)
 
 
+@pytest.mark.parametrize("direction", [-1, 0])
+def test_impact_that_leaves_the_ball_a_hair_below_the_ground_is_one_event(direction: int) -> None:
+    """The reset changes only the velocity; the position is where the event was located."""
+    x, v = Variable("x", "m", start=1.0), Variable("v", "m/s")
+    bounce = Event("bounce", x.symbol, direction, reset={"v": -0.8 * v.symbol})
+    model = Model("ball", x=(x, v), ode=ca.vertcat(v.symbol, -G), events=(bounce,))
+    run = simulate(model, 2.5, rtol=1e-10)
+    assert [time for time, _ in run.happened] == pytest.approx(impacts(4, 0.8), abs=1e-8)
+
+
 def test_elastic_ball_is_no_storm() -> None:
     run = simulate(ball(1.0), 40.0, rtol=1e-10)
     assert run.status is Status.SUCCESS

@@ -105,6 +105,13 @@ def test_differential_rows_pivot_on_their_diagonal_first() -> None:
     assert sorted(lu.order[:6]) == [(i, i) for i in range(6)]
 
 
+def test_differential_rows_come_first_even_where_an_algebraic_one_fills_less() -> None:
+    values = np.array([[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [0.0, 0.0, 1.0]])
+    lu, _ = solver(values, safe=(0, 1))
+    assert sorted(lu.order[:2]) == [(0, 0), (1, 1)]
+    assert lu.order[2] == (2, 2)
+
+
 def test_differential_rows_with_large_diagonal_stay_accurate_for_tiny_steps() -> None:
     """W = M/(gamma h) - J of a DAE whose algebraic row has no entry on the diagonal."""
     values = np.array([[1e12, 0.0, 1.0], [0.0, 1e12, 2.0], [1.0, 3.0, 0.0]])

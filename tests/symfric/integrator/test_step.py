@@ -133,6 +133,16 @@ def test_end_time_is_hit_exactly(t_end: float) -> None:
     assert S[T_AT] == t_end
 
 
+def test_end_time_is_hit_where_the_sum_of_time_and_step_would_miss_it() -> None:
+    ends, starts = np.random.default_rng(1).random((2, 4000)) * [[10.0], [1.0]]
+    missed = starts + (ends - starts) != ends
+    late = missed & (ends > starts + 0.1)
+    assert late.sum() > 10
+    still = Model("still", x=(x,), ode=0 * x.symbol)
+    for t, t_end in zip(starts[late][:10], ends[late][:10], strict=True):
+        assert attempt(still, column((1.0,), t=t, h=100.0), t_end=t_end)[T_AT] == t_end
+
+
 def test_step_cut_by_the_end_does_not_forget_its_size() -> None:
     S = attempt(smooth_ode(), column((1.0, 1.0), h=0.01), t_end=1e-6)
     assert S[T_AT] == 1e-6
