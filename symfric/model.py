@@ -47,6 +47,10 @@ class Monitor:
 class Event:
     """Something that happens when an expression passes through zero.
 
+    A jump counts, of an input or by the reset of another event, if it leads beyond zero. Error
+    control does not look at the expression, and each step is looked at in quarters: one that
+    returns within a quarter of a step is not seen, unless the equations depend on it.
+
     Attributes:
         expression: in t, x, z, u, p.
         direction: +1 only rising, -1 only falling, 0 both.
