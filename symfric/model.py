@@ -66,6 +66,29 @@ class Event:
 
 
 @dataclass(frozen=True, eq=False)
+class Holonomic:
+    """What a mechanical model knows beyond its equations: constraints on its coordinates.
+
+    The states of the model begin with coordinates q and their rates q', its algebraic variables
+    with the multipliers lam of the constraints phi(q) = 0. With the accelerations a as symbols no
+    mass matrix needs to be inverted:
+
+        M a + phi_q' lam = Q,   phi_q a + (phi_q q')_q q' = 0,   further algebraic equations
+
+    Attributes:
+        n: number of coordinates.
+        phi: SX (m, 1); no rows for a tree.
+        a: SX symbols (n, 1).
+        implicit: SX (n + nz, 1), the equations above in q, q', the other states, a, z, u, p.
+    """
+
+    n: int
+    phi: ca.SX
+    a: ca.SX
+    implicit: ca.SX
+
+
+@dataclass(frozen=True, eq=False)
 class Model:
     """A dynamic system 0 = F(t, x', x, z, u, p), explicit where it can be.
 
@@ -86,6 +109,7 @@ class Model:
         monitors: expressions that error control watches besides x.
         events: what happens at zero crossings.
         t: SX symbol of time [s].
+        holonomic: constraints on coordinates, kept by the integrator on all levels.
 
     Raises:
         ValueError: all problems at once: repeated names, wrong row counts, undeclared symbols.
@@ -104,6 +128,7 @@ class Model:
     monitors: tuple[Monitor, ...] = ()
     events: tuple[Event, ...] = ()
     t: ca.SX = field(default_factory=lambda: ca.SX.sym("t"))
+    holonomic: Holonomic | None = None
 
     def __post_init__(self) -> None:
         if self.ode is not None:

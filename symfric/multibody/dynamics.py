@@ -47,7 +47,7 @@ class Loop:
 
     def reaction(self, lam: ca.SX) -> Wrench:
         """Wrench on the child at its joint point, in world components."""
-        R, own = self.relative.R_WP, lam[self.rows]
+        R, own = self.relative.R_WP, lam[self.rows, 0]
         return -R @ (self.C_v.T @ own), -R @ (self.C_w.T @ own)
 
 
@@ -65,9 +65,8 @@ def loops(kin: Kinematics) -> tuple[Loop, ...]:
             expressions, [R, p], [ca.densify(relative.R), ca.densify(relative.p)]
         )
         m = phi.numel()
-        found.append(
-            Loop(joint, slice(first, first + m), *(ca.sparsify(v) for v in values), relative)
-        )
+        C_v, C_w = (ca.sparsify(value) for value in values[1:])
+        found.append(Loop(joint, slice(first, first + m), values[0], C_v, C_w, relative))
         first += m
     return tuple(found)
 
@@ -167,7 +166,7 @@ def _project(
         base_com = kin.motion[base].p + kin.motion[base].R @ other.c
         f, m = carried[base]
         carried[base] = f + force, m + about + ca.cross(at - base_com, force)
-    q = kin.q[link.rows]
+    q = kin.q[link.rows, 0]
     R_WP = kin.motion[base].R @ link.at_base.R
     H_w, H_v = link.subspace(q)
     rows = H_w.T @ (R_WP.T @ about) + H_v.T @ (R_WP.T @ force)

@@ -80,7 +80,12 @@ class Equations:
 
 
 def equations(
-    topology: Topology, joints: Sequence[Joint], forces: Sequence[Force], kept: Sequence[int] | None
+    topology: Topology,
+    joints: Sequence[Joint],
+    forces: Sequence[Force],
+    q: ca.SX,
+    qd: ca.SX,
+    kept: Sequence[int] | None = None,
 ) -> Equations:
     """Write the equations of motion of a mechanism.
 
@@ -88,10 +93,10 @@ def equations(
         topology: tree and loops.
         joints: all joints.
         forces: all applied forces.
+        q, qd: symbols of the coordinates and their rates, shape (n, 1).
         kept: indices of the independent constraints; None keeps all.
     """
-    n = topology.n
-    q, qd, a = (ca.SX.sym(name, n) for name in ("q", "qd", "a"))
+    a = ca.SX.sym("a", topology.n)
     kin = kinematics(topology, q, qd, a)
     by_name = {joint.name: joint for joint in joints}
     closed = loops(kin)
@@ -106,7 +111,7 @@ def equations(
     loads: list[Load | Axial] = [load for f in forces for load in f.loads(kin, by_name)]
     loads += [Axial(by_name[c.joint], c.direction, c.load) for c in contacts]
     rows, world = balance(kin, loads, closed, every)
-    rows += along @ (every[phi.numel() - norms.numel() :])
+    rows += along @ (every[phi.numel() - norms.numel() :, 0])
     pushed = along.T @ a + ca.jtimes(along.T @ qd, q, qd)
     rows += along @ (weights * pushed)
     phi = phi[list(kept)]
@@ -144,7 +149,7 @@ def _contacts(kin: Kinematics, joints: Sequence[Joint]) -> list[Contact]:
             name = joint.name if len(directions) == 1 else f"{joint.name}_{direction}"
             slip = kin.along(joint, direction)[1]
             if direction == "turn":
-                slip = joint.friction.radius * slip
+                slip = joint.friction.arm * slip
             symbol = ca.SX.sym(f"{name}_friction")
             found.append(Contact(name, joint.name, direction, joint.friction, slip, symbol))
     return found

@@ -133,7 +133,7 @@ class SpringDamper(Force):
         yield Load(body_of(self.b), -pull, p_b)
 
     def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
-        """stiffness (l - free_length)^2 / 2."""
+        """Stiffness (l - free_length)^2 / 2."""
         d = kin.point(self.b)[0] - kin.point(self.a)[0]
         if equals(self.free_length, 0.0):
             return self.stiffness * ca.dot(d, d) / 2
@@ -172,7 +172,7 @@ class JointSpringDamper(Force):
         yield Axial(joint, self.direction, f)
 
     def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
-        """stiffness (s - rest)^2 / 2."""
+        """Stiffness (s - rest)^2 / 2."""
         if equals(self.stiffness, 0.0):
             return ca.SX(0)
         s, _ = kin.along(joints[self.joint], self.direction)

@@ -68,6 +68,11 @@ class JointFriction:
             if not is_number(value) or not (value > 0 or (value == 0 and not strict)):
                 yield f"{name}: expected a number {'>' if strict else '>='} 0, got {value!r}"
 
+    @property
+    def arm(self) -> Scalar:
+        """The bearing's radius [m]; 1 for friction along z only."""
+        return 1.0 if self.radius is None else self.radius
+
     def magnitude(self, *components: ca.SX) -> ca.SX:
         """Smooth length of a force with these components [N]."""
         squares = sum((f * f for f in components), start=self.eps * self.eps)
@@ -85,12 +90,13 @@ class JointFriction:
         if self.normal is not None:
             return ca.SX(self.normal)
         fx1, fy1, fx2, fy2 = self.stations(F, T)
-        forces = [(fx1, fy1), (fx2, fy2)] if turns else [(fx1,), (fy1,), (fx2,), (fy2,)]
-        if turns and not slides:
-            forces.append((F[2],))
-        if not turns and self.width is not None:
-            f3 = T[2] / self.width
-            forces = [(fx1 + f3,), *forces[1:], (f3,)]
+        f3 = ca.SX(0) if turns or self.width is None else T[2] / self.width
+        forces: list[tuple[ca.SX, ...]]
+        if turns:
+            thrust = ca.SX(0) if slides else F[2]
+            forces = [(fx1, fy1), (fx2, fy2), (thrust,)]
+        else:
+            forces = [(fx1 + f3,), (fy1,), (fx2,), (fy2,), (f3,)]
         pressing = [f for f in forces if not ca.vertcat(*f).is_zero()]
         return sum((self.magnitude(*f) for f in pressing), start=ca.SX(self.preload))
 
@@ -119,4 +125,4 @@ class Contact:
     @property
     def load(self) -> ca.SX:
         """Force [N] along z or moment [N m] about z on the child."""
-        return -self.F if self.direction == "slide" else -self.friction.radius * self.F
+        return -self.F if self.direction == "slide" else -self.friction.arm * self.F

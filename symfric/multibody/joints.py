@@ -186,7 +186,7 @@ class Spherical(Joint):
         return rotation(q), ca.SX(3, 1)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """w = 2 E q'."""
+        """W = 2 E q'."""
         return 2 * euler_e(q), ca.SX(3, 4)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
@@ -197,7 +197,7 @@ class Spherical(Joint):
 @final
 @dataclass(frozen=True, eq=False)
 class Universal(Joint):
-    """Turns about x of the parent and about y of the child, which stay orthogonal; 4 constraints."""
+    """Turns about x of the parent and y of the child, which stay orthogonal; 4 constraints."""
 
     coordinates: ClassVar[tuple[tuple[str, str], ...]] = (("x", "rad"), ("y", "rad"))
     constrains: ClassVar[int] = 4
@@ -275,7 +275,7 @@ class Free(Joint):
         return rotation(q[3:]), q[:3]
 
     def subspace(self, q: ca.SX) -> Pair:
-        """v = q[:3]', w = 2 E q[3:]'."""
+        """V = q[:3]', w = 2 E q[3:]'."""
         return (
             ca.horzcat(ca.SX(3, 3), 2 * euler_e(q[3:])),
             ca.horzcat(ca.SX.eye(3), ca.SX(3, 4)),

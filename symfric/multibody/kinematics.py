@@ -17,7 +17,8 @@ from symfric.multibody.topology import Link, Topology, body_of, frame_at
 @dataclass(frozen=True, eq=False)
 class Motion:
     """Motion of a body: pose R_WB, p_WB of its origin; angular velocity w, velocity v of the origin
-    and their derivatives dw, dv."""
+    and their derivatives dw, dv.
+    """
 
     R: ca.SX
     p: ca.SX
@@ -119,7 +120,7 @@ def kinematics(topology: Topology, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> Kinematic
 
 def _carried(base: Motion, link: Link, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> Motion:
     """Motion of the body of `link`, given that of its base."""
-    q, qd, qdd = q[link.rows], qd[link.rows], qdd[link.rows]
+    q, qd, qdd = q[link.rows, 0], qd[link.rows, 0], qdd[link.rows, 0]
     R, p = link.pose(q)
     H_w, H_v = link.subspace(q)
     drift_w, drift_v = (ca.sparsify(ca.jtimes(H @ qd, q, qd)) for H in (H_w, H_v))
@@ -139,4 +140,3 @@ def _carried(base: Motion, link: Link, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> Motio
         dw,
         dv + ca.cross(dw, to_body) + ca.cross(w, ca.cross(w, to_body)),
     )
-

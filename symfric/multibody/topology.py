@@ -114,9 +114,7 @@ def spanning_tree(bodies: Mapping[str, Body], joints: Sequence[Joint]) -> Topolo
     return Topology(bodies, _numbered(links), tuple(rest))
 
 
-def absolute(
-    bodies: Mapping[str, Body], joints: Sequence[Joint], names: Sequence[str]
-) -> Topology:
+def absolute(bodies: Mapping[str, Body], joints: Sequence[Joint], names: Sequence[str]) -> Topology:
     """Every body free, with Euler parameters at its centre of mass; every joint closes a loop."""
     links = [
         Link(

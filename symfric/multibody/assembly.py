@@ -1,0 +1,221 @@
+"""From the equations of a mechanism to a `Model`.
+
+Accelerations are eliminated: a = -M^-1 (balance at a = 0). For bodies that hang freely on the
+ground (absolute coordinates) the inverse has a closed form,
+
+    M^-1 = diag(I/m, E' J_W^-1 E / 4 + p p' / weight),
+
+with J_W the inertia in world components; otherwise M is factorised as L D L'. The multipliers of
+loops and those normal forces that depend on reactions are algebraic variables.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+import numpy as np
+
+from symfric.laws import Law
+from symfric.model import Event, Holonomic, Model, Monitor, Output, Variables
+from symfric.multibody.body import GROUND
+from symfric.multibody.equations import Equations
+from symfric.multibody.friction import Contact
+from symfric.multibody.joints import Free
+from symfric.multibody.spatial import euler_e
+from symfric.multibody.topology import Topology
+from symfric.parameters import Variable
+
+NONE = ca.SX(0, 1)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Slip:
+    """A contact as the model sees it.
+
+    Attributes:
+        unknown: its normal force as algebraic variable, where it depends on the reactions and the
+            law depends on it.
+        N: normal force as the law gets it.
+        normal: the expression of it in terms of accelerations and multipliers.
+        states, rate: of the law.
+        force: friction force [N].
+    """
+
+    contact: Contact
+    unknown: Variables
+    N: ca.SX
+    normal: ca.SX
+    states: Variables
+    rate: ca.SX
+    force: ca.SX
+
+
+def coordinates(topology: Topology) -> tuple[Variables, Variables]:
+    """Joint coordinates and their rates as variables of a model."""
+    q: list[Variable] = []
+    qd: list[Variable] = []
+    for link in topology.links:
+        joint = link.joint
+        quaternion = range(0) if joint.quaternion is None else range(joint.quaternion, link.n)
+        given = zip(joint.coordinates, joint.starts, joint.rates, strict=True)
+        for i, ((suffix, unit), start, rate) in enumerate(given):
+            name = f"{joint.name}_{suffix}" if suffix else joint.name
+            per_second = "1/s" if i in quaternion else f"{unit}/s"
+            q.append(Variable(name, unit, start=start, doc="joint coordinate"))
+            qd.append(Variable(f"{name}_rate", per_second, start=rate, doc="joint rate"))
+    return tuple(q), tuple(qd)
+
+
+def depends_on_load(law: Law) -> bool:
+    """Whether friction force or states of `law` depend on the normal force."""
+    N, z = ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
+    v = ca.SX.sym("v")
+    return ca.depends_on(ca.vertcat(law.force(v, N, z), law.rate(v, N, z)), N)
+
+
+def solve_mass(eq: Equations, right: ca.SX) -> ca.SX:
+    """M^-1 right."""
+    topology = eq.kin.topology
+    free = [isinstance(link.joint, Free) and link.base == GROUND for link in topology.links]
+    if not all(free) or not free:
+        D, L, order = ca.ldl(eq.mass)
+        return ca.ldl_solve(ca.densify(right), D, L, order) if eq.n else right
+    rows: list[ca.SX] = []
+    for link in topology.links:
+        body, own = topology.bodies[link.body], right[link.rows, 0]
+        p, R = eq.q[link.rows, 0][3:], eq.kin.motion[link.body].R
+        weight = ca.trace(body.J)
+        turning = euler_e(p).T @ (R @ ca.solve(body.J, R.T @ (euler_e(p) @ own[3:])))
+        rows.append(own[:3] / body.mass)
+        rows.append(turning / 4 + p * (ca.dot(p, own[3:]) / weight))
+    return ca.vertcat(*rows)
+
+
+def slips(eq: Equations, normal_at_start: Sequence[float]) -> tuple[Slip, ...]:
+    """Friction laws at work in all contacts."""
+    found: list[Slip] = []
+    unknowns: dict[str, Variable] = {}
+    for contact, normal, start in zip(eq.contacts, eq.normals, normal_at_start, strict=True):
+        law, joint = contact.friction.law, contact.joint
+        unknown: Variables = ()
+        pressing = normal
+        if ca.depends_on(normal, ca.vertcat(eq.a, eq.lam, eq.F)) and depends_on_load(law):
+            if joint not in unknowns:
+                scale = max(1.0, abs(start))
+                made = Variable(f"{joint}_N", "N", start=start, nominal=scale, doc="normal force")
+                unknowns[joint], unknown = made, (made,)
+            pressing = unknowns[joint].symbol
+        steady = ca.SX(law.steady_state(contact.slip, start))
+        states = tuple(
+            Variable(f"{contact.name}_{s.name}", s.unit, start=steady[i], nominal=s.nominal)
+            for i, s in enumerate(law.states)
+        )
+        z = ca.vertcat(NONE, *(s.symbol for s in states))
+        rate, force = law.rate(contact.slip, pressing, z), law.force(contact.slip, pressing, z)
+        found.append(Slip(contact, unknown, pressing, normal, states, ca.SX(rate), ca.SX(force)))
+    return tuple(found)
+
+
+def assemble(
+    name: str,
+    eq: Equations,
+    q: Variables,
+    qd: Variables,
+    labels: Sequence[str],
+    guess: Mapping[str, np.ndarray],
+    p: Variables,
+    u: Variables,
+) -> Model:
+    """The model of a mechanism.
+
+    Args:
+        eq: its equations, in the symbols of q and qd.
+        labels: names of the multipliers.
+        guess: multipliers "lam" and normal forces "N" without friction, at the start.
+    """
+    contacts = slips(eq, guess["N"].tolist())
+    multipliers = tuple(
+        Variable(label, "", start=float(x), nominal=max(1.0, abs(float(x))), doc="multiplier")
+        for label, x in zip(labels, guess["lam"], strict=True)
+    )
+    pressed = [s for s in contacts if s.unknown]
+    forces = ca.vertcat(NONE, *(s.force for s in contacts))
+    symbols = ca.vertcat(NONE, *(v.symbol for v in multipliers))
+    before, after = ca.vertcat(eq.lam, eq.F), ca.vertcat(symbols, forces)
+    balance, normals, phi_ddot = ca.substitute(
+        [eq.balance, ca.vertcat(NONE, *(s.normal - s.N for s in pressed)), eq.phi_ddot],
+        [before],
+        [after],
+    )
+    acceleration = solve_mass(eq, -ca.substitute(balance, eq.a, ca.SX.zeros(eq.n)))
+    algebraic = ca.vertcat(phi_ddot, normals)
+    rates = ca.vertcat(NONE, *(s.rate for s in contacts))
+    qd_column = ca.vertcat(NONE, *(v.symbol for v in qd))
+    return Model(
+        name=name,
+        x=(*q, *qd, *(v for s in contacts for v in s.states)),
+        z=(*multipliers, *(v for s in contacts for v in s.unknown)),
+        u=u,
+        p=p,
+        ode=ca.vertcat(qd_column, acceleration, rates),
+        alg=ca.substitute(algebraic, eq.a, acceleration),
+        outputs=_outputs(eq, contacts, before, after, acceleration),
+        monitors=tuple(m for s in contacts for m in _monitor(s, p)),
+        events=tuple(e for s in contacts for e in _switches(s, qd)),
+        holonomic=Holonomic(eq.n, eq.phi, eq.a, ca.vertcat(balance, algebraic)),
+    )
+
+
+def _monitor(slip: Slip, p: Variables) -> tuple[Monitor, ...]:
+    """The sliding velocity on the scale of the law, at the start values of `p`."""
+    symbols = ca.vertcat(NONE, *(v.symbol for v in p))
+    values = ca.vertcat(NONE, *(v.start for v in p))
+    law = slip.contact.friction.law
+    scale = float(ca.DM(ca.substitute(ca.SX(law.velocity_scale), symbols, ca.SX(values))))
+    return (Monitor(slip.contact.slip, scale),) if np.isfinite(scale) else ()
+
+
+def _switches(slip: Slip, qd: Variables) -> tuple[Event, ...]:
+    """Mode changes of the law, with its states under their names in the model."""
+    contact = slip.contact
+    z = ca.vertcat(NONE, *(s.symbol for s in slip.states))
+    rest = {v.name: 0.0 for v in qd if v.name == f"{contact.name}_rate"}
+    return tuple(
+        Event(
+            f"{contact.name}_{s.name}",
+            s.expression,
+            s.direction,
+            reset={f"{contact.name}_{state}": value for state, value in s.reset.items()}
+            | (rest if s.halts else {}),
+        )
+        for s in contact.friction.law.switches(contact.slip, slip.N, z)
+    )
+
+
+def _outputs(
+    eq: Equations, contacts: Sequence[Slip], before: ca.SX, after: ca.SX, acceleration: ca.SX
+) -> dict[str, Output]:
+    """Results of the contacts, energies, and what is left of the constraints."""
+    found: dict[str, Output] = {}
+    norms = (("phi", eq.phi, "m"), ("phi_dot", eq.phi_dot, "m/s"), ("phi_ddot", eq.phi_ddot, ""))
+    expressions = [*(s.normal for s in contacts), *(x for _, x, _ in norms)]
+    expressions = ca.substitute(expressions, [before], [after])
+    expressions = ca.substitute(expressions, [eq.a], [acceleration])
+    for slip, normal in zip(contacts, expressions, strict=False):
+        contact, name = slip.contact, slip.contact.name
+        if slip.N is slip.normal:
+            found[f"{contact.joint}_N"] = Output(normal, "N", "normal force")
+        found[f"{name}_slip"] = Output(contact.slip, "m/s", "sliding velocity")
+        found[f"{name}_friction"] = Output(slip.force, "N", "friction force opposing the slip")
+        power = slip.force * contact.slip
+        found[f"{name}_power"] = Output(power, "W", "power taken by friction")
+    found["kinetic"] = Output(eq.kinetic, "J", "kinetic energy")
+    found["potential"] = Output(eq.potential, "J", "potential energy")
+    found["energy"] = Output(eq.kinetic + eq.potential, "J", "kinetic and potential energy")
+    if eq.m:
+        for (label, _, unit), value in zip(norms, expressions[len(contacts) :], strict=True):
+            norm = ca.sqrt(ca.sumsqr(value))
+            found[label] = Output(norm, unit, "norm of the constraints on this level")
+    return found

@@ -1,0 +1,167 @@
+"""What can be wrong with a mechanism: names, numbers, connections, start values, redundancy."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.multibody.body import GROUND, Body
+from symfric.multibody.forces import Force
+from symfric.multibody.joints import Joint
+from symfric.multibody.topology import Topology, body_of
+from symfric.numeric import is_number, is_symbolic
+
+Array = NDArray[np.float64]
+Position = Callable[[Array], tuple[ca.DM, ca.DM]]
+"""q -> (phi, Phi_q) as numbers."""
+FITS = 1e-8
+"""Largest violation of a constraint at the start [m, m/s]."""
+RANK = 1e-9
+"""Singular values below this times the largest count as zero."""
+
+
+def naming(
+    bodies: Sequence[Body], joints: Sequence[Joint], forces: Sequence[Force]
+) -> Iterator[str]:
+    """Names that are repeated or no C identifiers, places and joints that do not exist."""
+    names = [("body", b.name) for b in bodies] + [("joint", j.name) for j in joints]
+    names += [("force", f.name) for f in forces]
+    every = [name for _, name in names]
+    for kind, name in names:
+        if not (name.isascii() and name.isidentifier()):
+            yield f"{kind} '{name}': expected a name that is a C identifier"
+        if every.count(name) > 1:
+            yield f"{kind} '{name}': expected every name once"
+    known = {b.name: b for b in bodies}
+    for joint in joints:
+        for end in (joint.parent, joint.child):
+            yield from _place(f"joint '{joint.name}'", end, known)
+        if body_of(joint.parent) == body_of(joint.child):
+            yield f"joint '{joint.name}': expected two bodies, got {joint.parent} twice"
+    for force in forces:
+        for end in force.places():
+            yield from _place(f"force '{force.name}'", end, known)
+        for name in force.joints():
+            if name not in [j.name for j in joints]:
+                yield f"force '{force.name}': expected a joint, got {name}"
+
+
+def _place(where: str, place: str, bodies: Mapping[str, Body]) -> Iterator[str]:
+    body, _, frame = place.partition(".")
+    if body not in bodies:
+        near = get_close_matches(body, list(bodies), n=1, cutoff=0.4)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        yield f"{where}: expected a body, got {body}{hint}"
+    elif frame not in bodies[body].frames:
+        near = [name for name in bodies[body].frames if name]
+        yield f"{where}: expected one of the frames {', '.join(near) or '(none)'}, got {place}"
+
+
+def numbers(bodies: Sequence[Body], joints: Sequence[Joint], p: ca.SX, v: ca.DM) -> Iterator[str]:
+    """Masses, inertias, friction and start values that cannot be."""
+    for body in bodies:
+        if body.name != GROUND:
+            yield from (f"body '{body.name}' > {text}" for text in body.problems(p, v))
+    for joint in joints:
+        n = len(joint.coordinates)
+        for what, given in (("start", joint.start), ("rate", joint.rate)):
+            values = joint.starts if what == "start" else joint.rates
+            if given is not None and len(values) != n:
+                yield f"joint '{joint.name}' > {what}: expected {n} numbers, got {len(values)}"
+            bad = [x for x in values if not is_symbolic(x) and not _finite(x)]
+            if bad:
+                yield f"joint '{joint.name}' > {what}: expected finite numbers, got {bad[0]!r}"
+        if joint.friction is not None:
+            for text in joint.friction.problems(joint.slides, joint.turns):
+                yield f"joint '{joint.name}' > friction: {text}"
+
+
+def _finite(x: object) -> bool:
+    return is_number(x) and bool(np.isfinite(float(x)))  # type: ignore[arg-type]
+
+
+def connected(bodies: Sequence[Body], topology: Topology) -> Iterator[str]:
+    """Bodies that hang on nothing."""
+    hung = {GROUND, *(link.body for link in topology.links)}
+    for body in bodies:
+        if body.name not in hung:
+            yield (
+                f"body '{body.name}': expected joints with coordinates that lead to the ground, "
+                "found none; a Free joint lets it move freely"
+            )
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Rank:
+    """Which constraints determine the motion.
+
+    Attributes:
+        kept: indices of independent constraints.
+        redundant: indices of the others.
+        undetermined: multiplier combinations without effect on the motion, shape (m, k).
+        singular: whether the rank falls at the start position itself.
+    """
+
+    kept: tuple[int, ...]
+    redundant: tuple[int, ...]
+    undetermined: Array
+    singular: bool
+
+
+def rank(at: Position, q: Array) -> Rank:
+    """Independent constraints near q, by elimination with full pivoting.
+
+    Args:
+        at: q -> (phi, Phi_q).
+    """
+    here = at(q)[1].full()
+    near = here
+    rng = np.random.default_rng(0)
+    for size in (1e-3, 1e-2):
+        guess = project(at, q + size * rng.standard_normal(q.size))
+        if guess is not None:
+            other = at(guess)[1].full()
+            near = other if _rank(other) > _rank(near) else near
+    u, s, _ = np.linalg.svd(near)
+    r = int((s > RANK * max(1.0, s[0])).sum()) if s.size else 0
+    kept = tuple(sorted(_independent(near, r)))
+    redundant = tuple(i for i in range(near.shape[0]) if i not in kept)
+    return Rank(kept, redundant, u[:, r:], _rank(here) < r)
+
+
+def _rank(A: Array) -> int:
+    return int(np.linalg.matrix_rank(A, tol=RANK * max(1.0, float(np.abs(A).max(initial=0.0)))))
+
+
+def _independent(A: Array, r: int) -> list[int]:
+    """Indices of r independent rows: Gram-Schmidt, each time the row with most left.
+
+    Of equal rows the first is taken, so that the joints named first are kept whole.
+    """
+    left, chosen = A.copy(), list[int]()
+    for _ in range(r):
+        size = np.linalg.norm(left, axis=1)
+        i = int(np.argmax(size > 0.5 * size.max()))
+        chosen.append(i)
+        direction = left[i] / size[i]
+        left -= np.outer(left @ direction, direction)
+    return chosen
+
+
+def project(at: Position, q: Array, iterations: int = 30) -> Array | None:
+    """The nearest q that satisfies the constraints, by Gauss-Newton; None if there is none near."""
+    for _ in range(iterations):
+        phi, J = (m.full() for m in at(q))
+        if not phi.size or np.abs(phi).max() < 1e-13:
+            return q
+        step = np.linalg.lstsq(J, phi[:, 0], rcond=1e-10)[0]
+        if not np.isfinite(step).all():
+            return None
+        q = q - step
+    phi = at(q)[0].full()
+    return q if np.abs(phi).max() < FITS else None

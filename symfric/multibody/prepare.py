@@ -1,0 +1,206 @@
+"""Equations of a mechanism with variables, consistent start values and independent constraints."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.model import Variables
+from symfric.multibody import checks
+from symfric.multibody.assembly import coordinates
+from symfric.multibody.equations import Equations, equations
+from symfric.multibody.forces import Force
+from symfric.multibody.joints import Joint
+from symfric.multibody.spatial import euler_parameters
+from symfric.multibody.topology import Topology
+
+Array = NDArray[np.float64]
+NONE = ca.SX(0, 1)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Equations with their variables and start values.
+
+    Attributes:
+        eq: equations without redundant constraints.
+        q, qd: coordinates and rates with consistent start values.
+        q0, qd0: the same as numbers.
+        labels: names of the multipliers.
+        redundant: names of the constraints that were left out.
+        undetermined: joints whose normal force redundant constraints leave open.
+        singular: whether constraints that are independent nearby are not at the start.
+    """
+
+    eq: Equations
+    q: Variables
+    qd: Variables
+    q0: Array
+    qd0: Array
+    labels: tuple[str, ...]
+    redundant: tuple[str, ...]
+    undetermined: tuple[str, ...] = ()
+    singular: bool = False
+
+
+def start_problems(made: Prepared, p: ca.SX, values: ca.DM) -> Iterator[str]:
+    """Start positions or velocities that violate constraints; offers the nearest that fit."""
+    at = numeric(made.eq, p, values)
+    phi, J = (m.full() for m in at(made.q0))
+    if not phi.size:
+        return
+    worst = int(np.abs(phi).argmax())
+    if abs(phi[worst, 0]) > checks.FITS:
+        near = checks.project(at, made.q0)
+        offer = "no position near it does"
+        if near is not None:
+            pairs = zip(made.q, near, strict=True)
+            offer = "near it " + ", ".join(f"{v.name} = {x:.10g}" for v, x in pairs)
+        yield (
+            f"start: expected positions that satisfy {made.labels[worst]}, got "
+            f"{phi[worst, 0]:.3g}; {offer}; `assembled()` takes it"
+        )
+        return
+    speed = J @ made.qd0
+    worst = int(np.abs(speed).argmax())
+    if abs(speed[worst]) > checks.FITS * max(1.0, float(np.abs(made.qd0).max())):
+        near = made.qd0 - np.linalg.lstsq(J, speed, rcond=None)[0]
+        pairs = zip(made.qd, near, strict=True)
+        yield (
+            f"start: expected velocities that satisfy {made.labels[worst]}, got "
+            f"{speed[worst]:.3g}; near it "
+            + ", ".join(f"{v.name} = {x:.10g}" for v, x in pairs)
+            + "; `assembled()` takes it"
+        )
+
+
+def in_absolute_coordinates(
+    topology: Topology,
+    tree: Prepared,
+    joints: Sequence[Joint],
+    forces: Sequence[Force],
+    p: ca.SX,
+    values: ca.DM,
+) -> Prepared:
+    """The same mechanism in absolute coordinates, from the same start."""
+    kin = tree.eq.kin
+    starts: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {}
+    for link in topology.links:
+        motion, body = kin.motion[link.body], topology.bodies[link.body]
+        com, velocity = motion.point(body.c)
+        numbers = ca.Function("pose", [tree.eq.q, tree.eq.qd, p],
+                              [motion.R, com, velocity, motion.w])  # fmt: skip
+        R, r, v, w = numbers(tree.q0, tree.qd0, values)
+        e = euler_parameters(R)
+        # p' = E' w / 2
+        E = np.hstack([-e[1:].full(), _skew(e[1:]) + float(e[0]) * np.eye(3)])
+        rate = E.T @ w.full().ravel() / 2
+        starts[link.body] = (
+            (*r.full().ravel().tolist(), *e.full().ravel().tolist()),
+            (*v.full().ravel().tolist(), *rate.tolist()),
+        )
+    links = tuple(
+        replace(link, joint=replace(link.joint, start=starts[link.body][0],
+                                    rate=starts[link.body][1]))
+        for link in topology.links
+    )  # fmt: skip
+    topology = replace(topology, links=links)
+    q, qd = coordinates(topology)
+    return written(topology, joints, forces, q, qd, p, values)
+
+
+def without_friction(made: Prepared, p: Variables, u: Variables) -> dict[str, Array]:
+    """Multipliers and normal forces at the start if there were no friction."""
+    eq = made.eq
+    unknowns = ca.vertcat(eq.a, eq.lam)
+    rows = ca.vertcat(eq.balance, eq.phi_ddot)
+    zero = [ca.SX.zeros(eq.F.numel()), ca.SX(ca.vertcat(NONE, *(v.start for v in u)))]
+    symbols = [eq.F, ca.vertcat(NONE, *(v.symbol for v in u))]
+    rows, normals = ca.substitute([rows, ca.vertcat(NONE, *eq.normals)], symbols, zero)
+    solve = ca.Function(
+        "start",
+        [unknowns, eq.q, eq.qd, ca.vertcat(NONE, *(v.symbol for v in p))],
+        [rows, ca.jacobian(rows, unknowns), normals],
+    )
+    values = ca.DM(ca.vertcat(NONE, *(v.start for v in p)))
+    x = np.zeros(unknowns.numel())
+    right, matrix, _ = solve(x, made.q0, made.qd0, values)
+    x = -np.linalg.lstsq(matrix.full(), right.full()[:, 0], rcond=None)[0]
+    loads = solve(x, made.q0, made.qd0, values)[2].full().ravel()
+    return {"lam": x[eq.n :], "N": loads}
+
+
+def _skew(a: ca.DM) -> Array:
+    x, y, z = (float(v) for v in a.full().ravel())
+    return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+
+
+def numeric(eq: Equations, p: ca.SX, values: ca.DM) -> checks.Position:
+    """Q -> (phi, Phi_q) at the start values of the parameters."""
+    both = ca.Function("at", [eq.q, p], [eq.phi, ca.densify(eq.Phi_q)])
+
+    def at(q: Array) -> tuple[ca.DM, ca.DM]:
+        phi, jacobian = both.call([q, values])
+        return phi, jacobian
+
+    return at
+
+
+def written(
+    topology: Topology,
+    joints: Sequence[Joint],
+    forces: Sequence[Force],
+    q: Variables,
+    qd: Variables,
+    p: ca.SX,
+    values: ca.DM,
+) -> Prepared:
+    """Equations of independent constraints."""
+    q_symbols, qd_symbols = (ca.vertcat(NONE, *(v.symbol for v in g)) for g in (q, qd))
+    starts = (ca.vertcat(NONE, *(v.start for v in g)) for g in (q, qd))
+    q0, qd0 = (ca.DM(ca.substitute(s, p, ca.SX(values))).full().ravel() for s in starts)
+    eq = equations(topology, joints, forces, q_symbols, qd_symbols)
+    labels = labels_of(eq)
+    made = Prepared(eq, q, qd, q0, qd0, labels, ())
+    if not eq.m:
+        return made
+    found = checks.rank(numeric(eq, p, values), q0)
+    if not found.redundant:
+        return replace(made, singular=found.singular)
+    return replace(
+        made,
+        eq=equations(topology, joints, forces, q_symbols, qd_symbols, found.kept),
+        labels=tuple(labels[i] for i in found.kept),
+        redundant=tuple(labels[i] for i in found.redundant),
+        undetermined=_undetermined(made, found.undetermined, p, values),
+        singular=found.singular,
+    )
+
+
+def _undetermined(made: Prepared, free: Array, p: ca.SX, values: ca.DM) -> tuple[str, ...]:
+    """Joints whose normal force changes with combinations `free` of the multipliers."""
+    eq, rng = made.eq, np.random.default_rng(1)
+    normals = ca.vertcat(NONE, *eq.normals)
+    slope = ca.Function(
+        "slope", [eq.q, eq.qd, eq.a, eq.lam, p], [ca.densify(ca.jacobian(normals, eq.lam))],
+        {"allow_free": True},
+    )  # fmt: skip
+    some = rng.standard_normal(eq.n), rng.standard_normal(eq.m)
+    change = np.abs(slope.call([made.q0, made.qd0, *some, values])[0].full() @ free).max(axis=1)
+    return tuple(c.joint for c, x in zip(eq.contacts, change, strict=True) if x > 1e-7)
+
+
+def labels_of(eq: Equations) -> tuple[str, ...]:
+    """Names of the multipliers: joint and number, body and "norm"."""
+    labels: list[str] = []
+    for loop in eq.loops:
+        m = loop.phi.numel()
+        labels += [f"{loop.joint.name}_lambda" + (f"_{i + 1}" if m > 1 else "") for i in range(m)]
+    for link in eq.kin.topology.links:
+        if link.joint.quaternion is not None:
+            labels.append(f"{link.joint.name}_norm")
+    return tuple(labels)
