@@ -3,6 +3,7 @@
 from functools import cache
 
 import casadi as ca
+from dynamic_cases import DYNAMIC
 
 from symfric import (
     ALL_LAWS,
@@ -30,6 +31,7 @@ SYMMETRIC: dict[str, Law] = {
     "dahl, n 0.5": Dahl(n=0.5),
     "lugre, delta 0.78, viscous": LuGre(delta=0.78, sigma_2=0.4, v_eps=1e-6),
     "coulomb+viscous": Sum((Coulomb(), Viscous())),
+    **DYNAMIC,
     "lugre+dahl": Sum((LuGre(), Dahl())),
     "load_dependent(lugre)": LoadDependent(LuGre(), N_0=2.0, c=0.5),
 }

@@ -1,25 +1,42 @@
 """Small machines that the tests drive laws with."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
 
 import casadi as ca
 
 from symfric import Law, Model, Output, Variable
-from symfric.scenes import friction_states
+from symfric.scenes.base import contact
 
 
 def prescribed_motion(law: Law, N: float, velocity: Callable[[ca.SX], ca.SX]) -> Model:
-    """`law` slid with the given velocity of time from unloaded bristles: path, work, friction."""
+    """`law` slid with the given velocity of time from the unloaded law: path, work, friction."""
     path = Variable("path", "m", nominal=1e-5)
     work = Variable("work", "J", nominal=1e-5)
-    bristles, z = friction_states(law, 0.0, N)
     t = ca.SX.sym("t")
     v = velocity(t)
-    F = law.force(v, N, z)
+    slip = contact(law, v, N, (), rest={})
+    rest = law.steady_state(0.0, N)
+    states = tuple(replace(s, start=float(rest[i])) for i, s in enumerate(slip.states))
     return Model(
         "rig",
-        x=(path, work, *bristles),
-        ode=ca.vertcat(v, F * v, law.rate(v, N, z)),
-        outputs={"friction": Output(F, "N"), "v": Output(v, "m/s")},
+        x=(path, work, *states),
+        ode=ca.vertcat(v, slip.force * v, slip.rate),
+        events=slip.events,
+        outputs={"friction": Output(slip.force, "N"), "v": Output(v, "m/s")},
         t=t,
     )
+
+
+def through(points: Sequence[float], leg: float) -> Callable[[ca.SX], ca.SX]:
+    """Velocity of a motion through `points`, at rest in each, `leg` seconds between them."""
+
+    def velocity(t: ca.SX) -> ca.SX:
+        v = ca.SX(0)
+        for i, (a, b) in enumerate(pairwise(points)):
+            half_sine = (b - a) * ca.pi / (2 * leg) * ca.sin(ca.pi * (t / leg - i))
+            v = ca.if_else(ca.logic_and(t >= i * leg, t < (i + 1) * leg), half_sine, v)
+        return v
+
+    return velocity

@@ -4,9 +4,7 @@ from re import fullmatch
 
 from symfric.laws.base import Law
 from symfric.laws.compose import Asymmetric, LoadDependent, Sum
-from symfric.laws.dynamic.dahl import Dahl
-from symfric.laws.dynamic.elasto_plastic import ElastoPlastic
-from symfric.laws.dynamic.lugre import LuGre, LuGreNormalised, LuGrePassive
+from symfric.laws.dynamic import DYNAMIC_LAWS
 from symfric.laws.static.brown_mcphee import BrownMcPhee
 from symfric.laws.static.coulomb import Coulomb, Viscous
 from symfric.laws.static.self_tuning import SelfTuning
@@ -19,11 +17,7 @@ ALL_LAWS: dict[str, type[Law]] = {
     "stribeck": Stribeck,
     "brown_mcphee": BrownMcPhee,
     "self_tuning": SelfTuning,
-    "dahl": Dahl,
-    "lugre": LuGre,
-    "lugre_normalised": LuGreNormalised,
-    "lugre_passive": LuGrePassive,
-    "elasto_plastic": ElastoPlastic,
+    **DYNAMIC_LAWS,
 }
 """Every law that stands alone, by name; the contract tests run over it."""
 

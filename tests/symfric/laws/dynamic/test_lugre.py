@@ -9,6 +9,7 @@ from oracles import stribeck_curve
 from rigs import prescribed_motion
 
 from symfric import Dahl, LuGre, Trajectory, drive, simulate
+from symfric.laws import LuGreNormalised, LuGrePassive
 
 N = 7.848
 
@@ -101,3 +102,58 @@ def test_smoothing_above_the_creep_stretches_the_bristle_beyond_break_away() -> 
         model = prescribed_motion(LuGre(v_eps=v_eps), N, lambda t: ca.SX(creep))
         run = simulate(model, 200.0, rtol=1e-8, samples=2)
         assert run.final["z"] * 1e5 == pytest.approx(expected * limit, rel=1e-4)
+
+
+@given(v=st.floats(-0.1, 0.1), z=st.floats(-1e-5, 1e-5), load=st.floats(0.1, 100.0))
+def test_normalised_form_is_lugre_with_coefficients_times_the_load(
+    v: float, z: float, load: float
+) -> None:
+    normalised = LuGreNormalised(sigma_0=1e4, sigma_1=20.0, sigma_2=0.3)
+    law = LuGre(sigma_0=1e4 * load, sigma_1=20.0 * load, sigma_2=0.3 * load)
+    state = np.array([z])
+    rate = law.rate(v, load, state)[0]
+    assert normalised.rate(v, load, state)[0] == pytest.approx(rate, rel=1e-12, abs=1e-13 * abs(v))
+    scale = load * (1e4 * abs(z) + abs(v))
+    force = law.force(v, load, state)
+    assert normalised.force(v, load, state) == pytest.approx(force, rel=1e-10, abs=1e-10 * scale)
+
+
+def test_lifting_off_while_stuck_lets_go_in_the_normalised_form_only() -> None:
+    law = LuGreNormalised()
+    z = 0.9 * law.steady_state(1e-6, N)
+    assert law.force(0.0, N, z) == pytest.approx(0.9 * 0.15 * N, rel=1e-6)
+    assert law.force(0.0, 0.0, z) == 0.0
+    assert law.force(0.1, 0.0, z) == 0.0
+    stuck = 0.9 * LuGre().steady_state(1e-6, N)
+    assert LuGre().force(0.0, 1e-9, stuck) == pytest.approx(0.9 * 0.15 * N, rel=1e-6)
+
+
+@pytest.mark.parametrize("v", [0.05, 0.1, 1.0])
+def test_fading_damping_keeps_the_force_from_pointing_forward(v: float) -> None:
+    z = LuGre().steady_state(1e-4, N)
+    for share in np.linspace(0.0, 1.0, 11):
+        assert LuGrePassive().force(v, N, share * z) >= 0
+    assert LuGre().force(v, N, z) < -1.0
+
+
+@given(v=st.floats(-0.1, 0.1), share=st.floats(-1.0, 1.0))
+def test_passive_form_never_gives_more_than_it_stores(v: float, share: float) -> None:
+    """F v - d(sigma_0 z^2 / 2)/dt >= 0 in every state of the invariant set."""
+    law, z = LuGrePassive(v_eps=0.0), np.array([share * 0.15 * N / 1e5])
+    stored = 1e5 * z[0] * law.rate(v, N, z)[0]
+    assert law.force(v, N, z) * v - stored >= -1e-15
+
+
+def test_slow_fading_is_lugre() -> None:
+    z = np.array([5e-6])
+    expected = LuGre(sigma_2=0.4).force(0.02, N, z)
+    assert LuGrePassive(sigma_2=0.4, v_d=1e9).force(0.02, N, z) == expected
+
+
+def test_passivity_is_warned_about_with_the_bound() -> None:
+    (warning,) = LuGre().warnings()
+    assert "sigma_2 = 0 is below sigma_1 (mu_s - mu_d) / mu_d = 95" in warning
+    assert LuGre(sigma_2=95.1).warnings() == ()
+    assert LuGrePassive().warnings() == ()
+    assert len(LuGreNormalised().warnings()) == 1
+    assert LuGre(sigma_1=ca.SX.sym("sigma_1")).warnings() == ()
