@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from symfric import Model, Variable
 from symfric.integrator.dense import Dense
 from symfric.integrator.inputs import drivers
+from symfric.integrator.method import Method
 from symfric.integrator.step import build_dense_step, build_fixed
 from symfric.integrator.system import System, system
-from symfric.integrator.tableaux import Rosenbrock
 
 Array = NDArray[np.float64]
 T = 1.0
@@ -65,16 +65,16 @@ def prothero_robinson(rate: float) -> ClosedForm:
     return ClosedForm(Model("stiff", x=(x,), ode=slope, t=t), lambda s: (sin(s + 0.5), s))
 
 
-def fixed_steps(case: ClosedForm, tableau: Rosenbrock, count: int) -> float:
+def fixed_steps(case: ClosedForm, method: Method, count: int) -> float:
     """Largest error of any unknown at T after `count` equal steps."""
-    step = build_fixed(assemble(case.model), tableau).mapaccum(count)
+    step = build_fixed(assemble(case.model), method).mapaccum(count)
     y = step(case.exact(0.0), T / count, np.zeros(0)).full()[:, -1]
     return float(np.abs(y - case.exact(T)).max())
 
 
-def between_fixed_steps(case: ClosedForm, tableau: Rosenbrock, count: int) -> float:
+def between_fixed_steps(case: ClosedForm, method: Method, count: int) -> float:
     """Largest error of any unknown between `count` equal steps."""
-    step, h = build_dense_step(assemble(case.model), tableau), T / count
+    step, h = build_dense_step(assemble(case.model), method), T / count
     theta = np.linspace(0.0, 1.0, 11)
     y, worst = np.array(case.exact(0.0)), 0.0
     for k in range(count):

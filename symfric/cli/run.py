@@ -67,8 +67,8 @@ def run(
     ] = None,
     rtol: Annotated[float, typer.Option("--rtol", help="Relative tolerance of a step.")] = 1e-6,
     method: Annotated[
-        str, typer.Option("--method", help="rodas5p, rodas4p or rodas3.")
-    ] = "rodas5p",
+        str, typer.Option("--method", help="auto, rodas5p, rodas4p, rodas3, radau5, dopri5.")
+    ] = "auto",
     backend: Annotated[
         str,
         typer.Option("--backend", help="auto, vm, compiled, or CasADi's rosenbrock, sundials."),

@@ -5,7 +5,10 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from symfric.integrator.method import Method
+from symfric.integrator.tableaux import ADAPTIVE, METHODS
 from symfric.model import finite
+from symfric.parameters import check_names
 
 Array = NDArray[np.float64]
 LOOSE = 1e-5
@@ -41,3 +44,19 @@ def check_times(where: str, t_start: float, t_end: float, t_eval: ArrayLike) -> 
             f"got an array of shape {times.shape}"
         )
     return times
+
+
+def chosen(where: str, name: str, rtol: float) -> Method:
+    """The adaptive method of this name; "auto" is Rodas5P, and Radau5 at loose tolerances.
+
+    Raises:
+        ValueError: unknown name, or a method of fixed steps.
+    """
+    if name in METHODS and name not in ADAPTIVE:
+        raise ValueError(
+            f"{where}: method: expected one with error control, one of {', '.join(ADAPTIVE)}, got "
+            f"{name}, which has fixed steps; it is for flow and for the C of plants"
+        )
+    check_names(f"{where}: method", [name], ["auto", *ADAPTIVE])
+    automatic = "radau5" if rtol > LOOSE else "rodas5p"
+    return ADAPTIVE[automatic if name == "auto" else name]

@@ -4,9 +4,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.integrator.blocks import blocks
 from symfric.integrator.initial import consistent
 from symfric.integrator.integrator import Integrator
-from symfric.integrator.step import blocks
 from symfric.integrator.system import System
 from symfric.status import Status
 
@@ -79,7 +79,7 @@ def _singular(integrator: Integrator, y: Array, d: Array, h: float) -> str:
     """Algebraic equations that cannot be solved, or do not determine their unknowns."""
     system = integrator.system
     names = _named(system, np.array(system.algebraic[1], dtype=int))
-    factors = blocks(system, integrator.tableau).factor(y, max(h, 1e-12), d).full()
+    factors = blocks(system, 1.0).factor(y, max(h, 1e-12), d).full()
     if not np.isfinite(factors).all():
         return (
             f"the iteration matrix is singular in {names or 'the states'}; the constraints may be "

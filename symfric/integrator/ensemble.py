@@ -19,7 +19,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symfric.integrator.arguments import check_span, check_times
+from symfric.integrator.arguments import check_span, check_times, chosen
 from symfric.integrator.chunk import Chunk, Job, Solved, digest, solve_chunk
 from symfric.integrator.initial import first_step
 from symfric.integrator.inputs import Drivers, Input, drivers
@@ -28,7 +28,6 @@ from symfric.integrator.one_by_one import solve_one_by_one
 from symfric.integrator.run import Tolerances
 from symfric.integrator.step import GROWTH_MEMORY
 from symfric.integrator.store import Store
-from symfric.integrator.tableaux import ROSENBROCK
 from symfric.model import Model
 from symfric.parameters import check_names
 from symfric.status import Status
@@ -81,7 +80,7 @@ def simulate_many(
     p: Mapping[str, ArrayLike] | None = None,
     t_eval: ArrayLike | None = None,
     rtol: float = 1e-6,
-    method: str = "rodas5p",
+    method: str = "auto",
     backend: str = "auto",
     event_tolerance: float = 1e-10,
     max_steps: int = 10_000_000,
@@ -126,13 +125,14 @@ def simulate_many(
         UserWarning: rtol above 1e-5, where stick phases may get lost.
     """
     check_span("simulate_many", t_start, t_end, rtol)
-    _check(model, method, backend, executor, workers, chunk)
+    formula = chosen("simulate_many", method, rtol)
+    _check(model, backend, executor, workers, chunk)
     times = check_times(
         "simulate_many", t_start, t_end, [float(t_end)] if t_eval is None else t_eval
     )
     x0_of, p_of, members = _members(model, x0 or {}, p or {})
     inputs = drivers(model, u, float(t_start), float(t_end))
-    integrator = Integrator(model, inputs, ROSENBROCK[method])
+    integrator = Integrator(model, inputs, formula)
     tolerances = Tolerances(
         rtol, 0.1 * rtol * integrator.system.nominal, event_tolerance, max_steps
     )
@@ -184,13 +184,11 @@ def _size(pick: slice) -> int:
 
 def _check(
     model: Model,
-    method: str,
     backend: str,
     executor: str | Executor,
     workers: int | None,
     chunk: int,
 ) -> None:
-    check_names("simulate_many: method", [method], ROSENBROCK)
     check_names("simulate_many: backend", [backend], BACKENDS)
     if isinstance(executor, str):
         check_names("simulate_many: executor", [executor], EXECUTORS)

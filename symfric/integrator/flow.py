@@ -6,7 +6,7 @@ import numpy as np
 from symfric.integrator.inputs import Drivers
 from symfric.integrator.step import build_fixed
 from symfric.integrator.system import System, system
-from symfric.integrator.tableaux import ROSENBROCK
+from symfric.integrator.tableaux import METHODS
 from symfric.model import Model
 from symfric.parameters import check_names
 
@@ -24,12 +24,13 @@ def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Functi
     Args:
         model: explicit or implicit model without events.
         steps: number of steps; choose it so that h = T/steps resolves the transition velocity.
-        method: as in `simulate`.
+        method: as in `simulate`, or one of fixed steps: "backward_euler" (order 1, stays bounded
+            where h resolves nothing), "exponential" (order 1, one evaluation).
 
     Raises:
         ValueError: unknown method, events, fewer than one step.
     """
-    check_names("flow: method", [method], ROSENBROCK)
+    check_names("flow: method", [method], METHODS)
     if steps < 1:
         raise ValueError(f"flow: expected steps >= 1, got {steps}")
     if model.events:
@@ -39,7 +40,7 @@ def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Functi
         )
     u = model.vector("u")
     whole = system(model, Drivers(u, u, np.zeros(2), np.zeros((len(model.u), 1)), ("flow",)))
-    fixed = build_fixed(whole, ROSENBROCK[method])
+    fixed = build_fixed(whole, METHODS[method])
     x0, inputs = ca.MX.sym("x0", len(model.x)), ca.MX.sym("u", len(model.u))
     p, T = ca.MX.sym("p", len(model.p)), ca.MX.sym("T")
     data = ca.vertcat(p, inputs)

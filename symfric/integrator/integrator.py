@@ -13,9 +13,9 @@ from symfric.integrator.columns import Columns
 from symfric.integrator.compiler import find_compiler, library_path
 from symfric.integrator.engine import CompiledEngine, Engine, VmEngine, c_source
 from symfric.integrator.inputs import Drivers
+from symfric.integrator.method import Method
 from symfric.integrator.step import build_step
 from symfric.integrator.system import System, system
-from symfric.integrator.tableaux import Rosenbrock
 from symfric.model import Model
 
 Array = NDArray[np.float64]
@@ -34,7 +34,7 @@ class Integrator:
 
     model: Model
     inputs: Drivers
-    tableau: Rosenbrock
+    tableau: Method
     build_time: float = 0.0
     compile_time: float = 0.0
     vm_time: float = 0.0

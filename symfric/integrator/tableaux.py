@@ -1,59 +1,26 @@
-"""Coefficients of the methods, with order and source. Nothing else.
+"""Coefficients of the methods, with order and source.
 
-A Rosenbrock method in the transformed form of Hairer and Wanner (IV.7) solves, with
-W = M / (gamma h) - J at the start of the step,
-
-    W k_i = f(y_0 + sum_j a_ij k_j) + M sum_j (c_ij / h) k_j,      i = 1 ... s
-
-The methods here are stiffly accurate: y_1 is the last stage's argument plus k_s, and k_s is the
-error estimate. Dense output, 0 <= theta <= 1, with d_r = sum_j H_rj k_j:
+Dense output of all of them, 0 <= theta <= 1, with d_r = sum_j H_rj k_j:
 
     y(theta) = (1 - theta) y_0 + theta [y_1 + (1 - theta) (d_1 + theta (d_2 + theta d_3))]
 """
 
-from dataclasses import dataclass
-from typing import final
-
 import numpy as np
-from numpy.typing import NDArray
+
+from symfric.integrator.backward_euler import BackwardEuler
+from symfric.integrator.explicit import Explicit, shampine
+from symfric.integrator.exponential import Exponential
+from symfric.integrator.method import Array, Method
+from symfric.integrator.radau import Radau, through
+from symfric.integrator.rosenbrock import Rosenbrock
 
 
-def _lower(rows: list[list[float]]) -> NDArray[np.float64]:
+def _lower(rows: list[list[float]]) -> Array:
     """Strictly lower triangular matrix from its rows."""
     matrix = np.zeros((len(rows), len(rows)))
     for i, row in enumerate(rows):
         matrix[i, : len(row)] = row
     return matrix
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Rosenbrock:
-    """Coefficients of a stiffly accurate Rosenbrock method.
-
-    Attributes:
-        gamma: diagonal coefficient.
-        A, C: strictly lower triangular, shape (s, s).
-        H: dense output, shape (r, s).
-        order: of the solution, for ODEs and index-1 DAEs.
-        embedded: order of the solution behind the error estimate.
-        dense: order of the dense output, for index-1 DAEs (for ODEs that of the solution).
-    """
-
-    name: str
-    gamma: float
-    A: NDArray[np.float64]
-    C: NDArray[np.float64]
-    H: NDArray[np.float64]
-    order: int
-    embedded: int
-    dense: int
-    source: str
-
-    @property
-    def stages(self) -> int:
-        """Number of stages s."""
-        return self.A.shape[0]
 
 
 _RODAS5P_LAST = [
@@ -148,7 +115,8 @@ RODAS5P = Rosenbrock(
     ),
     order=5,
     embedded=4,
-    dense=4,
+    dense=5,
+    dense_dae=4,
     source="Steinebach, Construction of Rosenbrock-Wanner method Rodas5P, BIT 63:27, 2023",
 )
 
@@ -203,7 +171,8 @@ RODAS4P = Rosenbrock(
     ),
     order=4,
     embedded=3,
-    dense=3,
+    dense=4,
+    dense_dae=3,
     source="Steinebach, Order-reduction of ROW-methods for DAEs, TH Darmstadt preprint 1741, 1995",
 )
 
@@ -218,8 +187,88 @@ RODAS3 = Rosenbrock(
     order=3,
     embedded=2,
     dense=3,
+    dense_dae=3,
     source="Sandu et al., Benchmarking stiff ODE solvers II, Atmos. Environ. 31, 1997",
 )
 
-ROSENBROCK: dict[str, Rosenbrock] = {m.name.lower(): m for m in (RODAS5P, RODAS4P, RODAS3)}
-"""All Rosenbrock methods by name; the order test runs over them."""
+_DOPRI5_LAST = [35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84]
+
+
+DOPRI5 = Explicit(
+    name="DOPRI5",
+    A=_lower(
+        [
+            [],
+            [1 / 5],
+            [3 / 40, 9 / 40],
+            [44 / 45, -56 / 15, 32 / 9],
+            [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729],
+            [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656],
+            _DOPRI5_LAST,
+        ]
+    ),
+    E=np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40]),
+    H=shampine(
+        np.array([*_DOPRI5_LAST, 0.0]),
+        np.array(
+            [
+                -12715105075 / 11282082432,
+                0.0,
+                87487479700 / 32700410799,
+                -10690763975 / 1880347072,
+                701980252875 / 199316789632,
+                -1453857185 / 822651844,
+                69997945 / 29380423,
+            ]
+        ),
+    ),
+    order=5,
+    embedded=4,
+    dense=5,
+    source="Dormand and Prince, J. Comp. Appl. Math. 6, 1980; dense output by Shampine in Hairer, "
+    "Norsett and Wanner II.6",
+)
+
+
+_ROOT = np.sqrt(6.0)
+_RADAU_C = np.array([(4 - _ROOT) / 10, (4 + _ROOT) / 10, 1.0])
+
+RADAU5 = Radau(
+    name="Radau5",
+    c=_RADAU_C,
+    E=np.array([-(13 + 7 * _ROOT) / 3, (-13 + 7 * _ROOT) / 3, -1 / 3]),
+    H=through(_RADAU_C),
+    iterations=3,
+    order=5,
+    embedded=3,
+    dense=4,
+    dense_dae=4,
+    source="Hairer and Wanner, Solving Ordinary Differential Equations II, IV.5 and IV.8, 1996",
+)
+
+BACKWARD_EULER = BackwardEuler(
+    name="backward Euler",
+    iterations=4,
+    order=1,
+    source="Hairer and Wanner, Solving Ordinary Differential Equations II, IV.3, 1996",
+)
+
+EXPONENTIAL = Exponential(
+    name="exponential Euler",
+    order=1,
+    source="Hochbruck and Ostermann, Exponential integrators, Acta Numerica 19, 2010",
+)
+
+METHODS: dict[str, Method] = {
+    "rodas5p": RODAS5P,
+    "rodas4p": RODAS4P,
+    "rodas3": RODAS3,
+    "radau5": RADAU5,
+    "dopri5": DOPRI5,
+    "backward_euler": BACKWARD_EULER,
+    "exponential": EXPONENTIAL,
+}
+"""All methods by the name that a user writes; the order test runs over them."""
+
+ADAPTIVE: dict[str, Method] = {name: m for name, m in METHODS.items() if m.adaptive}
+"""Those that control their step size, for `simulate`."""

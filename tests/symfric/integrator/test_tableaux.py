@@ -22,13 +22,19 @@ from closed_forms import (
 from numpy.typing import NDArray
 
 from symfric import Model, Variable
-from symfric.integrator.step import blocks, build_fixed, stages
-from symfric.integrator.tableaux import ROSENBROCK, Rosenbrock
+from symfric.integrator.explicit import Explicit
+from symfric.integrator.method import Method
+from symfric.integrator.radau import Radau
+from symfric.integrator.rosenbrock import Rosenbrock
+from symfric.integrator.step import build_fixed
+from symfric.integrator.tableaux import ADAPTIVE, DOPRI5, METHODS
 
 Array = NDArray[np.floating[Any]]
 Tree = tuple["Tree", ...]
 
-each_method = pytest.mark.parametrize("name", ROSENBROCK)
+each_method = pytest.mark.parametrize("name", METHODS)
+each_adaptive = pytest.mark.parametrize("name", ADAPTIVE)
+each_stiff = pytest.mark.parametrize("name", [name for name, m in METHODS.items() if m.dae])
 
 
 def rooted_trees(order: int) -> list[Tree]:
@@ -54,36 +60,52 @@ def density(tree: Tree) -> int:
     return nodes(tree) * prod(density(branch) for branch in tree)
 
 
-def classical(tableau: Rosenbrock) -> tuple[Array, Array, Array]:
-    """alpha, beta of the classical form, and the map G of its weights: b = G^T m."""
-    G = np.linalg.inv(np.eye(tableau.stages) / tableau.gamma - tableau.C)
-    return tableau.A @ G, (tableau.A + np.eye(tableau.stages)) @ G, G
+def classical(method: Method) -> tuple[Array, Array, Array]:
+    """alpha, beta of the classical form, and the map G of weights: b = G^T m.
+
+    A Runge-Kutta method is a Rosenbrock method with beta = alpha.
+    """
+    if not isinstance(method, Rosenbrock):
+        assert isinstance(method, Explicit | Radau)
+        return method.A, method.A, np.eye(method.A.shape[0])
+    G = np.linalg.inv(np.eye(method.stages) / method.gamma - method.C)
+    return method.A @ G, (method.A + np.eye(method.stages)) @ G, G
 
 
-def defect(tableau: Rosenbrock, weights: Array, tree: Tree, theta: float = 1.0) -> float:
+def defect(method: Method, weights: Array, tree: Tree, theta: float = 1.0) -> float:
     """Residual of the order condition of a tree (Hairer and Wanner, IV.7) after theta h.
 
     The stage values enter where a node branches, the linearised ones where it does not.
     """
-    alpha, beta, G = classical(tableau)
+    alpha, beta, G = classical(method)
 
     def weight(branching: Tree) -> Array:
         within = beta if len(branching) == 1 else alpha
         terms = [within @ weight(branch) for branch in branching]
-        return np.prod(terms, axis=0) if terms else np.ones(tableau.stages)
+        return np.prod(terms, axis=0) if terms else np.ones(alpha.shape[0])
 
     # beta = (A + 1) G is alpha + Gamma with G = Gamma, since T = I / gamma - C is its inverse
     return float(weights @ G @ weight(tree)) - theta ** nodes(tree) / density(tree)
 
 
-def last_weights(tableau: Rosenbrock) -> Array:
-    """Of the stages in the end value: the last stage's argument plus the last stage."""
-    return tableau.A[-1] + np.eye(tableau.stages)[-1]
+def last_weights(method: Method) -> Array:
+    """Of the stages in the end value: the last stage's argument, for Rosenbrock plus that stage."""
+    assert isinstance(method, Rosenbrock | Explicit | Radau)
+    last = np.eye(method.A.shape[0])[-1]
+    return method.A[-1] + (last if isinstance(method, Rosenbrock) else 0.0)
 
 
-def dense_weights(tableau: Rosenbrock, theta: float) -> Array:
-    d = sum(theta**r * row for r, row in enumerate(tableau.H))
-    return theta * (last_weights(tableau) + (1 - theta) * d)
+def embedded_weights(method: Method) -> Array:
+    """Of the stages in the solution behind the error estimate."""
+    assert isinstance(method, Rosenbrock | Explicit)
+    return method.A[-1] - (method.E if isinstance(method, Explicit) else 0.0)
+
+
+def dense_weights(method: Method, theta: float) -> Array:
+    """Of the stages after theta h; Radau's rows act on its increments A k."""
+    d = sum(theta**r * row for r, row in enumerate(method.H))
+    inner = d @ method.A if isinstance(method, Radau) else d
+    return theta * (last_weights(method) + (1 - theta) * inner)
 
 
 def test_rooted_trees_are_complete() -> None:
@@ -91,124 +113,150 @@ def test_rooted_trees_are_complete() -> None:
     assert [len(set(rooted_trees(n))) for n in range(1, 7)] == [1, 1, 2, 4, 9, 20]
 
 
-@each_method
+@pytest.mark.parametrize("name", ["rodas5p", "rodas4p", "rodas3", "dopri5"])
 def test_coefficients_have_one_shape_and_lower_triangles(name: str) -> None:
-    tableau = ROSENBROCK[name]
-    shape = (tableau.stages, tableau.stages)
-    assert tableau.A.shape == tableau.C.shape == shape
-    assert not np.triu(tableau.A).any()
-    assert not np.triu(tableau.C).any()
-    assert tableau.H.shape[1] == tableau.stages
-    assert tableau.source
+    method = METHODS[name]
+    assert isinstance(method, Rosenbrock | Explicit)
+    shape = (method.stages, method.stages)
+    assert method.A.shape == shape
+    assert not np.triu(method.A).any()
+    if isinstance(method, Rosenbrock):
+        assert method.C.shape == shape
+        assert not np.triu(method.C).any()
+    assert method.H.shape[1] == method.stages
 
 
 @each_method
+def test_method_says_where_it_is_from_and_what_it_can(name: str) -> None:
+    method = METHODS[name]
+    assert method.source
+    assert (method.embedded > 0) == (method.dense > 0) == (name in ADAPTIVE)
+    assert (method.dense_dae > 0) == (method.dae and name in ADAPTIVE)
+
+
+@each_adaptive
 def test_order_conditions_hold_up_to_the_order_and_no_further(name: str) -> None:
-    tableau = ROSENBROCK[name]
-    m = last_weights(tableau)
-    for order in range(1, tableau.order + 1):
+    method = METHODS[name]
+    m = last_weights(method)
+    for order in range(1, method.order + 1):
         for tree in rooted_trees(order):
-            assert defect(tableau, m, tree) == pytest.approx(0, abs=1e-12), tree
-    higher = [abs(defect(tableau, m, tree)) for tree in rooted_trees(tableau.order + 1)]
+            assert defect(method, m, tree) == pytest.approx(0, abs=1e-12), tree
+    higher = [abs(defect(method, m, tree)) for tree in rooted_trees(method.order + 1)]
     assert max(higher) > 1e-4
 
 
-@each_method
+@pytest.mark.parametrize("name", ["rodas5p", "rodas4p", "rodas3", "dopri5"])
 def test_embedded_solution_has_exactly_its_order(name: str) -> None:
-    tableau = ROSENBROCK[name]
-    for order in range(1, tableau.embedded + 1):
+    method = METHODS[name]
+    m = embedded_weights(method)
+    for order in range(1, method.embedded + 1):
         for tree in rooted_trees(order):
-            assert defect(tableau, tableau.A[-1], tree) == pytest.approx(0, abs=1e-12), tree
-    higher = [
-        abs(defect(tableau, tableau.A[-1], tree)) for tree in rooted_trees(tableau.embedded + 1)
-    ]
-    assert tableau.embedded == tableau.order - 1
+            assert defect(method, m, tree) == pytest.approx(0, abs=1e-12), tree
+    higher = [abs(defect(method, m, tree)) for tree in rooted_trees(method.embedded + 1)]
+    assert method.embedded == method.order - 1
     assert max(higher) > 1e-4
 
 
-@each_method
+@each_adaptive
 @pytest.mark.parametrize("theta", [0.0, 0.2, 0.5, 0.9, 1.0])
-def test_dense_output_meets_the_order_conditions_below_the_order(name: str, theta: float) -> None:
-    tableau = ROSENBROCK[name]
-    m = dense_weights(tableau, theta)
-    for order in range(1, tableau.order):
+def test_dense_output_meets_the_order_conditions_below_its_order(name: str, theta: float) -> None:
+    method = METHODS[name]
+    m = dense_weights(method, theta)
+    for order in range(1, method.dense):
         for tree in rooted_trees(order):
-            assert defect(tableau, m, tree, theta) == pytest.approx(0, abs=1e-11), tree
+            assert defect(method, m, tree, theta) == pytest.approx(0, abs=1e-11), tree
 
 
-@each_method
+@each_stiff
 def test_stiffly_accurate_step_lands_on_a_linear_constraint(name: str) -> None:
     """Even from values that violate it."""
     x, z = Variable("x", "1"), Variable("z", "1")
     model = Model("line", x=(x,), z=(z,), ode=-z.symbol, alg=z.symbol - 2 * x.symbol - 3)
-    x_1, z_1 = build_fixed(assemble(model), ROSENBROCK[name])([1.0, 7.0], 0.3, []).full().ravel()
+    x_1, z_1 = build_fixed(assemble(model), METHODS[name])([1.0, 7.0], 0.3, []).full().ravel()
     assert z_1 == pytest.approx(2 * x_1 + 3, abs=1e-13)
 
 
-@each_method
+@each_stiff
 def test_oscillation_never_grows_whatever_the_step(name: str) -> None:
     """A-stable: the step maps the circle into itself for every h omega (no pole is on the left)."""
     x, y = Variable("x", "1"), Variable("y", "1")
     model = Model("circle", x=(x, y), ode=ca.vertcat(y.symbol, -x.symbol))
-    step = build_fixed(assemble(model), ROSENBROCK[name])
+    step = build_fixed(assemble(model), METHODS[name])
     radii = [np.linalg.norm(step([1.0, 0.0], h, []).full()) for h in np.logspace(-3, 6, 901)]
     assert max(radii) <= 1 + 1e-13
-    assert ROSENBROCK[name].gamma > 0
 
 
-@each_method
+@pytest.mark.parametrize("name", [*(n for n, m in METHODS.items() if m.dae), "exponential"])
 @pytest.mark.parametrize("rate", [1e8, 1e12])
 def test_fast_transient_is_gone_after_one_step(name: str, rate: float) -> None:
     """L-stable: R(-inf) = 0."""
     x = Variable("x", "1", start=1.0)
-    step = build_fixed(assemble(Model("fast", x=(x,), ode=-rate * x.symbol)), ROSENBROCK[name])
+    step = build_fixed(assemble(Model("fast", x=(x,), ode=-rate * x.symbol)), METHODS[name])
     assert abs(float(step(1.0, 1.0, []))) < 100 / rate
 
 
-@each_method
-@pytest.mark.parametrize("case", [smooth_ode, smooth_dae, timed_ode])
+def test_explicit_pair_is_stable_on_the_interval_of_its_polynomial() -> None:
+    """R(z) = 1 + z + ... + z^5/120 + z^6/600 leaves the unit disk at z = -3.3066."""
+    x = Variable("x", "1", start=1.0)
+    step = build_fixed(assemble(Model("decay", x=(x,), ode=-x.symbol)), DOPRI5)
+    assert abs(float(step(1.0, 3.306, []))) < 1
+    assert abs(float(step(1.0, 3.307, []))) > 1
+
+
+def cases(method: Method) -> list[Callable[[], ClosedForm]]:
+    """An ODE, an index-1 DAE (states and algebraic unknowns) and explicit time."""
+    return [smooth_ode, timed_ode, *([smooth_dae] if method.dae else [])]
+
+
+each_case = pytest.mark.parametrize(
+    ("name", "case"), [(name, case) for name, m in METHODS.items() for case in cases(m)]
+)
+each_adaptive_case = pytest.mark.parametrize(
+    ("name", "case"), [(name, case) for name, m in ADAPTIVE.items() for case in cases(m)]
+)
+
+
+@each_case
 def test_order_is_observed(name: str, case: Callable[[], ClosedForm]) -> None:
-    """On an ODE, an index-1 DAE (states and algebraic unknowns) and with explicit time."""
-    tableau, counts = ROSENBROCK[name], [16, 32, 64, 128]
-    errors = [fixed_steps(case(), tableau, count) for count in counts]
+    method, counts = METHODS[name], [32, 64, 96]
+    errors = [fixed_steps(case(), method, count) for count in counts]
     assert min(errors) > 1e-14
-    assert observed_order(counts, errors) == pytest.approx(tableau.order, abs=0.25)
+    assert observed_order(counts, errors) == pytest.approx(method.order, abs=0.25)
 
 
-@each_method
-@pytest.mark.parametrize("case", [smooth_ode, smooth_dae, timed_ode])
+@each_adaptive_case
 def test_order_of_the_dense_output_is_observed(name: str, case: Callable[[], ClosedForm]) -> None:
-    """That of the method without algebraic unknowns, `dense` with them."""
-    tableau, counts = ROSENBROCK[name], [16, 32, 64]
-    errors = [between_fixed_steps(case(), tableau, count) for count in counts]
-    claimed = tableau.dense if case is smooth_dae else tableau.order
+    method, counts = METHODS[name], [16, 32, 64]
+    errors = [between_fixed_steps(case(), method, count) for count in counts]
+    claimed = method.dense_dae if case is smooth_dae else method.dense
     assert observed_order(counts, errors) == pytest.approx(claimed, abs=0.25)
 
 
-@each_method
-@pytest.mark.parametrize("case", [smooth_ode, smooth_dae])
+@each_adaptive_case
 def test_error_estimate_shrinks_with_the_order_of_the_embedded_solution(
     name: str, case: Callable[[], ClosedForm]
 ) -> None:
     """Of the states; algebraic unknowns do not enter it."""
-    tableau, problem = ROSENBROCK[name], case()
+    method, problem = METHODS[name], case()
     system, h = assemble(problem.model), ca.SX.sym("h")
-    _, error, _ = stages(blocks(system, tableau), tableau, system.y, h, system.d)
+    error = method.trials(system)(system.y, h, system.d).error
     estimate = ca.Function("estimate", [system.y, h], [error])
-    counts = [16, 32, 64]
-    found = [np.abs(estimate(problem.exact(0.3), 1 / n).full()[:2]).max() for n in counts]
-    assert observed_order(counts, found) == pytest.approx(tableau.embedded + 1, abs=0.25)
+    counts = [32, 64, 128]
+    found = [np.abs(estimate(problem.exact(0.3), 1 / n).full()[: system.nx]).max() for n in counts]
+    assert observed_order(counts, found) == pytest.approx(method.embedded + 1, abs=0.25)
 
 
-ORDER_REDUCTION = {"rodas5p": 3.0, "rodas4p": 3.0, "rodas3": 1.0}
+ORDER_REDUCTION = {"rodas5p": 3.0, "rodas4p": 3.0, "rodas3": 1.0, "radau5": 3.0}
 """Observed on Prothero-Robinson where h is a thousand times the time constant and more."""
 
 
-@each_method
+@each_stiff
 def test_order_reduction_on_prothero_robinson(name: str) -> None:
-    """Rodas5P keeps 3 of 5, Rodas4P 3 of 4, RODAS3 1 of 3; all errors vanish with the stiffness."""
+    """Rodas5P and Radau IIA keep 3 of 5, Rodas4P 3 of 4, RODAS3 1 of 3, backward Euler all of its
+    1; all errors vanish with the stiffness."""
     counts = [8, 16, 32]
-    errors = [fixed_steps(prothero_robinson(1e5), ROSENBROCK[name], n) for n in counts]
-    assert observed_order(counts, errors) == pytest.approx(ORDER_REDUCTION[name], abs=0.15)
-    stiffer = [fixed_steps(prothero_robinson(1e7), ROSENBROCK[name], n) for n in counts]
+    errors = [fixed_steps(prothero_robinson(1e5), METHODS[name], n) for n in counts]
+    kept = ORDER_REDUCTION.get(name, METHODS[name].order)
+    assert observed_order(counts, errors) == pytest.approx(kept, abs=0.15)
+    stiffer = [fixed_steps(prothero_robinson(1e7), METHODS[name], n) for n in counts]
     assert max(stiffer) < 0.02 * max(errors)
