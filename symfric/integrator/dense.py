@@ -57,17 +57,20 @@ def hermite(t: Array, y: Array, slope: Array) -> Dense:
 def from_records(records: Array, n: int) -> Dense:
     """Pieces from the rows (t0, t1, y0, y1, D) that a step engine writes."""
     k, rows = records.shape[0], (records.shape[1] - 2) // n - 2
+    records = records.copy()  # of the rows in use; the buffer behind them is much larger
     return Dense(
-        records[:, 0].copy(),
-        records[:, 1].copy(),
-        records[:, 2 : 2 + n].copy(),
-        records[:, 2 + n : 2 + 2 * n].copy(),
-        records[:, 2 + 2 * n :].reshape(k, rows, n).copy(),
+        records[:, 0],
+        records[:, 1],
+        records[:, 2 : 2 + n],
+        records[:, 2 + n : 2 + 2 * n],
+        records[:, 2 + 2 * n :].reshape(k, rows, n),
     )
 
 
 def join(pieces: list[Dense]) -> Dense:
     """Pieces of several runs, in order."""
+    if len(pieces) == 1:
+        return pieces[0]
     return Dense(
         np.concatenate([p.t0 for p in pieces]),
         np.concatenate([p.t1 for p in pieces]),

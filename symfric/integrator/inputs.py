@@ -156,5 +156,7 @@ def drivers(
 
 def _undriven(t_start: float, t_end: float) -> Drivers:
     """The drivers of a model without inputs."""
-    none = ca.SX(0, 1)
-    return Drivers(none, none, np.array([t_start, t_end]), np.zeros((0, 1)), ())
+    return Drivers(_NONE, _NONE, np.array([t_start, t_end]), np.zeros((0, 1)), ())
+
+
+_NONE = ca.SX(0, 1)

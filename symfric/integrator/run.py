@@ -84,151 +84,145 @@ def integrate(
     progress: Callable[[float], None] | None,
 ) -> tuple[Run, Dense]:
     """Integrate over all input intervals; the result holds whatever was reached."""
-    run = Run()
-    t_start, t_end = float(inputs.breaks[0]), float(inputs.breaks[-1])
     d = np.concatenate([p, inputs.values[:, 0]])
     y = consistent(integrator.system, f"model '{integrator.model.name}'", y0, d)
-    h = first_step(t_end - t_start)
-    S = np.concatenate([[t_start, h, h, GROWTH_MEMORY, 0.0], y])
-    storm = EventStorm(t_end - t_start, tolerances.event)
+    drive = _Drive(integrator, inputs, tolerances, backend, progress, y)
     try:
-        for k in range(inputs.breaks.size - 1):
-            before, d = d, np.concatenate([p, inputs.values[:, k]])
-            old = _jump(integrator, run, S, before, d) if k else None
-            if run.status is not Status.SUCCESS:
-                break
-            R = np.concatenate([[inputs.breaks[k + 1], tolerances.rtol], tolerances.atol, d])
-            _interval(
-                integrator,
-                run,
-                S,
-                R,
-                d,
-                tolerances,
-                backend,
-                storm,
-                t_start,
-                t_end,
-                progress,
-                old,
-            )
-            if run.status is not Status.SUCCESS or S[0] < inputs.breaks[k + 1]:
-                break
+        drive.whole(p)
     except KeyboardInterrupt:
-        run.stop(Status.INTERRUPTED, f"{Status.INTERRUPTED.value} It reaches t = {S[0]:g} s.")
+        reached = f"{Status.INTERRUPTED.value} It reaches t = {drive.S[0]:g} s."
+        drive.run.stop(Status.INTERRUPTED, reached)
+    run = drive.run
     if not run.dense:
         empty = np.zeros((1, integrator.tableau.H.shape[0], y.size))
-        start = np.array([t_start])
+        start = inputs.breaks[:1]
         run.dense.append(Dense(start, start + 1e-300, y[None], y[None], empty))
     return run, join(run.dense)
 
 
-def _interval(
-    integrator: Integrator,
-    run: Run,
-    S: Array,
-    R: Array,
-    d: Array,
-    tolerances: Tolerances,
-    backend: str,
-    storm: EventStorm,
-    t_start: float,
-    t_end: float,
-    progress: Callable[[float], None] | None,
-    old: Array | None,
-) -> None:
-    """Integrate over one input interval, on which `d` is constant.
+@final
+class _Drive:
+    """One run under way: the step's memory and unknowns S, and what it has produced."""
 
-    `old` holds the values of the event expressions before the jump that led here, if one did.
-    """
-    eventful = bool(integrator.model.events)
-    n = integrator.system.n
-    h_min = 1e-15 * max(abs(t_start), abs(t_end), 1e-3)
-    left = 0.0
-    while S[0] < R[0]:
-        engine = integrator.choose(backend, left)
-        run.engine = engine.name
-        allowed = min(ATTEMPTS[engine.name], tolerances.max_steps - run.attempts)
+    def __init__(
+        self,
+        integrator: Integrator,
+        inputs: Drivers,
+        tolerances: Tolerances,
+        backend: str,
+        progress: Callable[[float], None] | None,
+        y: Array,
+    ) -> None:
+        self.integrator, self.inputs, self.tolerances = integrator, inputs, tolerances
+        self.backend, self.progress = backend, progress
+        self.t_start, self.t_end = float(inputs.breaks[0]), float(inputs.breaks[-1])
+        self.h_min = 1e-15 * max(abs(self.t_start), abs(self.t_end), 1e-3)
+        h = first_step(self.t_end - self.t_start)
+        self.S = np.concatenate([[self.t_start, h, h, GROWTH_MEMORY, 0.0], y])
+        self.eventful = bool(integrator.model.events)
+        self.storm = EventStorm(self.t_end - self.t_start, tolerances.event)
+        self.run, self.d = Run(), np.zeros(0)
+
+    def whole(self, p: Array) -> None:
+        """Integrate over all input intervals, each with its own run data d = (p, data)."""
+        for k in range(self.inputs.breaks.size - 1):
+            before, self.d = self.d, np.concatenate([p, self.inputs.values[:, k]])
+            old = self.jump(before) if k else None
+            if self.run.status is Status.SUCCESS:
+                self.interval(float(self.inputs.breaks[k + 1]), old)
+            if self.run.status is not Status.SUCCESS:
+                return
+
+    def interval(self, end: float, old: Array | None) -> None:
+        """Integrate up to `end`, on which d is constant.
+
+        `old` holds the values of the event expressions before the jump that led here, if one did.
+        """
+        S, n, left = self.S, self.integrator.system.n, 0.0
+        R = np.concatenate([[end, self.tolerances.rtol], self.tolerances.atol, self.d])
+        while S[0] < end:
+            records, reason, left = self.attempts(R, left)
+            if self.run.status is not Status.SUCCESS:
+                return
+            piece = from_records(records, n)
+            crossing = self.crossing(piece, old) if self.eventful else None
+            if crossing is not None:
+                old = self.happen(piece, crossing)
+            else:
+                self.run.keep(piece)
+                old = None if piece.t0.size else old
+                if reason is Stop.STEP_TOO_SMALL:
+                    self.run.stop(*explain(self.integrator, S[0], S[MEMORY:], self.d, S[1]))
+            if self.run.status is not Status.SUCCESS:
+                return
+            if self.progress is not None:
+                self.progress((S[0] - self.t_start) / (self.t_end - self.t_start))
+
+    def attempts(self, R: Array, left: float) -> tuple[Array, Stop, float]:
+        """A batch of attempts: records, why it stopped, time [s] the VM will still need."""
+        engine = self.integrator.choose(self.backend, left)
+        self.run.engine = engine.name
+        allowed = min(ATTEMPTS[engine.name], self.tolerances.max_steps - self.run.attempts)
         if allowed <= 0:
-            run.stop(Status.MAX_STEPS, f"{Status.MAX_STEPS.value} It stands at t = {S[0]:g} s.")
-            return
-        began, from_t = perf_counter(), S[0]
-        records, made, reason = engine.run(S, R, EVENT_ROWS if eventful else ROWS, allowed, h_min)
-        run.attempts += made
+            self.run.stop(
+                Status.MAX_STEPS, f"{Status.MAX_STEPS.value} It stands at t = {self.S[0]:g} s."
+            )
+            return np.zeros((0, 0)), Stop.ATTEMPTS, left
+        began, from_t = perf_counter(), self.S[0]
+        rows = EVENT_ROWS if self.eventful else ROWS
+        records, made, reason = engine.run(self.S, R, rows, allowed, self.h_min)
+        self.run.attempts += made
         if engine.name == "vm":
-            spent = perf_counter() - began
-            integrator.vm_time += spent
-            advance = S[0] - from_t
-            left = spent * (t_end - S[0]) / advance if advance > 0 else left
-        piece = from_records(records, n)
-        crossing = first_crossing(integrator, piece, d, old, tolerances.event) if eventful else None
-        if crossing is None:
-            run.keep(piece)
-            old = None if piece.t0.size else old
-            if reason is Stop.STEP_TOO_SMALL:
-                run.stop(*explain(integrator, S[0], S[MEMORY:], d, S[1]))
-                return
+            spent, advance = perf_counter() - began, self.S[0] - from_t
+            self.integrator.vm_time += spent
+            left = spent * (self.t_end - self.S[0]) / advance if advance > 0 else left
+        return records, reason, left
+
+    def crossing(self, piece: Dense, old: Array | None) -> Crossing | None:
+        """The first event in `piece`."""
+        return first_crossing(self.integrator, piece, self.d, old, self.tolerances.event)
+
+    def happen(self, piece: Dense, crossing: Crossing) -> Array:
+        """Cut the run at an event, carry it out and go on from there."""
+        self.run.keep(crossing.before(piece))
+        # steps beyond the event say nothing; its own is a guess only, what follows may be faster
+        h = float(piece.t1[crossing.step] - piece.t0[crossing.step])
+        h = max(min(h, self.tolerances.event * 1e3), 1e-3 * h)
+        self.S[:MEMORY] = crossing.t, h, h, GROWTH_MEMORY, 0.0
+        self.S[MEMORY:] = crossing.y
+        return self.carry_out(crossing.which)
+
+    def carry_out(self, which: tuple[int, ...]) -> Array:
+        """Apply the resets of the events `which`; event values before them, NaN for themselves."""
+        events, t = self.integrator.model.events, float(self.S[0])
+        old = values(self.integrator, t, self.S[MEMORY:], self.d)
+        old[list(which)] = np.nan
+        self.S[MEMORY:] = resets(self.integrator, t, self.S[MEMORY:], self.d, which)
+        self.run.happened += [(t, events[i].name) for i in which]
+        if any(events[i].terminal for i in which):
+            self.run.stop(Status.TERMINATED)
+        elif self.storm.raged_at(t, which):
+            self.run.stop(
+                Status.EVENT_STORM,
+                f"{Status.EVENT_STORM.value} It stands at t = {t:.9g} s, "
+                f"event '{events[which[0]].name}'.",
+            )
         else:
-            old = _happen(integrator, run, S, d, piece, crossing, tolerances, storm)
-            if run.status is not Status.SUCCESS:
-                return
-        if progress is not None:
-            progress((S[0] - t_start) / (t_end - t_start))
+            self.make_consistent()
+        return old
 
+    def jump(self, before: Array) -> Array | None:
+        """Take over new input data, which algebraic unknowns follow; event values before them."""
+        old = None
+        if self.eventful:
+            old = values(self.integrator, self.S[0], self.S[MEMORY:], before)
+        self.make_consistent()
+        return old
 
-def _happen(
-    integrator: Integrator,
-    run: Run,
-    S: Array,
-    d: Array,
-    piece: Dense,
-    crossing: Crossing,
-    tolerances: Tolerances,
-    storm: EventStorm,
-) -> Array:
-    """Cut the run at an event, carry it out and go on from there."""
-    run.keep(crossing.before(piece))
-    # steps beyond the event say nothing; its own is a guess only, what follows may be faster
-    h = float(piece.t1[crossing.step] - piece.t0[crossing.step])
-    h = max(min(h, tolerances.event * 1e3), 1e-3 * h)
-    S[:MEMORY] = crossing.t, h, h, GROWTH_MEMORY, 0.0
-    S[MEMORY:] = crossing.y
-    return _carry_out(integrator, run, S, d, crossing.which, storm)
-
-
-def _jump(integrator: Integrator, run: Run, S: Array, before: Array, d: Array) -> Array | None:
-    """Take over new input data, which algebraic unknowns follow; event values before them."""
-    old = values(integrator, S[0], S[MEMORY:], before) if integrator.model.events else None
-    _make_consistent(integrator, run, S, d)
-    return old
-
-
-def _carry_out(
-    integrator: Integrator, run: Run, S: Array, d: Array, which: tuple[int, ...], storm: EventStorm
-) -> Array:
-    """Apply the resets of the events `which`; event values before them, NaN for themselves."""
-    events, t = integrator.model.events, float(S[0])
-    old = values(integrator, t, S[MEMORY:], d)
-    old[list(which)] = np.nan
-    S[MEMORY:] = resets(integrator, t, S[MEMORY:], d, which)
-    run.happened += [(t, events[i].name) for i in which]
-    if any(events[i].terminal for i in which):
-        run.stop(Status.TERMINATED)
-    elif storm.raged_at(t, which):
-        run.stop(
-            Status.EVENT_STORM,
-            f"{Status.EVENT_STORM.value} It stands at t = {t:.9g} s, "
-            f"event '{events[which[0]].name}'.",
-        )
-    else:
-        _make_consistent(integrator, run, S, d)
-    return old
-
-
-def _make_consistent(integrator: Integrator, run: Run, S: Array, d: Array) -> None:
-    """Let the algebraic unknowns follow a jump, or stop the run where they cannot."""
-    where = f"simulate '{integrator.model.name}' at t = {S[0]:.9g} s"
-    try:
-        S[MEMORY:] = consistent(integrator.system, where, S[MEMORY:], d)
-    except ValueError as error:
-        run.stop(Status.SINGULAR, str(error))
+    def make_consistent(self) -> None:
+        """Let the algebraic unknowns follow a jump, or stop the run where they cannot."""
+        where = f"simulate '{self.integrator.model.name}' at t = {self.S[0]:.9g} s"
+        try:
+            self.S[MEMORY:] = consistent(self.integrator.system, where, self.S[MEMORY:], self.d)
+        except ValueError as error:
+            self.run.stop(Status.SINGULAR, str(error))
