@@ -78,7 +78,11 @@ def plot_laws(laws: "Mapping[str, Law]", N: float = 1.0, path: str | Path | None
         N: normal force [N].
         path: image file.
     """
-    figure, (near, far) = plt.subplots(1, 2, sharey=True, figsize=(7.5, 3.2), layout="constrained")
+    rows = -(-len(laws) // 4)
+    below = len(laws) > 8
+    figure, (near, far) = plt.subplots(
+        1, 2, sharey=True, figsize=(7.5, 3.2 + 0.2 * rows * below), layout="constrained"
+    )
     scales = [scale for law in laws.values() for scale in _velocity_scales(law)]
     scale = max(scales, default=0.1)
     decades = np.geomspace(1e-3 * scale, max(1.0, 10 * scale), 1201)
@@ -95,7 +99,11 @@ def plot_laws(laws: "Mapping[str, Law]", N: float = 1.0, path: str | Path | None
     near.set_ylabel("F in steady sliding [N]")
     near.set_title(f"near rest, N = {N:g} N", fontsize="medium")
     far.set_title("over decades", fontsize="medium")
-    near.legend(fontsize="small")
+    if below:
+        entries = near.get_legend_handles_labels()
+        figure.legend(*entries, loc="outside lower center", ncols=4, fontsize="x-small")
+    else:
+        near.legend(fontsize="small")
     return save(figure, path)
 
 

@@ -21,12 +21,34 @@ from symfric import (
     parameters,
     symbolise,
 )
+from symfric.laws import (
+    BAM,
+    Hollars,
+    MakkarDixon,
+    PoppStelter,
+    PowerLawViscous,
+    RuiWang,
+    Specker,
+    SteadyStateLuGre,
+)
 
 SYMMETRIC: dict[str, Law] = {
-    **{name: kind() for name, kind in ALL_LAWS.items()},
+    **{name: kind() for name, kind in ALL_LAWS.items() if kind.facts.odd},
     "stribeck, delta 0.78, viscous": Stribeck(delta=0.78, sigma_2=0.4),
     "brown_mcphee, viscous": BrownMcPhee(mu_v=0.4),
     "self_tuning, E 0.5": SelfTuning(E=0.5),
+    "coulomb, atan": Coulomb(shape="atan"),
+    "coulomb, erf": Coulomb(shape="erf"),
+    "coulomb, sqrt": Coulomb(shape="sqrt"),
+    "popp_stelter, quadratic": PoppStelter(kappa=0.1),
+    "hollars, viscous": Hollars(mu_v=0.4),
+    "specker, viscous": Specker(sigma_2=0.4),
+    "makkar_dixon, viscous": MakkarDixon(gamma_6=0.4),
+    "rui_wang, E 0.5": RuiWang(E=0.5),
+    "power_law_viscous, d 0.5": PowerLawViscous(d=0.5),
+    "steady_state_lugre, main": SteadyStateLuGre.main(),
+    "bam, m1": BAM(K_s=0.0, K_e=0.0, K_m=0.0, K_es=0.0, K_ms=0.0),
+    "bam, m6": BAM(Q_e=0.01, Q_m=0.02),
     "dahl, n 2": Dahl(n=2.0),
     "dahl, n 0.5": Dahl(n=0.5),
     "lugre, delta 0.78, viscous": LuGre(delta=0.78, sigma_2=0.4, v_eps=1e-6),
@@ -39,6 +61,7 @@ SYMMETRIC: dict[str, Law] = {
 
 CASES: dict[str, Law] = {
     **SYMMETRIC,
+    **{name: kind() for name, kind in ALL_LAWS.items() if not kind.facts.odd},
     "asymmetric(lugre)": Asymmetric(LuGre(), LuGre(mu_s=0.3, sigma_2=0.4)),
     "asymmetric(stribeck)": Asymmetric(Stribeck(), Stribeck(mu_d=0.12, v_s=2e-3)),
 }
@@ -60,24 +83,43 @@ def has_exact_step(law: Law) -> bool:
     return affine and not law.switches(v, N, z)
 
 
+EXAMPLE_INPUTS = {
+    "F_e": 0.6,
+    "dv": 0.3,
+    "tau_m": 0.4,
+    "tau_e": -0.3,
+    "x_rel": 1e-3,
+    "v_rel": 0.05,
+}
+"""A value for every further input that some law takes."""
+
+
+def given_inputs(law: Law) -> dict[str, float]:
+    """Values of the further inputs of a law."""
+    return {i.name: EXAMPLE_INPUTS[i.name] for i in law.inputs}
+
+
 @cache
 def compiled(name: str) -> ca.Function:
-    """(v, N, z) -> force, rate of a case."""
+    """(v, N, z, w) -> force, rate of a case; w are its further inputs, here scaled examples."""
     law = CASES[name]
-    v, N, z = ca.SX.sym("v"), ca.SX.sym("N"), state_symbols(law)
-    outputs = [law.force(v, N, z), law.rate(v, N, z)]
-    return ca.Function("law", [v, N, z], outputs, ["v", "N", "z"], ["force", "rate"])
+    v, N, z, w = ca.SX.sym("v"), ca.SX.sym("N"), state_symbols(law), ca.SX.sym("w")
+    given = {n: w * value for n, value in given_inputs(law).items()}
+    outputs = [law.force(v, N, z, **given), law.rate(v, N, z, **given)]
+    return ca.Function("law", [v, N, z, w], outputs, ["v", "N", "z", "w"], ["force", "rate"])
 
 
 @cache
 def symbolic(name: str) -> tuple[list[str], ca.SX, ca.SX, dict[str, float]]:
-    """Names and symbols of v, z and every parameter, (force, rate) stacked, and their values.
+    """Names and symbols of v, z, further inputs and parameters, (force, rate), and their values.
 
     The normal force is 7.848 N, that of the block of the Rabinowicz scene.
     """
     law, variables = symbolise(CASES[name], *parameters(CASES[name]))
     v, z = ca.SX.sym("v"), state_symbols(law)
-    names = ["v", *(s.name for s in law.states), *(p.name for p in variables)]
-    symbols = ca.vertcat(v, z, *(p.symbol for p in variables))
-    outputs = ca.vertcat(law.force(v, 7.848, z), law.rate(v, 7.848, z))
-    return names, symbols, outputs, {p.name: float(p.start) for p in variables}
+    values = given_inputs(law)
+    inputs = {name: ca.SX.sym(name) for name in values}
+    names = ["v", *(s.name for s in law.states), *inputs, *(p.name for p in variables)]
+    symbols = ca.vertcat(v, z, *inputs.values(), *(p.symbol for p in variables))
+    outputs = ca.vertcat(law.force(v, 7.848, z, **inputs), law.rate(v, 7.848, z, **inputs))
+    return names, symbols, outputs, values | {p.name: float(p.start) for p in variables}

@@ -1,17 +1,20 @@
 """`symfric laws`: what laws there are, and what one of them says."""
 
-from dataclasses import fields
+from dataclasses import asdict, fields
 from inspect import getdoc
+from re import split
 from typing import Annotated, Any
 
-import casadi as ca
 import typer
 
 from symfric import ALL_LAWS, Law, law_from_text, parameters
 from symfric.cli import output
 from symfric.cli.options import JsonOption, PlotOption, SetOption, check_outputs, law_with
 from symfric.laws import PHENOMENA
+from symfric.laws.cost import cost
+from symfric.laws.names import ALIASES
 from symfric.model import finite
+from symfric.parameters import options
 
 
 def laws(
@@ -39,8 +42,8 @@ def laws(
         from symfric.plotting import plot_laws  # noqa: PLC0415  (matplotlib is slow)
 
         plot_laws(chosen, finite("--normal-force", normal_force), plot)
-    described = {text: to_dict(law) for text, law in chosen.items()}
-    output.emit_json({"name": name, **described[name]} if name else {"laws": described}, json)
+    described = {text: {"name": text, **to_dict(law)} for text, law in chosen.items()}
+    output.emit_json(described[name] if name else {"laws": described}, json)
     if json != "-":
         show_law(name, chosen[name]) if name else show_list(chosen)
     output.say_written(plot, json)
@@ -55,7 +58,12 @@ def to_dict(law: Law) -> dict[str, Any]:
         "smoothness": law.facts.smoothness,
         "confidence": law.facts.confidence,
         "source": law.facts.source,
-        "instructions": instructions(law),
+        "odd": law.facts.odd,
+        "dissipative": law.facts.dissipative,
+        "load": law.facts.load,
+        "instructions": asdict(cost(law)),
+        "inputs": {i.name: {"unit": i.unit, "doc": i.doc} for i in law.inputs},
+        "options": {o.name: asdict(o) for o in options(law).values()},
         "parameters": {
             p.name: {
                 "value": p.value,
@@ -92,47 +100,32 @@ def title(law: Law) -> str:
     return (getdoc(type(law)) or "").partition("\n")[0].removesuffix(".")
 
 
-def instructions(law: Law) -> int:
-    """CasADi instructions for force and rate together, inputs and outputs included."""
-    v, N = ca.SX.sym("v"), ca.SX.sym("N")
-    z = ca.SX.sym("z", len(law.states))
-    both = [ca.SX(law.force(v, N, z)), ca.SX(law.rate(v, N, z))]
-    return ca.Function("law", [v, N, z], ca.cse(both)).n_instructions()
-
-
 def show_list(chosen: dict[str, Law]) -> None:
-    """All laws, their parameters and what the codes mean."""
+    """All laws, one a line, and what the codes mean."""
     output.show_table(
-        ["law", "shows", "states", "smoothness", "instr.", "formula confirmed by"],
+        ["law", "shows", "z", "", "value", "slope", "formula"],
         [
             (
                 name,
                 " ".join(phenomena(law)),
-                ", ".join(f"{s.name} [{s.unit}]" for s in law.states) or "-",
-                law.facts.smoothness,
-                instructions(law),
-                law.facts.confidence,
-            )
-            for name, law in chosen.items()
-        ],
-    )
-    output.show()
-    output.show_table(
-        ["law", "parameters = default [unit]"],
-        [
-            (
-                name,
-                ", ".join(
-                    f"{p.name} = {output.number(p.value)} [{p.unit}]"
-                    for p in parameters(law).values()
-                ),
+                len(law.states),
+                law.facts.smoothness.split()[0],
+                cost(law).value,
+                cost(law).gradient,
+                split(r";| \(| for ", law.facts.confidence)[0],
             )
             for name, law in chosen.items()
         ],
     )
     codes = "\n".join(f"  {code:<3} {meaning}" for code, meaning in PHENOMENA.items())
+    others = ", ".join(f"{alias} = {name}" for alias, name in ALIASES.items())
     output.show(
-        f"\nshows:\n{codes}\ninstr.: CasADi instructions for force and rate together\n"
+        f"\nshows:\n{codes}\n"
+        "z: number of states, then smoothness\n"
+        "value, slope: CasADi instructions for force and rate, and for their derivatives\n"
+        "formula: how it was confirmed\n"
+        "symfric laws NAME shows equation, parameters and more.\n"
+        f"Other names: {others}.\n"
         "Sums are written coulomb+viscous, wrappers asymmetric(lugre), load_dependent(lugre)."
     )
 
@@ -145,8 +138,20 @@ def show_law(name: str, law: Law) -> None:
     output.show(
         f"{name} shows {shown}.\n"
         f"Smoothness: {law.facts.smoothness}.\nFormula confirmed by: {law.facts.confidence}.\n"
-        f"Cost: {instructions(law)} CasADi instructions for force and rate.\n"
+        f"Cost: {cost(law).value} CasADi instructions for force and rate, "
+        f"{cost(law).gradient} for their derivatives.\n"
     )
+    if law.inputs:
+        output.show_table(
+            ["input", "unit", "meaning"], [(i.name, i.unit, i.doc) for i in law.inputs]
+        )
+        output.show()
+    if options(law):
+        output.show_table(
+            ["option", "value", "choices", "meaning"],
+            [(o.name, o.value, ", ".join(o.choices), o.doc) for o in options(law).values()],
+        )
+        output.show()
     output.show_table(
         ["parameter", "value", "unit", "lower", "upper", "meaning"],
         [

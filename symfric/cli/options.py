@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +10,7 @@ import typer
 
 from symfric import Law, law_from_text, parameters, with_values
 from symfric.model import finite
-from symfric.parameters import check_names
+from symfric.parameters import check_names, options
 
 JsonOption = Annotated[
     str | None,
@@ -52,10 +53,12 @@ def numbers(option: str, texts: Iterable[str] | None) -> dict[str, float]:
 
 
 def law_with(text: str, settings: Iterable[str] | None) -> Law:
-    """The law that `text` names, with the parameters of `--set`."""
-    law, values = law_from_text(text), numbers("--set", settings)
-    check_names(f"--set of law {text}", values, parameters(law))
-    return with_values(law, values)
+    """The law that `text` names, with the parameters and options of `--set`."""
+    law, given = law_from_text(text), assignments("--set", settings)
+    check_names(f"--set of law {text}", given, [*parameters(law), *options(law)])
+    forms = {name: given.pop(name) for name in options(law) if name in given}
+    values = {name: finite(f"--set {name}", value) for name, value in given.items()}
+    return with_values(replace(law, **forms) if forms else law, values)
 
 
 PICTURES = (".png", ".pdf", ".svg", ".jpg")

@@ -43,15 +43,17 @@ def _alike(law: Law) -> list[list[str]]:
 
 
 def _calls(law: Law, groups: Sequence[Sequence[str]]) -> int:
-    """Transcendental functions of v, N, z in the law with one symbol for every group."""
+    """Transcendental functions of v, N, z, w in the law with one symbol for every group."""
     v, N, z = ca.SX.sym("v"), ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
     p = ca.SX.sym("p", len(groups))
     symbols = [p[i] for i in range(len(groups))]
     values = {name: s for s, group in zip(symbols, groups, strict=True) for name in group}
     symbolic = with_values(law, values)
-    equations = ca.vertcat(symbolic.force(v, N, z), symbolic.rate(v, N, z))
-    source = graph(ca.Function("law", [v, N, z, p], [ca.densify(equations)]))
-    of_inputs = source.depends((0, 1, 2))
+    given = {i.name: ca.SX.sym(i.name) for i in law.inputs}
+    w = ca.vertcat(ca.SX(0, 1), *given.values())
+    equations = ca.vertcat(symbolic.force(v, N, z, **given), symbolic.rate(v, N, z, **given))
+    source = graph(ca.Function("law", [v, N, z, w, p], [ca.densify(equations)]))
+    of_inputs = source.depends((0, 1, 2, 3))
     return sum(
         node.op in TRANSCENDENTAL and depends
         for node, depends in zip(source.nodes, of_inputs, strict=True)

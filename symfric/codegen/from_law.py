@@ -30,7 +30,7 @@ def law_block(
     h: float | None = None,
     free: Sequence[str] | None = None,
 ) -> Block:
-    """The discrete-time block of `law` with inputs v, N and output F.
+    """The discrete-time block of `law` with inputs v, N, those of the law, and output F.
 
     A law without states becomes F(v, N). The rate of a law with states must be affine in each of
     them by itself, dz/dt = a(v, N) - lambda(v, N) z; then the step is exact for v and N held over
@@ -91,21 +91,27 @@ def law_block(
     return block
 
 
-def _inputs() -> Variables:
+def _inputs(law: Law) -> Variables:
     return (
         Variable("v", "m/s", doc="sliding velocity"),
         Variable("N", "N", nominal=10.0, lower=0.0, doc="normal force"),
+        *(Variable(i.name, i.unit, nominal=i.nominal, doc=i.doc) for i in law.inputs),
     )
 
 
+def _given(inputs: Variables) -> dict[str, ca.SX]:
+    """Symbols of what stands behind v and N."""
+    return {variable.name: variable.symbol for variable in inputs[2:]}
+
+
 def _function(law: Law, runtime: Variables) -> Block:
-    v, N = inputs = _inputs()
-    force = law.force(v.symbol, N.symbol, ca.SX(0, 1))
+    v, N, *_ = inputs = _inputs(law)
+    force = law.force(v.symbol, N.symbol, ca.SX(0, 1), **_given(inputs))
     return Block("F", inputs=inputs, parameters=runtime, outputs={"F": Output(force, "N", FORCE)})
 
 
 def _step(law: Law, runtime: Variables, h: float | None, where: str) -> Block:
-    v, N = inputs = _inputs()
+    v, N, *_ = inputs = _inputs(law)
     states = tuple(Variable(s.name, s.unit, nominal=s.nominal) for s in law.states)
     size = Variable("h", "s", start=STEP_SIZE if h is None else h, lower=0.0, doc="step size")
     if not finite(f"{where}: h", size.start) > 0.0:
@@ -113,11 +119,12 @@ def _step(law: Law, runtime: Variables, h: float | None, where: str) -> Block:
     duration = size.symbol if h is None else float(h)
 
     z = ca.vertcat(*(state.symbol for state in states))
-    rate = ca.SX(law.rate(v.symbol, N.symbol, z))
+    given = _given(inputs)
+    rate = ca.SX(law.rate(v.symbol, N.symbol, z, **given))
     phi1, phi2 = phi1_phi2(duration * _decay(rate, z, where))
     mean_rate = phi1 * rate
     mean_state = z + duration * (phi2 * rate)
-    force, r = _force_of_rate(ca.SX(law.force(v.symbol, N.symbol, z)), rate, z, where)
+    force, r = _force_of_rate(ca.SX(law.force(v.symbol, N.symbol, z, **given)), rate, z, where)
     mean_force = ca.substitute(force, ca.vertcat(z, r), ca.vertcat(mean_state, mean_rate))
     return Block(
         "F",

@@ -68,6 +68,7 @@ class Input:
     name: str
     unit: str
     doc: str
+    nominal: float = 1.0
 
 
 APPLIED_FORCE = Input("F_e", "N", "force that keeps the sliding velocity constant")
@@ -169,9 +170,15 @@ class StaticLaw(Law):
         """No internal states."""
         return ()
 
-    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """No rows."""
         return empty(v)
+
+    def switches(
+        self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
+    ) -> tuple[Switch, ...]:
+        """No modes."""
+        return ()
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """No rows."""

@@ -5,21 +5,21 @@ from re import fullmatch
 from symfric.laws.base import Law
 from symfric.laws.compose import Asymmetric, LoadDependent, Sum
 from symfric.laws.dynamic import DYNAMIC_LAWS
-from symfric.laws.static.brown_mcphee import BrownMcPhee
-from symfric.laws.static.coulomb import Coulomb, Viscous
-from symfric.laws.static.self_tuning import SelfTuning
-from symfric.laws.static.stribeck import Stribeck
+from symfric.laws.static import STATIC_LAWS
 from symfric.parameters import check_names
 
 ALL_LAWS: dict[str, type[Law]] = {
-    "coulomb": Coulomb,
-    "viscous": Viscous,
-    "stribeck": Stribeck,
-    "brown_mcphee": BrownMcPhee,
-    "self_tuning": SelfTuning,
+    **STATIC_LAWS,
     **DYNAMIC_LAWS,
 }
 """Every law that stands alone, by name; the contract tests run over it."""
+
+ALIASES = {
+    "bo_pavelescu": "stribeck",
+    "adams": "velocity_based",
+    "smooth_coulomb": "coulomb",
+}
+"""Other names of the same law, as papers and programs use them."""
 
 
 def law_name(law: Law) -> str:
@@ -37,8 +37,8 @@ def law_name(law: Law) -> str:
 def law_from_text(text: str) -> Law:
     """The law with default parameters that `text` names.
 
-    `brown_mcphee`, sums `coulomb+viscous`, wrappers `asymmetric(coulomb+viscous)` and
-    `load_dependent(lugre)`.
+    `brown_mcphee`, another name of a law as `adams`, sums `coulomb+viscous`, wrappers
+    `asymmetric(coulomb+viscous)` and `load_dependent(lugre)`.
 
     Raises:
         ValueError: unknown name (the closest one is offered), empty term, unbalanced parentheses.
@@ -53,8 +53,9 @@ def _single(term: str, text: str) -> Law:
     if wrapped:
         inner = law_from_text(wrapped[2])
         return Asymmetric(inner, inner) if wrapped[1] == "asymmetric" else LoadDependent(inner)
-    check_names(f"law '{text}'", [term], ALL_LAWS)
-    return ALL_LAWS[term]()
+    name = ALIASES.get(term, term)
+    check_names(f"law '{text}'", [name], ALL_LAWS)
+    return ALL_LAWS[name]()
 
 
 def _split_terms(text: str) -> list[str]:

@@ -1,13 +1,30 @@
 """Coulomb friction with a smooth sign, and viscous friction."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from math import inf
+from math import inf, pi
 from typing import ClassVar, final
 
 from symfric.laws import smooth
 from symfric.laws.base import Facts, StaticLaw
-from symfric.numeric import Scalar
-from symfric.parameters import param
+from symfric.numeric import Scalar, atan, equals, erf, sqrt, tanh
+from symfric.parameters import option, param
+
+
+def _quadratic(u: Scalar) -> Scalar:
+    held = smooth.clip(u, -1.0, 1.0)
+    return held * (2 - smooth.magnitude(held, 0.0))
+
+
+SHAPES: dict[str, Callable[[Scalar], Scalar]] = {
+    "tanh": tanh,
+    "atan": lambda u: 2 / pi * atan(u),
+    "erf": erf,
+    "sqrt": lambda u: u / sqrt(1 + u * u),
+    "saturation": lambda u: smooth.clip(u, -1.0, 1.0),
+    "quadratic": _quadratic,
+}
+"""Stand-ins for sign(u): odd, rising, -1 to 1."""
 
 
 @final
@@ -15,31 +32,44 @@ from symfric.parameters import param
 class Coulomb(StaticLaw):
     """Smooth Coulomb friction.
 
-        F = mu_d N tanh(v / v_eps)
+        F = mu_d N s(v / v_eps)
 
-    Limits: tends to mu_d N sign(v) as v_eps -> 0. Never sticks: under a load F_e < mu_d N it
-    creeps at v = v_eps atanh(F_e / (mu_d N)). Slope at rest mu_d N / v_eps.
-    Source: Amontons 1699, Coulomb 1785; tanh regularisation as in Project Chrono and MORe.
+    shape        s(u)                         slope at 0   s(10)   smoothness
+    tanh         tanh u                       1            1.000   C∞
+    atan         (2/pi) atan u                2/pi         0.937   C∞
+    erf          erf u                        2/sqrt(pi)   1.000   C∞
+    sqrt         u / sqrt(1 + u^2)            1            0.995   C∞
+    saturation   u, held within +-1           1            1       C0, kinks at u = +-1
+    quadratic    u (2 - |u|), held likewise   2            1       C1 at u = 0, +-1
+
+    Limits: tends to mu_d N sign(v) as v_eps -> 0; the float v_eps = 0 is sign(v) itself, 0 at rest.
+    Never sticks: under a load F_e < mu_d N it creeps, with tanh at v = v_eps atanh(F_e / (mu_d N)).
+    Slope at rest mu_d N / v_eps times that of the table.
+    Source: Amontons 1699, Coulomb 1785; tanh as in Project Chrono and MORe, atan in Leine's codes,
+    quadratic in the incremental potential contact and TAMSI methods.
     """
 
     facts: ClassVar[Facts] = Facts(
         phenomena=("D",),
-        smoothness="C∞",
+        smoothness="C∞ (shape saturation C0 at |v| = v_eps, quadratic C1 at 0 and |v| = v_eps)",
         confidence="two sources",
         source="Amontons 1699, Coulomb 1785; regularised by tanh",
     )
 
     mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_eps: Scalar = param(1e-3, unit="m/s", doc="smoothing velocity", lower=1e-12)
+    v_eps: Scalar = param(1e-3, unit="m/s", doc="smoothing velocity", lower=0.0)
+    shape: str = option("tanh", choices=tuple(SHAPES), doc="smooth sign")
 
     @property
     def velocity_scale(self) -> Scalar:
-        """The smoothing velocity [m/s]."""
-        return self.v_eps
+        """The smoothing velocity [m/s]; none without smoothing."""
+        return inf if equals(self.v_eps, 0.0) else self.v_eps
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
-        return self.mu_d * N * smooth.sign(v, self.v_eps)
+        if equals(self.v_eps, 0.0):
+            return self.mu_d * N * smooth.sign(v, 0.0)
+        return self.mu_d * N * SHAPES[self.shape](v / self.v_eps)
 
 
 @final
@@ -54,7 +84,11 @@ class Viscous(StaticLaw):
     """
 
     facts: ClassVar[Facts] = Facts(
-        phenomena=("V",), smoothness="C∞", confidence="two sources", source="textbook"
+        phenomena=("V",),
+        smoothness="C∞",
+        confidence="two sources",
+        source="textbook",
+        load="independent",
     )
 
     sigma_2: Scalar = param(0.4, unit="N s/m", doc="viscous coefficient", lower=0.0)
@@ -67,3 +101,39 @@ class Viscous(StaticLaw):
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         return self.sigma_2 * v
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PowerLawViscous(StaticLaw):
+    """Power-law viscous friction, independent of the load.
+
+        F = sigma_2 |v|^d sign(v)        smooth: sigma_2 v (v^2 + v_eps^2)^((d - 1)/2)
+
+    Limits: d = 1 is `Viscous`, d = 2 drag; for d < 1 the original is infinitely steep at rest and
+    the smooth one has the slope sigma_2 v_eps^(d - 1). Relative error (d - 1)/2 (v_eps/v)^2.
+    Source: textbook; the general exponent as in drive and fluid-film models.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("V",),
+        smoothness="C∞",
+        confidence="two sources",
+        source="textbook",
+        load="independent",
+    )
+
+    sigma_2: Scalar = param(0.4, unit="N (s/m)^d", doc="viscous coefficient", lower=0.0)
+    d: Scalar = param(2.0, unit="1", doc="exponent", lower=0.1, upper=10.0)
+    v_eps: Scalar = param(1e-4, unit="m/s", doc="smoothing velocity", lower=1e-12)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The smoothing velocity [m/s]; none for the linear law."""
+        return inf if equals(self.d, 1.0) else self.v_eps
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        if equals(self.d, 1.0):
+            return self.sigma_2 * v
+        return self.sigma_2 * smooth.signed_power(v, self.d, self.v_eps)

@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass
 from math import asin as asin_of_float
+from math import atan as atan_of_float
 from math import cos as cos_of_float
 from math import inf, pi
 from math import sin as sin_of_float
 from typing import ClassVar, final
 
 from symfric.laws.base import Facts, StaticLaw
-from symfric.numeric import Scalar, asin, atan, equals, exp, sin, tan
+from symfric.numeric import Scalar, asin, atan, equals, exp, is_casadi, sin, tan
 from symfric.parameters import param
 
 
@@ -22,7 +23,7 @@ class SelfTuning(StaticLaw):
 
     C fixes the magnitudes: the peak is mu_s N exactly and F -> mu_d N as v -> inf. B fixes only
     the velocity scale; the peak lies at phi = tan(pi / (2C)), for E = 0 at v = tan(pi/(2C)) / B.
-    `from_peak_velocity` places it, `brittleness` gives the paper's kind of B(N, mu_s - mu_d).
+    `from_peak_velocity` and `from_slope` choose B; `BrittleSelfTuning` lets it follow the load.
     Limits: mu_s = mu_d gives C = 1, monotone without a peak, but the gradient of C with respect
     to mu_s and mu_d is infinite there. Creeps under load. Slope at rest mu_s N B C.
     Source: reconstruction of doi 10.1177/14644193231169325, whose printed equations are lost; the
@@ -60,18 +61,92 @@ class SelfTuning(StaticLaw):
 
     @classmethod
     def from_peak_velocity(
-        cls, v_p: Scalar, mu_s: Scalar = 0.15, mu_d: Scalar = 0.1
+        cls, v_p: Scalar, mu_s: Scalar = 0.15, mu_d: Scalar = 0.1, E: float = 0.0
     ) -> "SelfTuning":
-        """The law with E = 0 whose peak mu_s N lies at the velocity `v_p` [m/s].
+        """The law whose peak mu_s N lies at the velocity `v_p` [m/s].
 
         Ill-posed as mu_d -> mu_s, where the peak moves to infinity.
+
+        Raises:
+            ValueError: E != 0 with symbols for mu_s or mu_d, since phi is inverted numerically.
         """
-        return cls(mu_s=mu_s, mu_d=mu_d, B=tan(pi / (2 * shape_factor(mu_d / mu_s))) / v_p)
+        peak = tan(pi / (2 * shape_factor(mu_d / mu_s)))
+        if not equals(E, 0.0):
+            peak = _inverse_phi(peak, E)
+        return cls(mu_s=mu_s, mu_d=mu_d, B=peak / v_p, E=E)
+
+    @classmethod
+    def from_slope(
+        cls, k: Scalar, N: Scalar, mu_s: Scalar = 0.15, mu_d: Scalar = 0.1, E: Scalar = 0.0
+    ) -> "SelfTuning":
+        """The law whose slope at rest is `k` [N s/m] under the normal force `N`; any E keeps it."""
+        return cls(mu_s=mu_s, mu_d=mu_d, B=k / (mu_s * N * shape_factor(mu_d / mu_s)), E=E)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class BrittleSelfTuning(StaticLaw):
+    """Self-tuning friction whose stiffness factor follows from load and brittleness.
+
+        B = B_0 + (B_max - B_0) [1 - exp(-(mu_s - mu_d)/difference_ref N/N_ref)]
+        F = SelfTuning(mu_s, mu_d, B, E)
+
+    A large mu_s - mu_d means brittle bristles and a faster transition, and so does load.
+    Limits: N -> 0 or mu_s = mu_d gives B_0, a heavy load B_max; the levels mu_s N and mu_d N are
+    those of `SelfTuning` whatever B is. With N from the multiplier of a mechanism dF/dN holds the
+    part by B, too.
+    Source: reconstruction of doi 10.1177/14644193231169325, which states the trends of B; its
+    formula is lost and this one is a candidate.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "St"),
+        smoothness="C∞",
+        confidence="reconstruction",
+        source="after doi 10.1177/14644193231169325 (equations reconstructed)",
+        load="more than proportional below the peak, since B grows",
+    )
+    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"), ("B_0", "B_max"))
+
+    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=1e-12)
+    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
+    B_0: Scalar = param(100.0, unit="s/m", doc="stiffness factor without load", lower=1e-12)
+    B_max: Scalar = param(1000.0, unit="s/m", doc="stiffness factor under heavy load", lower=1e-12)
+    difference_ref: Scalar = param(0.05, unit="1", doc="reference of mu_s - mu_d", lower=1e-12)
+    N_ref: Scalar = param(50.0, unit="N", doc="reference of the load", lower=1e-12)
+    E: Scalar = param(0.0, unit="1", doc="curvature factor", upper=0.999)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The velocity 1/B_max [m/s]."""
+        return 1 / self.B_max
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        difference = self.mu_s - self.mu_d
+        B = brittleness(N, difference, self.B_0, self.B_max, self.difference_ref, self.N_ref)
+        return SelfTuning(self.mu_s, self.mu_d, B, self.E).force(v, N)
 
 
 def shape_factor(ratio: Scalar) -> Scalar:
     """C = 2 - (2/pi) asin(mu_d / mu_s): the shape factor whose asymptote is mu_d N."""
     return 2 - (2 / pi) * asin(ratio)
+
+
+def _inverse_phi(target: Scalar, E: float) -> float:
+    """The y >= 0 at which (1 - E) y + E atan(y) = target, by bisection; it rises for E < 1."""
+    if is_casadi(target, E):
+        raise ValueError(
+            "SelfTuning.from_peak_velocity: expected numbers for mu_s, mu_d and E, got symbols; "
+            "take E = 0 or choose B yourself"
+        )
+    if not E < 1:
+        raise ValueError(f"SelfTuning.from_peak_velocity: E: expected E < 1, got {E:g}")
+    low, high = 0.0, (float(target) + abs(E) * pi / 2) / (1 - E)
+    for _ in range(80):
+        y = (low + high) / 2
+        low, high = (y, high) if (1 - E) * y + E * atan_of_float(y) < target else (low, y)
+    return high
 
 
 def corrected_shape_factor(

@@ -5,7 +5,7 @@ from typing import ClassVar, final
 
 from symfric.laws import smooth
 from symfric.laws.base import Facts, StaticLaw
-from symfric.numeric import Scalar
+from symfric.numeric import Scalar, equals
 from symfric.parameters import param
 
 
@@ -17,7 +17,8 @@ class Stribeck(StaticLaw):
         F = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)] tanh(v / v_eps) + sigma_2 v
 
     delta = 1 is Tustin's law, delta = 2 the Gaussian one. Keep v_eps << v_s: the peak is
-    0.968 mu_s N at v_eps = v_s/10 and tends to mu_s N as v_eps -> 0.
+    0.968 mu_s N at v_eps = v_s/10 and tends to mu_s N as v_eps -> 0; the float v_eps = 0 is the
+    original with sign(v), 0 at rest.
     Limits: mu_s = mu_d gives `Coulomb` + `Viscous`; at |v| = v_s the bracket is
     mu_d + (mu_s - mu_d)/e for every delta. Creeps under load like `Coulomb`.
     Source: Stribeck 1902; Hess and Soom 1990; Bo and Pavelescu, Wear 82, 1982 (exponent).
@@ -35,13 +36,13 @@ class Stribeck(StaticLaw):
     mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
     v_s: Scalar = param(1e-3, unit="m/s", doc="Stribeck velocity", lower=1e-12)
     delta: Scalar = param(2.0, unit="1", doc="Stribeck exponent", lower=0.1, upper=10.0)
-    v_eps: Scalar = param(1e-4, unit="m/s", doc="smoothing velocity", lower=1e-12)
+    v_eps: Scalar = param(1e-4, unit="m/s", doc="smoothing velocity", lower=0.0)
     sigma_2: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
-        """The smoothing velocity [m/s]."""
-        return self.v_eps
+        """The smoothing velocity [m/s], or the Stribeck velocity without smoothing."""
+        return self.v_s if equals(self.v_eps, 0.0) else self.v_eps
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

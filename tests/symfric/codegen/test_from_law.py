@@ -148,7 +148,7 @@ def test_the_name_is_that_of_the_law_as_an_identifier(text, name):
 
 def test_the_text_holds_the_equations_of_all_parts_once():
     doc = law_block(law_from_text("asymmetric(coulomb+viscous)")).doc
-    assert doc.count("F = mu_d N tanh(v / v_eps)") == 1
+    assert doc.count("F = mu_d N s(v / v_eps)") == 1
     assert doc.count("F = sigma_2 v") == 1
     assert doc.startswith("One law with different parameters")
 

@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from law_cases import BRISTLE, CASES, STATIC, SYMMETRIC, compiled, state_symbols, symbolic
+from law_cases import (
+    BRISTLE,
+    CASES,
+    STATIC,
+    SYMMETRIC,
+    compiled,
+    given_inputs,
+    state_symbols,
+    symbolic,
+)
 
 from symfric import (
     ALL_LAWS,
@@ -17,6 +26,7 @@ from symfric import (
     Law,
     LuGre,
     SelfTuning,
+    StaticLaw,
     Stribeck,
     parameters,
     symbolise,
@@ -68,7 +78,8 @@ def level(law: Law, which: str) -> float:
 def test_force_and_rate_are_odd(name: str, v: float, N: float, share: float) -> None:
     law = SYMMETRIC[name]
     z = stretched(law, N, share)
-    forward, backward = compiled(name)(v, N, z), compiled(name)(-v, N, mirrored(law, z))
+    forward = compiled(name)(v, N, z, 1.0)
+    backward = compiled(name)(-v, N, mirrored(law, z), -1.0)
     assert float(forward[0]) == -float(backward[0])
     np.testing.assert_array_equal(mirrored(law, forward[1].full()), backward[1].full())
 
@@ -80,8 +91,11 @@ def test_steady_sliding_takes_power(name: str, v: float, N: float) -> None:
     assert law.force(v, N, law.steady_state(v, N)) * v >= 0
 
 
-@each_static
-@given(v=velocities, N=loads, mu_s=st.floats(1e-3, 2.0), ratio=st.floats(0.0, 1.0))
+LEVELS = [n for n in STATIC if {"mu_s", "mu_d"} & set(parameters(SYMMETRIC[n]))]
+
+
+@pytest.mark.parametrize("name", LEVELS)
+@given(v=velocities, N=loads, mu_s=st.floats(1e-3, 2.0), ratio=st.floats(0.5, 1.0))
 def test_static_force_stays_below_static_level_plus_viscous(
     name: str, v: float, N: float, mu_s: float, ratio: float
 ) -> None:
@@ -89,8 +103,11 @@ def test_static_force_stays_below_static_level_plus_viscous(
     chosen = {"mu_s": mu_s, "mu_d": mu_s * ratio if "mu_s" in known else mu_s}
     law = with_values(SYMMETRIC[name], {n: x for n, x in chosen.items() if n in known})
     top = level(law, "mu_s") or level(law, "mu_d")
-    bound = top * N + (level(law, "sigma_2") + level(law, "mu_v")) * abs(v)
-    assert abs(law.force(v, N)) <= bound * (1 + 1e-15)
+    viscous = level(law, "sigma_2") + level(law, "mu_v") * max(N, 1.0)
+    bound = top * N + (viscous + level(law, "kappa") * abs(v)) * abs(v)
+    # the peaks of two laws overshoot by what tanh(10) lacks of 1
+    excess = 1e-8 if name.startswith(("specker", "simscape")) else 1e-15
+    assert abs(law.force(v, N)) <= bound * (1 + excess)
 
 
 @pytest.mark.parametrize("name", ["dahl", "dahl, n 2", "dahl, n 0.5", "lugre"])
@@ -113,13 +130,27 @@ def test_rate_vanishes_in_steady_sliding(name: str, v: float, N: float) -> None:
     assert (rate <= 1e-11 * np.maximum(near, abs(v))).all()
 
 
-@pytest.mark.parametrize("name", ["coulomb", "stribeck", "brown_mcphee", "self_tuning"])
+STATIC_KINDS = [n for n, kind in ALL_LAWS.items() if issubclass(kind, StaticLaw)]
+PROPORTIONAL = [n for n in STATIC_KINDS if ALL_LAWS[n].facts.load == "proportional"]
+INDEPENDENT = [n for n in STATIC_KINDS if ALL_LAWS[n].facts.load == "independent"]
+
+
+@pytest.mark.parametrize("name", PROPORTIONAL)
 @given(v=velocities, N=loads, factor=st.floats(0.01, 100.0))
 def test_dry_force_is_proportional_to_the_load(
     name: str, v: float, N: float, factor: float
 ) -> None:
     law = CASES[name]
     assert law.force(v, factor * N) == pytest.approx(factor * law.force(v, N), rel=1e-14)
+
+
+@pytest.mark.parametrize("name", INDEPENDENT)
+@given(v=velocities, N=loads)
+def test_force_without_load_is_the_same_where_the_law_says_so(
+    name: str, v: float, N: float
+) -> None:
+    law, w = CASES[name], given_inputs(CASES[name])
+    assert law.force(v, N, **w) == law.force(v, 0.0, **w)
 
 
 @pytest.mark.parametrize("name", ["dahl", "lugre"])
@@ -142,34 +173,43 @@ def test_value_gradient_and_hessian_are_finite(name: str, v: float, share: float
     assert all(np.isfinite(result.full()).all() for result in results)
 
 
-@each_static
+UNLOADED = [
+    name
+    for name in STATIC
+    if SYMMETRIC[name].facts.load == "proportional" and name != "popp_stelter, quadratic"
+]
+
+
+@pytest.mark.parametrize("name", UNLOADED)
 @pytest.mark.parametrize("v", EXTREMES)
 def test_without_load_only_viscous_friction_remains(name: str, v: float) -> None:
     law = SYMMETRIC[name]
-    viscous = 0.0 if name.startswith("brown_mcphee") else level(law, "sigma_2")
-    assert law.force(v, 0.0) == pytest.approx(viscous * v, abs=1e-300)
+    viscous = level(law, "sigma_2") * v
+    if name == "specker, viscous":
+        viscous -= 0.4 * v * np.exp((1 - (v / 1e-3) ** 2) / 2)
+    assert law.force(v, 0.0) == pytest.approx(viscous, rel=1e-12, abs=1e-300)
 
 
 @each_case
 @pytest.mark.parametrize("v", [0.0, 3e-4, -0.2])
 def test_all_number_types_give_the_same(name: str, v: float) -> None:
-    law, N = CASES[name], 5.0
+    law, N, w = CASES[name], 5.0, given_inputs(CASES[name])
     z = stretched(law, N, 0.7).ravel()
     n = z.size
-    F, rate = float(law.force(v, N, z)), np.asarray(law.rate(v, N, z))
+    F, rate = float(law.force(v, N, z, **w)), np.asarray(law.rate(v, N, z, **w))
     assert rate.shape == (n,)
-    many = law.force(np.full(3, v), N, np.tile(z[:, None], (1, 3)))
-    rates = law.rate(np.full(3, v), N, np.tile(z[:, None], (1, 3)))
+    many = law.force(np.full(3, v), N, np.tile(z[:, None], (1, 3)), **w)
+    rates = law.rate(np.full(3, v), N, np.tile(z[:, None], (1, 3)), **w)
     assert many.shape == (3,)
     assert rates.shape == (n, 3)
-    results = [(many[1], rates[:, 1]), tuple(r.full() for r in compiled(name)(v, N, z))]
-    w, L, s = ca.MX.sym("v"), ca.MX.sym("N"), ca.MX.sym("z", n)
-    of_mx = ca.Function("law", [w, L, s], [law.force(w, L, s), law.rate(w, L, s)])
+    results = [(many[1], rates[:, 1]), tuple(r.full() for r in compiled(name)(v, N, z, 1.0))]
+    x, L, s = ca.MX.sym("v"), ca.MX.sym("N"), ca.MX.sym("z", n)
+    of_mx = ca.Function("law", [x, L, s], [law.force(x, L, s, **w), law.rate(x, L, s, **w)])
     results.append(tuple(r.full() for r in of_mx(v, N, z)))
     dm = ca.DM(v), ca.DM(N), ca.DM(z) if n else ca.DM(0, 1)
-    assert law.force(*dm).shape == (1, 1)
-    assert law.rate(*dm).shape == (n, 1)
-    results.append((law.force(*dm).full(), law.rate(*dm).full()))
+    assert law.force(*dm, **w).shape == (1, 1)
+    assert law.rate(*dm, **w).shape == (n, 1)
+    results.append((law.force(*dm, **w).full(), law.rate(*dm, **w).full()))
     for one, other in results:
         np.testing.assert_allclose(np.ravel(one), F, rtol=1e-14, atol=1e-300)
         np.testing.assert_allclose(np.ravel(other), rate, rtol=1e-12, atol=1e-18)
@@ -182,7 +222,7 @@ def test_symbolised_law_equals_the_numeric_one(name: str, v: float, share: float
     z = stretched(CASES[name], 7.848, share).ravel()
     point = [v, *z, *(values[n] for n in names[1 + z.size :])]
     of_symbols = ca.Function("outputs", [symbols], [outputs])(point).full().ravel()
-    expected = np.concatenate([np.ravel(r.full()) for r in compiled(name)(v, 7.848, z)])
+    expected = np.concatenate([np.ravel(r.full()) for r in compiled(name)(v, 7.848, z, 1.0)])
     scale = np.array([1.0, *np.full(z.size, abs(v))])
     np.testing.assert_allclose(of_symbols / scale, expected / scale, rtol=1e-12, atol=1e-12)
 
@@ -193,11 +233,13 @@ def test_default_expressions_use_no_nonsmooth_primitive(name: str) -> None:
     v, N, z = ca.SX.sym("v"), ca.SX.sym("N"), state_symbols(law)
     if law.switches(v, N, z):
         pytest.skip("has modes")
-    function = ca.Function("law", [v, N, z], [law.force(v, N, z), law.rate(v, N, z)])
+    w = {name: ca.SX.sym(name) for name in given_inputs(law)}
+    outputs = [law.force(v, N, z, **w), law.rate(v, N, z, **w)]
+    function = ca.Function("law", [v, N, z, ca.vertcat(*w.values())], outputs)
     used = {function.instruction_id(k) for k in range(function.n_instructions())}
-    forbidden = {ca.OP_SIGN, ca.OP_FABS, ca.OP_IF_ELSE_ZERO, ca.OP_LT}
+    forbidden = {ca.OP_IF_ELSE_ZERO, ca.OP_LT, ca.OP_LE}
     if law.facts.smoothness.startswith("C∞"):
-        forbidden |= {ca.OP_FMIN, ca.OP_FMAX}
+        forbidden |= {ca.OP_SIGN, ca.OP_FABS, ca.OP_FMIN, ca.OP_FMAX}
     assert not used & forbidden
 
 

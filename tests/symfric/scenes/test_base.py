@@ -10,14 +10,24 @@ from symfric.scenes import ALL_SCENES, Scene, friction_states
 each_scene = pytest.mark.parametrize("kind", ALL_SCENES.values(), ids=ALL_SCENES.keys())
 
 
+FITTING = [name for name, law in CASES.items() if {i.name for i in law.inputs} <= {"F_e"}]
+
+
 @each_scene
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", FITTING)
 def test_every_law_gives_a_model_of_its_size_that_starts(kind: type[Scene], name: str) -> None:
     law = CASES[name]
     model = kind(law).model()
     assert len(model.x) == 2 + len(law.states)
     assert model.initial_state().shape == (len(model.x),)
     assert model.p == ()
+
+
+@each_scene
+@pytest.mark.parametrize("name", sorted(set(CASES) - set(FITTING)))
+def test_law_that_needs_what_the_scene_lacks_is_refused(kind: type[Scene], name: str) -> None:
+    with pytest.raises(ValueError, match="expected a law that needs no more than v, N, F_e here"):
+        kind(CASES[name]).model()
 
 
 @each_scene

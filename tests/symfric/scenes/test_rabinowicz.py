@@ -35,7 +35,10 @@ def test_closed_form_has_the_published_numbers() -> None:
     assert (found.x_max, found.x_min) == pytest.approx((0.570501, 0.176927), abs=5e-7)
 
 
-@pytest.mark.parametrize("kind", ALL_LAWS.values(), ids=ALL_LAWS.keys())
+FITTING = [n for n, kind in ALL_LAWS.items() if {i.name for i in kind().inputs} <= {"F_e"}]
+
+
+@pytest.mark.parametrize("kind", [ALL_LAWS[name] for name in FITTING], ids=FITTING)
 def test_belt_carries_the_block_along_while_friction_opposes_the_slip(kind: type[Law]) -> None:
     run = simulate(rabinowicz(kind()), 0.5, rtol=1e-6)
     assert run["v_rel"][0] == pytest.approx(-V_BELT)

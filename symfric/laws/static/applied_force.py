@@ -1,0 +1,230 @@
+"""Laws that see what the contact must carry: true sticking without an internal state."""
+
+from dataclasses import dataclass
+from math import pi
+from typing import ClassVar, final
+
+from symfric.laws import smooth
+from symfric.laws.base import APPLIED_FORCE, Facts, Input, StaticLaw
+from symfric.numeric import Scalar, atan, exp, is_number
+from symfric.parameters import option, param
+
+FORMS = ("smooth", "original")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Karnopp(StaticLaw):
+    """Karnopp friction: inside a band around rest the contact carries the applied force.
+
+        F = clip(F_e, -mu_s N, mu_s N)        for |v| < D_v, original
+        F = mu_d N sign(v) + sigma_2 v        beyond
+        F = (1 - w) hold(F_e, mu_s N) + w (mu_d N sign(v) + sigma_2 v)    smooth
+        w = S(|v| / D_v),   S(t) = t^3 (10 - 15t + 6t^2) for 0 <= t <= 1
+
+    hold is the clip with corners rounded over +-F_eps; below them F(0) = F_e exactly.
+    Limits: at rest dv/dt = 0 for |F_e| <= mu_s N - F_eps. A moving body comes to rest only
+    asymptotically, v ~ t^(-1/2) inside the band; in the original form v stays where it entered the
+    band unless the integrator sets it to zero. D_v -> 0 is Coulomb friction with stiction. Inside
+    the band F v may be negative.
+    Source: Karnopp, ASME J. Dyn. Syst. Meas. Control 107, 1985 (not read), as in public codes.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "V"),
+        smoothness="C2 at 0, |v| = D_v, |F_e| = mu_s N -+ F_eps (original: jump at |v| = D_v)",
+        confidence="two sources",
+        source="Karnopp 1985, as in public codes",
+    )
+    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+
+    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
+    D_v: Scalar = param(1e-3, unit="m/s", doc="half width of the band around rest", lower=1e-12)
+    sigma_2: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
+    F_eps: Scalar = param(1e-3, unit="N", doc="rounding of the break-away", lower=1e-12)
+    form: str = option("smooth", choices=FORMS, doc="window or hard switch")
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """The applied force."""
+        return (APPLIED_FORCE,)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The half width of the band [m/s]."""
+        return self.D_v
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
+        """Friction force [N]."""
+        slip = self.mu_d * N * smooth.sign(v, 0.0) + self.sigma_2 * v
+        speed, static = smooth.magnitude(v, 0.0), self.mu_s * N
+        if self.form == "original":
+            return smooth.choose(speed < self.D_v, smooth.hold(F_e, static, 0.0), slip)
+        w = smooth.step5(speed / self.D_v)
+        return (1 - w) * smooth.hold(F_e, static, self.F_eps) + w * slip
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Awrejcewicz(StaticLaw):
+    """Awrejcewicz-Grzelczyk-Pyryev friction: four branches, continuous, in one expression.
+
+        u = |v| / epsilon
+        F = (1 - A) clip(F_e, -mu_s N, mu_s N) + A g sign(v)
+        g = N {mu_d + (mu_s - mu_d) exp(-[max(|v| - epsilon, 0) / v_s]^2)}
+        A = u^2 (3 - 2u) original,   u^3 (10 - 15u + 6u^2) smooth,   0 <= u <= 1
+
+    Within |v| <= epsilon g = mu_s N, and the expression equals the four branches of the paper. The
+    corners of the clip are rounded over +-F_eps in the smooth form. The fall beyond epsilon is a
+    choice made here.
+    Limits: F(0) = F_e for |F_e| <= mu_s N - F_eps; F(epsilon) = mu_s N. Inside the window F v may
+    be negative. A moving body comes to rest only asymptotically, as with `Karnopp`.
+    Source: Awrejcewicz, Grzelczyk, Pyryev 2008 (not read; branches checked to join).
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "St"),
+        smoothness="C1 at |v| = epsilon, C2 at 0, |F_e| = mu_s N -+ F_eps (original: C0 in F_e)",
+        confidence="memory",
+        source="Awrejcewicz, Grzelczyk, Pyryev 2008",
+    )
+    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+
+    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
+    epsilon: Scalar = param(1e-3, unit="m/s", doc="half width of the window", lower=1e-12)
+    v_s: Scalar = param(1e-2, unit="m/s", doc="Stribeck velocity", lower=1e-12)
+    F_eps: Scalar = param(1e-3, unit="N", doc="rounding of the break-away", lower=1e-12)
+    form: str = option("smooth", choices=FORMS, doc="quintic or cubic window")
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """The applied force."""
+        return (APPLIED_FORCE,)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The half width of the window [m/s]."""
+        return self.epsilon
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
+        """Friction force [N]."""
+        soft = self.form == "smooth"
+        speed, static = smooth.magnitude(v, 0.0), self.mu_s * N
+        beyond = smooth.positive(speed - self.epsilon, 0.0) / self.v_s
+        slip = N * (self.mu_d + (self.mu_s - self.mu_d) * exp(-beyond * beyond))
+        A = (smooth.step5 if soft else smooth.step3)(speed / self.epsilon)
+        stick = smooth.hold(F_e, static, self.F_eps if soft else 0.0)
+        return (1 - A) * stick + A * slip * smooth.sign(v, 0.0)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class LeineSwitch(StaticLaw):
+    """Switch model of Leine et al., and its smooth stand-in.
+
+        smooth:    F = mu_s N (2/pi) atan(v / v_eps) / (1 + delta |v|)
+        original:  F = mu_s N sign(v) / (1 + delta |v|)          for |v| > eta, slip
+                   F = clip(F_e + c v, -mu_s N, mu_s N)          for |v| <= eta, stick
+
+    c v draws a sticking body to the middle of the band: with m alpha for c, dv/dt = -alpha v.
+    |v| of the smooth form is smooth over v_eps.
+    Limits: the level falls from mu_s N to zero, with no dynamic level. The smooth form creeps under
+    load and is 6 % short of the original at 10 v_eps, since atan is slow.
+    Source: Leine et al., Nonlinear Dynam. 16, 1998 (not read); smooth form and slip law as in the
+    author's public code.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "St"),
+        smoothness="C∞ (original: jump at |v| = eta)",
+        confidence="one source; memory for the switching",
+        source="Leine et al. 1998; the author's public code",
+    )
+
+    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
+    delta: Scalar = param(3.0, unit="s/m", doc="steepness of the fall", lower=0.0)
+    v_eps: Scalar = param(1e-4, unit="m/s", doc="smoothing velocity", lower=1e-12)
+    eta: Scalar = param(1e-6, unit="m/s", doc="half width of the band, original form", lower=1e-15)
+    c: Scalar = param(10.0, unit="N s/m", doc="pull to the middle, original form", lower=0.0)
+    form: str = option("smooth", choices=FORMS, doc="arctangent or switch")
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """The applied force, in the original form."""
+        return () if self.form == "smooth" else (APPLIED_FORCE,)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The smoothing velocity, or the half width of the band [m/s]."""
+        return self.v_eps if self.form == "smooth" else self.eta
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
+        """Friction force [N]."""
+        static = self.mu_s * N
+        if self.form == "smooth":
+            falling = static / (1 + self.delta * smooth.magnitude(v, self.v_eps))
+            return falling * (2 / pi * atan(v / self.v_eps))
+        speed = smooth.magnitude(v, 0.0)
+        slip = static * smooth.sign(v, 0.0) / (1 + self.delta * speed)
+        stick = smooth.hold(F_e + self.c * v, static, 0.0)
+        return smooth.choose(speed <= self.eta, stick, slip)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Wojewoda(StaticLaw):
+    """Hysteretic friction of Wojewoda et al.: other branches for speeding up and slowing down.
+
+        F = N [mu_d + (mu_s - mu_d) h sign(v dv/dt)] sign(v)
+        h = exp(-a_1 |v| / (|dv/dt| + a_2))
+
+    sign(v) and |v| are smooth over v_eps, |dv/dt| over a_eps, sign(v dv/dt) over v_eps a_eps. The
+    stick branch of the paper, clip(F_e), is left to laws with modes.
+    Limits: F -> mu_d N for fast sliding; at dv/dt = 0 it is Coulomb friction. Needs mu_s <= 2 mu_d,
+    or the branch of deceleration turns forward. Given the acceleration of the body that it brakes,
+    it closes an algebraic loop: pass a measured or filtered one.
+    Source: after Wojewoda, Stefanski, Wiercigroch, Kapitaniak 2008 (abstract only).
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "St", "L"),
+        smoothness="C∞",
+        confidence="reconstruction",
+        source="after Wojewoda, Stefanski, Wiercigroch, Kapitaniak 2008",
+    )
+    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+
+    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
+    a_1: Scalar = param(100.0, unit="1/s", doc="decay of the hysteresis", lower=0.0)
+    a_2: Scalar = param(0.1, unit="m/s^2", doc="acceleration of half the decay", lower=1e-12)
+    v_eps: Scalar = param(1e-4, unit="m/s", doc="smoothing velocity", lower=1e-12)
+    a_eps: Scalar = param(1e-2, unit="m/s^2", doc="smoothing acceleration", lower=1e-12)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if is_number(self.mu_s) and is_number(self.mu_d) and self.mu_s > 2 * self.mu_d:
+            raise ValueError(
+                f"Wojewoda: mu_s: expected mu_s <= 2 mu_d = {2 * self.mu_d:g}, got {self.mu_s:g}; "
+                "beyond, friction drives a body that slows down"
+            )
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """The sliding acceleration."""
+        return (Input("dv", "m/s^2", "sliding acceleration"),)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The smoothing velocity [m/s]."""
+        return self.v_eps
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, dv: Scalar = 0.0) -> Scalar:
+        """Friction force [N]."""
+        speed, change = smooth.magnitude(v, self.v_eps), smooth.magnitude(dv, self.a_eps)
+        h = exp(-self.a_1 * speed / (change + self.a_2))
+        phase = smooth.sign(v * dv, self.v_eps * self.a_eps)
+        mu = self.mu_d + (self.mu_s - self.mu_d) * h * phase
+        return mu * N * smooth.sign(v, self.v_eps)

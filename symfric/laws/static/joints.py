@@ -1,0 +1,192 @@
+"""Friction of robot joints, servo drives and belts: torques that see load and temperature."""
+
+from dataclasses import dataclass
+from typing import ClassVar, final
+
+from symfric.laws import smooth
+from symfric.laws.base import Facts, Input, StaticLaw
+from symfric.numeric import Scalar, equals, exp, expm1, is_number, tanh
+from symfric.parameters import param
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Bittencourt(StaticLaw):
+    """Friction torque of a robot joint under load N at temperature T, after Bittencourt.
+
+        static(T)  = max(F_s0 + F_sT T, 0),   v_s(T) = v_s0 + v_sT T
+        F = {F_c0 + F_cl N + F_sl N exp(-|v/v_sl|^delta)
+             + static(T) exp(-|v/v_s(T)|^delta)} sign(v) + (F_v0 + F_vT exp(-T/T_v)) v
+
+    N is the magnitude of the load torque [N m], v in rad/s, F in N m. |v|^delta and sign(v) are
+    smooth over v_eps, the maximum over F_eps. Temperature is a parameter, so that it may be a
+    symbol. All defaults are invented.
+    Limits: at fixed N and T a `Stribeck` law with two falls; not valid outside the temperatures of
+    its identification. Creeps under load.
+    Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134(5), 2012 (abstract only).
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "St", "V"),
+        smoothness="C∞",
+        confidence="memory",
+        source="Bittencourt and Gunnarsson 2012",
+        load="affine",
+    )
+
+    T: Scalar = param(30.0, unit="degC", doc="temperature", lower=-60.0, upper=200.0)
+    F_c0: Scalar = param(0.03, unit="N m", doc="dynamic level without load", lower=0.0)
+    F_cl: Scalar = param(0.02, unit="1", doc="dynamic level by load", lower=0.0)
+    F_sl: Scalar = param(0.1, unit="1", doc="static excess by load", lower=0.0)
+    F_s0: Scalar = param(0.0, unit="N m", doc="static excess at 0 degC")
+    F_sT: Scalar = param(1e-3, unit="N m/K", doc="static excess by temperature")
+    v_sl: Scalar = param(10.0, unit="rad/s", doc="Stribeck velocity of the load part", lower=1e-12)
+    v_s0: Scalar = param(5.0, unit="rad/s", doc="Stribeck velocity at 0 degC")
+    v_sT: Scalar = param(0.5, unit="rad/(s K)", doc="Stribeck velocity by temperature")
+    F_v0: Scalar = param(1e-3, unit="N m s/rad", doc="viscous coefficient, hot", lower=0.0)
+    F_vT: Scalar = param(
+        2e-3, unit="N m s/rad", doc="viscous coefficient, rise to 0 degC", lower=0.0
+    )
+    T_v: Scalar = param(20.0, unit="K", doc="temperature scale of the viscous part", lower=1e-12)
+    delta: Scalar = param(1.3, unit="1", doc="Stribeck exponent", lower=0.1, upper=10.0)
+    v_eps: Scalar = param(0.1, unit="rad/s", doc="smoothing velocity", lower=1e-12)
+    F_eps: Scalar = param(1e-4, unit="N m", doc="smoothing of the maximum", lower=0.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        v_s = self.v_s0 + self.v_sT * self.T
+        if is_number(v_s) and v_s <= 0:
+            raise ValueError(
+                f"Bittencourt: expected v_s0 + v_sT T > 0, got {v_s:g} rad/s at T = {self.T:g}; "
+                "the law is not valid at this temperature"
+            )
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The smoothing velocity [rad/s]."""
+        return self.v_eps
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction torque [N m]."""
+        v_s = self.v_s0 + self.v_sT * self.T
+        loaded = self.F_sl * N * smooth.stribeck(v, self.v_sl, self.delta, self.v_eps)
+        static = smooth.positive(self.F_s0 + self.F_sT * self.T, self.F_eps)
+        level = self.F_c0 + self.F_cl * N + loaded
+        level += static * smooth.stribeck(v, v_s, self.delta, self.v_eps)
+        viscous = self.F_v0 + self.F_vT * exp(-self.T / self.T_v)
+        return level * smooth.sign(v, self.v_eps) + viscous * v
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class BAM(StaticLaw):
+    """Servo friction of the BAM family, models M1 to M6, torques in N m.
+
+        s = exp(-|v/v_s|^alpha)
+        K = K_b + |K_e tau_e - K_m tau_m| + s [K_s + |K_es tau_e - K_ms tau_m| + quadratic]
+        quadratic = Q_e tau_e^2 where the motor drives, Q_m tau_m^2 where it is driven,
+                    only while tau_e and tau_m oppose each other
+        F = K sign(v) + K_v v
+
+    tau_m is the torque of the motor, tau_e the external one. Zero coefficients switch terms off:
+    M5 has no quadratic; M4 also K_e = K_m and K_es = K_ms; M3 of M4 no Stribeck part; M2 of M4 no
+    load; M1 neither. The motor drives where |tau_m| > |tau_e|. |v|, sign(v) are smooth over v_eps,
+    magnitudes and cases of the torques over tau_eps.
+    Limits: M1 is Coulomb + viscous, M2 is `Stribeck`. `N` has no effect. Creeps under load; BAM
+    itself limits the torque that stops the motor within a step.
+    Source: Duclusaud et al. 2025, as in their public code.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "St", "V"),
+        smoothness="C∞",
+        confidence="one source",
+        source="Duclusaud et al. 2025, public code",
+        load="independent",
+    )
+
+    K_b: Scalar = param(0.05, unit="N m", doc="dynamic level without load", lower=0.0)
+    K_s: Scalar = param(0.05, unit="N m", doc="static excess without load", lower=0.0)
+    K_e: Scalar = param(0.05, unit="1", doc="dynamic level by external torque", lower=0.0)
+    K_m: Scalar = param(0.05, unit="1", doc="dynamic level by motor torque", lower=0.0)
+    K_es: Scalar = param(0.05, unit="1", doc="static excess by external torque", lower=0.0)
+    K_ms: Scalar = param(0.05, unit="1", doc="static excess by motor torque", lower=0.0)
+    Q_e: Scalar = param(0.0, unit="1/(N m)", doc="excess by external torque squared", lower=0.0)
+    Q_m: Scalar = param(0.0, unit="1/(N m)", doc="excess by motor torque squared", lower=0.0)
+    v_s: Scalar = param(0.2, unit="rad/s", doc="Stribeck velocity", lower=1e-12)
+    alpha: Scalar = param(1.35, unit="1", doc="Stribeck exponent", lower=0.1, upper=10.0)
+    K_v: Scalar = param(0.1, unit="N m s/rad", doc="viscous coefficient", lower=0.0)
+    v_eps: Scalar = param(0.01, unit="rad/s", doc="smoothing velocity", lower=1e-12)
+    tau_eps: Scalar = param(1e-3, unit="N m", doc="smoothing torque", lower=1e-12)
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """The torques on both sides of the gear, where a coefficient asks for them."""
+        of_load = (self.K_e, self.K_m, self.K_es, self.K_ms, self.Q_e, self.Q_m)
+        if all(equals(coefficient, 0.0) for coefficient in of_load):
+            return ()
+        return (
+            Input("tau_m", "N m", "torque of the motor"),
+            Input("tau_e", "N m", "external torque"),
+        )
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The smoothing velocity [rad/s]."""
+        return self.v_eps
+
+    def force(
+        self, v: Scalar, N: Scalar, z: Scalar = (), *, tau_m: Scalar = 0.0, tau_e: Scalar = 0.0
+    ) -> Scalar:
+        """Friction torque [N m]."""
+        dynamic = smooth.magnitude(self.K_e * tau_e - self.K_m * tau_m, self.tau_eps)
+        static = smooth.magnitude(self.K_es * tau_e - self.K_ms * tau_m, self.tau_eps)
+        if not (equals(self.Q_e, 0.0) and equals(self.Q_m, 0.0)):
+            static += self._quadratic(tau_m, tau_e)
+        falling = smooth.stribeck(v, self.v_s, self.alpha, self.v_eps)
+        level = self.K_b + dynamic + falling * (self.K_s + static)
+        return level * smooth.sign(v, self.v_eps) + self.K_v * v
+
+    def _quadratic(self, tau_m: Scalar, tau_e: Scalar) -> Scalar:
+        width = self.tau_eps * self.tau_eps
+        opposed = (1 - tanh(tau_m * tau_e / width)) / 2
+        drives = (1 + tanh((tau_m * tau_m - tau_e * tau_e) / width)) / 2
+        return opposed * (
+            drives * self.Q_e * tau_e * tau_e + (1 - drives) * self.Q_m * tau_m * tau_m
+        )
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Capstan(StaticLaw):
+    """Capstan (belt) friction of Euler and Eytelwein.
+
+        F = T_1 - T_2 = N [exp(mu_d beta sign(v)) - 1]
+
+    N is the tension T_2 of the belt on one side; the tension T_1 on the other is larger while the
+    belt slides towards it (v > 0) and smaller while it slides back. sign(v) is smooth over v_eps.
+    Limits: mu_d beta -> 0 gives `Coulomb` with the coefficient mu_d beta. Not odd: sliding back,
+    |F| is smaller by exp(-mu_d beta). Creeps under load.
+    Source: Euler 1769, Eytelwein 1808; textbook.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D",),
+        smoothness="C∞",
+        confidence="memory (textbook)",
+        source="Euler 1769, Eytelwein 1808",
+        odd=False,
+    )
+
+    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
+    beta: Scalar = param(3.141592653589793, unit="rad", doc="wrap angle", lower=0.0)
+    v_eps: Scalar = param(1e-3, unit="m/s", doc="smoothing velocity", lower=0.0)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The smoothing velocity [m/s]."""
+        return self.v_eps
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        return N * expm1(self.mu_d * self.beta * smooth.sign(v, self.v_eps))

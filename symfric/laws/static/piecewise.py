@@ -1,0 +1,217 @@
+"""Laws that multibody codes compose from pieces: ramps, steps and a fall."""
+
+from dataclasses import dataclass
+from typing import ClassVar, final
+
+from symfric.laws import smooth
+from symfric.laws.base import Facts, StaticLaw
+from symfric.numeric import Scalar, exp
+from symfric.parameters import option, param
+
+FORMS = ("smooth", "original")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class BengisuAkay(StaticLaw):
+    """Bengisu-Akay friction: a parabola up to the static level, then a fall.
+
+        F = mu_s N u (2 - |u|)                                  u = v/v_0, for |u| <= 1
+        F = N [mu_d + (mu_s - mu_d) exp(-xi (|v| - v_0))] sign(v)       beyond, original
+        F = N [mu_d + (mu_s - mu_d) exp(-xi^2 (|v| - v_0)^2)] sign(v)   beyond, smooth
+
+    Limits: the peak F(v_0) = mu_s N is exact; F -> mu_d N. The slope of the original jumps at v_0
+    from 0 to -xi (mu_s - mu_d) N, that of the smooth form is 0 on both sides. Creeps under load.
+    Source: Bengisu and Akay, J. Sound Vib. 171, 1994 (not read).
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "St"),
+        smoothness="C1 at 0 and |v| = v_0 (original: C0 at |v| = v_0)",
+        confidence="memory",
+        source="Bengisu and Akay 1994",
+    )
+    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+
+    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
+    v_0: Scalar = param(1e-3, unit="m/s", doc="velocity of the peak", lower=1e-12)
+    xi: Scalar = param(1e3, unit="s/m", doc="steepness of the fall", lower=0.0)
+    form: str = option("smooth", choices=FORMS, doc="fall behind the peak")
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The velocity of the peak [m/s]."""
+        return self.v_0
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        u = smooth.clip(v / self.v_0, -1.0, 1.0)
+        beyond = self.xi * smooth.positive(smooth.magnitude(v, 0.0) - self.v_0, 0.0)
+        fall = exp(-beyond * beyond) if self.form == "smooth" else exp(-beyond)
+        mu = self.mu_d + (self.mu_s - self.mu_d) * fall
+        return mu * N * (u * (2 - smooth.magnitude(u, 0.0)))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class VelocityBased(StaticLaw):
+    """Velocity-based friction of MSC ADAMS: a step up to the static level, a step down.
+
+        F = N [2 S((v + v_s) / (2 v_s)) - 1] [mu_s - (mu_s - mu_d) S((|v| - v_s) / (v_d - v_s))]
+        S(t) = t^2 (3 - 2t) original,   t^3 (10 - 15t + 6t^2) smooth,   0 <= t <= 1
+
+    With u = v/v_s the first bracket is u (3 - u^2)/2 or u (15 - 10 u^2 + 3 u^4)/8, |u| <= 1.
+    Limits: F(v_s) = mu_s N and F = mu_d N from v_d on, both exactly. Slope at rest 1.5 mu_s N / v_s
+    original, 1.875 mu_s N / v_s smooth. ADAMS joints take v_d = 1.5 v_s. Creeps under load.
+    Source: documentation of MSC ADAMS, contact friction and STEP, two pages.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S"),
+        smoothness="C2 at |v| = v_s and v_d (original: C1)",
+        confidence="two sources",
+        source="documentation of MSC ADAMS",
+    )
+    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+    strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = (("v_s", "v_d"),)
+
+    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
+    v_s: Scalar = param(1e-3, unit="m/s", doc="stiction transition velocity", lower=1e-12)
+    v_d: Scalar = param(1.5e-3, unit="m/s", doc="friction transition velocity", lower=1e-12)
+    form: str = option("smooth", choices=FORMS, doc="quintic or cubic steps")
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The stiction transition velocity [m/s]."""
+        return self.v_s
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        u = smooth.clip(v / self.v_s, -1.0, 1.0)
+        beyond = (smooth.magnitude(v, 0.0) - self.v_s) / (self.v_d - self.v_s)
+        if self.form == "smooth":
+            rise, fall = u * (15 - u * u * (10 - 3 * u * u)) / 8, smooth.step5(beyond)
+        else:
+            rise, fall = u * (3 - u * u) / 2, smooth.step3(beyond)
+        return rise * N * (self.mu_s - (self.mu_s - self.mu_d) * fall)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Ambrosio(StaticLaw):
+    """Ambrosio friction: nothing below v_0, a ramp to the dynamic level at v_1.
+
+        F = mu_d N sign(v) s((|v| - v_0) / (v_1 - v_0)),   0 <= v_0 < v_1
+        s(t) = t original,   t^3 (10 - 15t + 6t^2) smooth,   0 <= t <= 1
+
+    Limits: F = mu_d N from v_1 on; no friction at all below v_0, so a loaded contact creeps freely
+    there and the linearisation at rest is singular; v_0 = 0 in the original is `Coulomb` with the
+    shape saturation.
+    Source: Ambrosio 2003 (not read), as in public multibody code.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D",),
+        smoothness="C2 at |v| = v_0 and v_1 (original: C0)",
+        confidence="one source",
+        source="Ambrosio 2003, as in public multibody code",
+    )
+    strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = (("v_0", "v_1"),)
+
+    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
+    v_0: Scalar = param(2e-4, unit="m/s", doc="velocity below which nothing acts", lower=0.0)
+    v_1: Scalar = param(1e-3, unit="m/s", doc="velocity of full friction", lower=1e-12)
+    form: str = option("smooth", choices=FORMS, doc="quintic step or ramp")
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The width of the ramp [m/s]."""
+        return self.v_1 - self.v_0
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        forward, backward = ((w - self.v_0) / (self.v_1 - self.v_0) for w in (v, -v))
+        if self.form == "smooth":
+            return self.mu_d * N * (smooth.step5(forward) - smooth.step5(backward))
+        return self.mu_d * N * (smooth.clip(forward, 0.0, 1.0) - smooth.clip(backward, 0.0, 1.0))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Hollars(StaticLaw):
+    """Hollars friction, of Simbody.
+
+        u = |v| / v_t
+        F = N {min(u, 1) [mu_d + 2 (mu_s - mu_d) / (1 + u^2)] + mu_v |v|} sign(v)
+
+    min(u, 1) is rounded over 1 +- u_eps; the float u_eps = 0 is the original.
+    Limits: F(v_t) = mu_s N in the original, (1 - 0.19 u_eps) mu_s N here; the excess over mu_d N
+    falls like 2/u^2. Slope at rest N (2 mu_s - mu_d) / v_t. Creeps under load.
+    Source: Simbody, three public headers.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "St", "V"),
+        smoothness="C2 at |v| = v_t (1 -+ u_eps) (u_eps = 0: C0 at v_t)",
+        confidence="one source",
+        source="Simbody, HuntCrossleyForce",
+    )
+    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+
+    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
+    v_t: Scalar = param(1e-2, unit="m/s", doc="transition velocity", lower=1e-12)
+    mu_v: Scalar = param(0.0, unit="s/m", doc="viscous coefficient, load-dependent", lower=0.0)
+    u_eps: Scalar = param(0.2, unit="1", doc="rounding of the peak", lower=0.0, upper=1.0)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The transition velocity [m/s]."""
+        return self.v_t
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        u = v / self.v_t
+        mu = self.mu_d + 2 * (self.mu_s - self.mu_d) / (1 + u * u)
+        return N * (smooth.hold(u, 1.0, self.u_eps) * mu + self.mu_v * v)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Step5(StaticLaw):
+    """Quintic-step Stribeck friction, of Simbody and of the early Drake.
+
+        u = |v| / v_t,   S(t) = t^3 (10 - 15t + 6t^2) for 0 <= t <= 1
+        F = N {mu_s S(u) - (mu_s - mu_d) S((u - 1)/2) + mu_v |v|} sign(v)
+
+    Limits: F(v_t) = mu_s N, F(3 v_t) = mu_d N exactly (without mu_v). The slope at rest is zero:
+    nothing resists slow creep and the linearisation at rest is singular.
+    Source: Simbody, public source.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "St", "V"),
+        smoothness="C2 at 0, |v| = v_t and 3 v_t",
+        confidence="one source",
+        source="Simbody, HuntCrossleyForce",
+    )
+    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+
+    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
+    v_t: Scalar = param(1e-3, unit="m/s", doc="transition velocity", lower=1e-12)
+    mu_v: Scalar = param(0.0, unit="s/m", doc="viscous coefficient, load-dependent", lower=0.0)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The transition velocity [m/s]."""
+        return self.v_t
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        u = v / self.v_t
+        rise = smooth.step5(u) - smooth.step5(-u)
+        fall = smooth.step5((smooth.magnitude(u, 0.0) - 1) / 2)
+        return N * (rise * (self.mu_s - (self.mu_s - self.mu_d) * fall) + self.mu_v * v)

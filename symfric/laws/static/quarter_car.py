@@ -1,0 +1,132 @@
+"""Friction of a quarter-car test rig, whose normal force follows from the linkage of the strut."""
+
+from dataclasses import dataclass
+from math import pi
+from typing import ClassVar, final
+
+from symfric.laws import smooth
+from symfric.laws.base import Facts, Input, StaticLaw
+from symfric.numeric import Scalar, asin, cos, equals, exp, sin, sqrt, tan
+from symfric.parameters import option, param
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class QuarterCarGeneral(StaticLaw):
+    """Quarter-car friction with the load of the linkage, in newton.
+
+        f_sd = k_s x_rel + b_d v_rel                              force of spring and damper
+        sin d_theta = x_rel cos(theta) / (L_d - x_rel sin(theta))
+        slip   = [C_e exp(-|v|/e_1) + mu |f_sd| / tan(theta - d_theta)] sign(v) + sigma_v v
+        F      = (1 - w) hold(f_sd, F_brk) + w slip,   w = S(|v| / v_eps),   smooth
+        F      = f_sd at v = 0, else C_e exp(-|v|/e_1) sign(v) + mu f_sd / tan(theta - d_theta)
+                 + sigma_v v,                                                as printed
+
+    S is the quintic step of `Karnopp`, hold its rounded clip. `N` has no effect: the load is
+    |f_sd| / tan. `v` is the velocity of the body, x_rel the wheel's position minus the body's.
+    As printed, the Coulomb term has the sign of the spring force and may drive the body, the branch
+    at rest is not limited, and exp(|v|/e_1) needs e_1 < 0: here e_1 is its magnitude.
+    C_e, e_1, mu, sigma_v and L_d are not given in the paper; their defaults are invented.
+    Limits: holds |f_sd| <= F_brk - F_eps at rest; mu = 0 leaves the simple law beyond v_eps;
+    x_rel < L_d / (2 sin(theta)).
+    Source: Al-Zughaibi, quarter-car friction, equations 7-12 and 24 (seed 1), corrected as said.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "St", "V"),
+        smoothness="C2 at 0, |v| = v_eps, |f_sd| = F_brk -+ F_eps (as printed: jump at 0)",
+        confidence="one source",
+        source="Al-Zughaibi, quarter-car friction (seed 1), corrected",
+        odd=False,
+        load="independent",
+    )
+
+    k_s: Scalar = param(28900.0, unit="N/m", doc="spring stiffness", lower=0.0)
+    b_d: Scalar = param(260.0, unit="N s/m", doc="damper coefficient", lower=0.0)
+    theta: Scalar = param(pi / 4, unit="rad", doc="angle of the strut", lower=0.01, upper=1.56)
+    L_d: Scalar = param(0.4, unit="m", doc="length of the strut", lower=1e-12)
+    F_brk: Scalar = param(193.8, unit="N", doc="break-away force", lower=0.0)
+    C_e: Scalar = param(180.0, unit="N", doc="static excess at rest", lower=0.0)
+    e_1: Scalar = param(0.01, unit="m/s", doc="velocity of the decay", lower=1e-12)
+    mu: Scalar = param(0.05, unit="1", doc="friction coefficient of the guide", lower=0.0)
+    sigma_v: Scalar = param(50.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
+    v_eps: Scalar = param(1e-3, unit="m/s", doc="half width of the stick window", lower=1e-12)
+    F_eps: Scalar = param(
+        1.0, unit="N", doc="rounding of the break-away and of |f_sd|", lower=1e-12
+    )
+    form: str = option("smooth", choices=("smooth", "as_printed"), doc="corrected or as printed")
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """Position and velocity of the wheel relative to the body."""
+        return (
+            Input("x_rel", "m", "position of the wheel minus that of the body", 0.01),
+            Input("v_rel", "m/s", "velocity of the wheel minus that of the body", 0.1),
+        )
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The half width of the stick window [m/s]."""
+        return self.v_eps
+
+    def force(
+        self, v: Scalar, N: Scalar, z: Scalar = (), *, x_rel: Scalar = 0.0, v_rel: Scalar = 0.0
+    ) -> Scalar:
+        """Friction force [N]."""
+        f_sd = self.k_s * x_rel + self.b_d * v_rel
+        leverage = 0.0 if equals(self.mu, 0.0) else self.mu / tan(self.theta - self.tilt(x_rel))
+        speed = smooth.magnitude(v, 0.0)
+        dry = self.C_e * exp(-speed / self.e_1)
+        if self.form == "as_printed":
+            slip = dry * smooth.sign(v, 0.0) + leverage * f_sd + self.sigma_v * v
+            return smooth.choose(speed <= 0, f_sd, slip)
+        load = sqrt(f_sd * f_sd + self.F_eps * self.F_eps)
+        slip = (dry + leverage * load) * smooth.sign(v, 0.0) + self.sigma_v * v
+        w = smooth.step5(speed / self.v_eps)
+        return (1 - w) * smooth.hold(f_sd, self.F_brk, self.F_eps) + w * slip
+
+    def tilt(self, x_rel: Scalar) -> Scalar:
+        """Change d_theta of the strut's angle [rad], positive for a shortened spring.
+
+        The paper writes sin(theta) for cos(theta), which is the same at its 45 degrees.
+        """
+        return asin(x_rel * cos(self.theta) / (self.L_d - x_rel * sin(self.theta)))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class QuarterCarSimple(StaticLaw):
+    """Quarter-car friction without the Coulomb term, in newton.
+
+        F = C_e exp(-|v|/e_1) sign(v) + sigma_v v
+
+    |v| and sign(v) are smooth over v_eps; the float v_eps = 0 is the original. As printed the
+    exponent grows: here e_1 is the magnitude of the paper's. `N` has no effect. C_e, e_1 and
+    sigma_v are not given in the paper; their defaults are invented.
+    Limits: `Tustin` with a dynamic level of zero. Creeps under load; `QuarterCarGeneral` with
+    mu = 0 holds at rest.
+    Source: Al-Zughaibi, quarter-car friction, equation 21 (seed 1), with the sign of e_1 corrected.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("S", "St", "V"),
+        smoothness="C∞",
+        confidence="one source",
+        source="Al-Zughaibi, quarter-car friction (seed 1), corrected",
+        load="independent",
+    )
+
+    C_e: Scalar = param(180.0, unit="N", doc="static level", lower=0.0)
+    e_1: Scalar = param(0.01, unit="m/s", doc="velocity of the decay", lower=1e-12)
+    sigma_v: Scalar = param(50.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
+    v_eps: Scalar = param(1e-3, unit="m/s", doc="smoothing velocity", lower=0.0)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The smoothing velocity [m/s], or that of the decay without smoothing."""
+        return self.e_1 if equals(self.v_eps, 0.0) else self.v_eps
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        dry = self.C_e * exp(-smooth.power(v, 1.0, self.v_eps) / self.e_1)
+        return dry * smooth.sign(v, self.v_eps) + self.sigma_v * v
