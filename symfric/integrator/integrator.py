@@ -68,11 +68,18 @@ class Integrator:
 
     @cached_property
     def signals(self) -> ca.Function:
-        """All signals of the model as a Function (t, y, d)."""
-        m = self.model
+        """All signals of the model as a Function (t, y, d), those of a mechanism refined.
+
+        Between steps the constraints of a mechanism hold to the tolerance only, at results exactly.
+        """
+        m, manifold = self.model, self.system.manifold
         outputs = (ca.SX(o.expression) for o in m.outputs.values())
         stacked = ca.vertcat(m.vector("x"), m.vector("z"), m.vector("u"), *outputs)
-        return self.of_time("signals", stacked)
+        signals = self.of_time("signals", stacked)
+        if manifold is None:
+            return signals
+        t, y, d = ca.SX.sym("t"), ca.SX.sym("y", self.system.n), ca.SX.sym("d", signals.numel_in(2))
+        return ca.Function("signals", [t, y, d], [signals(t, manifold.refine(y, d), d)])
 
     @cached_property
     def signal_columns(self) -> Columns:

@@ -58,12 +58,15 @@ class SymbolicLU:
         return ca.vertcat(ca.SX(0, 1), *x)
 
 
-def factorise(matrix: ca.SX, safe: tuple[int, ...]) -> SymbolicLU:
+def factorise(
+    matrix: ca.SX, safe: tuple[int, ...], then: tuple[int, ...] = ()
+) -> SymbolicLU:
     """Factorise a structurally nonsingular sparse matrix.
 
     Pivots are chosen once, at build time, by least fill (Markowitz). Diagonal entries of the rows
     in `safe` (differential equations, whose pivot 1/(gamma h) dominates for small steps) come
-    first; algebraic rows may pivot anywhere.
+    first, then those of the rows in `then` (constraints, whose pivot is the definite Schur
+    complement of the rows before); other algebraic rows may pivot anywhere.
 
     Raises:
         ValueError: structurally singular.
@@ -78,8 +81,9 @@ def factorise(matrix: ca.SX, safe: tuple[int, ...]) -> SymbolicLU:
     kept: list[tuple[int, ...]] = []
     eliminated: list[tuple[int, ...]] = []
     packed: list[ca.SX] = []
+    rank = dict.fromkeys(then, 1) | dict.fromkeys(safe, 0)
     while active_rows:
-        row, column = _pivot(rows, active_rows, active_columns, set(safe))
+        row, column = _pivot(rows, active_rows, active_columns, rank)
         active_rows.discard(row)
         active_columns.discard(column)
         inverse = 1 / rows[row][column]
@@ -105,20 +109,23 @@ def factorise(matrix: ca.SX, safe: tuple[int, ...]) -> SymbolicLU:
 
 
 def _pivot(
-    rows: list[dict[int, ca.SX]], active_rows: set[int], active_columns: set[int], safe: set[int]
+    rows: list[dict[int, ca.SX]],
+    active_rows: set[int],
+    active_columns: set[int],
+    rank: dict[int, int],
 ) -> tuple[int, int]:
-    """The entry whose elimination fills least; safe diagonals before all others."""
+    """The entry whose elimination fills least; diagonals of ranked rows first, rank by rank."""
     in_column = {c: sum(c in rows[r] for r in active_rows) for c in active_columns}
     candidates = [
         (
-            r not in safe,
+            rank.get(r, 2),
             (sum(j in active_columns for j in rows[r]) - 1) * (in_column[c] - 1),
             r,
             c,
         )
         for r in active_rows
         for c in rows[r]
-        if c in active_columns and (r == c or r not in safe)
+        if c in active_columns and (r == c or r not in rank)
     ]
     if not candidates:
         raise ValueError(

@@ -10,12 +10,13 @@ or rejects (h shrinks). `fixed(y, h, d) -> y_next` is the bare step, for derivat
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from symfric.integrator.method import Method
+from symfric.integrator.method import Method, Trial, Trials
 from symfric.integrator.system import System
 
 MEMORY = 5
@@ -30,11 +31,24 @@ KAPPA = 0.03
 """What Newton's method may leave over, in units of the tolerance."""
 
 
+def steps(system: System, method: Method) -> Trials:
+    """The steps of a method, which end on the constraints of a mechanism where there are any."""
+    free, manifold = method.trials(system), system.manifold
+    if manifold is None:
+        return free
+
+    def trial(y: Any, h: Any, d: Any) -> Trial:
+        found = free(y, h, d)
+        return replace(found, end=manifold.project(found.end, d))
+
+    return trial
+
+
 def build_fixed(system: System, method: Method, kind: Any = ca.SX) -> ca.Function:
     """The bare step (y, h, d) -> y_next, without error control: what derivatives are taken of."""
     y, d = kind.sym("y", system.n), kind.sym("d", system.d.numel())
     h = kind.sym("h")
-    end = method.trials(system)(y, h, d).end
+    end = steps(system, method)(y, h, d).end
     return ca.Function("fixed", [y, h, d], [end], ["y", "h", "d"], ["y_next"], {"cse": True})
 
 
@@ -42,7 +56,7 @@ def build_dense_step(system: System, method: Method) -> ca.Function:
     """The bare step with its dense output, (y, h, d) -> all = (y_next, D), for sensitivities."""
     y, d = ca.SX.sym("y", system.n), ca.SX.sym("d", system.d.numel())
     h = ca.SX.sym("h")
-    trial = method.trials(system)(y, h, d)
+    trial = steps(system, method)(y, h, d)
     everything = ca.vertcat(trial.end, *trial.dense)
     return ca.Function("dense", [y, h, d], [everything], ["y", "h", "d"], ["all"], {"cse": True})
 
@@ -107,7 +121,7 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
     left = t_end - t
     h = ca.fmax(ca.fmin(h_wish, left), 1e-300)
     order = method.embedded + 1
-    trial = method.trials(system)(y, h, d)
+    trial = steps(system, method)(y, h, d)
     y_new = trial.end
     norm = error_norm(system, y, y_new, atol, rtol, d)
     e2 = norm(trial.error)

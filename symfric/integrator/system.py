@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.inputs import Drivers
+from symfric.integrator.manifold import Manifold, holonomic_columns, manifold
 from symfric.model import Model
 
 
@@ -32,6 +33,9 @@ class System:
         monitors: SX (m, 1), expressions whose relative error is controlled too: those of the model
             and its algebraic variables.
         monitor_nominal: their typical magnitudes, shape (m,).
+        manifold: where the solution of a holonomic model lies.
+        safe, then: algebraic rows with a safe pivot on the diagonal: those of a mass matrix, and
+            those of constraints once the former are eliminated.
     """
 
     y: ca.SX
@@ -44,6 +48,9 @@ class System:
     nominal: NDArray[np.float64]
     monitors: ca.SX
     monitor_nominal: NDArray[np.float64]
+    manifold: Manifold | None = None
+    safe: tuple[int, ...] = ()
+    then: tuple[int, ...] = ()
 
     @property
     def n(self) -> int:
@@ -52,8 +59,9 @@ class System:
 
     @cached_property
     def diagonal(self) -> tuple[int, ...]:
-        """Differential equations with the rate of their own unknown: safe pivots."""
-        return tuple(i for i in range(self.nx) if self.mass.sparsity().has_nz(i, i))
+        """Rows whose pivot on the diagonal is safe: rates of their own unknown, mass matrices."""
+        own = (i for i in range(self.nx) if self.mass.sparsity().has_nz(i, i))
+        return (*own, *self.safe)
 
     @cached_property
     def is_ode(self) -> bool:
@@ -82,25 +90,10 @@ def system(model: Model, inputs: Drivers) -> System:
     """Put the inputs into the model and bring it into the form M y' = f(y, d).
 
     An implicit model that is linear in x' with a constant matrix keeps that matrix as mass; any
-    other one gets its rates as additional algebraic unknowns.
+    other one gets its rates as additional algebraic unknowns, a holonomic one its accelerations.
     """
-    x, z = model.vector("x"), model.vector("z")
-    nx = x.numel()
-    names = [v.name for v in (*model.x, *model.z)]
-    if model.ode is not None:
-        unknowns, f = ca.vertcat(x, z), ca.vertcat(model.ode, model.alg)
-        mass = ca.diagcat(ca.SX.eye(nx), ca.SX(z.numel(), z.numel()))
-    else:
-        matrix = ca.jacobian(model.residual, model.xdot)
-        unknowns = ca.vertcat(x, z)
-        if matrix.is_constant():
-            f = -ca.substitute(model.residual, model.xdot, ca.SX.zeros(nx))
-            mass = ca.horzcat(matrix, ca.SX(matrix.size1(), z.numel()))
-        else:
-            unknowns = ca.vertcat(x, model.xdot, z)
-            f = ca.vertcat(model.xdot, model.residual)
-            mass = ca.diagcat(ca.SX.eye(nx), ca.SX(f.numel() - nx, f.numel() - nx))
-            names = [*names[:nx], *(f"{v.name}_dot" for v in model.x), *names[nx:]]
+    unknowns, f, mass, names = _columns(model)
+    nx = len(model.x)
     f = ca.substitute(f, model.vector("u"), inputs.expression)
     timed = bool(ca.depends_on(f, model.t))
     if timed:
@@ -111,9 +104,12 @@ def system(model: Model, inputs: Drivers) -> System:
     watched = [*((m.expression, m.nominal) for m in model.monitors)]
     watched += [(v.symbol, v.nominal) for v in model.z]
     monitors = ca.vertcat(ca.SX(0, 1), *(ca.SX(expression) for expression, _ in watched))
+    d = ca.vertcat(model.vector("p"), inputs.data)
+    mechanics = model.holonomic
+    n, m = (mechanics.n, mechanics.phi.numel()) if mechanics else (0, 0)
     return System(
         unknowns,
-        ca.vertcat(model.vector("p"), inputs.data),
+        d,
         ca.cse(f),
         ca.sparsify(mass),
         nx,
@@ -122,4 +118,29 @@ def system(model: Model, inputs: Drivers) -> System:
         model.nominal("x"),
         ca.substitute(monitors, model.vector("u"), inputs.expression),
         np.array([nominal for _, nominal in watched], dtype=float),
+        manifold(model, unknowns, d, f) if mechanics else None,
+        tuple(range(nx, nx + n)),
+        tuple(range(nx + n, nx + n + m)),
     )
+
+
+def _columns(model: Model) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
+    """Unknowns without time, right-hand side, mass matrix and names."""
+    x, z = model.vector("x"), model.vector("z")
+    nx, names = x.numel(), [v.name for v in (*model.x, *model.z)]
+    if model.holonomic is not None:
+        unknowns, f, names = holonomic_columns(model)
+        algebraic = f.numel() - nx
+        return unknowns, f, ca.diagcat(ca.SX.eye(nx), ca.SX(algebraic, algebraic)), names
+    if model.ode is not None:
+        f = ca.vertcat(model.ode, model.alg)
+        return ca.vertcat(x, z), f, ca.diagcat(ca.SX.eye(nx), ca.SX(z.numel(), z.numel())), names
+    matrix = ca.jacobian(model.residual, model.xdot)
+    if matrix.is_constant():
+        f = -ca.substitute(model.residual, model.xdot, ca.SX.zeros(nx))
+        mass = ca.horzcat(matrix, ca.SX(matrix.size1(), z.numel()))
+        return ca.vertcat(x, z), f, mass, names
+    f = ca.vertcat(model.xdot, model.residual)
+    mass = ca.diagcat(ca.SX.eye(nx), ca.SX(f.numel() - nx, f.numel() - nx))
+    names = [*names[:nx], *(f"{v.name}_dot" for v in model.x), *names[nx:]]
+    return ca.vertcat(x, model.xdot, z), f, mass, names

@@ -6,7 +6,8 @@ import pytest
 from closed_forms import assemble, smooth_dae
 
 from symfric import LuGre, Model, Variable, rabinowicz, simulate
-from symfric.integrator.initial import consistent
+from symfric.integrator.columns import Columns
+from symfric.integrator.initial import consistent, consistent_many
 
 x = Variable("x", "m", start=1.0)
 
@@ -72,6 +73,25 @@ def test_guess_is_not_changed() -> None:
     found = consistent(assemble(smooth_dae().model), "here", before, np.zeros(0))
     assert before.tolist() == [1.0, 1.0, 0.3]
     assert found == pytest.approx([1.0, 1.0, 1.0])
+
+
+def test_many_start_as_each_one_alone() -> None:
+    """Both branches, guesses that need damping, guesses without a solution."""
+    system = assemble(root(1.0, 4 * x.symbol))
+    starts, guesses = [1.0, 2.0, -1.0, 0.5, 1.0], [0.5, -1e-3, 1.0, 1e6, 0.0]
+    y, none = np.column_stack([starts, guesses]), np.zeros((5, 0))
+    before = y.copy()
+    found, failed = consistent_many(system, Columns(system.constraints), "here", y, none)
+    np.testing.assert_array_equal(y, before)
+    for m in range(5):
+        if m in failed:
+            with pytest.raises(ValueError, match=r"^here: expected consistent start values") as e:
+                consistent(system, "here", y[m], none[m])
+            assert failed[m] == str(e.value)
+        else:
+            alone = consistent(system, "here", y[m], none[m])
+            assert found[m] == pytest.approx(alone, rel=1e-12)
+    assert sorted(failed) == [2, 4]
 
 
 def test_bristle_starts_in_steady_sliding() -> None:

@@ -1,0 +1,99 @@
+"""Constraints of a mechanism kept on all levels.
+
+A holonomic model is integrated with its accelerations as unknowns beside multipliers and normal
+forces, so that no mass matrix is inverted and no derivative goes through a factorisation:
+
+    x' = (q', a, ...),   M a + phi_q' lam = Q,   phi_q a + gamma = 0,   normal forces
+
+Every accepted step ends on the constraints:
+
+    q  <- q  - phi_q' (phi_q phi_q')^-1 phi(q)       repeated with one factorisation
+    q' <- q' - phi_q' (phi_q phi_q')^-1 phi_q q'
+
+Limits: constraints do not depend on time; impacts are excluded. A step in which phi_q loses rank
+is not accepted, or accepted on the other side without a sign of it.
+"""
+
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+
+from symfric.integrator.lu import factorise
+from symfric.model import Model
+
+ITERATIONS = 4
+"""Of Newton's method with frozen derivatives: from 1e-3 to 1e-13."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Manifold:
+    """Functions that put a column of unknowns onto the constraints of a holonomic model.
+
+    Attributes:
+        project: (y, d) -> y with positions and velocities on the constraints; the same y where
+            there are none.
+        refine: (y, d) -> y, also its accelerations, multipliers and normal forces exact.
+        defect: (y, d) -> constraints and their rates.
+    """
+
+    project: ca.Function
+    refine: ca.Function
+    defect: ca.Function
+
+
+def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, list[str]]:
+    """Unknowns (x, a, z) of a holonomic model, their right-hand sides and names."""
+    mechanics, x = model.holonomic, model.vector("x")
+    if mechanics is None or model.ode is None:
+        raise ValueError(f"model '{model.name}': expected a holonomic model with an ode")
+    n = mechanics.n
+    f = ca.vertcat(x[n : 2 * n], mechanics.a, model.ode[2 * n :], mechanics.implicit)
+    names = [v.name for v in model.x]
+    names += [f"{v.name}_dot" for v in model.x[n : 2 * n]] + [v.name for v in model.z]
+    return ca.vertcat(x, mechanics.a, model.vector("z")), f, names
+
+
+def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX) -> Manifold:
+    """The constraints of a holonomic model as Functions of the unknowns of its system."""
+    mechanics = model.holonomic
+    if mechanics is None:
+        raise ValueError(f"model '{model.name}': expected a holonomic model")
+    n, nx = mechanics.n, len(model.x)
+    q, qd = y[:n], y[n : 2 * n]
+    rate = ca.jtimes(mechanics.phi, q, qd)
+    at = ca.Function("at", [q, qd, d], [mechanics.phi, ca.jacobian(mechanics.phi, q), rate])
+    m = mechanics.phi.numel()
+    projected = ca.vertcat(*_projected(at, q, qd, d), y[2 * n :]) if m else y
+    project = ca.Function("project", [y, d], [projected], {"cse": True})
+
+    algebraic = list(range(nx, nx + n + len(model.z)))
+    implicit = ca.Function("implicit", [y, d], [f[algebraic]])
+    J = ca.jacobian(f[algebraic], y[algebraic])
+    slope = ca.Function("slope", [y, d], [J])
+    column = projected
+    for _ in range(2):
+        lu = factorise(slope(column, d), tuple(range(n)), tuple(range(n, n + m)))
+        step = ca.substitute(lu.solve(implicit(column, d)), lu.packed_symbol, lu.packed)
+        column = ca.vertcat(column[:nx], column[algebraic] - step, column[algebraic[-1] + 1 :, 0])
+    return Manifold(
+        project,
+        ca.Function("refine", [y, d], [column], {"cse": True}),
+        ca.Function("defect", [y, d], [ca.vertcat(mechanics.phi, rate)]),
+    )
+
+
+def _projected(at: ca.Function, q: ca.SX, qd: ca.SX, d: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Positions and velocities on the constraints near q and qd."""
+    _, J, _ = at(q, qd, d)
+    lu = factorise(ca.sparsify(J @ J.T), tuple(range(J.size1())))
+
+    def across(defect: ca.SX) -> ca.SX:
+        return J.T @ ca.substitute(lu.solve(defect), lu.packed_symbol, lu.packed)
+
+    for _ in range(ITERATIONS):
+        q = q - across(at(q, qd, d)[0])
+    for _ in range(ITERATIONS - 1):
+        qd = qd - across(at(q, qd, d)[2])
+    return q, qd

@@ -1,0 +1,43 @@
+"""Arguments that simulations have in common."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from symfric.integrator.arguments import check_span, check_times
+
+
+def test_good_arguments_pass_without_a_word() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_span("here", 0.0, 1.0, 1e-5)
+    np.testing.assert_array_equal(check_times("here", 0.0, 1.0, [0, 1]), [0.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("t_start", "t_end", "rtol", "message"),
+    [
+        (1.0, 1.0, 1e-6, "here: expected t_end > t_start = 1 s, got 1 s"),
+        (np.nan, 1.0, 1e-6, "here: t_start: expected a finite number, got nan"),
+        (0.0, np.inf, 1e-6, "here: t_end: expected a finite number, got inf"),
+        (0.0, 1.0, 1e-14, "here: expected 1e-13 <= rtol <= 0.1, got 1e-14"),
+        (0.0, 1.0, np.nan, "here: expected 1e-13 <= rtol <= 0.1, got nan"),
+    ],
+)
+def test_empty_span_and_odd_tolerance_are_refused(
+    t_start: float, t_end: float, rtol: float, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        check_span("here", t_start, t_end, rtol)
+
+
+@pytest.mark.parametrize("t_eval", [[], [[0.0]], [0.5, 0.5], [-0.1], [1.1], [np.nan], 0.5])
+def test_times_that_are_no_increasing_row_in_the_span_are_refused(t_eval: object) -> None:
+    with pytest.raises(ValueError, match=r"here: t_eval: expected increasing times in \[0, 1\] s"):
+        check_times("here", 0.0, 1.0, t_eval)  # pyright: ignore[reportArgumentType]
+
+
+def test_loose_tolerance_warns_with_its_place() -> None:
+    with pytest.warns(UserWarning, match="here: rtol = 0.001 is above 1e-05; whole stick phases"):
+        check_span("here", 0.0, 1.0, 1e-3)

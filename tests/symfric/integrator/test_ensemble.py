@@ -1,0 +1,487 @@
+"""Ensembles: every member as `simulate` runs it, on every executor, whatever happens."""
+
+import tracemalloc
+import weakref
+from collections.abc import Callable
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from differentiable import oscillator, root, switched
+
+from symfric import (
+    BrownMcPhee,
+    Ensemble,
+    Hold,
+    Law,
+    Linear,
+    LuGre,
+    Model,
+    Output,
+    Status,
+    Variable,
+    rabinowicz,
+    simulate,
+    simulate_many,
+)
+from symfric.integrator import chunk as chunk_module
+from symfric.model import Event
+
+VELOCITIES = np.linspace(-0.1, 0.1, 7)
+LAWS: dict[str, Law] = {"brown_mcphee": BrownMcPhee(), "lugre": LuGre()}
+
+each_engine = pytest.mark.parametrize("backend", ["vm", "compiled"])
+
+
+class Inline(Executor):
+    """Runs a task when it is submitted; counts tasks, and the results that are alive at once."""
+
+    def __init__(self) -> None:
+        self.tasks, self.alive, self.most = 0, 0, 0
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        self.tasks += 1
+        result = fn(*args, **kwargs)
+        self.alive += 1
+        self.most = max(self.most, self.alive)
+        weakref.finalize(result, self._gone)
+        future: Future[Any] = Future()
+        future.set_result(result)
+        return future
+
+    def _gone(self) -> None:
+        self.alive -= 1
+
+
+def assert_same(one: Ensemble, other: Ensemble) -> None:
+    assert list(one.signals) == list(other.signals)
+    for name in one.signals:
+        np.testing.assert_array_equal(one[name], other[name])
+    np.testing.assert_array_equal(one.attempts, other.attempts)
+    np.testing.assert_array_equal(one.reached, other.reached)
+    assert one.failed == other.failed
+
+
+def assert_member(many: Ensemble, m: int, model: Model, t_end: float, **arguments: Any) -> None:
+    """Member m has all signals and attempts of a simulation of its own."""
+    alone = simulate(model, t_end, t_eval=many.t, **arguments)
+    for name in model.signals:
+        scale = np.abs(alone[name]).max() + 1e-9
+        assert many[name][m] == pytest.approx(alone[name], rel=0.0, abs=1e-7 * scale)
+    assert many.attempts[m] == alone.statistics.steps + alone.statistics.rejections
+    assert many.reached[m] == t_end
+
+
+@each_engine
+@pytest.mark.parametrize("law", LAWS)
+def test_members_are_what_simulate_gives(law: str, backend: str) -> None:
+    """Over start values and parameters; at the start, between the steps and at the end."""
+    model = rabinowicz(LAWS[law], free=["mu_s", "k"])
+    times, mu_s = [0.0, 0.3, 2.71, 9.0], np.linspace(0.12, 0.18, 7)
+    many = simulate_many(
+        model, 9.0, x0={"v": VELOCITIES}, p={"mu_s": mu_s, "k": 2.0}, t_eval=times,
+        backend=backend, chunk=3,
+    )  # fmt: skip
+    assert many.scene == "rabinowicz"
+    assert many.units == model.signals
+    assert many["x"].shape == (7, 4)
+    assert many.status is Status.SUCCESS
+    assert not many.failed
+    for m in range(7):
+        assert_member(
+            many, m, model, 9.0, x0={"v": VELOCITIES[m]}, p={"mu_s": mu_s[m], "k": 2.0},
+            backend=backend,
+        )  # fmt: skip
+
+
+INPUTS: dict[str, tuple[Callable[[], Model], Any]] = {
+    "held": (oscillator, Hold([0.0, 0.3, 0.7], [1.0, -2.0, 3.0])),
+    "linear": (oscillator, Linear([0.0, 0.3, 0.7], [1.0, -2.0, 3.0])),
+    "function of time": (oscillator, lambda t: ca.sin(5 * t)),
+    "held, algebraic unknowns follow": (switched, Hold([0.0, 0.3, 0.7], [1.0, -2.0, 3.0])),
+}
+
+
+@each_engine
+@pytest.mark.parametrize("case", INPUTS)
+def test_inputs_are_common_to_all_members(case: str, backend: str) -> None:
+    make, u = INPUTS[case]
+    model = make()
+    times = [0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0]  # the jumps among them
+    many = simulate_many(
+        model, 1.0, x0={"x": [0.5, 1.0, 2.0]}, u={"u": u}, t_eval=times, backend=backend
+    )
+    for m, x in enumerate([0.5, 1.0, 2.0]):
+        assert_member(many, m, model, 1.0, x0={"x": x}, u={"u": u}, backend=backend)
+
+
+@each_engine
+def test_algebraic_variables_start_consistently(backend: str) -> None:
+    """z^3 = p x at the start, from a guess far from it."""
+    many = simulate_many(root(), 0.5, p={"p": [0.1, 0.7, 300.0]}, t_eval=[0.0], backend=backend)
+    assert many["z"][:, 0] == pytest.approx(np.cbrt([0.1, 0.7, 300.0]), rel=1e-9)
+
+
+def test_time_may_start_anywhere() -> None:
+    x, t = Variable("x", "m", start=0.0), ca.SX.sym("t")
+    model = Model("swing", x=(x,), ode=ca.cos(t), t=t)
+    many = simulate_many(model, 3.0, t_start=1.0, x0={"x": [0.0, 1.0]}, t_eval=[1.0, 3.0])
+    rise = np.sin(3.0) - np.sin(1.0)
+    assert many["x"] == pytest.approx(np.array([[0.0, rise], [1.0, 1.0 + rise]]), abs=1e-5)
+
+
+def test_numbers_alone_are_one_member() -> None:
+    many = simulate_many(oscillator(), 1.0, x0={"x": 2.0})
+    assert many["x"].shape == (1, 1)
+    assert many.t == pytest.approx([1.0])
+
+
+def executors() -> dict[str, Callable[[], Any]]:
+    return {
+        "threads": lambda: "threads",
+        "processes": lambda: "processes",
+        "handed in": lambda: ThreadPoolExecutor(2),
+        "of one's own": Inline,
+    }
+
+
+@each_engine
+@pytest.mark.parametrize("kind", executors())
+def test_every_executor_gives_the_same(kind: str, backend: str) -> None:
+    model, x0 = rabinowicz(LuGre()), {"v": VELOCITIES}
+    serial = simulate_many(model, 2.0, x0=x0, executor="serial", backend=backend, chunk=2)
+    other = simulate_many(
+        model, 2.0, x0=x0, executor=executors()[kind](), backend=backend, chunk=2, workers=2
+    )
+    assert_same(serial, other)
+
+
+def test_executor_of_dask_gives_the_same() -> None:
+    distributed = pytest.importorskip("distributed", reason="extra: pip install symfric[cluster]")
+    model, x0 = rabinowicz(LuGre()), {"v": VELOCITIES}
+    serial = simulate_many(model, 2.0, x0=x0, executor="serial", chunk=2)
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+        client.get_executor() as executor,
+    ):
+        other = simulate_many(model, 2.0, x0=x0, executor=executor, chunk=2, workers=2)
+    assert_same(serial, other)
+
+
+def explosive() -> Model:
+    """x' = p x^2: x = 1/(1 - p t) from x = 1, infinite at t = 1/p."""
+    x, p = Variable("x", "m", start=1.0), Variable("p", "1/(m s)", start=0.0)
+    return Model("explosive", x=(x,), p=(p,), ode=p.symbol * x.symbol**2)
+
+
+@each_engine
+@pytest.mark.parametrize("executor", ["serial", "threads", "processes"])
+def test_failed_member_is_named_and_the_others_are_not_lost(executor: str, backend: str) -> None:
+    p = np.array([0.1, 2.0, 0.5, 4.0, 0.0])
+    many = simulate_many(
+        explosive(), 1.0, p={"p": p}, t_eval=[0.1, 1.0], executor=executor, backend=backend, chunk=2
+    )
+    assert list(many.failed) == [1, 3]
+    assert many.status is Status.SUCCESS
+    assert many["x"][:, 0] == pytest.approx(1 / (1 - 0.1 * p), rel=1e-5)
+    fine = [0, 2, 4]
+    assert many["x"][fine, 1] == pytest.approx(1 / (1 - p[fine]), rel=1e-5)
+    assert np.isnan(many["x"][[1, 3], 1]).all()
+    assert many.reached == pytest.approx([1.0, 0.5, 1.0, 0.25, 1.0], rel=1e-5)
+    assert many.failed[1].startswith(Status.STEP_TOO_SMALL.value)
+    assert "It stands at t = 0.5 s" in many.failed[1]
+
+
+@each_engine
+def test_member_that_uses_up_its_steps_is_named(backend: str) -> None:
+    """An oscillator of 1e4 rad/s among slow ones."""
+    many = simulate_many(
+        oscillator(), 1.0, p={"k": [1.0, 1e8, 4.0]}, max_steps=1000, backend=backend
+    )
+    assert list(many.failed) == [1]
+    assert many.failed[1].startswith(Status.MAX_STEPS.value)
+    assert many.attempts[1] == pytest.approx(1000, abs=31)  # the virtual machine counts in batches
+    assert 0 < many.reached[1] < 1
+
+
+@each_engine
+def test_member_without_a_consistent_start_is_named(backend: str) -> None:
+    """z^2 = x has no solution for x < 0."""
+    x, z = Variable("x", "m", start=1.0), Variable("z", "m", start=1.0)
+    model = Model("root", x=(x,), z=(z,), ode=ca.SX(0.0), alg=z.symbol**2 - x.symbol)
+    many = simulate_many(model, 1.0, x0={"x": [4.0, -1.0, 9.0]}, backend=backend)
+    assert list(many.failed) == [1]
+    assert "found no solution of the algebraic equations for z" in many.failed[1]
+    assert many["z"][[0, 2], 0] == pytest.approx([2.0, 3.0])
+    assert np.isnan(many["z"][1, 0])
+    assert many.attempts[1] == 0
+
+
+def test_progress_rises_to_one() -> None:
+    told: list[float] = []
+    simulate_many(
+        oscillator(), 1.0, x0={"x": np.ones(10)}, chunk=3, executor="serial", progress=told.append
+    )
+    assert told == pytest.approx([0.3, 0.6, 0.9, 1.0])
+
+
+def after(chunks: int) -> Callable[[float], None]:
+    """A user who presses Ctrl-C after some chunks."""
+    told: list[float] = []
+
+    def progress(fraction: float) -> None:
+        told.append(fraction)
+        if len(told) == chunks:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+@pytest.mark.parametrize("executor", ["serial", "threads", "processes"])
+def test_interrupt_keeps_what_is_finished(executor: str) -> None:
+    many = simulate_many(
+        oscillator(), 1.0, x0={"x": np.ones(60)}, chunk=2, executor=executor, progress=after(3)
+    )
+    assert many.status is Status.INTERRUPTED
+    finished = np.isfinite(many["x"][:, 0])
+    assert 6 <= finished.sum() < 60
+    np.testing.assert_array_equal(finished, np.isfinite(many.reached))
+    np.testing.assert_array_equal(finished, many.attempts > 0)
+    assert not many.failed
+
+
+def test_interrupted_run_is_resumed_where_it_stopped(tmp_path: Path) -> None:
+    """With a failed member in the part that was finished before; the model is built anew."""
+    p = np.linspace(0.0, 0.9, 20)
+    p[1] = 2.0
+
+    def run(executor: Executor, progress: Callable[[float], None] | None = None) -> Ensemble:
+        return simulate_many(
+            explosive(), 1.0, p={"p": p}, chunk=3, executor=executor, workers=1, out=tmp_path,
+            progress=progress,
+        )  # fmt: skip
+
+    first, second, third = Inline(), Inline(), Inline()
+    interrupted = run(first, after(3))
+    assert interrupted.status is Status.INTERRUPTED
+    assert np.isfinite(interrupted["x"][:, 0]).sum() == 3 * 3 - 1
+    told: list[float] = []
+    resumed = run(second, told.append)
+    assert resumed.status is Status.SUCCESS
+    assert second.tasks == 7 - 3
+    assert len(told) == 4
+    assert told[0] >= 11 / 20
+    assert told[-1] == 1.0
+    assert_same(resumed, simulate_many(explosive(), 1.0, p={"p": p}, executor="serial"))
+    assert list(resumed.failed) == [1]
+    assert_same(run(third), resumed)
+    assert third.tasks == 0
+
+
+def test_folder_holds_the_same_results_as_plain_arrays(tmp_path: Path) -> None:
+    model, x0 = rabinowicz(LuGre()), {"v": VELOCITIES}
+    times = [0.5, 1.0]
+    in_memory = simulate_many(model, 1.0, x0=x0, t_eval=times, chunk=3)
+    on_disk = simulate_many(model, 1.0, x0=x0, t_eval=times, chunk=3, out=tmp_path)
+    assert_same(in_memory, on_disk)
+    assert isinstance(on_disk["x"], np.memmap)
+    (folder,) = tmp_path.iterdir()
+    np.testing.assert_array_equal(np.load(folder / "x.npy"), in_memory["x"])
+
+
+def constant(value: float, output: float = 1.0, bound: float = 0.0) -> Model:
+    """x' = value + p + u, an output, a start value that is an expression."""
+    p, u = Variable("p", "m/s", start=0.0), Variable("u", "m/s", start=0.0)
+    x = Variable("x", "m", start=0.0)
+    y = Variable("y", "m", start=x.symbol + bound)
+    return Model(
+        "constant",
+        x=(x, y),
+        p=(p,),
+        u=(u,),
+        ode=ca.vertcat(value + p.symbol + u.symbol, 0),
+        outputs={"out": Output(output * x.symbol, "m")},
+    )
+
+
+MANY = np.zeros(2500)
+"""Long enough for NumPy to leave most of it out of what it prints."""
+
+
+def changed(row: int) -> Any:
+    array = MANY.copy()
+    array[row] = 1e-9
+    return array
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"x0": {"x": changed(1250)}},
+        {"x0": {"y": changed(1250)}},
+        {"p": {"p": changed(1250)}},
+        {"p": {"p": 1e-12}},
+        {"u": {"u": 1e-12}},
+        {"u": {"u": Hold([0.0], [1e-12])}},
+        {"u": {"u": lambda t: 1e-12 * t}},
+        {"rtol": 2e-6},
+        {"method": "rodas4p"},
+        {"max_steps": 9_999_999},
+        {"t_eval": [1.0 - 1e-12]},
+        {"t_end": 1.0 + 1e-12, "t_eval": [1.0]},
+        {"t_start": 1e-12},
+        {"backend": "vm"},
+        {"chunk": 1250},
+        {"model": constant(1.0 + 1e-15)},
+        {"model": constant(1.0, output=2.0)},
+        {"model": constant(1.0, bound=1e-12)},
+    ],
+    ids=str,
+)
+def test_other_arguments_never_take_these_results(change: dict[str, Any], tmp_path: Path) -> None:
+    arguments: dict[str, Any] = {"t_end": 1.0, "x0": {"x": MANY}, "chunk": 2500}
+    first, again, other = Inline(), Inline(), Inline()
+    simulate_many(constant(1.0), **arguments, executor=first, out=tmp_path)
+    simulate_many(constant(1.0), **arguments, executor=again, out=tmp_path)
+    assert (first.tasks, again.tasks) == (1, 0)
+    arguments = {"model": constant(1.0)} | arguments | change
+    simulate_many(**arguments, executor=other, out=tmp_path)
+    assert other.tasks == 2500 // arguments["chunk"]
+
+
+def test_only_a_few_chunks_are_alive_at_once(tmp_path: Path) -> None:
+    executor = Inline()
+    simulate_many(
+        oscillator(), 0.1, x0={"x": np.ones(200)}, chunk=2, executor=executor, workers=2,
+        out=tmp_path,
+    )  # fmt: skip
+    assert executor.tasks == 100
+    assert executor.most <= 2 * 2 + 1
+
+
+@pytest.mark.slow
+def test_memory_stays_bounded_for_a_hundred_thousand_members(tmp_path: Path) -> None:
+    members, times = 100_000, np.linspace(0.0, 0.1, 50)
+    tracemalloc.start()
+    many = simulate_many(
+        oscillator(), 0.1, x0={"x": np.linspace(0.0, 1.0, members)}, t_eval=times, out=tmp_path
+    )
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    whole = sum(values.nbytes for values in many.signals.values())
+    assert whole == 4 * 50 * 8 * members
+    assert most < whole / 4
+    assert not many.failed
+    end = many["x"][:, -1]
+    assert np.diff(end) == pytest.approx(np.full(members - 1, np.diff(end).mean()), rel=1e-3)
+
+
+def bouncing(terminal: bool) -> Model:
+    """A ball under gravity that returns half of its speed, or stays down."""
+    h, v = Variable("h", "m", start=1.0), Variable("v", "m/s", start=0.0)
+    ground = Event(
+        "ground",
+        h.symbol,
+        direction=-1,
+        terminal=terminal,
+        reset={} if terminal else {"v": -v.symbol / 2},
+    )
+    return Model("ball", x=(h, v), ode=ca.vertcat(v.symbol, -9.81), events=(ground,))
+
+
+@each_engine
+@pytest.mark.parametrize("executor", ["serial", "threads"])
+def test_models_with_events_run_one_by_one(executor: str, backend: str) -> None:
+    model, times = bouncing(terminal=False), [0.0, 0.4, 0.7]
+    many = simulate_many(
+        model, 0.7, x0={"h": [0.3, 1.0, 5.0]}, t_eval=times, executor=executor, backend=backend
+    )
+    for m, h in enumerate([0.3, 1.0, 5.0]):
+        assert_member(many, m, model, 0.7, x0={"h": h}, backend=backend)
+
+
+def test_terminal_event_ends_a_member_at_its_time() -> None:
+    heights, times = np.array([0.2, 1.0, 50.0]), np.array([0.1, 0.3, 0.6])
+    many = simulate_many(bouncing(terminal=True), 1.0, x0={"h": heights}, t_eval=times)
+    assert not many.failed
+    falls = np.sqrt(2 * heights / 9.81)
+    assert many.reached == pytest.approx(np.minimum(falls, 1.0), rel=1e-8)
+    np.testing.assert_array_equal(np.isfinite(many["h"]), times <= falls[:, None])
+
+
+def test_event_storm_of_one_member_is_named() -> None:
+    """The Zeno time of the first ball is 3 sqrt(2 h/g)."""
+    many = simulate_many(bouncing(terminal=False), 1.0, x0={"h": [0.1, 1.0]})
+    assert list(many.failed) == [0]
+    assert many.failed[0].startswith(Status.EVENT_STORM.value)
+    assert many.reached[0] == pytest.approx(3 * np.sqrt(0.2 / 9.81), rel=1e-3)
+
+
+def test_results_of_models_with_events_are_resumed_and_told_apart(tmp_path: Path) -> None:
+    def reached(model: Model) -> Any:
+        return simulate_many(model, 0.4, x0={"h": [0.2, 1.0]}, out=tmp_path).reached
+
+    falls = np.sqrt(0.4 / 9.81)
+    for _ in range(2):
+        assert reached(bouncing(terminal=True)) == pytest.approx([falls, 0.4])
+        assert reached(bouncing(terminal=False)) == pytest.approx([0.4, 0.4])
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_without_a_compiler_the_virtual_machine_takes_over(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    expected = simulate_many(oscillator(), 1.0, backend="vm")
+    monkeypatch.setattr(chunk_module, "find_compiler", lambda: None)
+    assert_same(simulate_many(oscillator(), 1.0), expected)
+
+
+def test_loose_tolerance_warns() -> None:
+    with pytest.warns(UserWarning, match="simulate_many: rtol = 0.001 is above 1e-05"):
+        simulate_many(oscillator(), 1.0, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"x0": {"w": [1.0]}}, "x0 of 'oscillator': expected one of x, v, got w"),
+        ({"p": {"kk": [1.0]}}, "p of 'oscillator': expected one of k, c, got kk; did you mean k"),
+        (
+            {"x0": {"x": np.ones(2)}, "p": {"k": np.ones(3)}},
+            r"arrays of one length, got x0\.x of shape \(2,\), p\.k of shape \(3,\)",
+        ),
+        ({"x0": {"x": np.ones((2, 2))}}, r"of one length, got x0\.x of shape \(2, 2\)"),
+        ({"x0": {"x": []}}, "expected at least one member, got empty arrays"),
+        (
+            {"x0": {"x": [1.0, np.nan]}, "p": {"k": np.inf}},
+            r"expected finite numbers, got NaN or infinity: x0\.x of member 1, p\.k of member 0",
+        ),
+        ({"t_end": -1.0}, "simulate_many: expected t_end > t_start = 0 s, got -1 s"),
+        ({"rtol": 1.0}, "simulate_many: expected 1e-13 <= rtol <= 0.1, got 1"),
+        ({"t_eval": [0.5, 0.2]}, r"t_eval: expected increasing times in \[0, 1\] s"),
+        ({"t_eval": [2.0]}, r"t_eval: expected increasing times in \[0, 1\] s"),
+        ({"method": "euler"}, "simulate_many: method: expected one of .*, got euler"),
+        ({"backend": "gpu"}, "backend: expected one of auto, vm, compiled, got gpu"),
+        ({"executor": "mpi"}, "executor: expected one of serial, threads, processes, got mpi"),
+        ({"chunk": 0}, "simulate_many: expected chunk >= 1, got 0"),
+        ({"workers": 0}, "simulate_many: expected workers >= 1, got 0"),
+        (
+            {"model": bouncing(terminal=True), "executor": "processes"},
+            r"expected serial or threads for a model with events \('ball' has 1\), got processes",
+        ),
+    ],
+)
+def test_bad_input_is_refused_saying_where(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        simulate_many(**({"model": oscillator(), "t_end": 1.0} | arguments))
+
+
+def test_unknown_signal_is_refused() -> None:
+    with pytest.raises(ValueError, match="ensemble of 'oscillator': expected one of x, v, u, ener"):
+        _ = simulate_many(oscillator(), 1.0)["force"]
