@@ -32,7 +32,8 @@ def blocks(system: System, gamma: float) -> Blocks:
     h = ca.SX.sym("h")
     right, memory = ca.SX.sym("right", system.n), ca.SX.sym("memory", system.n)
     J = ca.jacobian(system.f, system.y)
-    lu = factorise(ca.sparsify(system.mass / (gamma * h) - J), safe=system.diagonal, then=system.then)
+    W = ca.sparsify(system.mass / (gamma * h) - J)
+    lu = factorise(W, safe=system.diagonal, then=system.then)
     tiny, rows = ca.densify(system.mass), system.algebraic[0]
     tiny[rows, :] = -J[rows, :]
     reference = factorise(ca.sparsify(tiny), safe=system.diagonal, then=system.then).sign

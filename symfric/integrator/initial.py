@@ -8,10 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.columns import Columns
+from symfric.integrator.manifold import Manifold
 from symfric.integrator.system import System
+from symfric.numeric import evaluate
 
 Array = NDArray[np.float64]
 ITERATIONS = 50
+ASSEMBLED = 1e-12
+"""What constraints may leave over, relative to the largest state."""
 NEAR, CONVERGED = 1e-4, 1e-10
 """Relative Newton steps below which no damping is needed, and below which it is done."""
 
@@ -38,6 +42,8 @@ def consistent(system: System | Equations, where: str, y: Array, d: Array) -> Ar
     Raises:
         ValueError: no solution near the guess.
     """
+    if isinstance(system, System) and system.manifold is not None:
+        y = _assembled(system, system.manifold, where, y, d)
     columns = system.algebraic[1]
     if not columns:
         return y
@@ -108,6 +114,24 @@ def _newton_steps(g: Array, J: Array) -> Array:
         return np.linalg.solve(matrices, g[:, :, None])[:, :, 0].astype(float)
     except np.linalg.LinAlgError:
         return np.full((members, n), np.nan)
+
+
+def _assembled(system: System, manifold: Manifold, where: str, y: Array, d: Array) -> Array:
+    """`y` with positions and velocities on the constraints of a mechanism, the nearest ones.
+
+    Raises:
+        ValueError: none near.
+    """
+    defect = np.inf
+    for _ in range(ITERATIONS):
+        defect = float(np.abs(evaluate(manifold.defect, y, d)).max(initial=0.0))
+        if defect < ASSEMBLED * max(1.0, float(np.abs(y[: system.nx]).max(initial=0.0))):
+            return y
+        y = evaluate(manifold.project, y, d)
+    raise ValueError(
+        f"{where}: expected start positions and velocities from which all loops can be closed, "
+        f"got constraints that stay at {defect:.3g}; give others"
+    )
 
 
 def _newton_step(system: System | Equations, y: Array, d: Array) -> Array:

@@ -58,9 +58,7 @@ class SymbolicLU:
         return ca.vertcat(ca.SX(0, 1), *x)
 
 
-def factorise(
-    matrix: ca.SX, safe: tuple[int, ...], then: tuple[int, ...] = ()
-) -> SymbolicLU:
+def factorise(matrix: ca.SX, safe: tuple[int, ...], then: tuple[int, ...] = ()) -> SymbolicLU:
     """Factorise a structurally nonsingular sparse matrix.
 
     Pivots are chosen once, at build time, by least fill (Markowitz). Diagonal entries of the rows

@@ -236,7 +236,7 @@ def _trajectory(
 
     def states(at: Array) -> dict[str, Array]:
         if integrator.system.manifold is not None:
-            return {name: values for name, values in evaluate(at).items() if name in names[:nx]}
+            return evaluate(at)
         return dict(zip(names, dense(at)[: len(model.x)], strict=False))
 
     def evaluate(at: Array) -> dict[str, Array]:
