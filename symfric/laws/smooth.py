@@ -78,10 +78,12 @@ def hold(x: Scalar, top: Scalar, eps: Scalar) -> Scalar:
         return clip(x, -top, top)
 
     def corner(y: Scalar) -> Scalar:
-        t = clip((y - top) / (2 * eps) + 0.5, 0.0, 1.0)
+        t = positive((y - top) / (2 * eps) + 0.5, 0.0)
         return t * t * t * (2 - t) * eps
 
-    return clip(x, -top - eps, top + eps) - corner(x) + corner(-x)
+    # one clip alone, so that no two of them disagree by rounding about which side of a knot it is
+    within = clip(x, -top - eps, top + eps)
+    return within - corner(within) + corner(-within)
 
 
 def step3(x: Scalar) -> Scalar:

@@ -193,7 +193,7 @@ class Step5(StaticLaw):
 
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V"),
-        smoothness="C2 at 0, |v| = v_t and 3 v_t",
+        smoothness="C2 at |v| = v_t and 3 v_t",
         confidence="one source",
         source="Simbody, HuntCrossleyForce",
     )
@@ -211,7 +211,8 @@ class Step5(StaticLaw):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
-        u = v / self.v_t
-        rise = smooth.step5(u) - smooth.step5(-u)
-        fall = smooth.step5((smooth.magnitude(u, 0.0) - 1) / 2)
+        u, speed = v / self.v_t, smooth.magnitude(v / self.v_t, 0.0)
+        inner, size = smooth.clip(u, -1.0, 1.0), smooth.clip(speed, 0.0, 1.0)
+        rise = inner * inner * inner * (10 - size * (15 - 6 * size))
+        fall = smooth.step5((speed - 1) / 2)
         return N * (rise * (self.mu_s - (self.mu_s - self.mu_d) * fall) + self.mu_v * v)
