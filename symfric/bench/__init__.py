@@ -1,5 +1,7 @@
 """Benchmarks: run time against error, ratios within one run. May import everything."""
 
+from symfric.bench.ensemble import EnsembleRow as EnsembleRow
 from symfric.bench.integrator import Benchmark as Benchmark
 from symfric.bench.integrator import Row as Row
 from symfric.bench.integrator import bench_integrator as bench_integrator
+from symfric.bench.sensitivities import SensitivityRow as SensitivityRow

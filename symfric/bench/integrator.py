@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.bench import peers
+from symfric.bench.ensemble import EnsembleRow, measure_ensemble
+from symfric.bench.sensitivities import SensitivityRow, measure_sensitivities
 from symfric.bench.timing import best_time
 from symfric.integrator.compiler import find_compiler
 from symfric.integrator.simulate import simulate
@@ -61,11 +63,15 @@ class Benchmark:
         rows: every integrator at every tolerance.
         skipped: integrator -> why it was not run.
         first: build, compile and run time [s] of the first call, by case and cache state.
+        ensemble: many runs at once.
+        sensitivities: what derivatives cost.
     """
 
     rows: tuple[Row, ...]
     skipped: dict[str, str]
     first: dict[str, dict[str, float]] = field(default_factory=dict[str, dict[str, float]])
+    ensemble: tuple[EnsembleRow, ...] = ()
+    sensitivities: tuple[SensitivityRow, ...] = ()
 
     def time_at(self, case: str, integrator: str, error: float) -> float:
         """Time [s] to reach `error`, log-log interpolated on the best rows; NaN if not reached."""
@@ -108,13 +114,15 @@ class Benchmark:
         return found
 
     def to_dict(self) -> dict[str, Any]:
-        """Rows, ratios (those that were reached), what was skipped, first results."""
+        """Rows, ratios (those that were reached), what was skipped, first results and the rest."""
         ratios = [r for r in self.ratios() if r["ratio"] == r["ratio"]]
         return {
             "rows": [asdict(row) for row in self.rows],
             "ratios": ratios,
             "skipped": self.skipped,
             "first": self.first,
+            "ensemble": [asdict(row) for row in self.ensemble],
+            "sensitivities": [asdict(row) for row in self.sensitivities],
         }
 
     def plot(self, path: str | Path | None = None) -> "Figure":
@@ -134,7 +142,7 @@ def bench_integrator(
     """Measure all integrators that this machine has, in one run.
 
     Args:
-        quick: fewer tolerances and start velocities, no SciPy; for tests.
+        quick: fewer tolerances, start velocities and members, no SciPy; for tests.
         progress: called with what is measured and the fraction done.
     """
     tolerances = TOLERANCES[1:4] if quick else TOLERANCES
@@ -156,7 +164,14 @@ def bench_integrator(
                     rows.append(
                         _measure(case, name, rtol, make(model, TIMES, rtol), starts, reference)
                     )
-    return Benchmark(tuple(rows), skipped, first)
+    many: list[EnsembleRow] = []
+    slopes: list[SensitivityRow] = []
+    for case, law in CASES.items():
+        if progress is not None:
+            progress(f"{case}: ensembles and derivatives", 1.0)
+        many += measure_ensemble(case, law, quick)
+        slopes += measure_sensitivities(case, law, quick)
+    return Benchmark(tuple(rows), skipped, first, tuple(many), tuple(slopes))
 
 
 Maker = Callable[[Model, Array, float], peers.Solve]

@@ -47,6 +47,24 @@ def bench(
             ],
             "At equal error, time over that of symfric compiled",
         )
+        output.show_table(
+            ["case", "members", "threads", "us each", "efficiency", "cvodes"],
+            [
+                [r.case, r.members, r.workers, round(1e6 * r.member_s, 1), round(r.efficiency, 2),
+                 round(r.ratio, 1)]
+                for r in result.ensemble
+            ],
+            "Ensembles; cvodes: time of a Python loop over cvodes at the same rtol over ours",
+        )  # fmt: skip
+        output.show_table(
+            ["case", "integrator", "p", "run [ms]", "forward", "adjoint"],
+            [
+                [r.case, r.integrator, r.parameters, round(1e3 * r.plain_s, 3),
+                 round(r.forward, 1), "failed" if r.adjoint is None else f"{r.adjoint:.1f}"]
+                for r in result.sensitivities
+            ],
+            "Derivatives by p parameters: time of the run with them over that of the run alone",
+        )  # fmt: skip
         for name, why in result.skipped.items():
             output.show(f"{name}: not run, {why}")
     output.say_written(plot, json)

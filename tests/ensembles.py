@@ -1,0 +1,57 @@
+"""What tests of ensembles share: an executor that counts, an impatient user, a model that fails."""
+
+import weakref
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from typing import Any
+
+import numpy as np
+
+from symfric import Ensemble, Model, Variable
+
+
+class Inline(Executor):
+    """Runs a task when it is submitted; counts tasks, and the results that are alive at once."""
+
+    def __init__(self) -> None:
+        self.tasks, self.alive, self.most = 0, 0, 0
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        self.tasks += 1
+        result = fn(*args, **kwargs)
+        self.alive += 1
+        self.most = max(self.most, self.alive)
+        weakref.finalize(result, self._gone)
+        future: Future[Any] = Future()
+        future.set_result(result)
+        return future
+
+    def _gone(self) -> None:
+        self.alive -= 1
+
+
+def assert_same(one: Ensemble, other: Ensemble) -> None:
+    assert list(one.signals) == list(other.signals)
+    for name in one.signals:
+        np.testing.assert_array_equal(one[name], other[name])
+    np.testing.assert_array_equal(one.attempts, other.attempts)
+    np.testing.assert_array_equal(one.reached, other.reached)
+    assert one.failed == other.failed
+
+
+def explosive() -> Model:
+    """x' = p x^2: x = 1/(1 - p t) from x = 1, infinite at t = 1/p."""
+    x, p = Variable("x", "m", start=1.0), Variable("p", "1/(m s)", start=0.0)
+    return Model("explosive", x=(x,), p=(p,), ode=p.symbol * x.symbol**2)
+
+
+def after(chunks: int) -> Callable[[float], None]:
+    """A user who presses Ctrl-C after some chunks."""
+    told: list[float] = []
+
+    def progress(fraction: float) -> None:
+        told.append(fraction)
+        if len(told) == chunks:
+            raise KeyboardInterrupt
+
+    return progress
