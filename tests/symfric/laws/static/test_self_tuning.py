@@ -9,6 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from symfric import SelfTuning, symbolise
+from symfric.laws import BrittleSelfTuning
 from symfric.laws.static.self_tuning import brittleness, corrected_shape_factor, shape_factor
 
 ratios = st.floats(0.0, 0.999)
@@ -122,3 +123,49 @@ def test_brittleness_serves_as_a_stiffness_with_a_symbolic_load() -> None:
     law = SelfTuning(B=brittleness(N, 0.05))
     v_p = ca.Function("peak", [N], [tan(pi / (2 * law.C)) / law.B])
     assert float(v_p(200.0)) < float(v_p(5.0))
+
+
+@given(ratio=st.floats(0.3, 0.95), v_p=st.floats(1e-4, 1.0), E=st.floats(-5.0, 0.9))
+def test_peak_lies_at_the_chosen_velocity_for_any_curvature(
+    ratio: float, v_p: float, E: float
+) -> None:
+    law = SelfTuning.from_peak_velocity(v_p, mu_s=0.4, mu_d=0.4 * ratio, E=E)
+    assert law.force(v_p, 5.0) == pytest.approx(2.0, rel=1e-14)
+    assert law.force(0.9 * v_p, 5.0) < law.force(v_p, 5.0) > law.force(1.1 * v_p, 5.0)
+
+
+@pytest.mark.parametrize("E", [0.0, 0.5, -2.0])
+def test_slope_at_rest_is_the_chosen_one_for_any_curvature(E: float) -> None:
+    law = SelfTuning.from_slope(3e3, 5.0, mu_s=0.4, mu_d=0.3, E=E)
+    assert law.force(1e-12, 5.0) / 1e-12 == pytest.approx(3e3, rel=1e-6)
+
+
+def test_slope_may_hold_symbols_and_a_curved_peak_may_not() -> None:
+    mu_s = ca.SX.sym("mu_s")
+    assert isinstance(SelfTuning.from_slope(3e3, 5.0, mu_s=mu_s).B, ca.SX)
+    assert isinstance(SelfTuning.from_peak_velocity(1e-3, mu_s=mu_s).B, ca.SX)
+    with pytest.raises(ValueError, match="expected numbers for mu_s, mu_d and E, got symbols"):
+        SelfTuning.from_peak_velocity(1e-3, mu_s=mu_s, E=0.5)
+    with pytest.raises(ValueError, match="E: expected E < 1, got 1"):
+        SelfTuning.from_peak_velocity(1e-3, E=1.0)
+
+
+@pytest.mark.parametrize(("N", "B"), [(5.0, 186), (10.0, 263), (50.0, 669), (200.0, 984)])
+def test_brittle_law_has_the_stiffness_factor_computed_for_its_load(N: float, B: float) -> None:
+    law = BrittleSelfTuning(mu_s=0.15, mu_d=0.1)
+    assert brittleness(N, 0.05) == pytest.approx(B, abs=0.5)
+    same = SelfTuning(mu_s=0.15, mu_d=0.1, B=brittleness(N, 0.05))
+    assert law.force(1e-3, N) == pytest.approx(same.force(1e-3, N), rel=1e-12)
+
+
+@pytest.mark.parametrize("N", [1e-9, 5.0, 1e4])
+def test_levels_of_the_brittle_law_do_not_depend_on_its_stiffness(N: float) -> None:
+    law = BrittleSelfTuning(mu_s=0.4, mu_d=0.3, E=0.5)
+    F = law.force(np.geomspace(1e-6, 1.0, 100_001), N)
+    assert F.max() == pytest.approx(0.4 * N, rel=1e-7)
+    assert law.force(1e9, N) == pytest.approx(0.3 * N, rel=1e-6)
+
+
+def test_brittle_law_refuses_a_stiffness_that_falls_with_the_load() -> None:
+    with pytest.raises(ValueError, match=r"B_0 <= B_max, got B_0 = 5000 and B_max = 1000"):
+        BrittleSelfTuning(B_0=5000.0)
