@@ -21,6 +21,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "symfric.scenes": {
         "symfric.laws",
         "symfric.model",
+        "symfric.multibody",
+        "symfric.numeric",
+        "symfric.parameters",
+    },
+    "symfric.multibody": {
+        "symfric.laws",
+        "symfric.model",
         "symfric.numeric",
         "symfric.parameters",
     },

@@ -24,8 +24,18 @@ from symfric.integrator.inputs import Sampled
 from symfric.parameters import check_names
 from symfric.scenes import ALL_SCENES, Scene
 
-DEFAULT_T_END = {"rabinowicz": 20.0, "drive": 4.0}
-"""Times [s] that show what the scene is about: three stick-slip periods, two reversals."""
+DEFAULT_T_END = {
+    "rabinowicz": 20.0,
+    "drive": 4.0,
+    "pendulum": 10.0,
+    "double_pendulum": 5.0,
+    "pendulum_box": 15.0,
+    "four_mass": 4.0,
+    "slider_crank": 0.25,
+    "four_bar": 3.0,
+    "arm": 1.0,
+}
+"""Times [s] that show what the scene is about, such as three stick-slip periods."""
 
 
 def sine(t: ca.SX) -> ca.SX:
@@ -40,7 +50,7 @@ DEFAULT_INPUT: dict[str, tuple[str, str, Callable[[ca.SX], ca.SX]]] = {
 
 
 def run(
-    scene: Annotated[str, typer.Argument(metavar="SCENE", help="rabinowicz or drive.")],
+    scene: Annotated[str, typer.Argument(metavar="SCENE", help=f"One of {', '.join(ALL_SCENES)}.")],
     law: Annotated[
         list[str],
         typer.Option("--law", metavar="NAME", help="Friction law; repeat it to compare several."),

@@ -6,12 +6,31 @@ from symfric.laws import Law
 from symfric.model import Model
 from symfric.numeric import Scalar
 from symfric.parameters import with_values
+from symfric.scenes.arm import Arm as Arm
 from symfric.scenes.base import Scene as Scene
 from symfric.scenes.base import friction_states as friction_states
 from symfric.scenes.drive import Drive as Drive
+from symfric.scenes.four_bar import FourBar as FourBar
+from symfric.scenes.four_mass import FourMass as FourMass
+from symfric.scenes.mechanism import MechanismScene as MechanismScene
+from symfric.scenes.pendulum import DoublePendulum as DoublePendulum
+from symfric.scenes.pendulum import Pendulum as Pendulum
+from symfric.scenes.pendulum_box import PendulumBox as PendulumBox
 from symfric.scenes.rabinowicz import Rabinowicz as Rabinowicz
+from symfric.scenes.slider_crank import SliderCrank as SliderCrank
 
-ALL_SCENES: dict[str, type[Scene]] = {"rabinowicz": Rabinowicz, "drive": Drive}
+MECHANISMS: dict[str, type[MechanismScene]] = {
+    "pendulum": Pendulum,
+    "double_pendulum": DoublePendulum,
+    "pendulum_box": PendulumBox,
+    "four_mass": FourMass,
+    "slider_crank": SliderCrank,
+    "four_bar": FourBar,
+    "arm": Arm,
+}
+"""Scenes of several bodies, with the same law in several joints."""
+
+ALL_SCENES: dict[str, type[Scene]] = {"rabinowicz": Rabinowicz, "drive": Drive, **MECHANISMS}
 """Every scene by the name the command line uses."""
 
 

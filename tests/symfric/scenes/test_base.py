@@ -5,9 +5,12 @@ import pytest
 from law_cases import CASES
 
 from symfric import Coulomb, LuGre, Stribeck, Sum, Viscous, drive, parameters, rabinowicz
-from symfric.scenes import ALL_SCENES, Scene, friction_states
+from symfric.scenes import ALL_SCENES, MECHANISMS, Scene, friction_states
 
-each_scene = pytest.mark.parametrize("kind", ALL_SCENES.values(), ids=ALL_SCENES.keys())
+SINGLE = {name: kind for name, kind in ALL_SCENES.items() if name not in MECHANISMS}
+"""Scenes with one contact; those with several are tested in test_mechanism.py."""
+
+each_scene = pytest.mark.parametrize("kind", SINGLE.values(), ids=SINGLE.keys())
 
 
 FITTING = [name for name, law in CASES.items() if {i.name for i in law.inputs} <= {"F_e"}]

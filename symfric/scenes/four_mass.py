@@ -1,0 +1,56 @@
+"""Spatial four-mass system: sliders on three axes, coupled by rods and springs."""
+
+from dataclasses import dataclass
+from typing import final
+
+from symfric.multibody import Distance, JointFriction, Mechanism, Prismatic, SpringDamper
+from symfric.numeric import Scalar
+from symfric.parameters import param
+from symfric.scenes.mechanism import MechanismScene
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class FourMass(MechanismScene):
+    """Four sliders: 1 and 4 on the axis x, 2 on y, 3 on z; two degrees of freedom.
+
+    Massless rods of lengths 5 and 7 m hold 1 to 2 and 2 to 3; springs of rate k hold 1, 2, 3 to
+    the ground (free at 3, 4, 3 m), and one of rate k_4 holds 4 to 1 (free at 1 m). The normal
+    force of every guide follows from the forces in the rods, so friction acts back on itself.
+
+    Defaults: Haug's spatial example, with friction; t_end = 4 s.
+    """
+
+    m_1: Scalar = param(2.0, unit="kg", doc="mass of sliders 1 and 2", lower=1e-12)
+    m_3: Scalar = param(6.0, unit="kg", doc="mass of sliders 3 and 4", lower=1e-12)
+    k: Scalar = param(2.0, unit="N/m", doc="rate of the springs to the ground", lower=0.0)
+    k_4: Scalar = param(10.0, unit="N/m", doc="rate of the spring between 1 and 4", lower=0.0)
+    v_4: Scalar = param(-1.0, unit="m/s", doc="velocity of slider 4 at the start")
+    a: Scalar = param(0.1, unit="m", doc="distance of the bearing stations", lower=1e-12)
+    g: Scalar = param(9.8, unit="m/s^2", doc="gravity", lower=0.0)
+
+    def mechanism(self) -> Mechanism:
+        """Four bodies, four guides, two rods, four springs."""
+        m = Mechanism("four_mass", gravity=(0.0, 0.0, -self.g))
+        masses = (self.m_1, self.m_1, self.m_3, self.m_3)
+        starts = (("x1", 4.0, 0.0), ("y2", 3.0, 0.0), ("z3", 40.0**0.5, 0.0), ("x4", 5.0, self.v_4))
+        axes = ((X, Z), (Y, X), (Z, X), (X, Z))
+        friction = JointFriction(self.law, length=self.a, width=self.a)
+        for i, (name, start, rate) in enumerate(starts):
+            body, (z, x) = f"slider_{i + 1}", axes[i]
+            m.body(body, masses[i], (1.0, 1.0, 1.0))
+            m.frame(f"{body}.guide", z=z, x=x)
+            m.frame(f"ground.guide_{i + 1}", z=z, x=x)
+            m.joint(
+                Prismatic(name, f"ground.guide_{i + 1}", f"{body}.guide", start, rate, friction)
+            )
+        m.joint(Distance("rod_12", "slider_1", "slider_2", length=5.0))
+        m.joint(Distance("rod_23", "slider_2", "slider_3", length=7.0))
+        for i, (axis, free) in enumerate(((X, 13.0), (Y, 14.0), (Z, 13.0)), start=1):
+            m.frame(f"ground.wall_{i}", at=tuple(-10.0 * a for a in axis))
+            m.force(SpringDamper(f"spring_{i}", f"ground.wall_{i}", f"slider_{i}", self.k, free))
+        m.frame("slider_4.far", at=(10.0, 0.0, 0.0))
+        m.force(SpringDamper("spring_4", "slider_1", "slider_4.far", self.k_4, 11.0))
+        return m

@@ -1,0 +1,52 @@
+"""A pendulum hinged to a box that slides on the ground."""
+
+from dataclasses import dataclass
+from typing import final
+
+from symfric.laws import Law
+from symfric.multibody import JointFriction, Mechanism, Prismatic, Revolute
+from symfric.numeric import Scalar
+from symfric.parameters import param
+from symfric.scenes.mechanism import MechanismScene
+from symfric.scenes.pendulum import HINGE
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PendulumBox(MechanismScene):
+    """A box on rough ground and a pendulum on it, friction under the box and in the hinge.
+
+    x is the position of the box, phi the angle of the pendulum from hanging; the normal force
+    under the box is the whole vertical reaction, that of the hinge the size of its reaction.
+    `hinge` is the law of the hinge, with its own parameters (endings _1 and _2); without it the
+    hinge has the law of the box.
+
+    Defaults: seed tables 6 and 7 (box 6 kg, pendulum 20 kg on 0.3 m, from 30 degrees). There the
+    pendulum's inertia is that of a point mass, and no radius of the hinge is given; 0.01 m here.
+    Limits: the ground does not pull: while N > 0 the box does not lift off, which is not checked.
+    """
+
+    hinge: Law | None = None
+    m_box: Scalar = param(6.0, unit="kg", doc="mass of the box", lower=1e-12)
+    m: Scalar = param(20.0, unit="kg", doc="mass of the pendulum", lower=1e-12)
+    L: Scalar = param(0.3, unit="m", doc="distance of hinge and mass", lower=1e-12)
+    J: Scalar = param(1e-9, unit="kg m^2", doc="inertia about the mass", lower=1e-12)
+    R: Scalar = param(0.01, unit="m", doc="radius of the hinge", lower=1e-12)
+    phi_0: Scalar = param(0.5235987755982988, unit="rad", doc="angle at the start")
+    g: Scalar = param(9.81, unit="m/s^2", doc="gravity", lower=0.0)
+
+    def mechanism(self) -> Mechanism:
+        """Two bodies, a slide and a hinge."""
+        m = Mechanism("pendulum_box", gravity=(0.0, 0.0, -self.g))
+        along, down = (1.0, 0.0, 0.0), (0.0, 0.0, -1.0)
+        m.body("box", self.m_box, (0.1, 0.1, 0.1))
+        m.body("pendulum", self.m, (self.J, self.J, self.J))
+        m.frame("ground.floor", z=along, x=(0.0, 0.0, 1.0))
+        m.frame("box.floor", z=along, x=(0.0, 0.0, 1.0))
+        m.frame("box.hinge", at=(0.0, 0.0, 0.4), z=HINGE, x=down)
+        m.frame("pendulum.hinge", at=(0.0, 0.0, self.L), z=HINGE, x=down)
+        floor = JointFriction(self.law)
+        bearing = JointFriction(self.law if self.hinge is None else self.hinge, radius=self.R)
+        m.joint(Prismatic("x", "ground.floor", "box.floor", friction=floor))
+        m.joint(Revolute("phi", "box.hinge", "pendulum.hinge", start=self.phi_0, friction=bearing))
+        return m

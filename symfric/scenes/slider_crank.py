@@ -1,0 +1,61 @@
+"""Spatial slider-crank: a crank that turns about x drives a slider along x over a skew rod."""
+
+from dataclasses import dataclass
+from typing import final
+
+from symfric.multibody import Distance, JointFriction, Mechanism, Prismatic, Revolute
+from symfric.numeric import Scalar, sqrt
+from symfric.parameters import param
+from symfric.scenes.mechanism import MechanismScene
+
+X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class SliderCrank(MechanismScene):
+    """A crank, a slider and a massless rod between them; one degree of freedom.
+
+    The crank turns about x through (0, b, c); its pin stands at r, above at the start. The rod of
+    length l ends at the height e on the slider:
+
+        slider^2 = l^2 - (b - r sin(crank))^2 - (c - e + r cos(crank))^2
+
+    The slider swings back and forth and gathers and returns most of the crank's energy, so the
+    rod's force changes its sign and its size by orders of magnitude.
+
+    Defaults: Haug's spatial example, friction in the bearing of the crank; t_end = 0.25 s.
+    """
+
+    m_crank: Scalar = param(0.5, unit="kg", doc="mass of the crank", lower=1e-12)
+    m_slider: Scalar = param(5.0, unit="kg", doc="mass of the slider", lower=1e-12)
+    J: Scalar = param(0.2, unit="kg m^2", doc="inertia of the crank about x", lower=1e-12)
+    r: Scalar = param(0.08, unit="m", doc="crank radius", lower=1e-12)
+    l: Scalar = param(0.3, unit="m", doc="length of the rod", lower=1e-12)  # noqa: E741
+    b: Scalar = param(0.1, unit="m", doc="position of the crank along y")
+    c: Scalar = param(0.12, unit="m", doc="position of the crank along z")
+    e: Scalar = param(0.02, unit="m", doc="height of the rod's end on the slider")
+    a: Scalar = param(0.1, unit="m", doc="distance of the bearing stations", lower=1e-12)
+    R: Scalar = param(0.1, unit="m", doc="radius of the crank's bearing", lower=1e-12)
+    omega: Scalar = param(120.0, unit="rad/s", doc="angular velocity at the start")
+    g: Scalar = param(9.8, unit="m/s^2", doc="gravity", lower=0.0)
+
+    def mechanism(self) -> Mechanism:
+        """Two bodies, a bearing, a guide and a rod."""
+        m = Mechanism("slider_crank", gravity=(0.0, 0.0, -self.g))
+        m.body("wheel", self.m_crank, (self.J, self.J, self.J))
+        m.body("block", self.m_slider, (0.2, 0.2, 0.2))
+        m.frame("ground.bearing", at=(0.0, self.b, self.c), z=X, x=Z)
+        m.frame("ground.guide", z=X, x=Z)
+        m.frame("wheel.bearing", z=X, x=Z)
+        m.frame("wheel.pin", at=(0.0, 0.0, self.r))
+        m.frame("block.guide", z=X, x=Z)
+        m.frame("block.pin", at=(0.0, 0.0, self.e))
+        rise = self.c + self.r - self.e
+        reach = sqrt(self.l * self.l - self.b * self.b - rise * rise)
+        speed = self.b * self.r * self.omega / reach
+        bearing = JointFriction(self.law, radius=self.R, length=self.a)
+        m.joint(Revolute("crank", "ground.bearing", "wheel.bearing", 0.0, self.omega, bearing))
+        m.joint(Prismatic("slider", "ground.guide", "block.guide", reach, speed))
+        m.joint(Distance("rod", "wheel.pin", "block.pin", length=self.l))
+        return m
