@@ -63,6 +63,7 @@ tan = _dispatch("tan")
 atan = _dispatch("atan", "arctan")
 asin = _dispatch("asin", "arcsin")
 tanh = _dispatch("tanh")
+asinh = _dispatch("asinh", "arcsinh")
 expm1 = _dispatch("expm1")
 
 _erf_of_numbers = np.vectorize(erf_of_float, otypes=[float])

@@ -1,11 +1,34 @@
 """Laws with states whose options lead to other expressions than the defaults."""
 
 from symfric import Law
-from symfric.laws import GMS, ElastoPlastic, MaxwellSlip
+from symfric.laws import (
+    GMS,
+    BlimanSorine,
+    Bristle2D,
+    ElastoPlastic,
+    HaessigFriedland,
+    MaxwellSlip,
+    RateAndState,
+    StickSlip,
+)
 
 DYNAMIC: dict[str, Law] = {
+    "bliman_sorine, order 1": BlimanSorine(order="1"),
+    "haessig_friedland, event": HaessigFriedland(form="event"),
     "elasto_plastic, viscous": ElastoPlastic(sigma_2=0.4),
     "maxwell_slip, n 2": MaxwellSlip(n=2.0),
     "maxwell_slip, event": MaxwellSlip(form="event"),
     "gms, event, viscous": GMS(sigma_2=0.4, form="event"),
+    "stick_slip, published": StickSlip(branch="published"),
+    "bristle_2d, kappa 0.2": Bristle2D(kappa=0.2),
+    "rate_and_state, slip": RateAndState(evolution="slip"),
 }
+
+SETTLED = {
+    "gonthier": 6e-3,
+    "bristle_2d": 0.2,
+    "bristle_2d, kappa 0.2": 2.0,
+    "stick_slip": 1e-3,
+    "stick_slip, published": 1e-3,
+}
+"""Speed [m/s] from which the steady state of a law is exact, as its docstring says."""

@@ -76,10 +76,11 @@ def state_symbols(law: Law) -> ca.SX:
 
 
 def has_exact_step(law: Law) -> bool:
-    """Whether no state acts on another's rate and each enters its own linearly, without modes."""
+    """Whether force and rate are affine in the states, each state alone in its rate, no modes."""
     v, N, z = ca.SX.sym("v"), ca.SX.sym("N"), state_symbols(law)
     slope = ca.jacobian(ca.SX(law.rate(v, N, z)), z)
-    affine = not ca.depends_on(slope, z) and slope.sparsity().is_diag()
+    slopes = ca.veccat(slope, ca.jacobian(ca.SX(law.force(v, N, z)), z))
+    affine = not ca.depends_on(slopes, z) and slope.sparsity().is_diag()
     return affine and not law.switches(v, N, z)
 
 

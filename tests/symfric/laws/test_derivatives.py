@@ -22,9 +22,11 @@ def expansion_point(name: str) -> np.ndarray:
     names, _, _, values = symbolic(name)
     law = CASES[name]
     z = SHARE * np.asarray(law.steady_state(1.0, 7.848)).ravel()
+    nominal = np.array([state.nominal for state in law.states])
+    z = np.where(np.abs(z) > 1e-6 * nominal, z, 0.3 * nominal)
     off_zero = {n: x if x else 0.3 for n, x in values.items()}
     # at 1e-9 m/s the smoothing has long saturated: compare where it bends
-    smoothing = {n: 5e-4 for n in values if n.startswith("v_eps")}
+    smoothing = {n: 5e-4 for n in values if n.startswith("v_e")}
     return np.array([V, *z, *((off_zero | smoothing)[n] for n in names[1 + z.size :])])
 
 

@@ -1,0 +1,75 @@
+"""Bliman-Sorine friction: linear in the path, with a break-away peak."""
+
+from dataclasses import dataclass
+from math import inf
+from typing import ClassVar, final
+
+from symfric.laws import smooth
+from symfric.laws.base import Facts, Law, State
+from symfric.numeric import Scalar, column
+from symfric.parameters import option, param
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class BlimanSorine(Law):
+    """Bliman-Sorine friction of second order (two states), or of first order (one).
+
+        dF_1/dt = ( mu_1 N v - |v| F_1) / (eta s_f)
+        dF_2/dt = (-mu_2 N v - |v| F_2) / s_f
+        F = F_1 + F_2
+
+    Linear in the path |v| t, hence rate-independent: each reversal is followed by a peak at the
+    path s_p = eta s_f/(1 - eta) ln(mu_1/(eta mu_2)), of the height
+    N [mu_1 (1 - exp(-s_p/(eta s_f))) - mu_2 (1 - exp(-s_p/s_f))].
+    order = "1" keeps F_1 alone, with mu_2 = 0 and the path eta s_f: that is `Dahl`.
+    Limits: steady state (mu_1 - mu_2) N sign(v), no Stribeck effect in steady sliding; initial
+    stiffness N (mu_1/eta - mu_2)/s_f. Weakly damped at velocity reversals; dissipative for the
+    default set, not for every one. |v| is smooth over v_eps, as in `LuGre`.
+    Source: Bliman and Sorine, Proc. European Control Conf. 1995; Olsson et al., Eur. J. Control 4,
+    1998.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "P"),
+        smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
+        confidence="memory, verified by its closed forms",
+        source="Bliman and Sorine, ECC 1995; Olsson et al. 1998",
+        load="proportional in steady sliding",
+    )
+    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_2", "mu_1"),)
+
+    mu_1: Scalar = param(0.3, unit="1", doc="coefficient of the fast part", lower=1e-12)
+    mu_2: Scalar = param(0.2, unit="1", doc="coefficient of the slow part", lower=0.0)
+    eta: Scalar = param(0.4, unit="1", doc="path ratio, fast to slow", lower=1e-6, upper=0.999)
+    s_f: Scalar = param(1e-5, unit="m", doc="path constant of the slow part", lower=1e-15)
+    v_eps: Scalar = param(1e-9, unit="m/s", doc="smoothing velocity of |v|", lower=0.0)
+    order: str = option("2", choices=("1", "2"), doc="number of states")
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The fast and the slow part of the force."""
+        return tuple(State(f"F_{i + 1}", "N", 1.0) for i in range(int(self.order)))
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """None: the force depends on the path alone."""
+        return inf
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        return z[0] if self.order == "1" else z[0] + z[1]
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Rates of the parts [N/s]."""
+        speed = smooth.magnitude(v, self.v_eps)
+        fast = (self.mu_1 * N * v - speed * z[0]) / (self.eta * self.s_f)
+        if self.order == "1":
+            return column(fast)
+        return column(fast, (-self.mu_2 * N * v - speed * z[1]) / self.s_f)
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """The parts in steady sliding [N]."""
+        direction = smooth.sign(v, self.v_eps)
+        parts = self.mu_1 * N * direction, -self.mu_2 * N * direction
+        return column(*parts[: int(self.order)])

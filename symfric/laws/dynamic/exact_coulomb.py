@@ -1,0 +1,86 @@
+"""Coulomb friction without regularisation: stick and slip as modes."""
+
+from dataclasses import dataclass
+from math import inf
+from typing import ClassVar, final
+
+from symfric.laws import smooth
+from symfric.laws.base import APPLIED_FORCE, Facts, Input, Law, State, Switch
+from symfric.numeric import Scalar, column
+from symfric.parameters import param
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ExactCoulomb(Law):
+    """Set-valued Coulomb friction with a static level, by modes (one state).
+
+        slip: F = mu_d N mode,  mode = sign(v)
+        stick: F = F_e,  mode = 0,  while |F_e| <= mu_s N
+        F = mu_d N mode + F_e (1 - mode^2)
+
+    F_e is the applied force: what the contact must carry for no acceleration. Sliding ends where
+    v passes through zero; the contact sticks there if it can, or slides on to the other side. This
+    is the truth that regularised laws are measured against; needs a scene with events.
+    Limits: `Coulomb`, `Stribeck` and others tend to it as their width tends to zero. Between the
+    switches the mode is constant.
+    Source: Coulomb 1785; as a hybrid system Olsson et al., Eur. J. Control 4, 1998.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S"),
+        smoothness="set-valued at v = 0, exact by modes",
+        confidence="two sources",
+        source="Coulomb 1785; Olsson et al., Eur. J. Control 4, 1998",
+    )
+    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+
+    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The mode: direction of sliding, or 0 for stick."""
+        return (State("mode", "1", 1.0),)
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """The applied force."""
+        return (APPLIED_FORCE,)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """None: what happens at v = 0 is an event."""
+        return inf
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
+        """Friction force [N]."""
+        return self.mu_d * N * z[0] + F_e * (1 - z[0] * z[0])
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
+        """Zero: the mode changes at switches only."""
+        return column(0.0 * v)
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """The direction of sliding."""
+        return column(smooth.sign(v, 0.0))
+
+    def start(self, v: Scalar, N: Scalar, *, F_e: Scalar = 0.0) -> Scalar:
+        """The direction of sliding; at rest stick, or the direction of a load beyond mu_s N."""
+        overload = smooth.magnitude(F_e, 0.0) > self.mu_s * N
+        at_rest = smooth.choose(overload, smooth.sign(F_e, 0.0), 0.0)
+        return column(smooth.choose(v == 0, at_rest, smooth.sign(v, 0.0)))
+
+    def switches(
+        self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0
+    ) -> tuple[Switch, ...]:
+        """The end of sliding, and break-away."""
+        mode, onward = z[0], smooth.sign(F_e, 0.0)
+        stuck = smooth.magnitude(F_e, 0.0) - self.mu_s * N
+        held = smooth.choose(stuck <= 0, 0.0, onward)
+        return (
+            Switch(
+                "stick", smooth.choose(mode == 0, 1.0, mode * v), -1, {"mode": held}, halts=True
+            ),
+            Switch("slip", smooth.choose(mode == 0, stuck, -1.0), 1, {"mode": onward}),
+        )

@@ -1,0 +1,98 @@
+"""Haessig-Friedland friction: the reset integrator."""
+
+from dataclasses import dataclass
+from math import inf
+from typing import ClassVar, final
+
+from symfric.laws import smooth
+from symfric.laws.base import Facts, Law, State, Switch
+from symfric.laws.dynamic.element import yielding
+from symfric.numeric import Scalar, column
+from symfric.parameters import option, param
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class HaessigFriedland(Law):
+    """Reset-integrator friction (one state, with a mode in the event form).
+
+        r     = sigma_0 z / (mu_d N)
+        stick: dz/dt = v until |r| = 1
+        slip:  dz/dt = 0 until v changes sign
+        F = sigma_0 z mu_s/mu_d + sigma_1 dz/dt  in stick,  sigma_0 z  in slip
+
+    The stiction gradient of the paper is a = (mu_s - mu_d) / mu_d. form = "event" is this law, for
+    constant N; the force drops from mu_s N to mu_d N at once. form = "smooth" yields with the
+    sharpness n, dz/dt = v [1 - |r|^n (1 + sign(v r)) / 2], and loses the excess in a step of |r|
+    from 1 - knee to 1.
+    Limits: steady state mu_d N sign(v); rate-independent for sigma_1 = 0; drifts as little as
+    `MaxwellSlip` with one element. |v| is smooth over v_eps. Not valid for N = 0.
+    Source: Haessig and Friedland, ASME J. Dyn. Syst. Meas. Control 113(3), 1991.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "P", "N"),
+        smoothness="C2 (jumps as knee -> 0)",
+        confidence="memory; smooth form constructed",
+        source="Haessig and Friedland, J. Dyn. Syst. Meas. Control 113(3), 1991",
+        load="proportional in steady sliding",
+    )
+    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+
+    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=1e-12)
+    sigma_0: Scalar = param(1e5, unit="N/m", doc="bristle stiffness in slip", lower=1e-12)
+    sigma_1: Scalar = param(190.0, unit="N s/m", doc="bristle damping in stick", lower=0.0)
+    n: Scalar = param(50.0, unit="1", doc="sharpness of the yielding", lower=1.0, upper=1e3)
+    knee: Scalar = param(0.05, unit="1", doc="share over which excess is lost", lower=1e-6, upper=1)
+    v_eps: Scalar = param(1e-9, unit="m/s", doc="smoothing velocity of |v|", lower=0.0)
+    r_eps: Scalar = param(1e-8, unit="1", doc="smoothing of the load share", lower=1e-12)
+    form: str = option("smooth", choices=("smooth", "event"), doc="rounded, or exact with modes")
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The bristle deflection, and in the event form the mode."""
+        mode = (State("slip", "1", 1.0, even=True),) if self.form == "event" else ()
+        return (State("z", "m", 1e-5), *mode)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """None: the force depends on the path."""
+        return inf
+
+    def _share(self, N: Scalar, z: Scalar) -> Scalar:
+        return self.sigma_0 * z[0] / (self.mu_d * N)
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Rate of the deflection [m/s] and, zero, of the mode."""
+        if self.form == "event":
+            return column((1 - z[1]) * v, 0.0 * v)
+        return column(yielding(v, self._share(N, z), self.n, self.v_eps, self.r_eps))
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        if self.form == "event":
+            excess = 1 - z[1]
+        else:
+            r = smooth.magnitude(self._share(N, z), self.r_eps)
+            excess = 1 - smooth.step5((r - 1) / self.knee + 1)
+        stiffness = self.sigma_0 * (1 + (self.mu_s / self.mu_d - 1) * excess)
+        return stiffness * z[0] + self.sigma_1 * self.rate(v, N, z)[0]
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """Deflection at its limit [m], mode slipping."""
+        direction = smooth.sign(v, 0.0 if self.form == "event" else self.v_eps)
+        z = self.mu_d * N / self.sigma_0 * direction
+        return column(z, direction**2) if self.form == "event" else column(z)
+
+    def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
+        """Slip at the limit, stick when v changes sign."""
+        if self.form == "smooth":
+            return ()
+        direction = smooth.sign(v, 0.0)
+        reached = smooth.choose(z[1] > 0.5, -1.0, direction * self._share(N, z) - 1)
+        limit = direction * self.mu_d * N / self.sigma_0
+        return (
+            Switch("slip_begins", reached, 1, {"z": limit, "slip": 1.0}),
+            Switch("reversal", v, 0, {"slip": 0.0}),
+        )
