@@ -1,14 +1,17 @@
-"""`symfric codegen`: a friction law as C99, verified on this machine."""
+"""`symfric codegen`: a friction law, or a scene as a plant, as C99, verified on this machine."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from symfric.cli import output
-from symfric.cli.options import JsonOption, LawOption, SetOption, check_folder, law_with
-from symfric.codegen import Generated, Verification, generate, verify
-from symfric.parameters import check_names
+from symfric.cli.options import JsonOption, LawOption, SetOption, check_folder, law_with, numbers
+from symfric.cli.run import scenes_with
+from symfric.codegen import Block, Generated, Verification, generate, plant_block, verify
+from symfric.parameters import check_names, parameters
+from symfric.scenes import ALL_SCENES
 
 REALS = {"double": ("double",), "float": ("float",), "both": ("double", "float")}
 
@@ -17,10 +20,21 @@ def codegen(
     law: LawOption,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")],
     settings: SetOption = None,
-    real: Annotated[str, typer.Option("--real", help="double, float or both.")] = "both",
+    scene: Annotated[
+        str | None,
+        typer.Option("--scene", metavar="NAME", help="The plant of this scene with the law."),
+    ] = None,
+    method: Annotated[
+        str | None,
+        typer.Option("--method", help="How a plant advances; default rodas3."),
+    ] = None,
+    real: Annotated[
+        str | None,
+        typer.Option("--real", help="double, float or both; default both, double for a plant."),
+    ] = None,
     step_size: Annotated[
         float | None,
-        typer.Option("--step-size", help="Step [s] as a constant, for laws with states."),
+        typer.Option("--step-size", help="Step [s] as a constant, for laws with states, plants."),
     ] = None,
     name: Annotated[
         str | None, typer.Option("--name", help="C identifier; default from the law.")
@@ -34,17 +48,24 @@ def codegen(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Write a friction law as C99 and verify it.
+    """Write a friction law, or with --scene a plant, as C99 and verify it.
 
     The C is compiled and compared with CasADi over 20 000 steps.
 
     Example: symfric codegen --law lugre --out build --step-size 0.001
     """
-    check_names("--real", [real], REALS)
+    kind = real or ("both" if scene is None else "double")
+    check_names("--real", [kind], REALS)
     check_folder(out)
-    generated = generate(
-        law_with(law, settings), out, name=name, real=REALS[real], h=step_size, free=free
-    )
+    if scene is not None:
+        block = plant(scene, law, numbers("--set", settings), method, step_size, name, free)
+        generated = generate(block, out, real=REALS[kind])
+    elif method is not None:
+        raise ValueError("--method: expected with --scene only: the step of a law is exact")
+    else:
+        generated = generate(
+            law_with(law, settings), out, name=name, real=REALS[kind], h=step_size, free=free
+        )
     verification = verify(generated, compiler=compiler)
     output.emit_json(to_dict(law, generated, verification), json)
     if json != "-":
@@ -52,6 +73,23 @@ def codegen(
     output.say_written(*generated.files, json)
     if verification.checks and not verification.ok:
         raise typer.Exit(1)
+
+
+def plant(
+    scene: str,
+    law: str,
+    values: dict[str, float],
+    method: str | None,
+    h: float | None,
+    name: str | None,
+    free: list[str] | None,
+) -> Block:
+    """The plant of a scene, whose other parameters are listed as constants."""
+    check_names("--scene", [scene], ALL_SCENES)
+    machine = scenes_with(scene, [law], values)[law]
+    block = plant_block(machine.model(free or ()), h=h, method=method or "rodas3", name=name)
+    known = {n: float(p.value) for n, p in parameters(machine).items() if n not in (free or ())}
+    return replace(block, constants=known | dict(block.constants))
 
 
 def to_dict(law: str, generated: Generated, verification: Verification) -> dict[str, Any]:

@@ -96,8 +96,11 @@ def run_c(block: Block, real: Real, executable: Path, inputs: Array) -> Array:
     return np.frombuffer(done.stdout, kind).reshape(len(inputs), columns).astype(float)
 
 
-def run_vm(block: Block, real: Real, inputs: Array) -> Array:
-    """The same rows from CasADi in double, with inputs and parameters rounded to `real`."""
+def run_vm(block: Block, real: Real, inputs: Array, states: Array | None = None) -> Array:
+    """The same rows from CasADi in double, with inputs and parameters rounded to `real`.
+
+    With `states`, shape (steps, states), every step but the first begins from the row before.
+    """
     kind = np.float32 if real.size == 4 else np.float64
     inputs = inputs.astype(kind).astype(float)
     p = np.array([v.start for v in block.parameters], dtype=kind).astype(float)
@@ -111,8 +114,10 @@ def run_vm(block: Block, real: Real, inputs: Array) -> Array:
         for reset, other in zip(block.resets, others, strict=True)
     ]
     rows = np.zeros((len(inputs), len(signals(block))))
-    for row, now in zip(rows, inputs, strict=True):
+    for k, (row, now) in enumerate(zip(rows, inputs, strict=True)):
         u[:] = now
+        if states is not None and k:
+            x[:] = states[k - 1]
         step()
         for call in calls:
             call()

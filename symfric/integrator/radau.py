@@ -120,8 +120,8 @@ def _pair(system: System, basis: Eigenbasis) -> tuple[ca.Function, ca.Function]:
     J, M = ca.jacobian(system.f, system.y), system.mass / h
     diagonal, across = basis.alpha * M - J, basis.beta * M
     both = ca.blockcat([[diagonal, across], [-across, diagonal]])
-    safe = (*system.diagonal, *(n + i for i in system.diagonal))
-    lu = factorise(ca.sparsify(both), safe=safe)
+    safe, then = ((*rows, *(n + i for i in rows)) for rows in (system.diagonal, system.then))
+    lu = factorise(ca.sparsify(both), safe=safe, then=then)
     right, memory = ca.SX.sym("right", 2 * n), ca.SX.sym("memory", 2 * n)
     solution = lu.solve(right + ca.diagcat(system.mass, system.mass) @ memory)
     return (

@@ -26,8 +26,7 @@ SAFETY, GROW, SHRINK = 0.85, 8.0, 0.2
 E_FLOOR, GROWTH_MEMORY = 1e-6, 2.5
 """Smallest error the controller believes, and largest growth it remembers."""
 
-
-KAPPA = 0.03
+KAPPA = 0.1
 """What Newton's method may leave over, in units of the tolerance."""
 
 

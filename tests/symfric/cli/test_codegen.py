@@ -61,3 +61,35 @@ def test_without_a_compiler_the_files_are_written_all_the_same(
 )
 def test_distance_in_words(ulp: int | None, words: str) -> None:
     assert bits(ulp) == words
+
+
+@compiled
+def test_scene_becomes_a_plant(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    line = f"codegen --scene rabinowicz --law lugre --set k=3 --out {tmp_path} --free mu_s"
+    assert main(f"{line} --step-size 1e-3 --method backward_euler --json -".split()) == 0
+    result = json.loads(capsys.readouterr().out)
+    manifest = result["manifest"]
+    assert [state["name"] for state in manifest["states"]] == ["x", "v", "z"]
+    assert [p["name"] for p in manifest["parameters"]] == ["mu_s"]
+    assert (manifest["constants"]["k"], manifest["constants"]["h"]) == (3.0, 1e-3)
+    (check,) = result["verification"]["checks"]
+    assert (check["real"], check["ulp"]) == ("double", 0)
+    assert "backward Euler" in (tmp_path / "rabinowicz_f64.h").read_text()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--method rodas3", "--method: expected with --scene only"),
+        ("--scene belt", "--scene: expected one of rabinowicz, drive"),
+        ("--scene drive --method euler", "expected one of rodas5p"),
+        ("--scene drive --set v_belt=1", "v_belt"),
+    ],
+)
+def test_bad_plants_are_refused_in_one_sentence(
+    options: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(f"codegen --law lugre --out {tmp_path} {options}".split()) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert "Traceback" not in error

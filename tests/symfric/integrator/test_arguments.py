@@ -1,11 +1,12 @@
-"""Arguments that simulations have in common."""
+"""Arguments that simulations have in common, and which method "auto" is."""
 
 import warnings
 
 import numpy as np
 import pytest
 
-from symfric.integrator.arguments import check_span, check_times
+from symfric.integrator.arguments import LOOSE, check_span, check_times, chosen
+from symfric.integrator.tableaux import ADAPTIVE, METHODS, RADAU5, RODAS5P
 
 
 def test_good_arguments_pass_without_a_word() -> None:
@@ -41,3 +42,30 @@ def test_times_that_are_no_increasing_row_in_the_span_are_refused(t_eval: object
 def test_loose_tolerance_warns_with_its_place() -> None:
     with pytest.warns(UserWarning, match="here: rtol = 0.001 is above 1e-05; whole stick phases"):
         check_span("here", 0.0, 1.0, 1e-3)
+
+
+@pytest.mark.parametrize("name", ADAPTIVE)
+def test_every_adaptive_method_is_chosen_by_its_name(name: str) -> None:
+    assert chosen("here", name, 1e-6) is METHODS[name]
+
+
+@pytest.mark.parametrize(
+    ("rtol", "method"), [(1e-13, RODAS5P), (1e-6, RODAS5P), (LOOSE, RODAS5P), (2e-5, RADAU5)]
+)
+def test_automatic_choice_takes_the_careful_method_at_loose_tolerances(
+    rtol: float, method: object
+) -> None:
+    assert chosen("here", "auto", rtol) is method
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("rodas5", "here: method: expected one of auto, rodas5p.* did you mean rodas5p"),
+        ("backward_euler", "here: method: expected one with error control.* which has fixed steps"),
+        ("exponential", "it is for flow and for the C of plants"),
+    ],
+)
+def test_what_cannot_control_its_error_is_refused(name: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        chosen("here", name, 1e-6)

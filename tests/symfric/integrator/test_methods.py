@@ -1,0 +1,132 @@
+"""All adaptive methods through `simulate`, `simulate_many` and their derivatives."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric import (
+    BrownMcPhee,
+    Law,
+    LuGre,
+    Model,
+    Variable,
+    drive,
+    flow,
+    rabinowicz,
+    simulate,
+    simulate_many,
+)
+from symfric.integrator.tableaux import ADAPTIVE, METHODS
+from symfric.model import Event
+
+each_method = pytest.mark.parametrize("method", ADAPTIVE)
+TIMES = np.linspace(0.0, 12.0, 61)
+
+
+def decay() -> Model:
+    """x' = -k x^3 from 2: x = 2 / sqrt(1 + 8 k t)."""
+    x, k = Variable("x", "m", start=2.0), Variable("k", "1/s", start=0.7)
+    return Model("decay", x=(x,), p=(k,), ode=-k.symbol * x.symbol**3)
+
+
+@each_method
+@pytest.mark.parametrize("law", [BrownMcPhee(), LuGre()], ids=["brown_mcphee", "lugre"])
+def test_methods_agree_on_stick_slip(method: str, law: Law) -> None:
+    model = rabinowicz(law)
+    run = simulate(model, 12.0, rtol=1e-7, t_eval=TIMES, method=method)
+    exact = simulate(model, 12.0, rtol=1e-12, t_eval=TIMES, method="rodas4p")
+    assert run["x"] == pytest.approx(exact["x"], abs=2e-6)
+    assert run.statistics.method == METHODS[method].name
+
+
+@each_method
+@pytest.mark.parametrize("rtol", [1e-5, 1e-7, 1e-9])
+def test_tolerance_is_met_between_the_steps_too(method: str, rtol: float) -> None:
+    t = np.linspace(0.0, 5.0, 400)
+    run = simulate(decay(), 5.0, rtol=rtol, t_eval=t, method=method)
+    assert run["x"] == pytest.approx(2 / np.sqrt(1 + 5.6 * t), rel=10 * rtol)
+
+
+@each_method
+def test_derivatives_are_those_of_the_closed_form(method: str) -> None:
+    """dx/dk = -x^3 t, dx/dx0 = x^3 / 8."""
+    run = simulate(
+        decay(), 5.0, rtol=1e-10, method=method, sensitivities=["k", "x0.x"],
+        t_eval=np.linspace(0.0, 5.0, 31),
+    )  # fmt: skip
+    x, t = run["x"], run.t
+    found = run.sensitivities
+    assert found["k"]["x"] == pytest.approx(-(x**3) * t, abs=1e-7)
+    assert found["x0.x"]["x"] == pytest.approx(x**3 / 8, abs=1e-7)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_flow_and_its_derivative(method: str) -> None:
+    k = ca.MX.sym("k")
+    xf = flow(decay(), steps=400, method=method)(x0=2.0, p=k, T=1.0)["xf"]
+    value, slope = ca.Function("both", [k], [xf, ca.jacobian(xf, k)])(0.7)
+    within = 1e-7 if METHODS[method].order > 1 else 5e-3
+    assert float(value) == pytest.approx(2 / np.sqrt(6.6), rel=within)
+    assert float(slope) == pytest.approx(-8 / 6.6**1.5, rel=within)
+
+
+@each_method
+@pytest.mark.parametrize("backend", ["vm", "compiled"])
+def test_ensemble_members_are_single_runs(method: str, backend: str) -> None:
+    k, t = np.array([0.5, 0.7, 1.1]), np.linspace(0.0, 3.0, 7)
+    found = simulate_many(decay(), 3.0, p={"k": k}, t_eval=t, method=method, backend=backend)
+    alone = [simulate(decay(), 3.0, p={"k": v}, t_eval=t, method=method)["x"] for v in k]
+    assert found["x"] == pytest.approx(np.vstack(alone), rel=1e-9)
+    assert not found.failed
+
+
+@each_method
+def test_event_is_found_where_it_is(method: str) -> None:
+    """4 / (1 + 5.6 t) = 1 at t = 3 / 5.6."""
+    x = Variable("x", "m", start=2.0)
+    model = Model(
+        "decay", x=(x,), ode=-0.7 * x.symbol**3,
+        events=(Event("one", x.symbol - 1.0, terminal=True),),
+    )  # fmt: skip
+    run = simulate(model, 5.0, rtol=1e-9, method=method)
+    assert run.happened[-1][0] == pytest.approx(3 / 5.6, rel=1e-7)
+    assert run.t[-1] <= run.happened[-1][0]
+
+
+@each_method
+def test_held_input_restarts_every_method(method: str) -> None:
+    model = drive(BrownMcPhee(), m=2.0, N=0.0)
+    run = simulate(model, 3.0, u={"force": 3.0}, rtol=1e-8, method=method)
+    assert run.final["x"] == pytest.approx(0.5 * 1.5 * 9.0, rel=1e-7)
+
+
+@each_method
+def test_algebraic_unknowns_are_solved_or_refused(method: str) -> None:
+    x, z = Variable("x", "1", start=1.0), Variable("z", "1")
+    model = Model("dae", x=(x,), z=(z,), ode=-z.symbol, alg=z.symbol - 2 * x.symbol)
+    if not METHODS[method].dae:
+        with pytest.raises(ValueError, match="got the algebraic unknowns z; use an implicit"):
+            simulate(model, 1.0, method=method)
+        return
+    run = simulate(model, 1.0, rtol=1e-9, method=method)
+    assert run.final["z"] == pytest.approx(2 * np.exp(-2), rel=1e-7)
+
+
+@pytest.mark.parametrize("call", [simulate, simulate_many])
+@pytest.mark.parametrize("method", [m for m in METHODS if m not in ADAPTIVE])
+def test_method_of_fixed_steps_is_refused(call: object, method: str) -> None:
+    with pytest.raises(ValueError, match="expected one with error control"):
+        call(decay(), 1.0, method=method)  # pyright: ignore[reportCallIssue]
+
+
+@each_method
+def test_work_is_counted(method: str) -> None:
+    s = simulate(rabinowicz(LuGre()), 0.5, method=method).statistics
+    attempts = s.steps + s.rejections
+    evaluations, jacobians, factorisations = {
+        "rodas5p": (8, 1, 1), "rodas4p": (6, 1, 1), "rodas3": (4, 1, 1),
+        "radau5": (7, 1, 2), "dopri5": (7, 0, 0),
+    }[method]  # fmt: skip
+    assert s.evaluations == evaluations * attempts
+    assert s.jacobians == jacobians * attempts
+    assert s.factorisations == factorisations * attempts
