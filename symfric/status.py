@@ -23,6 +23,7 @@ class Status(Enum):
         "The step became too small; a discontinuity or a singular equation is near this time."
     )
     NOT_FINITE = "An equation returned NaN or infinity."
+    JAMMED = "Friction jams: reactions grow with the friction that they cause, without bound."
     SINGULAR = "The iteration matrix became singular."
     SOLVER_FAILED = "The solver gave up."
     SOLVED = "The optimality conditions hold within the tolerance."

@@ -7,10 +7,13 @@ from numpy.typing import NDArray
 from symfric.integrator.blocks import blocks
 from symfric.integrator.initial import consistent
 from symfric.integrator.integrator import Integrator
+from symfric.integrator.manifold import jammed
 from symfric.integrator.system import System
 from symfric.status import Status
 
 Array = NDArray[np.float64]
+NEARLY = 0.1
+"""A step that shrinks to nothing with this little left of det(I - dN/dN) has jammed."""
 
 
 def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> tuple[Status, str]:
@@ -19,6 +22,7 @@ def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> t
     where = f"simulate '{name}': stopped at t = {t:.9g} s"
     f = integrator.f(y, d).full().ravel()
     for status, cause in (
+        (Status.JAMMED, _jammed(integrator, y, d)),
         (Status.STEP_TOO_SMALL, _unbounded(system, y, f, h)),
         (Status.NOT_FINITE, _not_finite(integrator, y, d, h)),
         (Status.NOT_FINITE, _steep(system, y, d)),
@@ -32,6 +36,17 @@ def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> t
         f"{where}: the step fell to {h:.1e} s, fastest equation {fastest}; a discontinuity is "
         "near, give the law a smooth form or the model an event there",
     )
+
+
+def _jammed(integrator: Integrator, y: Array, d: Array) -> str:
+    """Contacts whose normal forces grow with their own friction; with joint and law."""
+    manifold = integrator.system.manifold
+    if manifold is None:
+        return ""
+    cause = jammed(manifold, integrator.system.names, y, d, NEARLY)
+    for variable in integrator.model.z:
+        cause = cause.replace(f"through {variable.name}:", f"through the {variable.doc}:")
+    return cause
 
 
 def _unbounded(system: System, y: Array, f: Array, h: float) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.columns import Columns
-from symfric.integrator.manifold import Manifold
+from symfric.integrator.manifold import Manifold, jammed
 from symfric.integrator.system import System
 from symfric.numeric import evaluate
 
@@ -27,13 +27,17 @@ class Equations:
 
     Attributes:
         names: of all unknowns.
+        nx: number of differential states.
         algebraic: rows of the equations, columns of their unknowns.
         constraints: as `System.constraints`.
+        manifold: as `System.manifold`.
     """
 
     names: tuple[str, ...]
+    nx: int
     algebraic: tuple[list[int], list[int]]
     constraints: ca.Function
+    manifold: Manifold | None = None
 
 
 def consistent(system: System | Equations, where: str, y: Array, d: Array) -> Array:
@@ -42,8 +46,17 @@ def consistent(system: System | Equations, where: str, y: Array, d: Array) -> Ar
     Raises:
         ValueError: no solution near the guess.
     """
-    if isinstance(system, System) and system.manifold is not None:
-        y = _assembled(system, system.manifold, where, y, d)
+    manifold = system.manifold
+    if manifold is not None:
+        y = _assembled(system, manifold, where, y, d)
+    y = _solved(system, where, y, d)
+    if manifold is not None and (cause := jammed(manifold, system.names, y, d, 0.0)):
+        raise ValueError(f"{where}: {cause}")
+    return y
+
+
+def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array:
+    """`y` with its algebraic unknowns solved for, by damped Newton."""
     columns = system.algebraic[1]
     if not columns:
         return y
@@ -84,8 +97,11 @@ def consistent_many(
     if not columns:
         return y, failed
     guess, y, alone = y, y.copy(), list[int]()
-    todo = np.arange(y.shape[0])
-    before, last = np.full((2, todo.size), np.inf)
+    if system.manifold is not None:
+        # mechanisms are few and large: each one alone
+        alone = list(range(y.shape[0]))
+    todo = np.delete(np.arange(y.shape[0]), alone)
+    before, last = np.full((2, y.shape[0]), np.inf)
     while todo.size:
         g, J = together([y[todo], d[todo]])
         norm = np.linalg.norm(g, axis=1)
@@ -116,7 +132,9 @@ def _newton_steps(g: Array, J: Array) -> Array:
         return np.full((members, n), np.nan)
 
 
-def _assembled(system: System, manifold: Manifold, where: str, y: Array, d: Array) -> Array:
+def _assembled(
+    system: System | Equations, manifold: Manifold, where: str, y: Array, d: Array
+) -> Array:
     """`y` with positions and velocities on the constraints of a mechanism, the nearest ones.
 
     Raises:

@@ -18,10 +18,13 @@ from dataclasses import dataclass
 from typing import final
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
 from symfric.integrator.lu import factorise
 from symfric.model import Model
 
+Array = NDArray[np.float64]
 ITERATIONS = 4
 """Of Newton's method with frozen derivatives: from 1e-3 to 1e-13."""
 
@@ -36,11 +39,21 @@ class Manifold:
             there are none.
         refine: (y, d) -> y, also its accelerations, multipliers and normal forces exact.
         defect: (y, d) -> constraints and their rates.
+        rows, first: number of accelerations and multipliers among the algebraic rows, the others
+            being normal forces, and of states before them.
+        slope: (y, d) -> derivatives of the algebraic equations by the algebraic unknowns.
+        passable: (y, d) -> sign of det(I - dN/dN), the loop from normal forces over friction to
+            reactions and back. At zero friction jams: the normal forces grow without bound; the
+            solution beyond has the wrong sign and is none of the machine.
     """
 
     project: ca.Function
     refine: ca.Function
     defect: ca.Function
+    rows: int
+    first: int
+    slope: ca.Function
+    passable: ca.Function
 
 
 def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, list[str]]:
@@ -72,6 +85,9 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX) -> Manifold:
     implicit = ca.Function("implicit", [y, d], [f[algebraic]])
     J = ca.jacobian(f[algebraic], y[algebraic])
     slope = ca.Function("slope", [y, d], [J])
+    whole = factorise(J, tuple(range(n)), tuple(range(n, n + m)))
+    # with a definite mass matrix the sign without friction is (-1) ^ rows without rates
+    regular = -1 if (len(algebraic) - n) % 2 else 1
     column = projected
     for _ in range(2):
         lu = factorise(slope(column, d), tuple(range(n)), tuple(range(n, n + m)))
@@ -81,6 +97,10 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX) -> Manifold:
         project,
         ca.Function("refine", [y, d], [column], {"cse": True}),
         ca.Function("defect", [y, d], [ca.vertcat(mechanics.phi, rate)]),
+        n + m,
+        nx,
+        slope,
+        ca.Function("passable", [y, d], [regular * whole.sign], {"cse": True}),
     )
 
 
@@ -97,3 +117,24 @@ def _projected(at: ca.Function, q: ca.SX, qd: ca.SX, d: ca.SX) -> tuple[ca.SX, c
     for _ in range(ITERATIONS - 1):
         qd = qd - across(at(q, qd, d)[2])
     return q, qd
+
+
+def jammed(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array, margin: float) -> str:
+    """What jams at y, in words; empty where det(I - dN/dN) > margin."""
+    A, k = manifold.slope(y, d).full(), manifold.rows
+    if A.shape[0] == k or not np.isfinite(A).all():
+        return ""
+    try:
+        loop = A[k:, :k] @ np.linalg.solve(A[:k, :k], A[:k, k:]) - A[k:, k:]
+    except np.linalg.LinAlgError:
+        return ""
+    determinant = float(np.linalg.det(loop))
+    if determinant > margin:
+        return ""
+    values, vectors = np.linalg.eig(loop)
+    worst = int(np.argmax(np.abs(vectors[:, int(np.argmin(np.real(values)))])))
+    return (
+        f"friction jams, most of all through {names[manifold.first + k + worst]}: the reactions "
+        f"grow with the friction that they cause (det(I - dN/dN) = {determinant:.3g}); less "
+        "friction or a longer bearing would let it move"
+    )

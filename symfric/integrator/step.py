@@ -38,7 +38,10 @@ def steps(system: System, method: Method) -> Trials:
 
     def trial(y: Any, h: Any, d: Any) -> Trial:
         found = free(y, h, d)
-        return replace(found, end=manifold.project(found.end, d))
+        sign = manifold.passable(found.end, d)
+        if found.orientation is not None:
+            sign = ca.fmin(sign, found.orientation)
+        return replace(found, end=manifold.project(found.end, d), orientation=sign)
 
     return trial
 

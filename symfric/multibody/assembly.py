@@ -104,12 +104,13 @@ def slips(eq: Equations, normal_at_start: Sequence[float]) -> tuple[Slip, ...]:
         if ca.depends_on(normal, ca.vertcat(eq.a, eq.lam, eq.F)) and depends_on_load(law):
             if joint not in unknowns:
                 scale = max(1.0, abs(start))
-                made = Variable(f"{joint}_N", "N", start=start, nominal=scale, doc="normal force")
+                doc = f"normal force of joint '{joint}' with {type(law).__name__}"
+                made = Variable(f"{joint}_N", "N", start=start, nominal=scale, doc=doc)
                 unknowns[joint], unknown = made, (made,)
             pressing = unknowns[joint].symbol
-        steady = ca.SX(law.steady_state(contact.slip, start))
+        begin = ca.SX(law.start(contact.slip, start))
         states = tuple(
-            Variable(f"{contact.name}_{s.name}", s.unit, start=steady[i], nominal=s.nominal)
+            Variable(f"{contact.name}_{s.name}", s.unit, start=begin[i], nominal=s.nominal)
             for i, s in enumerate(law.states)
         )
         z = ca.vertcat(NONE, *(s.symbol for s in states))
