@@ -68,7 +68,7 @@ def simulate(
         samples: number of equally spaced times.
         method: which formula; the numbers are of Rabinowicz's stick-slip over 20 s.
             "auto": rodas5p, and radau5 where rtol > 1e-5.
-            "rodas5p": order 5, the fewest steps at 1e-6 and below; error 1 to 3 times rtol.
+            "rodas5p": order 5, the fewest steps at 1e-6 and below; error about rtol.
             "rodas4p": order 4; steps cost 2/3, and grow more in number with tighter rtol.
             "rodas3": order 3; for comparisons with plants in fixed steps.
             "radau5": order 5, the most careful one: its iteration fails where a contact changes

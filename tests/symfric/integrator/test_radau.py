@@ -100,7 +100,7 @@ def test_failed_iteration_is_rejected_and_the_step_halved(kind: type) -> None:
     model = Model("cubic", x=(x,), ode=-1000 * (x.symbol - 1) ** 3)
     step = build_step(assemble(model), RADAU5, kind)
     S = [0.0, 0.01, 0.01, 1.0, 0.0, 2.0]
-    after = step(S, [1.0, 0.5, 0.5])[0].full().ravel()  # an error of this size would be allowed
+    after = step(S, [1.0, 0.05, 0.05])[0].full().ravel()  # an error of this size would be allowed
     assert after[MEMORY:].tolist() == [2.0]
     assert after[1] == pytest.approx(0.005)
 
