@@ -140,10 +140,6 @@ class Law(Parametric, ABC):
         With a smoothing velocity the rate vanishes there to rounding beyond 20 v_eps.
         """
 
-    def start(self, v: Scalar, N: Scalar) -> Scalar:
-        """Internal states to begin with, where none are given: those of steady sliding."""
-        return self.steady_state(v, N)
-
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
         """The changes of mode; none for a law whose rate says it all."""
         return ()

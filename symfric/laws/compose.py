@@ -96,11 +96,6 @@ class Sum(Law):
         """Those of the terms."""
         return tuple(warning for law in self.laws for warning in law.warnings())
 
-    def start(self, v: Scalar, N: Scalar, **inputs: Scalar) -> Scalar:
-        """Where the states of all terms begin."""
-        laws = [law for law in self.laws if law.states]
-        return _join(v, [law.start(v, N, **chosen(law, inputs)) for law in laws])
-
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Steady states of all terms."""
         return _join(v, [law.steady_state(v, N) for law in self.laws if law.states])
@@ -182,10 +177,6 @@ class Asymmetric(Law):
         """Those of the law."""
         return self.positive.warnings() + self.negative.warnings()
 
-    def start(self, v: Scalar, N: Scalar, **inputs: Scalar) -> Scalar:
-        """Where the states of the law begin."""
-        return self._at(v).start(v, N, **inputs)
-
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Steady states of the law."""
         return self._at(v).steady_state(v, N)
@@ -253,10 +244,6 @@ class LoadDependent(Law):
     def warnings(self) -> tuple[str, ...]:
         """Those of the law."""
         return self.law.warnings()
-
-    def start(self, v: Scalar, N: Scalar, **inputs: Scalar) -> Scalar:
-        """Where the states of the law begin."""
-        return self.law.start(v, self._load(N), **inputs)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Steady states of the law."""

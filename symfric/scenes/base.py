@@ -77,7 +77,7 @@ def contact(
             f"{', '.join(missing)}"
         )
     given = chosen(law, inputs)
-    states, z = friction_states(law, v, N, **given)
+    states, z = friction_states(law, v, N)
     events = tuple(
         Event(
             s.name,
@@ -107,9 +107,9 @@ def slip_monitor(law: Law, v: Scalar, p: Variables) -> tuple[Monitor, ...]:
     return (Monitor(v, scale),) if isfinite(scale) else ()
 
 
-def friction_states(law: Law, v: Scalar, N: Scalar, **inputs: Scalar) -> tuple[Variables, ca.SX]:
+def friction_states(law: Law, v: Scalar, N: Scalar) -> tuple[Variables, ca.SX]:
     """The internal states of `law` as model variables, starting in steady sliding at `v`."""
-    start = ca.SX(law.start(ca.SX(v), N, **inputs) if law.states else ca.SX(0, 1))
+    start = ca.SX(law.steady_state(ca.SX(v), N))
     variables = tuple(
         Variable(s.name, s.unit, start=start[i], nominal=s.nominal, doc="internal friction state")
         for i, s in enumerate(law.states)

@@ -16,12 +16,13 @@ class ExactCoulomb(Law):
     """Set-valued Coulomb friction with a static level, by modes (one state).
 
         slip: F = mu_d N mode,  mode = sign(v)
-        stick: F = F_e,  mode = 0,  while |F_e| <= mu_s N
-        F = mu_d N mode + F_e (1 - mode^2)
+        stick: F = F_e within +-mu_s N,  mode = 0,  until |F_e| = mu_s N
+        F = mu_d N mode + clip(F_e, mu_s N) (1 - mode^2)
 
     F_e is the applied force: what the contact must carry for no acceleration. Sliding ends where
     v passes through zero; the contact sticks there if it can, or slides on to the other side. This
-    is the truth that regularised laws are measured against; needs a scene with events.
+    is the truth that regularised laws are measured against; needs a scene with events. A load
+    beyond mu_s N from the very start has no instant of break-away; its stick ends at |v| = v_0.
     Limits: `Coulomb`, `Stribeck` and others tend to it as their width tends to zero. Between the
     switches the mode is constant.
     Source: Coulomb 1785; as a hybrid system Olsson et al., Eur. J. Control 4, 1998.
@@ -37,6 +38,8 @@ class ExactCoulomb(Law):
 
     mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
     mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
+
+    v_0: Scalar = param(1e-9, unit="m/s", doc="velocity that ends a stick", lower=1e-15)
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -55,7 +58,8 @@ class ExactCoulomb(Law):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
         """Friction force [N]."""
-        return self.mu_d * N * z[0] + F_e * (1 - z[0] * z[0])
+        held = smooth.clip(F_e, -self.mu_s * N, self.mu_s * N)
+        return self.mu_d * N * z[0] + held * (1 - z[0] * z[0])
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
         """Zero: the mode changes at switches only."""
@@ -65,22 +69,18 @@ class ExactCoulomb(Law):
         """The direction of sliding."""
         return column(smooth.sign(v, 0.0))
 
-    def start(self, v: Scalar, N: Scalar, *, F_e: Scalar = 0.0) -> Scalar:
-        """The direction of sliding; at rest stick, or the direction of a load beyond mu_s N."""
-        overload = smooth.magnitude(F_e, 0.0) > self.mu_s * N
-        at_rest = smooth.choose(overload, smooth.sign(F_e, 0.0), 0.0)
-        return column(smooth.choose(v == 0, at_rest, smooth.sign(v, 0.0)))
-
     def switches(
         self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0
     ) -> tuple[Switch, ...]:
-        """The end of sliding, and break-away."""
+        """The end of sliding, break-away under a growing load, and motion under an overload."""
         mode, onward = z[0], smooth.sign(F_e, 0.0)
         stuck = smooth.magnitude(F_e, 0.0) - self.mu_s * N
+        gone = smooth.magnitude(v, 0.0) - self.v_0
         held = smooth.choose(stuck <= 0, 0.0, onward)
         return (
             Switch(
                 "stick", smooth.choose(mode == 0, 1.0, mode * v), -1, {"mode": held}, halts=True
             ),
             Switch("slip", smooth.choose(mode == 0, stuck, -1.0), 1, {"mode": onward}),
+            Switch("overload", smooth.choose(mode == 0, gone, -1.0), 1, {"mode": onward}),
         )
