@@ -116,7 +116,10 @@ def equations(
     rows += along @ (weights * pushed)
     phi = phi[list(kept)]
     phi_dot = ca.jtimes(phi, q, qd)
-    reactions = {name: in_child_frame(kin, joint, world[name]) for name, joint in by_name.items()}
+    reactions = {
+        name: _without(in_child_frame(kin, joint, world[name]), name, kin, loads)
+        for name, joint in by_name.items()
+    }
     return Equations(
         kin,
         closed,
@@ -136,6 +139,20 @@ def equations(
         _power(kin, loads),
         reactions,
     )
+
+
+def _without(wrench: Wrench, name: str, kin: Kinematics, loads: Sequence[Load | Axial]) -> Wrench:
+    """What the constraints of a joint in the tree transmit, without its axial loads."""
+    if name not in kin.topology.link_of:
+        return wrench
+    force, moment = ca.SX(wrench[0]), ca.SX(wrench[1])
+    for load in loads:
+        if isinstance(load, Axial) and load.joint.name == name:
+            if load.direction == "slide":
+                force[2] -= load.value
+            else:
+                moment[2] -= load.value
+    return force, moment
 
 
 def _contacts(kin: Kinematics, joints: Sequence[Joint]) -> list[Contact]:

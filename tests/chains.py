@@ -1,0 +1,115 @@
+"""Mechanisms for tests: a chain through every joint, and what their equations give as numbers."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.multibody import (
+    Cylindrical,
+    Fixed,
+    Free,
+    JointFriction,
+    Mechanism,
+    Planar,
+    Prismatic,
+    Revolute,
+    Spherical,
+    Universal,
+)
+from symfric.multibody.equations import Equations
+from symfric.multibody.prepare import Prepared
+
+Array = NDArray[np.float64]
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+TREE = (Revolute, Prismatic, Cylindrical, Universal, Planar, Spherical, Fixed, Free)
+
+
+def body(m: Mechanism, name: str, seed: int) -> None:
+    """An unsymmetric body with its centre of mass beside its origin and two skew frames."""
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(3, 3))
+    spread = A @ A.T
+    J = np.trace(spread) * np.eye(3) - spread
+    six = (J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2])
+    m.body(name, float(rng.uniform(1, 3)), six, com=tuple(rng.normal(size=3) * 0.2))
+    for frame in ("in", "out"):
+        at, z, x = rng.normal(size=(3, 3))
+        m.frame(f"{name}.{frame}", tuple(at), tuple(z), tuple(x))
+
+
+def chain(reverse: bool = False, gravity: float = 9.81) -> Mechanism:
+    """A body behind every kind of joint, with the ground first or every joint turned round."""
+    m = Mechanism("chain", gravity=(0.0, 0.0, -gravity))
+    m.frame("ground.out", (0.1, 0.2, 0.3), (0.3, 0.4, 0.9), (1.0, 0.2, 0.1))
+    last = "ground.out"
+    for i, kind in enumerate(TREE):
+        name = f"b{i}"
+        body(m, name, seed=i)
+        ends = (f"{name}.in", last) if reverse else (last, f"{name}.in")
+        m.joint(kind(f"j{i}", *ends))
+        last = f"{name}.out"
+    return m
+
+
+def state(made: Prepared, seed: int = 0) -> tuple[Array, Array]:
+    """Random coordinates with Euler parameters of length one, and rates that keep it."""
+    rng = np.random.default_rng(seed)
+    q, qd = rng.normal(size=(2, made.eq.n)) * 0.7
+    for link in made.eq.kin.topology.links:
+        if link.joint.quaternion is not None:
+            rows = slice(link.first + link.joint.quaternion, link.first + link.joint.quaternion + 4)
+            q[rows] /= np.linalg.norm(q[rows])
+            qd[rows] -= q[rows] * (q[rows] @ qd[rows])
+    return q, qd
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Accelerations, multipliers and what follows from them."""
+
+    a: Array
+    lam: Array
+    N: Array
+    bodies: dict[str, Array]
+    reactions: dict[str, Array]
+
+
+def solve(eq: Equations, q: Array, qd: Array, rounds: int = 60) -> Solved:
+    """Solve the equations of motion with friction laws in the contacts by Newton's method."""
+    N = ca.SX.sym("N", len(eq.contacts))
+    forces = [c.friction.law.force(c.slip, N[k]) for k, c in enumerate(eq.contacts)]
+    unknowns = ca.vertcat(eq.a, eq.lam, N)
+    rows = ca.vertcat(eq.balance, eq.phi_ddot, ca.vertcat(ca.SX(0, 1), *eq.normals) - N)
+    rows = ca.substitute(rows, eq.F, ca.vertcat(ca.SX(0, 1), *forces))
+    step = ca.Function("step", [unknowns, eq.q, eq.qd], [rows, ca.jacobian(rows, unknowns)])
+    x = np.zeros(unknowns.numel())
+    for _ in range(rounds):
+        r, J = (m.full() for m in step.call([x, q, qd]))
+        x = x - np.linalg.solve(J, r[:, 0])
+    every = {name: ca.vertcat(m.dw, m.dv) for name, m in eq.kin.motion.items() if name != "ground"}
+    wrenches = {name: ca.vertcat(*w) for name, w in eq.reactions.items()}
+    values = ca.Function(
+        "values", [unknowns, eq.q, eq.qd, eq.F], [*every.values(), *wrenches.values()]
+    )
+    applied = ca.Function("F", [unknowns, eq.q, eq.qd], [ca.vertcat(ca.SX(0, 1), *forces)])
+    found = [m.full().ravel() for m in values.call([x, q, qd, applied(x, q, qd)])]
+    n, m = eq.n, eq.m
+    return Solved(
+        x[:n],
+        x[n : n + m],
+        x[n + m :],
+        dict(zip(every, found, strict=False)),
+        dict(zip(wrenches, found[len(every) :], strict=True)),
+    )
+
+
+def rod(friction: JointFriction | None = None, **start: float) -> Mechanism:
+    """A rod on a hinge about y."""
+    m = Mechanism("rod")
+    m.body("rod", 2.0, (0.1, 0.1, 0.1))
+    m.frame("ground.hinge", z=Y)
+    m.frame("rod.hinge", at=(0.0, 0.0, 0.4), z=Y)
+    m.joint(Revolute("hinge", "ground.hinge", "rod.hinge", friction=friction, **start))
+    return m

@@ -1,0 +1,109 @@
+"""Every joint: pose, motion subspace and constraints fit each other."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric.multibody import ALL_JOINTS, Joint
+from symfric.multibody.spatial import skew
+
+MOVING = [kind for kind in ALL_JOINTS if not kind.closes]
+each_joint = pytest.mark.parametrize("kind", ALL_JOINTS, ids=lambda kind: kind.__name__)
+each_moving = pytest.mark.parametrize("kind", MOVING, ids=lambda kind: kind.__name__)
+
+
+def joint(kind: type[Joint]) -> Joint:
+    return kind("j", "a", "b")
+
+
+def coordinates(kind: type[Joint], seed: int = 0) -> np.ndarray:
+    q = np.random.default_rng(seed).normal(size=len(kind.coordinates))
+    if kind.quaternion is not None:
+        q[kind.quaternion :] /= np.linalg.norm(q[kind.quaternion :])
+    return q
+
+
+@each_moving
+def test_motion_subspace_is_the_derivative_of_the_pose(kind: type[Joint]) -> None:
+    n = len(kind.coordinates)
+    q, qd = ca.SX.sym("q", n), ca.SX.sym("qd", n)
+    R, p = joint(kind).pose(q)
+    H_w, H_v = joint(kind).subspace(q)
+    R_dot = ca.reshape(ca.jtimes(ca.vec(ca.densify(R)), q, qd), 3, 3)
+    p_dot = ca.jtimes(ca.densify(p), q, qd)
+    both = ca.Function("both", [q, qd], [R_dot - skew(H_w @ qd) @ R, p_dot - H_v @ qd])
+    rates = np.random.default_rng(1).normal(size=n)
+    if kind.quaternion is not None:
+        unit = coordinates(kind)[kind.quaternion :]
+        rates[kind.quaternion :] -= unit * (unit @ rates[kind.quaternion :])
+    for left in both.call([coordinates(kind), rates]):
+        assert left.full() == pytest.approx(np.zeros(left.shape), abs=1e-14)
+
+
+@each_moving
+def test_constraints_vanish_wherever_the_joint_goes(kind: type[Joint]) -> None:
+    q = ca.SX.sym("q", len(kind.coordinates))
+    phi = ca.densify(joint(kind).constraints(*joint(kind).pose(q)))
+    value = ca.Function("phi", [q], [phi])(coordinates(kind)).full()
+    assert value == pytest.approx(np.zeros((kind.constrains, 1)), abs=1e-15)
+
+
+@each_moving
+def test_constraints_and_freedoms_make_six(kind: type[Joint]) -> None:
+    q = ca.SX.sym("q", len(kind.coordinates))
+    H = ca.Function("H", [q], [ca.densify(ca.vertcat(*joint(kind).subspace(q)))])
+    freedoms = np.linalg.matrix_rank(H(coordinates(kind)).full()) if kind.coordinates else 0
+    assert freedoms + kind.constrains == 6
+
+
+def twist_derivatives(kind: type[Joint], R: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Constraint rows along relative velocity and angular velocity."""
+    R_s, p_s, w = ca.SX.sym("R", 3, 3), ca.SX.sym("p", 3), ca.SX.sym("w", 3)
+    phi = ca.densify(joint(kind).constraints(R_s, p_s))
+    by_w = ca.jacobian(ca.jtimes(phi, ca.vec(R_s), ca.vec(skew(w) @ R_s)), w)
+    rows = ca.Function("C", [R_s, p_s], [ca.densify(ca.horzcat(ca.jacobian(phi, p_s), by_w))])
+    return rows(R, p).full()
+
+
+@each_joint
+def test_constraints_are_independent(kind: type[Joint]) -> None:
+    C = twist_derivatives(
+        kind, np.eye(3), np.array([0.0, 0.0, 1.0]) if kind.closes else np.zeros(3)
+    )
+    assert C.shape[0] == kind.constrains
+    assert np.linalg.matrix_rank(C) == kind.constrains
+
+
+@each_moving
+def test_motion_subspace_does_no_work_against_the_constraints(kind: type[Joint]) -> None:
+    q = ca.SX.sym("q", len(kind.coordinates))
+    R, p = joint(kind).pose(q)
+    H_w, H_v = joint(kind).subspace(q)
+    made = ca.Function("m", [q], [ca.densify(x) for x in (R, p, H_v, H_w)])
+    R0, p0, v, w = (m.full() for m in made.call([coordinates(kind)]))
+    work = twist_derivatives(kind, R0, p0) @ np.vstack([v, w])
+    assert work == pytest.approx(np.zeros(work.shape), abs=1e-14)
+
+
+def test_distance_measures_from_point_to_point() -> None:
+    (rod,) = (k for k in ALL_JOINTS if k.__name__ == "Distance")
+    made = rod("rod", "a", "b", length=5.0)  # type: ignore[call-arg]
+    assert float(ca.DM(made.constraints(ca.SX.eye(3), ca.SX([3.0, 4.0, 0.0])))) == 0.0
+    assert float(ca.DM(made.constraints(ca.SX.eye(3), ca.SX([3.0, 4.0, 1.0])))) == 0.5
+
+
+@pytest.mark.parametrize(
+    ("kind", "start", "expected"),
+    [
+        ("Revolute", 0.3, (0.3,)),
+        ("Revolute", None, (0.0,)),
+        ("Cylindrical", (1.0, 2.0), (1.0, 2.0)),
+        ("Spherical", None, (1.0, 0.0, 0.0, 0.0)),
+        ("Free", None, (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)),
+    ],
+)
+def test_a_joint_starts_where_it_is_told_or_without_displacement(
+    kind: str, start: object, expected: tuple[float, ...]
+) -> None:
+    (made,) = (k for k in ALL_JOINTS if k.__name__ == kind)
+    assert made("j", "a", "b", start=start).starts == expected

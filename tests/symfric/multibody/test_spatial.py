@@ -1,0 +1,105 @@
+"""Rotations and Euler parameters against their defining identities."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from symfric.multibody import Frame
+from symfric.multibody.spatial import (
+    euler_e,
+    euler_g,
+    euler_parameters,
+    rotation,
+    rotation_x,
+    rotation_y,
+    rotation_z,
+    skew,
+    turned,
+)
+
+
+def unit(seed: int) -> np.ndarray:
+    p = np.random.default_rng(seed).normal(size=4)
+    return p / np.linalg.norm(p)
+
+
+def full(expression: ca.SX) -> np.ndarray:
+    return ca.DM(expression).full()
+
+
+def test_skew_matrix_is_the_cross_product() -> None:
+    a, b = np.random.default_rng(0).normal(size=(2, 3))
+    assert full(skew(ca.SX(a))) @ b == pytest.approx(np.cross(a, b))
+
+
+@pytest.mark.parametrize(
+    ("turn", "axis"), [(rotation_x, "x"), (rotation_y, "y"), (rotation_z, "z")]
+)
+def test_turns_about_an_axis_agree_with_scipy(turn: object, axis: str) -> None:
+    R = full(turn(ca.SX(0.7)))  # type: ignore[operator]
+    assert pytest.approx(Rotation.from_euler(axis, 0.7).as_matrix()) == R
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_euler_parameters_agree_with_scipy_and_come_back(seed: int) -> None:
+    p = unit(seed)
+    R = full(rotation(ca.SX(p)))
+    assert pytest.approx(Rotation.from_quat([*p[1:], p[0]]).as_matrix()) == R
+    back = euler_parameters(ca.DM(R)).full().ravel()
+    assert back == pytest.approx(p * np.sign(p[0]))
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_half_turns_have_euler_parameters_too(axis: int) -> None:
+    R = -np.eye(3)
+    R[axis, axis] = 1.0
+    p = euler_parameters(ca.DM(R)).full().ravel()
+    assert np.abs(p) == pytest.approx(np.eye(4)[axis + 1])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_identities_of_e_and_g(seed: int) -> None:
+    p = unit(seed)
+    E, G, R = (full(f(ca.SX(p))) for f in (euler_e, euler_g, rotation))
+    assert pytest.approx(R) == E @ G.T
+    assert E @ p == pytest.approx(np.zeros(3))
+    assert pytest.approx(np.eye(3)) == E @ E.T
+    assert pytest.approx(np.eye(4) - np.outer(p, p)) == E.T @ E
+
+
+def test_rates_of_euler_parameters_give_both_angular_velocities() -> None:
+    p, pd = ca.SX(unit(1)), np.random.default_rng(5).normal(size=4)
+    pd = ca.SX(pd - unit(1) * (unit(1) @ pd))
+    symbol = ca.SX.sym("p", 4)
+    R_dot = ca.jtimes(ca.vec(rotation(symbol)), symbol, pd)
+    R_dot = full(ca.reshape(ca.substitute(R_dot, symbol, p), 3, 3))
+    R = full(rotation(p))
+    assert full(skew(2 * euler_e(p) @ pd)) @ R == pytest.approx(R_dot)
+    assert R @ full(skew(2 * euler_g(p) @ pd)) == pytest.approx(R_dot)
+
+
+def test_b_is_the_derivative_of_a_turned_vector() -> None:
+    p, a = ca.SX.sym("p", 4), ca.SX(np.random.default_rng(2).normal(size=3))
+    values = np.random.default_rng(3).normal(size=4)  # also off the unit sphere
+    both = [turned(p, a), ca.jacobian(rotation(p) @ a, p)]
+    ours, expected = ca.Function("B", [p], both).call([values])
+    assert ours.full() == pytest.approx(expected.full())
+
+
+def test_axes_of_a_frame_are_right_handed_and_z_is_kept() -> None:
+    frame = Frame(z=(0.0, 3.0, 4.0), x=(1.0, 1.0, 0.0))
+    R = full(frame.R)
+    assert pytest.approx(np.eye(3)) == R.T @ R
+    assert np.linalg.det(R) == pytest.approx(1.0)
+    assert R[:, 2] == pytest.approx([0.0, 0.6, 0.8])
+
+
+def test_a_frame_without_directions_has_those_of_the_body() -> None:
+    assert full(Frame().R) == pytest.approx(np.eye(3))
+
+
+@pytest.mark.parametrize(("z", "x"), [((0, 0, 0), None), ((0, 0, 1), (0, 0, 2)), ((1, 0), None)])
+def test_axes_that_say_nothing_are_refused(z: tuple[float, ...], x: tuple[float, ...]) -> None:
+    with pytest.raises(ValueError, match="frame: [zx]: expected three numbers, not parallel"):
+        Frame(z=z, x=x)
