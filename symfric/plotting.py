@@ -78,11 +78,7 @@ def plot_laws(laws: "Mapping[str, Law]", N: float = 1.0, path: str | Path | None
         N: normal force [N].
         path: image file.
     """
-    rows = -(-len(laws) // 4)
-    below = len(laws) > 8
-    figure, (near, far) = plt.subplots(
-        1, 2, sharey=True, figsize=(7.5, 3.2 + 0.2 * rows * below), layout="constrained"
-    )
+    figure, (near, far) = plt.subplots(1, 2, sharey=True, figsize=(7.5, 3.2), layout="constrained")
     scales = [scale for law in laws.values() for scale in _velocity_scales(law)]
     scale = max(scales, default=0.1)
     decades = np.geomspace(1e-3 * scale, max(1.0, 10 * scale), 1201)
@@ -99,18 +95,47 @@ def plot_laws(laws: "Mapping[str, Law]", N: float = 1.0, path: str | Path | None
     near.set_ylabel("F in steady sliding [N]")
     near.set_title(f"near rest, N = {N:g} N", fontsize="medium")
     far.set_title("over decades", fontsize="medium")
-    if below:
-        entries = near.get_legend_handles_labels()
-        figure.legend(*entries, loc="outside lower center", ncols=4, fontsize="x-small")
-    else:
-        near.legend(fontsize="small")
+    near.legend(fontsize="small")
+    return save(figure, path)
+
+
+def plot_catalogue(
+    laws: "Mapping[str, Law]", N: float = 1.0, path: str | Path | None = None
+) -> Figure:
+    """Friction force in steady sliding against velocity, a small panel with its own axes per law.
+
+    Args:
+        laws: title -> law, with numbers for parameters.
+        N: normal force [N].
+        path: image file.
+    """
+    columns = 6
+    rows = -(-len(laws) // columns)
+    figure, grid = plt.subplots(
+        rows, columns, squeeze=False, figsize=(11, 0.6 + 1.3 * rows), layout="constrained"
+    )
+    for axis in grid.flat[len(laws) :]:
+        axis.set_visible(False)
+    for axis, (label, law) in zip(grid.flat, laws.items(), strict=False):
+        edge = 5 * max(_velocity_scales(law), default=0.1)
+        v = np.linspace(-edge, edge, 1001)
+        force = law.force(v, N, law.steady_state(v, N))
+        axis.plot(v, np.broadcast_to(force, v.shape), linewidth=1.1)
+        axis.set_title(label, fontsize="x-small")
+        axis.set_xticks([-edge, 0.0, edge], labels=[f"{-edge:.3g}", "0", f"{edge:.3g}"])
+        axis.locator_params(axis="y", nbins=4)
+        axis.tick_params(labelsize="xx-small")
+        axis.yaxis.get_offset_text().set_fontsize("xx-small")
+        axis.grid(alpha=0.3)
+    figure.supxlabel("v [m/s or rad/s]", fontsize="small")
+    figure.supylabel(f"F in steady sliding [N or N m], N = {N:g}", fontsize="small")
     return save(figure, path)
 
 
 def _velocity_scales(law: "Law") -> list[float]:
     """The velocities [m/s] among the parameters, on which the force changes."""
     known = [(float(p.value), p.unit) for p in parameters(law).values()]
-    scales = [value for value, unit in known if unit == "m/s"]
+    scales = [value for value, unit in known if unit in ("m/s", "rad/s")]
     return scales + [1 / value for value, unit in known if unit == "s/m" and value > 0]
 
 

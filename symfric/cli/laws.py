@@ -39,9 +39,10 @@ def laws(
     if settings and not name:
         raise ValueError("--set: expected the name of a law before it, got none")
     if plot:
-        from symfric.plotting import plot_laws  # noqa: PLC0415  (matplotlib is slow)
+        from symfric.plotting import plot_catalogue, plot_laws  # noqa: PLC0415  (matplotlib is slow)
 
-        plot_laws(chosen, finite("--normal-force", normal_force), plot)
+        draw = plot_laws if name else plot_catalogue
+        draw(chosen, finite("--normal-force", normal_force), plot)
     described = {text: {"name": text, **to_dict(law)} for text, law in chosen.items()}
     output.emit_json(described[name] if name else {"laws": described}, json)
     if json != "-":
@@ -59,7 +60,6 @@ def to_dict(law: Law) -> dict[str, Any]:
         "confidence": law.facts.confidence,
         "source": law.facts.source,
         "odd": law.facts.odd,
-        "dissipative": law.facts.dissipative,
         "load": law.facts.load,
         "instructions": asdict(cost(law)),
         "inputs": {i.name: {"unit": i.unit, "doc": i.doc} for i in law.inputs},

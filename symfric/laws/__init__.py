@@ -64,6 +64,7 @@ from symfric.laws.static import Specker as Specker
 from symfric.laws.static import SteadyStateLuGre as SteadyStateLuGre
 from symfric.laws.static import Step5 as Step5
 from symfric.laws.static import Stribeck as Stribeck
+from symfric.laws.static import Table as Table
 from symfric.laws.static import Threlfall as Threlfall
 from symfric.laws.static import Tustin as Tustin
 from symfric.laws.static import VelocityBased as VelocityBased

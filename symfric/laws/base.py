@@ -33,7 +33,6 @@ class Facts:
         confidence: how the formula was confirmed.
         source: the publication.
         odd: the force changes sign with v, states and further inputs together.
-        dissipative: F v >= 0 in steady sliding, without further inputs.
         load: how the dry force follows the normal force: "proportional", "independent" or in
             words.
     """
@@ -43,7 +42,6 @@ class Facts:
     confidence: str
     source: str
     odd: bool = True
-    dissipative: bool = True
     load: str = "proportional"
 
 

@@ -1,13 +1,13 @@
 """Laws made of laws: sum, asymmetric and load-dependent. Wrap, never subclass."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from typing import ClassVar, final
 
 from symfric.laws import smooth
 from symfric.laws.base import Facts, Input, Law, State, Switch, check_law, chosen
 from symfric.numeric import Scalar, column, empty, is_casadi, smallest
-from symfric.parameters import distinct, param, parameters, with_values
+from symfric.parameters import Parametric, distinct, param, parameters, with_values
 
 
 @final
@@ -124,10 +124,11 @@ class Asymmetric(Law):
     def __post_init__(self) -> None:
         check_law("Asymmetric", self.positive)
         check_law("Asymmetric", self.negative)
-        if list(parameters(self.positive)) != list(parameters(self.negative)):
+        if _structure(self.positive) != _structure(self.negative):
             raise ValueError(
                 "Asymmetric: expected the same law on both sides, got "
-                f"{type(self.positive).__name__} and {type(self.negative).__name__}"
+                f"{type(self.positive).__name__} and {type(self.negative).__name__}; "
+                "only parameters may differ, no options and no tables"
             )
         super().__post_init__()
 
@@ -248,6 +249,14 @@ class LoadDependent(Law):
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Steady states of the law."""
         return self.law.steady_state(v, self._load(N))
+
+
+def _structure(value: object) -> object:
+    """A law without its numbers: class, options, and the same of what it holds."""
+    if isinstance(value, Parametric):
+        held = (getattr(value, item.name) for item in fields(value) if "unit" not in item.metadata)
+        return type(value), *map(_structure, held)
+    return tuple(map(_structure, value)) if isinstance(value, tuple) else value
 
 
 def _differ(a: Scalar, b: Scalar) -> bool:

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.image import imread
 
 from symfric import BrownMcPhee, LuGre, Trajectory, Viscous, rabinowicz, simulate
-from symfric.plotting import panels, plot_laws, plot_trajectories, save
+from symfric.plotting import panels, plot_catalogue, plot_laws, plot_trajectories, save
 
 
 @pytest.fixture(autouse=True)
@@ -91,3 +91,12 @@ def test_laws_are_plotted_near_rest_and_over_decades() -> None:
     assert near.get_ylabel().endswith("[N]")
     assert far.get_xscale() == "log"
     assert near.lines[0].get_ydata().max() == pytest.approx(0.3, rel=1e-2)
+
+
+def test_catalogue_has_a_panel_of_its_own_scale_for_every_law() -> None:
+    laws = {f"law {k}": BrownMcPhee(v_t=10.0**-k) for k in range(7)}
+    shown = [axis for axis in plot_catalogue(laws, N=2.0).axes if axis.get_visible()]
+    assert [axis.get_title() for axis in shown] == list(laws)
+    for k, axis in enumerate(shown):
+        assert axis.lines[0].get_xdata().max() == pytest.approx(5 * 10.0**-k)
+        assert axis.lines[0].get_ydata().max() == pytest.approx(0.3, rel=1e-2)

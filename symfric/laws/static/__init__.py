@@ -20,6 +20,7 @@ from symfric.laws.static.rui_wang import RuiWang
 from symfric.laws.static.self_tuning import BrittleSelfTuning, SelfTuning
 from symfric.laws.static.smooth_peak import MakkarDixon, SimscapeBreakaway, Specker
 from symfric.laws.static.stribeck import Stribeck
+from symfric.laws.static.table import Table as Table
 from symfric.laws.static.threlfall import ModifiedThrelfall, Threlfall
 
 STATIC_LAWS: dict[str, type[Law]] = {

@@ -33,7 +33,9 @@ def everything(tmp_path_factory):
         for real in made.reals:
             headers.append(made.header(real).name)
             sources.append(made.source(real))
-        suffix = "(0, 1, &law_{0}_{1}_default)" if made.block.is_function else "_init(&s_{0}_{1})"
+        inputs = ", ".join(str(k) for k in range(len(made.block.inputs)))
+        call = f"({inputs}, &law_{{0}}_{{1}}_default)"
+        suffix = call if made.block.is_function else "_init(&s_{0}_{1})"
         for kind in ("f32", "f64"):
             state = "" if made.block.is_function else f"law_{i}_{kind}_state_t s_{i}_{kind}; "
             uses.append(state + f"law_{i}_{kind}{suffix.format(i, kind)};")

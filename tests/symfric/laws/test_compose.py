@@ -24,6 +24,7 @@ from symfric import (
     symbolise,
     with_values,
 )
+from symfric.laws import Karnopp, ModifiedThrelfall, Table, Threlfall
 
 speeds = st.floats(-0.1, 0.1)
 
@@ -205,9 +206,21 @@ def test_sum_of_less_than_two_is_refused(laws: tuple[Law, ...]) -> None:
         Sum(laws)
 
 
-def test_sides_of_different_kind_are_refused() -> None:
-    with pytest.raises(ValueError, match="expected the same law on both sides, got Dahl and LuGre"):
-        Asymmetric(Dahl(), LuGre())
+@pytest.mark.parametrize(
+    ("positive", "negative"),
+    [
+        (Dahl(), LuGre()),
+        (Threlfall(), ModifiedThrelfall()),
+        (Coulomb(), Coulomb(shape="atan")),
+        (Sum((Coulomb(), Viscous())), Sum((Viscous(), Coulomb()))),
+        (LoadDependent(Karnopp()), LoadDependent(Karnopp(form="original"))),
+        (Table((0.0, 1.0), (0.1, 0.2)), Table((0.0, 2.0), (0.1, 0.2))),
+    ],
+)
+def test_sides_that_differ_in_more_than_numbers_are_refused(positive: Law, negative: Law) -> None:
+    names = f"{type(positive).__name__} and {type(negative).__name__}"
+    with pytest.raises(ValueError, match=f"expected the same law on both sides, got {names}; only"):
+        Asymmetric(positive, negative)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,82 @@
+"""Friction by a table of measured coefficients."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import ClassVar, final
+
+import numpy as np
+
+from symfric.laws import smooth
+from symfric.laws.base import Facts, StaticLaw
+from symfric.numeric import Scalar
+from symfric.parameters import param
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Table(StaticLaw):
+    """Friction coefficients measured at some speeds, interpolated without overshoot.
+
+        F = N mu(|v|) sign(v)
+
+    `mu` passes through (speeds, coefficients) as a monotone cubic (PCHIP of Fritsch and Carlson)
+    and is constant outside them; sign(v) is smooth over v_eps. One cubic per interval, all of them
+    evaluated: for tens of points, not for thousands.
+    Limits: between two equal coefficients mu is constant; a table of two points is nearly a ramp.
+    Creeps under load.
+    Source: Fritsch and Carlson, SIAM J. Numer. Anal. 17, 1980, in the form of Fritsch and Butland
+    1984 (harmonic mean of slopes); tables as in Modelica's SupportFriction.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "St", "V"),
+        smoothness="C1 at the speeds of the table",
+        confidence="two sources",
+        source="Fritsch and Carlson 1980; Fritsch and Butland 1984",
+    )
+
+    speeds: tuple[float, ...]
+    coefficients: tuple[float, ...]
+    v_eps: Scalar = param(1e-4, unit="m/s", doc="smoothing velocity", lower=1e-12)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        v, mu = np.asarray(self.speeds, float), np.asarray(self.coefficients, float)
+        if v.ndim != 1 or v.shape != mu.shape or v.size < 2:
+            raise ValueError(
+                "Table: expected as many coefficients as speeds, two or more, got "
+                f"{v.size} speeds and {mu.size} coefficients"
+            )
+        if not (np.isfinite(v).all() and (np.diff(v) > 0).all() and v[0] >= 0):
+            raise ValueError(f"Table: speeds: expected 0 <= rising numbers, got {self.speeds}")
+        if not (np.isfinite(mu).all() and (mu >= 0).all()):
+            raise ValueError(f"Table: coefficients: expected numbers >= 0, got {self.coefficients}")
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The smoothing velocity [m/s]."""
+        return self.v_eps
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        speed, mu = smooth.magnitude(v, 0.0), self.coefficients[0]
+        pieces = zip(pairwise(self.speeds), pairwise(self.coefficients), self._slopes, strict=True)
+        for (a, b), (low, high), (left, right) in pieces:
+            t = smooth.clip((speed - a) / (b - a), 0.0, 1.0)
+            rise, left, right = high - low, left * (b - a), right * (b - a)
+            bend = left + right - 2 * rise
+            mu = mu + t * (left + t * (rise - left - bend + t * bend))
+        return N * mu * smooth.sign(v, self.v_eps)
+
+    @cached_property
+    def _slopes(self) -> list[tuple[float, float]]:
+        """Slopes at both ends of every interval: weighted harmonic means, zero at the ends."""
+        h = np.diff(self.speeds)
+        secant = np.diff(self.coefficients) / h
+        before, after = secant[:-1], secant[1:]
+        near, far = 2 * h[1:] + h[:-1], h[1:] + 2 * h[:-1]
+        turning = before * after <= 0
+        one, other = (np.where(turning, 1.0, s) for s in (before, after))
+        inner = np.where(turning, 0.0, (near + far) / (near / one + far / other))
+        return list(pairwise([0.0, *inner.tolist(), 0.0]))
