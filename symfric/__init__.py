@@ -2,6 +2,9 @@
 
 from importlib.metadata import version as _version
 
+from symfric.figures import FigureData as FigureData
+from symfric.figures import compare as compare
+from symfric.figures import figure as figure
 from symfric.integrator import Ensemble as Ensemble
 from symfric.integrator import Hold as Hold
 from symfric.integrator import Linear as Linear

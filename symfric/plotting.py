@@ -13,6 +13,7 @@ from symfric.files import written
 from symfric.parameters import check_names, parameters
 
 if TYPE_CHECKING:
+    from symfric.figures import FigureData
     from symfric.integrator.trajectory import Trajectory
     from symfric.laws import Law
 
@@ -137,6 +138,45 @@ def _velocity_scales(law: "Law") -> list[float]:
     known = [(float(p.value), p.unit) for p in parameters(law).values()]
     scales = [value for value, unit in known if unit in ("m/s", "rad/s")]
     return scales + [1 / value for value, unit in known if unit == "s/m" and value > 0]
+
+
+def plot_figure(data: "FigureData", path: str | Path | None = None) -> Figure:
+    """A behaviour figure: a panel per pair of columns, a colour per law or, for one law, per case.
+
+    With several laws the cases differ by their dashes.
+
+    Args:
+        data: its curves, panels and units.
+        path: image file.
+    """
+    laws = list(dict.fromkeys(c.law for c in data.curves))
+    cases = list(dict.fromkeys(c.case for c in data.curves))
+    abscissae = {x for x, _ in data.panels}
+    height = 4.0 if len(data.panels) == 1 else 2.6
+    figure, axes = panels(len(data.panels), 7.0, height, shared=len(abscissae) == 1)
+    dashes = ["-", "--", ":", "-."]
+    for axis, (x, y) in zip(axes, data.panels, strict=True):
+        for c in data.curves:
+            case = cases.index(c.case)
+            dash = dashes[case % len(dashes)] if len(laws) > 1 else "--" if c.reference else "-"
+            number = laws.index(c.law) if len(laws) > 1 else case
+            axis.plot(
+                c[x], c[y], dash, color=f"C{number % 10}", linewidth=1.2,
+                marker="o" if data.dots else None, markersize=4, label=c.label,
+            )  # fmt: skip
+        axis.ticklabel_format(axis="both", style="sci", scilimits=(-2, 4), useMathText=True)
+        if x in data.log:
+            axis.set_xscale("log")
+        axis.set_ylabel(f"{y} [{data.units[y]}]")
+        if axis is axes[-1] or len(abscissae) > 1:
+            axis.set_xlabel(f"{x} [{data.units[x]}]")
+    title = data.title if len(laws) > 1 else f"{laws[0]}: {data.title}"
+    figure.suptitle(title, fontsize="medium")
+    if len(data.curves) > 1:
+        entries = axes[0].get_legend_handles_labels()
+        figure.legend(*entries, loc="outside lower center", ncols=3, fontsize="small")
+    figure.align_ylabels(axes)
+    return save(figure, path)
 
 
 def plot_work_precision(

@@ -1,0 +1,55 @@
+"""Break-away force against the loading rate."""
+
+from collections.abc import Sequence
+from math import isfinite, sqrt
+
+import numpy as np
+
+from symfric.figures.data import Curve, FigureData
+from symfric.figures.motion import fine, pushed
+from symfric.figures.requirements import require
+from symfric.figures.scales import NORMAL_FORCE, Scales, scales
+from symfric.integrator import Linear
+from symfric.laws import Law, law_name
+
+
+def break_away(
+    law: Law,
+    N: float = NORMAL_FORCE,
+    given: Scales | None = None,
+    rates: Sequence[float] = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0),
+) -> FigureData:
+    """Greatest friction force of a block whose load grows at a constant rate.
+
+    Columns rate [N/s], F [N]: the largest friction before the block, of 0.8 kg or 1 kg per 1.5 N,
+    exceeds twice the sum of the Stribeck velocity and that of its elastic motion, rate over
+    stiffness. It falls with the rate for LuGre-like laws and is the static level, or what of it
+    they reach, for laws of the velocity or the path alone.
+
+    Raises:
+        ValueError: a law with neither static friction nor pre-sliding, a rate that is not positive.
+    """
+    require("break_away", law, "S", "P")
+    if not all(rate > 0 for rate in rates):
+        raise ValueError(f"break_away: rates: expected numbers above 0 N/s, got {tuple(rates)}")
+    magnitudes = given or scales(law, N)
+    levels = np.array([_peak(law, N, rate, magnitudes) for rate in rates])
+    return FigureData(
+        "break_away",
+        f"break-away force, N = {N:g} N",
+        {"rate": "N/s", "F": "N"},
+        (("rate", "F"),),
+        (Curve(law_name(law), "", {"rate": np.array(rates, dtype=float), "F": levels}),),
+        log=("rate",),
+        dots=True,
+    )
+
+
+def _peak(law: Law, N: float, rate: float, magnitudes: Scales) -> float:
+    """The greatest friction force [N] until the block has broken away."""
+    elastic = rate * magnitudes.stretch / magnitudes.static if isfinite(magnitudes.stretch) else 0.0
+    until, mass = 2 * (magnitudes.velocity + elastic), magnitudes.mass
+    t_end = 2 * magnitudes.static / rate + 4 * sqrt(2 * mass * until / rate)
+    ramp = Linear([0.0, t_end], [0.0, rate * t_end])
+    run = pushed(law, N, mass, ramp, t_end, until)
+    return float(np.max(run.at(fine(run))["friction"]))

@@ -1,0 +1,52 @@
+"""All figures by name."""
+
+from typing import Protocol
+
+from symfric.figures.break_away import break_away
+from symfric.figures.data import FigureData
+from symfric.figures.drift import drift
+from symfric.figures.hysteresis import hysteresis
+from symfric.figures.lag import lag
+from symfric.figures.profile import profile
+from symfric.figures.scales import NORMAL_FORCE, Scales
+from symfric.figures.steady_state import steady_state
+from symfric.figures.sweeps import sweep_b, sweep_c, sweep_e
+from symfric.figures.transition import transition
+from symfric.laws import Law
+from symfric.parameters import check_names
+
+
+class MakeFigure(Protocol):
+    """A function that makes a figure of a law."""
+
+    def __call__(self, law: Law, N: float = ..., given: Scales | None = None) -> FigureData:
+        """The figure of `law` under `N` [N], with its own magnitudes or those `given`."""
+        ...
+
+
+FIGURES: dict[str, MakeFigure] = {
+    "profile": profile,
+    "sweep_b": sweep_b,
+    "sweep_c": sweep_c,
+    "sweep_e": sweep_e,
+    "hysteresis": hysteresis,
+    "lag": lag,
+    "transition": transition,
+    "drift": drift,
+    "break_away": break_away,
+    "steady_state": steady_state,
+}
+"""Every figure by the name the command line uses."""
+
+
+def figure(law: Law, name: str, N: float = NORMAL_FORCE) -> FigureData:
+    """The figure `name` of `law` under the normal force `N` [N], with the excitation of the papers.
+
+    The functions of the same names take more options.
+
+    Raises:
+        ValueError: unknown name (the closest one is offered), or a law that cannot show it.
+        SolveError: a simulation behind it failed.
+    """
+    check_names("figure", [name], FIGURES)
+    return FIGURES[name](law, N)

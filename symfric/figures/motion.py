@@ -1,0 +1,88 @@
+"""A contact that is slid with a given velocity, and one that is pushed with a given force."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import casadi as ca
+import numpy as np
+
+from symfric.figures.data import Array, Curve
+from symfric.integrator import simulate
+from symfric.integrator.inputs import Input
+from symfric.integrator.trajectory import Trajectory
+from symfric.laws import Law, law_name
+from symfric.model import Event, Model, Output
+from symfric.parameters import Variable
+from symfric.scenes.base import contact
+from symfric.scenes.drive import Drive
+
+UNITS = {"t": "s", "x": "m", "v": "m/s", "F": "N"}
+"""The columns of a prescribed motion."""
+
+
+def prescribed(law: Law, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]) -> Model:
+    """`law` slid with `velocity(t, pace)` [m/s] from steady sliding at its first value.
+
+    `pace` is a parameter of the model, so that one model serves several speeds. The law may need
+    the sliding acceleration dv.
+    """
+    travel = Variable("travel", "m", nominal=1e-5)
+    pace, t = Variable("pace", "1", start=1.0), ca.SX.sym("t")
+    v = velocity(t, pace.symbol)
+    slip = contact(law, v, N, (), rest={}, dv=ca.jacobian(v, t))
+    begin = float(ca.DM(ca.substitute(ca.SX(v), ca.vertcat(t, pace.symbol), ca.DM([0.0, 1.0]))))
+    first = law.steady_state(begin, N)
+    states = tuple(replace(s, start=float(first[i])) for i, s in enumerate(slip.states))
+    return Model(
+        "prescribed_motion",
+        x=(travel, *states),
+        p=(pace,),
+        ode=ca.vertcat(v, slip.rate),
+        events=slip.events,
+        outputs={"slip_velocity": Output(v, "m/s"), "friction": Output(slip.force, "N")},
+        t=t,
+    )
+
+
+def slide(model: Model, law: Law, case: str, times: Array, pace: float) -> Curve:
+    """One run of a `prescribed` motion, seen at `times` [s]."""
+    run = simulate(model, float(times[-1]), p={"pace": pace}, t_eval=times)
+    columns = {"t": run.t, "x": run["travel"], "v": run["slip_velocity"], "F": run["friction"]}
+    return Curve(law_name(law), case, columns)
+
+
+def through(points: Sequence[float], leg: float) -> Callable[[ca.SX, ca.SX], ca.SX]:
+    """Velocity of a motion through `points` [m], at rest in each, `leg` / pace [s] between them."""
+
+    def velocity(t: ca.SX, pace: ca.SX) -> ca.SX:
+        phase = pace * t / leg
+        v = ca.SX(0)
+        for i, (a, b) in enumerate(pairwise(points)):
+            swing = (b - a) * pace * ca.pi / (2 * leg) * ca.sin(ca.pi * (phase - i))
+            v = ca.if_else(ca.logic_and(phase >= i, phase < i + 1), swing, v)
+        return v
+
+    return velocity
+
+
+def pushed(
+    law: Law, N: float, mass: float, force: Input, t_end: float, until: float | None = None
+) -> Trajectory:
+    """A block of `mass` [kg] under `law`, at rest at first, pushed with `force` [N] to `t_end` [s].
+
+    With `until` the run ends where the velocity rises beyond it [m/s].
+    """
+    model = Drive(law, m=mass, N=N).model()
+    if until is not None:
+        v = next(variable.symbol for variable in model.x if variable.name == "v")
+        over = Event("broken_away", v - until, direction=1, terminal=True)
+        model = replace(model, events=(*model.events, over))
+    return simulate(model, t_end, u={"force": force})
+
+
+def fine(run: Trajectory, parts: int = 4) -> Array:
+    """The ends of the steps of `run` with `parts` intervals in each [s]."""
+    inner = np.linspace(0.0, 1.0, parts, endpoint=False)
+    starts, lengths = run.steps[:-1], np.diff(run.steps)
+    return np.append((starts[:, None] + lengths[:, None] * inner).ravel(), run.steps[-1])

@@ -1,0 +1,106 @@
+"""The magnitudes of a law, from which its figures take their excitation."""
+
+from dataclasses import dataclass
+from math import inf, isfinite
+from typing import final
+
+import casadi as ca
+import numpy as np
+
+from symfric.figures.data import Array
+from symfric.figures.requirements import phenomena
+from symfric.laws import Law
+from symfric.laws.base import check_law
+from symfric.model import finite
+from symfric.parameters import parameters
+
+MASS = 0.8
+"""Mass of the block where one is driven [kg], of seed table 2."""
+
+NORMAL_FORCE = MASS * 9.81
+"""Normal force of the figures if none is given [N]."""
+
+
+@final
+@dataclass(frozen=True)
+class Scales:
+    """Magnitudes of a law under one normal force.
+
+    Attributes:
+        static: peak of the force in steady sliding, or mu_s N where that is more [N].
+        kinetic: lowest force beyond the peak, up to 10 velocities [N].
+        elastic: force up to which no drift is claimed [N]: sigma_0 z_ba of a law with a break-away
+            deflection z_ba, else the kinetic level.
+        stretch: static level over the stiffness at rest, the pre-sliding distance [m]; inf for a
+            law without pre-sliding.
+        velocity: Stribeck velocity [m/s]: the parameter v_s, else where the force has fallen half
+            the way from its peak, else the `velocity_scale` of the law, else 100 stretches a
+            second.
+    """
+
+    static: float
+    kinetic: float
+    elastic: float
+    stretch: float
+    velocity: float
+
+    @property
+    def mass(self) -> float:
+        """Mass of a block to push [kg]: 0.8, or more for a strong contact (1.5 m/s^2 at most)."""
+        return max(MASS, self.static / 1.5)
+
+
+def scales(law: Law, N: float = NORMAL_FORCE) -> Scales:
+    """The magnitudes of `law`, with numbers for parameters, under the normal force `N` [N].
+
+    Raises:
+        ValueError: no law, symbols for parameters, N that is not positive.
+    """
+    check_law("figure", law)
+    if finite("figure: N", N) <= 0:
+        raise ValueError(f"figure: N: expected a normal force above 0 N, got {N:g}")
+    known = {p.name: finite(f"figure: {p.name}", p.value) for p in parameters(law).values()}
+    stiffness = _stiffness(law, N) if "P" in phenomena(law) else 0.0
+    velocity = known.get("v_s", float(law.velocity_scale))
+    if not isfinite(velocity):
+        top = float(steady_force(law, np.array([1e-3]), N)[0])
+        velocity = 100 * top / stiffness if stiffness > 0 else 1e-3
+    elif "v_s" not in known:
+        velocity = _half_fall(law, velocity, N)
+    F = steady_force(law, velocity * np.geomspace(1e-3, 10.0, 801), N)
+    peak = _peak(F)
+    kinetic = float(np.min(F[peak:]))
+    static = max(float(F[peak]), known.get("mu_s", 0.0) * N)
+    elastic = min(known.get("sigma_0", inf) * known.get("z_ba", inf), kinetic)
+    stretch = static / stiffness if stiffness > 0 else inf
+    return Scales(static, kinetic, elastic, stretch, velocity)
+
+
+def _peak(F: Array) -> int:
+    """Where `F` first falls, or ends."""
+    falls = np.flatnonzero((np.diff(F) <= 0) & (F[:-1] > 0))
+    return int(falls[0]) if falls.size else F.size - 1
+
+
+def _half_fall(law: Law, scale: float, N: float) -> float:
+    """The velocity at which the force has fallen half the way [m/s]; `scale` if it does not."""
+    v = scale * np.geomspace(1e-2, 1e3, 1001)
+    F = steady_force(law, v, N)
+    beyond = F[_peak(F) :]
+    top, low = beyond[0], np.min(beyond)
+    if top - low < 0.01 * top:
+        return scale
+    half = np.argmax(beyond <= (top + low) / 2)
+    return float(v[_peak(F) + half])
+
+
+def steady_force(law: Law, v: Array, N: float) -> Array:
+    """Force in steady sliding [N] at the velocities `v` [m/s]; further inputs of the law are 0."""
+    return np.array(np.broadcast_to(law.force(v, N, law.steady_state(v, N)), v.shape), dtype=float)
+
+
+def _stiffness(law: Law, N: float) -> float:
+    """dF/dx at rest [N/m]: how the force grows with a displacement of the unloaded contact."""
+    v, z = ca.SX.sym("v"), ca.SX.sym("z", len(law.states))
+    slope = ca.jacobian(law.force(v, N, z), z) @ ca.jacobian(law.rate(v, N, z), v)
+    return float(ca.Function("stiffness", [v, z], [slope])(0.0, law.steady_state(0.0, N)))

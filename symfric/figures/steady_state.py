@@ -1,0 +1,43 @@
+"""The Stribeck curve: steady sliding, and what viscous friction adds."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from symfric.figures.data import Curve, FigureData
+from symfric.figures.scales import NORMAL_FORCE, Scales, scales, steady_force
+from symfric.laws import Law, law_name
+from symfric.parameters import parameters, with_values
+
+
+def steady_state(
+    law: Law,
+    N: float = NORMAL_FORCE,
+    given: Scales | None = None,
+    shares: Sequence[float] = (0.0, 0.25, 0.5, 1.0),
+) -> FigureData:
+    """Force in steady sliding up to 10 Stribeck velocities V (seed 4, figs. 3.2, 3.3 and 5.3).
+
+    Columns v [m/s], F [N]. A law with the viscous coefficient sigma_2 is shown with that of its
+    own and, dashed, with those that add `shares` of the kinetic level at 10 V; the first, none,
+    is its dry part. Every other law is shown as it is.
+    """
+    magnitudes = given or scales(law, N)
+    v = np.geomspace(1e-3, 10.0, 601) * magnitudes.velocity
+    curves = [Curve(law_name(law), "", {"v": v, "F": steady_force(law, v, N)})]
+    if "sigma_2" in parameters(law):
+        unit = parameters(law)["sigma_2"].unit
+        load = N if unit == "s/m" else 1.0
+        for share in shares:
+            sigma_2 = share * magnitudes.kinetic / (10 * magnitudes.velocity * load)
+            other = with_values(law, {"sigma_2": sigma_2})
+            columns = {"v": v, "F": steady_force(other, v, N)}
+            case = f"sigma_2 = {sigma_2:.4g} {unit}"
+            curves.append(Curve(law_name(law), case, columns, reference=True))
+    return FigureData(
+        "steady_state",
+        f"steady sliding, N = {N:g} N",
+        {"v": "m/s", "F": "N"},
+        (("v", "F"),),
+        tuple(curves),
+    )

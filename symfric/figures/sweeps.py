@@ -1,0 +1,106 @@
+"""What the factors B, C and E of the self-tuning law do to its profile."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from symfric.figures.data import Curve, FigureData
+from symfric.figures.scales import NORMAL_FORCE, Scales, scales, steady_force
+from symfric.laws import Law, RuiWang, SelfTuning, law_name
+
+SHAPES = (0.0, 0.5, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0)
+STIFFNESSES = (0.05, 0.1, 0.2, 0.3, 0.5, 1.0)
+CURVATURES = (-1.0, 0.0, 0.25, 0.5, 0.75, 0.95)
+
+
+def sweep_c(
+    law: Law,
+    N: float = NORMAL_FORCE,
+    given: Scales | None = None,
+    values: Sequence[float] = SHAPES,
+) -> FigureData:
+    """Profiles for the shape factors `values` in [0, 2] (seed 0, fig. 7).
+
+    Columns v [m/s], F [N]. `SelfTuning` computes C >= 1 from mu_d / mu_s; here C is set, as in
+    `RuiWang` with D = mu_s N. C = 0 is no friction, C <= 1 monotone, C > 1 has a peak.
+
+    Raises:
+        ValueError: neither of these laws.
+    """
+    return _sweep(_formula("sweep_c", law, N), law, N, given, "C", values)
+
+
+def sweep_b(
+    law: Law,
+    N: float = NORMAL_FORCE,
+    given: Scales | None = None,
+    values: Sequence[float] = STIFFNESSES,
+) -> FigureData:
+    """Profiles for the stiffness factors `values` as shares of B (seed 0, fig. 8).
+
+    Columns v [m/s], F [N]. B scales the velocity and leaves the peak as high as it is.
+
+    Raises:
+        ValueError: neither `SelfTuning` nor `RuiWang`.
+    """
+    base = _formula("sweep_b", law, N)
+    return _sweep(base, law, N, given, "B", [share * float(base.B) for share in values])
+
+
+def sweep_e(
+    law: Law,
+    N: float = NORMAL_FORCE,
+    given: Scales | None = None,
+    values: Sequence[float] = CURVATURES,
+) -> FigureData:
+    """Profiles for the curvature factors `values` below 1 (seed 0, fig. 9).
+
+    Columns v [m/s], F [N]. E moves the peak and leaves its height and the slope at rest.
+
+    Raises:
+        ValueError: neither `SelfTuning` nor `RuiWang`.
+    """
+    return _sweep(_formula("sweep_e", law, N), law, N, given, "E", values)
+
+
+def _formula(where: str, law: Law, N: float) -> RuiWang:
+    """The magic formula of `law`, its shape factor free."""
+    if isinstance(law, RuiWang):
+        return law
+    if isinstance(law, SelfTuning):
+        return RuiWang(D=law.mu_s * N, C=law.C, B=law.B, E=law.E)
+    raise ValueError(
+        f"{where} of {law_name(law)}: expected a law with the factors B, C and E, self_tuning or "
+        "rui_wang, got one without them"
+    )
+
+
+def _sweep(
+    base: RuiWang,
+    law: Law,
+    N: float,
+    given: Scales | None,
+    factor: str,
+    values: Sequence[float],
+) -> FigureData:
+    v = np.linspace(-10.0, 10.0, 1201) * (given or scales(law, N)).velocity
+    curves = [
+        Curve(
+            law_name(law),
+            f"{factor} = {value:g}" + (" s/m" if factor == "B" else ""),
+            {"v": v, "F": steady_force(_with(base, factor, value), v, N)},
+        )
+        for value in values
+    ]
+    return FigureData(
+        f"sweep_{factor.lower()}",
+        f"profiles for factors {factor}, N = {N:g} N",
+        {"v": "m/s", "F": "N"},
+        (("v", "F"),),
+        tuple(curves),
+    )
+
+
+def _with(base: RuiWang, factor: str, value: float) -> RuiWang:
+    factors = {"B": base.B, "C": base.C, "E": base.E} | {factor: value}
+    return RuiWang(D=base.D, **factors)
