@@ -10,6 +10,7 @@ from symfric.multibody import (
     Cylindrical,
     Fixed,
     Free,
+    Joint,
     JointFriction,
     Mechanism,
     Planar,
@@ -39,6 +40,16 @@ def body(m: Mechanism, name: str, seed: int) -> None:
         m.frame(f"{name}.{frame}", tuple(at), tuple(z), tuple(x))
 
 
+def begin(kind: type[Joint], seed: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Random coordinates and rates of a joint, those of Euler parameters as they must be."""
+    q, qd = np.random.default_rng(seed + 100).normal(size=(2, len(kind.coordinates))) * 0.5
+    if kind.quaternion is not None:
+        p = slice(kind.quaternion, kind.quaternion + 4)
+        q[p] /= np.linalg.norm(q[p])
+        qd[p] -= q[p] * (q[p] @ qd[p])
+    return tuple(q.tolist()), tuple(qd.tolist())
+
+
 def chain(reverse: bool = False, gravity: float = 9.81) -> Mechanism:
     """A body behind every kind of joint, with the ground first or every joint turned round."""
     m = Mechanism("chain", gravity=(0.0, 0.0, -gravity))
@@ -48,7 +59,7 @@ def chain(reverse: bool = False, gravity: float = 9.81) -> Mechanism:
         name = f"b{i}"
         body(m, name, seed=i)
         ends = (f"{name}.in", last) if reverse else (last, f"{name}.in")
-        m.joint(kind(f"j{i}", *ends))
+        m.joint(kind(f"j{i}", *ends, *begin(kind, i)))
         last = f"{name}.out"
     return m
 
@@ -83,6 +94,9 @@ def solve(eq: Equations, q: Array, qd: Array, rounds: int = 60) -> Solved:
     unknowns = ca.vertcat(eq.a, eq.lam, N)
     rows = ca.vertcat(eq.balance, eq.phi_ddot, ca.vertcat(ca.SX(0, 1), *eq.normals) - N)
     rows = ca.substitute(rows, eq.F, ca.vertcat(ca.SX(0, 1), *forces))
+    known = {s.__hash__() for s in ca.symvar(ca.vertcat(unknowns, eq.q, eq.qd))}
+    inputs = ca.vertcat(ca.SX(0, 1), *(s for s in ca.symvar(rows) if s.__hash__() not in known))
+    rows = ca.substitute(rows, inputs, ca.SX.zeros(inputs.numel()))
     step = ca.Function("step", [unknowns, eq.q, eq.qd], [rows, ca.jacobian(rows, unknowns)])
     x = np.zeros(unknowns.numel())
     for _ in range(rounds):
@@ -90,9 +104,9 @@ def solve(eq: Equations, q: Array, qd: Array, rounds: int = 60) -> Solved:
         x = x - np.linalg.solve(J, r[:, 0])
     every = {name: ca.vertcat(m.dw, m.dv) for name, m in eq.kin.motion.items() if name != "ground"}
     wrenches = {name: ca.vertcat(*w) for name, w in eq.reactions.items()}
-    values = ca.Function(
-        "values", [unknowns, eq.q, eq.qd, eq.F], [*every.values(), *wrenches.values()]
-    )
+    results = [ca.densify(e) for e in (*every.values(), *wrenches.values())]
+    results = ca.substitute(results, [inputs], [ca.SX.zeros(inputs.numel())])
+    values = ca.Function("values", [unknowns, eq.q, eq.qd, eq.F], results)
     applied = ca.Function("F", [unknowns, eq.q, eq.qd], [ca.vertcat(ca.SX(0, 1), *forces)])
     found = [m.full().ravel() for m in values.call([x, q, qd, applied(x, q, qd)])]
     n, m = eq.n, eq.m

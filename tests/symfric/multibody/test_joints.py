@@ -67,9 +67,8 @@ def twist_derivatives(kind: type[Joint], R: np.ndarray, p: np.ndarray) -> np.nda
 
 @each_joint
 def test_constraints_are_independent(kind: type[Joint]) -> None:
-    C = twist_derivatives(
-        kind, np.eye(3), np.array([0.0, 0.0, 1.0]) if kind.closes else np.zeros(3)
-    )
+    apart = np.array([0.0, 0.0, 1.0]) if kind.closes else np.zeros(3)
+    C = twist_derivatives(kind, np.eye(3), apart)
     assert C.shape[0] == kind.constrains
     assert np.linalg.matrix_rank(C) == kind.constrains
 

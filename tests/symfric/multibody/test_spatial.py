@@ -101,5 +101,5 @@ def test_a_frame_without_directions_has_those_of_the_body() -> None:
 
 @pytest.mark.parametrize(("z", "x"), [((0, 0, 0), None), ((0, 0, 1), (0, 0, 2)), ((1, 0), None)])
 def test_axes_that_say_nothing_are_refused(z: tuple[float, ...], x: tuple[float, ...]) -> None:
-    with pytest.raises(ValueError, match="frame: [zx]: expected three numbers, not parallel"):
+    with pytest.raises(ValueError, match=r"frame: [zx]: expected three numbers, not parallel"):
         Frame(z=z, x=x)

@@ -1,0 +1,150 @@
+"""Newton-Euler against Lagrange, energy against work, reactions against both formulations."""
+
+from functools import cache
+
+import casadi as ca
+import numpy as np
+import pytest
+from chains import TREE, chain, rod, solve, state
+
+from symfric import BrownMcPhee
+from symfric.multibody import (
+    Distance,
+    JointFriction,
+    JointSpringDamper,
+    Mechanism,
+    Prismatic,
+    Revolute,
+    SpringDamper,
+    UserForce,
+)
+from symfric.multibody.dynamics import kinetic_energy
+from symfric.multibody.prepare import Prepared
+from symfric.scenes import MECHANISMS
+
+
+@cache
+def prepared(reverse: bool) -> Prepared:
+    return chain(reverse).prepare()
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_newton_euler_gives_lagranges_equations(reverse: bool) -> None:
+    made = prepared(reverse)
+    eq, kin = made.eq, made.eq.kin
+    T, V = kinetic_energy(kin), eq.potential
+    p = ca.gradient(T, eq.qd)
+    lagrange = ca.jtimes(p, eq.qd, eq.a) + ca.jtimes(p, eq.q, eq.qd) - ca.gradient(T - V, eq.q)
+    values = ca.Function("both", [eq.q, eq.qd, eq.a, eq.lam], [eq.balance, lagrange])
+    q, qd = state(made)
+    a = np.random.default_rng(4).normal(size=eq.n)
+    P: list[tuple[slice, np.ndarray]] = []
+    for link in kin.topology.links:
+        if link.joint.quaternion is not None:
+            rows = slice(link.first + link.joint.quaternion, link.first + link.joint.quaternion + 4)
+            a[rows] -= q[rows] * (q[rows] @ a[rows] + qd[rows] @ qd[rows])
+            free = np.eye(4) - np.outer(q[rows], q[rows])
+            P.append((rows, free))
+    ours, expected = (m.full().ravel() for m in values.call([q, qd, a, np.zeros(eq.m)]))
+    for rows, free in P:  # along the Euler parameters themselves there is no motion
+        ours[rows], expected[rows] = free @ ours[rows], free @ expected[rows]
+    assert ours == pytest.approx(expected, rel=1e-11, abs=1e-10)
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_mass_matrix_is_symmetric_and_positive(reverse: bool) -> None:
+    made = prepared(reverse)
+    M = ca.Function("M", [made.eq.q], [ca.densify(made.eq.mass)])(state(made)[0]).full()
+    assert pytest.approx(M.T, rel=1e-12, abs=1e-12) == M
+    assert np.linalg.eigvalsh(M).min() > 0
+
+
+def loaded(formulation: str) -> Prepared:
+    """The chain with every kind of force."""
+    m = chain()
+    m.force(SpringDamper("spring", "ground", "b3.out", 30.0, 0.5, 2.0, 1.0))
+    m.force(SpringDamper("pull", "b1", "b5.out", stiffness=4.0))
+    m.force(JointSpringDamper("torsion", "j0", "turn", 5.0, 0.2, 0.3, 1.5))
+    m.force(JointSpringDamper("push", "j2", "slide", 5.0, 0.2, 0.3, 1.5))
+    m.force(UserForce("wind", "b6.out", lambda kin: (kin.motion["b1"].v, (0.1, 0.2, 0.3))))
+    return m.prepare(formulation=formulation)
+
+
+@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+def test_kinetic_energy_changes_by_the_power_of_all_forces(formulation: str) -> None:
+    made = loaded(formulation)
+    eq = made.eq
+    T_dot = ca.jtimes(eq.kinetic, eq.q, eq.qd) + ca.jtimes(eq.kinetic, eq.qd, eq.a)
+    values = ca.Function("power", [eq.q, eq.qd, eq.a], [T_dot, eq.power])
+    q, qd = (made.q0, made.qd0) if formulation == "absolute" else state(made)
+    found = solve(eq, q, qd)
+    rate, power = (float(x) for x in values.call([q, qd, found.a]))
+    assert rate == pytest.approx(power, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_both_formulations_agree(name: str) -> None:
+    scene = MECHANISMS[name](BrownMcPhee(v_t=0.5))
+    tree, whole = (scene.mechanism().prepare(formulation=f) for f in ("joint", "absolute"))
+    ours, expected = (solve(made.eq, made.q0, made.qd0) for made in (tree, whole))
+    scale = max(1.0, float(np.abs(ours.N).max()))
+    assert pytest.approx(expected.N, rel=1e-12, abs=1e-12 * scale) == ours.N
+    loops = [i for i, label in enumerate(tree.labels) if not label.endswith("_norm")]
+    others = [whole.labels.index(tree.labels[i]) for i in loops]
+    assert ours.lam[loops] == pytest.approx(expected.lam[others], rel=1e-12, abs=1e-11 * scale)
+    for body, motion in ours.bodies.items():
+        largest = np.abs(motion).max()
+        assert motion == pytest.approx(expected.bodies[body], abs=1e-12 * max(1.0, largest))
+    for joint, wrench in ours.reactions.items():
+        assert wrench == pytest.approx(expected.reactions[joint], abs=1e-11 * scale), joint
+
+
+def test_reactions_of_every_joint_agree_between_the_formulations() -> None:
+    tree, whole = loaded("joint"), loaded("absolute")
+    ours = solve(tree.eq, tree.q0, tree.qd0).reactions
+    expected = solve(whole.eq, whole.q0, whole.qd0).reactions
+    assert len(ours) == len(TREE)
+    for joint, wrench in ours.items():
+        assert wrench == pytest.approx(expected[joint], rel=1e-10, abs=1e-9), joint
+
+
+def test_turning_a_joint_round_changes_nothing() -> None:
+    """The wrench on the child is that on the parent with the opposite sign."""
+    m = [Mechanism("m") for _ in range(2)]
+    for k, each in enumerate(m):
+        each.body("rod", 2.0, (0.1, 0.2, 0.2))
+        each.frame("rod.hinge", at=(0.0, 0.0, 0.4), z=(0.0, 1.0, 0.0))
+        each.frame("ground.hinge", z=(0.0, 1.0, 0.0))
+        ends = ("ground.hinge", "rod.hinge")
+        each.joint(Revolute("h", *(ends if k == 0 else ends[::-1]), start=0.5 - k))
+    results = [solve(each.prepare().eq, np.array([0.5 - k]), np.array([1.0 - 2 * k]))
+               for k, each in enumerate(m)]  # fmt: skip
+    assert results[0].a == pytest.approx(-results[1].a)
+    forward, back = (r.reactions["h"][:3] for r in results)
+    assert np.linalg.norm(forward) == pytest.approx(np.linalg.norm(back))
+
+
+def test_hanging_rod_pulls_with_its_weight() -> None:
+    made = rod().prepare()
+    found = solve(made.eq, np.array([0.0]), np.array([0.0]))
+    assert found.a == pytest.approx([0.0])
+    assert np.abs(found.reactions["hinge"]).max() == pytest.approx(2.0 * 9.81)
+
+
+def test_swinging_rod_carries_the_centrifugal_force() -> None:
+    """At the lowest point m g + m L w^2."""
+    made = rod(JointFriction(BrownMcPhee(mu_s=0.0, mu_d=0.0), radius=0.1)).prepare()
+    found = solve(made.eq, np.array([0.0]), np.array([3.0]))
+    assert pytest.approx([2.0 * 9.81 + 2.0 * 0.4 * 9.0], abs=2e-4) == found.N
+
+
+def test_force_in_a_rod_is_its_multiplier_times_its_length() -> None:
+    """A bob that hangs on a rod of 2 m: tension m g, negative as the rod pulls."""
+    m = Mechanism("m")
+    m.body("bob", 3.0, (0.1, 0.1, 0.1))
+    m.frame("ground.axis", z=(0.0, 0.0, 1.0))
+    m.joint(Prismatic("slide", "ground.axis", "bob", start=-2.0))
+    m.joint(Distance("rod", "ground", "bob", length=2.0))
+    made = m.prepare()
+    found = solve(made.eq, made.q0, made.qd0)
+    assert found.lam * 2.0 == pytest.approx([3.0 * 9.81])
