@@ -118,3 +118,20 @@ def test_law_that_claims_all_derivatives_has_continuous_ones(name: str, order: i
     for p, here in zip(points, values, strict=True):
         for side in (-1e-9, 1e-9):
             assert float(f(p + side * max(1.0, abs(p)))) == pytest.approx(here, abs=1e-4 * size)
+
+
+EXTREMES = [s * m for m in (0.0, 1e-300, 1e-12, 1e-6, 1e-3, 1.0, 1e3) for s in (1.0, -1.0)]
+
+
+@pytest.mark.parametrize("name", FORMS)
+@pytest.mark.parametrize("v", EXTREMES)
+def test_value_and_derivatives_of_every_form_are_finite_and_odd(name: str, v: float) -> None:
+    law, x = FORMS[name][0], ca.SX.sym("x")
+    given = {n: ca.SX.sym(n) for n in given_inputs(law)}
+    every = ca.vertcat(x, *given.values())
+    hessian, gradient = ca.hessian(ca.SX(law.force(x, 5.0, **given)), every)
+    f = ca.Function("f", [every], [law.force(x, 5.0, **given), gradient, hessian])
+    forward, backward = (f([s * v, *(s * w for w in given_inputs(law).values())]) for s in (1, -1))
+    assert all(result.is_regular() for result in forward)
+    if law.facts.odd:
+        assert float(forward[0]) == -float(backward[0])

@@ -20,6 +20,18 @@ from symfric import (
     Viscous,
     symbolise,
 )
+from symfric.laws import (
+    Andersson,
+    BrittleSelfTuning,
+    Hollars,
+    PoppStelter,
+    PowerLawViscous,
+    QuarterCarGeneral,
+    RuiWang,
+    Specker,
+    SteadyStateLuGre,
+    Tustin,
+)
 
 
 def instructions(law: Law) -> int:
@@ -42,6 +54,17 @@ OPTIONS: list[tuple[Callable[..., Law], str, float, float]] = [
     (LuGre, "sigma_2", 0.0, 0.4),
     (LuGre, "delta", 2.0, 1.5),
     (LuGre, "v_eps", 0.0, 1e-6),
+    (PowerLawViscous, "d", 1.0, 1.5),
+    (Tustin, "v_eps", 0.0, 1e-4),
+    (Andersson, "p", 2.0, 1.5),
+    (SteadyStateLuGre, "delta", 2.0, 3.2),
+    (PoppStelter, "kappa", 0.0, 0.1),
+    (Specker, "sigma_2", 0.0, 0.4),
+    (RuiWang, "E", 0.0, 0.5),
+    (BrittleSelfTuning, "E", 0.0, 0.5),
+    (Hollars, "u_eps", 0.0, 0.2),
+    (Hollars, "mu_v", 0.0, 0.4),
+    (QuarterCarGeneral, "mu", 0.0, 0.1),
 ]
 
 
