@@ -3,6 +3,7 @@
 import casadi as ca
 
 from symfric import Model, Output, Variable
+from symfric.model import Holonomic
 
 
 def oscillator() -> Model:
@@ -43,4 +44,30 @@ def switched() -> Model:
         u=(u,),
         ode=-z.symbol,
         alg=z.symbol - p.symbol * u.symbol * x.symbol,
+    )
+
+
+def pendulum() -> Model:
+    """A point of mass 1 on a circle of radius l about the origin, in Cartesian coordinates."""
+    x, y = Variable("x", "m", start=0.6), Variable("y", "m", start=-0.8)
+    vx, vy = Variable("vx", "m/s"), Variable("vy", "m/s")
+    lam, radius = Variable("lam", "1/s^2"), Variable("l", "m", start=1.0)
+    a = ca.SX.sym("a", 2)
+    q, v = ca.vertcat(x.symbol, y.symbol), ca.vertcat(vx.symbol, vy.symbol)
+    weight = ca.vertcat(0.0, -9.81)
+
+    def closed(acceleration: ca.SX) -> ca.SX:
+        return ca.dot(q, acceleration) + ca.sumsqr(v)
+
+    free = weight - q * lam.symbol
+    return Model(
+        "pendulum",
+        x=(x, y, vx, vy),
+        z=(lam,),
+        p=(radius,),
+        ode=ca.vertcat(v, free),
+        alg=closed(free),
+        holonomic=Holonomic(
+            2, (ca.sumsqr(q) - radius.symbol**2) / 2, a, ca.vertcat(a - free, closed(a))
+        ),
     )

@@ -4,11 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.sensitivity import (
-    Derivatives,
     Path,
     Seeds,
     derivatives,
-    following,
+    made_consistent,
     signal_slopes,
 )
 
@@ -26,6 +25,9 @@ def gradient(path: Path, which: Seeds, times: Array, weights: Array) -> dict[str
     """
     s, made = path.integrator.system, derivatives(path.integrator)
     by_y, by_d = signal_slopes(path, times)
+    # a signal without weight may have no derivative, as a norm at zero
+    used = np.flatnonzero(weights.any(axis=1))
+    weights, by_y, by_d = weights[used], by_y[:, used], by_d[:, used]
     by_data = np.einsum("rm,mrd->d", weights, by_d)
     on_steps = _on_steps(path, times, np.einsum("rm,mrn->mn", weights, by_y))
     adjoint = np.zeros(s.n)
@@ -34,9 +36,9 @@ def gradient(path: Path, which: Seeds, times: Array, weights: Array) -> dict[str
         before, of_data = made.reverse(steps, adjoint, path.backend)
         by_data += of_data.sum(axis=0)
         adjoint = before[-1]
-        if s.algebraic[1]:
-            adjoint, more = _followed(made, steps[0][-1], steps[2][-1], adjoint)
-            by_data += more
+        by_before, by_start = made_consistent(path, piece)
+        by_data += by_start.T @ adjoint
+        adjoint = by_before.T @ adjoint
     through_start = adjoint[: s.nx] @ which.start
     through_data = by_data @ which.of_data(by_data.size)
     return dict(zip(which.names, (through_start + through_data).tolist(), strict=True))
@@ -52,13 +54,3 @@ def _on_steps(path: Path, times: Array, by_y: Array) -> Array:
     total = np.zeros((dense.t0.size, rows + 2, n))
     np.add.at(total, k, basis.T[:, :, None] * by_y[:, None, :])
     return total.reshape(dense.t0.size, -1)
-
-
-def _followed(made: Derivatives, y: Array, d: Array, adjoint: Array) -> tuple[Array, Array]:
-    """Adjoint of y before algebraic unknowns followed a jump, and what goes to the run data."""
-    columns = made.system.algebraic[1]
-    others = [i for i in range(made.system.n) if i not in columns]
-    by_others, by_d = following(made, y, d)
-    before = np.zeros_like(adjoint)
-    before[others] = adjoint[others] + by_others.T @ adjoint[columns]
-    return before, by_d.T @ adjoint[columns]

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from hashlib import sha256
-from typing import final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
@@ -15,6 +15,7 @@ from symfric.integrator.engine import Stop
 from symfric.integrator.initial import Equations, consistent_many
 from symfric.integrator.inputs import Drivers
 from symfric.integrator.integrator import Integrator
+from symfric.integrator.manifold import Manifold
 from symfric.integrator.members import (
     CompiledMembers,
     Members,
@@ -28,6 +29,7 @@ from symfric.status import Status
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Places = tuple[int, ...]
+Packed = tuple[tuple[str, str | int], ...]
 WHY = {Stop.ATTEMPTS: Status.MAX_STEPS, Stop.STEP_TOO_SMALL: Status.STEP_TOO_SMALL}
 
 
@@ -71,6 +73,7 @@ class Job:
         n_signals: how many there are.
         constraints: the serialised algebraic equations, "" where there are none.
         algebraic: their rows and columns.
+        manifold: the constraints of a mechanism, Functions serialised; () where it is none.
         names: of the unknowns.
         nx: number of differential states.
         breaks, data: input intervals and the data on them.
@@ -85,6 +88,7 @@ class Job:
     n_signals: int
     constraints: str
     algebraic: tuple[Places, Places]
+    manifold: Packed
     names: tuple[str, ...]
     nx: int
     breaks: Array
@@ -109,6 +113,7 @@ class Job:
             n_signals=integrator.signals.numel_out(0),
             constraints=str(s.constraints.serialize()) if s.algebraic[0] else "",
             algebraic=(tuple(s.algebraic[0]), tuple(s.algebraic[1])),
+            manifold=_packed(s.manifold),
             names=s.names,
             nx=s.nx,
             breaks=inputs.breaks,
@@ -159,12 +164,35 @@ def digest(*parts: object) -> str:
     return total.hexdigest()
 
 
+def _packed(manifold: Manifold | None) -> Packed:
+    """A mechanism's constraints as plain data, () where there are none."""
+    if manifold is None:
+        return ()
+    values = ((f.name, getattr(manifold, f.name)) for f in fields(manifold))
+    return tuple(
+        (name, str(value.serialize()) if isinstance(value, ca.Function) else value)
+        for name, value in values
+    )
+
+
 @lru_cache(16)
 def _equations(
-    names: tuple[str, ...], rows: Places, columns: Places, constraints: str
+    names: tuple[str, ...],
+    nx: int,
+    rows: Places,
+    columns: Places,
+    constraints: str,
+    manifold: Packed,
 ) -> tuple[Equations, Columns]:
-    function = ca.Function.deserialize(constraints)
-    return Equations(names, (list(rows), list(columns)), function), Columns(function)
+    function, mechanism = ca.Function.deserialize(constraints), None
+    if manifold:
+        values: dict[str, Any] = {
+            name: ca.Function.deserialize(value) if isinstance(value, str) else value
+            for name, value in manifold
+        }
+        mechanism = Manifold(**values)
+    places = (list(rows), list(columns))
+    return Equations(names, nx, places, function, mechanism), Columns(function)
 
 
 @lru_cache(16)
@@ -208,7 +236,9 @@ def _follow(
     job: Job, chunk: Chunk, S: Array, alive: Indices, interval: int, failed: dict[int, str]
 ) -> Indices:
     """Let algebraic unknowns follow the input data of an interval; the members that can."""
-    equations, together = _equations(job.names, *job.algebraic, job.constraints)
+    equations, together = _equations(
+        job.names, job.nx, *job.algebraic, job.constraints, job.manifold
+    )
     d = chunk.R[alive, 2 + job.nx :]
     d[:, d.shape[1] - job.data.shape[0] :] = job.data[:, interval]
     S[alive, MEMORY:], refused = consistent_many(

@@ -55,6 +55,9 @@ def _start(model: Model, whole: System, x0: ca.MX, data: ca.MX) -> ca.MX:
     """All unknowns at time 0, the algebraic ones consistent."""
     rows, columns = whole.algebraic
     unknowns = [x0[i] if i < whole.nx else ca.MX(0) for i in range(whole.n)]
+    if whole.manifold is not None:
+        on = whole.manifold.project(ca.vertcat(*unknowns), data)
+        unknowns = [on[i] for i in range(whole.n)]
     if columns:
         guesses = {v.name: float(v.start) for v in model.z}
         known = [i for i in range(whole.n) if i not in columns]

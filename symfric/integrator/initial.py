@@ -93,14 +93,14 @@ def consistent_many(
         where: for messages.
         y, d: guesses and run data, a row for each member.
     """
-    columns, failed = system.algebraic[1], dict[int, str]()
-    if not columns:
+    columns, failed = np.array(system.algebraic[1], dtype=np.intp), dict[int, str]()
+    if not columns.size:
         return y, failed
     guess, y, alone = y, y.copy(), list[int]()
     if system.manifold is not None:
         # mechanisms are few and large: each one alone
         alone = list(range(y.shape[0]))
-    todo = np.delete(np.arange(y.shape[0]), alone)
+    todo = np.arange(0 if alone else y.shape[0])
     before, last = np.full((2, y.shape[0]), np.inf)
     while todo.size:
         g, J = together([y[todo], d[todo]])

@@ -174,6 +174,15 @@ class Derivatives:
         return ca.Function("algebraic", [s.y, s.d], [ca.jacobian(alg, s.y), ca.jacobian(alg, s.d)])
 
     @cached_property
+    def assembly(self) -> ca.Function | None:
+        """Derivatives of the start of a mechanism (y, d) -> (by y, by d); None for others."""
+        if self.system.manifold is None:
+            return None
+        y, _, d = self.symbols
+        on = self.system.manifold.project(y, d)
+        return ca.Function("assembly", [y, d], [ca.jacobian(on, y), ca.jacobian(on, d)])
+
+    @cached_property
     def of_signals(self) -> Columns:
         """Derivatives of the signals (t, y, d) -> (by y, by d)."""
         t, y, d = (ca.SX.sym(n, self.signals.numel_in(i)) for i, n in enumerate("tyd"))
@@ -194,15 +203,25 @@ def derivatives(integrator: Integrator) -> Derivatives:
     return _MADE[integrator]
 
 
-def following(made: Derivatives, y: Array, d: Array) -> tuple[Array, Array]:
-    """How algebraic unknowns follow at (y, d): dz = A dx + B dd for the others x of y."""
-    columns = made.system.algebraic[1]
-    others = [i for i in range(made.system.n) if i not in columns]
-    by_y, by_d = (m.full() for m in made.algebraic(y, d))
-    return (
-        -np.linalg.solve(by_y[:, columns], by_y[:, others]),
-        -np.linalg.solve(by_y[:, columns], by_d),
-    )
+def made_consistent(path: Path, piece: slice) -> tuple[Array, Array]:
+    """Derivatives of the unknowns at the start of a piece by those before it, and by d.
+
+    Algebraic unknowns follow the others; at the very start those of a mechanism are put onto its
+    constraints before.
+    """
+    made = derivatives(path.integrator)
+    n, columns = made.system.n, made.system.algebraic[1]
+    y, d = path.steps[0][piece.start], path.steps[2][piece.start]
+    by_before, by_d = np.eye(n), np.zeros((n, d.size))
+    if piece.start == 0 and made.assembly is not None:
+        by_before, by_d = (m.full() for m in made.assembly.call([y, d]))
+    if columns:
+        others = [i for i in range(n) if i not in columns]
+        slope, more = (m.full() for m in made.algebraic.call([y, d]))
+        own, rest = slope[:, columns], slope[:, others]
+        by_before[columns] = -np.linalg.solve(own, rest @ by_before[others])
+        by_d[columns] = -np.linalg.solve(own, rest @ by_d[others] + more)
+    return by_before, by_d
 
 
 def forward(path: Path, which: Seeds) -> Dense:
@@ -210,22 +229,19 @@ def forward(path: Path, which: Seeds) -> Dense:
 
     All directions go along in one sweep over the steps.
     """
-    s, names, made = path.integrator.system, len(which.names), derivatives(path.integrator)
-    columns = s.algebraic[1]
-    others = [i for i in range(s.n) if i not in columns]
+    s, names = path.integrator.system, len(which.names)
+    sweep = derivatives(path.integrator).forward(which)
     moved = np.zeros((s.n, names))
     moved[: s.nx] = which.start
     begin, end, bend = [], [], []
     for piece in path.pieces:
-        steps = [a[piece] for a in path.steps]
-        if columns:
-            by_others, by_d = following(made, steps[0][0], steps[2][0])
-            moved[columns] = by_others @ moved[others] + by_d @ which.of_data(s.d.numel())
-        after, inner = made.forward(which)(steps, moved.T, path.backend)
+        by_before, by_d = made_consistent(path, piece)
+        moved = by_before @ moved + by_d @ which.of_data(s.d.numel())
+        after, inner = sweep([a[piece] for a in path.steps], moved.T, path.backend)
         begin.append(np.vstack([moved.T.reshape(1, -1), after[:-1]]))
         end.append(after)
         bend.append(inner)
-        moved = after[-1].reshape(names, s.n).T.copy()
+        moved = after[-1].reshape(names, s.n).T
     count = path.dense.t0.size
     D = np.vstack(bend).reshape(count, names, -1, s.n).transpose(0, 2, 1, 3)
     return Dense(

@@ -1,11 +1,24 @@
 """Gradients backwards: equal to the forward derivatives, whatever is weighted."""
 
+import casadi as ca
 import numpy as np
 import pytest
-from differentiable import oscillator, root, switched
+from differentiable import oscillator, pendulum, root, switched
 from numpy.typing import NDArray
 
-from symfric import BrownMcPhee, Hold, Law, Linear, LuGre, Model, Trajectory, rabinowicz, simulate
+from symfric import (
+    BrownMcPhee,
+    Hold,
+    Law,
+    Linear,
+    LuGre,
+    Model,
+    Output,
+    Trajectory,
+    Variable,
+    rabinowicz,
+    simulate,
+)
 
 Array = NDArray[np.float64]
 LAWS: dict[str, Law] = {"brown_mcphee": BrownMcPhee(), "lugre": LuGre()}
@@ -34,6 +47,7 @@ def test_backward_and_forward_give_one_gradient(law: str, backend: str) -> None:
 def models() -> dict[str, tuple[Model, dict[str, Hold | Linear]]]:
     return {
         "algebraic": (root(), {}),
+        "mechanism": (pendulum(), {}),
         "jumps of algebraic unknowns": (
             switched(), {"u": Hold([0.0, 0.3, 0.7], [1.0, -2.0, 3.0])}
         ),
@@ -52,6 +66,16 @@ def test_gradient_of_every_kind_of_model(case: str) -> None:
         signal: np.linspace(1.0, -2.0 * i, 8) for i, signal in enumerate(model.signals, start=1)
     }
     assert run.gradient(weights) == pytest.approx(summed(run, weights), rel=1e-10)
+
+
+def test_signal_without_weight_needs_no_derivative() -> None:
+    """A distance that is zero has none."""
+    x, y = Variable("x", "m", start=1.0), Variable("y", "m", start=1.0)
+    apart = Output(ca.sqrt((x.symbol - y.symbol) ** 2), "m")
+    model = Model("decay", x=(x, y), ode=-ca.vertcat(x.symbol, y.symbol), outputs={"apart": apart})
+    run = simulate(model, 1.0, samples=2, rtol=1e-8, sensitivities=["x0.x"])
+    assert np.isnan(run.gradient({"apart": 1.0})["x0.x"])
+    assert run.gradient({"x": [0.0, 1.0]}) == pytest.approx({"x0.x": np.exp(-1.0)})
 
 
 def test_gradient_of_a_cost_meets_its_difference_quotient() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from differentiable import oscillator, root, switched
+from differentiable import oscillator, pendulum, root, switched
 from ensembles import Inline, after, assert_same, explosive
 
 from symfric import (
@@ -92,6 +92,22 @@ def test_algebraic_variables_start_consistently(backend: str) -> None:
     """z^3 = p x at the start, from a guess far from it."""
     many = simulate_many(root(), 0.5, p={"p": [0.1, 0.7, 300.0]}, t_eval=[0.0], backend=backend)
     assert many["z"][:, 0] == pytest.approx(np.cbrt([0.1, 0.7, 300.0]), rel=1e-9)
+
+
+@each_engine
+def test_mechanisms_start_on_their_constraints(backend: str) -> None:
+    """One start beside the circle, one radius away from it, one that cannot be assembled."""
+    x0, lengths = [0.6, 0.7, 0.6], [1.0, 1.1, 1e200]
+    many = simulate_many(
+        pendulum(), 1.0, x0={"x": x0}, p={"l": lengths}, t_eval=[0.0, 0.5, 1.0], backend=backend,
+        executor="processes",
+    )  # fmt: skip
+    for m in range(2):
+        assert_member(
+            many, m, pendulum(), 1.0, x0={"x": x0[m]}, p={"l": lengths[m]}, backend=backend
+        )
+    assert list(many.failed) == [2]
+    assert "from which all loops can be closed" in many.failed[2]
 
 
 def test_time_may_start_anywhere() -> None:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 import pytest
-from differentiable import oscillator, root
+from differentiable import oscillator, pendulum, root
 from scipy.linalg import expm
 
 from symfric import BrownMcPhee, LuGre, Model, Variable, Viscous, drive, flow, rabinowicz, simulate
@@ -56,6 +56,15 @@ def test_algebraic_variables_are_solved_for() -> None:
     q = 0.7 ** (1 / 3)
     assert float(value) == pytest.approx((1 - 2 / 3 * q) ** 1.5, rel=1e-7)
     assert float(slope) == pytest.approx(-np.sqrt(1 - 2 / 3 * q) * q / (3 * 0.7), rel=1e-6)
+
+
+def test_mechanism_flows_on_its_constraints() -> None:
+    """From a start beside the circle, as it is simulated."""
+    x0 = [0.61, -0.8, 0.0, 0.0]
+    end = flow(pendulum(), steps=50)(x0=x0, p=1.0, T=1.0)["xf"].full().ravel()
+    assert np.hypot(end[0], end[1]) == pytest.approx(1.0, abs=1e-12)
+    run = simulate(pendulum(), 1.0, x0={"x": 0.61}, rtol=1e-10, t_eval=[1.0])
+    assert end == pytest.approx([run[v][0] for v in ("x", "y", "vx", "vy")], rel=1e-6)
 
 
 def test_implicit_model_flows() -> None:

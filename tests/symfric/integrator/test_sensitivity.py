@@ -5,7 +5,7 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 import pytest
-from differentiable import oscillator, root, switched
+from differentiable import oscillator, pendulum, root, switched
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
@@ -221,6 +221,27 @@ def test_implicit_model_with_a_matrix_that_is_not_constant() -> None:
     run = simulate(model, 2.0, samples=5, rtol=1e-9, sensitivities=["p"])
     by_p = -run.t * np.exp(-0.5 * run.t)
     assert derivative(run, "p", "x") == pytest.approx(by_p, rel=1e-6, abs=1e-7)
+
+
+def test_mechanism_starts_and_stays_on_its_constraints_with_its_derivatives() -> None:
+    """The start (0.6, -0.8) l moves along the radius with l, and along the circle with x0."""
+    names = ["l", "x0.x"]
+    run = simulate(pendulum(), 1.0, samples=3, rtol=1e-10, sensitivities=names)
+    start = [[derivative(run, name, signal)[0] for signal in ("x", "y")] for name in names]
+    assert start == [pytest.approx([0.6, -0.8]), pytest.approx([0.64, 0.48])]
+    for name, by_radius in (("l", 1.0), ("x0.x", 0.0)):
+        along = run["x"] * derivative(run, name, "x") + run["y"] * derivative(run, name, "y")
+        assert along == pytest.approx(np.full(3, by_radius), abs=1e-9)
+
+        def at(h: float, name: str = name) -> Trajectory:
+            p = {"l": 1.0 + h} if name == "l" else {}
+            x0 = {} if name == "l" else {"x": 0.6 + h}
+            return simulate(pendulum(), 1.0, samples=3, rtol=1e-12, p=p, x0=x0)
+
+        ahead, behind = at(1e-5), at(-1e-5)
+        for signal in ("x", "vy", "lam"):
+            quotient = (ahead[signal] - behind[signal]) / 2e-5
+            assert derivative(run, name, signal) == pytest.approx(quotient, rel=1e-5, abs=1e-6)
 
 
 @each_law
