@@ -71,7 +71,7 @@ def test_gradient_of_every_kind_of_model(case: str) -> None:
 def test_signal_without_weight_needs_no_derivative() -> None:
     """A distance that is zero has none."""
     x, y = Variable("x", "m", start=1.0), Variable("y", "m", start=1.0)
-    apart = Output(ca.sqrt((x.symbol - y.symbol) ** 2), "m")
+    apart = Output(ca.sqrt((x.symbol - y.symbol) ** 2 + (x.symbol**2 - y.symbol**2) ** 2), "m")
     model = Model("decay", x=(x, y), ode=-ca.vertcat(x.symbol, y.symbol), outputs={"apart": apart})
     run = simulate(model, 1.0, samples=2, rtol=1e-8, sensitivities=["x0.x"])
     assert np.isnan(run.gradient({"apart": 1.0})["x0.x"])
