@@ -184,14 +184,15 @@ def _kinds(quick: bool) -> tuple[dict[str, tuple[Maker, float]], dict[str, str]]
     skipped: dict[str, str] = {}
     if compiler:
         ours = partial(peers.ours, backend="compiled")
-        kinds["symfric compiled"] = (partial(ours, method="rodas5p"), 0.0)
+        kinds["symfric compiled"] = (partial(ours, method="auto"), 0.0)
         kinds["symfric compiled rodas4p"] = (partial(ours, method="rodas4p"), 0.0)
+        kinds["symfric compiled radau5"] = (partial(ours, method="radau5"), 0.0)
         rosenbrock = partial(peers.casadi, plugin="rosenbrock", compiled=True)
         kinds["casadi rosenbrock compiled"] = (rosenbrock, 0.0)
     else:
         for name in ("symfric compiled", "casadi rosenbrock compiled"):
             skipped[name] = "no C compiler"
-    kinds["symfric vm"] = (partial(peers.ours, backend="vm", method="rodas5p"), 0.0)
+    kinds["symfric vm"] = (partial(peers.ours, backend="vm", method="auto"), 0.0)
     for plugin in ("rosenbrock", "cvodes", "idas"):
         kinds[f"casadi {plugin}"] = (partial(peers.casadi, plugin=plugin, compiled=False), 0.0)
     if quick:
