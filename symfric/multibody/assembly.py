@@ -108,7 +108,7 @@ def slips(eq: Equations, normal_at_start: Sequence[float]) -> tuple[Slip, ...]:
                 made = Variable(f"{joint}_N", "N", start=start, nominal=scale, doc=doc)
                 unknowns[joint], unknown = made, (made,)
             pressing = unknowns[joint].symbol
-        begin = ca.SX(law.start(contact.slip, start))
+        begin = ca.SX(law.steady_state(contact.slip, start))
         states = tuple(
             Variable(f"{contact.name}_{s.name}", s.unit, start=begin[i], nominal=s.nominal)
             for i, s in enumerate(law.states)

@@ -1,0 +1,243 @@
+"""Scenes of several bodies against equations in minimal coordinates and published numbers."""
+
+import numpy as np
+import pytest
+from mechanics import (
+    Rates,
+    brown_mcphee,
+    double_pendulum,
+    four_mass,
+    pendulum_box,
+    pendulum_period,
+    rocker_angle,
+    slider_crank,
+)
+from scipy.integrate import solve_ivp
+
+from symfric import (
+    BrownMcPhee,
+    Coulomb,
+    Law,
+    Model,
+    SelfTuning,
+    Trajectory,
+    Viscous,
+    parameters,
+    simulate,
+)
+from symfric.laws import LuGreNormalised
+from symfric.scenes import (
+    MECHANISMS,
+    Arm,
+    DoublePendulum,
+    FourBar,
+    FourMass,
+    MechanismScene,
+    Pendulum,
+    PendulumBox,
+    SliderCrank,
+)
+
+SMOOTH = Viscous(sigma_2=0.0)
+"""No friction at all: a float zero leaves no term."""
+each_scene = pytest.mark.parametrize("kind", MECHANISMS.values(), ids=MECHANISMS.keys())
+
+
+def reference(rates: Rates, y0: list[float], times: np.ndarray) -> np.ndarray:
+    run = solve_ivp(
+        rates, (0.0, times[-1]), y0, method="Radau", rtol=1e-9, atol=1e-11, t_eval=times
+    )
+    assert run.success
+    return run.y
+
+
+def constraints(run: Trajectory) -> tuple[float, float, float]:
+    """Largest violation on position, velocity and acceleration level."""
+    return tuple(float(run[name].max()) for name in ("phi", "phi_dot", "phi_ddot"))  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize("amplitude", [0.1, 1.0, 3.0])
+def test_pendulum_swings_with_the_elliptic_period(amplitude: float) -> None:
+    inertia = 1 / 12 + 0.25
+    period = pendulum_period(np.sqrt(9.81 * 0.5 / inertia), amplitude)
+    model = Pendulum(SMOOTH, phi_0=amplitude).model()
+    run = simulate(model, 2 * period, rtol=1e-10, t_eval=[period, 2 * period])
+    assert run["phi"] == pytest.approx([amplitude, amplitude], abs=1e-8)
+    assert run["phi_rate"] == pytest.approx([0.0, 0.0], abs=1e-7)
+
+
+def test_double_pendulum_agrees_with_the_textbook() -> None:
+    times = np.linspace(0.1, 4.0, 40)
+    a, b, *_ = reference(double_pendulum(1.0, 1.0, 9.81), [2.0, 2.0, 0.0, 0.0], times)
+    run = simulate(DoublePendulum(SMOOTH).model(), 4.0, rtol=1e-10, t_eval=times)
+    assert run["phi_1"] == pytest.approx(a, abs=2e-6)
+    assert run["phi_1"] + run["phi_2"] == pytest.approx(b, abs=2e-6)
+    assert np.ptp(run["energy"]) < 1e-7
+
+
+@pytest.mark.parametrize("law", [BrownMcPhee(mu_s=0.03, mu_d=0.02, v_t=0.02)])
+def test_pendulum_on_a_box_agrees_with_newtons_laws(law: BrownMcPhee) -> None:
+    times = np.linspace(0.1, 5.0, 25)
+
+    def mu(v: float) -> float:
+        return brown_mcphee(v, 0.03, 0.02, 0.02)
+
+    expected = reference(pendulum_box(6.0, 20.0, 0.3, 0.05, 9.81, mu), [0, np.pi / 6, 0, 0], times)
+    run = simulate(PendulumBox(law, R=0.05).model(), 5.0, rtol=1e-9, t_eval=times)
+    for name, values in zip(("x", "phi", "x_rate", "phi_rate"), expected, strict=True):
+        assert run[name] == pytest.approx(values, abs=1e-6), name
+
+
+def test_box_and_hinge_may_have_different_laws() -> None:
+    scene = PendulumBox(BrownMcPhee(), hinge=BrownMcPhee(mu_s=0.003, mu_d=0.002))
+    names = parameters(scene)
+    assert (names["mu_s_1"].value, names["mu_s_2"].value) == (0.15, 0.003)
+    assert simulate(scene.model(), 1.0)["energy"][-1] < 27.6
+
+
+def four_mass_model(law: Law | None) -> Model:
+    return FourMass(SMOOTH if law is None else law).model()
+
+
+PEAK = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
+
+
+def test_frictionless_four_mass_meets_the_published_positions() -> None:
+    """Section 5a of the reference: energy 387.936521 J."""
+    run = simulate(four_mass_model(None), 4.0, rtol=1e-11, t_eval=[4.0])
+    found = [run[name][0] for name in ("x1", "y2", "z3", "x4")]
+    assert found == pytest.approx([-0.54021178, 4.97073146, 4.92867414, -2.15971352], abs=1e-8)
+    assert run["energy"][0] == pytest.approx(387.936521, abs=1e-6)
+    assert max(constraints(run)) < 1e-11
+
+
+def test_four_mass_with_friction_meets_the_published_positions() -> None:
+    run = simulate(four_mass_model(PEAK), 4.0, rtol=1e-9, t_eval=[2.0, 4.0])
+    found = np.array([run[name] for name in ("x1", "y2", "z3", "x4")])
+    assert found[:, 0] == pytest.approx([0.765030, 4.941126, 4.958354, 2.484775], abs=1e-5)
+    assert found[:, 1] == pytest.approx([-0.134542, 4.998190, 4.900827, 0.212878], abs=1e-5)
+    assert run["energy"][1] == pytest.approx(304.733, abs=1e-3)
+
+
+def test_four_mass_with_the_self_tuning_law_meets_the_published_positions() -> None:
+    law = SelfTuning.from_peak_velocity(0.01, mu_s=0.12, mu_d=0.1)
+    assert pytest.approx(1.37286, abs=1e-5) == law.C
+    run = simulate(four_mass_model(law), 4.0, rtol=1e-9, t_eval=[2.0, 4.0])
+    found = np.array([run[name] for name in ("x1", "y2", "z3", "x4")])
+    assert found[:, 0] == pytest.approx([0.753115, 4.942956, 4.956529, 2.497415], abs=1e-5)
+    assert found[:, 1] == pytest.approx([-0.135846, 4.998154, 4.900863, 0.207150], abs=1e-5)
+    assert run["energy"][1] == pytest.approx(304.772, abs=1e-3)
+
+
+def test_slider_crank_with_the_self_tuning_law_meets_the_published_numbers() -> None:
+    law = SelfTuning.from_peak_velocity(0.01, mu_s=0.1, mu_d=0.08)
+    run = simulate(SliderCrank(law).model(), 0.25, rtol=1e-10)
+    assert [run["crank_rate"][-1], run["crank"][-1]] == pytest.approx([84.3534, 25.2698], abs=1e-4)
+    assert run["energy"][-1] == pytest.approx(741.108, abs=1e-2)
+
+
+def test_four_mass_agrees_with_minimal_coordinates() -> None:
+    times = np.linspace(0.1, 4.0, 40)
+
+    def mu(v: float) -> float:
+        return brown_mcphee(v, 0.12, 0.1, 0.01)
+
+    th, x4, *_ = reference(four_mass(mu), [np.arctan2(3, 4), 5.0, 0.0, -1.0], times)
+    run = simulate(four_mass_model(PEAK), 4.0, rtol=1e-9, t_eval=times)
+    assert run["x1"] == pytest.approx(5 * np.cos(th), abs=1e-6)
+    assert run["y2"] == pytest.approx(5 * np.sin(th), abs=1e-6)
+    assert run["z3"] == pytest.approx(np.sqrt(49 - 25 * np.sin(th) ** 2), abs=1e-6)
+    assert run["x4"] == pytest.approx(x4, abs=1e-6)
+    assert run["phi"].max() < 1e-11
+    assert run["phi_dot"].max() < 1e-13
+    assert run["phi_ddot"].max() < 1e-11
+    assert (np.diff(run["energy"]) < 1e-9).all()
+
+
+def test_frictionless_slider_crank_keeps_its_energy_and_meets_the_published_numbers() -> None:
+    run = simulate(SliderCrank(SMOOTH).model(), 0.25, rtol=1e-11)
+    last = [run[name][-1] for name in ("crank_rate", "crank", "slider")]
+    assert last == pytest.approx([120.8896, 30.1022, 0.20990], abs=5e-5)
+    th = run["crank"]
+    py, pz = 0.1 - 0.08 * np.sin(th), 0.1 + 0.08 * np.cos(th)
+    x = np.sqrt(0.09 - py**2 - pz**2)
+    slope = (0.08 * np.cos(th) * py + 0.08 * np.sin(th) * pz) / x
+    closed = 120.0 * np.sqrt((0.2 + 5 * slope[0] ** 2) / (0.2 + 5 * slope**2))
+    assert run["slider"] == pytest.approx(x, abs=1e-12)
+    assert run["crank_rate"] == pytest.approx(closed, abs=1e-6)
+
+
+CRANK = BrownMcPhee(mu_s=0.1, mu_d=0.08, v_t=0.01)
+
+
+def test_slider_crank_with_friction_meets_the_published_numbers() -> None:
+    run = simulate(SliderCrank(CRANK).model(), 0.25, rtol=1e-10)
+    assert run["crank_N"][0] == pytest.approx(4724.36, abs=5e-3)
+    assert -run["crank_power"][0] == pytest.approx(-4535.4, abs=0.05)
+    last = [run[name][-1] for name in ("crank_rate", "crank", "slider")]
+    assert last == pytest.approx([84.363452, 25.271674, 0.2235396], abs=5e-6)
+    assert constraints(run) < (1e-13, 1e-13 * 120, 1e-12 * 1e4)
+
+
+def test_slider_crank_agrees_with_the_crank_angle_alone() -> None:
+    times = np.linspace(0.01, 0.25, 25)
+
+    def mu(v: float) -> float:
+        return brown_mcphee(v, 0.1, 0.08, 0.01)
+
+    th, w = reference(slider_crank(mu), [0.0, 120.0], times)
+    run = simulate(SliderCrank(CRANK).model(), 0.25, rtol=1e-10, t_eval=times)
+    assert run["crank"] == pytest.approx(th, abs=1e-6)
+    assert run["crank_rate"] == pytest.approx(w, abs=1e-4)
+
+
+def test_four_bar_closes_as_freudenstein_says() -> None:
+    scene = FourBar(Coulomb(v_eps=0.02))
+    run = simulate(scene.model(), 3.0, rtol=1e-8)
+    expected = [rocker_angle(0.1, 0.35, 0.3, 0.4, th) for th in run["theta_crank"]]
+    off = np.abs(np.exp(1j * run["theta_rocker"]) - np.exp(1j * np.array(expected)))
+    assert off.max() < 1e-11
+    assert (np.diff(run["energy"]) < 1e-9).all()
+
+
+def test_four_bar_without_friction_keeps_its_energy() -> None:
+    run = simulate(FourBar(SMOOTH).model(), 3.0, rtol=1e-10)
+    assert np.ptp(run["energy"]) < 1e-6 * run["kinetic"].max()
+
+
+def test_arm_loses_what_friction_takes() -> None:
+    model = Arm(LuGreNormalised()).model()
+    assert (len(model.x), len(model.z)) == (18, 6)
+    run = simulate(model, 0.5, rtol=1e-8, samples=20001)
+    dissipated = sum(run[f"q{i}_power"] for i in range(1, 7))
+    work = np.trapezoid(dissipated, run.t)
+    assert run["energy"][0] - run["energy"][-1] == pytest.approx(work, rel=1e-5)
+    assert min(run[f"q{i}_N"].min() for i in range(1, 7)) > 0
+
+
+@each_scene
+@pytest.mark.parametrize(
+    "law", [LuGreNormalised(), BrownMcPhee()], ids=lambda law: type(law).__name__
+)
+def test_every_parameter_can_be_free(kind: type[MechanismScene], law: Law) -> None:
+    scene = kind(law)
+    names = list(parameters(scene))
+    free, fixed = scene.model(names), scene.model()
+    assert [p.name for p in free.p] == names
+    assert free.initial_state() == pytest.approx(fixed.initial_state(), abs=1e-12)
+    assert free.function("ode").n_instructions() >= fixed.function("ode").n_instructions()
+
+
+@each_scene
+@pytest.mark.parametrize("law", ["LuGre", "lugre", None], ids=str)
+def test_what_is_not_a_law_is_refused(kind: type[MechanismScene], law: object) -> None:
+    with pytest.raises(ValueError, match=rf"{kind.__name__}: expected a law"):
+        kind(law)  # type: ignore[arg-type]
+
+
+def test_another_parameter_closes_the_loop_again() -> None:
+    """A longer rod than the model was written for: the start is assembled."""
+    model = SliderCrank(CRANK).model(["l"])
+    run = simulate(model, 0.01, p={"l": 0.35}, rtol=1e-8)
+    assert run["phi"].max() < 1e-12
+    assert run["slider"][0] == pytest.approx(np.sqrt(0.35**2 - 0.1**2 - 0.18**2))
