@@ -22,7 +22,7 @@ class BoucWen(Law):
     elastic element would reach it. A = 1, beta = gamma = 1/2 unloads elastically; n = 1 then has
     the virgin curve of `Dahl`, n -> inf is an element of `MaxwellSlip`.
     Limits: steady state mu_d N (A / (beta + gamma))^(1/n) sign(v); rate-independent. n = 1,
-    beta = 1, gamma = 0 is `Dahl`. Dissipates for beta > 0 and -beta <= gamma <= beta; one element
+    beta = 1, gamma = 0 is `Dahl`. Dissipates for -beta < gamma <= beta; one element
     has no non-local memory and drifts under vibration with an offset. sign(v) and sign(z) are
     smooth over v_eps and z_eps; v_eps ten times below the slowest motion. Not valid for N = 0.
     Source: Bouc 1967; Wen, J. Eng. Mech. Div. ASCE 102(2), 1976, 249-263.
@@ -47,9 +47,11 @@ class BoucWen(Law):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if all(map(is_number, (self.beta, self.gamma))) and not abs(self.gamma) <= self.beta:
+        if all(map(is_number, (self.beta, self.gamma))) and not (
+            -self.beta < self.gamma <= self.beta
+        ):
             raise ValueError(
-                f"BoucWen: expected -beta <= gamma <= beta, got gamma = {self.gamma:g} and "
+                f"BoucWen: expected -beta < gamma <= beta, got gamma = {self.gamma:g} and "
                 f"beta = {self.beta:g}; beyond them the element is unbounded or gives energy"
             )
 

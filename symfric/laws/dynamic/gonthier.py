@@ -21,8 +21,8 @@ class Gonthier(Law):
         F        = sat(sigma_0 z + sigma_1 dz/dt, F_C) + sigma_2 v
 
     s_dw is the memory of the dwell: after a rest of duration t, break-away takes
-    N [mu_d + (mu_s - mu_d) (1 - exp(-t/tau_dw))]. sat(x, F_C) holds x within +-F_C, rounded over
-    the share kappa of F_C. Without it the printed law creeps under any load when v_s is above the
+    N [mu_d + (mu_s - mu_d) (1 - exp(-t/tau_dw))]. sat(x, F_C) is x up to F_C and bends over to
+    (1 + kappa) F_C. Without it the printed law creeps under any load when v_s is above the
     creep velocity: its force there is F_C + sigma_1 v s/(1 - s), 191 N at 1 um/s; kappa = 0 asks
     for that original. tau changes smoothly over s_eps.
     Limits: steady state F_C(s(v)) dir + sigma_2 v for v far above v_s; mu_s = mu_d has no dwell
@@ -49,7 +49,7 @@ class Gonthier(Law):
     sigma_1: Scalar = param(190.0, unit="N s/m", doc="bristle damping", lower=1e-12)
     sigma_2: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
     tau_dw: Scalar = param(0.1, unit="s", doc="time constant of the dwell", lower=1e-12)
-    kappa: Scalar = param(0.02, unit="1", doc="rounding of the saturation", lower=0.0, upper=1.0)
+    kappa: Scalar = param(1e-3, unit="1", doc="rounding of the saturation", lower=0.0, upper=1.0)
     s_eps: Scalar = param(1e-3, unit="1", doc="smoothing of the dwell switch", lower=1e-12)
 
     @property
@@ -85,8 +85,8 @@ class Gonthier(Law):
         bristle = self.sigma_0 * z[0] + self.sigma_1 * self.rate(v, N, z)[0]
         if equals(self.kappa, 0.0):
             return bristle + self.sigma_2 * v
-        top = self._level(N, z[1])
-        return smooth.hold(bristle, top, self.kappa * top) + self.sigma_2 * v
+        rounding = self.kappa * self._level(N, z[1])
+        return smooth.hold(bristle, self._level(N, z[1]) + rounding, rounding) + self.sigma_2 * v
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Bristle and dwell memory in steady sliding; the force is at its limit."""
