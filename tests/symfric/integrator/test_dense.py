@@ -40,9 +40,10 @@ def test_ends_of_the_pieces_are_the_accepted_values(rows: int) -> None:
     every = np.arange(3)
     np.testing.assert_array_equal(dense.piece(every, np.zeros(3)), dense.y0)
     np.testing.assert_array_equal(dense.piece(every, np.ones(3)), dense.y1)
-    assert pytest.approx(
-        np.vstack([dense.y0, dense.y1[-1:]]), abs=1e-14
-    ) == dense(np.array([0.0, 1.0, 2.0, 3.0])).T
+    assert (
+        pytest.approx(np.vstack([dense.y0, dense.y1[-1:]]), abs=1e-14)
+        == dense(np.array([0.0, 1.0, 2.0, 3.0])).T
+    )
 
 
 @pytest.mark.parametrize(("rows", "degree"), [(0, 1), (1, 2), (2, 3), (3, 4)])
