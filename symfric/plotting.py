@@ -160,9 +160,10 @@ def plot_figure(data: "FigureData", path: str | Path | None = None) -> Figure:
             case = cases.index(c.case)
             dash = dashes[case % len(dashes)] if len(laws) > 1 else "--" if c.reference else "-"
             number = laws.index(c.law) if len(laws) > 1 else case
+            label = c.label if len(laws) > 1 else c.case or "as it is"
             axis.plot(
                 c[x], c[y], dash, color=f"C{number % 10}", linewidth=1.2,
-                marker="o" if data.dots else None, markersize=4, label=c.label,
+                marker="o" if data.dots else None, markersize=4, label=label,
             )  # fmt: skip
         axis.ticklabel_format(axis="both", style="sci", scilimits=(-2, 4), useMathText=True)
         if x in data.log:

@@ -43,8 +43,18 @@ MAY_IMPORT: dict[str, set[str]] = {
         "symfric.files",
         "symfric.numeric",
         "symfric.parameters",
+        "symfric.figures",  # types only
         "symfric.integrator",  # types only
         "symfric.laws",  # types only
+    },
+    "symfric.figures": {
+        "symfric.integrator",
+        "symfric.laws",
+        "symfric.model",
+        "symfric.numeric",
+        "symfric.parameters",
+        "symfric.plotting",  # on request, when a figure draws itself
+        "symfric.scenes",
     },
     "symfric.codegen": {
         "symfric",
@@ -60,6 +70,9 @@ MAY_IMPORT: dict[str, set[str]] = {
     "identification": {"symfric"},
 }
 """Unit -> units it may import (CONVENTIONS, section 8); each may import itself."""
+
+ON_REQUEST = {"symfric.laws": {"symfric.figures"}}
+"""Module -> what it imports inside a function, when an attribute of that name is asked for."""
 
 ON_TOP = ("symfric.cli", "symfric.bench")
 """They see all, and they may print."""
@@ -126,7 +139,17 @@ def test_imports_point_down(path: Path) -> None:
     unit = unit_of(module)
     assert unit, f"{module}: say in MAY_IMPORT what it may know"
     wrong = sorted({name for name in imported(parsed(path)) if not allowed(name, unit)})
+    later = ON_REQUEST.get(module, set())
+    wrong = [name for name in wrong if not any(within(name, unit) for unit in later)]
     assert not wrong, f"{module} must not import {', '.join(wrong)}"
+
+
+@pytest.mark.parametrize("module", ON_REQUEST)
+def test_what_is_fetched_on_request_is_not_imported_before(module: str) -> None:
+    path = ROOT.joinpath(*module.split("."), "__init__.py")
+    eager = [n for n in parsed(path).body if isinstance(n, ast.Import | ast.ImportFrom)]
+    early = [name for node in eager for name in imported(node)]
+    assert not [n for n in early if any(within(n, unit) for unit in ON_REQUEST[module])]
 
 
 @each_source

@@ -1,7 +1,8 @@
 """`symfric laws`: what laws there are, and what one of them says."""
 
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from inspect import getdoc
+from pathlib import Path
 from re import split
 from typing import Annotated, Any
 
@@ -10,11 +11,15 @@ import typer
 from symfric import ALL_LAWS, Law, law_from_text, parameters
 from symfric.cli import output
 from symfric.cli.options import JsonOption, PlotOption, SetOption, check_outputs, law_with
+from symfric.figures import FIGURES, FigureData, compare
+from symfric.figures.requirements import parts, phenomena
+from symfric.figures.scales import NORMAL_FORCE
 from symfric.laws import PHENOMENA
 from symfric.laws.cost import cost
 from symfric.laws.names import ALIASES
 from symfric.model import finite
-from symfric.parameters import options
+from symfric.parameters import check_names, options
+from symfric.scenes import ALL_SCENES
 
 
 def laws(
@@ -23,18 +28,32 @@ def laws(
     ] = None,
     settings: SetOption = None,
     plot: PlotOption = None,
+    figure: Annotated[
+        str | None,
+        typer.Option("--figure", metavar="FIGURE", help=f"Behaviour: {', '.join(FIGURES)}."),
+    ] = None,
+    others: Annotated[
+        list[str] | None,
+        typer.Option("--compare", metavar="LAW", help="Overlay another law; may be repeated."),
+    ] = None,
     normal_force: Annotated[
-        float, typer.Option("--normal-force", help="Normal force of the picture [N].")
-    ] = 1.0,
+        float | None,
+        typer.Option("--normal-force", help="Normal force [N]; default 1, and 7.848 for --figure."),
+    ] = None,
     json: JsonOption = None,
 ) -> None:
     """List the friction laws, or show one in full.
 
-    In full: equation, limits, source, parameters with units and bounds, and a picture.
+    In full: equation, limits, source, parameters with units and bounds, and a picture. With
+    --figure or --compare its behaviour instead, computed as in the papers; --figure takes
+    scenes such as rabinowicz, too.
 
-    Example: symfric laws lugre --plot lugre.png
+    Example: symfric laws gms --figure hysteresis --compare lugre --plot loops.png
     """
     check_outputs(json, picture=plot)
+    if figure or others:
+        behaviour(name, settings, figure, others or [], normal_force, plot, json)
+        return
     chosen = {name: law_with(name, settings)} if name else {n: law_from_text(n) for n in ALL_LAWS}
     if settings and not name:
         raise ValueError("--set: expected the name of a law before it, got none")
@@ -42,12 +61,60 @@ def laws(
         from symfric.plotting import plot_catalogue, plot_laws  # noqa: PLC0415  (matplotlib is slow)
 
         draw = plot_laws if name else plot_catalogue
-        draw(chosen, finite("--normal-force", normal_force), plot)
-    described = {text: {"name": text, **to_dict(law)} for text, law in chosen.items()}
-    output.emit_json(described[name] if name else {"laws": described}, json)
+        load = 1.0 if normal_force is None else finite("--normal-force", normal_force)
+        draw(chosen, load, plot)
+    described = [{"name": text, **to_dict(law)} for text, law in chosen.items()]
+    output.emit_json(described[0] if name else {"laws": described}, json)
     if json != "-":
         show_law(name, chosen[name]) if name else show_list(chosen)
     output.say_written(plot, json)
+
+
+def behaviour(
+    name: str | None,
+    settings: list[str] | None,
+    figure: str | None,
+    others: list[str],
+    normal_force: float | None,
+    plot: Path | None,
+    json: str | None,
+) -> None:
+    """Compute a figure of one or several laws, and write, draw or summarise it."""
+    if not name:
+        raise ValueError("--figure, --compare: expected the name of a law before it, got none")
+    scenario = figure or "profile"
+    check_names("--figure", [scenario], [*FIGURES, *ALL_SCENES])
+    load = NORMAL_FORCE if normal_force is None else finite("--normal-force", normal_force)
+    chosen = [law_with(name, settings), *map(law_from_text, others)]
+    with output.progress(f"{scenario} of {', '.join([name, *others])}"):
+        data = compare(chosen, scenario, load)
+    if plot:
+        data.plot(plot)
+    output.emit_json(data.to_dict(), json)
+    if json != "-":
+        show_figure(data)
+    output.say_written(plot, json)
+
+
+def show_figure(data: FigureData) -> None:
+    """The range of every column of each curve."""
+    columns = {name for curve in data.curves for name in curve.columns}
+    shown = [name for name in data.units if name in columns]
+    rows = [
+        [
+            curve.label,
+            *(
+                f"{curve[name].min():.4g} ... {curve[name].max():.4g}"
+                if name in curve.columns
+                else "-"
+                for name in shown
+            ),
+        ]
+        for curve in data.curves
+    ]
+    output.show_table(
+        ["curve", *(f"{name} [{data.units[name]}]" for name in shown)], rows, data.title
+    )
 
 
 def to_dict(law: Law) -> dict[str, Any]:
@@ -76,23 +143,6 @@ def to_dict(law: Law) -> dict[str, Any]:
         },
         "doc": "\n\n".join(getdoc(part) or "" for part in parts(law)),
     }
-
-
-def parts(law: Law) -> list[type[Law]]:
-    """The kinds of law inside `law`, from the outside in, each once."""
-    found = [type(law)]
-    for item in fields(law):
-        value = getattr(law, item.name)
-        for child in value if isinstance(value, tuple) else (value,):
-            if isinstance(child, Law):
-                found += parts(child)
-    return list(dict.fromkeys(found))
-
-
-def phenomena(law: Law) -> list[str]:
-    """The codes of everything that `law` and the laws in it show."""
-    shown = {code for part in parts(law) for code in part.facts.phenomena}
-    return [code for code in PHENOMENA if code in shown]
 
 
 def title(law: Law) -> str:
@@ -124,7 +174,8 @@ def show_list(chosen: dict[str, Law]) -> None:
         "z: number of states, then smoothness\n"
         "value, slope: CasADi instructions for force and rate, and for their derivatives\n"
         "formula: how it was confirmed\n"
-        "symfric laws NAME shows equation, parameters and more.\n"
+        "symfric laws NAME shows equation, parameters and more;\n"
+        f"symfric laws NAME --figure draws {', '.join(FIGURES)}.\n"
         f"Other names: {others}.\n"
         "Sums are written coulomb+viscous, wrappers asymmetric(lugre), load_dependent(lugre)."
     )

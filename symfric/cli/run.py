@@ -1,10 +1,8 @@
 """`symfric run`: simulate a scene with one friction law, or compare several."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
-import casadi as ca
 import numpy as np
 import typer
 
@@ -19,34 +17,11 @@ from symfric.cli.options import (
     check_outputs,
     numbers,
 )
+from symfric.figures.scene import DEFAULT_INPUT, DEFAULT_T_END
 from symfric.integrator import Input
 from symfric.integrator.inputs import Sampled
 from symfric.parameters import check_names
 from symfric.scenes import ALL_SCENES, Scene
-
-DEFAULT_T_END = {
-    "rabinowicz": 20.0,
-    "drive": 4.0,
-    "pendulum": 10.0,
-    "double_pendulum": 5.0,
-    "pendulum_box": 15.0,
-    "four_mass": 4.0,
-    "slider_crank": 0.25,
-    "four_bar": 3.0,
-    "arm": 1.0,
-}
-"""Times [s] that show what the scene is about, such as three stick-slip periods."""
-
-
-def sine(t: ca.SX) -> ca.SX:
-    """Force 2 sin(pi t) N: beyond the default break-away force of 1.18 N in both directions."""
-    return 2 * ca.sin(ca.pi * t)
-
-
-DEFAULT_INPUT: dict[str, tuple[str, str, Callable[[ca.SX], ca.SX]]] = {
-    "drive": ("force", "2 sin(pi t)", sine)
-}
-"""Input of a scene that is given none: name, text and function of time."""
 
 
 def run(

@@ -3,12 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import casadi as ca
-
 from symfric.figures.catalogue import FIGURES
-from symfric.figures.data import Curve, FigureData
+from symfric.figures.data import FigureData
 from symfric.figures.scales import NORMAL_FORCE, scales
-from symfric.integrator import simulate
+from symfric.figures.scene import scene_figure
 from symfric.laws import Law, law_from_text, law_name
 from symfric.laws.base import check_law
 from symfric.parameters import check_names, distinct
@@ -24,8 +22,8 @@ def compare(
 
     Args:
         laws: laws or their names, or legend entry -> law.
-        scenario: a figure (profile, hysteresis, lag, ...), or a scene (rabinowicz, drive). All laws
-            get the amplitudes that the figure takes from the first one, so put the law whose
+        scenario: a figure (profile, hysteresis, lag, ...), or a scene (rabinowicz, drive, ...). All
+            laws get the amplitudes that the figure takes from the first one, so put the law whose
             scales matter first.
         N: normal force [N] of a figure; a scene has its own.
 
@@ -39,7 +37,7 @@ def compare(
     check_names("compare: scenario", [scenario], [*FIGURES, *ALL_SCENES])
     named = _named(laws)
     if scenario in ALL_SCENES:
-        return _scene(named, scenario)
+        return scene_figure(named, scenario)
     given = scales(next(iter(named.values())), N)
     shown = [FIGURES[scenario](law, N, given).named(name) for name, law in named.items()]
     return replace(shown[0], curves=tuple(curve for one in shown for curve in one.curves))
@@ -60,33 +58,3 @@ def _named(laws: Sequence[Law | str] | Mapping[str, Law]) -> dict[str, Law]:
     for law in found.values():
         check_law("compare", law)
     return found
-
-
-T_END = {"rabinowicz": 20.0, "drive": 4.0}
-"""Times [s] that show what a scene is about: three stick-slip periods, two reversals."""
-
-
-def sine(t: ca.SX) -> ca.SX:
-    """Force 2 sin(pi t) N: beyond the default break-away force of 1.18 N in both directions."""
-    return 2 * ca.sin(ca.pi * t)
-
-
-INPUTS = {"rabinowicz": {}, "drive": {"force": sine}}
-"""What drives a scene."""
-
-
-def _scene(laws: Mapping[str, Law], name: str) -> FigureData:
-    """Position, velocity and friction of a scene with each law, as `symfric run` shows it."""
-    curves: list[Curve] = []
-    for label, law in laws.items():
-        model = ALL_SCENES[name](law).model()
-        run = simulate(model, T_END[name], u=INPUTS[name])
-        columns = {"t": run.t, "x": run["x"], "v": run["v"], "F": run["friction"]}
-        curves.append(Curve(label, "", columns))
-    return FigureData(
-        name,
-        name,
-        {"t": "s", "x": "m", "v": "m/s", "F": "N"},
-        (("t", "x"), ("t", "v"), ("t", "F")),
-        tuple(curves),
-    )

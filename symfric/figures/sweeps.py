@@ -83,7 +83,7 @@ def _sweep(
     factor: str,
     values: Sequence[float],
 ) -> FigureData:
-    v = np.linspace(-10.0, 10.0, 1201) * (given or scales(law, N)).velocity
+    v = np.linspace(-2.0, 2.0, 1201) * (given or scales(law, N)).velocity
     curves = [
         Curve(
             law_name(law),

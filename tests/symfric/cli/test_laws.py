@@ -45,7 +45,7 @@ def test_one_law_shows_equation_source_and_parameters(
 
 
 def test_the_json_of_the_list_holds_every_law(capsys: pytest.CaptureFixture[str]) -> None:
-    laws = described(capsys)["laws"]
+    laws = {law["name"]: law for law in described(capsys)["laws"]}
     assert list(laws) == list(ALL_LAWS)
     assert laws["lugre"]["states"] == {"z": "m"}
     assert list(laws["lugre"]["phenomena"]) == ["D", "S", "St", "V", "P", "L", "B"]
@@ -101,3 +101,63 @@ def test_the_picture_is_a_png(arguments: list[str], tmp_path: Path) -> None:
     path = tmp_path / "laws.png"
     assert main(["laws", *arguments, "--plot", str(path)]) == 0
     assert path.read_bytes().startswith(PNG)
+
+
+LISTED = {
+    "name", "states", "phenomena", "smoothness", "confidence", "source", "parameters",
+    "instructions",
+}  # fmt: skip
+
+
+def test_the_json_of_the_list_is_a_list_of_laws_with_all_they_say(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for law in described(capsys)["laws"]:
+        assert set(law) >= LISTED
+        assert min(law["instructions"].values()) > 0
+
+
+def test_a_figure_is_drawn_summarised_and_given_as_data(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    picture, file = tmp_path / "h.png", tmp_path / "h.json"
+    arguments = ["laws", "maxwell_slip", "--figure", "hysteresis"]
+    assert main([*arguments, "--plot", str(picture), "--json", str(file)]) == 0
+    out, err = capsys.readouterr()
+    assert "maxwell_slip, 20x" in out
+    assert "F [N]" in out
+    assert err == f"wrote {picture}, {file}\n"
+    assert picture.read_bytes().startswith(PNG)
+    data = json.loads(file.read_text())
+    assert data["name"] == "hysteresis"
+    assert [curve["case"] for curve in data["curves"]] == ["1x", "5x", "20x"]
+    assert data["units"]["x"] == "m"
+
+
+def test_compared_laws_are_overlaid_with_the_settings_of_the_first(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    data = described(capsys, "lugre", "--set", "mu_s=0.3", "--compare", "lugre", "--compare", "gms")
+    assert [curve["law"] for curve in data["curves"]] == ["lugre_1", "lugre_2", "gms"]
+    tops = [max(curve["columns"]["F"]) for curve in data["curves"]]
+    assert tops == pytest.approx([0.3 * 7.848, 0.15 * 7.848, 0.15 * 7.848], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["lugre", "--figure", "histeresis"], "did you mean hysteresis?"),
+        (["coulomb", "--figure", "lag"], "lag of coulomb: expected a law that shows"),
+        (["--figure", "lag"], "expected the name of a law before it"),
+        (["lugre", "--compare", "lugrr"], "did you mean lugre?"),
+        (["lugre", "--figure", "lag", "--normal-force", "0"], "N: expected a normal force above"),
+    ],
+)
+def test_a_figure_that_cannot_be_is_refused_in_one_sentence(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["laws", *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert said in err
+    assert len(err.splitlines()) == 1

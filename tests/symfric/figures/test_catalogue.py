@@ -1,0 +1,73 @@
+"""Every figure of every law is drawn from finite numbers, or refused in a sentence."""
+
+import numpy as np
+import pytest
+
+from symfric import ALL_LAWS, Coulomb, LuGre, figure, law_from_text
+from symfric.figures import FIGURES, phenomena
+
+NEEDS = {
+    "profile": set(ALL_LAWS),
+    "steady_state": set(ALL_LAWS),
+    "sweep_b": {"self_tuning", "rui_wang"},
+    "sweep_c": {"self_tuning", "rui_wang"},
+    "sweep_e": {"self_tuning", "rui_wang"},
+}
+SHOWN_WITH = {
+    "hysteresis": {"P"},
+    "transition": {"P"},
+    "lag": {"L"},
+    "drift": {"S", "P"},
+    "break_away": {"S", "P"},
+}
+OTHER_INPUTS = {"quarter_car_general", "bam"}
+"""Laws that need more than a pushed block offers."""
+
+
+def shows(law: str, name: str) -> bool:
+    if name in NEEDS:
+        return law in NEEDS[name]
+    if name in ("drift", "break_away") and law in OTHER_INPUTS | {"wojewoda"}:
+        return False
+    return bool(SHOWN_WITH[name] & set(phenomena(law_from_text(law))))
+
+
+EVERY = [(law, name) for law in ALL_LAWS for name in FIGURES]
+
+
+@pytest.mark.parametrize(("law", "name"), [pair for pair in EVERY if shows(*pair)])
+def test_a_law_that_shows_it_has_finite_columns_of_one_length(law: str, name: str) -> None:
+    data = figure(law_from_text(law), name)
+    assert data.name == name
+    for curve in data.curves:
+        assert len({values.shape for values in curve.columns.values()}) == 1
+        assert {column for panel in data.panels for column in panel} <= set(curve.columns)
+        assert set(curve.columns) <= set(data.units)
+        assert all(np.isfinite(values).all() for values in curve.columns.values())
+
+
+@pytest.mark.parametrize(("law", "name"), [pair for pair in EVERY if not shows(*pair)])
+def test_a_law_that_cannot_show_it_is_refused(law: str, name: str) -> None:
+    with pytest.raises(ValueError, match=r"expected a law (that|with)"):
+        figure(law_from_text(law), name)
+
+
+def test_the_refusal_says_what_is_missing_and_who_has_it() -> None:
+    with pytest.raises(ValueError, match=r"shows pre-sliding displacement, got .* are dahl, "):
+        figure(Coulomb(), "hysteresis")
+
+
+def test_an_unknown_figure_is_refused_with_the_closest_name() -> None:
+    with pytest.raises(ValueError, match="did you mean hysteresis"):
+        figure(LuGre(), "histeresis")
+
+
+def test_a_class_and_a_symbol_are_refused() -> None:
+    with pytest.raises(ValueError, match="got the class LuGre"):
+        figure(LuGre, "profile")  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize("N", [0.0, -1.0, float("nan")])
+def test_a_normal_force_that_does_not_press_is_refused(N: float) -> None:
+    with pytest.raises(ValueError, match="figure: N: expected"):
+        figure(LuGre(), "hysteresis", N)

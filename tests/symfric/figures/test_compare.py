@@ -1,0 +1,65 @@
+"""Laws under one excitation."""
+
+import pytest
+
+import symfric
+import symfric.laws
+from symfric import Coulomb, LuGre, with_values
+from symfric.figures import FigureData, compare
+
+
+def test_all_laws_get_the_motion_of_the_first() -> None:
+    data = compare(["lugre", "maxwell_slip"], "hysteresis")
+    assert [curve.label for curve in data.curves] == [
+        f"{law}, {speed}x" for law in ("lugre", "maxwell_slip") for speed in (1, 5, 20)
+    ]
+    one, other = data["lugre, 5x"], data["maxwell_slip, 5x"]
+    assert other["x"] == pytest.approx(one["x"], abs=1e-10)
+    assert one["x"].max() == pytest.approx(2 * 0.15 * 7.848 / 1e5, rel=1e-6)
+
+
+def test_laws_of_one_kind_are_numbered_and_a_mapping_names_them() -> None:
+    strong = with_values(LuGre(), {"mu_s": 0.2})
+    assert [c.law for c in compare([LuGre(), strong]).curves] == ["lugre_1", "lugre_2"]
+    assert [c.law for c in compare({"weak": LuGre(), "strong": strong}).curves] == [
+        "weak", "strong",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("scene", ["rabinowicz", "drive"])
+def test_a_scene_shows_the_signals_that_the_laws_share(scene: str) -> None:
+    data = compare([LuGre(), "brown_mcphee"], scene)
+    assert [curve.law for curve in data.curves] == ["lugre", "brown_mcphee"]
+    assert {"t", "x", "v", "friction"} <= set(data.units)
+    assert "z" not in data.units  # a state of LuGre alone
+
+
+def test_stick_slip_of_two_laws_reaches_the_exact_amplitude() -> None:
+    data = compare(["lugre", "brown_mcphee"], "rabinowicz")
+    assert data["lugre"]["x"].max() == pytest.approx(0.5705, rel=0.02)
+    assert data["brown_mcphee"]["x"].max() == pytest.approx(0.5705, rel=0.02)
+
+
+def test_one_law_that_cannot_show_it_is_named() -> None:
+    with pytest.raises(ValueError, match="hysteresis of coulomb"):
+        compare([LuGre(), Coulomb()], "hysteresis")
+
+
+def test_unknown_scenario_is_refused_with_a_hint() -> None:
+    with pytest.raises(ValueError, match=r"compare: scenario: .* did you mean rabinowicz"):
+        compare(["lugre"], "rabinovicz")
+
+
+def test_no_law_and_no_law_at_all_are_refused() -> None:
+    with pytest.raises(ValueError, match="at least one law"):
+        compare([])
+    with pytest.raises(ValueError, match="compare: expected a law such as"):
+        compare([3.0])  # pyright: ignore[reportArgumentType]
+
+
+def test_it_is_reached_from_the_front_and_from_the_laws() -> None:
+    assert symfric.compare is compare
+    assert symfric.laws.compare is compare
+    with pytest.raises(AttributeError, match=r"symfric\.laws.* 'compose_'"):
+        _ = symfric.laws.compose_
+    assert isinstance(symfric.compare(["coulomb"]), FigureData)
