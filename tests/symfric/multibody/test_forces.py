@@ -1,0 +1,98 @@
+"""Forces: power is minus the rate of their energy, actuators do what their rate says."""
+
+import casadi as ca
+import pytest
+from chains import chain, state
+
+from symfric.multibody import Gravity, JointSpringDamper, SpringDamper, UserForce
+from symfric.multibody.equations import equations
+from symfric.multibody.forces import Axial, Force, Load
+
+CONSERVATIVE: dict[str, Force] = {
+    "gravity": Gravity("g", (0.1, 0.2, -9.0)),
+    "spring": SpringDamper("s", "ground.out", "b4.out", 30.0, 0.5),
+    "spring without length": SpringDamper("s", "b1.out", "b4", stiffness=30.0),
+    "torsion": JointSpringDamper("t", "j0", "turn", 5.0, 0.3),
+    "sliding spring": JointSpringDamper("t", "j2", "slide", 5.0, 0.3),
+    "spring in a turn of a cylinder": JointSpringDamper("t", "j2", "turn", 5.0, 0.3),
+}
+
+
+def power_of(force: Force, formulation: str = "joint", reverse: bool = False) -> tuple[float, float]:
+    """Power of a force and rate of its energy, in a random state."""
+    m = chain(reverse)
+    made = m.prepare(formulation=formulation)
+    q, qd = (made.q0, made.qd0) if formulation == "absolute" else state(made)
+    kin, joints = made.eq.kin, {j.name: j for j in m.joints}
+    total = ca.SX(0)
+    for load in force.loads(kin, joints):
+        if isinstance(load, Load):
+            total += load.power(kin)
+        else:
+            assert isinstance(load, Axial)
+            total += load.value * kin.along(load.joint, load.direction)[1]
+    rate = ca.jtimes(force.energy(kin, joints), kin.q, kin.qd)
+    values = ca.Function("power", [kin.q, kin.qd], [total, rate])
+    return tuple(float(x) for x in values.call([q, qd]))  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize("name", CONSERVATIVE)
+@pytest.mark.parametrize("reverse", [False, True])
+def test_power_is_minus_the_rate_of_the_energy(name: str, reverse: bool) -> None:
+    power, rate = power_of(CONSERVATIVE[name], reverse=reverse)
+    assert power == pytest.approx(-rate, rel=1e-11)
+    assert abs(power) > 1e-3
+
+
+@pytest.mark.parametrize("name", ["torsion", "sliding spring", "spring"])
+def test_both_formulations_see_the_same_power(name: str) -> None:
+    force = CONSERVATIVE[name]
+    assert power_of(force, "absolute")[0] == pytest.approx(power_at_start(force), rel=1e-10)
+
+
+def power_at_start(force: Force) -> float:
+    m = chain()
+    made = m.prepare()
+    joints = {j.name: j for j in m.joints}
+    total = ca.SX(0)
+    for load in force.loads(made.eq.kin, joints):
+        if isinstance(load, Load):
+            total += load.power(made.eq.kin)
+        else:
+            total += load.value * made.eq.kin.along(load.joint, load.direction)[1]
+    return float(ca.Function("p", [made.eq.q, made.eq.qd], [total])(made.q0, made.qd0))
+
+
+@pytest.mark.parametrize(
+    "force",
+    [SpringDamper("d", "ground.out", "b3.out", damping=2.0),
+     JointSpringDamper("d", "j1", "slide", damping=2.0)],
+)  # fmt: skip
+def test_dampers_take_energy(force: Force) -> None:
+    power, rate = power_of(force)
+    assert power < 0
+    assert rate == 0.0
+
+
+def test_a_user_force_has_the_power_of_its_expression() -> None:
+    push = UserForce("push", "b2.out", lambda kin: (-3 * kin.point("b2.out")[1], (0, 0, 0)))
+    m = chain()
+    made = m.prepare()
+    q, qd = state(made)
+    speed = ca.Function("v", [made.eq.q, made.eq.qd], [made.eq.kin.point("b2.out")[1]])(q, qd)
+    assert power_of(push)[0] == pytest.approx(-3 * float(ca.sumsqr(speed)), rel=1e-12)
+
+
+def test_absent_terms_cost_nothing() -> None:
+    """A spring without damping has no velocity in it, one without length no root."""
+    def instructions(force: Force) -> int:
+        m = chain(gravity=0.0)
+        made = m.prepare()
+        topology = made.eq.kin.topology
+        eq = equations(topology, m.joints, [force], made.eq.q, made.eq.qd)
+        return ca.Function("b", [eq.q, eq.qd, eq.a, eq.lam], [eq.balance]).n_instructions()
+
+    linear, spring, damped = (
+        instructions(SpringDamper("s", "ground", "b1", 3.0, *more)) for more in ((), (1.0,), (1.0, 2.0))
+    )
+    assert linear < spring < damped

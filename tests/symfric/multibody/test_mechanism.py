@@ -1,0 +1,287 @@
+"""The builder: one error for all mistakes, each with its path; starts, redundancy, sizes."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from chains import X, Y, Z, rod
+
+from symfric import BrownMcPhee, LuGre, Viscous, simulate
+from symfric.multibody import (
+    Distance,
+    Fixed,
+    Free,
+    JointFriction,
+    JointSpringDamper,
+    Mechanism,
+    PointOnLine,
+    Prismatic,
+    Revolute,
+    Spherical,
+    SpringDamper,
+)
+from symfric.parameters import Variable
+
+LAW = BrownMcPhee()
+
+
+def wrong(change: Callable[[Mechanism], object]) -> Mechanism:
+    m = rod()
+    change(m)
+    return m
+
+
+MISTAKES: dict[str, tuple[Callable[[Mechanism], object], str]] = {
+    "zero mass": (
+        lambda m: m.body("bob", 0.0, (1.0, 1.0, 1.0)),
+        "> body 'bob' > mass: expected > 0 kg, got 0",
+    ),
+    "indefinite inertia": (
+        lambda m: m.body("bob", 1.0, (1.0, 1.0, 1.0, 2.0, 0.0, 0.0)),
+        "> body 'bob' > inertia: expected positive principal moments, got -1, 1, 3",
+    ),
+    "zero inertia": (
+        lambda m: m.body("bob", 1.0, (0.0, 0.0, 0.0)),
+        "> body 'bob' > inertia: expected positive principal moments, got 0, 0, 0",
+    ),
+    "impossible inertia": (
+        lambda m: m.body("bob", 1.0, (1.0, 1.0, 3.0)),
+        "largest principal moment to be at most the sum of the others, got 1, 1, 3",
+    ),
+    "two numbers of inertia": (
+        lambda m: m.body("bob", 1.0, (1.0, 1.0)),
+        "> body 'bob' > inertia: expected 3 or 6 numbers, got 2",
+    ),
+    "no identifier": (
+        lambda m: m.body("the bob", 1.0, (1.0, 1.0, 1.0)),
+        "> body 'the bob': expected a name that is a C identifier",
+    ),
+    "twice": (
+        lambda m: m.body("hinge", 1.0, (1.0, 1.0, 1.0)),
+        "> joint 'hinge': expected every name once",
+    ),
+    "unknown body": (
+        lambda m: m.joint(Fixed("weld", "rodd", "ground")),
+        "> joint 'weld': expected a body, got rodd; did you mean rod?",
+    ),
+    "unknown frame": (
+        lambda m: m.joint(Fixed("weld", "rod.tip", "ground")),
+        "> joint 'weld': expected one of the frames hinge, got rod.tip",
+    ),
+    "one body twice": (
+        lambda m: m.joint(Fixed("weld", "rod", "rod.hinge")),
+        "> joint 'weld': expected two bodies, got rod twice",
+    ),
+    "frame of nothing": (
+        lambda m: m.frame("bob.tip"),
+        "> frame 'bob.tip': expected 'body.frame' of a known body",
+    ),
+    "force at nothing": (
+        lambda m: m.force(SpringDamper("spring", "ground", "bob")),
+        "> force 'spring': expected a body, got bob",
+    ),
+    "force along nothing": (
+        lambda m: m.force(JointSpringDamper("motor", "hing")),
+        "> force 'motor': expected a joint, got hing",
+    ),
+    "loose body": (
+        lambda m: m.body("bob", 1.0, (1.0, 1.0, 1.0)),
+        "> body 'bob': expected joints with coordinates that lead to the ground, found none; "
+        "a Free joint lets it move freely",
+    ),
+    "friction of a ball": (
+        lambda m: (
+            m.body("bob", 1.0, (1.0, 1.0, 1.0)),
+            m.joint(Spherical("ball", "rod", "bob", friction=JointFriction(LAW))),
+        ),
+        "> joint 'ball' > friction: expected a revolute, prismatic or cylindrical joint",
+    ),
+    "start of another size": (
+        lambda m: (
+            m.body("bob", 1.0, (1.0, 1.0, 1.0)),
+            m.joint(Spherical("ball", "rod", "bob", start=(1.0, 0.0))),
+        ),
+        "> joint 'ball' > start: expected 4 numbers, got 2",
+    ),
+    "start that is no number": (
+        lambda m: (
+            m.body("bob", 1.0, (1.0, 1.0, 1.0)),
+            m.joint(Revolute("pin", "rod", "bob", rate=float("nan"))),
+        ),
+        "> joint 'pin' > rate: expected finite numbers, got nan",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_mistakes_are_described_with_their_path(name: str) -> None:
+    change, message = MISTAKES[name]
+    with pytest.raises(ValueError) as caught:
+        wrong(change).build()
+    assert "mechanism 'rod' > " in str(caught.value)
+    assert message in str(caught.value)
+
+
+def test_all_mistakes_come_at_once() -> None:
+    m = Mechanism("crank")
+    m.body("a", -1.0, (1.0, 1.0, 1.0))
+    m.body("b", 1.0, (0.0, 1.0, 1.0))
+    m.joint(Revolute("slider", "ground", "a", friction=JointFriction(LAW)))
+    m.joint(Prismatic("slide", "a", "c"))
+    with pytest.raises(ValueError) as caught:
+        m.build()
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 4
+    assert all(line.startswith("mechanism 'crank' > ") for line in lines)
+    assert any("joint 'slider' > friction" in line for line in lines)
+
+
+def test_unknown_formulations_are_refused() -> None:
+    with pytest.raises(ValueError, match="formulation: expected one of joint, absolute, got abs"):
+        rod().build(formulation="abs")
+
+
+def slider_on_a_rod(start: float = 0.8, rate: float = 0.0) -> Mechanism:
+    """Two slides at a right angle and a rod of 1 m: x^2 + z^2 = 1."""
+    m = Mechanism("ladder")
+    for name, axis in (("x", X), ("z", Z)):
+        m.body(f"block_{name}", 1.0, (0.1, 0.1, 0.1))
+        m.frame(f"ground.{name}", z=axis)
+        m.frame(f"block_{name}.{name}", z=axis)
+    m.joint(Prismatic("x", "ground.x", "block_x.x", start=start, rate=rate))
+    m.joint(Prismatic("z", "ground.z", "block_z.z", start=0.6))
+    m.joint(Distance("rod", "block_x", "block_z", length=1.0))
+    return m
+
+
+def test_an_open_loop_is_refused_and_the_nearest_closed_one_offered() -> None:
+    with pytest.raises(ValueError, match=r"start: expected positions that satisfy rod_lambda") as e:
+        slider_on_a_rod(start=0.9).build()
+    assert "x = 0.832" in str(e.value)
+    assert "z = 0.554" in str(e.value)
+    assembled = slider_on_a_rod(start=0.9).assembled().build()
+    x, z, *_ = assembled.initial_state()
+    assert x**2 + z**2 == pytest.approx(1.0, abs=1e-12)
+    assert (x, z) == pytest.approx(np.array([0.9, 0.6]) / np.hypot(0.9, 0.6), abs=1e-12)
+
+
+def test_velocities_against_a_rod_are_refused_and_the_nearest_offered() -> None:
+    with pytest.raises(ValueError, match="expected velocities that satisfy rod_lambda") as e:
+        slider_on_a_rod(rate=1.0).build()
+    assert "x_rate = 0.36" in str(e.value)
+    assembled = slider_on_a_rod(rate=1.0).assembled().build()
+    assert assembled.initial_state()[2:] == pytest.approx([0.36, -0.48])
+
+
+def test_loops_that_cannot_be_closed_are_refused() -> None:
+    m = slider_on_a_rod()
+    m.joint(Distance("long", "ground", "block_x", length=3.0))
+    with pytest.raises(ValueError, match="no position near it does"):
+        m.build()
+    with pytest.raises(ValueError, match="from which the loops can be closed"):
+        m.assembled()
+
+
+def four_bar(last: type[Revolute] | type[PointOnLine], friction: JointFriction | None = None) -> Mechanism:
+    """A parallelogram that stands slanted, its last joint a hinge or a pin."""
+    m = Mechanism("four_bar")
+    up = (0.6, 0.0, 0.8)
+    for name, far in (("left", up), ("right", up), ("top", (2.0, 0.0, 0.0))):
+        m.body(name, 1.0, (0.1, 0.1, 0.1))
+        m.frame(f"{name}.near", z=Y)
+        m.frame(f"{name}.far", at=far, z=Y)
+    m.frame("ground.left", z=Y)
+    m.frame("ground.right", at=(2.0, 0.0, 0.0), z=Y)
+    m.joint(Revolute("a", "ground.left", "left.near", friction=friction))
+    m.joint(Revolute("b", "ground.right", "right.near"))
+    m.joint(Revolute("c", "left.far", "top.near"))
+    m.joint(last("d", "top.far", "right.far"))
+    return m
+
+
+def test_redundant_constraints_are_left_out_and_named() -> None:
+    hinged, pinned = (four_bar(kind).prepare() for kind in (Revolute, PointOnLine))
+    assert len(hinged.redundant) == 3
+    assert all(name.startswith("d_lambda") for name in hinged.redundant)
+    assert (len(pinned.labels), pinned.redundant) == (2, ())
+    runs = [simulate(four_bar(kind).build(), 1.0, rtol=1e-9) for kind in (Revolute, PointOnLine)]
+    assert runs[0]["a"] == pytest.approx(runs[1]["a"], abs=1e-7)
+
+
+def test_friction_from_reactions_that_are_not_unique_is_refused() -> None:
+    friction = JointFriction(LAW, radius=0.02, length=0.1)
+    with pytest.raises(ValueError, match="joint 'a' > friction: expected reactions that the motion"):
+        four_bar(Revolute, friction).build()
+    assert four_bar(PointOnLine, friction).build().z
+    constant = JointFriction(LAW, radius=0.02, normal=50.0)
+    assert four_bar(Revolute, constant).build().name == "four_bar"
+
+
+def test_a_dead_centre_is_refused_as_a_start() -> None:
+    with pytest.raises(ValueError, match="start: expected independent constraints, got a singular"):
+        dead_centre().build()
+
+
+def dead_centre() -> Mechanism:
+    """Slides at a right angle, the rod lying along one of them: z cannot be told from x."""
+    m = Mechanism("dead")
+    for name in ("a", "b"):
+        m.body(name, 1.0, (0.1, 0.1, 0.1))
+        m.frame(f"{name}.slide", z=X)
+    m.frame("ground.slide", z=X)
+    m.frame("ground.side", at=(1.0, 0.0, 0.0), z=Y)
+    m.frame("b.side", z=Y)
+    m.joint(Prismatic("x", "ground.slide", "a.slide"))
+    m.joint(Prismatic("y", "ground.side", "b.side"))
+    m.joint(Distance("rod", "a", "b", length=1.0))
+    m.joint(Distance("stay", "ground", "b", length=1.0))
+    return m
+
+
+def sizes(friction: JointFriction | None) -> tuple[int, int, int]:
+    model = rod(friction).build()
+    return len(model.x), len(model.z), model.function("ode").n_instructions()
+
+
+def test_what_a_joint_does_not_need_is_not_there() -> None:
+    none = sizes(None)
+    viscous = sizes(JointFriction(Viscous(), radius=0.1))
+    constant = sizes(JointFriction(LAW, radius=0.1, normal=20.0))
+    reaction = sizes(JointFriction(LAW, radius=0.1))
+    bristle = sizes(JointFriction(LuGre(), radius=0.1, normal=20.0))
+    assert none[:2] == viscous[:2] == constant[:2] == (2, 0)
+    assert reaction[:2] == (2, 1)
+    assert bristle[:2] == (3, 0)
+    assert none[2] < viscous[2] < constant[2]
+
+
+def test_frictionless_rod_has_the_size_of_its_equation() -> None:
+    """sin, a product with the constant, and loads and stores."""
+    assert sizes(None)[2] <= 8
+
+
+def test_inputs_and_parameters_enter_forces_and_bodies() -> None:
+    mass = Variable("mass", "kg", start=2.0)
+    m = Mechanism("m", gravity=(0.0, 0.0, 0.0))
+    m.body("block", mass.symbol, (0.1, 0.1, 0.1))
+    m.joint(Prismatic("x", "ground", "block"))
+    m.force(JointSpringDamper("motor", "x", "slide", actuator=m.input("force", "N")))
+    model = m.build((mass,))
+    run = simulate(model, 2.0, u={"force": 6.0}, p={"mass": 3.0}, rtol=1e-9)
+    assert run["x"][-1] == pytest.approx(0.5 * 2.0 * 4.0)
+
+
+@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+def test_a_free_body_spins_as_it_must(formulation: str) -> None:
+    """Momentum and energy of a tumbling body without forces."""
+    m = Mechanism("m", gravity=(0.0, 0.0, 0.0))
+    m.body("stone", 2.0, (1.0, 2.0, 2.5))
+    rate = tuple(0.5 * w for w in (0.3, 2.0, 0.1))
+    m.joint(
+        Free("pose", "ground", "stone", rate=(1.0, 0.0, 0.0, 0.0, *rate))
+    )
+    run = simulate(m.build(formulation=formulation), 5.0, rtol=1e-9)
+    assert np.ptp(run["kinetic"]) < 1e-7
+    assert run["phi"].max() < 1e-12
+    name = "pose" if formulation == "joint" else "stone"
+    assert run[f"{name}_x"] == pytest.approx(run.t, abs=1e-9)
