@@ -167,7 +167,8 @@ def optimal_moves(folder: Path, found: Identification) -> Chapter:
 
     def move(T: float | Free) -> Solution:
         problem = rest_to_rest(found.drive.model(), DISTANCE, T, limit=LIMIT)
-        return solve(replace(problem, bounds={**problem.bounds, "v": (-speed, speed)}))
+        bounded = replace(problem, bounds={**problem.bounds, "v": (-speed, speed)})
+        return solve(bounded, intervals=100)
 
     fastest = move(Free(0.05, 10.0, guess=0.5))
     moves = {"minimum time": fastest, "minimum effort": move(1.5 * fastest.T)}

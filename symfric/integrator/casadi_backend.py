@@ -16,6 +16,7 @@ from symfric.status import Status
 
 Array = NDArray[np.float64]
 CHUNKS = 32
+COUNTS = ("steps", "rejections", "evaluations", "jacobians", "factorisations")
 STEPS_PER_INTERVAL = 100_000
 """SUNDIALS would otherwise spend minutes in front of a singularity."""
 
@@ -109,7 +110,7 @@ def integrate_by_peer(
     y = consistent(system, "simulate", y0, np.concatenate([p, inputs.values[:, 0]]))
     grid = np.unique(np.concatenate([inputs.breaks, times]))
     run = Run(engine=f"casadi {problem.plugin}")
-    found, counts = y[:, None], dict[str, int]()
+    found, counts = y[:, None], dict.fromkeys(COUNTS, 0)
     pieces = [np.arange(1, grid.size)]
     while pieces:
         piece = pieces.pop(0)
@@ -135,7 +136,7 @@ def integrate_by_peer(
         part[columns] = result["zf"].full()
         found = np.hstack([found, part])
         for name, value in _counts(solver).items():
-            counts[name] = counts.get(name, 0) + value
+            counts[name] += value
     return run, _dense(system, inputs, p, grid[: found.shape[1]], found), counts
 
 
