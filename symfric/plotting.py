@@ -152,7 +152,7 @@ def plot_figure(data: "FigureData", path: str | Path | None = None) -> Figure:
     laws = list(dict.fromkeys(c.law for c in data.curves))
     cases = list(dict.fromkeys(c.case for c in data.curves))
     abscissae = {x for x, _ in data.panels}
-    height = 4.0 if len(data.panels) == 1 else 2.6
+    height = {1: 4.0, 2: 2.6}.get(len(data.panels), 1.7)
     figure, axes = panels(len(data.panels), 7.0, height, shared=len(abscissae) == 1)
     dashes = ["-", "--", ":", "-."]
     for axis, (x, y) in zip(axes, data.panels, strict=True):

@@ -25,7 +25,9 @@ def lag(
 
     Columns t [s], x [m], v [m/s], F [N] of the last of `periods`, for each f of `frequencies` [Hz];
     the curve "steady" is F in steady sliding. With lag the force is higher while v rises than
-    while it falls.
+    while it falls. A memory much longer than the periods has not settled by then: rate-and-state
+    renews its contacts over D_c, here within seconds, and shows its direct effect; give it a
+    larger velocity by `given`.
 
     Raises:
         ValueError: a law without frictional lag.
@@ -45,7 +47,7 @@ def lag(
     steady = Curve(law_name(law), "steady", {"v": v, "F": steady_force(law, v, N)}, reference=True)
     return FigureData(
         "lag",
-        f"frictional lag, v = {V:g} m/s (2.5 + 2 sin(2πft)), N = {N:g} N",
+        f"frictional lag, v = {V:.3g} m/s (2.5 + 2 sin(2πft)), N = {N:g} N",
         UNITS,
         (("v", "F"),),
         (*curves, steady),

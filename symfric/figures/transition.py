@@ -40,7 +40,7 @@ def transition(
     ]
     return FigureData(
         "transition",
-        f"from pre-sliding to sliding, v = {V:g} m/s sin(2πft), N = {N:g} N",
+        f"from pre-sliding to sliding, v = {V:.3g} m/s sin(2πft), N = {N:g} N",
         UNITS,
         (("v", "F"), ("x", "F")),
         tuple(curves),

@@ -1,0 +1,33 @@
+"""Who drifts, who does not."""
+
+import numpy as np
+import pytest
+
+from symfric import LuGre, law_from_text
+from symfric.figures import compare, drift
+from symfric.laws import ElastoPlastic
+
+
+def test_lugre_drifts_and_the_elasto_plastic_law_does_not() -> None:
+    elastic = ElastoPlastic(z_ba=0.7 * 0.7848 / 1e5)
+    data = compare({"elasto-plastic": elastic, "LuGre": LuGre()}, "drift")
+    assert abs(data["elasto-plastic"]["x"][-1]) < 3e-7
+    assert data["LuGre"]["x"][-1] > 1e-4
+
+
+def test_drift_of_lugre_is_that_of_an_independent_integration() -> None:
+    assert drift(LuGre())["lugre"]["x"][-1] == pytest.approx(2.43e-4, rel=5e-3)  # SciPy's LSODA
+
+
+@pytest.mark.parametrize("name", ["maxwell_slip", "gms", "leuven", "haessig_friedland"])
+def test_laws_with_hysteresis_settle_instead_of_drifting(name: str) -> None:
+    curve = drift(law_from_text(name))[name]
+    t, x = curve["t"], curve["x"]
+    early, late = (np.mean(x[(t >= a) & (t < a + 1)]) for a in (3.0, 7.0))
+    assert abs(late - early) < 2e-6  # LuGre: 1.6e-4
+
+
+def test_the_block_is_pushed_below_break_away_at_first_and_in_the_end() -> None:
+    F_e = drift(LuGre())["lugre"]["F_e"]
+    assert F_e.max() == pytest.approx(0.8 * 0.7848, rel=1e-3)
+    assert F_e.min() == pytest.approx(0.2 * 0.7848, rel=1e-3)
