@@ -102,7 +102,11 @@ def solve(eq: Equations, q: Array, qd: Array, rounds: int = 60) -> Solved:
     for _ in range(rounds):
         r, J = (m.full() for m in step.call([x, q, qd]))
         x = x - np.linalg.solve(J, r[:, 0])
-    every = {name: ca.vertcat(m.dw, m.dv) for name, m in eq.kin.motion.items() if name != "ground"}
+    every = {
+        name: ca.vertcat(m.R @ m.dw_B, m.R @ m.dv_B)
+        for name, m in eq.kin.motion.items()
+        if name != "ground"
+    }
     wrenches = {name: ca.vertcat(*w) for name, w in eq.reactions.items()}
     results = [ca.densify(e) for e in (*every.values(), *wrenches.values())]
     results = ca.substitute(results, [inputs], [ca.SX.zeros(inputs.numel())])

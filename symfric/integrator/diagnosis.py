@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from symfric.integrator.blocks import blocks
 from symfric.integrator.initial import consistent
 from symfric.integrator.integrator import Integrator
-from symfric.integrator.manifold import jammed
+from symfric.integrator.manifold import jammed, singular
 from symfric.integrator.system import System
 from symfric.status import Status
 
@@ -22,6 +22,7 @@ def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> t
     where = f"simulate '{name}': stopped at t = {t:.9g} s"
     f = integrator.f(y, d).full().ravel()
     for status, cause in (
+        (Status.SINGULAR, _dead_centre(system, y, d)),
         (Status.JAMMED, _jammed(integrator, y, d)),
         (Status.STEP_TOO_SMALL, _unbounded(system, y, f, h)),
         (Status.NOT_FINITE, _not_finite(integrator, y, d, h)),
@@ -36,6 +37,12 @@ def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> t
         f"{where}: the step fell to {h:.1e} s, fastest equation {fastest}; a discontinuity is "
         "near, give the law a smooth form or the model an event there",
     )
+
+
+def _dead_centre(system: System, y: Array, d: Array) -> str:
+    """Constraints of a mechanism that depend on each other here."""
+    manifold = system.manifold
+    return "" if manifold is None else singular(manifold, system.names, y, d)
 
 
 def _jammed(integrator: Integrator, y: Array, d: Array) -> str:

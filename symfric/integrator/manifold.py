@@ -25,6 +25,8 @@ from symfric.integrator.lu import factorise
 from symfric.model import Model
 
 Array = NDArray[np.float64]
+DEPENDENT = 1e-5
+"""Ratio of singular values of phi_q at which a mechanism that cannot go on is called singular."""
 ITERATIONS = 4
 """Of Newton's method with frozen derivatives: from 1e-3 to 1e-13."""
 
@@ -39,8 +41,8 @@ class Manifold:
             there are none.
         refine: (y, d) -> y, also its accelerations, multipliers and normal forces exact.
         defect: (y, d) -> constraints and their rates.
-        rows, first: number of accelerations and multipliers among the algebraic rows, the others
-            being normal forces, and of states before them.
+        n, m, first: numbers of accelerations, of multipliers and of states. The algebraic unknowns
+            are accelerations, multipliers, normal forces, in this order after the states.
         slope: (y, d) -> derivatives of the algebraic equations by the algebraic unknowns.
         passable: (y, d) -> sign of det(I - dN/dN), the loop from normal forces over friction to
             reactions and back. At zero friction jams: the normal forces grow without bound; the
@@ -50,7 +52,8 @@ class Manifold:
     project: ca.Function
     refine: ca.Function
     defect: ca.Function
-    rows: int
+    n: int
+    m: int
     first: int
     slope: ca.Function
     passable: ca.Function
@@ -97,7 +100,8 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX) -> Manifold:
         project,
         ca.Function("refine", [y, d], [column], {"cse": True}),
         ca.Function("defect", [y, d], [ca.vertcat(mechanics.phi, rate)]),
-        n + m,
+        n,
+        m,
         nx,
         slope,
         ca.Function("passable", [y, d], [regular * whole.sign], {"cse": True}),
@@ -121,7 +125,7 @@ def _projected(at: ca.Function, q: ca.SX, qd: ca.SX, d: ca.SX) -> tuple[ca.SX, c
 
 def jammed(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array, margin: float) -> str:
     """What jams at y, in words; empty where det(I - dN/dN) > margin."""
-    A, k = manifold.slope(y, d).full(), manifold.rows
+    A, k = manifold.slope(y, d).full(), manifold.n + manifold.m
     if A.shape[0] == k or not np.isfinite(A).all():
         return ""
     try:
@@ -137,4 +141,22 @@ def jammed(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array, margi
         f"friction jams, most of all through {names[manifold.first + k + worst]}: the reactions "
         f"grow with the friction that they cause (det(I - dN/dN) = {determinant:.3g}); less "
         "friction or a longer bearing would let it move"
+    )
+
+
+def singular(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array) -> str:
+    """Which constraints lose their independence at y, in words; empty where none do."""
+    n, m = manifold.n, manifold.m
+    phi_q = manifold.slope(y, d).full()[n : n + m, :n]
+    if not m or not np.isfinite(phi_q).all():
+        return ""
+    u, s, _ = np.linalg.svd(phi_q)
+    if s[-1] > DEPENDENT * s[0]:
+        return ""
+    worst = np.argsort(-np.abs(u[:, -1]))[:2]
+    labels = ", ".join(sorted(names[manifold.first + n + int(i)] for i in worst))
+    return (
+        f"the configuration is singular: constraints depend on each other, most of all those of "
+        f"{labels} (singular values of phi_q {s[-1]:.1e} ... {s[0]:.1e}); where the mechanism goes "
+        "from here is not determined"
     )

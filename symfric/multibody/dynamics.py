@@ -6,8 +6,8 @@ With the accelerations a of the coordinates and the multipliers lam of the loops
 
 where each row of the balance is the wrench that a joint of the tree transmits, projected on its
 motion subspace. What remains of that wrench is the reaction that presses the bearing; for a joint
-that closes a loop it follows from its multipliers. Both are wrenches on the joint's child at the
-origin of the joint's frame there.
+that closes a loop it follows from its multipliers. Both are wrenches on the joint's child about the
+origin of the joint's frame there and in the axes of that frame.
 """
 
 from collections.abc import Iterable
@@ -46,9 +46,9 @@ class Loop:
     relative: Relative
 
     def reaction(self, lam: ca.SX) -> Wrench:
-        """Wrench on the child at its joint point, in world components."""
-        R, own = self.relative.R_WP, lam[self.rows, 0]
-        return -R @ (self.C_v.T @ own), -R @ (self.C_w.T @ own)
+        """Wrench on the child at its joint point, in the parent's joint frame."""
+        own = lam[self.rows, 0]
+        return -self.C_v.T @ own, -self.C_w.T @ own
 
 
 def loops(kin: Kinematics) -> tuple[Loop, ...]:
@@ -121,11 +121,14 @@ def balance(
             axial.setdefault(load.joint.name, []).append(load)
         else:
             loads += _pairs(kin, load)
-    reactions = {loop.joint.name: loop.reaction(lam) for loop in closed}
+    reactions: dict[str, Wrench] = {}
     for loop in closed:
-        force, moment = reactions[loop.joint.name]
-        at = loop.relative.p_WC
-        loads.append(Load(body_of(loop.joint.child), force, at, moment))
+        force_P, moment_P = loop.reaction(lam)
+        R_WP, R_CP, at = loop.relative.R_WP, loop.relative.R.T, loop.relative.p_WC
+        reactions[loop.joint.name] = R_CP @ force_P, R_CP @ moment_P
+        force, moment = R_WP @ force_P, R_WP @ moment_P
+        on_child = frame_at(kin.topology.bodies, loop.joint.child).p
+        loads.append(Load(body_of(loop.joint.child), force, at, moment, on_child))
         loads.append(Load(body_of(loop.joint.parent), -force, at, -moment))
     carried = {link.body: _inertial(kin, link, loads) for link in links}
     rows: list[ca.SX] = [ca.SX(0, 1)] * len(links)
@@ -136,16 +139,17 @@ def balance(
 
 
 def _inertial(kin: Kinematics, link: Link, loads: list[Load]) -> Wrench:
-    """Inertial minus applied wrench of a body, about its centre of mass."""
+    """Inertial minus applied wrench of a body about its centre of mass, in its components."""
     body, motion = kin.topology.bodies[link.body], kin.motion[link.body]
-    com = motion.p + motion.R @ body.c
-    w, dw = motion.R.T @ motion.w, motion.R.T @ motion.dw
+    com, _ = motion.point(body.c)
+    w, J = motion.w_B, body.J
     force = body.mass * motion.acceleration(body.c)
-    moment = motion.R @ (body.J @ dw + ca.cross(w, body.J @ w))
+    moment = J @ motion.dw_B + ca.cross(w, J @ w)
     for load in loads:
         if load.body == link.body:
-            force = force - load.force
-            moment = moment - load.moment - ca.cross(load.point - com, load.force)
+            force -= motion.R.T @ load.force
+            arm = motion.R.T @ (load.point - com) if load.arm is None else load.arm - body.c
+            moment -= motion.R.T @ load.moment + ca.cross(arm, motion.R.T @ load.force)
     return force, moment
 
 
@@ -154,35 +158,30 @@ def _project(
 ) -> tuple[ca.SX, Wrench]:
     """Balance of a link's coordinates and the wrench its joint puts on the joint's child.
 
-    `carried` holds the wrench that each body needs from its joint, about its centre of mass; that
-    of the base grows by what this link passes on.
+    `carried` holds the wrench that each body needs from its joint, about its centre of mass and in
+    its own components; that of the base A grows by what this link passes on. The reaction is in
+    the axes of the joint's frame on the child, about its origin.
     """
-    body, motion, base = kin.topology.bodies[link.body], kin.motion[link.body], link.base
+    body, q = kin.topology.bodies[link.body], kin.q[link.rows, 0]
+    R_PC, p = link.pose(q)
     force, moment = carried[link.body]
-    com, at = motion.p + motion.R @ body.c, motion.point(link.at_body.p)[0]
-    about = moment + ca.cross(com - at, force)
-    if base != GROUND:
-        other = kin.topology.bodies[base]
-        base_com = kin.motion[base].p + kin.motion[base].R @ other.c
-        f, m = carried[base]
-        carried[base] = f + force, m + about + ca.cross(at - base_com, force)
-    q = kin.q[link.rows, 0]
-    R_WP = kin.motion[base].R @ link.at_base.R
+    about = moment + ca.cross(body.c - link.at_body.p, force)
+    force_C, about_C = link.at_body.R.T @ force, link.at_body.R.T @ about
+    force_P, about_P = R_PC @ force_C, R_PC @ about_C
+    if link.base != GROUND:
+        R_AP, base = link.at_base.R, kin.topology.bodies[link.base]
+        arm = link.at_base.p + R_AP @ p - base.c
+        f, m = carried[link.base]
+        passed = R_AP @ force_P
+        carried[link.base] = f + passed, m + R_AP @ about_P + ca.cross(arm, passed)
     H_w, H_v = link.subspace(q)
-    rows = H_w.T @ (R_WP.T @ about) + H_v.T @ (R_WP.T @ force)
+    rows = (R_PC.T @ H_w).T @ about_C + (R_PC.T @ H_v).T @ force_C
     for load in axial.get(link.joint.name, ()):
         k = 1 if link.n == 2 and load.direction == "turn" else 0
         rows[k] -= load.value
     if not link.reverse:
-        return rows, (force, about)
-    far = kin.motion[base].point(link.at_base.p)[0]
-    return rows, (-force, -about - ca.cross(at - far, force))
-
-
-def in_child_frame(kin: Kinematics, joint: Joint, wrench: Wrench) -> Wrench:
-    """The components of a reaction in the child's joint frame."""
-    R = kin.motion[body_of(joint.child)].R @ frame_at(kin.topology.bodies, joint.child).R
-    return R.T @ wrench[0], R.T @ wrench[1]
+        return rows, (force_C, about_C)
+    return rows, (-force_P, -about_P - ca.cross(p, force_P))
 
 
 def kinetic_energy(kin: Kinematics) -> ca.SX:
@@ -190,7 +189,7 @@ def kinetic_energy(kin: Kinematics) -> ca.SX:
     total = ca.SX(0)
     for link in kin.topology.links:
         body, motion = kin.topology.bodies[link.body], kin.motion[link.body]
-        _, v = motion.point(body.c)
-        w = motion.R.T @ motion.w
+        w = motion.w_B
+        v = motion.v_B + ca.cross(w, body.c)
         total += body.mass * ca.dot(v, v) / 2 + ca.dot(w, body.J @ w) / 2
     return total

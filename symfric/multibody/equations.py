@@ -10,7 +10,6 @@ from symfric.multibody.dynamics import (
     Loop,
     Wrench,
     balance,
-    in_child_frame,
     kinetic_energy,
     loops,
     normalisations,
@@ -116,10 +115,7 @@ def equations(
     rows += along @ (weights * pushed)
     phi = phi[list(kept)]
     phi_dot = ca.jtimes(phi, q, qd)
-    reactions = {
-        name: _without(in_child_frame(kin, joint, world[name]), name, kin, loads)
-        for name, joint in by_name.items()
-    }
+    reactions = {name: _without(world[name], name, kin, loads) for name in by_name}
     return Equations(
         kin,
         closed,

@@ -25,12 +25,16 @@ ZERO = ca.SX(3, 1)
 @final
 @dataclass(frozen=True, eq=False)
 class Load:
-    """A force [N] at a point and a moment [N m] on a body, in world components."""
+    """A force [N] at a point and a moment [N m] on a body, in world components.
+
+    `arm` is the point from the origin of the body in its own components, where it is fixed to it.
+    """
 
     body: str
     force: ca.SX
     point: ca.SX
     moment: ca.SX = ZERO
+    arm: ca.SX | None = None
 
     def power(self, kin: Kinematics) -> ca.SX:
         """Power on the body [W]."""
@@ -83,7 +87,8 @@ class Gravity(Force):
         """Weights."""
         for name, body in kin.topology.bodies.items():
             if name != GROUND:
-                yield Load(name, body.mass * vector(self.g), kin.motion[name].point(body.c)[0])
+                com, _ = kin.motion[name].point(body.c)
+                yield Load(name, body.mass * vector(self.g), com, arm=body.c)
 
     def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
         """-m g . p."""
@@ -129,8 +134,8 @@ class SpringDamper(Force):
             if not equals(self.damping, 0.0):
                 f += self.damping * ca.dot(d, v_b - v_a) / length
             pull = f / length * d
-        yield Load(body_of(self.a), pull, p_a)
-        yield Load(body_of(self.b), -pull, p_b)
+        yield Load(body_of(self.a), pull, p_a, arm=kin.offset(self.a))
+        yield Load(body_of(self.b), -pull, p_b, arm=kin.offset(self.b))
 
     def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
         """Stiffness (l - free_length)^2 / 2."""
@@ -199,4 +204,5 @@ class UserForce(Force):
     def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
         """The expression."""
         force, moment = self.expression(kin)
-        yield Load(body_of(self.place), vector(force), kin.point(self.place)[0], vector(moment))
+        at, arm = kin.point(self.place)[0], kin.offset(self.place)
+        yield Load(body_of(self.place), vector(force), at, vector(moment), arm)

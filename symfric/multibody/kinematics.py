@@ -1,7 +1,4 @@
-"""Positions, velocities and accelerations of all bodies: one recursion outwards from the ground.
-
-All vectors are in world components.
-"""
+"""Positions, velocities and accelerations of all bodies: one recursion outwards from the ground."""
 
 from dataclasses import dataclass
 from typing import final
@@ -16,26 +13,39 @@ from symfric.multibody.topology import Link, Topology, body_of, frame_at
 @final
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Motion of a body: pose R_WB, p_WB of its origin; angular velocity w, velocity v of the origin
-    and their derivatives dw, dv.
+    """Motion of a body B relative to the world W.
+
+    Attributes:
+        R, p: pose R_WB, p_WB of its origin.
+        w_B, v_B: angular velocity, velocity of the origin, in components of B.
+        dw_B, dv_B: angular acceleration, acceleration of the origin, in components of B.
     """
 
     R: ca.SX
     p: ca.SX
-    w: ca.SX
-    v: ca.SX
-    dw: ca.SX
-    dv: ca.SX
+    w_B: ca.SX
+    v_B: ca.SX
+    dw_B: ca.SX
+    dv_B: ca.SX
+
+    @property
+    def w(self) -> ca.SX:
+        """Angular velocity in world components."""
+        return self.R @ self.w_B
+
+    @property
+    def v(self) -> ca.SX:
+        """Velocity of the origin in world components."""
+        return self.R @ self.v_B
 
     def point(self, offset: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """Position and velocity of a point fixed to the body, `offset` in its components."""
-        r = self.R @ offset
-        return self.p + r, self.v + ca.cross(self.w, r)
+        """Position and velocity in the world of a point fixed to the body."""
+        return self.p + self.R @ offset, self.R @ (self.v_B + ca.cross(self.w_B, offset))
 
     def acceleration(self, offset: ca.SX) -> ca.SX:
-        """Acceleration of a point fixed to the body."""
-        r = self.R @ offset
-        return self.dv + ca.cross(self.dw, r) + ca.cross(self.w, ca.cross(self.w, r))
+        """Acceleration of a point fixed to the body, in components of B."""
+        w, r = self.w_B, offset
+        return self.dv_B + ca.cross(self.dw_B, r) + ca.cross(w, ca.cross(w, r))
 
 
 @final
@@ -75,6 +85,10 @@ class Kinematics:
     def point(self, place: str) -> tuple[ca.SX, ca.SX]:
         """Position and velocity in the world of the origin of the frame "body.frame"."""
         return self.motion[body_of(place)].point(frame_at(self.topology.bodies, place).p)
+
+    def offset(self, place: str) -> ca.SX:
+        """Position of the frame "body.frame" on its body, in the body's components."""
+        return frame_at(self.topology.bodies, place).p
 
     def relative(self, joint: Joint) -> Relative:
         """Pose and motion of the child frame of `joint` in its parent frame."""
@@ -119,24 +133,30 @@ def kinematics(topology: Topology, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> Kinematic
 
 
 def _carried(base: Motion, link: Link, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> Motion:
-    """Motion of the body of `link`, given that of its base."""
+    """Motion of the body of `link`, given that of its base A.
+
+    P is the joint's frame on the base, C that on the body; everything is turned into the body
+    before it is added up, so that what the joint adds stays what it is in its own axes.
+    """
     q, qd, qdd = q[link.rows, 0], qd[link.rows, 0], qdd[link.rows, 0]
-    R, p = link.pose(q)
+    R_PC, p = link.pose(q)
     H_w, H_v = link.subspace(q)
     drift_w, drift_v = (ca.sparsify(ca.jtimes(H @ qd, q, qd)) for H in (H_w, H_v))
-    R_WP = base.R @ link.at_base.R
-    w_PC, v_PC = R_WP @ (H_w @ qd), R_WP @ (H_v @ qd)
-    arm = base.R @ link.at_base.p + R_WP @ p
-    to_body = -(R_WP @ R @ link.at_body.R.T @ link.at_body.p)
-    w = base.w + w_PC
-    dw = base.dw + ca.cross(base.w, w_PC) + R_WP @ (H_w @ qdd + drift_w)
-    dv = base.dv + ca.cross(base.dw, arm) + ca.cross(base.w, ca.cross(base.w, arm))
-    dv += 2 * ca.cross(base.w, v_PC) + R_WP @ (H_v @ qdd + drift_v)
+    R_AP, R_BC, to_body = link.at_base.R, link.at_body.R, -link.at_body.p
+    R_BP = ca.sparsify(R_BC @ R_PC.T)
+    R_BA = ca.sparsify(R_BP @ R_AP.T)
+    arm = link.at_base.p + R_AP @ p
+    w_A, own_w, own_v = base.w_B, R_BP @ (H_w @ qd), R_BP @ (H_v @ qd)
+    w = R_BA @ w_A + own_w
+    dw = R_BA @ base.dw_B + ca.cross(R_BA @ w_A, own_w) + R_BP @ (H_w @ qdd + drift_w)
+    dv = R_BA @ (base.dv_B + ca.cross(base.dw_B, arm) + ca.cross(w_A, ca.cross(w_A, arm)))
+    dv += 2 * ca.cross(R_BA @ w_A, own_v) + R_BP @ (H_v @ qdd + drift_v)
+    R_WB = ca.sparsify(base.R @ R_BA.T)
     return Motion(
-        ca.sparsify(R_WP @ R @ link.at_body.R.T),
-        base.p + arm + to_body,
+        R_WB,
+        base.p + base.R @ arm + R_WB @ to_body,
         w,
-        base.v + ca.cross(base.w, arm) + v_PC + ca.cross(w, to_body),
+        R_BA @ (base.v_B + ca.cross(w_A, arm)) + own_v + ca.cross(w, to_body),
         dw,
         dv + ca.cross(dw, to_body) + ca.cross(w, ca.cross(w, to_body)),
     )

@@ -18,7 +18,9 @@ CONSERVATIVE: dict[str, Force] = {
 }
 
 
-def power_of(force: Force, formulation: str = "joint", reverse: bool = False) -> tuple[float, float]:
+def power_of(
+    force: Force, formulation: str = "joint", reverse: bool = False
+) -> tuple[float, float]:
     """Power of a force and rate of its energy, in a random state."""
     m = chain(reverse)
     made = m.prepare(formulation=formulation)
@@ -85,6 +87,7 @@ def test_a_user_force_has_the_power_of_its_expression() -> None:
 
 def test_absent_terms_cost_nothing() -> None:
     """A spring without damping has no velocity in it, one without length no root."""
+
     def instructions(force: Force) -> int:
         m = chain(gravity=0.0)
         made = m.prepare()
@@ -93,6 +96,7 @@ def test_absent_terms_cost_nothing() -> None:
         return ca.Function("b", [eq.q, eq.qd, eq.a, eq.lam], [eq.balance]).n_instructions()
 
     linear, spring, damped = (
-        instructions(SpringDamper("s", "ground", "b1", 3.0, *more)) for more in ((), (1.0,), (1.0, 2.0))
+        instructions(SpringDamper("s", "ground", "b1", 3.0, *more))
+        for more in ((), (1.0,), (1.0, 2.0))
     )
     assert linear < spring < damped
