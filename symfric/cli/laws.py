@@ -97,24 +97,14 @@ def behaviour(
 
 
 def show_figure(data: FigureData) -> None:
-    """The range of every column of each curve."""
-    columns = {name for curve in data.curves for name in curve.columns}
-    shown = [name for name in data.units if name in columns]
+    """The range of every column that is drawn, for each curve."""
+    drawn = list(dict.fromkeys(column for panel in data.panels for column in panel))
     rows = [
-        [
-            curve.label,
-            *(
-                f"{curve[name].min():.4g} ... {curve[name].max():.4g}"
-                if name in curve.columns
-                else "-"
-                for name in shown
-            ),
-        ]
+        (curve.label, name, data.units[name], float(curve[name].min()), float(curve[name].max()))
         for curve in data.curves
+        for name in drawn
     ]
-    output.show_table(
-        ["curve", *(f"{name} [{data.units[name]}]" for name in shown)], rows, data.title
-    )
+    output.show_table(["curve", "column", "unit", "least", "greatest"], rows, data.title)
 
 
 def to_dict(law: Law) -> dict[str, Any]:

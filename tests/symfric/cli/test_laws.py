@@ -124,8 +124,11 @@ def test_a_figure_is_drawn_summarised_and_given_as_data(
     arguments = ["laws", "maxwell_slip", "--figure", "hysteresis"]
     assert main([*arguments, "--plot", str(picture), "--json", str(file)]) == 0
     out, err = capsys.readouterr()
-    assert "maxwell_slip, 20x" in out
-    assert "F [N]" in out
+    rows = [line.split() for line in out.splitlines()]
+    last = next(row for row in rows if row[:3] == ["maxwell_slip,", "20x", "F"])
+    assert last[3] == "N"
+    least, greatest = map(float, last[4:])
+    assert (least, greatest) == pytest.approx((-0.7, 0.75), abs=0.1)
     assert err == f"wrote {picture}, {file}\n"
     assert picture.read_bytes().startswith(PNG)
     data = json.loads(file.read_text())
