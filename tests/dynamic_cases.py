@@ -1,15 +1,17 @@
 """Laws with states whose options lead to other expressions than the defaults."""
 
-from symfric import Law
+from symfric import Law, LuGre, Stribeck
 from symfric.laws import (
     GMS,
     BlimanSorine,
     Bristle2D,
     ElastoPlastic,
     HaessigFriedland,
+    Lagged,
     MaxwellSlip,
     RateAndState,
     StickSlip,
+    TemperatureDependent,
 )
 
 DYNAMIC: dict[str, Law] = {
@@ -21,6 +23,8 @@ DYNAMIC: dict[str, Law] = {
     "gms, event, viscous": GMS(sigma_2=0.4, form="event"),
     "stick_slip, published": StickSlip(branch="published"),
     "bristle_2d, kappa 0.2": Bristle2D(kappa=0.2),
+    "lagged(stribeck)": Lagged(Stribeck(sigma_2=0.4)),
+    "temperature_dependent(lugre)": TemperatureDependent(LuGre(sigma_2=0.4), T=303.15, k_dry=0.01),
     "rate_and_state, slip": RateAndState(evolution="slip"),
 }
 

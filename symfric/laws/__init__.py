@@ -34,6 +34,9 @@ from symfric.laws.dynamic import StickSlip as StickSlip
 from symfric.laws.names import ALL_LAWS as ALL_LAWS
 from symfric.laws.names import law_from_text as law_from_text
 from symfric.laws.names import law_name as law_name
+from symfric.laws.planar import Planar as Planar
+from symfric.laws.populations import GenericAsperity as GenericAsperity
+from symfric.laws.populations import RandomBristles as RandomBristles
 from symfric.laws.static import BAM as BAM
 from symfric.laws.static import Ambrosio as Ambrosio
 from symfric.laws.static import Andersson as Andersson
@@ -70,6 +73,8 @@ from symfric.laws.static import Tustin as Tustin
 from symfric.laws.static import VelocityBased as VelocityBased
 from symfric.laws.static import Viscous as Viscous
 from symfric.laws.static import Wojewoda as Wojewoda
+from symfric.laws.wrap import Lagged as Lagged
+from symfric.laws.wrap import TemperatureDependent as TemperatureDependent
 
 
 def __getattr__(name: str) -> object:

@@ -6,6 +6,7 @@ from symfric.laws.base import Law
 from symfric.laws.compose import Asymmetric, LoadDependent, Sum
 from symfric.laws.dynamic import DYNAMIC_LAWS
 from symfric.laws.static import STATIC_LAWS
+from symfric.laws.wrap import Lagged, TemperatureDependent
 from symfric.parameters import check_names
 
 ALL_LAWS: dict[str, type[Law]] = {
@@ -21,6 +22,13 @@ ALIASES = {
 }
 """Other names of the same law, as papers and programs use them."""
 
+WRAPPERS: dict[str, type[LoadDependent | Lagged | TemperatureDependent]] = {
+    "load_dependent": LoadDependent,
+    "lagged": Lagged,
+    "temperature_dependent": TemperatureDependent,
+}
+"""Laws around one law, by the name that stands before its parentheses."""
+
 
 def law_name(law: Law) -> str:
     """The text that `law_from_text` turns into a law of this kind; the class name of your own."""
@@ -28,8 +36,9 @@ def law_name(law: Law) -> str:
         return "+".join(law_name(term) for term in law.laws)
     if isinstance(law, Asymmetric):
         return f"asymmetric({law_name(law.positive)})"
-    if isinstance(law, LoadDependent):
-        return f"load_dependent({law_name(law.law)})"
+    if isinstance(law, LoadDependent | Lagged | TemperatureDependent):
+        name = next(name for name, kind in WRAPPERS.items() if kind is type(law))
+        return f"{name}({law_name(law.law)})"
     known = (name for name, kind in ALL_LAWS.items() if kind is type(law))
     return next(known, type(law).__name__)
 
@@ -38,7 +47,8 @@ def law_from_text(text: str) -> Law:
     """The law with default parameters that `text` names.
 
     `brown_mcphee`, another name of a law as `adams`, sums `coulomb+viscous`, wrappers
-    `asymmetric(coulomb+viscous)` and `load_dependent(lugre)`.
+    `asymmetric(coulomb+viscous)`, `load_dependent(lugre)`, `lagged(stribeck)` and
+    `temperature_dependent(lugre)`.
 
     Raises:
         ValueError: unknown name (the closest one is offered), empty term, unbalanced parentheses.
@@ -49,10 +59,12 @@ def law_from_text(text: str) -> Law:
 
 
 def _single(term: str, text: str) -> Law:
-    wrapped = fullmatch(r"(asymmetric|load_dependent)\((.+)\)", term)
+    wrapped = fullmatch(rf"(asymmetric|{'|'.join(WRAPPERS)})\((.+)\)", term)
     if wrapped:
         inner = law_from_text(wrapped[2])
-        return Asymmetric(inner, inner) if wrapped[1] == "asymmetric" else LoadDependent(inner)
+        return (
+            Asymmetric(inner, inner) if wrapped[1] == "asymmetric" else WRAPPERS[wrapped[1]](inner)
+        )
     name = ALIASES.get(term, term)
     check_names(f"law '{text}'", [name], ALL_LAWS)
     return ALL_LAWS[name]()

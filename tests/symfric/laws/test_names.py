@@ -20,6 +20,8 @@ def test_name_gives_the_law_with_default_parameters(name: str) -> None:
         "coulomb+viscous+lugre",
         "asymmetric(coulomb+viscous)",
         "load_dependent(lugre)",
+        "lagged(stribeck+viscous)",
+        "temperature_dependent(load_dependent(lugre))",
         "load_dependent(asymmetric(dahl+viscous))+stribeck",
         "asymmetric(lugre)+load_dependent(coulomb)",
     ],

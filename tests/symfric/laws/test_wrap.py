@@ -1,0 +1,85 @@
+"""Lag and temperature around a law."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rigs import prescribed_motion
+
+from symfric import Coulomb, LuGre, Stribeck, Sum, Viscous, parameters, rabinowicz, simulate
+from symfric.laws import Karnopp, Lagged, TemperatureDependent
+
+N = 7.848
+
+
+@given(v=st.floats(-0.1, 0.1), w=st.floats(-0.1, 0.1))
+def test_lagged_force_is_that_of_the_velocity_it_follows(v: float, w: float) -> None:
+    law, z = Lagged(Stribeck(), tau_L=0.02), np.array([w])
+    assert law.force(v, N, z) == Stribeck().force(w, N)
+    assert law.rate(v, N, z)[0] == pytest.approx((v - w) / 0.02)
+    assert law.force(v, N, law.steady_state(v, N)) == Stribeck().force(v, N)
+
+
+def test_force_lags_behind_a_swinging_velocity_as_a_filter_does() -> None:
+    """Viscous friction shows the velocity that it follows, in closed form."""
+    w, tau = 2 * np.pi * 5, 0.02
+    law = Lagged(Viscous(sigma_2=2.0), tau_L=tau)
+    model = prescribed_motion(law, N, lambda t: 0.1 * ca.sin(w * t))
+    run = simulate(model, 1.0, rtol=1e-9, samples=5001)
+    late = run.t > 0.5
+    expected = 0.2 * np.sin(w * run.t - np.arctan(w * tau)) / np.hypot(1, w * tau)
+    assert run["friction"][late] == pytest.approx(expected[late], abs=1e-6)
+
+
+def test_lag_opens_a_loop_around_the_stribeck_curve() -> None:
+    law = Lagged(Stribeck(v_s=1e-3), tau_L=5e-3)
+    model = prescribed_motion(law, N, lambda t: 3e-3 + 2e-3 * ca.sin(20 * t))
+    run = simulate(model, 1.0, rtol=1e-8, samples=5001)
+    speeding = np.gradient(run["v"], run.t) > 0
+    near = (np.abs(run["v"] - 2e-3) < 2e-5) & (run.t > 0.3)
+    up, down = run["friction"][near & speeding].mean(), run["friction"][near & ~speeding].mean()
+    assert up > Stribeck(v_s=1e-3).force(2e-3, N) > down
+
+
+def test_lagged_law_runs_in_a_scene() -> None:
+    run = simulate(rabinowicz(Lagged(Coulomb(), tau_L=1e-4)), 5.0, rtol=1e-6)
+    assert run["x"].max() == pytest.approx(0.4354, abs=0.01)
+
+
+def test_law_with_states_is_not_lagged() -> None:
+    with pytest.raises(ValueError, match="Lagged: expected a law without states, got LuGre"):
+        Lagged(LuGre())
+    assert [i.name for i in Lagged(Karnopp()).inputs] == ["F_e"]
+
+
+@given(T=st.floats(253.15, 353.15), v=st.floats(-0.1, 0.1))
+def test_coefficients_fall_exponentially_with_the_temperature(T: float, v: float) -> None:
+    parts = Sum((Coulomb(mu_d=0.1), Viscous(sigma_2=3.0)))
+    law = TemperatureDependent(parts, T=T, k_dry=0.002, k_wet=0.03)
+    rise = T - 293.15
+    expected = Coulomb(mu_d=0.1).force(v, N) * np.exp(-0.002 * rise)
+    expected += 3.0 * v * np.exp(-0.03 * rise)
+    assert law.force(v, N) == pytest.approx(expected, rel=1e-12, abs=1e-300)
+
+
+@given(v=st.floats(-0.1, 0.1), z=st.floats(-1e-5, 1e-5))
+def test_at_the_reference_temperature_it_is_the_law(v: float, z: float) -> None:
+    law, state = LuGre(sigma_2=0.4), np.array([z])
+    wrapped = TemperatureDependent(law)
+    assert wrapped.force(v, N, state) == law.force(v, N, state)
+    assert wrapped.rate(v, N, state) == law.rate(v, N, state)
+
+
+def test_steady_state_and_names_are_those_of_the_law() -> None:
+    law = TemperatureDependent(LuGre(), T=313.15, k_dry=0.01)
+    assert law.steady_state(0.1, N)[0] == pytest.approx(0.1 * N / 1e5 * np.exp(-0.2))
+    assert list(parameters(law))[:4] == ["T", "T_0", "k_dry", "k_wet"]
+    assert [s.name for s in law.states] == ["z"]
+
+
+def test_temperature_may_be_a_symbol() -> None:
+    T = ca.SX.sym("T")
+    law = TemperatureDependent(Viscous(sigma_2=2.0), T=T)
+    F = ca.Function("F", [T], [law.force(0.1, N)])
+    assert float(F(303.15)) == pytest.approx(0.2 * np.exp(-0.3))
