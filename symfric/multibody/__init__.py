@@ -8,6 +8,7 @@ from symfric.multibody.forces import JointSpringDamper as JointSpringDamper
 from symfric.multibody.forces import SpringDamper as SpringDamper
 from symfric.multibody.forces import UserForce as UserForce
 from symfric.multibody.friction import JointFriction as JointFriction
+from symfric.multibody.functions import functions as functions
 from symfric.multibody.joints import ALL_JOINTS as ALL_JOINTS
 from symfric.multibody.joints import Cylindrical as Cylindrical
 from symfric.multibody.joints import Distance as Distance

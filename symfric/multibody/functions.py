@@ -1,0 +1,79 @@
+"""The equations of a mechanism as named CasADi Functions, for those who write their own."""
+
+import casadi as ca
+
+from symfric.model import Variables
+from symfric.multibody.assembly import slips
+from symfric.multibody.body import GROUND
+from symfric.multibody.mechanism import Mechanism
+
+NONE = ca.SX(0, 1)
+
+
+def functions(
+    mechanism: Mechanism, p: Variables = (), formulation: str = "joint"
+) -> dict[str, ca.Function]:
+    """Functions of coordinates q, rates qd, accelerations a, inputs u and parameters p.
+
+    Args:
+        mechanism: what is described.
+        p: parameters, as for `Mechanism.build`.
+        formulation: "joint" or "absolute".
+
+    Returns:
+        mass: (q, p) -> M, shape (n, n).
+        bias: (q, qd, u, p) -> Coriolis forces minus applied forces, without friction: what
+            M a + phi_q' lam must balance.
+        constraints: (q, p) -> phi, shape (m, 1), and its Jacobian phi_q.
+        inverse_dynamics: (q, qd, a, lam, z, u, p) -> the generalised forces that are missing for
+            the accelerations a, friction included; its normal forces follow from a and lam
+            without a loop. z are the internal states of the laws.
+        energy: (q, qd, p) -> kinetic and potential energy [J].
+        poses: (q, p) -> for every body R_WB (3, 3) and p_WB (3, 1) side by side, (3, 4 bodies).
+
+    Raises:
+        ValueError: as `Mechanism.build`.
+    """
+    eq = mechanism.prepare(p, formulation).eq
+    q, qd, a, lam = eq.q, eq.qd, eq.a, eq.lam
+    u, parameters = (
+        ca.vertcat(NONE, *(v.symbol for v in group)) for group in (mechanism.inputs, p)
+    )
+    still = [ca.SX.zeros(x.numel()) for x in (a, lam, eq.F)]
+    (bias,) = ca.substitute([eq.balance], [a, lam, eq.F], still)
+    contacts = slips(eq, [1.0] * len(eq.contacts))
+    z = ca.vertcat(NONE, *(s.symbol for c in contacts for s in c.states))
+    forces = ca.vertcat(NONE, *(c.force for c in contacts))
+    for c in contacts:
+        if c.N is not c.normal:
+            forces = ca.substitute(forces, c.N, c.normal)
+    moved = ca.substitute(eq.balance, eq.F, forces)
+    bodies = [m for name, m in eq.kin.motion.items() if name != GROUND]
+    poses = ca.horzcat(ca.SX(3, 0), *(ca.horzcat(m.R, m.p) for m in bodies))
+    cse = {"cse": True}
+    return {
+        "mass": ca.Function("mass", [q, parameters], [eq.mass], ["q", "p"], ["M"], cse),
+        "bias": ca.Function(
+            "bias", [q, qd, u, parameters], [bias], ["q", "qd", "u", "p"], ["bias"], cse
+        ),
+        "constraints": ca.Function(
+            "constraints", [q, parameters], [eq.phi, eq.Phi_q], ["q", "p"], ["phi", "phi_q"], cse
+        ),
+        "inverse_dynamics": ca.Function(
+            "inverse_dynamics",
+            [q, qd, a, lam, z, u, parameters],
+            [moved],
+            ["q", "qd", "a", "lam", "z", "u", "p"],
+            ["missing"],
+            cse,
+        ),
+        "energy": ca.Function(
+            "energy",
+            [q, qd, parameters],
+            [eq.kinetic, eq.potential],
+            ["q", "qd", "p"],
+            ["kinetic", "potential"],
+            cse,
+        ),
+        "poses": ca.Function("poses", [q, parameters], [ca.densify(poses)], ["q", "p"], ["poses"]),
+    }
