@@ -116,6 +116,7 @@ def to_dict(law: Law) -> dict[str, Any]:
         "smoothness": law.facts.smoothness,
         "confidence": law.facts.confidence,
         "source": law.facts.source,
+        "warnings": list(law.warnings()),
         "odd": law.facts.odd,
         "load": law.facts.load,
         "instructions": asdict(cost(law)),
@@ -167,7 +168,8 @@ def show_list(chosen: dict[str, Law]) -> None:
         "symfric laws NAME shows equation, parameters and more;\n"
         f"symfric laws NAME --figure draws {', '.join(FIGURES)}.\n"
         f"Other names: {others}.\n"
-        "Sums are written coulomb+viscous, wrappers asymmetric(lugre), load_dependent(lugre)."
+        "Sums are written coulomb+viscous, wrappers asymmetric(lugre), load_dependent(lugre),\n"
+        "lagged(stribeck), temperature_dependent(lugre)."
     )
 
 
@@ -182,6 +184,8 @@ def show_law(name: str, law: Law) -> None:
         f"Cost: {cost(law).value} CasADi instructions for force and rate, "
         f"{cost(law).gradient} for their derivatives.\n"
     )
+    for warning in law.warnings():
+        output.show(f"Warning: {warning}.\n")
     if law.inputs:
         output.show_table(
             ["input", "unit", "meaning"], [(i.name, i.unit, i.doc) for i in law.inputs]

@@ -1,12 +1,13 @@
 """`symfric run`: simulate a scene with one friction law, or compare several."""
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
 
-from symfric import SolveError, Trajectory, law_from_text, parameters, simulate, with_values
+from symfric import Law, SolveError, Trajectory, law_from_text, parameters, simulate, with_values
 from symfric.cli import output
 from symfric.cli.inputs import input_from_text
 from symfric.cli.options import (
@@ -108,6 +109,7 @@ def run(
         output.emit_json(to_dict(name, machines[name], trajectory) | {"inputs": described}, json)
         if json != "-":
             show_trajectory(name, trajectory)
+            show_warnings(name, machines[name])
     output.say_written(out, plot, json)
     for trajectory in found.values():
         if not trajectory.status.ok:
@@ -159,6 +161,14 @@ def to_dict(law: str, scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
         "t_end": float(trajectory.t[-1]),
         "final": trajectory.final,
     }
+
+
+def show_warnings(law: str, scene: Scene) -> None:
+    """Print what the numbers of the scene's laws give away."""
+    held = (getattr(scene, item.name) for item in fields(scene))
+    for value in held:
+        for warning in value.warnings() if isinstance(value, Law) else ():
+            output.show(f"Warning: {law}: {warning}.\n")
 
 
 def show_trajectory(law: str, trajectory: Trajectory) -> None:

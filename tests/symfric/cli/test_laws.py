@@ -164,3 +164,10 @@ def test_a_figure_that_cannot_be_is_refused_in_one_sentence(
     assert out == ""
     assert said in err
     assert len(err.splitlines()) == 1
+
+
+def test_what_the_numbers_give_away_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "sigma_2 = 0 is below" in described(capsys, "lugre")["warnings"][0]
+    assert described(capsys, "lugre", "--set", "sigma_2=100")["warnings"] == []
+    assert main(["laws", "lugre"]) == 0
+    assert "Warning: not passive from v to F" in capsys.readouterr().out

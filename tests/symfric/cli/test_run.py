@@ -131,3 +131,14 @@ def test_a_failed_solve_has_status_1_and_keeps_what_there_is(
 @pytest.mark.parametrize("scene", ALL_SCENES)
 def test_every_scene_runs_with_its_defaults(scene: str) -> None:
     assert main(["run", scene, "--law", "coulomb+viscous"]) == 0
+
+
+def test_a_law_that_may_push_is_warned_about_with_the_bound(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["run", "rabinowicz", "--law", "lugre", "--t-end", "0.1"]) == 0
+    words = " ".join(capsys.readouterr().out.split())
+    assert "Warning: lugre: not passive from v to F: sigma_2 = 0 is below" in words
+    assert "= 95" in words
+    assert main(["run", "rabinowicz", "--law", "lugre_passive", "--t-end", "0.1"]) == 0
+    assert "Warning" not in capsys.readouterr().out
