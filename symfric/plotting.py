@@ -40,6 +40,10 @@ def panels(
     return figure, list(axes[:, 0])
 
 
+PANELS = 8
+"""More signals than this are drawn together, a panel per unit, unless they were named."""
+
+
 def plot_trajectories(
     trajectories: "Mapping[str, Trajectory]",
     names: Sequence[str] = (),
@@ -49,13 +53,16 @@ def plot_trajectories(
 
     Args:
         trajectories: legend entry -> trajectory.
-        names: signals to show; those that all trajectories share if none is given.
+        names: signals to show, a panel each; those that all trajectories share if none is given,
+            then a panel per unit where they are many.
         path: image file.
     """
     first = next(iter(trajectories.values()))
     shared = [n for n in first.signals if all(n in t.signals for t in trajectories.values())]
     check_names(f"plot of '{first.scene}'", names, shared)
     shown = list(names) or shared
+    if len(shown) > PANELS and not names:
+        return save(_by_unit(trajectories, shown), path)
     figure, axes = panels(len(shown))
     for axis, name in zip(axes, shown, strict=True):
         for label, trajectory in trajectories.items():
@@ -69,6 +76,37 @@ def plot_trajectories(
     axes[-1].set_xlabel("t [s]")
     figure.align_ylabels(axes)
     return save(figure, path)
+
+
+def _by_unit(trajectories: "Mapping[str, Trajectory]", shown: Sequence[str]) -> Figure:
+    """Many signals: a panel per unit, a colour per signal, a line style per simulation."""
+    first = next(iter(trajectories.values()))
+    groups: dict[str, list[str]] = {}
+    for name in shown:
+        groups.setdefault(first.units[name], []).append(name)
+    figure, axes = panels(len(groups), width=9.5, height=2.3)
+    for axis, (unit, members) in zip(axes, groups.items(), strict=True):
+        for k, name in enumerate(members):
+            for style, trajectory in zip(
+                ("-", "--", ":", "-."), trajectories.values(), strict=False
+            ):
+                label = name if style == "-" else None
+                axis.plot(
+                    trajectory.t, trajectory[name], style, color=f"C{k % 10}", label=label,
+                    linewidth=1.1,
+                )  # fmt: skip
+        axis.set_ylabel(f"[{unit}]" if unit else "[several units]")
+        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize="x-small")
+    styles = ", ".join(
+        f"{label} {style}"
+        for label, style in zip(trajectories, ("-", "- -", ":", "- ."), strict=False)
+    )
+    axes[0].set_title(
+        f"{first.scene}: {styles}" if len(trajectories) > 1 else first.scene, loc="left"
+    )
+    axes[-1].set_xlabel("t [s]")
+    figure.align_ylabels(axes)
+    return figure
 
 
 def plot_laws(laws: "Mapping[str, Law]", N: float = 1.0, path: str | Path | None = None) -> Figure:
