@@ -16,7 +16,7 @@ from symfric.status import Status
 
 Array = NDArray[np.float64]
 CHUNKS = 32
-COUNTS = ("steps", "rejections", "evaluations", "jacobians", "factorisations")
+COUNTS: tuple[str, ...] = ("steps", "rejections", "evaluations", "jacobians", "factorisations")
 STEPS_PER_INTERVAL = 100_000
 """SUNDIALS would otherwise spend minutes in front of a singularity."""
 
