@@ -55,6 +55,12 @@ class JointFriction:
         """What is wrong for a joint that slides along or turns about z."""
         if not (slides or turns):
             yield "expected a revolute, prismatic or cylindrical joint"
+        if self.law.inputs:
+            needs = ", ".join(i.name for i in self.law.inputs)
+            yield (
+                f"law: expected one that needs v and N alone, got {type(self.law).__name__}, which "
+                f"needs {needs}; a joint has no such input"
+            )
         if turns and self.radius is None:
             yield "radius: expected the bearing's radius [m], got none"
         limits = {

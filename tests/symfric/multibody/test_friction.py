@@ -4,6 +4,7 @@ import casadi as ca
 import pytest
 
 from symfric import BrownMcPhee
+from symfric.laws import Karnopp
 from symfric.multibody import JointFriction
 
 LAW = BrownMcPhee()
@@ -58,6 +59,7 @@ def test_absent_reactions_leave_no_trace() -> None:
     ("friction", "slides", "turns", "message"),
     [
         (JointFriction(LAW), False, True, "radius: expected the bearing's radius"),
+        (JointFriction(Karnopp()), True, False, "got Karnopp, which needs F_e"),
         (JointFriction(LAW), False, False, "expected a revolute, prismatic or cylindrical joint"),
         (JointFriction(LAW, radius=-1.0), False, True, "radius: expected a number > 0, got -1"),
         (JointFriction(LAW, length=0.0), True, False, "length: expected a number > 0"),
