@@ -57,7 +57,7 @@ def run(
     ] = "auto",
     backend: Annotated[
         str,
-        typer.Option("--backend", help="auto, vm, compiled, or CasADi's rosenbrock, sundials."),
+        typer.Option("--backend", help="auto, vm, compiled, or CasADi's rosenbrock, sundials, ggl."),
     ] = "auto",
     samples: Annotated[
         int, typer.Option("--samples", help="Number of equally spaced times of the result.")

@@ -1,6 +1,12 @@
-"""CasADi's own implicit integrators as a second opinion: rosenbrock, SUNDIALS' cvodes and idas."""
+"""CasADi's own implicit integrators as a second opinion: rosenbrock, SUNDIALS' cvodes and idas.
+
+Mechanisms are integrated in the form of index 1, whose constraints drift, or with idas in the
+stabilised form of index 2 (`symfric.integrator.ggl`). Nothing is projected: the norms of the
+constraints among the results show what each of them makes of it.
+"""
 
 from dataclasses import dataclass
+from re import sub
 from typing import Any, final
 
 import casadi as ca
@@ -8,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.dense import Dense, hermite
-from symfric.integrator.initial import consistent
+from symfric.integrator.ggl import stabilised
+from symfric.integrator.initial import consistent, first_step
 from symfric.integrator.inputs import Drivers
 from symfric.integrator.run import Run, Tolerances
 from symfric.integrator.system import System
@@ -19,6 +26,12 @@ CHUNKS = 32
 COUNTS: tuple[str, ...] = ("steps", "rejections", "evaluations", "jacobians", "factorisations")
 STEPS_PER_INTERVAL = 100_000
 """SUNDIALS would otherwise spend minutes in front of a singularity."""
+HINTS = {
+    1: "look for a discontinuity or a NaN there, or loosen rtol",
+    2: "its corrector seldom converges below rtol = 1e-8 in this form of index 2, loosen rtol; "
+    "or look for a discontinuity there",
+}
+"""What to try when CasADi's integrator stops, by the index of the equations."""
 
 
 @final
@@ -32,14 +45,22 @@ class Peer:
     plugin: str
     dae: dict[str, ca.SX]
     options: dict[str, Any]
+    index: int = 1
 
-    def over(self, grid: Array) -> tuple[ca.Function, Array]:
-        """Integrator from grid[0] over grid[1:], and the input data for it."""
+    def over(self, grid: Array, y: Array | None = None) -> tuple[ca.Function, Array]:
+        """Integrator from grid[0] over grid[1:], and the input data for it.
+
+        Args:
+            grid: times [s].
+            y: consistent unknowns at the first of them; index 2 needs them.
+        """
         first = self.inputs.interval((grid[:-1] + grid[1:]) / 2)
         extra: dict[str, Any] = {}
         if self.plugin == "rosenbrock":
             first, counts = np.unique(first, return_counts=True)
             extra["control_group_size"] = counts.tolist()
+        if self.index == 2 and y is not None:
+            extra = self._begin(grid, y, self.inputs.values[:, first[0]])
         solver = ca.integrator(
             "solver",
             self.plugin,
@@ -50,24 +71,47 @@ class Peer:
         )
         return solver, self.inputs.values[:, first]
 
+    def _begin(self, grid: Array, y: Array, data: Array) -> dict[str, Any]:
+        """A start that spares idas a search for consistent values, which index 2 makes singular."""
+        rates, nominal = rates_of(self.system)
+        f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
+        slope = f(y, np.concatenate([self.p, data])).full().ravel()[rates] / nominal
+        # its own guess of a first step is so long that tight tolerances are never met
+        return {
+            "init_xdot": slope.tolist(),
+            "step0": first_step(float(grid[-1] - grid[0])),
+        }
+
+
+def rates_of(system: System) -> tuple[list[int], Array]:
+    """Which unknowns are differential states, and their nominal values."""
+    rates = [i for i in range(system.n) if i not in system.algebraic[1]]
+    nominal = np.ones(system.n)
+    nominal[: system.nx] = system.nominal
+    return rates, nominal[rates]
+
 
 def peer(system: System, inputs: Drivers, p: Array, tolerances: Tolerances, backend: str) -> Peer:
     """Semi-explicit DAE of `system` for CasADi, with time as its own variable.
 
+    Args:
+        backend: "rosenbrock", "sundials" or "ggl".
+
     Raises:
-        ValueError: a mass matrix that is not diagonal, which CasADi does not take.
+        ValueError: a mass matrix that is not diagonal, which CasADi does not take, or "ggl" for
+            what is no mechanism.
     """
+    if backend == "ggl":
+        system = stabilised(system)
     rows, columns = system.algebraic
-    rates = [i for i in range(system.n) if i not in columns]
+    rates, nominal = rates_of(system)
     mass = ca.DM(system.mass)
     if rows != columns or mass.nnz() != len(rates):
         raise ValueError(
             "simulate: expected a diagonal mass matrix for this backend, got coupled rates; "
             "use backend='auto'"
         )
-    nominal = np.ones(system.n)
-    nominal[: system.nx] = system.nominal
-    scale = ca.DM(nominal[rates])
+    scale = ca.DM(nominal)
     scaled = ca.SX.sym("x", len(rates))
     f = ca.substitute(system.f, system.y[rates], scale * scaled)
     n_p = p.size
@@ -80,6 +124,9 @@ def peer(system: System, inputs: Drivers, p: Array, tolerances: Tolerances, back
     if plugin != "rosenbrock":
         # without it SUNDIALS adjoints of several parameters are silently wrong (casadi#4383)
         options["quad_err_con"] = True
+    if backend == "ggl":
+        # multipliers of index 2 carry an error / h, which no step size brings below a tolerance
+        options |= {"suppress_algebraic": True, "calc_ic": False}
     ode = f[rates] / (scale * ca.diag(mass)[rates])
     dae = {
         "x": scaled,
@@ -89,7 +136,7 @@ def peer(system: System, inputs: Drivers, p: Array, tolerances: Tolerances, back
         "ode": ca.densify(ode),
         "alg": f[rows],
     }
-    return Peer(system, inputs, p, plugin, dae, options)
+    return Peer(system, inputs, p, plugin, dae, options, 2 if backend == "ggl" else 1)
 
 
 def integrate_by_peer(
@@ -103,41 +150,38 @@ def integrate_by_peer(
 ) -> tuple[Run, Dense, dict[str, int]]:
     """Integrate with CasADi over `times`; a failure keeps what came before it."""
     problem = peer(system, inputs, p, tolerances, backend)
-    rates = [i for i in range(system.n) if i not in system.algebraic[1]]
-    columns = system.algebraic[1]
-    nominal = np.ones(system.n)
-    nominal[: system.nx] = system.nominal
+    (rates, nominal), columns = rates_of(problem.system), problem.system.algebraic[1]
     y = consistent(system, "simulate", y0, np.concatenate([p, inputs.values[:, 0]]))
+    y = np.concatenate([y, np.zeros(problem.system.n - system.n)])
     grid = np.unique(np.concatenate([inputs.breaks, times]))
     run = Run(engine=f"casadi {problem.plugin}")
     found, counts = y[:, None], dict.fromkeys(COUNTS, 0)
     pieces = [np.arange(1, grid.size)]
     while pieces:
         piece = pieces.pop(0)
-        solver, data = problem.over(grid[[piece[0] - 1, *piece]])
+        solver, data = problem.over(grid[[piece[0] - 1, *piece]], found[:, -1])
         try:
-            result = solver(
-                x0=found[rates, -1] / nominal[rates], z0=found[columns, -1], p=p, u=data
-            )
+            result = solver(x0=found[rates, -1] / nominal, z0=found[columns, -1], p=p, u=data)
         except RuntimeError as error:
             if piece.size == grid.size - 1 > 1:
                 # again in pieces, so that everything before the failure is kept
                 pieces = np.array_split(piece, min(CHUNKS, piece.size))
                 continue
-            last = [line for line in str(error).splitlines() if line.strip()][-1].strip()
+            last = [line for line in str(error).splitlines() if line.strip()][-1]
+            last = sub(r"^.*\.cpp:\d+: |\. Consult .*$", "", last.strip())
             run.stop(
                 Status.SOLVER_FAILED,
                 f"simulate: {problem.plugin} stopped after t = {grid[piece[0] - 1]:g} s ({last}); "
-                "look for a discontinuity or a NaN there, or loosen rtol",
+                f"{HINTS[problem.index]}",
             )
             break
-        part = np.zeros((system.n, piece.size))
-        part[rates] = result["xf"].full() * nominal[rates, None]
+        part = np.zeros((problem.system.n, piece.size))
+        part[rates] = result["xf"].full() * nominal[:, None]
         part[columns] = result["zf"].full()
         found = np.hstack([found, part])
         for name, value in _counts(solver).items():
             counts[name] += value
-    return run, _dense(system, inputs, p, grid[: found.shape[1]], found), counts
+    return run, _dense(system, inputs, p, grid[: found.shape[1]], found[: system.n]), counts
 
 
 def _counts(solver: ca.Function) -> dict[str, int]:

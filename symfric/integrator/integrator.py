@@ -67,15 +67,20 @@ class Integrator:
         return ca.Function(name, [self.model.t, s.y, s.d], [driven])
 
     @cached_property
+    def plain_signals(self) -> ca.Function:
+        """All signals of the model as a Function (t, y, d)."""
+        m = self.model
+        outputs = (ca.SX(o.expression) for o in m.outputs.values())
+        stacked = ca.vertcat(m.vector("x"), m.vector("z"), m.vector("u"), *outputs)
+        return self.of_time("signals", stacked)
+
+    @cached_property
     def signals(self) -> ca.Function:
         """All signals of the model as a Function (t, y, d), those of a mechanism refined.
 
         Between steps the constraints of a mechanism hold to the tolerance only, at results exactly.
         """
-        m, manifold = self.model, self.system.manifold
-        outputs = (ca.SX(o.expression) for o in m.outputs.values())
-        stacked = ca.vertcat(m.vector("x"), m.vector("z"), m.vector("u"), *outputs)
-        signals = self.of_time("signals", stacked)
+        signals, manifold = self.plain_signals, self.system.manifold
         if manifold is None:
             return signals
         t, y, d = ca.SX.sym("t"), ca.SX.sym("y", self.system.n), ca.SX.sym("d", signals.numel_in(2))
@@ -85,6 +90,11 @@ class Integrator:
     def signal_columns(self) -> Columns:
         """The signals at many times."""
         return Columns(self.signals)
+
+    @cached_property
+    def plain_signal_columns(self) -> Columns:
+        """The signals at many times as they are, drift of constraints included."""
+        return Columns(self.plain_signals)
 
     def vm(self) -> Engine:
         """The engine that needs no compiler."""

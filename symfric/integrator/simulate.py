@@ -24,7 +24,7 @@ from symfric.parameters import check_names
 from symfric.status import SolveError, Status
 
 Array = NDArray[np.float64]
-PEERS = ("rosenbrock", "sundials")
+PEERS = ("rosenbrock", "sundials", "ggl")
 BACKENDS = ("auto", "vm", "compiled", *PEERS)
 REMEMBERED = 16
 """Integrators kept per model; the oldest goes first."""
@@ -79,7 +79,9 @@ def simulate(
             criterion proves an equation not to be stiff, so it is never chosen by itself.
         backend: "vm" needs no compiler; "compiled" compiles the step once and keeps it in the
             user's cache; "auto" starts in the former and goes over to the latter when that is
-            predicted to pay; "rosenbrock" and "sundials" are CasADi's own integrators.
+            predicted to pay; "rosenbrock" and "sundials" are CasADi's own integrators, under
+            which the constraints of mechanisms drift, "ggl" is idas with constraints on positions
+            and velocities (`symfric.integrator.ggl`), for comparisons.
         event_tolerance: how sharply events are located [s].
         max_steps: attempts allowed.
         sensitivities: free parameters by name and start values as "x0.v"; the trajectory then
@@ -233,6 +235,8 @@ def _trajectory(
 ) -> Trajectory:
     model = integrator.model
     names = list(model.signals)
+    drifts = run.engine.startswith("casadi")
+    signals = integrator.plain_signal_columns if drifts else integrator.signal_columns
 
     def states(at: Array) -> dict[str, Array]:
         if integrator.system.manifold is not None:
@@ -241,7 +245,7 @@ def _trajectory(
 
     def evaluate(at: Array) -> dict[str, Array]:
         d = np.hstack([np.tile(p, (at.size, 1)), inputs.values[:, inputs.interval(at)].T])
-        (values,) = integrator.signal_columns([at, dense(at).T, d])
+        (values,) = signals([at, dense(at).T, d])
         return dict(zip(names, np.ascontiguousarray(values.T), strict=True))
 
     reached = times[(times >= dense.t0[0]) & (times <= dense.t1[-1])]
