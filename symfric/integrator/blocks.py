@@ -31,17 +31,17 @@ def blocks(system: System, gamma: float) -> Blocks:
     """The blocks of a method with the diagonal coefficient `gamma`."""
     h = ca.SX.sym("h")
     right, memory = ca.SX.sym("right", system.n), ca.SX.sym("memory", system.n)
-    J = ca.jacobian(system.f, system.y)
+    J = system.J
     W = ca.sparsify(system.mass / (gamma * h) - J)
-    lu = factorise(W, safe=system.diagonal, then=system.then)
+    lu = factorise(W, system.pivots)
     tiny, rows = ca.densify(system.mass), system.algebraic[0]
     tiny[rows, :] = -J[rows, :]
-    reference = factorise(ca.sparsify(tiny), safe=system.diagonal, then=system.then).sign
+    reference = factorise(ca.sparsify(tiny), system.pivots).sign()
     return Blocks(
         ca.Function("f", [system.y, system.d], [system.f], {"cse": True}),
         ca.Function("factor", [system.y, h, system.d], [lu.packed], {"cse": True}),
         ca.Function(
             "solve", [lu.packed_symbol, right, memory], [lu.solve(right + system.mass @ memory)]
         ),
-        ca.Function("orientation", [system.y, h, system.d], [lu.sign * reference], {"cse": True}),
+        ca.Function("orientation", [system.y, h, system.d], [lu.sign() * reference], {"cse": True}),
     )

@@ -1,5 +1,6 @@
 """Sparse LU factors written out as expressions: no pivot search and no index at run time."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final
 
@@ -26,12 +27,16 @@ class SymbolicLU:
     columns: tuple[tuple[int, ...], ...]
     packed_symbol: ca.SX
 
-    @property
-    def sign(self) -> ca.SX:
-        """Sign of the determinant, in terms of `packed`."""
-        places = np.array([row for row, _ in self.order])[np.argsort([c for _, c in self.order])]
-        sign, at = ca.SX(round(np.linalg.det(np.eye(places.size)[places]))), 0
-        for others, below in zip(self.rows, self.columns, strict=True):
+    def sign(self, leading: int | None = None) -> ca.SX:
+        """Sign of the determinant, in terms of `packed`.
+
+        Args:
+            leading: only of the block that the first pivots eliminate, whose rows and columns are
+                the same; all by default.
+        """
+        order = self.order[:leading]
+        sign, at = ca.SX(_parity(dict(order))), 0
+        for others, below in zip(self.rows[:leading], self.columns[:leading], strict=True):
             sign = sign * ca.sign(self.packed[at])
             at += 1 + len(others) + len(below)
         return sign
@@ -58,77 +63,86 @@ class SymbolicLU:
         return ca.vertcat(ca.SX(0, 1), *x)
 
 
-def factorise(matrix: ca.SX, safe: tuple[int, ...], then: tuple[int, ...] = ()) -> SymbolicLU:
+def factorise(matrix: ca.SX, groups: Sequence[Sequence[int]] = ()) -> SymbolicLU:
     """Factorise a structurally nonsingular sparse matrix.
 
-    Pivots are chosen once, at build time, by least fill (Markowitz). Diagonal entries of the rows
-    in `safe` (differential equations, whose pivot 1/(gamma h) dominates for small steps) come
-    first, then those of the rows in `then` (constraints, whose pivot is the definite Schur
-    complement of the rows before); other algebraic rows may pivot anywhere.
+    Pivots are chosen once, at build time. The rows of each group pivot on the diagonal, group by
+    group, those of a group by least fill (Markowitz): differential equations, whose pivot
+    1/(gamma h) dominates for small steps; a mass matrix; constraints, whose pivot is the definite
+    Schur complement of the mass matrix before. Rows in no group come last and pivot anywhere.
 
     Raises:
         ValueError: structurally singular.
     """
     n = matrix.size1()
     rows: list[dict[int, ca.SX]] = [{} for _ in range(n)]
-    triplets = zip(*matrix.sparsity().get_triplet(), strict=True)
-    for k, (i, j) in enumerate(triplets):
+    for k, (i, j) in enumerate(zip(*matrix.sparsity().get_triplet(), strict=True)):
         rows[i][j] = matrix.nz[k]
-    active_rows, active_columns = set(range(n)), set(range(n))
-    order: list[tuple[int, int]] = []
-    kept: list[tuple[int, ...]] = []
-    eliminated: list[tuple[int, ...]] = []
+    holders: list[set[int]] = [set() for _ in range(n)]
+    for i, row in enumerate(rows):
+        for j in row:
+            holders[j].add(i)
+    grouped = [set(group) for group in groups]
+    grouped.append(set(range(n)).difference(*grouped))
+    steps: list[tuple[int, int, tuple[int, ...], tuple[int, ...]]] = []
     packed: list[ca.SX] = []
-    rank = dict.fromkeys(then, 1) | dict.fromkeys(safe, 0)
-    while active_rows:
-        row, column = _pivot(rows, active_rows, active_columns, rank)
-        active_rows.discard(row)
-        active_columns.discard(column)
-        inverse = 1 / rows[row][column]
-        others = tuple(c for c in rows[row] if c in active_columns)
-        below = tuple(r for r in sorted(active_rows) if column in rows[r])
-        packed += [inverse, *(rows[row][c] for c in others)]
+    for _ in range(n):
+        row, column = _pivot(rows, holders, grouped)
+        holders[column].discard(row)
+        inverse = 1 / rows[row].pop(column)
+        others, below = tuple(rows[row]), tuple(sorted(holders[column]))
+        for c in others:
+            holders[c].discard(row)
+        packed += [inverse, *rows[row].values()]
         for r in below:
             factor = rows[r].pop(column) * inverse
             packed.append(factor)
-            for c in others:
-                update = factor * rows[row][c]
+            for c, value in rows[row].items():
+                update = factor * value
                 rows[r][c] = rows[r][c] - update if c in rows[r] else -update
-        order.append((row, column))
-        kept.append(others)
-        eliminated.append(below)
+                holders[c].add(r)
+        steps.append((row, column, others, below))
     return SymbolicLU(
         ca.vertcat(ca.SX(0, 1), *packed),
-        tuple(order),
-        tuple(kept),
-        tuple(eliminated),
+        tuple((row, column) for row, column, _, _ in steps),
+        tuple(others for _, _, others, _ in steps),
+        tuple(below for _, _, _, below in steps),
         ca.SX.sym("lu", len(packed)),
     )
 
 
 def _pivot(
-    rows: list[dict[int, ca.SX]],
-    active_rows: set[int],
-    active_columns: set[int],
-    rank: dict[int, int],
+    rows: list[dict[int, ca.SX]], holders: list[set[int]], grouped: list[set[int]]
 ) -> tuple[int, int]:
-    """The entry whose elimination fills least; diagonals of ranked rows first, rank by rank."""
-    in_column = {c: sum(c in rows[r] for r in active_rows) for c in active_columns}
-    candidates = [
-        (
-            rank.get(r, 2),
-            (sum(j in active_columns for j in rows[r]) - 1) * (in_column[c] - 1),
-            r,
-            c,
+    """The entry whose elimination fills least, in the first group that has one.
+
+    Args:
+        rows, holders: entries that are left, by row, and rows that hold them, by column.
+        grouped: rows that are left; those of the last group may pivot off the diagonal. The row
+            found is taken out.
+    """
+    for group in grouped:
+        candidates = (
+            ((len(rows[r]) - 1) * (len(holders[c]) - 1), r, c)
+            for r in group
+            for c in (rows[r] if group is grouped[-1] else (r,))
+            if c in rows[r]
         )
-        for r in active_rows
-        for c in rows[r]
-        if c in active_columns and (r == c or r not in rank)
-    ]
-    if not candidates:
-        raise ValueError(
-            "factorise: expected a structurally nonsingular matrix, found no pivot for "
-            f"equations {sorted(active_rows)}; an algebraic variable is not determined"
-        )
-    _, _, row, column = min(candidates)
-    return row, column
+        best = min(candidates, default=None)
+        if best is not None:
+            group.discard(best[1])
+            return best[1], best[2]
+    raise ValueError(
+        "factorise: expected a structurally nonsingular matrix, found no pivot for "
+        f"equations {sorted(set().union(*grouped))}; an algebraic variable is not determined"
+    )
+
+
+def _parity(columns: dict[int, int]) -> int:
+    """Sign of the permutation row -> column."""
+    sign, left = 1, dict(columns)
+    while left:
+        start, row = left.popitem()
+        while row != start:
+            row, sign = left.pop(row), -sign
+    return sign

@@ -8,9 +8,9 @@ forces, so that no mass matrix is inverted and no derivative goes through a fact
 Every accepted step ends on the constraints:
 
     q  <- q  - phi_q' (phi_q phi_q')^-1 phi(q)       repeated with one factorisation
-    q' <- q' - phi_q' (phi_q phi_q')^-1 phi_q q'
+    q' <- q' - phi_q' (phi_q phi_q')^-1 (phi_q q' + phi_t)
 
-Limits: constraints do not depend on time; impacts are excluded. A step in which phi_q loses rank
+Limits: impacts are excluded. A step in which phi_q loses rank
 is not accepted, or accepted on the other side without a sign of it.
 """
 
@@ -77,41 +77,42 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX) -> Manifold:
     if mechanics is None:
         raise ValueError(f"model '{model.name}': expected a holonomic model")
     n, nx = mechanics.n, len(model.x)
-    q, qd = y[:n], y[n : 2 * n]
-    rate = ca.jtimes(mechanics.phi, q, qd)
-    at = ca.Function("at", [q, qd, d], [mechanics.phi, ca.jacobian(mechanics.phi, q), rate])
-    m = mechanics.phi.numel()
-    projected = ca.vertcat(*_projected(at, q, qd, d), y[2 * n :]) if m else y
+    q, qd, phi = y[:n], y[n : 2 * n], mechanics.phi
+    rate = ca.jtimes(phi, q, qd) + ca.jacobian(phi, model.t)
+    fixed = ca.vertcat(model.t, d)
+    at = ca.Function("at", [q, qd, fixed], [phi, ca.jacobian(phi, q), rate])
+    m = phi.numel()
+    projected = ca.vertcat(*_projected(at, q, qd, fixed), y[2 * n :]) if m else y
     project = ca.Function("project", [y, d], [projected], {"cse": True})
 
     algebraic = list(range(nx, nx + n + len(model.z)))
     implicit = ca.Function("implicit", [y, d], [f[algebraic]])
     J = ca.jacobian(f[algebraic], y[algebraic])
     slope = ca.Function("slope", [y, d], [J])
-    whole = factorise(J, tuple(range(n)), tuple(range(n, n + m)))
+    whole = factorise(J, (range(n), range(n, n + m)))
     # with a definite mass matrix the sign without friction is (-1) ^ rows without rates
     regular = -1 if (len(algebraic) - n) % 2 else 1
     column = projected
     for _ in range(2):
-        lu = factorise(slope(column, d), tuple(range(n)), tuple(range(n, n + m)))
+        lu = factorise(slope(column, d), (range(n), range(n, n + m)))
         step = ca.substitute(lu.solve(implicit(column, d)), lu.packed_symbol, lu.packed)
         column = ca.vertcat(column[:nx], column[algebraic] - step, column[algebraic[-1] + 1 :, 0])
     return Manifold(
         project,
         ca.Function("refine", [y, d], [column], {"cse": True}),
-        ca.Function("defect", [y, d], [ca.vertcat(mechanics.phi, rate)]),
+        ca.Function("defect", [y, d], [ca.vertcat(phi, rate)]),
         n,
         m,
         nx,
         slope,
-        ca.Function("passable", [y, d], [regular * whole.sign], {"cse": True}),
+        ca.Function("passable", [y, d], [regular * whole.sign()], {"cse": True}),
     )
 
 
 def _projected(at: ca.Function, q: ca.SX, qd: ca.SX, d: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Positions and velocities on the constraints near q and qd."""
     _, J, _ = at(q, qd, d)
-    lu = factorise(ca.sparsify(J @ J.T), tuple(range(J.size1())))
+    lu = factorise(ca.sparsify(J @ J.T), [range(J.size1())])
 
     def across(defect: ca.SX) -> ca.SX:
         return J.T @ ca.substitute(lu.solve(defect), lu.packed_symbol, lu.packed)

@@ -117,11 +117,10 @@ def _pair(system: System, basis: Eigenbasis) -> tuple[ca.Function, ca.Function]:
         (y, h, d) -> its factors; (factors, right, memory) -> k with W k = right + M memory.
     """
     h, n = ca.SX.sym("h"), system.n
-    J, M = ca.jacobian(system.f, system.y), system.mass / h
+    J, M = system.J, system.mass / h
     diagonal, across = basis.alpha * M - J, basis.beta * M
     both = ca.blockcat([[diagonal, across], [-across, diagonal]])
-    safe, then = ((*rows, *(n + i for i in rows)) for rows in (system.diagonal, system.then))
-    lu = factorise(ca.sparsify(both), safe=safe, then=then)
+    lu = factorise(ca.sparsify(both), [(*rows, *(n + i for i in rows)) for rows in system.pivots])
     right, memory = ca.SX.sym("right", 2 * n), ca.SX.sym("memory", 2 * n)
     solution = lu.solve(right + ca.diagcat(system.mass, system.mass) @ memory)
     return (

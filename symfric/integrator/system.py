@@ -34,8 +34,8 @@ class System:
             and its algebraic variables.
         monitor_nominal: their typical magnitudes, shape (m,).
         manifold: where the solution of a holonomic model lies.
-        safe, then: algebraic rows with a safe pivot on the diagonal: those of a mass matrix, and
-            those of constraints once the former are eliminated.
+        safe: groups of algebraic rows with a safe pivot on the diagonal, each once those before it
+            are eliminated: those of a mass matrix, those of constraints.
     """
 
     y: ca.SX
@@ -49,8 +49,7 @@ class System:
     monitors: ca.SX
     monitor_nominal: NDArray[np.float64]
     manifold: Manifold | None = None
-    safe: tuple[int, ...] = ()
-    then: tuple[int, ...] = ()
+    safe: tuple[tuple[int, ...], ...] = ()
 
     @property
     def n(self) -> int:
@@ -58,10 +57,16 @@ class System:
         return self.y.numel()
 
     @cached_property
-    def diagonal(self) -> tuple[int, ...]:
-        """Rows whose pivot on the diagonal is safe: rates of their own unknown, mass matrices."""
-        own = (i for i in range(self.nx) if self.mass.sparsity().has_nz(i, i))
-        return (*own, *self.safe)
+    def J(self) -> ca.SX:
+        """Jacobian of f, shape (n, n)."""
+        return ca.jacobian(self.f, self.y)
+
+    @cached_property
+    def pivots(self) -> tuple[tuple[int, ...], ...]:
+        """Groups of rows that pivot on the diagonal: rates of their own unknown and masses first."""
+        own = tuple(i for i in range(self.nx) if self.mass.sparsity().has_nz(i, i))
+        first, *then = self.safe or ((),)
+        return ((*own, *first), *then)
 
     @cached_property
     def is_ode(self) -> bool:
@@ -95,7 +100,9 @@ def system(model: Model, inputs: Drivers) -> System:
     unknowns, f, mass, names = _columns(model)
     nx = len(model.x)
     f = ca.substitute(f, model.vector("u"), inputs.expression)
-    timed = bool(ca.depends_on(f, model.t))
+    mechanics = model.holonomic
+    phi = mechanics.phi if mechanics else ca.SX(0, 1)
+    timed = bool(ca.depends_on(ca.vertcat(f, phi), model.t))
     if timed:
         unknowns, f = ca.vertcat(unknowns, model.t), ca.vertcat(f, 1)
         mass = ca.diagcat(mass, 1)
@@ -105,8 +112,7 @@ def system(model: Model, inputs: Drivers) -> System:
     watched += [(v.symbol, v.nominal) for v in model.z]
     monitors = ca.vertcat(ca.SX(0, 1), *(ca.SX(expression) for expression, _ in watched))
     d = ca.vertcat(model.vector("p"), inputs.data)
-    mechanics = model.holonomic
-    n, m = (mechanics.n, mechanics.phi.numel()) if mechanics else (0, 0)
+    n, m = (mechanics.n, phi.numel()) if mechanics else (0, 0)
     return System(
         unknowns,
         d,
@@ -119,8 +125,7 @@ def system(model: Model, inputs: Drivers) -> System:
         ca.substitute(monitors, model.vector("u"), inputs.expression),
         np.array([nominal for _, nominal in watched], dtype=float),
         manifold(model, unknowns, d, f) if mechanics else None,
-        tuple(range(nx, nx + n)),
-        tuple(range(nx + n, nx + n + m)),
+        (tuple(range(nx, nx + n)), tuple(range(nx + n, nx + n + m))),
     )
 
 
