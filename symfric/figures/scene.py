@@ -12,6 +12,7 @@ from symfric.scenes import ALL_SCENES
 DEFAULT_T_END = {
     "rabinowicz": 20.0,
     "drive": 4.0,
+    "quarter_car": 10.0,
     "pendulum": 10.0,
     "double_pendulum": 5.0,
     "pendulum_box": 15.0,

@@ -16,6 +16,7 @@ from symfric.scenes.mechanism import MechanismScene as MechanismScene
 from symfric.scenes.pendulum import DoublePendulum as DoublePendulum
 from symfric.scenes.pendulum import Pendulum as Pendulum
 from symfric.scenes.pendulum_box import PendulumBox as PendulumBox
+from symfric.scenes.quarter_car import QuarterCar as QuarterCar
 from symfric.scenes.rabinowicz import Rabinowicz as Rabinowicz
 from symfric.scenes.slider_crank import SliderCrank as SliderCrank
 
@@ -30,7 +31,12 @@ MECHANISMS: dict[str, type[MechanismScene]] = {
 }
 """Scenes of several bodies, with the same law in several joints."""
 
-ALL_SCENES: dict[str, type[Scene]] = {"rabinowicz": Rabinowicz, "drive": Drive, **MECHANISMS}
+ALL_SCENES: dict[str, type[Scene]] = {
+    "rabinowicz": Rabinowicz,
+    "drive": Drive,
+    "quarter_car": QuarterCar,
+    **MECHANISMS,
+}
 """Every scene by the name the command line uses."""
 
 

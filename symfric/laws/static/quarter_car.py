@@ -10,6 +10,17 @@ from symfric.numeric import Scalar, asin, cos, equals, exp, sin, sqrt, tan
 from symfric.parameters import option, param
 
 
+def tilt(x_rel: Scalar, theta: Scalar, L_d: Scalar) -> Scalar:
+    """Change d_theta of the strut's angle [rad], positive for a shortened spring.
+
+        sin d_theta = x_rel cos(theta) / (L_d - x_rel sin(theta))
+
+    for a strut of length L_d [m] at the angle theta [rad] whose wheel rose by x_rel [m] relative
+    to the body. The paper writes sin(theta) for cos(theta), which is the same at its 45 degrees.
+    """
+    return asin(x_rel * cos(theta) / (L_d - x_rel * sin(theta)))
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class QuarterCarGeneral(StaticLaw):
@@ -74,7 +85,8 @@ class QuarterCarGeneral(StaticLaw):
     ) -> Scalar:
         """Friction force [N]."""
         f_sd = self.k_s * x_rel + self.b_d * v_rel
-        leverage = 0.0 if equals(self.mu, 0.0) else self.mu / tan(self.theta - self.tilt(x_rel))
+        lean = self.theta - tilt(x_rel, self.theta, self.L_d)
+        leverage = 0.0 if equals(self.mu, 0.0) else self.mu / tan(lean)
         speed = smooth.magnitude(v, 0.0)
         dry = self.C_e * exp(-speed / self.e_1)
         if self.form == "as_printed":
@@ -84,13 +96,6 @@ class QuarterCarGeneral(StaticLaw):
         slip = (dry + leverage * load) * smooth.sign(v, 0.0) + self.sigma_v * v
         w = smooth.step5(speed / self.v_eps)
         return (1 - w) * smooth.hold(f_sd, self.F_brk, self.F_eps) + w * slip
-
-    def tilt(self, x_rel: Scalar) -> Scalar:
-        """Change d_theta of the strut's angle [rad], positive for a shortened spring.
-
-        The paper writes sin(theta) for cos(theta), which is the same at its 45 degrees.
-        """
-        return asin(x_rel * cos(self.theta) / (self.L_d - x_rel * sin(self.theta)))
 
 
 @final
