@@ -71,8 +71,8 @@ class Holonomic:
     """What a mechanical model knows beyond its equations: constraints on its coordinates.
 
     The states of the model begin with coordinates q and their rates q', its algebraic variables
-    with the multipliers lam of the constraints phi(q, t) = 0. With the accelerations a as symbols no
-    mass matrix needs to be inverted:
+    with the multipliers lam of the constraints phi(q, t) = 0. With the accelerations a as symbols
+    no mass matrix needs to be inverted:
 
         M a + phi_q' lam = Q,   d^2 phi / dt^2 = phi_q a + ... = 0,   further algebraic equations
 

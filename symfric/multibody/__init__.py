@@ -2,6 +2,9 @@
 
 from symfric.multibody.body import GROUND as GROUND
 from symfric.multibody.body import Body as Body
+from symfric.multibody.constraints import Constraint as Constraint
+from symfric.multibody.constraints import PrescribedMotion as PrescribedMotion
+from symfric.multibody.constraints import UserConstraint as UserConstraint
 from symfric.multibody.forces import Force as Force
 from symfric.multibody.forces import Gravity as Gravity
 from symfric.multibody.forces import JointSpringDamper as JointSpringDamper
