@@ -44,7 +44,8 @@ class Held:
     problems: tuple[str, ...] = ()
 
 
-def _impossible(*problems: str) -> Held:
+def impossible(*problems: str) -> Held:
+    """No equations, and why."""
     return Held(ca.SX(0, 1), (), lambda lam: (), problems)
 
 
@@ -125,7 +126,7 @@ class PrescribedMotion(Constraint):
         """motion(t) - s = 0."""
         joint, target = joints[self.joint], ca.SX(self.motion(kin.t))
         if target.numel() != 1:
-            return _impossible(f"motion: expected one expression, got {target.numel()}")
+            return impossible(f"motion: expected one expression, got {target.numel()}")
         label = f"{self.name}_{'force' if joint.linear(self.direction) else 'moment'}"
         period = 2 * pi if wraps(kin, joint, self.direction) else None
         return linear(kin, label, [(joint, self.direction, 1.0)], target, period)
@@ -153,7 +154,7 @@ class UserConstraint(Constraint):
         phi = ca.SX(self.expression(probe))
         rates = [x for m in probe.motion.values() for x in (m.w_B, m.v_B, m.dw_B, m.dv_B)]
         if ca.depends_on(phi, ca.vertcat(kin.qd, *rates)):
-            return _impossible(
+            return impossible(
                 "expression: expected positions only, got velocities; nonholonomic constraints "
                 "are excluded"
             )
