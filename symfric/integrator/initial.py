@@ -71,6 +71,8 @@ def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array
             if size < CONVERGED or size > last / 2:  # no longer quadratic: rounding
                 return y
         elif not _descend(system, y, d, step):
+            if np.abs(step).max() < CONVERGED * np.abs(y[columns]).max():
+                return y  # what is left of an unknown that is zero is rounding
             break
         last = size
     names = ", ".join(system.names[i] for i in columns)

@@ -136,7 +136,7 @@ def _work(
             power += ca.jtimes(energy, kin.q, kin.qd)
         yield f"{force.name}_work_rate", Output(power, "W", f"power put in by '{force.name}'")
     if eq.contacts:
-        taken = sum((-c.F * c.slip for c in eq.contacts), ca.SX(0))
+        taken = sum((-ca.dot(c.F, c.slip) for c in eq.contacts), ca.SX(0))
         yield "friction_work_rate", Output(taken, "W", "power put in by friction, at most zero")
     if eq.m and not eq.phi_t.is_zero():
         drive = ca.dot(eq.lam, eq.phi_t)
