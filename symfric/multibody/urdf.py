@@ -264,10 +264,10 @@ def _hang(
     m.frame(ends[0], _plain(p), _plain(R @ z), _plain(R @ x))
     m.frame(ends[1], (0.0, 0.0, 0.0), _plain(z), _plain(x))
     kind = KINDS[joint.kind]
-    single = bool(kind.turns or kind.slides)
+    single = len(kind.directions) == 1
     m.joint(kind(name, *ends, start=start if single else None, friction=friction))
     if single and joint.mimic is None:
-        torque = m.input(f"tau_{name}", "N m" if kind.turns else "N")
+        torque = m.input(f"tau_{name}", "N m" if "turn" in kind.directions else "N")
         motor = JointSpringDamper(f"motor_{name}", name, _direction(kind), actuator=torque)
         m.force(motor)
     elif not single and (joint.damping or joint.friction):
@@ -275,7 +275,7 @@ def _hang(
 
 
 def _direction(kind: type[Joint]) -> str:
-    return "turn" if kind.turns else "slide"
+    return "turn" if "turn" in kind.directions else "slide"
 
 
 def _couple(m: Mechanism, moved: Iterable[UrdfJoint], names: _Names) -> None:
