@@ -349,7 +349,7 @@ class Closing(Joint):
 class Distance(Closing):
     """A massless rod with ball joints at both ends: (d'd - length^2) / 2 = 0; 1 constraint.
 
-    Its multiplier [N/m] times the length is the force in the rod, positive under pressure.
+    Its multiplier [N/m] times the length is the force in the rod, positive under tension.
     """
 
     constrains: ClassVar[int] = 1
