@@ -130,7 +130,7 @@ def run(
             raise SolveError(trajectory.message, trajectory.status, trajectory)
 
 
-def kind_of(scene: str) -> Callable[[Law], Scene]:
+def kind_of(scene: str, where: str = "scene") -> Callable[[Law], Scene]:
     """What makes the scene of a law: a scene by its name, or the robot of a URDF file.
 
     Raises:
@@ -138,7 +138,7 @@ def kind_of(scene: str) -> Callable[[Law], Scene]:
     """
     if scene.endswith(".urdf"):
         return lambda law: Robot(relative(law), scene)
-    check_names("scene", [scene], ALL_SCENES)
+    check_names(where, [scene], ALL_SCENES)
     return ALL_SCENES[scene]
 
 
