@@ -198,6 +198,22 @@ def test_floating_joints_move_as_pinocchio_says() -> None:
     assert a[list(rows)] == pytest.approx(expected[list(rows.values())], rel=1e-10)
 
 
+def test_planar_joint_has_the_energies_of_pinocchio() -> None:
+    """With its axis along z: Pinocchio takes no other."""
+    pin = pytest.importorskip("pinocchio", reason="needs Pinocchio (extra urdf-check)")
+    tag = '<dynamics damping="0.3" friction="0.2"/>'
+    text = rod(
+        **{"revolute": "planar", "0 1 0": "0 0 1", '"0 0 1"/>': '"0 0 1" rpy="3 2 1"/>', tag: ""}
+    )
+    there = pin.buildModelFromXML(text.replace("</joint>", LIMIT))
+    c, s = np.cos(0.7), np.sin(0.7)
+    q, v = np.array([0.3, -0.2, c, s]), np.array([0.5 * c + 0.4 * s, 0.4 * c - 0.5 * s, -0.9])
+    kinetic = pin.computeKineticEnergy(there, there.createData(), q, v)
+    potential = pin.computePotentialEnergy(there, there.createData(), q)
+    found = functions(read_urdf(text))["energy"].call([[0.3, -0.2, 0.7], [0.5, 0.4, -0.9], []])
+    assert [float(x) for x in found] == pytest.approx([kinetic, potential], rel=1e-12)
+
+
 def rod(**changes: str) -> str:
     text = SMALL
     for old, new in changes.items():
