@@ -206,7 +206,7 @@ def _legend(figure: Figure) -> None:
     ]
     flat = figure.get_layout_engine() is not None
     figure.legend(
-        handles=entries, loc="outside lower right" if flat else "lower right", ncols=2,
+        handles=entries, loc="outside lower right" if flat else "upper right", ncols=2,
         frameon=False, fontsize="small", handletextpad=0.2,
     )  # fmt: skip
 
