@@ -66,7 +66,7 @@ def _mark(
     grounded = GROUND in (body_of(end) for end in ends)
     # the axes of a universal joint belong one to each end, which are at one point anyway
     if grounded and body_of(ends[0]) != GROUND and kind != "universal":
-        ends = ends[::-1]
+        ends = ends[1], ends[0]
     return Mark(name, kind, used[ends[0]], used[ends[1]], slips, grounded)
 
 
