@@ -81,12 +81,18 @@ class Holonomic:
         phi: SX (m, 1); no rows for a tree.
         a: SX symbols (n, 1).
         implicit: SX (n + nz, 1), the equations above in q, q', the other states, a, z, u, p, t.
+        pressing: SX (k, 1), normal forces over their typical size, which must not be negative.
+        pressed: what they are, in words.
+        advice: what to try where friction and reactions have no solution; may be empty.
     """
 
     n: int
     phi: ca.SX
     a: ca.SX
     implicit: ca.SX
+    pressing: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    pressed: tuple[str, ...] = ()
+    advice: str = ""
 
 
 @dataclass(frozen=True, eq=False)

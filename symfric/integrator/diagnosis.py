@@ -30,13 +30,20 @@ def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> t
         (Status.SINGULAR, _singular(integrator, y, d, h)),
     ):
         if cause:
-            return status, f"{where}: {cause}"
+            helps = status is Status.JAMMED or "algebraic equations" in cause
+            return status, f"{where}: {cause}{_advice(integrator) if helps else ''}"
     fastest = system.names[int(np.argmax(np.abs(f[: system.nx]) / system.nominal))]
     return (
         Status.STEP_TOO_SMALL,
         f"{where}: the step fell to {h:.1e} s, fastest equation {fastest}; a discontinuity is "
-        "near, give the law a smooth form or the model an event there",
+        "near, give the law a smooth form or the model an event there" + _advice(integrator),
     )
+
+
+def _advice(integrator: Integrator) -> str:
+    """What a mechanism says about friction without a solution."""
+    mechanics = integrator.model.holonomic
+    return f"; {mechanics.advice}" if mechanics is not None and mechanics.advice else ""
 
 
 def _dead_centre(system: System, y: Array, d: Array) -> str:

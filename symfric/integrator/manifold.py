@@ -27,6 +27,8 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 DEPENDENT = 1e-5
 """Ratio of singular values of phi_q at which a mechanism that cannot go on is called singular."""
+PULLING = 1e-3
+"""Negative normal forces up to this times their typical size are errors of a step."""
 ITERATIONS = 4
 """Of Newton's method with frozen derivatives: from 1e-3 to 1e-13."""
 
@@ -46,7 +48,10 @@ class Manifold:
         slope: (y, d) -> derivatives of the algebraic equations by the algebraic unknowns.
         passable: (y, d) -> sign of det(I - dN/dN), the loop from normal forces over friction to
             reactions and back. At zero friction jams: the normal forces grow without bound; the
-            solution beyond has the wrong sign and is none of the machine.
+            solution beyond has the wrong sign and is none of the machine. Negative also where a
+            normal force is.
+        pressing: (y, d) -> normal forces over their typical size, which must not be negative.
+        pressed: what they are, in words.
     """
 
     project: ca.Function
@@ -57,6 +62,8 @@ class Manifold:
     first: int
     slope: ca.Function
     passable: ca.Function
+    pressing: ca.Function
+    pressed: tuple[str, ...]
 
 
 def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, list[str]]:
@@ -71,8 +78,15 @@ def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, list[str]]:
     return ca.vertcat(x, mechanics.a, model.vector("z")), f, names
 
 
-def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX) -> Manifold:
-    """The constraints of a holonomic model as Functions of the unknowns of its system."""
+def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
+    """The constraints of a holonomic model as Functions of the unknowns of its system.
+
+    Args:
+        model: its equations.
+        y, d: unknowns and constants of a run.
+        f: right-hand sides.
+        u: inputs in terms of y and d.
+    """
     mechanics = model.holonomic
     if mechanics is None:
         raise ValueError(f"model '{model.name}': expected a holonomic model")
@@ -97,6 +111,10 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX) -> Manifold:
         lu = factorise(slope(column, d), (range(n), range(n, n + m)))
         step = ca.substitute(lu.solve(implicit(column, d)), lu.packed_symbol, lu.packed)
         column = ca.vertcat(column[:nx], column[algebraic] - step, column[algebraic[-1] + 1 :, 0])
+    pressing = ca.substitute(mechanics.pressing, model.vector("u"), u)
+    passable = regular * whole.sign()
+    for N in ca.vertsplit(pressing):
+        passable = ca.if_else(N > -PULLING, passable, -1)
     return Manifold(
         project,
         ca.Function("refine", [y, d], [column], {"cse": True}),
@@ -105,7 +123,9 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX) -> Manifold:
         m,
         nx,
         slope,
-        ca.Function("passable", [y, d], [regular * whole.sign()], {"cse": True}),
+        ca.Function("passable", [y, d], [passable], {"cse": True}),
+        ca.Function("pressing", [y, d], [pressing]),
+        mechanics.pressed,
     )
 
 
@@ -125,7 +145,25 @@ def _projected(at: ca.Function, q: ca.SX, qd: ca.SX, d: ca.SX) -> tuple[ca.SX, c
 
 
 def jammed(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array, margin: float) -> str:
-    """What jams at y, in words; empty where det(I - dN/dN) > margin."""
+    """What jams or pulls at y, in words; empty where det(I - dN/dN) > margin and N > 0."""
+    return _grows(manifold, names, y, d, margin) or _pulls(manifold, y, d, margin)
+
+
+def _pulls(manifold: Manifold, y: Array, d: Array, margin: float) -> str:
+    """Normal forces that are negative; with a margin those that have almost vanished, too."""
+    limit = PULLING if margin > 0.0 else -PULLING
+    values = manifold.pressing(y, d).full().ravel()
+    for share, what in zip(values, manifold.pressed, strict=True):
+        if share < limit:
+            return (
+                f"the {what} falls below zero ({share:.3g} times its typical size): it would pull, and "
+                "its friction would drive"
+            )
+    return ""
+
+
+def _grows(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array, margin: float) -> str:
+    """Normal forces that grow with the friction that they cause."""
     A, k = manifold.slope(y, d).full(), manifold.n + manifold.m
     if A.shape[0] == k or not np.isfinite(A).all():
         return ""
