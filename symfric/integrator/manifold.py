@@ -146,23 +146,23 @@ def _projected(at: ca.Function, q: ca.SX, qd: ca.SX, d: ca.SX) -> tuple[ca.SX, c
 
 def jammed(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array, margin: float) -> str:
     """What jams or pulls at y, in words; empty where det(I - dN/dN) > margin and N > 0."""
-    return _grows(manifold, names, y, d, margin) or _pulls(manifold, y, d, margin)
+    return grows(manifold, names, y, d, margin) or pulls(manifold, y, d, margin)
 
 
-def _pulls(manifold: Manifold, y: Array, d: Array, margin: float) -> str:
+def pulls(manifold: Manifold, y: Array, d: Array, margin: float) -> str:
     """Normal forces that are negative; with a margin those that have almost vanished, too."""
     limit = PULLING if margin > 0.0 else -PULLING
     values = manifold.pressing(y, d).full().ravel()
     for share, what in zip(values, manifold.pressed, strict=True):
         if share < limit:
             return (
-                f"the {what} falls below zero ({share:.3g} times its typical size): it would pull, and "
-                "its friction would drive"
+                f"the {what} falls below zero ({share:.3g} times its typical size): it would "
+                "pull, and its friction would drive"
             )
     return ""
 
 
-def _grows(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array, margin: float) -> str:
+def grows(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array, margin: float) -> str:
     """Normal forces that grow with the friction that they cause."""
     A, k = manifold.slope(y, d).full(), manifold.n + manifold.m
     if A.shape[0] == k or not np.isfinite(A).all():
