@@ -141,6 +141,10 @@ class TemperatureDependent(Law):
         """Steady states of the law."""
         return self.at_temperature().steady_state(v, N)
 
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """That of the law."""
+        return self.at_temperature().held_step(v, N, z, h)
+
     def warnings(self) -> tuple[str, ...]:
         """Those of the law at this temperature."""
         return self.at_temperature().warnings()
