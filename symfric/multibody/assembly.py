@@ -155,8 +155,15 @@ def assemble(
         more: what writes further results and the sketch.
     """
     contacts = slips(eq, guess["N"].tolist())
+    units = {label: part.unit for part in eq.held for label in part.labels}
     multipliers = tuple(
-        Variable(label, "", start=float(x), nominal=max(1.0, abs(float(x))), doc="multiplier")
+        Variable(
+            label,
+            units.get(label, ""),
+            start=float(x),
+            nominal=max(1.0, abs(float(x))),
+            doc="multiplier",
+        )
         for label, x in zip(labels, guess["lam"], strict=True)
     )
     pressed = [s for s in contacts if s.unknown]

@@ -339,6 +339,20 @@ def test_named_functions_take_time_where_it_matters() -> None:
     assert functions(winch("distance", 0.0))["constraints"].name_in() == ["q", "p"]
 
 
+def test_multipliers_of_drives_have_units() -> None:
+    units = driven_crank().build().signals
+    assert (units["drive_moment"], units["rod_lambda"]) == ("N m", "")
+
+
+def test_derivatives_by_a_parameter_of_the_motion_are_exact() -> None:
+    """For crank = A sin(w t): d crank / dA = sin(w t), also where A moves the start."""
+    A = Variable("A", "rad", start=1.0)
+    m = SliderCrank(SMOOTH, omega=OMEGA).mechanism()
+    m.constraint(PrescribedMotion("drive", "crank", lambda t: A.symbol * ca.sin(OMEGA * t)))
+    run = simulate(m.build((A,)), 0.5, sensitivities=("A",), samples=11)
+    assert run.sensitivities["A"]["crank"] == pytest.approx(np.sin(OMEGA * run.t), abs=1e-12)
+
+
 def test_friction_follows_a_drive() -> None:
     """A block drawn along at a constant speed: the drive's force is friction."""
     m = Mechanism("m")

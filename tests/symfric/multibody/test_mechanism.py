@@ -84,6 +84,14 @@ MISTAKES: dict[str, tuple[Callable[[Mechanism], object], str]] = {
         lambda m: m.force(JointSpringDamper("motor", "hing")),
         "> force 'motor': expected a joint, got hing",
     ),
+    "turning a slide": (
+        lambda m: (
+            m.body("block", 1.0, (1.0, 1.0, 1.0)),
+            m.joint(Prismatic("rail", "ground", "block")),
+            m.force(JointSpringDamper("motor", "rail")),
+        ),
+        "> force 'motor' > direction: expected slide, got turn",
+    ),
     "loose body": (
         lambda m: m.body("bob", 1.0, (1.0, 1.0, 1.0)),
         "> body 'bob': expected joints with coordinates that lead to the ground, found none; "
