@@ -269,8 +269,11 @@ def show_books(trajectory: Trajectory) -> None:
     """Print how well the constraints hold, and where the energy went."""
     levels = largest_norms(trajectory)
     if levels:
-        text = ", ".join(f"|{n}| <= {x:.1e} {trajectory.units[n]}" for n, x in levels.items())
-        output.show(f"Constraints: {text}".rstrip())
+        text = ", ".join(
+            f"{name.removeprefix('constraint_')} {x:.1e} {trajectory.units[name]}".rstrip()
+            for name, x in levels.items()
+        )
+        output.show(f"Constraints hold to: {text}")
     balance = trajectory.energy_balance()
     work = "".join(f", {name} {w[-1]:+.6g} J" for name, w in balance.work.items() if w.any())
     output.show(

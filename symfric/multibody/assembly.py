@@ -271,7 +271,11 @@ def _sizes(slip: Slip) -> tuple[ca.SX, ca.SX]:
 def _outputs(eq: Equations, contacts: Sequence[Slip], put: Put) -> dict[str, Output]:
     """Results of the contacts, energies, and what is left of the constraints."""
     found: dict[str, Output] = {}
-    norms = (("phi", eq.phi, "m"), ("phi_dot", eq.phi_dot, "m/s"), ("phi_ddot", eq.phi_ddot, ""))
+    norms = (
+        ("constraint_position", eq.phi, "m"),
+        ("constraint_velocity", eq.phi_dot, "m/s"),
+        ("constraint_acceleration", eq.phi_ddot, ""),
+    )
     expressions = put([*(s.normal for s in contacts), *(x for _, x, _ in norms)])
     for slip, normal in zip(contacts, expressions, strict=False):
         contact, name = slip.contact, slip.contact.name

@@ -22,7 +22,7 @@ def test_every_kind_of_a_mechanism_with_loops_and_bristles() -> None:
     }  # fmt: skip
 
 
-def test_a_joint_may_bear_the_name_of_a_norm_where_there_is_none() -> None:
+def test_without_loops_there_are_no_norms_of_constraints() -> None:
     model = Pendulum(BrownMcPhee()).model()
     assert norms(model) == ()
     assert kinds(model)["phi"] == "position"
