@@ -79,6 +79,12 @@ def hollars(v: float) -> float:
     return min(v / 1e-3, 1.0) * (F_C + 2 * (F_S - F_C) / (1 + (v / 1e-3) ** 2))
 
 
+def exudyn(v: float) -> float:
+    if v <= 1e-3:
+        return F_S * v / 1e-3
+    return F_C + (F_S - F_C) * exp(-(v - 1e-3) / 1e-3)
+
+
 def quintic(t: float) -> float:
     return 10 * t**3 - 15 * t**4 + 6 * t**5
 

@@ -4,14 +4,14 @@ import numpy as np
 
 from symfric.figures.data import Curve, FigureData
 from symfric.figures.scales import NORMAL_FORCE, Scales, scales
-from symfric.laws import AnyLaw, law_name, steady_force
+from symfric.laws import AnyLaw, law_name, steady_force, steady_inputs
 
 
 def profile(law: AnyLaw, N: float = NORMAL_FORCE, given: Scales | None = None) -> FigureData:
     """Force-velocity profile over +-5 Stribeck velocities (seed 0, fig. 1).
 
     Columns v [m/s], F [N]. Every law has one. Further inputs of a law, such as the applied force,
-    are zero; so is the force of a law that carries it at rest.
+    have the values that the title says, with the sign of v.
 
     Args:
         law: with numbers for parameters.
@@ -23,7 +23,7 @@ def profile(law: AnyLaw, N: float = NORMAL_FORCE, given: Scales | None = None) -
     v = np.concatenate([-fine[::-1], [0.0], fine])
     return FigureData(
         "profile",
-        f"force in steady sliding, N = {N:g} N",
+        f"force in steady sliding, N = {N:g} N{steady_inputs(law)}",
         {"v": "m/s", "F": "N"},
         (("v", "F"),),
         (Curve(law_name(law), "", {"v": v, "F": steady_force(law, v, N)}),),

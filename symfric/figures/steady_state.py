@@ -6,7 +6,7 @@ import numpy as np
 
 from symfric.figures.data import Curve, FigureData
 from symfric.figures.scales import NORMAL_FORCE, Scales, scales
-from symfric.laws import AnyLaw, Law, law_name, steady_force
+from symfric.laws import AnyLaw, Law, law_name, steady_force, steady_inputs
 from symfric.parameters import parameters, with_values
 
 
@@ -36,7 +36,7 @@ def steady_state(
             curves.append(Curve(law_name(law), case, columns, reference=True))
     return FigureData(
         "steady_state",
-        f"steady sliding, N = {N:g} N",
+        f"steady sliding, N = {N:g} N{steady_inputs(law)}",
         {"v": "m/s", "F": "N"},
         (("v", "F"),),
         tuple(curves),

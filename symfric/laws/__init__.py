@@ -41,7 +41,6 @@ from symfric.laws.populations import AnyLaw as AnyLaw
 from symfric.laws.populations import GenericAsperity as GenericAsperity
 from symfric.laws.populations import Population as Population
 from symfric.laws.populations import RandomBristles as RandomBristles
-from symfric.laws.populations import steady_force as steady_force
 from symfric.laws.static import BAM as BAM
 from symfric.laws.static import Ambrosio as Ambrosio
 from symfric.laws.static import Andersson as Andersson
@@ -55,6 +54,7 @@ from symfric.laws.static import BrownMcPhee as BrownMcPhee
 from symfric.laws.static import Capstan as Capstan
 from symfric.laws.static import Coulomb as Coulomb
 from symfric.laws.static import DuanSingh as DuanSingh
+from symfric.laws.static import Exudyn as Exudyn
 from symfric.laws.static import Hollars as Hollars
 from symfric.laws.static import Karnopp as Karnopp
 from symfric.laws.static import LeineSwitch as LeineSwitch
@@ -78,6 +78,8 @@ from symfric.laws.static import Tustin as Tustin
 from symfric.laws.static import VelocityBased as VelocityBased
 from symfric.laws.static import Viscous as Viscous
 from symfric.laws.static import Wojewoda as Wojewoda
+from symfric.laws.steady import steady_force as steady_force
+from symfric.laws.steady import steady_inputs as steady_inputs
 from symfric.laws.wrap import Lagged as Lagged
 from symfric.laws.wrap import TemperatureDependent as TemperatureDependent
 

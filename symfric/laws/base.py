@@ -61,15 +61,19 @@ class State:
 
 @dataclass(frozen=True)
 class Input:
-    """What a law takes besides v and N, as a keyword-only argument of its methods."""
+    """What a law takes besides v and N, as a keyword-only argument of its methods.
+
+    `nominal` is its typical magnitude, `steady` its value in pictures of steady sliding (v > 0).
+    """
 
     name: str
     unit: str
     doc: str
     nominal: float = 1.0
+    steady: float = 0.0
 
 
-APPLIED_FORCE = Input("F_e", "N", "force that keeps the sliding velocity constant")
+APPLIED_FORCE = Input("F_e", "N", "force that keeps the sliding velocity constant", steady=1.0)
 """What the contact must carry for no acceleration: m dv/dt = F_e - F."""
 
 

@@ -173,15 +173,6 @@ AnyLaw = Law | Population
 """What has a name, facts and figures."""
 
 
-def steady_force(law: AnyLaw, v: Array, N: float) -> Array:
-    """Force in steady sliding [N] at the velocities `v` [m/s], further inputs at their nominal."""
-    if isinstance(law, Population):
-        return law.steady_force(v, N)
-    given = {i.name: i.nominal for i in law.inputs}
-    force = law.force(v, N, law.steady_state(v, N), **given)
-    return np.array(np.broadcast_to(force, v.shape), dtype=float)
-
-
 @final
 @dataclass(frozen=True, eq=False)
 class GenericAsperity(Population):

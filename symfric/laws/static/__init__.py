@@ -14,7 +14,14 @@ from symfric.laws.static.exponential import (
 )
 from symfric.laws.static.falling import Lorentzian, PoppStelter
 from symfric.laws.static.joints import BAM, Bittencourt, Capstan
-from symfric.laws.static.piecewise import Ambrosio, BengisuAkay, Hollars, Step5, VelocityBased
+from symfric.laws.static.piecewise import (
+    Ambrosio,
+    BengisuAkay,
+    Exudyn,
+    Hollars,
+    Step5,
+    VelocityBased,
+)
 from symfric.laws.static.quarter_car import QuarterCarGeneral, QuarterCarSimple
 from symfric.laws.static.rui_wang import RuiWang
 from symfric.laws.static.self_tuning import BrittleSelfTuning, SelfTuning
@@ -43,6 +50,7 @@ STATIC_LAWS: dict[str, type[Law]] = {
     "velocity_based": VelocityBased,
     "ambrosio": Ambrosio,
     "hollars": Hollars,
+    "exudyn": Exudyn,
     "step5": Step5,
     "benson": Benson,
     "andersson": Andersson,

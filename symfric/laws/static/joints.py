@@ -126,8 +126,8 @@ class BAM(StaticLaw):
         if all(equals(coefficient, 0.0) for coefficient in of_load):
             return ()
         return (
-            Input("tau_m", "N m", "torque of the motor"),
-            Input("tau_e", "N m", "external torque"),
+            Input("tau_m", "N m", "torque of the motor", steady=1.0),
+            Input("tau_e", "N m", "external torque", steady=0.5),
         )
 
     @property

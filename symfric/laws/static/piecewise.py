@@ -180,6 +180,51 @@ class Hollars(StaticLaw):
 
 @final
 @dataclass(frozen=True, eq=False)
+class Exudyn(StaticLaw):
+    """Regularised friction of Exudyn: a ramp up to the static level, an exponential fall.
+
+        F = N mu_s u                                                u = v/v_reg, for |u| <= 1
+        F = N {mu_d + (mu_s - mu_d) exp(-w/v_exp) + mu_v w} sign(v),   w = |v| - v_reg, beyond
+
+    The ramp's corner at |u| = 1 is rounded over 1 +- u_eps, and w with it; the float u_eps = 0 is
+    the original, with its kink.
+    Limits: F(v_reg) = mu_s N in the original, some 0.19 u_eps less here; F -> mu_d N without mu_v;
+    v_reg -> 0 is `Benson`. Slope at rest mu_s N / v_reg. Creeps under load.
+    Source: Exudyn, public source; its text writes the ramp without the division by v_reg.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "St", "V"),
+        smoothness="C2 at |v| = v_reg (1 -+ u_eps) (u_eps = 0: C0 at v_reg)",
+        confidence="one source",
+        source="Exudyn, public source",
+    )
+    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
+
+    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
+    v_reg: Scalar = param(1e-3, unit="m/s", doc="velocity of the ramp's end", lower=1e-12)
+    v_exp: Scalar = param(1e-3, unit="m/s", doc="velocity of the fall", lower=1e-12)
+    mu_v: Scalar = param(0.0, unit="s/m", doc="viscous coefficient, load-dependent", lower=0.0)
+    u_eps: Scalar = param(0.2, unit="1", doc="rounding of the peak", lower=0.0, upper=1.0)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The velocity of the ramp's end [m/s]."""
+        return self.v_reg
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N]."""
+        u = v / self.v_reg
+        ramp = smooth.hold(u, 1.0, self.u_eps)
+        beyond = self.v_reg * (u - ramp)
+        falling = exp(-smooth.magnitude(beyond, 0.0) / self.v_exp)
+        mu = self.mu_d + (self.mu_s - self.mu_d) * falling
+        return N * (ramp * mu + self.mu_v * beyond)
+
+
+@final
+@dataclass(frozen=True, eq=False)
 class Step5(StaticLaw):
     """Quintic-step Stribeck friction, of Simbody and of the early Drake.
 

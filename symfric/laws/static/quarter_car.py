@@ -71,7 +71,7 @@ class QuarterCarGeneral(StaticLaw):
     def inputs(self) -> tuple[Input, ...]:
         """Position and velocity of the wheel relative to the body."""
         return (
-            Input("x_rel", "m", "position of the wheel minus that of the body", 0.01),
+            Input("x_rel", "m", "position of the wheel minus that of the body", 0.01, 5e-3),
             Input("v_rel", "m/s", "velocity of the wheel minus that of the body", 0.1),
         )
 

@@ -21,6 +21,7 @@ from symfric.laws import (
     Bittencourt,
     Capstan,
     DuanSingh,
+    Exudyn,
     Hollars,
     Karnopp,
     LeineSwitch,
@@ -88,6 +89,10 @@ PRINTED: dict[str, tuple[Law, tuple[float, ...]]] = {
     "hollars": (
         Hollars(**BOTH, v_t=1e-3, u_eps=0.0),
         (0.199009901, 0.9, 1.5, 1.2, 1.009900990),
+    ),
+    "exudyn": (
+        Exudyn(**BOTH, u_eps=0.0),
+        (0.15, 0.75, 1.5, 1.183939721, 1.000061705),
     ),
     "step5": (Step5(**BOTH), (0.01284, 0.75, 1.5, 1.25, 1.0)),
     "brown_mcphee": (

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from symfric import Coulomb, Law
-from symfric.laws import Ambrosio, BengisuAkay, Hollars, Step5, VelocityBased
+from symfric.laws import Ambrosio, BengisuAkay, Benson, Exudyn, Hollars, Step5, VelocityBased
 
 LEVELS = {"mu_s": 1.5, "mu_d": 1.0}
 each_form = pytest.mark.parametrize("form", ["smooth", "original"])
@@ -82,6 +82,22 @@ def test_hollars_loses_the_stated_share_of_its_peak_to_the_rounding(u_eps: float
 def test_excess_of_hollars_falls_with_the_square_of_the_velocity() -> None:
     law = Hollars(**LEVELS, v_t=1e-3)
     assert [law.force(v, 1.0) - 1.0 for v in (0.1, 1.0)] == pytest.approx([1e-4, 1e-6], rel=2e-4)
+
+
+def test_exudyn_is_benson_beyond_its_ramp_and_viscous_in_the_end() -> None:
+    law, dry = Exudyn(**LEVELS, mu_v=0.2, u_eps=0.0), Exudyn(**LEVELS, u_eps=0.0)
+    fall = Benson(**LEVELS, d_c=1e3, v_eps=0.0)
+    v = np.array([1e-3, 2e-3, 1e-2])
+    assert dry.force(v + 1e-3, 2.0) == pytest.approx(fall.force(v, 2.0), rel=1e-13)
+    assert law.force(0.5, 2.0) - dry.force(0.5, 2.0) == pytest.approx(0.2 * 2.0 * 0.499)
+    assert slope(law, 0.0) == pytest.approx(1.5 / 1e-3, rel=1e-14)
+
+
+@pytest.mark.parametrize("u_eps", [0.1, 0.4])
+def test_exudyn_loses_the_stated_share_of_its_peak_to_the_rounding(u_eps: float) -> None:
+    lost = 0.1875 * u_eps
+    expected = 2.0 * (1.0 + 0.5 * np.exp(-lost)) * (1 - lost)
+    assert Exudyn(**LEVELS, u_eps=u_eps).force(1e-3, 2.0) == pytest.approx(expected, rel=1e-14)
 
 
 def test_step5_meets_both_levels_and_is_flat_at_rest() -> None:
