@@ -43,10 +43,8 @@ class Manifold:
         defect: (y, d) -> constraints and their rates.
         n, m, first: numbers of accelerations, of multipliers and of states. The algebraic unknowns
             are accelerations, multipliers, normal forces, in this order after the states.
+        basis: where y holds V, a basis of the tangent space, column by column.
         slope: (y, d) -> derivatives of the algebraic equations by the algebraic unknowns.
-        passable: (y, d) -> sign of det(I - dN/dN), the loop from normal forces over friction to
-            reactions and back. At zero friction jams: the normal forces grow without bound; the
-            solution beyond has the wrong sign and is none of the machine.
     """
 
     project: ca.Function
@@ -55,12 +53,16 @@ class Manifold:
     n: int
     m: int
     first: int
+    basis: slice
     slope: ca.Function
-    passable: ca.Function
 
 
-def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, list[str]]:
-    """Unknowns (x, a, z) of a holonomic model, their right-hand sides and names."""
+def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
+    """Unknowns (x, a, z, V) of a holonomic model, right-hand sides, mass matrix and names.
+
+    V is a basis of the tangent space of the constraints, column by column, at the start of the step
+    before; it has no rates. Without constraints it has no rows.
+    """
     mechanics, x = model.holonomic, model.vector("x")
     if mechanics is None or model.ode is None:
         raise ValueError(f"model '{model.name}': expected a holonomic model with an ode")
@@ -68,7 +70,15 @@ def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, list[str]]:
     f = ca.vertcat(x[n : 2 * n], mechanics.a, model.ode[2 * n :], mechanics.implicit)
     names = [v.name for v in model.x]
     names += [f"{v.name}_dot" for v in model.x[n : 2 * n]] + [v.name for v in model.z]
-    return ca.vertcat(x, mechanics.a, model.vector("z")), f, names
+    m = mechanics.phi.numel()
+    V = ca.SX.sym("V", n * (n - m) if m else 0)
+    mass = ca.diagcat(ca.SX.eye(x.numel()), ca.SX(*2 * [n + len(model.z)]), ca.SX.eye(V.numel()))
+    return (
+        ca.vertcat(x, mechanics.a, model.vector("z"), V),
+        ca.vertcat(f, ca.SX.zeros(V.numel())),
+        mass,
+        [*names, *(f"V_{i}" for i in range(V.numel()))],
+    )
 
 
 def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX) -> Manifold:
@@ -89,9 +99,6 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX) -> Manifold:
     implicit = ca.Function("implicit", [y, d], [f[algebraic]])
     J = ca.jacobian(f[algebraic], y[algebraic])
     slope = ca.Function("slope", [y, d], [J])
-    whole = factorise(J, (range(n), range(n, n + m)))
-    # with a definite mass matrix the sign without friction is (-1) ^ rows without rates
-    regular = -1 if (len(algebraic) - n) % 2 else 1
     column = projected
     for _ in range(2):
         lu = factorise(slope(column, d), (range(n), range(n, n + m)))
@@ -104,8 +111,8 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX) -> Manifold:
         n,
         m,
         nx,
+        slice(algebraic[-1] + 1, algebraic[-1] + 1 + (n * (n - m) if m else 0)),
         slope,
-        ca.Function("passable", [y, d], [regular * whole.sign()], {"cse": True}),
     )
 
 

@@ -10,14 +10,15 @@ or rejects (h shrinks). `fixed(y, h, d) -> y_next` is the bare step, for derivat
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from symfric.integrator.blocks import signs
 from symfric.integrator.method import Method, Trial, Trials
 from symfric.integrator.system import System
+from symfric.integrator.tangent import tangent
 
 MEMORY = 5
 """Rows of S before y: t, h, h_old, growth_old, rejected."""
@@ -31,19 +32,51 @@ KAPPA = 0.1
 
 
 def steps(system: System, method: Method) -> Trials:
-    """The steps of a method, which end on the constraints of a mechanism where there are any."""
-    free, manifold = method.trials(system), system.manifold
-    if manifold is None:
-        return free
+    """The steps of a method, those of a mechanism with constraints in a chart of each step."""
+    chart = tangent(system)
+    if chart is None:
+        return method.trials(system)
+    inside = method.trials(chart.reduced)
 
     def trial(y: Any, h: Any, d: Any) -> Trial:
-        found = free(y, h, d)
-        sign = manifold.passable(found.end, d)
-        if found.orientation is not None:
-            sign = ca.fmin(sign, found.orientation)
-        return replace(found, end=manifold.project(found.end, d), orientation=sign)
+        data = chart.open(y, d)
+        return chart.trial(inside(chart.enter(y, data), h, data), y, h, data)
 
     return trial
+
+
+Signs = Callable[[Any, Any, Any], Any]
+"""(y, h, d) -> negative where a step must not end at y."""
+
+
+def obstacles(system: System, method: Method) -> Signs | None:
+    """What forbids to accept a step although its error is small; None where nothing can.
+
+    Breaking away would be missed without a sign of it: where a contact turns unstable, a long step
+    stays on the solution that sticks, and estimates no error; `signs` tells. And where the loop
+    from normal forces over friction to reactions and back, det(I - dN/dN), is negative, friction
+    has jammed: that solution is none of the machine. Mechanisms without friction have neither.
+    """
+    gamma, manifold, chart = method.diagonal, system.manifold, tangent(system)
+    if gamma is None or (manifold is not None and not system.rubs):
+        return None
+    if chart is None:
+        both = signs(system, gamma)
+    else:
+        inner = signs(chart.reduced, gamma)
+
+        def both(y: Any, h: Any, d: Any) -> Any:
+            data = chart.open(y, d)
+            return inner(chart.enter(y, data), h, data)
+
+    def sign(y: Any, h: Any, d: Any) -> Any:
+        own, tiny = both(y, h, d)
+        if manifold is None:
+            return own * tiny
+        # with a definite mass matrix and no friction, that of n accelerations is (-1)^n
+        return ca.fmin(own * tiny, (-1) ** manifold.n * tiny)
+
+    return sign
 
 
 def build_fixed(system: System, method: Method, kind: Any = ca.SX) -> ca.Function:
@@ -128,10 +161,9 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
     norm = error_norm(system, y, y_new, atol, rtol, d)
     e2 = norm(trial.error)
     sound = e2 <= 1e20
-    if trial.orientation is not None:
-        # breaking away would be missed without a sign of it: where a contact turns unstable, a
-        # long step stays on the solution that sticks, and estimates no error
-        sound = ca.logic_and(sound, ca.logic_not(trial.orientation < 0))
+    obstacle = obstacles(system, method)
+    if obstacle is not None:
+        sound = ca.logic_and(sound, ca.logic_not(obstacle(y_new, h, d) < 0))
     if unwatched := system.algebraic[1]:
         sound = ca.logic_and(sound, ca.sumsqr(y_new[unwatched]) < np.inf)
     if trial.corrections:
