@@ -5,7 +5,7 @@ generation consume it. Letters as in CasADi's DaeBuilder: time t, differential s
 variables z, inputs u, parameters p.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from symfric.numeric import Scalar, evaluate
 from symfric.parameters import Variable, check_names
+from symfric.sketch import Sketch
 
 Variables = tuple[Variable, ...]
 RESERVED = {"t", "ode", "alg", "residual", "signals"}
@@ -70,16 +71,16 @@ class Holonomic:
     """What a mechanical model knows beyond its equations: constraints on its coordinates.
 
     The states of the model begin with coordinates q and their rates q', its algebraic variables
-    with the multipliers lam of the constraints phi(q) = 0. With the accelerations a as symbols no
-    mass matrix needs to be inverted:
+    with the multipliers lam of the constraints phi(q, t) = 0. With the accelerations a as symbols
+    no mass matrix needs to be inverted:
 
-        M a + phi_q' lam = Q,   phi_q a + (phi_q q')_q q' = 0,   further algebraic equations
+        M a + phi_q' lam = Q,   d^2 phi / dt^2 = phi_q a + ... = 0,   further algebraic equations
 
     Attributes:
         n: number of coordinates.
         phi: SX (m, 1); no rows for a tree.
         a: SX symbols (n, 1).
-        implicit: SX (n + nz, 1), the equations above in q, q', the other states, a, z, u, p.
+        implicit: SX (n + nz, 1), the equations above in q, q', the other states, a, z, u, p, t.
     """
 
     n: int
@@ -110,6 +111,9 @@ class Model:
         events: what happens at zero crossings.
         t: SX symbol of time [s].
         holonomic: constraints on coordinates, kept by the integrator on all levels.
+        details: writes further results, such as reactions, when somebody asks for one of them; to
+            carry one along in derivatives and in C, put it into `outputs`.
+        sketch: writes what is drawn of the machine, when somebody asks for a picture of it.
 
     Raises:
         ValueError: all problems at once: repeated names, wrong row counts, undeclared symbols.
@@ -129,6 +133,8 @@ class Model:
     events: tuple[Event, ...] = ()
     t: ca.SX = field(default_factory=lambda: ca.SX.sym("t"))
     holonomic: Holonomic | None = None
+    details: Callable[[], Mapping[str, Output]] = dict[str, Output]
+    sketch: Callable[[], Sketch] | None = None
 
     def __post_init__(self) -> None:
         if self.ode is not None:
@@ -220,13 +226,41 @@ class Model:
         found = {v.name: v.unit for group in (self.x, self.z, self.u) for v in group}
         return found | {name: output.unit for name, output in self.outputs.items()}
 
+    @cached_property
+    def further(self) -> dict[str, Output]:
+        """The `details`, written out.
+
+        Raises:
+            ValueError: one has a name that the model has already.
+        """
+        found = dict(self.details())
+        repeated = sorted(found.keys() & {*self.signals, *(v.name for v in self.p)})
+        if repeated:
+            raise ValueError(
+                f"model '{self.name}': details: expected new names, got {', '.join(repeated)}"
+            )
+        return found
+
+    def expression(self, name: str) -> ca.SX:
+        """The signal or detail `name` in the symbols of the model.
+
+        Raises:
+            ValueError: unknown name.
+        """
+        variables = {v.name: v.symbol for group in (self.x, self.z, self.u) for v in group}
+        if name in variables:
+            return variables[name]
+        outputs = self.outputs if name in self.outputs else self.further
+        check_names(f"model '{self.name}'", [name], [*self.signals, *outputs])
+        return ca.SX(outputs[name].expression)
+
     def function(self, what: str) -> ca.Function:
         """One CasADi Function with named arguments.
 
         Args:
             what: "ode" and "alg" (t, x, z, u, p), "residual" (t, xdot, x, z, u, p), "signals"
                 (t, x, z, u, p), which stacks x, z, u and the outputs in the order of `signals`,
-                or the name of one output.
+                or the name of one output or detail.
 
         Raises:
             ValueError: unknown name, or "ode" of an implicit model.
@@ -247,6 +281,8 @@ class Model:
             x, z, u, *(ca.SX(o.expression) for o in self.outputs.values())
         )
         known |= {name: ca.SX(output.expression) for name, output in self.outputs.items()}
+        if what not in known:
+            known |= {name: ca.SX(output.expression) for name, output in self.further.items()}
         check_names(f"model '{self.name}'", [what], [*known, "residual"])
         return ca.Function(what, [t, x, z, u, p], [known[what]], ["t", "x", "z", "u", "p"], [what])
 

@@ -7,7 +7,9 @@ from symfric.laws import (
     Bristle2D,
     ElastoPlastic,
     HaessigFriedland,
+    Karnopp,
     Lagged,
+    LeineSwitch,
     MaxwellSlip,
     RateAndState,
     StickSlip,
@@ -25,6 +27,8 @@ DYNAMIC: dict[str, Law] = {
     "bristle_2d, kappa 0.2": Bristle2D(kappa=0.2),
     "lagged(stribeck)": Lagged(Stribeck(sigma_2=0.4)),
     "temperature_dependent(lugre)": TemperatureDependent(LuGre(sigma_2=0.4), T=303.15, k_dry=0.01),
+    "karnopp, event": Karnopp(sigma_2=0.4, form="event"),
+    "leine_switch, event": LeineSwitch(form="event"),
     "rate_and_state, slip": RateAndState(evolution="slip"),
 }
 

@@ -5,7 +5,7 @@ Nothing here imports symfric, so that a mistake cannot stand on both sides of a 
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import atan, cos, exp, hypot, inf, pi, sin, sqrt, tanh
+from math import acos, atan, cos, exp, hypot, inf, pi, sin, sqrt, tanh
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,24 @@ def rabinowicz_coulomb(
     w = sqrt(k / m)
     amplitude = hypot(excess, v_belt / w)
     stick, slip = 2 * excess / v_belt, 2 / w * (pi - atan(excess * w / v_belt))
+    return StickSlip(stick + slip, stick, slip, centre + amplitude, centre - amplitude, centre)
+
+
+def rabinowicz_karnopp(
+    mu_s: float, mu_d: float, m: float, k: float, v_belt: float, g: float, D_v: float
+) -> StickSlip:
+    """Stick-slip under Karnopp friction in closed form; sticking counts as rest in the band.
+
+    From break-away the static level acts until the block lags the belt by D_v; then it swings
+    freely about mu_d m g / k until it lags by D_v again, and stops on the belt.
+    """
+    w = sqrt(k / m)
+    leaves, centre = mu_s * m * g / k, mu_d * m * g / k
+    in_band = acos(1 - D_v / v_belt) / w
+    off, v = leaves + v_belt / w * sin(w * in_band) - centre, v_belt - D_v
+    free = 2 / w * (pi - atan(off * w / v))
+    stick, amplitude = (leaves - (centre - off)) / v_belt, hypot(off, v / w)
+    slip = in_band + free
     return StickSlip(stick + slip, stick, slip, centre + amplitude, centre - amplitude, centre)
 
 

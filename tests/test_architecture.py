@@ -17,7 +17,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "symfric.numeric": set(),
     "symfric.parameters": {"symfric.numeric"},
     "symfric.laws": {"symfric.numeric", "symfric.parameters"},
-    "symfric.model": {"symfric.numeric", "symfric.parameters"},
+    "symfric.sketch": set(),
+    "symfric.model": {"symfric.numeric", "symfric.parameters", "symfric.sketch"},
     "symfric.scenes": {
         "symfric.laws",
         "symfric.model",
@@ -30,6 +31,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "symfric.model",
         "symfric.numeric",
         "symfric.parameters",
+        "symfric.sketch",
     },
     "symfric.integrator": {
         "symfric.model",
@@ -37,7 +39,14 @@ MAY_IMPORT: dict[str, set[str]] = {
         "symfric.parameters",
         "symfric.status",
         "symfric.files",
-        "symfric.plotting",  # on request, when a trajectory draws itself
+        "symfric.sketch",
+        "symfric.animation",  # on request, when a trajectory draws itself
+        "symfric.plotting",  # likewise
+    },
+    "symfric.animation": {
+        "symfric.files",
+        "symfric.sketch",
+        "symfric.integrator",  # types only
     },
     "symfric.plotting": {
         "symfric.files",

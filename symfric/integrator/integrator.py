@@ -66,21 +66,24 @@ class Integrator:
             return ca.Function(name, [t, s.y, s.d], [driven])
         return ca.Function(name, [self.model.t, s.y, s.d], [driven])
 
-    @cached_property
-    def plain_signals(self) -> ca.Function:
-        """All signals of the model as a Function (t, y, d)."""
+    @property
+    def _every(self) -> ca.SX:
+        """All signals of the model."""
         m = self.model
         outputs = (ca.SX(o.expression) for o in m.outputs.values())
-        stacked = ca.vertcat(m.vector("x"), m.vector("z"), m.vector("u"), *outputs)
-        return self.of_time("signals", stacked)
+        return ca.vertcat(m.vector("x"), m.vector("z"), m.vector("u"), *outputs)
 
     @cached_property
     def signals(self) -> ca.Function:
-        """All signals of the model as a Function (t, y, d), those of a mechanism refined.
+        """All signals of the model as a Function (t, y, d), refined."""
+        return self.refined(self._every)
+
+    def refined(self, expression: ca.SX) -> ca.Function:
+        """`expression` of the model as a Function (t, y, d), that of a mechanism refined.
 
         Between steps the constraints of a mechanism hold to the tolerance only, at results exactly.
         """
-        signals, manifold = self.plain_signals, self.system.manifold
+        signals, manifold = self.of_time("signals", expression), self.system.manifold
         if manifold is None:
             return signals
         t, y, d = ca.SX.sym("t"), ca.SX.sym("y", self.system.n), ca.SX.sym("d", signals.numel_in(2))
@@ -94,7 +97,7 @@ class Integrator:
     @cached_property
     def plain_signal_columns(self) -> Columns:
         """The signals at many times as they are, drift of constraints included."""
-        return Columns(self.plain_signals)
+        return Columns(self.of_time("signals", self._every))
 
     def vm(self) -> Engine:
         """The engine that needs no compiler."""

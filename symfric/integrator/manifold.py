@@ -10,8 +10,8 @@ Every accepted step ends on the constraints:
     q  <- q  - phi_q' (phi_q phi_q')^-1 phi(q)       repeated with one factorisation
     q' <- q' - phi_q' (phi_q phi_q')^-1 (phi_q q' + phi_t)
 
-Limits: impacts are excluded. A step in which phi_q loses rank
-is not accepted, or accepted on the other side without a sign of it.
+Limits: impacts are excluded. A step in which phi_q loses rank is not accepted, or accepted on the
+other side without a sign of it.
 """
 
 from dataclasses import dataclass

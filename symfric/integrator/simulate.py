@@ -2,16 +2,18 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from time import perf_counter
 from weakref import WeakKeyDictionary
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.integrator.adjoint import gradient
 from symfric.integrator.arguments import check_span, check_times, chosen
 from symfric.integrator.casadi_backend import integrate_by_peer
+from symfric.integrator.columns import Columns
 from symfric.integrator.dense import Dense
 from symfric.integrator.inputs import Drivers, Input, drivers
 from symfric.integrator.integrator import Integrator
@@ -243,10 +245,17 @@ def _trajectory(
             return evaluate(at)
         return dict(zip(names, dense(at)[: len(model.x)], strict=False))
 
-    def evaluate(at: Array) -> dict[str, Array]:
+    def rows(columns: Columns, at: Array) -> Array:
         d = np.hstack([np.tile(p, (at.size, 1)), inputs.values[:, inputs.interval(at)].T])
-        (values,) = signals([at, dense(at).T, d])
-        return dict(zip(names, np.ascontiguousarray(values.T), strict=True))
+        (values,) = columns([at, dense(at).T, d])
+        return np.ascontiguousarray(values.T)
+
+    def evaluate(at: Array) -> dict[str, Array]:
+        return dict(zip(names, rows(signals, at), strict=True))
+
+    def express(expression: ca.SX, at: Array) -> Array:
+        plain = partial(integrator.of_time, "signals")
+        return rows(Columns((plain if drifts else integrator.refined)(expression)), at)
 
     reached = times[(times >= dense.t0[0]) & (times <= dense.t1[-1])]
     return Trajectory(
@@ -259,6 +268,8 @@ def _trajectory(
         np.append(dense.t0, dense.t1[-1]),
         states,
         evaluate,
+        express,
+        model,
         tuple(run.happened),
     )
 

@@ -2,6 +2,12 @@
 
 from symfric.multibody.body import GROUND as GROUND
 from symfric.multibody.body import Body as Body
+from symfric.multibody.constraints import Constraint as Constraint
+from symfric.multibody.constraints import PrescribedMotion as PrescribedMotion
+from symfric.multibody.constraints import UserConstraint as UserConstraint
+from symfric.multibody.couplings import Gear as Gear
+from symfric.multibody.couplings import Rolling as Rolling
+from symfric.multibody.couplings import Screw as Screw
 from symfric.multibody.forces import Force as Force
 from symfric.multibody.forces import Gravity as Gravity
 from symfric.multibody.forces import JointSpringDamper as JointSpringDamper

@@ -165,6 +165,7 @@ def assemble(
         outputs=_outputs(eq, contacts, before, after, acceleration),
         monitors=tuple(m for s in contacts for m in _monitor(s, p)),
         events=tuple(e for s in contacts for e in _switches(s, qd)),
+        t=eq.kin.t,
         holonomic=Holonomic(eq.n, eq.phi, eq.a, ca.vertcat(balance, algebraic)),
     )
 

@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.multibody.body import GROUND, Body
+from symfric.multibody.constraints import Constraint
 from symfric.multibody.forces import Force
 from symfric.multibody.joints import Joint
 from symfric.multibody.topology import Topology, body_of
 from symfric.numeric import is_number, is_symbolic
 
 Array = NDArray[np.float64]
-Position = Callable[[Array], tuple[ca.DM, ca.DM]]
-"""q -> (phi, Phi_q) as numbers."""
+Position = Callable[[Array], tuple[ca.DM, ca.DM, ca.DM]]
+"""q -> (phi, phi_q, phi_t) as numbers at time 0."""
 FITS = 1e-8
 """Largest violation of a constraint at the start [m, m/s]."""
 RANK = 1e-9
@@ -25,11 +26,14 @@ RANK = 1e-9
 
 
 def naming(
-    bodies: Sequence[Body], joints: Sequence[Joint], forces: Sequence[Force]
+    bodies: Sequence[Body],
+    joints: Sequence[Joint],
+    forces: Sequence[Force],
+    constraints: Sequence[Constraint],
 ) -> Iterator[str]:
     """Names that are repeated or no C identifiers, places and joints that do not exist."""
     names = [("body", b.name) for b in bodies] + [("joint", j.name) for j in joints]
-    names += [("force", f.name) for f in forces]
+    names += [("force", f.name) for f in forces] + [(c.kind, c.name) for c in constraints]
     every = [name for _, name in names]
     for kind, name in names:
         if not (name.isascii() and name.isidentifier()):
@@ -48,6 +52,16 @@ def naming(
         for name in force.joints():
             if name not in [j.name for j in joints]:
                 yield f"force '{force.name}': expected a joint, got {name}"
+    moving = {joint.name: joint.directions for joint in joints}
+    for constraint in constraints:
+        where = f"{constraint.kind} '{constraint.name}'"
+        for name, direction in constraint.joints():
+            if name not in moving:
+                yield f"{where}: expected a joint, got {name}"
+            elif direction not in moving[name]:
+                known_ones = " or ".join(moving[name]) or "a joint that moves along an axis"
+                yield f"{where} > direction: expected {known_ones}, got {direction}"
+        yield from (f"{where} > {text}" for text in constraint.problems())
 
 
 def _place(where: str, place: str, bodies: Mapping[str, Body]) -> Iterator[str]:
@@ -117,7 +131,7 @@ def rank(at: Position, q: Array) -> Rank:
     """Independent constraints near q, by elimination with full pivoting.
 
     Args:
-        at: q -> (phi, Phi_q).
+        at: q -> (phi, phi_q, phi_t).
     """
     here = at(q)[1].full()
     near = here
@@ -156,7 +170,7 @@ def _independent(A: Array, r: int) -> list[int]:
 def project(at: Position, q: Array, iterations: int = 30) -> Array | None:
     """The nearest q that satisfies the constraints, by Gauss-Newton; None if there is none near."""
     for _ in range(iterations):
-        phi, J = (m.full() for m in at(q))
+        phi, J, _ = (m.full() for m in at(q))
         if not phi.size or np.abs(phi).max() < 1e-13:
             return q
         step = np.linalg.lstsq(J, phi[:, 0], rcond=1e-10)[0]

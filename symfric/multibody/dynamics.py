@@ -94,9 +94,10 @@ def normalisations(kin: Kinematics) -> tuple[ca.SX, ca.SX, ca.SX]:
 
 def _pairs(kin: Kinematics, axial: Axial) -> tuple[Load, Load]:
     """An axial load of a joint that closes a loop, as loads on both bodies."""
-    relative = kin.relative(axial.joint)
-    along = relative.R_WP[:, 2] * axial.value
-    force, moment = (along, ca.SX(3, 1)) if axial.direction == "slide" else (ca.SX(3, 1), along)
+    relative, joint = kin.relative(axial.joint), axial.joint
+    along = relative.R_WP @ joint.axis(axial.direction, relative.R) * axial.value
+    none = ca.SX(3, 1)
+    force, moment = (along, none) if joint.linear(axial.direction) else (none, along)
     child, parent = body_of(axial.joint.child), body_of(axial.joint.parent)
     return (
         Load(child, force, relative.p_WC, moment),
@@ -177,8 +178,7 @@ def _project(
     H_w, H_v = link.subspace(q)
     rows = (R_PC.T @ H_w).T @ about_C + (R_PC.T @ H_v).T @ force_C
     for load in axial.get(link.joint.name, ()):
-        k = 1 if link.n == 2 and load.direction == "turn" else 0
-        rows[k] -= load.value
+        rows[load.joint.directions[load.direction]] -= load.value
     if not link.reverse:
         return rows, (force_C, about_C)
     return rows, (-force_P, -about_P - ca.cross(p, force_P))

@@ -6,6 +6,7 @@ from typing import final
 
 import casadi as ca
 
+from symfric.multibody.constraints import Constraint, Held
 from symfric.multibody.dynamics import (
     Loop,
     Wrench,
@@ -28,19 +29,21 @@ class Equations:
 
     Attributes:
         q, qd, a: coordinates, rates, accelerations, shape (n, 1).
-        lam: multipliers of the loops, then of the Euler parameters, shape (m, 1).
+        lam: multipliers of loops, then further constraints, then Euler parameters, shape (m, 1).
         F: friction forces of the contacts [N].
+        held: constraints that are no joints.
         phi, phi_dot, phi_ddot: constraints on three levels, shape (m, 1).
         balance: M a + Phi_q' lam - Q, shape (n, 1), affine in a, lam and F.
         contacts: where friction acts.
         normals: normal force of each contact [N], in terms of q, qd, a, lam.
         kinetic, potential: energies [J].
-        power: power of all applied forces and of friction on the bodies [W].
+        power: power of all applied forces, of friction and of drives on the bodies [W].
         reactions: wrench on the child of each joint at its joint point, in the child's joint frame.
     """
 
     kin: Kinematics
     loops: tuple[Loop, ...]
+    held: tuple[Held, ...]
     q: ca.SX
     qd: ca.SX
     a: ca.SX
@@ -73,6 +76,11 @@ class Equations:
         return ca.jacobian(self.phi, self.q)
 
     @property
+    def phi_t(self) -> ca.SX:
+        """Partial derivative of the constraints by time, shape (m, 1)."""
+        return ca.jacobian(self.phi, self.kin.t)
+
+    @property
     def mass(self) -> ca.SX:
         """Mass matrix M, shape (n, n)."""
         return ca.jacobian(self.balance, self.a)
@@ -82,8 +90,10 @@ def equations(
     topology: Topology,
     joints: Sequence[Joint],
     forces: Sequence[Force],
+    constraints: Sequence[Constraint],
     q: ca.SX,
     qd: ca.SX,
+    t: ca.SX,
     kept: Sequence[int] | None = None,
 ) -> Equations:
     """Write the equations of motion of a mechanism.
@@ -92,15 +102,18 @@ def equations(
         topology: tree and loops.
         joints: all joints.
         forces: all applied forces.
+        constraints: what restricts the motion besides joints.
         q, qd: symbols of the coordinates and their rates, shape (n, 1).
+        t: symbol of time.
         kept: indices of the independent constraints; None keeps all.
     """
     a = ca.SX.sym("a", topology.n)
-    kin = kinematics(topology, q, qd, a)
+    kin = kinematics(topology, q, qd, a, t)
     by_name = {joint.name: joint for joint in joints}
     closed = loops(kin)
     norms, along, weights = normalisations(kin)
-    phi = ca.vertcat(ca.SX(0, 1), *(loop.phi for loop in closed), norms)
+    held = tuple(c.held(kin, by_name) for c in constraints)
+    phi = ca.vertcat(ca.SX(0, 1), *(part.phi for part in (*closed, *held)), norms)
     kept = range(phi.numel()) if kept is None else kept
     lam = ca.SX.sym("lam", len(kept))
     every = ca.SX(phi.numel(), 1)
@@ -109,16 +122,19 @@ def equations(
     contacts = tuple(_contacts(kin, joints))
     loads: list[Load | Axial] = [load for f in forces for load in f.loads(kin, by_name)]
     loads += [Axial(by_name[c.joint], c.direction, c.load) for c in contacts]
+    power = _power(kin, loads) + ca.dot(every, ca.jacobian(phi, t))
+    loads += _holding(held, every[sum(loop.phi.numel() for loop in closed) :, 0])
     rows, world = balance(kin, loads, closed, every)
     rows += along @ (every[phi.numel() - norms.numel() :, 0])
     pushed = along.T @ a + ca.jtimes(along.T @ qd, q, qd)
     rows += along @ (weights * pushed)
     phi = phi[list(kept)]
-    phi_dot = ca.jtimes(phi, q, qd)
+    phi_dot = ca.jtimes(phi, q, qd) + ca.jacobian(phi, t)
     reactions = {name: _without(world[name], name, kin, loads) for name in by_name}
     return Equations(
         kin,
         closed,
+        held,
         q,
         qd,
         a,
@@ -126,13 +142,13 @@ def equations(
         ca.vertcat(ca.SX(0, 1), *(c.F for c in contacts)),
         ca.densify(phi),
         phi_dot,
-        ca.jtimes(phi, q, a) + ca.jtimes(phi_dot, q, qd),
+        ca.jtimes(phi, q, a) + ca.jtimes(phi_dot, q, qd) + ca.jacobian(phi_dot, t),
         ca.densify(rows),
         contacts,
         tuple(_normal(c, by_name[c.joint], reactions) for c in contacts),
         kinetic_energy(kin),
         sum((f.energy(kin, by_name) for f in forces), ca.SX(0)),
-        _power(kin, loads),
+        power,
         reactions,
     )
 
@@ -142,13 +158,27 @@ def _without(wrench: Wrench, name: str, kin: Kinematics, loads: Sequence[Load | 
     if name not in kin.topology.link_of:
         return wrench
     force, moment = ca.SX(wrench[0]), ca.SX(wrench[1])
+    link = kin.topology.link_of[name]
+    R = link.joint.pose(kin.q[link.rows, 0])[0]
     for load in loads:
         if isinstance(load, Axial) and load.joint.name == name:
-            if load.direction == "slide":
-                force[2] -= load.value
+            own = ca.sparsify(R.T @ link.joint.axis(load.direction, R)) * load.value
+            if link.joint.linear(load.direction):
+                force -= own
             else:
-                moment[2] -= load.value
+                moment -= own
     return force, moment
+
+
+def _holding(held: Sequence[Held], lam: ca.SX) -> list[Load | Axial]:
+    """Loads of constraints that are no joints, whose multipliers `lam` begins with."""
+    loads: list[Load | Axial] = []
+    first = 0
+    for part in held:
+        m = part.phi.numel()
+        loads += part.loads(lam[first : first + m, 0])
+        first += m
+    return loads
 
 
 def _contacts(kin: Kinematics, joints: Sequence[Joint]) -> list[Contact]:

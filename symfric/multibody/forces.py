@@ -46,7 +46,10 @@ class Load:
 @final
 @dataclass(frozen=True, eq=False)
 class Axial:
-    """A force [N] or moment [N m] on the child of a joint along its axis, with its reaction."""
+    """A force [N] or moment [N m] on the child of a joint in one of its directions.
+
+    Its opposite acts on the parent.
+    """
 
     joint: Joint
     direction: str

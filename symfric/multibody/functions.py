@@ -15,6 +15,8 @@ def functions(
 ) -> dict[str, ca.Function]:
     """Functions of coordinates q, rates qd, accelerations a, inputs u and parameters p.
 
+    Those that depend on time, through prescribed motion or forces, take it as last argument t.
+
     Args:
         mechanism: what is described.
         p: parameters, as for `Mechanism.build`.
@@ -50,30 +52,24 @@ def functions(
     moved = ca.substitute(eq.balance, eq.F, forces)
     bodies = [m for name, m in eq.kin.motion.items() if name != GROUND]
     poses = ca.horzcat(ca.SX(3, 0), *(ca.horzcat(m.R, m.p) for m in bodies))
-    cse = {"cse": True}
-    return {
-        "mass": ca.Function("mass", [q, parameters], [eq.mass], ["q", "p"], ["M"], cse),
-        "bias": ca.Function(
-            "bias", [q, qd, u, parameters], [bias], ["q", "qd", "u", "p"], ["bias"], cse
-        ),
-        "constraints": ca.Function(
-            "constraints", [q, parameters], [eq.phi, eq.Phi_q], ["q", "p"], ["phi", "phi_q"], cse
-        ),
-        "inverse_dynamics": ca.Function(
-            "inverse_dynamics",
-            [q, qd, a, lam, z, u, parameters],
-            [moved],
-            ["q", "qd", "a", "lam", "z", "u", "p"],
-            ["missing"],
-            cse,
-        ),
-        "energy": ca.Function(
-            "energy",
-            [q, qd, parameters],
-            [eq.kinetic, eq.potential],
-            ["q", "qd", "p"],
-            ["kinetic", "potential"],
-            cse,
-        ),
-        "poses": ca.Function("poses", [q, parameters], [ca.densify(poses)], ["q", "p"], ["poses"]),
-    }
+    every = {
+        "q": q, "qd": qd, "a": a, "lam": lam, "z": z, "u": u, "p": parameters, "t": eq.kin.t,
+    }  # fmt: skip
+
+    def function(name: str, arguments: str, **results: ca.SX) -> ca.Function:
+        expressions = [ca.densify(result) for result in results.values()]
+        named = arguments.split()
+        if ca.depends_on(ca.veccat(*expressions), eq.kin.t):
+            named.append("t")
+        symbols = [every[argument] for argument in named]
+        return ca.Function(name, symbols, expressions, named, list(results), {"cse": True})
+
+    made = (
+        function("mass", "q p", M=eq.mass),
+        function("bias", "q qd u p", bias=bias),
+        function("constraints", "q p", phi=eq.phi, phi_q=eq.Phi_q),
+        function("inverse_dynamics", "q qd a lam z u p", missing=moved),
+        function("energy", "q qd p", kinetic=eq.kinetic, potential=eq.potential),
+        function("poses", "q p", poses=poses),
+    )
+    return {each.name(): each for each in made}

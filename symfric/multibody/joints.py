@@ -8,6 +8,7 @@ coordinates. The axis of a joint is z of both frames.
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, final
 
@@ -29,11 +30,15 @@ ANGLE, LENGTH = ("", "rad"), ("", "m")
 EULER = tuple((f"e{i}", "1") for i in range(4))
 
 
-def _z() -> ca.SX:
-    """Motion along or about z, shape (3, 1)."""
+def _unit(k: int) -> ca.SX:
+    """Motion along or about the axis k, shape (3, 1)."""
     column = ca.SX(3, 1)
-    column[2] = 1
+    column[k] = 1
     return column
+
+
+def _z() -> ca.SX:
+    return _unit(2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +64,8 @@ class Joint(ABC):
     """Whether friction acts along z."""
     turns: ClassVar[bool] = False
     """Whether friction acts about z."""
+    directions: ClassVar[Mapping[str, int]] = {}
+    """Where forces and motions may be prescribed: "slide", "turn", ... -> joint coordinate."""
     quaternion: ClassVar[int | None] = None
     """Index of the first of four Euler parameters among the coordinates."""
 
@@ -80,6 +87,20 @@ class Joint(ABC):
     @abstractmethod
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
         """Expressions of R_PC and p_PC that must vanish, shape (m, 1)."""
+
+    def linear(self, direction: str) -> bool:
+        """Whether motion in this direction is a translation [m], not a rotation [rad]."""
+        return self.coordinates[self.directions[direction]][1] == "m"
+
+    def axis(self, direction: str, R: ca.SX) -> ca.SX:
+        """Axis of a direction in P, shape (3, 1)."""
+        return _unit("xyz".index(direction) if direction in "xyz" else 2)
+
+    def displacement(self, direction: str, R: ca.SX, p: ca.SX) -> ca.SX:
+        """The coordinate of a direction at a pose; an angle between -pi and pi."""
+        if self.linear(direction):
+            return p["xyz".index(direction) if direction in "xyz" else 2]
+        return ca.atan2(R[1, 0], R[0, 0])
 
     @property
     def starts(self) -> tuple[Scalar, ...]:
@@ -113,6 +134,7 @@ class Revolute(Joint):
     coordinates: ClassVar[tuple[tuple[str, str], ...]] = (ANGLE,)
     constrains: ClassVar[int] = 5
     turns: ClassVar[bool] = True
+    directions: ClassVar[Mapping[str, int]] = {"turn": 0}
 
     def pose(self, q: ca.SX) -> Pair:
         """Turned by q about z."""
@@ -135,6 +157,7 @@ class Prismatic(Joint):
     coordinates: ClassVar[tuple[tuple[str, str], ...]] = (LENGTH,)
     constrains: ClassVar[int] = 5
     slides: ClassVar[bool] = True
+    directions: ClassVar[Mapping[str, int]] = {"slide": 0}
 
     def pose(self, q: ca.SX) -> Pair:
         """Shifted by q along z."""
@@ -158,6 +181,7 @@ class Cylindrical(Joint):
     constrains: ClassVar[int] = 4
     slides: ClassVar[bool] = True
     turns: ClassVar[bool] = True
+    directions: ClassVar[Mapping[str, int]] = {"slide": 0, "turn": 1}
 
     def pose(self, q: ca.SX) -> Pair:
         """Shifted by q[0] along z and turned by q[1] about it."""
@@ -201,6 +225,7 @@ class Universal(Joint):
 
     coordinates: ClassVar[tuple[tuple[str, str], ...]] = (("x", "rad"), ("y", "rad"))
     constrains: ClassVar[int] = 4
+    directions: ClassVar[Mapping[str, int]] = {"x": 0, "y": 1}
 
     def pose(self, q: ca.SX) -> Pair:
         """Turned by q[0] about x, then by q[1] about the new y."""
@@ -215,6 +240,16 @@ class Universal(Joint):
         """One point in common, orthogonal axes."""
         return ca.vertcat(p, R[0, 1])
 
+    def axis(self, direction: str, R: ca.SX) -> ca.SX:
+        """The parent's x, the child's y."""
+        return _unit(0) if direction == "x" else R[:, 1]
+
+    def displacement(self, direction: str, R: ca.SX, p: ca.SX) -> ca.SX:
+        """Angle about the parent's x, angle about the child's y."""
+        if direction == "x":
+            return ca.atan2(R[2, 1], R[1, 1])
+        return ca.atan2(R[0, 2], R[0, 0])
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -223,6 +258,7 @@ class Planar(Joint):
 
     coordinates: ClassVar[tuple[tuple[str, str], ...]] = (("x", "m"), ("y", "m"), ("angle", "rad"))
     constrains: ClassVar[int] = 3
+    directions: ClassVar[Mapping[str, int]] = {"x": 0, "y": 1, "turn": 2}
 
     def pose(self, q: ca.SX) -> Pair:
         """Shifted by q[0], q[1] in the plane and turned by q[2] about its normal."""

@@ -74,13 +74,14 @@ class Relative:
 class Kinematics:
     """Motions of all bodies in terms of coordinates q, rates qd and accelerations qdd.
 
-    What a force may ask: `motion`, `point`, `along`.
+    What a force or a constraint may ask: `motion`, `point`, `along` and the time `t`.
     """
 
     topology: Topology
     q: ca.SX
     qd: ca.SX
     motion: dict[str, Motion]
+    t: ca.SX
 
     def point(self, place: str) -> tuple[ca.SX, ca.SX]:
         """Position and velocity in the world of the origin of the frame "body.frame"."""
@@ -109,27 +110,27 @@ class Kinematics:
         )
 
     def along(self, joint: Joint, direction: str) -> tuple[ca.SX, ca.SX]:
-        """Displacement along z ("slide") or angle about z ("turn") of a joint, and its rate.
+        """Displacement or angle of a joint in one of its `directions`, and its rate.
 
         The angle of a joint that closes a loop lies between -pi and pi.
         """
         link = self.topology.link_of.get(joint.name)
         if link is not None:
-            k = link.first + (1 if joint.slides and joint.turns and direction == "turn" else 0)
+            k = link.first + joint.directions[direction]
             return self.q[k], self.qd[k]
         relative = self.relative(joint)
-        if direction == "slide":
-            return relative.p[2], relative.v[2]
-        return ca.atan2(relative.R[1, 0], relative.R[0, 0]), relative.w[2]
+        axis = joint.axis(direction, relative.R)
+        rate = ca.dot(axis, relative.v if joint.linear(direction) else relative.w)
+        return joint.displacement(direction, relative.R, relative.p), rate
 
 
-def kinematics(topology: Topology, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> Kinematics:
+def kinematics(topology: Topology, q: ca.SX, qd: ca.SX, qdd: ca.SX, t: ca.SX) -> Kinematics:
     """The recursion from the ground outwards."""
     zero = ca.SX(3, 1)
     motion = {GROUND: Motion(ca.SX.eye(3), zero, zero, zero, zero, zero)}
     for link in topology.links:
         motion[link.body] = _carried(motion[link.base], link, q, qd, qdd)
-    return Kinematics(topology, q, qd, motion)
+    return Kinematics(topology, q, qd, motion, t)
 
 
 def _carried(base: Motion, link: Link, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> Motion:

@@ -12,6 +12,7 @@ from symfric.model import Model, Variables
 from symfric.multibody import checks
 from symfric.multibody.assembly import assemble, coordinates
 from symfric.multibody.body import GROUND, Body
+from symfric.multibody.constraints import Constraint
 from symfric.multibody.forces import Force, Gravity
 from symfric.multibody.joints import Joint
 from symfric.multibody.prepare import (
@@ -33,7 +34,7 @@ FORMULATIONS = ("joint", "absolute")
 
 
 class Mechanism:
-    """Collects bodies, joints and forces; `build` writes the `Model`.
+    """Collects bodies, joints, forces and constraints; `build` writes the `Model`.
 
     Example:
         m = Mechanism("pendulum")
@@ -49,6 +50,7 @@ class Mechanism:
         self.bodies: list[Body] = [Body(GROUND, 0.0, (0.0, 0.0, 0.0))]
         self.joints: list[Joint] = []
         self.forces: list[Force] = []
+        self.constraints: list[Constraint] = []
         self.inputs: list[Variable] = []
         self.frames: list[tuple[str, Frame]] = []
         if not all(isinstance(g, float | int) and g == 0 for g in gravity):  # type: ignore[union-attr]
@@ -77,6 +79,10 @@ class Mechanism:
     def force(self, force: Force) -> None:
         """Add a force."""
         self.forces.append(force)
+
+    def constraint(self, constraint: Constraint) -> None:
+        """Add a constraint that is no joint: prescribed motion, a coupling, an expression."""
+        self.constraints.append(constraint)
 
     def input(self, name: str, unit: str, start: float = 0.0, nominal: float = 1.0) -> ca.SX:
         """Add an input and return its symbol, for actuators and user forces."""
@@ -111,7 +117,7 @@ class Mechanism:
         bodies, problems = self._placed()
         symbols = ca.vertcat(NONE, *(v.symbol for v in p))
         values = ca.DM(ca.vertcat(NONE, *(v.start for v in p)))
-        problems += checks.naming(bodies, self.joints, self.forces)
+        problems += checks.naming(bodies, self.joints, self.forces, self.constraints)
         problems += checks.numbers(bodies, self.joints, symbols, values)
         self._refuse(problems)
         by_name = {body.name: body for body in bodies}
@@ -121,9 +127,10 @@ class Mechanism:
         if formulation == "absolute":
             names = [body.name for body in bodies if body.name != GROUND]
             made = in_absolute_coordinates(
-                absolute(by_name, self.joints, names), made, self.joints, self.forces, symbols,
-                values,
+                absolute(by_name, self.joints, names), made, self.joints, self.forces,
+                self.constraints, symbols, values,
             )  # fmt: skip
+            self._refuse(made.problems)
             self._refuse(_left_open(made))
         return made
 
@@ -157,7 +164,8 @@ class Mechanism:
     def _consistent(self, topology: Topology, p: ca.SX, values: ca.DM) -> Prepared:
         """Equations in joint coordinates, their start values checked."""
         q, qd = coordinates(topology)
-        made = written(topology, self.joints, self.forces, q, qd, p, values)
+        made = written(topology, self.joints, self.forces, self.constraints, q, qd, p, values)
+        self._refuse(made.problems)
         self._refuse([*start_problems(made, p, values), *_left_open(made)])
         return made
 
@@ -170,14 +178,18 @@ class Mechanism:
         bodies, _ = self._placed()
         topology = spanning_tree({body.name: body for body in bodies}, self.joints)
         q, qd = coordinates(topology)
-        made = written(topology, self.joints, self.forces, q, qd, NONE, ca.DM(0, 1))
+        made = written(
+            topology, self.joints, self.forces, self.constraints, q, qd, NONE, ca.DM(0, 1)
+        )
+        self._refuse(made.problems)
         at = numeric(made.eq, NONE, ca.DM(0, 1))
         near = checks.project(at, made.q0)
         if near is None:
             self._refuse(["start: expected positions from which the loops can be closed"])
             near = made.q0
-        J = at(near)[1].full()
-        rates = made.qd0 - np.linalg.lstsq(J, J @ made.qd0, rcond=None)[0] if J.size else made.qd0
+        _, J, phi_t = (part.full() for part in at(near))
+        speed = J @ made.qd0 + phi_t[:, 0]
+        rates = made.qd0 - np.linalg.lstsq(J, speed, rcond=None)[0] if J.size else made.qd0
         start = {
             link.joint.name: replace(
                 link.joint,
@@ -188,6 +200,7 @@ class Mechanism:
         }
         copy = Mechanism(self.name)
         copy.bodies, copy.forces, copy.inputs = self.bodies, self.forces, self.inputs
+        copy.constraints = self.constraints
         copy.frames, copy.joints = self.frames, [start.get(j.name, j) for j in self.joints]
         return copy
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from symfric.model import Variables
 from symfric.multibody import checks
 from symfric.multibody.assembly import coordinates
+from symfric.multibody.constraints import Constraint
 from symfric.multibody.equations import Equations, equations
 from symfric.multibody.forces import Force
 from symfric.multibody.joints import Joint
@@ -34,6 +35,7 @@ class Prepared:
         redundant: names of the constraints that were left out.
         undetermined: joints whose normal force redundant constraints leave open.
         singular: whether constraints that are independent nearby are not at the start.
+        problems: constraints that cannot be.
     """
 
     eq: Equations
@@ -45,12 +47,13 @@ class Prepared:
     redundant: tuple[str, ...]
     undetermined: tuple[str, ...] = ()
     singular: bool = False
+    problems: tuple[str, ...] = ()
 
 
 def start_problems(made: Prepared, p: ca.SX, values: ca.DM) -> Iterator[str]:
     """Start positions or velocities that violate constraints; offers the nearest that fit."""
     at = numeric(made.eq, p, values)
-    phi, J = (m.full() for m in at(made.q0))
+    phi, J, phi_t = (m.full() for m in at(made.q0))
     if not phi.size:
         return
     worst = int(np.abs(phi).argmax())
@@ -65,7 +68,7 @@ def start_problems(made: Prepared, p: ca.SX, values: ca.DM) -> Iterator[str]:
             f"{phi[worst, 0]:.3g}; {offer}; `assembled()` takes it"
         )
         return
-    speed = J @ made.qd0
+    speed = J @ made.qd0 + phi_t[:, 0]
     worst = int(np.abs(speed).argmax())
     if abs(speed[worst]) > checks.FITS * max(1.0, float(np.abs(made.qd0).max())):
         near = made.qd0 - np.linalg.lstsq(J, speed, rcond=None)[0]
@@ -83,6 +86,7 @@ def in_absolute_coordinates(
     tree: Prepared,
     joints: Sequence[Joint],
     forces: Sequence[Force],
+    constraints: Sequence[Constraint],
     p: ca.SX,
     values: ca.DM,
 ) -> Prepared:
@@ -110,7 +114,7 @@ def in_absolute_coordinates(
     )  # fmt: skip
     topology = replace(topology, links=links)
     q, qd = coordinates(topology)
-    return written(topology, joints, forces, q, qd, p, values)
+    return written(topology, joints, forces, constraints, q, qd, p, values)
 
 
 def without_friction(made: Prepared, p: Variables, u: Variables) -> dict[str, Array]:
@@ -118,8 +122,8 @@ def without_friction(made: Prepared, p: Variables, u: Variables) -> dict[str, Ar
     eq = made.eq
     unknowns = ca.vertcat(eq.a, eq.lam)
     rows = ca.vertcat(eq.balance, eq.phi_ddot)
-    zero = [ca.SX.zeros(eq.F.numel()), ca.SX(ca.vertcat(NONE, *(v.start for v in u)))]
-    symbols = [eq.F, ca.vertcat(NONE, *(v.symbol for v in u))]
+    zero = [ca.SX.zeros(eq.F.numel()), ca.SX(ca.vertcat(NONE, *(v.start for v in u))), ca.SX(0)]
+    symbols = [eq.F, ca.vertcat(NONE, *(v.symbol for v in u)), eq.kin.t]
     rows, normals = ca.substitute([rows, ca.vertcat(NONE, *eq.normals)], symbols, zero)
     solve = ca.Function(
         "start",
@@ -140,12 +144,13 @@ def _skew(a: ca.DM) -> Array:
 
 
 def numeric(eq: Equations, p: ca.SX, values: ca.DM) -> checks.Position:
-    """Q -> (phi, Phi_q) at the start values of the parameters."""
-    both = ca.Function("at", [eq.q, p], [eq.phi, ca.densify(eq.Phi_q)])
+    """Q -> (phi, phi_q, phi_t) at time 0 and the start values of the parameters."""
+    parts = [eq.phi, ca.densify(eq.Phi_q), ca.densify(eq.phi_t)]
+    every = ca.Function("at", [eq.q, p, eq.kin.t], parts)
 
-    def at(q: Array) -> tuple[ca.DM, ca.DM]:
-        phi, jacobian = both.call([q, values])
-        return phi, jacobian
+    def at(q: Array) -> tuple[ca.DM, ca.DM, ca.DM]:
+        phi, jacobian, rate = every.call([q, values, 0.0])
+        return phi, jacobian, rate
 
     return at
 
@@ -154,6 +159,7 @@ def written(
     topology: Topology,
     joints: Sequence[Joint],
     forces: Sequence[Force],
+    constraints: Sequence[Constraint],
     q: Variables,
     qd: Variables,
     p: ca.SX,
@@ -163,28 +169,62 @@ def written(
     q_symbols, qd_symbols = (ca.vertcat(NONE, *(v.symbol for v in g)) for g in (q, qd))
     starts = (ca.vertcat(NONE, *(v.start for v in g)) for g in (q, qd))
     q0, qd0 = (ca.DM(ca.substitute(s, p, ca.SX(values))).full().ravel() for s in starts)
-    eq = equations(topology, joints, forces, q_symbols, qd_symbols)
+    arguments = topology, joints, forces, constraints, q_symbols, qd_symbols, ca.SX.sym("t")
+    eq = equations(*arguments)
     labels = labels_of(eq)
-    made = Prepared(eq, q, qd, q0, qd0, labels, ())
-    if not eq.m:
+    made = Prepared(eq, q, qd, q0, qd0, labels, (), problems=tuple(_held(eq, constraints, p)))
+    if not eq.m or made.problems:
         return made
     found = checks.rank(numeric(eq, p, values), q0)
     if not found.redundant:
         return replace(made, singular=found.singular)
     return replace(
         made,
-        eq=equations(topology, joints, forces, q_symbols, qd_symbols, found.kept),
+        eq=equations(*arguments, found.kept),
         labels=tuple(labels[i] for i in found.kept),
         redundant=tuple(labels[i] for i in found.redundant),
         undetermined=_undetermined(made, found.undetermined, p, values),
         singular=found.singular,
+        problems=tuple(_fixed_already(made, constraints, found.undetermined)),
     )
+
+
+def _held(eq: Equations, constraints: Sequence[Constraint], p: ca.SX) -> Iterator[str]:
+    """Why constraints cannot be held, or what they depend on besides coordinates and time."""
+    known = {s.__hash__() for s in ca.symvar(ca.vertcat(eq.q, eq.kin.t, p))}
+    for constraint, part in zip(constraints, eq.held, strict=True):
+        where = f"{constraint.kind} '{constraint.name}'"
+        yield from (f"{where} > {text}" for text in part.problems)
+        stray = [str(s) for s in ca.symvar(part.phi) if s.__hash__() not in known]
+        if stray:
+            yield (
+                f"{where}: expected an expression of positions, time and parameters, got "
+                f"{', '.join(stray)}; of an input the two derivatives are not known"
+            )
+
+
+def _fixed_already(made: Prepared, constraints: Sequence[Constraint], free: Array) -> Iterator[str]:
+    """Constraints in time whose multipliers take part in the combinations `free`.
+
+    Two motions prescribed for one coordinate agree at the start at most.
+    """
+    phi, t = made.eq.phi, made.eq.kin.t
+    involved = np.abs(free).max(axis=1) > checks.RANK
+    for constraint, part in zip(constraints, made.eq.held, strict=True):
+        for label in part.labels:
+            i = made.labels.index(label)
+            if involved[i] and ca.depends_on(phi[i], t):
+                others = (made.labels[k] for k in np.flatnonzero(involved) if k != i)
+                yield (
+                    f"{constraint.kind} '{constraint.name}': expected motion that no other "
+                    f"constraint fixes, got one that depends on {', '.join(others)}"
+                )
 
 
 def _undetermined(made: Prepared, free: Array, p: ca.SX, values: ca.DM) -> tuple[str, ...]:
     """Joints whose normal force changes with combinations `free` of the multipliers."""
     eq, rng = made.eq, np.random.default_rng(1)
-    normals = ca.vertcat(NONE, *eq.normals)
+    normals = ca.substitute(ca.vertcat(NONE, *eq.normals), eq.kin.t, ca.SX(0))
     slope = ca.Function(
         "slope", [eq.q, eq.qd, eq.a, eq.lam, p], [ca.densify(ca.jacobian(normals, eq.lam))],
         {"allow_free": True},
@@ -195,11 +235,12 @@ def _undetermined(made: Prepared, free: Array, p: ca.SX, values: ca.DM) -> tuple
 
 
 def labels_of(eq: Equations) -> tuple[str, ...]:
-    """Names of the multipliers: joint and number, body and "norm"."""
+    """Names of the multipliers: joint and number, those of constraints, body and "norm"."""
     labels: list[str] = []
     for loop in eq.loops:
         m = loop.phi.numel()
         labels += [f"{loop.joint.name}_lambda" + (f"_{i + 1}" if m > 1 else "") for i in range(m)]
+    labels += [label for part in eq.held for label in part.labels]
     for link in eq.kin.topology.links:
         if link.joint.quaternion is not None:
             labels.append(f"{link.joint.name}_norm")

@@ -4,15 +4,15 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar, final
 
-from symfric.laws import smooth
-from symfric.laws.base import APPLIED_FORCE, Facts, Input, Law, State, Switch
-from symfric.numeric import Scalar, column
+from symfric.laws.base import Facts, Switch
+from symfric.laws.sticking import Sticking, held, stick_and_slip
+from symfric.numeric import Scalar
 from symfric.parameters import param
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class ExactCoulomb(Law):
+class ExactCoulomb(Sticking):
     """Set-valued Coulomb friction with a static level, by modes (one state).
 
         slip: F = mu_d N mode,  mode = sign(v)
@@ -38,18 +38,12 @@ class ExactCoulomb(Law):
 
     mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
     mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-
     v_0: Scalar = param(1e-9, unit="m/s", doc="velocity that ends a stick", lower=1e-15)
 
     @property
-    def states(self) -> tuple[State, ...]:
-        """The mode: direction of sliding, or 0 for stick."""
-        return (State("mode", "1", 1.0),)
-
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        """The applied force."""
-        return (APPLIED_FORCE,)
+    def has_mode(self) -> bool:
+        """Always."""
+        return True
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -58,29 +52,10 @@ class ExactCoulomb(Law):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
         """Friction force [N]."""
-        held = smooth.clip(F_e, -self.mu_s * N, self.mu_s * N)
-        return self.mu_d * N * z[0] + held * (1 - z[0] * z[0])
-
-    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
-        """Zero: the mode changes at switches only."""
-        return column(0.0 * v)
-
-    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """The direction of sliding."""
-        return column(smooth.sign(v, 0.0))
+        return self.mu_d * N * z[0] + held(z[0], F_e, self.mu_s * N)
 
     def switches(
         self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0
     ) -> tuple[Switch, ...]:
         """The end of sliding, break-away under a growing load, and motion under an overload."""
-        mode, onward = z[0], smooth.sign(F_e, 0.0)
-        stuck = smooth.magnitude(F_e, 0.0) - self.mu_s * N
-        gone = smooth.magnitude(v, 0.0) - self.v_0
-        held = smooth.choose(stuck <= 0, 0.0, onward)
-        return (
-            Switch(
-                "stick", smooth.choose(mode == 0, 1.0, mode * v), -1, {"mode": held}, halts=True
-            ),
-            Switch("slip", smooth.choose(mode == 0, stuck, -1.0), 1, {"mode": onward}),
-            Switch("overload", smooth.choose(mode == 0, gone, -1.0), 1, {"mode": onward}),
-        )
+        return stick_and_slip(v, z[0], F_e, self.mu_s * N, self.v_0)

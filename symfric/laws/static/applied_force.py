@@ -1,20 +1,22 @@
 """Laws that see what the contact must carry: true sticking without an internal state."""
 
 from dataclasses import dataclass
-from math import pi
+from math import inf, pi
 from typing import ClassVar, final
 
 from symfric.laws import smooth
-from symfric.laws.base import APPLIED_FORCE, Facts, Input, StaticLaw
+from symfric.laws.base import APPLIED_FORCE, Facts, Input, StaticLaw, Switch
+from symfric.laws.sticking import Sticking, held, stick_and_slip
 from symfric.numeric import Scalar, atan, exp, is_number
 from symfric.parameters import option, param
 
 FORMS = ("smooth", "original")
+WITH_MODES = (*FORMS, "event")
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Karnopp(StaticLaw):
+class Karnopp(Sticking):
     """Karnopp friction: inside a band around rest the contact carries the applied force.
 
         F = clip(F_e, -mu_s N, mu_s N)        for |v| < D_v, original
@@ -23,10 +25,15 @@ class Karnopp(StaticLaw):
         w = S(|v| / D_v),   S(t) = t^3 (10 - 15t + 6t^2) for 0 <= t <= 1
 
     hold is the clip with corners rounded over +-F_eps; below them F(0) = F_e exactly.
-    Limits: at rest dv/dt = 0 for |F_e| <= mu_s N - F_eps. A moving body comes to rest only
-    asymptotically, v ~ t^(-1/2) inside the band; in the original form v stays where it entered the
-    band unless the integrator sets it to zero. D_v -> 0 is Coulomb friction with stiction. Inside
-    the band F v may be negative.
+    form = "event" (one state, the mode) is the original in which the band counts as rest: a sliding
+    body that enters it stops, and one that is pulled by more than mu_s N leaves it, against mu_s N
+    up to |v| = D_v. It needs a scene with events.
+    Limits: at rest dv/dt = 0 for |F_e| <= mu_s N - F_eps. In the smooth form a moving body comes to
+    rest only asymptotically, v ~ t^(-1/2) inside the band; in the original one v stays where it
+    entered the band unless the integrator sets it to zero; in the event form it stops at once,
+    which takes m D_v^2/2 of energy. D_v -> 0 is Coulomb friction with stiction (`ExactCoulomb`).
+    Inside the band F v may be negative, not so in the event form. Keep
+    sigma_2 D_v < (mu_s - mu_d) N: else that form enters the band again as soon as it has left it.
     Source: Karnopp, ASME J. Dyn. Syst. Meas. Control 107, 1985 (not read), as in public codes.
     """
 
@@ -43,26 +50,44 @@ class Karnopp(StaticLaw):
     D_v: Scalar = param(1e-3, unit="m/s", doc="half width of the band around rest", lower=1e-12)
     sigma_2: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
     F_eps: Scalar = param(1e-3, unit="N", doc="rounding of the break-away", lower=1e-12)
-    form: str = option("smooth", choices=FORMS, doc="window or hard switch")
+    form: str = option("smooth", choices=WITH_MODES, doc="window, hard switch, or exact with mode")
 
     @property
-    def inputs(self) -> tuple[Input, ...]:
-        """The applied force."""
-        return (APPLIED_FORCE,)
+    def has_mode(self) -> bool:
+        """In the event form."""
+        return self.form == "event"
 
     @property
     def velocity_scale(self) -> Scalar:
-        """The half width of the band [m/s]."""
-        return self.D_v
+        """The half width of the band [m/s]; none in the event form, where it is an event."""
+        return inf if self.has_mode else self.D_v
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
         """Friction force [N]."""
+        if self.has_mode:
+            level = self.mu_d * N + self.sigma_2 * z[0] * v
+            leaving = smooth.choose(z[0] * v < self.D_v, self.mu_s * N, level)
+            return z[0] * leaving + held(z[0], F_e, self.mu_s * N)
         slip = self.mu_d * N * smooth.sign(v, 0.0) + self.sigma_2 * v
         speed, static = smooth.magnitude(v, 0.0), self.mu_s * N
         if self.form == "original":
             return smooth.choose(speed < self.D_v, smooth.hold(F_e, static, 0.0), slip)
         w = smooth.step5(speed / self.D_v)
         return (1 - w) * smooth.hold(F_e, static, self.F_eps) + w * slip
+
+    def switches(
+        self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0
+    ) -> tuple[Switch, ...]:
+        """Those of a contact that sticks; the band ends a slide, and its edge jumps the force."""
+        if not self.has_mode:
+            return ()
+        edge = smooth.choose(z[0] == 0, -1.0, z[0] * v - self.D_v)
+        stuck = stick_and_slip(v, z[0], F_e, self.mu_s * N, self.D_v)
+        return (
+            *stuck,
+            Switch("stop", edge, -1, stuck[0].reset, halts=True),
+            Switch("leave", edge, 1),
+        )
 
 
 @final
@@ -121,7 +146,7 @@ class Awrejcewicz(StaticLaw):
 
 @final
 @dataclass(frozen=True, eq=False)
-class LeineSwitch(StaticLaw):
+class LeineSwitch(Sticking):
     """Switch model of Leine et al., and its smooth stand-in.
 
         smooth:    F = mu_s N (2/pi) atan(v / v_eps) / (1 + delta |v|)
@@ -130,6 +155,9 @@ class LeineSwitch(StaticLaw):
 
     c v draws a sticking body to the middle of the band: with m alpha for c, dv/dt = -alpha v.
     |v| of the smooth form is smooth over v_eps.
+    form = "event" (one state, the mode) has no band: sliding ends where v passes through zero,
+    rest where |F_e| reaches mu_s N, or at |v| = eta under a greater load from the very start. It
+    needs a scene with events.
     Limits: the level falls from mu_s N to zero, with no dynamic level. The smooth form creeps under
     load and is 6 % short of the original at 10 v_eps, since atan is slow.
     Source: Leine et al., Nonlinear Dynam. 16, 1998 (not read); smooth form and slip law as in the
@@ -146,19 +174,24 @@ class LeineSwitch(StaticLaw):
     mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
     delta: Scalar = param(3.0, unit="s/m", doc="steepness of the fall", lower=0.0)
     v_eps: Scalar = param(1e-4, unit="m/s", doc="smoothing velocity", lower=1e-12)
-    eta: Scalar = param(1e-6, unit="m/s", doc="half width of the band, original form", lower=1e-15)
+    eta: Scalar = param(1e-6, unit="m/s", doc="half width of the band of rest", lower=1e-15)
     c: Scalar = param(10.0, unit="N s/m", doc="pull to the middle, original form", lower=0.0)
-    form: str = option("smooth", choices=FORMS, doc="arctangent or switch")
+    form: str = option("smooth", choices=WITH_MODES, doc="arctangent, switch, or exact with mode")
+
+    @property
+    def has_mode(self) -> bool:
+        """In the event form."""
+        return self.form == "event"
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """The applied force, in the original form."""
+        """The applied force, but not in the smooth form."""
         return () if self.form == "smooth" else (APPLIED_FORCE,)
 
     @property
     def velocity_scale(self) -> Scalar:
-        """The smoothing velocity, or the half width of the band [m/s]."""
-        return self.v_eps if self.form == "smooth" else self.eta
+        """The smoothing velocity, or the half width of the band [m/s]; none in the event form."""
+        return {"smooth": self.v_eps, "original": self.eta, "event": inf}[self.form]
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
         """Friction force [N]."""
@@ -167,9 +200,19 @@ class LeineSwitch(StaticLaw):
             falling = static / (1 + self.delta * smooth.magnitude(v, self.v_eps))
             return falling * (2 / pi * atan(v / self.v_eps))
         speed = smooth.magnitude(v, 0.0)
+        if self.has_mode:
+            return static * z[0] / (1 + self.delta * speed) + held(z[0], F_e, static)
         slip = static * smooth.sign(v, 0.0) / (1 + self.delta * speed)
         stick = smooth.hold(F_e + self.c * v, static, 0.0)
         return smooth.choose(speed <= self.eta, stick, slip)
+
+    def switches(
+        self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0
+    ) -> tuple[Switch, ...]:
+        """The end of sliding, break-away under a growing load, and motion under an overload."""
+        if not self.has_mode:
+            return ()
+        return stick_and_slip(v, z[0], F_e, self.mu_s * N, self.eta)
 
 
 @final

@@ -78,14 +78,14 @@ def test_an_option_is_set_like_a_parameter(capsys: pytest.CaptureFixture[str]) -
 
 def test_an_unknown_choice_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["laws", "karnopp", "--set", "form=sharp"]) != 0
-    assert "form: expected one of smooth, original, got 'sharp'" in capsys.readouterr().err
+    assert "form: expected one of smooth, original, event, got 'sharp'" in capsys.readouterr().err
 
 
 def test_further_inputs_and_options_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["laws", "karnopp"]) == 0
     out = capsys.readouterr().out
     assert "F_e" in out[out.index("input ") :]
-    assert "smooth, original" in out[out.index("option ") :]
+    assert "smooth, original, event" in out[out.index("option ") :]
 
 
 def test_cost_is_shown_as_instructions_of_value_and_gradient(

@@ -27,7 +27,6 @@ from symfric import (
     Law,
     LuGre,
     SelfTuning,
-    StaticLaw,
     Stribeck,
     parameters,
     symbolise,
@@ -131,7 +130,7 @@ def test_rate_vanishes_in_steady_sliding(name: str, v: float, N: float) -> None:
     assert (rate <= 1e-11 * np.maximum(near, abs(v))).all()
 
 
-STATIC_KINDS = [n for n, kind in ALL_LAWS.items() if issubclass(kind, StaticLaw)]
+STATIC_KINDS = [n for n, kind in ALL_LAWS.items() if not kind().states]
 PROPORTIONAL = [n for n in STATIC_KINDS if ALL_LAWS[n].facts.load == "proportional"]
 INDEPENDENT = [n for n in STATIC_KINDS if ALL_LAWS[n].facts.load == "independent"]
 

@@ -92,7 +92,7 @@ def test_absent_terms_cost_nothing() -> None:
         m = chain(gravity=0.0)
         made = m.prepare()
         topology = made.eq.kin.topology
-        eq = equations(topology, m.joints, [force], made.eq.q, made.eq.qd)
+        eq = equations(topology, m.joints, [force], [], made.eq.q, made.eq.qd, made.eq.kin.t)
         return ca.Function("b", [eq.q, eq.qd, eq.a, eq.lam], [eq.balance]).n_instructions()
 
     linear, spring, damped = (

@@ -1,0 +1,69 @@
+"""What is drawn of a mechanism: its bodies as lines between frames, its joints, rods and springs."""
+
+from collections.abc import Iterable, Mapping
+
+import casadi as ca
+
+from symfric.multibody.body import GROUND
+from symfric.multibody.equations import Equations
+from symfric.multibody.forces import Force, SpringDamper
+from symfric.multibody.joints import Joint
+from symfric.multibody.kinematics import Kinematics
+from symfric.multibody.topology import body_of, frame_at
+from symfric.numeric import equals
+from symfric.sketch import Mark, Part, Sketch
+
+
+def sketch(
+    eq: Equations, joints: Iterable[Joint], forces: Iterable[Force], scales: Mapping[str, float]
+) -> Sketch:
+    """The sketch of a mechanism.
+
+    Args:
+        eq: its equations.
+        joints, forces: what is drawn beside bodies.
+        scales: contact -> velocity [m/s] below which it counts as sticking.
+    """
+    drawn = [f for f in forces if isinstance(f, SpringDamper)]
+    used: dict[str, int] = {}
+    for joint in joints:
+        for place in (joint.parent, joint.child):
+            used.setdefault(place, len(used))
+    for force in drawn:
+        for place in force.places():
+            used.setdefault(place, len(used))
+    columns = [_frame(eq.kin, place) for place in used]
+    parts: list[Part] = []
+    for name in eq.kin.motion:
+        corners = tuple(k for place, k in used.items() if body_of(place) == name)
+        parts.append(Part(name, len(columns), corners, fixed=name == GROUND))
+        columns.append(_centre(eq.kin, name))
+    marks = [_joint(eq, joint, used, scales) for joint in joints]
+    for force in drawn:
+        elastic = not equals(force.stiffness, 0.0)
+        marks.append(Mark(force.name, "spring" if elastic else "damper", used[force.a],
+                          used[force.b]))  # fmt: skip
+    return Sketch(ca.horzcat(*columns), tuple(parts), tuple(marks))
+
+
+def _joint(eq: Equations, joint: Joint, used: dict[str, int], scales: Mapping[str, float]) -> Mark:
+    slips = tuple(
+        (f"{c.name}_slip", scales[c.name])
+        for c in eq.contacts
+        if c.joint == joint.name and c.name in scales
+    )
+    kind, grounded = type(joint).__name__.lower(), body_of(joint.parent) == GROUND
+    return Mark(joint.name, kind, used[joint.parent], used[joint.child], slips, grounded)
+
+
+def _frame(kin: Kinematics, place: str) -> ca.SX:
+    """Axes and position of the frame "body.frame", shape (12, 1)."""
+    frame, motion = frame_at(kin.topology.bodies, place), kin.motion[body_of(place)]
+    return ca.densify(ca.vertcat(ca.vec(motion.R @ frame.R), motion.point(frame.p)[0]))
+
+
+def _centre(kin: Kinematics, name: str) -> ca.SX:
+    """Axes of a body and its centre of mass, shape (12, 1)."""
+    motion = kin.motion[name]
+    at = motion.point(kin.topology.bodies[name].c)[0]
+    return ca.densify(ca.vertcat(ca.vec(motion.R), at))

@@ -1,0 +1,61 @@
+"""What a machine looks like: places that move, and the marks drawn at and between them."""
+
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A body: lines from its centre to its places.
+
+    Attributes:
+        centre: index of the place at its centre of mass.
+        corners: indices of its other places; none is drawn as a block.
+        fixed: whether it is the ground, which has no lines.
+    """
+
+    name: str
+    centre: int
+    corners: tuple[int, ...]
+    fixed: bool = False
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Mark:
+    """Something between two places: a joint, a rod, a spring.
+
+    Attributes:
+        kind: "revolute", "prismatic", ..., "distance", "spring", "damper".
+        a, b: indices of the places on parent and child.
+        slips: name of the sliding velocity of each contact and the velocity [m/s] below which it
+            counts as sticking.
+        grounded: whether `a` does not move.
+    """
+
+    name: str
+    kind: str
+    a: int
+    b: int
+    slips: tuple[tuple[str, float], ...] = ()
+    grounded: bool = False
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Sketch:
+    """A machine as it is drawn.
+
+    Attributes:
+        places: SX (12, k) in the symbols of a model: for each place its axes in the world, column
+            by column, and its position [m].
+        parts: bodies.
+        marks: what stands between the places.
+    """
+
+    places: ca.SX
+    parts: tuple[Part, ...]
+    marks: tuple[Mark, ...]

@@ -1,0 +1,353 @@
+"""Prescribed motion and expressions of positions and time, held on three levels."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from chains import X, Y, Z, begin, chain, solve
+from scipy.integrate import solve_ivp
+
+from symfric import BrownMcPhee, Viscous, simulate
+from symfric.laws import Law
+from symfric.multibody import (
+    Constraint,
+    Cylindrical,
+    Distance,
+    JointFriction,
+    Mechanism,
+    Planar,
+    PrescribedMotion,
+    Prismatic,
+    Revolute,
+    UserConstraint,
+    functions,
+)
+from symfric.multibody.kinematics import Kinematics
+from symfric.parameters import Variable
+from symfric.scenes import FourBar, SliderCrank
+
+SMOOTH = Viscous(sigma_2=0.0)
+FORMULATIONS = ["joint", "absolute"]
+in_both = pytest.mark.parametrize("formulation", FORMULATIONS)
+OMEGA = 20.0
+
+
+def driven_crank(law: Law = SMOOTH) -> Mechanism:
+    """The slider-crank, its crank turning at a constant speed."""
+    m = SliderCrank(law, omega=OMEGA).mechanism()
+    m.constraint(PrescribedMotion("drive", "crank", lambda t: OMEGA * t))
+    return m
+
+
+def slide(theta: ca.SX) -> ca.SX:
+    """Position of the slider [m] from its closed relation."""
+    across, up = 0.1 - 0.08 * ca.sin(theta), 0.1 + 0.08 * ca.cos(theta)
+    return ca.sqrt(0.09 - across**2 - up**2)
+
+
+@in_both
+def test_driven_slider_crank_goes_through_full_turns_as_its_closed_relation(
+    formulation: str,
+) -> None:
+    """Position, and the driving moment from virtual work, m x' x'' omega^2."""
+    run = simulate(driven_crank().build(formulation=formulation), 1.0, rtol=1e-6, samples=101)
+    theta = ca.SX.sym("theta")
+    x, slope = slide(theta), ca.gradient(slide(theta), theta)
+    moment = 5.0 * OMEGA**2 * slope * ca.gradient(slope, theta)
+    expected = ca.Function("x", [theta], [x, moment]).map(run.t.size)(OMEGA * run.t)
+    name = "slider" if formulation == "joint" else "block_x"
+    assert run[name] == pytest.approx(expected[0].full()[0], abs=1e-13)
+    assert run["drive_moment"] == pytest.approx(expected[1].full()[0], abs=1e-10)
+    assert max(run["phi"].max(), run["phi_dot"].max()) < 1e-13
+    assert run["phi_ddot"].max() < 1e-11
+
+
+def test_both_formulations_need_the_same_moment_against_friction() -> None:
+    made = [driven_crank(BrownMcPhee(v_t=0.5)).prepare(formulation=f) for f in FORMULATIONS]
+    tree, whole = (solve(one.eq, one.q0, one.qd0) for one in made)
+    assert pytest.approx(whole.N, rel=1e-12) == tree.N
+    moments = [x.lam[one.labels.index("drive_moment")]
+               for x, one in zip((tree, whole), made, strict=True)]  # fmt: skip
+    assert moments[0] == pytest.approx(moments[1], rel=1e-12)
+    assert abs(moments[0]) > 1.0
+
+
+def test_pivot_that_is_shaken_drives_the_pendulum() -> None:
+    """L theta'' = -g sin(theta) - x'' cos(theta) for x = A sin(w t)."""
+    A, w, L = 0.1, 7.0, 0.4
+    m = Mechanism("shaken")
+    m.body("cart", 1.0, (0.1, 0.1, 0.1))
+    m.body("bob", 2.0, (1e-9, 1e-9, 1e-9))
+    m.frame("ground.rail", z=X)
+    m.frame("cart.rail", z=X)
+    m.frame("cart.pivot", z=Y)
+    m.frame("bob.pivot", at=(0.0, 0.0, L), z=Y)
+    m.joint(Prismatic("x", "ground.rail", "cart.rail", rate=A * w))
+    m.joint(Revolute("theta", "cart.pivot", "bob.pivot", start=0.5))
+    m.constraint(PrescribedMotion("shaker", "x", lambda t: A * ca.sin(w * t), "slide"))
+    run = simulate(m.build(), 3.0, rtol=1e-9, samples=301)
+
+    def rate(t: float, y: np.ndarray) -> list[float]:
+        # about y a positive angle swings the hanging bob towards -x
+        return [y[1], (-9.81 * np.sin(y[0]) - A * w**2 * np.sin(w * t) * np.cos(y[0])) / L]
+
+    expected = solve_ivp(rate, (0, 3), [0.5, 0.0], "DOP853", run.t, rtol=1e-11, atol=1e-12)
+    assert run["theta"] == pytest.approx(expected.y[0], abs=1e-6)
+    assert run["x"] == pytest.approx(A * np.sin(w * run.t), abs=1e-14)
+
+
+def test_accelerated_arm_needs_inertia_times_acceleration_and_weight() -> None:
+    m = Mechanism("arm")
+    m.body("rod", 2.0, (0.1, 0.1, 0.1))
+    m.frame("ground.hinge", z=Y)
+    m.frame("rod.hinge", at=(0.0, 0.0, 0.4), z=Y)
+    alpha = Variable("alpha", "rad/s^2", start=3.0)
+    m.joint(Revolute("hinge", "ground.hinge", "rod.hinge"))
+    m.constraint(PrescribedMotion("motor", "hinge", lambda t: alpha.symbol * t * t / 2))
+    run = simulate(m.build((alpha,)), 2.0, p={"alpha": 5.0}, rtol=1e-8)
+    expected = (0.1 + 2.0 * 0.16) * 5.0 + 2.0 * 9.81 * 0.4 * np.sin(2.5 * run.t**2)
+    assert run["motor_moment"] == pytest.approx(expected, abs=1e-11)
+
+
+def test_a_hinge_that_closes_a_loop_is_driven_through_full_turns() -> None:
+    """The crank's own hinge, cylindrical, is cut; the coupler pin fixes the rest."""
+    scene = FourBar(SMOOTH)
+    free = scene.mechanism()
+    m = scene.mechanism()
+    crank, coupler, rocker, pin = m.joints
+    m.joints = [
+        Cylindrical("crank", crank.parent, crank.child),
+        coupler,
+        rocker,
+        Revolute("pin", pin.parent, pin.child),
+    ]
+    beta, gamma, beta_rate, gamma_rate = scene.closed()
+    m.joints[1] = Revolute("coupler", "coupler_rod.far", "rocker_rod.far",
+                           gamma - beta, gamma_rate - beta_rate)  # fmt: skip
+    m.joints[3] = Revolute("knee", "coupler_rod.near", "crank_rod.far",
+                           1.0 - beta, 10.0 - beta_rate)  # fmt: skip
+    m.constraint(PrescribedMotion("drive", "crank", lambda t: 1.0 + 10.0 * t))
+    free.constraint(PrescribedMotion("drive", "theta_crank", lambda t: 1.0 + 10.0 * t))
+    cut, whole = (simulate(each.build(), 2.0, rtol=1e-6, samples=201) for each in (m, free))
+    assert cut["theta_rocker"] == pytest.approx(whole["theta_rocker"], abs=1e-12)
+    assert cut["drive_moment"] == pytest.approx(whole["drive_moment"], abs=1e-9)
+    assert np.ptp(whole["theta_crank"]) == pytest.approx(20.0)
+
+
+DRIVES: dict[str, tuple[int, str, int]] = {
+    "hinge": (0, "turn", 0),
+    "slide": (1, "slide", 0),
+    "slide of a tube": (2, "slide", 0),
+    "turn of a tube": (2, "turn", 1),
+    "cross": (3, "x", 0),
+    "other arm of the cross": (3, "y", 1),
+    "plane along y": (4, "y", 1),
+    "turn in the plane": (4, "turn", 2),
+}
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+@pytest.mark.parametrize("name", DRIVES)
+def test_every_direction_is_driven_alike_in_both_formulations(name: str, reverse: bool) -> None:
+    """Motion s + s' t + t^2: accelerations of all bodies, reactions of all joints, the force."""
+    number, direction, k = DRIVES[name]
+    m = chain(reverse)
+    q, qd = (values[k] for values in begin(type(m.joints[number]), number))
+    m.constraint(PrescribedMotion("d", f"j{number}", lambda t: q + qd * t + t * t, direction))
+    made = [m.prepare(formulation=f) for f in FORMULATIONS]
+    tree, whole = (solve(one.eq, one.q0, one.qd0) for one in made)
+    first = made[0].eq.kin.topology.links[number].first
+    assert tree.a[first + k] == pytest.approx(2.0)
+    force, same = (next(x for x, label in zip(s.lam, one.labels, strict=True) if label[:2] == "d_")
+                   for s, one in zip((tree, whole), made, strict=True))  # fmt: skip
+    assert force == pytest.approx(same, rel=1e-10)
+    for body, motion in tree.bodies.items():
+        assert motion == pytest.approx(whole.bodies[body], rel=1e-10, abs=1e-10), body
+    for joint, wrench in tree.reactions.items():
+        assert wrench == pytest.approx(whole.reactions[joint], rel=1e-9, abs=1e-8), joint
+
+
+@in_both
+def test_energy_changes_by_the_power_of_the_drive(formulation: str) -> None:
+    m = chain()
+    q, qd = (values[0] for values in begin(Revolute, 0))
+    m.constraint(PrescribedMotion("d", "j0", lambda t: q + qd * t + t * t))
+    made = m.prepare(formulation=formulation)
+    eq = made.eq
+    T_dot = ca.jtimes(eq.kinetic, eq.q, eq.qd) + ca.jtimes(eq.kinetic, eq.qd, eq.a)
+    arguments = [eq.q, eq.qd, eq.a, eq.lam, eq.kin.t]
+    values = ca.Function("power", arguments, [T_dot, eq.power])
+    found = solve(eq, made.q0, made.qd0)
+    rate, power = (float(x) for x in values.call([made.q0, made.qd0, found.a, found.lam, 0.0]))
+    weights = m.prepare().eq
+    without = ca.Function("p", [weights.q, weights.qd], [ca.jtimes(weights.potential, weights.q,
+                          weights.qd)])  # fmt: skip
+    tree = m.prepare()
+    drive = found.lam[made.labels.index("d_moment")] * qd
+    assert rate == pytest.approx(power, rel=1e-9)
+    assert power == pytest.approx(drive - float(without(tree.q0, tree.qd0)), rel=1e-9)
+
+
+def winch(kind: str = "user", rate: float = -0.3) -> Mechanism:
+    """A bob in the plane x, z on a rope that is pulled in: L = 1 + rate t."""
+    m = Mechanism("winch")
+    m.body("bob", 2.0, (0.1, 0.1, 0.1))
+    m.frame("ground.plane", z=Y, x=X)
+    m.frame("bob.plane", z=Y, x=X)
+    theta = 0.6
+    start = (np.sin(theta), np.cos(theta), 0.0)
+    m.joint(Planar("bob_at", "ground.plane", "bob.plane", start,
+                   (rate * start[0], rate * start[1], 0.0)))  # fmt: skip
+    if kind == "user":
+        m.constraint(UserConstraint("rope", lambda kin: (
+            ca.sumsqr(kin.point("bob")[0]) - (1 + rate * kin.t) ** 2) / 2))  # fmt: skip
+    else:
+        m.joint(Distance("rope", "ground", "bob", length=1.0))
+    return m
+
+
+@in_both
+def test_rope_that_is_pulled_in_swings_faster(formulation: str) -> None:
+    """L theta'' = -g sin(theta) - 2 L' theta'."""
+    run = simulate(winch().build(formulation=formulation), 2.0, rtol=1e-8, samples=201)
+
+    def rate(t: float, y: np.ndarray) -> list[float]:
+        return [y[1], (-9.81 * np.sin(y[0]) + 0.6 * y[1]) / (1 - 0.3 * t)]
+
+    found = solve_ivp(rate, (0, 2), [0.6, 0.0], "DOP853", run.t, rtol=1e-11, atol=1e-12).y[0]
+    x = run["bob_at_x" if formulation == "joint" else "bob_x"]
+    assert x == pytest.approx((1 - 0.3 * run.t) * np.sin(found), abs=1e-6)
+    assert run["phi"].max() < 1e-13
+    assert run["phi_dot"].max() < 1e-12
+
+
+@in_both
+def test_a_rope_of_ones_own_is_the_rope_of_the_library(formulation: str) -> None:
+    made = [winch(kind, 0.0).prepare(formulation=formulation) for kind in ("user", "distance")]
+    assert made[0].labels[-1 if formulation == "joint" else -2] == "rope_lambda"
+    own, ours = (solve(one.eq, one.q0, one.qd0) for one in made)
+    for body, motion in own.bodies.items():
+        assert motion == pytest.approx(ours.bodies[body], abs=1e-13)
+
+
+def test_user_constraints_load_bodies_where_they_hold_them() -> None:
+    """A moving rod between bodies of the chain, an angle: the same reactions everywhere."""
+    m = chain()
+
+    def gap(kin: Kinematics) -> ca.SX:
+        return ca.sumsqr(kin.point("b2.out")[0] - kin.point("b5.in")[0])
+
+    eq = m.prepare().eq
+    at = m.prepare()
+    numbers = ca.Function("g", [eq.q, eq.qd], [gap(eq.kin), ca.jtimes(gap(eq.kin), eq.q, eq.qd)])
+    value, speed = (float(x) for x in numbers(at.q0, at.qd0))
+    j1 = m.joints[1]
+    s, rate = (values[0] for values in begin(Prismatic, 1))
+
+    def fixed(kin: Kinematics) -> ca.SX:
+        slide = kin.along(j1, "slide")[0]
+        return ca.vertcat(gap(kin) - value - speed * kin.t, slide - s - rate * kin.t)
+
+    m.constraint(UserConstraint("own", fixed))
+    made = [m.prepare(formulation=f) for f in FORMULATIONS]
+    assert made[0].labels[:2] == ("own_lambda_1", "own_lambda_2")
+    tree, whole = (solve(one.eq, one.q0, one.qd0) for one in made)
+    for joint, wrench in tree.reactions.items():
+        assert wrench == pytest.approx(whole.reactions[joint], rel=1e-9, abs=1e-8), joint
+    assert tree.a[1] == pytest.approx(0.0, abs=1e-10)
+
+
+def test_start_against_a_drive_is_refused_and_a_fitting_one_offered() -> None:
+    m = Mechanism("m")
+    m.body("block", 1.0, (0.1, 0.1, 0.1))
+    m.joint(Prismatic("x", "ground", "block", start=0.1))
+    m.constraint(PrescribedMotion("drive", "x", lambda t: 0.2 + 3.0 * t, "slide"))
+    with pytest.raises(ValueError, match=r"positions that satisfy drive_force, .* x = 0\.2;"):
+        m.build()
+    m.joints = [Prismatic("x", "ground", "block", start=0.2)]
+    with pytest.raises(ValueError, match=r"velocities that satisfy drive_force, .* x_rate = 3;"):
+        m.build()
+    run = simulate(m.assembled().build(), 1.0)
+    assert run["x"] == pytest.approx(0.2 + 3.0 * run.t)
+
+
+def test_a_run_that_starts_later_starts_where_the_drive_is() -> None:
+    run = simulate(driven_crank().build(), 1.5, t_start=1.0, samples=11)
+    assert run["crank"] == pytest.approx(OMEGA * run.t, abs=1e-13)
+
+
+MISTAKES: dict[str, tuple[Constraint, str]] = {
+    "no joint": (PrescribedMotion("d", "y", lambda t: t), "> drive 'd': expected a joint, got y"),
+    "no direction": (
+        PrescribedMotion("d", "x", lambda t: t),
+        "> drive 'd' > direction: expected slide, got turn",
+    ),
+    "two motions": (
+        PrescribedMotion("d", "x", lambda t: ca.vertcat(t, t), "slide"),
+        "> drive 'd' > motion: expected one expression, got 2",
+    ),
+    "stray symbol": (
+        PrescribedMotion("d", "x", lambda t: ca.SX.sym("w") * t, "slide"),
+        "> drive 'd': expected an expression of positions, time and parameters, got w",
+    ),
+    "velocity": (
+        UserConstraint("c", lambda kin: kin.point("block")[1][0]),
+        "> constraint 'c' > expression: expected positions only, got velocities",
+    ),
+    "name twice": (
+        PrescribedMotion("x", "x", lambda t: t, "slide"),
+        "> drive 'x': expected every name once",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_constraints_that_cannot_be_are_described_with_their_path(name: str) -> None:
+    constraint, message = MISTAKES[name]
+    m = Mechanism("m")
+    m.body("block", 1.0, (0.1, 0.1, 0.1))
+    m.joint(Prismatic("x", "ground", "block"))
+    m.constraint(constraint)
+    with pytest.raises(ValueError) as caught:
+        m.build()
+    assert f"mechanism 'm' {message}" in str(caught.value)
+
+
+def test_inputs_cannot_drive() -> None:
+    m = Mechanism("m")
+    m.body("block", 1.0, (0.1, 0.1, 0.1))
+    m.joint(Prismatic("x", "ground", "block"))
+    u = m.input("wish", "m")
+    m.constraint(PrescribedMotion("d", "x", lambda t: u, "slide"))
+    with pytest.raises(ValueError, match="got wish; of an input the two derivatives are not known"):
+        m.build()
+
+
+@in_both
+def test_motion_that_is_prescribed_twice_is_refused(formulation: str) -> None:
+    m = winch()
+    m.constraint(UserConstraint("again", lambda kin: ca.sumsqr(kin.point("bob")[0]) - 1))
+    with pytest.raises(ValueError, match="constraint 'rope': expected motion that no other "
+                       "constraint fixes, got one that depends on again_lambda"):  # fmt: skip
+        m.build(formulation=formulation)
+
+
+def test_named_functions_take_time_where_it_matters() -> None:
+    m = winch()
+    phi = functions(m)["constraints"]
+    assert phi.name_in() == ["q", "p", "t"]
+    assert float(phi([0.0, 0.7, 0.0], [], 1.0)[0]) == pytest.approx(0.0)
+    assert functions(winch("distance", 0.0))["constraints"].name_in() == ["q", "p"]
+
+
+def test_friction_follows_a_drive() -> None:
+    """A block drawn along at a constant speed: the drive's force is friction."""
+    m = Mechanism("m")
+    m.body("block", 2.0, (0.1, 0.1, 0.1))
+    m.frame("ground.rail", z=X, x=Z)
+    m.frame("block.rail", z=X, x=Z)
+    law = BrownMcPhee(mu_s=0.3, mu_d=0.2, v_t=0.01)
+    m.joint(Prismatic("x", "ground.rail", "block.rail", rate=1.0, friction=JointFriction(law)))
+    m.constraint(PrescribedMotion("drive", "x", lambda t: t, "slide"))
+    run = simulate(m.build(), 1.0)
+    assert run["drive_force"] == pytest.approx(run["x_friction"], rel=1e-12)
+    assert run["drive_force"][-1] == pytest.approx(0.2 * 2.0 * 9.81, rel=2e-3)
