@@ -16,7 +16,7 @@ import casadi as ca
 
 from symfric.multibody.friction import JointFriction
 from symfric.multibody.spatial import (
-    euler_e,
+    euler_g,
     rotation,
     rotation_x,
     rotation_y,
@@ -210,8 +210,8 @@ class Spherical(Joint):
         return rotation(q), ca.SX(3, 1)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """W = 2 E q'."""
-        return 2 * euler_e(q), ca.SX(3, 4)
+        """W' = 2 G q'."""
+        return 2 * euler_g(q), ca.SX(3, 4)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
         """One point in common."""
@@ -232,8 +232,8 @@ class Universal(Joint):
         return rotation_x(q[0]) @ rotation_y(q[1]), ca.SX(3, 1)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Rotation about x, and about y turned by q[0]."""
-        axes = ca.horzcat(ca.vertcat(1, 0, 0), ca.vertcat(0, ca.cos(q[0]), ca.sin(q[0])))
+        """Rotation about y, and about x before it."""
+        axes = ca.horzcat(ca.vertcat(ca.cos(q[1]), 0, ca.sin(q[1])), ca.vertcat(0, 1, 0))
         return axes, ca.SX(3, 2)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
@@ -311,9 +311,9 @@ class Free(Joint):
         return rotation(q[3:]), q[:3]
 
     def subspace(self, q: ca.SX) -> Pair:
-        """V = q[:3]', w = 2 E q[3:]'."""
+        """V = q[:3]', w' = 2 G q[3:]'."""
         return (
-            ca.horzcat(ca.SX(3, 3), 2 * euler_e(q[3:])),
+            ca.horzcat(ca.SX(3, 3), 2 * euler_g(q[3:])),
             ca.horzcat(ca.SX.eye(3), ca.SX(3, 4)),
         )
 
