@@ -10,12 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from symfric.files import written
+from symfric.laws import steady_force
 from symfric.parameters import check_names, parameters
 
 if TYPE_CHECKING:
     from symfric.figures import FigureData
     from symfric.integrator.trajectory import Trajectory
-    from symfric.laws import Law
+    from symfric.laws import AnyLaw
 
 
 def save(figure: Figure, path: str | Path | None) -> Figure:
@@ -109,7 +110,9 @@ def _by_unit(trajectories: "Mapping[str, Trajectory]", shown: Sequence[str]) -> 
     return figure
 
 
-def plot_laws(laws: "Mapping[str, Law]", N: float = 1.0, path: str | Path | None = None) -> Figure:
+def plot_laws(
+    laws: "Mapping[str, AnyLaw]", N: float = 1.0, path: str | Path | None = None
+) -> Figure:
     """Friction force in steady sliding against velocity: near rest, and over many decades.
 
     Args:
@@ -124,8 +127,7 @@ def plot_laws(laws: "Mapping[str, Law]", N: float = 1.0, path: str | Path | None
     around = np.linspace(-10 * scale, 10 * scale, 2001)
     for label, law in laws.items():
         for axis, v in ((near, around), (far, decades)):
-            force = law.force(v, N, law.steady_state(v, N))
-            axis.plot(v, np.broadcast_to(force, v.shape), label=label, linewidth=1.3)
+            axis.plot(v, steady_force(law, v, N), label=label, linewidth=1.3)
     near.ticklabel_format(axis="x", style="sci", scilimits=(-2, 3), useMathText=True)
     far.set_xscale("log")
     for axis in (near, far):
@@ -139,7 +141,7 @@ def plot_laws(laws: "Mapping[str, Law]", N: float = 1.0, path: str | Path | None
 
 
 def plot_catalogue(
-    laws: "Mapping[str, Law]", N: float = 1.0, path: str | Path | None = None
+    laws: "Mapping[str, AnyLaw]", N: float = 1.0, path: str | Path | None = None
 ) -> Figure:
     """Friction force in steady sliding against velocity, a small panel with its own axes per law.
 
@@ -158,8 +160,7 @@ def plot_catalogue(
     for axis, (label, law) in zip(grid.flat, laws.items(), strict=False):
         edge = 5 * max(_velocity_scales(law), default=0.1)
         v = np.linspace(-edge, edge, 1001)
-        force = law.force(v, N, law.steady_state(v, N))
-        axis.plot(v, np.broadcast_to(force, v.shape), linewidth=1.1)
+        axis.plot(v, steady_force(law, v, N), linewidth=1.1)
         axis.set_title(label, fontsize="x-small")
         axis.set_xticks([-edge, 0.0, edge], labels=[f"{-edge:.3g}", "0", f"{edge:.3g}"])
         axis.locator_params(axis="y", nbins=4)
@@ -171,7 +172,7 @@ def plot_catalogue(
     return save(figure, path)
 
 
-def _velocity_scales(law: "Law") -> list[float]:
+def _velocity_scales(law: "AnyLaw") -> list[float]:
     """The velocities [m/s] among the parameters, on which the force changes."""
     known = [(float(p.value), p.unit) for p in parameters(law).values()]
     scales = [value for value, unit in known if unit in ("m/s", "rad/s")]

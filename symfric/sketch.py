@@ -13,13 +13,15 @@ class Part:
 
     Attributes:
         centre: index of the place at its centre of mass.
-        corners: indices of its other places; none is drawn as a block.
+        corners: indices of its frames; a body whose frames all lie in its centre is a block.
+        ends: indices of those where only springs and dampers end.
         fixed: whether it is the ground, which has no lines.
     """
 
     name: str
     centre: int
     corners: tuple[int, ...]
+    ends: tuple[int, ...] = ()
     fixed: bool = False
 
 

@@ -43,9 +43,11 @@ MAY_IMPORT: dict[str, set[str]] = {
         "symfric.animation",  # on request, when a trajectory draws itself
         "symfric.plotting",  # likewise
     },
+    "symfric.strokes": {"symfric.sketch"},
     "symfric.animation": {
         "symfric.files",
         "symfric.sketch",
+        "symfric.strokes",
         "symfric.integrator",  # types only
     },
     "symfric.plotting": {
@@ -54,7 +56,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "symfric.parameters",
         "symfric.figures",  # types only
         "symfric.integrator",  # types only
-        "symfric.laws",  # types only
+        "symfric.laws",
     },
     "symfric.figures": {
         "symfric.integrator",

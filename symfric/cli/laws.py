@@ -8,13 +8,13 @@ from typing import Annotated, Any
 
 import typer
 
-from symfric import ALL_LAWS, Law, law_from_text, parameters
+from symfric import ALL_LAWS, parameters
 from symfric.cli import output
-from symfric.cli.options import JsonOption, PlotOption, SetOption, check_outputs, law_with
+from symfric.cli.options import JsonOption, PlotOption, SetOption, any_with, check_outputs
 from symfric.figures import FIGURES, FigureData, compare
 from symfric.figures.requirements import parts, phenomena
 from symfric.figures.scales import NORMAL_FORCE
-from symfric.laws import PHENOMENA
+from symfric.laws import PHENOMENA, POPULATIONS, AnyLaw, Population, any_from_text
 from symfric.laws.cost import cost
 from symfric.laws.names import ALIASES
 from symfric.model import finite
@@ -54,7 +54,8 @@ def laws(
     if figure or others:
         behaviour(name, settings, figure, others or [], normal_force, plot, json)
         return
-    chosen = {name: law_with(name, settings)} if name else {n: law_from_text(n) for n in ALL_LAWS}
+    every = [name] if name else [*ALL_LAWS, *POPULATIONS]
+    chosen = {text: any_with(text, settings if name else None) for text in every}
     if settings and not name:
         raise ValueError("--set: expected the name of a law before it, got none")
     if plot:
@@ -85,7 +86,7 @@ def behaviour(
     scenario = figure or "profile"
     check_names("--figure", [scenario], [*FIGURES, *ALL_SCENES])
     load = NORMAL_FORCE if normal_force is None else finite("--normal-force", normal_force)
-    chosen = [law_with(name, settings), *map(law_from_text, others)]
+    chosen = [any_with(name, settings), *map(any_from_text, others)]
     with output.progress(f"{scenario} of {', '.join([name, *others])}"):
         data = compare(chosen, scenario, load)
     if plot:
@@ -107,7 +108,7 @@ def show_figure(data: FigureData) -> None:
     output.show_table(["curve", "column", "unit", "least", "greatest"], rows, data.title)
 
 
-def to_dict(law: Law) -> dict[str, Any]:
+def to_dict(law: AnyLaw) -> dict[str, Any]:
     """What `--json` holds of one law."""
     return {
         "title": title(law),
@@ -136,12 +137,17 @@ def to_dict(law: Law) -> dict[str, Any]:
     }
 
 
-def title(law: Law) -> str:
+def costs(law: AnyLaw) -> str:
+    """What the instructions of `law` compute."""
+    return "a step of one contact" if isinstance(law, Population) else "force and rate"
+
+
+def title(law: AnyLaw) -> str:
     """The first line of the docstring."""
     return (getdoc(type(law)) or "").partition("\n")[0].removesuffix(".")
 
 
-def show_list(chosen: dict[str, Law]) -> None:
+def show_list(chosen: dict[str, AnyLaw]) -> None:
     """All laws, one a line, and what the codes mean."""
     output.show_table(
         ["law", "shows", "z", "", "value", "slope", "formula"],
@@ -173,7 +179,7 @@ def show_list(chosen: dict[str, Law]) -> None:
     )
 
 
-def show_law(name: str, law: Law) -> None:
+def show_law(name: str, law: AnyLaw) -> None:
     """Docstring, facts and parameters of one law."""
     for part in parts(law):
         output.show_doc(getdoc(part) or "")
@@ -181,7 +187,7 @@ def show_law(name: str, law: Law) -> None:
     output.show(
         f"{name} shows {shown}.\n"
         f"Smoothness: {law.facts.smoothness}.\nFormula confirmed by: {law.facts.confidence}.\n"
-        f"Cost: {cost(law).value} CasADi instructions for force and rate, "
+        f"Cost: {cost(law).value} CasADi instructions for {costs(law)}, "
         f"{cost(law).gradient} for their derivatives.\n"
     )
     for warning in law.warnings():

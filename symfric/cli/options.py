@@ -4,11 +4,12 @@ import os
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import typer
 
 from symfric import Law, law_from_text, parameters, with_values
+from symfric.laws import AnyLaw, any_from_text
 from symfric.model import finite
 from symfric.parameters import check_names, options
 
@@ -27,6 +28,9 @@ SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter; may be repeated."),
 ]
+
+
+L = TypeVar("L", Law, AnyLaw)
 
 
 def assignments(option: str, texts: Iterable[str] | None) -> dict[str, str]:
@@ -54,7 +58,16 @@ def numbers(option: str, texts: Iterable[str] | None) -> dict[str, float]:
 
 def law_with(text: str, settings: Iterable[str] | None) -> Law:
     """The law that `text` names, with the parameters and options of `--set`."""
-    law, given = law_from_text(text), assignments("--set", settings)
+    return _set(law_from_text(text), text, settings)
+
+
+def any_with(text: str, settings: Iterable[str] | None) -> AnyLaw:
+    """The law or population that `text` names, with the parameters and options of `--set`."""
+    return _set(any_from_text(text), text, settings)
+
+
+def _set(law: L, text: str, settings: Iterable[str] | None) -> L:
+    given = assignments("--set", settings)
     check_names(f"--set of law {text}", given, [*parameters(law), *options(law)])
     forms = {name: given.pop(name) for name in options(law) if name in given}
     values = {name: finite(f"--set {name}", value) for name, value in given.items()}

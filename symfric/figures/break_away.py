@@ -10,11 +10,11 @@ from symfric.figures.motion import fine, pushed
 from symfric.figures.requirements import require
 from symfric.figures.scales import NORMAL_FORCE, Scales, scales
 from symfric.integrator import Linear
-from symfric.laws import Law, law_name
+from symfric.laws import AnyLaw, law_name
 
 
 def break_away(
-    law: Law,
+    law: AnyLaw,
     N: float = NORMAL_FORCE,
     given: Scales | None = None,
     rates: Sequence[float] = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0),
@@ -45,7 +45,7 @@ def break_away(
     )
 
 
-def _peak(law: Law, N: float, rate: float, magnitudes: Scales) -> float:
+def _peak(law: AnyLaw, N: float, rate: float, magnitudes: Scales) -> float:
     """The greatest friction force [N] until the block has broken away."""
     elastic = rate * magnitudes.stretch / magnitudes.static if isfinite(magnitudes.stretch) else 0.0
     until, mass = 2 * (magnitudes.velocity + elastic), magnitudes.mass

@@ -12,14 +12,14 @@ from symfric.figures.scales import NORMAL_FORCE, Scales
 from symfric.figures.steady_state import steady_state
 from symfric.figures.sweeps import sweep_b, sweep_c, sweep_e
 from symfric.figures.transition import transition
-from symfric.laws import Law
+from symfric.laws import AnyLaw
 from symfric.parameters import check_names
 
 
 class MakeFigure(Protocol):
     """A function that makes a figure of a law."""
 
-    def __call__(self, law: Law, N: float = ..., given: Scales | None = None) -> FigureData:
+    def __call__(self, law: AnyLaw, N: float = ..., given: Scales | None = None) -> FigureData:
         """The figure of `law` under `N` [N], with its own magnitudes or those `given`."""
         ...
 
@@ -39,7 +39,7 @@ FIGURES: dict[str, MakeFigure] = {
 """Every figure by the name the command line uses."""
 
 
-def figure(law: Law, name: str, N: float = NORMAL_FORCE) -> FigureData:
+def figure(law: AnyLaw, name: str, N: float = NORMAL_FORCE) -> FigureData:
     """The figure `name` of `law` under the normal force `N` [N], with the excitation of the papers.
 
     The functions of the same names take more options.

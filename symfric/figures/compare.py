@@ -5,16 +5,16 @@ from dataclasses import replace
 
 from symfric.figures.catalogue import FIGURES
 from symfric.figures.data import FigureData
+from symfric.figures.requirements import check_any
 from symfric.figures.scales import NORMAL_FORCE, scales
 from symfric.figures.scene import scene_figure
-from symfric.laws import Law, law_from_text, law_name
-from symfric.laws.base import check_law
+from symfric.laws import AnyLaw, Law, Population, any_from_text, law_name
 from symfric.parameters import check_names, distinct
 from symfric.scenes import ALL_SCENES
 
 
 def compare(
-    laws: Sequence[Law | str] | Mapping[str, Law],
+    laws: Sequence[AnyLaw | str] | Mapping[str, AnyLaw],
     scenario: str = "profile",
     N: float = NORMAL_FORCE,
 ) -> FigureData:
@@ -37,24 +37,31 @@ def compare(
     check_names("compare: scenario", [scenario], [*FIGURES, *ALL_SCENES])
     named = _named(laws)
     if scenario in ALL_SCENES:
-        return scene_figure(named, scenario)
+        references = [name for name, law in named.items() if isinstance(law, Population)]
+        if references:
+            raise ValueError(
+                f"compare: expected laws with equations in the scene {scenario}, got "
+                f"{', '.join(references)}, a population of random contacts; it has figures"
+            )
+        machines = {name: law for name, law in named.items() if isinstance(law, Law)}
+        return scene_figure(machines, scenario)
     given = scales(next(iter(named.values())), N)
     shown = [FIGURES[scenario](law, N, given).named(name) for name, law in named.items()]
     return replace(shown[0], curves=tuple(curve for one in shown for curve in one.curves))
 
 
-def _named(laws: Sequence[Law | str] | Mapping[str, Law]) -> dict[str, Law]:
+def _named(laws: Sequence[AnyLaw | str] | Mapping[str, AnyLaw]) -> dict[str, AnyLaw]:
     """The laws by legend entry; laws of one kind are numbered."""
     if isinstance(laws, Mapping):
         found = dict(laws)
     else:
-        each = [law_from_text(law) if isinstance(law, str) else law for law in laws]
+        each = [any_from_text(law) if isinstance(law, str) else law for law in laws]
         for law in each:
-            check_law("compare", law)
+            check_any("compare", law)
         names = [name for (name,) in distinct([[law_name(law)] for law in each])]
         found = dict(zip(names, each, strict=True))
     if not found:
         raise ValueError("compare: expected at least one law, got none")
     for law in found.values():
-        check_law("compare", law)
+        check_any("compare", law)
     return found

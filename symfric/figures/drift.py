@@ -7,14 +7,14 @@ from symfric.figures.data import Curve, FigureData
 from symfric.figures.motion import pushed
 from symfric.figures.requirements import require
 from symfric.figures.scales import NORMAL_FORCE, Scales, scales
-from symfric.laws import Law, law_name
+from symfric.laws import AnyLaw, law_name
 
-HOLD_FROM, VIBRATE_FROM = 1.05, 2.0
-"""End of the sliding phase and start of the vibration [s]."""
+RELEASED, HOLD_FROM, VIBRATE_FROM = 1.05, 1.5, 2.0
+"""End of the push, and start of the constant load and of the vibration [s]."""
 
 
 def drift(
-    law: Law,
+    law: AnyLaw,
     N: float = NORMAL_FORCE,
     given: Scales | None = None,
     frequency: float = 10.0,
@@ -23,7 +23,8 @@ def drift(
     """Displacement of a block under a vibrating force (seed 3, figs. 8 and 9).
 
         F_e = 1.05 F_S t           up to 1 s, held until 1.05 s: it breaks away
-        F_e = 0.5 F_b              up to 2 s: it comes to rest
+        F_e = 0                    up to 1.5 s: it comes to rest
+        F_e = 0.5 F_b              up to 2 s
         F_e = F_b [0.5 + 0.3 sin(2 pi f t)]   beyond: does it move on?
 
     F_S is the static level and F_b the kinetic one, or sigma_0 z_ba for `ElastoPlastic`, which
@@ -41,10 +42,11 @@ def drift(
     def force(t: ca.SX) -> ca.SX:
         shaken = base * (0.5 + 0.3 * ca.sin(2 * ca.pi * frequency * (t - VIBRATE_FROM)))
         held = ca.if_else(t < VIBRATE_FROM, 0.5 * base, shaken)
-        return ca.if_else(t < HOLD_FROM, peak * ca.fmin(t, 1.0), held)
+        loaded = ca.if_else(t < HOLD_FROM, 0.0, held)
+        return ca.if_else(t < RELEASED, peak * ca.fmin(t, 1.0), loaded)
 
     run = pushed(law, N, magnitudes.mass, force, t_end)
-    t = np.linspace(HOLD_FROM, t_end, 2781)
+    t = np.linspace(RELEASED, t_end, 2781)
     found = run.at(t)
     rest = float(run.at(VIBRATE_FROM)["x"][0])
     columns = {"t": t, "F_e": found["force"], "x": found["x"] - rest, "F": found["friction"]}

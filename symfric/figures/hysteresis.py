@@ -5,17 +5,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from symfric.figures.data import FigureData
-from symfric.figures.motion import UNITS, prescribed, slide, through
+from symfric.figures.motion import UNITS, slides, through
 from symfric.figures.requirements import require
 from symfric.figures.scales import NORMAL_FORCE, Scales, scales
-from symfric.laws import Law
+from symfric.laws import AnyLaw
 
 ROUTE = (0.0, 2.0, -2.0, 1.0, -1.0, 1.0, -2.0, 2.0)
 """Turning points in pre-sliding distances: a loop from -1 to 1 within one from -2 to 2."""
 
 
 def hysteresis(
-    law: Law,
+    law: AnyLaw,
     N: float = NORMAL_FORCE,
     given: Scales | None = None,
     speeds: Sequence[float] = (1.0, 5.0, 20.0),
@@ -34,10 +34,9 @@ def hysteresis(
     require("hysteresis", law, "P")
     stretch = (given or scales(law, N)).stretch
     leg = duration / (len(ROUTE) - 1)
-    model = prescribed(law, N, through([point * stretch for point in ROUTE], leg))
+    slide = slides(law, N, through([point * stretch for point in ROUTE], leg))
     curves = [
-        slide(model, law, f"{speed:g}x", np.linspace(0.0, duration / speed, 1401), speed)
-        for speed in speeds
+        slide(f"{speed:g}x", np.linspace(0.0, duration / speed, 1401), speed) for speed in speeds
     ]
     return FigureData(
         "hysteresis",

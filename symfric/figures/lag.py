@@ -6,14 +6,14 @@ import casadi as ca
 import numpy as np
 
 from symfric.figures.data import Curve, FigureData
-from symfric.figures.motion import UNITS, prescribed, slide
+from symfric.figures.motion import UNITS, slides
 from symfric.figures.requirements import require
-from symfric.figures.scales import NORMAL_FORCE, Scales, scales, steady_force
-from symfric.laws import Law, law_name
+from symfric.figures.scales import NORMAL_FORCE, Scales, scales
+from symfric.laws import AnyLaw, law_name, steady_force
 
 
 def lag(
-    law: Law,
+    law: AnyLaw,
     N: float = NORMAL_FORCE,
     given: Scales | None = None,
     frequencies: Sequence[float] = (2.0, 5.0, 10.0),
@@ -38,10 +38,9 @@ def lag(
     def velocity(t: ca.SX, pace: ca.SX) -> ca.SX:
         return V * (2.5 + 2 * ca.sin(2 * ca.pi * pace * t))
 
-    model = prescribed(law, N, velocity)
+    slide = slides(law, N, velocity)
     curves = [
-        slide(model, law, f"{f:g} Hz", np.linspace((periods - 1) / f, periods / f, 401), f)
-        for f in frequencies
+        slide(f"{f:g} Hz", np.linspace((periods - 1) / f, periods / f, 401), f) for f in frequencies
     ]
     v = V * np.linspace(0.5, 4.5, 401)
     steady = Curve(law_name(law), "steady", {"v": v, "F": steady_force(law, v, N)}, reference=True)

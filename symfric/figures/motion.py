@@ -1,17 +1,19 @@
 """A contact that is slid with a given velocity, and one that is pushed with a given force."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Protocol
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
 from symfric.figures.data import Array, Curve
+from symfric.figures.random_motion import shoved, slid
 from symfric.integrator import simulate
 from symfric.integrator.inputs import Input
-from symfric.integrator.trajectory import Trajectory
-from symfric.laws import Law, law_name
+from symfric.laws import AnyLaw, Law, Population, law_name
 from symfric.model import Event, Model, Output
 from symfric.parameters import Variable
 from symfric.scenes.base import contact
@@ -45,6 +47,34 @@ def prescribed(law: Law, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]) ->
     )
 
 
+class Run(Protocol):
+    """A run of a pushed block."""
+
+    @property
+    def steps(self) -> Array:
+        """Ends of its steps [s]."""
+        ...
+
+    def at(self, t: ArrayLike, /) -> Mapping[str, Array]:
+        """Its signals at the times `t` [s]."""
+        ...
+
+
+def slides(
+    law: AnyLaw, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]
+) -> Callable[[str, Array, float], Curve]:
+    """The motion `velocity(t, pace)` [m/s] as a function (case, times [s], pace) -> curve.
+
+    A law starts from steady sliding at the first velocity, a population from unloaded contacts.
+    """
+    if isinstance(law, Population):
+        return lambda case, times, pace: Curve(
+            law_name(law), case, slid(law, N, velocity, times, pace)
+        )
+    model = prescribed(law, N, velocity)
+    return lambda case, times, pace: slide(model, law, case, times, pace)
+
+
 def slide(model: Model, law: Law, case: str, times: Array, pace: float) -> Curve:
     """One run of a `prescribed` motion, seen at `times` [s]."""
     run = simulate(model, float(times[-1]), p={"pace": pace}, t_eval=times)
@@ -67,12 +97,14 @@ def through(points: Sequence[float], leg: float) -> Callable[[ca.SX, ca.SX], ca.
 
 
 def pushed(
-    law: Law, N: float, mass: float, force: Input, t_end: float, until: float | None = None
-) -> Trajectory:
+    law: AnyLaw, N: float, mass: float, force: Input, t_end: float, until: float | None = None
+) -> Run:
     """A block of `mass` [kg] under `law`, at rest at first, pushed with `force` [N] to `t_end` [s].
 
     With `until` the run ends where the velocity rises beyond it [m/s].
     """
+    if isinstance(law, Population):
+        return shoved(law, N, mass, force, t_end, until)
     model = Drive(law, m=mass, N=N).model()
     if until is not None:
         v = next(variable.symbol for variable in model.x if variable.name == "v")
@@ -81,7 +113,7 @@ def pushed(
     return simulate(model, t_end, u={"force": force})
 
 
-def fine(run: Trajectory, parts: int = 4) -> Array:
+def fine(run: Run, parts: int = 4) -> Array:
     """The ends of the steps of `run` with `parts` intervals in each [s]."""
     inner = np.linspace(0.0, 1.0, parts, endpoint=False)
     starts, lengths = run.steps[:-1], np.diff(run.steps)

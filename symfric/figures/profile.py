@@ -3,11 +3,11 @@
 import numpy as np
 
 from symfric.figures.data import Curve, FigureData
-from symfric.figures.scales import NORMAL_FORCE, Scales, scales, steady_force
-from symfric.laws import Law, law_name
+from symfric.figures.scales import NORMAL_FORCE, Scales, scales
+from symfric.laws import AnyLaw, law_name, steady_force
 
 
-def profile(law: Law, N: float = NORMAL_FORCE, given: Scales | None = None) -> FigureData:
+def profile(law: AnyLaw, N: float = NORMAL_FORCE, given: Scales | None = None) -> FigureData:
     """Force-velocity profile over +-5 Stribeck velocities (seed 0, fig. 1).
 
     Columns v [m/s], F [N]. Every law has one. Further inputs of a law, such as the applied force,

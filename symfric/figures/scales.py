@@ -8,9 +8,8 @@ import casadi as ca
 import numpy as np
 
 from symfric.figures.data import Array
-from symfric.figures.requirements import phenomena
-from symfric.laws import Law
-from symfric.laws.base import check_law
+from symfric.figures.requirements import check_any, phenomena
+from symfric.laws import AnyLaw, Population, steady_force
 from symfric.model import finite
 from symfric.parameters import parameters
 
@@ -50,13 +49,13 @@ class Scales:
         return max(MASS, self.static / 1.5)
 
 
-def scales(law: Law, N: float = NORMAL_FORCE) -> Scales:
+def scales(law: AnyLaw, N: float = NORMAL_FORCE) -> Scales:
     """The magnitudes of `law`, with numbers for parameters, under the normal force `N` [N].
 
     Raises:
         ValueError: no law, symbols for parameters, N that is not positive.
     """
-    check_law("figure", law)
+    check_any("figure", law)
     if finite("figure: N", N) <= 0:
         raise ValueError(f"figure: N: expected a normal force above 0 N, got {N:g}")
     known = {p.name: finite(f"figure: {p.name}", p.value) for p in parameters(law).values()}
@@ -82,7 +81,7 @@ def _peak(F: Array) -> int:
     return int(falls[0]) if falls.size else F.size - 1
 
 
-def _half_fall(law: Law, scale: float, N: float) -> float:
+def _half_fall(law: AnyLaw, scale: float, N: float) -> float:
     """The velocity at which the force has fallen half the way [m/s]; `scale` if it does not."""
     v = scale * np.geomspace(1e-2, 1e3, 1001)
     F = steady_force(law, v, N)
@@ -94,13 +93,10 @@ def _half_fall(law: Law, scale: float, N: float) -> float:
     return float(v[_peak(F) + half])
 
 
-def steady_force(law: Law, v: Array, N: float) -> Array:
-    """Force in steady sliding [N] at the velocities `v` [m/s]; further inputs of the law are 0."""
-    return np.array(np.broadcast_to(law.force(v, N, law.steady_state(v, N)), v.shape), dtype=float)
-
-
-def _stiffness(law: Law, N: float) -> float:
+def _stiffness(law: AnyLaw, N: float) -> float:
     """dF/dx at rest [N/m]: how the force grows with a displacement of the unloaded contact."""
+    if isinstance(law, Population):
+        return law.stiffness
     v, z = ca.SX.sym("v"), ca.SX.sym("z", len(law.states))
     slope = ca.jacobian(law.force(v, N, z), z) @ ca.jacobian(law.rate(v, N, z), v)
     return float(ca.Function("stiffness", [v, z], [slope])(0.0, law.steady_state(0.0, N)))

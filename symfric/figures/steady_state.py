@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from symfric.figures.data import Curve, FigureData
-from symfric.figures.scales import NORMAL_FORCE, Scales, scales, steady_force
-from symfric.laws import Law, law_name
+from symfric.figures.scales import NORMAL_FORCE, Scales, scales
+from symfric.laws import AnyLaw, Law, law_name, steady_force
 from symfric.parameters import parameters, with_values
 
 
 def steady_state(
-    law: Law,
+    law: AnyLaw,
     N: float = NORMAL_FORCE,
     given: Scales | None = None,
     shares: Sequence[float] = (0.0, 0.25, 0.5, 1.0),
@@ -25,7 +25,7 @@ def steady_state(
     magnitudes = given or scales(law, N)
     v = np.geomspace(1e-3, 10.0, 601) * magnitudes.velocity
     curves = [Curve(law_name(law), "", {"v": v, "F": steady_force(law, v, N)})]
-    if "sigma_2" in parameters(law):
+    if isinstance(law, Law) and "sigma_2" in parameters(law):
         unit = parameters(law)["sigma_2"].unit
         load = N if unit == "s/m" else 1.0
         for share in shares:

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from symfric.figures.data import Curve, FigureData
-from symfric.figures.scales import NORMAL_FORCE, Scales, scales, steady_force
-from symfric.laws import Law, RuiWang, SelfTuning, law_name
+from symfric.figures.scales import NORMAL_FORCE, Scales, scales
+from symfric.laws import AnyLaw, RuiWang, SelfTuning, law_name, steady_force
 
 SHAPES = (0.0, 0.5, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0)
 STIFFNESSES = (0.05, 0.1, 0.2, 0.3, 0.5, 1.0)
@@ -14,7 +14,7 @@ CURVATURES = (-1.0, 0.0, 0.25, 0.5, 0.75, 0.95)
 
 
 def sweep_c(
-    law: Law,
+    law: AnyLaw,
     N: float = NORMAL_FORCE,
     given: Scales | None = None,
     values: Sequence[float] = SHAPES,
@@ -31,7 +31,7 @@ def sweep_c(
 
 
 def sweep_b(
-    law: Law,
+    law: AnyLaw,
     N: float = NORMAL_FORCE,
     given: Scales | None = None,
     values: Sequence[float] = STIFFNESSES,
@@ -48,7 +48,7 @@ def sweep_b(
 
 
 def sweep_e(
-    law: Law,
+    law: AnyLaw,
     N: float = NORMAL_FORCE,
     given: Scales | None = None,
     values: Sequence[float] = CURVATURES,
@@ -63,7 +63,7 @@ def sweep_e(
     return _sweep(_formula("sweep_e", law, N), law, N, given, "E", values)
 
 
-def _formula(where: str, law: Law, N: float) -> RuiWang:
+def _formula(where: str, law: AnyLaw, N: float) -> RuiWang:
     """The magic formula of `law`, its shape factor free."""
     if isinstance(law, RuiWang):
         return law
@@ -77,7 +77,7 @@ def _formula(where: str, law: Law, N: float) -> RuiWang:
 
 def _sweep(
     base: RuiWang,
-    law: Law,
+    law: AnyLaw,
     N: float,
     given: Scales | None,
     factor: str,

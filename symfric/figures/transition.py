@@ -6,14 +6,14 @@ import casadi as ca
 import numpy as np
 
 from symfric.figures.data import FigureData
-from symfric.figures.motion import UNITS, prescribed, slide
+from symfric.figures.motion import UNITS, slides
 from symfric.figures.requirements import require
 from symfric.figures.scales import NORMAL_FORCE, Scales, scales
-from symfric.laws import Law
+from symfric.laws import AnyLaw
 
 
 def transition(
-    law: Law,
+    law: AnyLaw,
     N: float = NORMAL_FORCE,
     given: Scales | None = None,
     frequencies: Sequence[float] = (2.0, 10.0),
@@ -33,9 +33,9 @@ def transition(
     def velocity(t: ca.SX, pace: ca.SX) -> ca.SX:
         return V * ca.sin(2 * ca.pi * pace * t)
 
-    model = prescribed(law, N, velocity)
+    slide = slides(law, N, velocity)
     curves = [
-        slide(model, law, f"{f:g} Hz", np.linspace((periods - 1) / f, periods / f, 1201), f)
+        slide(f"{f:g} Hz", np.linspace((periods - 1) / f, periods / f, 1201), f)
         for f in frequencies
     ]
     return FigureData(

@@ -32,11 +32,16 @@ from symfric.laws.dynamic import RateAndState as RateAndState
 from symfric.laws.dynamic import Slider as Slider
 from symfric.laws.dynamic import StickSlip as StickSlip
 from symfric.laws.names import ALL_LAWS as ALL_LAWS
+from symfric.laws.names import POPULATIONS as POPULATIONS
+from symfric.laws.names import any_from_text as any_from_text
 from symfric.laws.names import law_from_text as law_from_text
 from symfric.laws.names import law_name as law_name
 from symfric.laws.planar import Planar as Planar
+from symfric.laws.populations import AnyLaw as AnyLaw
 from symfric.laws.populations import GenericAsperity as GenericAsperity
+from symfric.laws.populations import Population as Population
 from symfric.laws.populations import RandomBristles as RandomBristles
+from symfric.laws.populations import steady_force as steady_force
 from symfric.laws.static import BAM as BAM
 from symfric.laws.static import Ambrosio as Ambrosio
 from symfric.laws.static import Andersson as Andersson

@@ -5,6 +5,7 @@ from re import fullmatch
 from symfric.laws.base import Law
 from symfric.laws.compose import Asymmetric, LoadDependent, Sum
 from symfric.laws.dynamic import DYNAMIC_LAWS
+from symfric.laws.populations import AnyLaw, GenericAsperity, RandomBristles
 from symfric.laws.static import STATIC_LAWS
 from symfric.laws.wrap import Lagged, TemperatureDependent
 from symfric.parameters import check_names
@@ -15,10 +16,17 @@ ALL_LAWS: dict[str, type[Law]] = {
 }
 """Every law that stands alone, by name; the contract tests run over it."""
 
+POPULATIONS: dict[str, type[GenericAsperity | RandomBristles]] = {
+    "generic_asperity": GenericAsperity,
+    "random_bristles": RandomBristles,
+}
+"""References of many random contacts by name: figures and a force along a motion, no equations."""
+
 ALIASES = {
     "bo_pavelescu": "stribeck",
     "adams": "velocity_based",
     "smooth_coulomb": "coulomb",
+    "haessig_friedland_bristles": "random_bristles",
 }
 """Other names of the same law, as papers and programs use them."""
 
@@ -30,8 +38,8 @@ WRAPPERS: dict[str, type[LoadDependent | Lagged | TemperatureDependent]] = {
 """Laws around one law, by the name that stands before its parentheses."""
 
 
-def law_name(law: Law) -> str:
-    """The text that `law_from_text` turns into a law of this kind; the class name of your own."""
+def law_name(law: AnyLaw) -> str:
+    """The text that `any_from_text` turns into a law of this kind; the class name of your own."""
     if isinstance(law, Sum):
         return "+".join(law_name(term) for term in law.laws)
     if isinstance(law, Asymmetric):
@@ -39,8 +47,14 @@ def law_name(law: Law) -> str:
     if isinstance(law, LoadDependent | Lagged | TemperatureDependent):
         name = next(name for name, kind in WRAPPERS.items() if kind is type(law))
         return f"{name}({law_name(law.law)})"
-    known = (name for name, kind in ALL_LAWS.items() if kind is type(law))
+    known = (name for name, kind in (ALL_LAWS | POPULATIONS).items() if kind is type(law))
     return next(known, type(law).__name__)
+
+
+def any_from_text(text: str) -> AnyLaw:
+    """The law or population with default parameters that `text` names; raises `law_from_text`'s."""
+    name = ALIASES.get(text.strip(), text.strip())
+    return POPULATIONS[name]() if name in POPULATIONS else law_from_text(text)
 
 
 def law_from_text(text: str) -> Law:
@@ -66,6 +80,11 @@ def _single(term: str, text: str) -> Law:
             Asymmetric(inner, inner) if wrapped[1] == "asymmetric" else WRAPPERS[wrapped[1]](inner)
         )
     name = ALIASES.get(term, term)
+    if name in POPULATIONS:
+        raise ValueError(
+            f"law '{text}': expected a law with equations, got {name}, a population of random "
+            "contacts; it has figures and `force(t, x, N)`; gms is the law next to it"
+        )
     check_names(f"law '{text}'", [name], ALL_LAWS)
     return ALL_LAWS[name]()
 

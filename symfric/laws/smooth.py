@@ -98,6 +98,11 @@ def step5(x: Scalar) -> Scalar:
     return t * t * t * (10 - t * (15 - 6 * t))
 
 
+def fraction(x: Scalar) -> Scalar:
+    """`x` modulo 1, in [0, 1)."""
+    return x - (ca.floor(x) if is_casadi(x) else np.floor(x))
+
+
 def choose(condition: Scalar, yes: Scalar, no: Scalar) -> Scalar:
     """`yes` where the condition holds, else `no`: for modes and for originals that jump."""
     if is_casadi(condition, yes, no):

@@ -29,3 +29,4 @@ from symfric.multibody.joints import Spherical as Spherical
 from symfric.multibody.joints import Universal as Universal
 from symfric.multibody.mechanism import Mechanism as Mechanism
 from symfric.multibody.spatial import Frame as Frame
+from symfric.multibody.urdf import read_urdf as read_urdf

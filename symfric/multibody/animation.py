@@ -1,4 +1,4 @@
-"""What is drawn of a mechanism: its bodies as lines between frames, its joints, rods and springs."""
+"""What is drawn of a mechanism: bodies as lines to their frames, joints, rods and springs."""
 
 from collections.abc import Iterable, Mapping
 
@@ -25,18 +25,19 @@ def sketch(
         scales: contact -> velocity [m/s] below which it counts as sticking.
     """
     drawn = [f for f in forces if isinstance(f, SpringDamper)]
-    used: dict[str, int] = {}
-    for joint in joints:
-        for place in (joint.parent, joint.child):
-            used.setdefault(place, len(used))
-    for force in drawn:
-        for place in force.places():
-            used.setdefault(place, len(used))
+    held = dict.fromkeys(place for joint in joints for place in (joint.parent, joint.child))
+    bodies = eq.kin.topology.bodies
+    named = (f"{body}.{frame}" for body, b in bodies.items() for frame in b.frames if frame)
+    pulled = (place for force in drawn for place in force.places())
+    used = {place: k for k, place in enumerate({**held, **dict.fromkeys((*named, *pulled))})}
+    only = {place for force in drawn for place in force.places()} - held.keys()
     columns = [_frame(eq.kin, place) for place in used]
     parts: list[Part] = []
     for name in eq.kin.motion:
-        corners = tuple(k for place, k in used.items() if body_of(place) == name)
-        parts.append(Part(name, len(columns), corners, fixed=name == GROUND))
+        own = [(place, k) for place, k in used.items() if body_of(place) == name]
+        corners = tuple(k for place, k in own if place not in only)
+        ends = tuple(k for place, k in own if place in only)
+        parts.append(Part(name, len(columns), corners, ends, fixed=name == GROUND))
         columns.append(_centre(eq.kin, name))
     marks = [_joint(eq, joint, used, scales) for joint in joints]
     for force in drawn:

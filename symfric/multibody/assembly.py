@@ -9,7 +9,7 @@ with J_W the inertia in world components; otherwise M is factorised as L D L'. T
 loops and those normal forces that depend on reactions are algebraic variables.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import final
 
@@ -22,11 +22,15 @@ from symfric.multibody.body import GROUND
 from symfric.multibody.equations import Equations
 from symfric.multibody.friction import Contact
 from symfric.multibody.joints import Free
+from symfric.multibody.results import Put
 from symfric.multibody.spatial import euler_e
 from symfric.multibody.topology import Topology
 from symfric.parameters import Variable
+from symfric.sketch import Sketch
 
 NONE = ca.SX(0, 1)
+Details = Callable[[ca.SX, Put], Mapping[str, Output]]
+Drawn = Callable[[Mapping[str, float]], Sketch]
 
 
 @final
@@ -128,6 +132,7 @@ def assemble(
     guess: Mapping[str, np.ndarray],
     p: Variables,
     u: Variables,
+    more: tuple[Details, Drawn],
 ) -> Model:
     """The model of a mechanism.
 
@@ -135,6 +140,7 @@ def assemble(
         eq: its equations, in the symbols of q and qd.
         labels: names of the multipliers.
         guess: multipliers "lam" and normal forces "N" without friction, at the start.
+        more: what writes further results and the sketch.
     """
     contacts = slips(eq, guess["N"].tolist())
     multipliers = tuple(
@@ -145,6 +151,7 @@ def assemble(
     forces = ca.vertcat(NONE, *(s.force for s in contacts))
     symbols = ca.vertcat(NONE, *(v.symbol for v in multipliers))
     before, after = ca.vertcat(eq.lam, eq.F), ca.vertcat(symbols, forces)
+    p_column = ca.vertcat(NONE, *(v.symbol for v in p))
     balance, normals, phi_ddot = ca.substitute(
         [eq.balance, ca.vertcat(NONE, *(s.normal - s.N for s in pressed)), eq.phi_ddot],
         [before],
@@ -152,6 +159,13 @@ def assemble(
     )
     acceleration = solve_mass(eq, -ca.substitute(balance, eq.a, ca.SX.zeros(eq.n)))
     algebraic = ca.vertcat(phi_ddot, normals)
+
+    def put(expressions: Sequence[ca.SX]) -> list[ca.SX]:
+        known = ca.substitute(list(expressions), [before], [after])
+        return ca.substitute(known, [eq.a], [acceleration])
+
+    scales = [(s, x) for s in contacts if np.isfinite(x := _scale(s, p))]
+    names = {s.contact.name: x for s, x in scales}
     rates = ca.vertcat(NONE, *(s.rate for s in contacts))
     qd_column = ca.vertcat(NONE, *(v.symbol for v in qd))
     return Model(
@@ -162,21 +176,22 @@ def assemble(
         p=p,
         ode=ca.vertcat(qd_column, acceleration, rates),
         alg=ca.substitute(algebraic, eq.a, acceleration),
-        outputs=_outputs(eq, contacts, before, after, acceleration),
-        monitors=tuple(m for s in contacts for m in _monitor(s, p)),
+        outputs=_outputs(eq, contacts, put),
+        monitors=tuple(Monitor(s.contact.slip, x) for s, x in scales),
         events=tuple(e for s in contacts for e in _switches(s, qd)),
         t=eq.kin.t,
+        details=lambda: more[0](p_column, put),
+        sketch=lambda: more[1](names),
         holonomic=Holonomic(eq.n, eq.phi, eq.a, ca.vertcat(balance, algebraic)),
     )
 
 
-def _monitor(slip: Slip, p: Variables) -> tuple[Monitor, ...]:
-    """The sliding velocity on the scale of the law, at the start values of `p`."""
+def _scale(slip: Slip, p: Variables) -> float:
+    """Sliding velocity on which the law changes, at the start values of `p` [m/s]."""
     symbols = ca.vertcat(NONE, *(v.symbol for v in p))
     values = ca.vertcat(NONE, *(v.start for v in p))
     law = slip.contact.friction.law
-    scale = float(ca.DM(ca.substitute(ca.SX(law.velocity_scale), symbols, ca.SX(values))))
-    return (Monitor(slip.contact.slip, scale),) if np.isfinite(scale) else ()
+    return float(ca.DM(ca.substitute(ca.SX(law.velocity_scale), symbols, ca.SX(values))))
 
 
 def _switches(slip: Slip, qd: Variables) -> tuple[Event, ...]:
@@ -196,15 +211,11 @@ def _switches(slip: Slip, qd: Variables) -> tuple[Event, ...]:
     )
 
 
-def _outputs(
-    eq: Equations, contacts: Sequence[Slip], before: ca.SX, after: ca.SX, acceleration: ca.SX
-) -> dict[str, Output]:
+def _outputs(eq: Equations, contacts: Sequence[Slip], put: Put) -> dict[str, Output]:
     """Results of the contacts, energies, and what is left of the constraints."""
     found: dict[str, Output] = {}
     norms = (("phi", eq.phi, "m"), ("phi_dot", eq.phi_dot, "m/s"), ("phi_ddot", eq.phi_ddot, ""))
-    expressions = [*(s.normal for s in contacts), *(x for _, x, _ in norms)]
-    expressions = ca.substitute(expressions, [before], [after])
-    expressions = ca.substitute(expressions, [eq.a], [acceleration])
+    expressions = put([*(s.normal for s in contacts), *(x for _, x, _ in norms)])
     for slip, normal in zip(contacts, expressions, strict=False):
         contact, name = slip.contact, slip.contact.name
         if slip.N is slip.normal:

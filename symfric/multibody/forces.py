@@ -70,6 +70,11 @@ class Force(ABC):
         """The joints it names."""
         return ()
 
+    @property
+    def conservative(self) -> bool:
+        """Whether its power is nothing but the change of its potential energy."""
+        return False
+
     @abstractmethod
     def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
         """What it puts on the bodies."""
@@ -85,6 +90,11 @@ class Gravity(Force):
     """The weight m g of every body at its centre of mass; g [m/s^2] in world components."""
 
     g: Vector = (0.0, 0.0, -9.81)
+
+    @property
+    def conservative(self) -> bool:
+        """Always."""
+        return True
 
     def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
         """Weights."""
@@ -120,6 +130,11 @@ class SpringDamper(Force):
     def places(self) -> Iterable[str]:
         """Both ends."""
         return (self.a, self.b)
+
+    @property
+    def conservative(self) -> bool:
+        """As a spring alone."""
+        return equals(self.damping, 0.0) and equals(self.actuator, 0.0)
 
     @property
     def _linear(self) -> bool:
@@ -169,6 +184,11 @@ class JointSpringDamper(Force):
     def joints(self) -> Iterable[str]:
         """Its joint."""
         return (self.joint,)
+
+    @property
+    def conservative(self) -> bool:
+        """As a spring alone."""
+        return equals(self.damping, 0.0) and equals(self.actuator, 0.0)
 
     def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
         """One axial load."""

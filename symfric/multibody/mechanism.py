@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import casadi as ca
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from symfric.model import Model, Variables
 from symfric.multibody import checks
+from symfric.multibody.animation import sketch
 from symfric.multibody.assembly import assemble, coordinates
 from symfric.multibody.body import GROUND, Body
 from symfric.multibody.constraints import Constraint
@@ -23,6 +25,7 @@ from symfric.multibody.prepare import (
     without_friction,
     written,
 )
+from symfric.multibody.results import results
 from symfric.multibody.spatial import Frame, Vector
 from symfric.multibody.topology import Topology, absolute, spanning_tree
 from symfric.numeric import Scalar
@@ -105,7 +108,9 @@ class Mechanism:
         made = self.prepare(p, formulation)
         u = tuple(self.inputs)
         guess = without_friction(made, p, u)
-        return assemble(self.name, made.eq, made.q, made.qd, made.labels, guess, p, u)
+        parts = made.eq, tuple(self.joints), tuple(self.forces)
+        more = partial(results, *parts, made.open_reactions), partial(sketch, *parts)
+        return assemble(self.name, made.eq, made.q, made.qd, made.labels, guess, p, u, more)
 
     def prepare(self, p: Variables = (), formulation: str = "joint") -> Prepared:
         """The equations of motion with their variables, checked.

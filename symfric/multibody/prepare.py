@@ -1,6 +1,6 @@
 """Equations of a mechanism with variables, consistent start values and independent constraints."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -34,6 +34,7 @@ class Prepared:
         labels: names of the multipliers.
         redundant: names of the constraints that were left out.
         undetermined: joints whose normal force redundant constraints leave open.
+        open_reactions: joints whose reactions they leave open.
         singular: whether constraints that are independent nearby are not at the start.
         problems: constraints that cannot be.
     """
@@ -46,6 +47,7 @@ class Prepared:
     labels: tuple[str, ...]
     redundant: tuple[str, ...]
     undetermined: tuple[str, ...] = ()
+    open_reactions: tuple[str, ...] = ()
     singular: bool = False
     problems: tuple[str, ...] = ()
 
@@ -183,7 +185,20 @@ def written(
         eq=equations(*arguments, found.kept),
         labels=tuple(labels[i] for i in found.kept),
         redundant=tuple(labels[i] for i in found.redundant),
-        undetermined=_undetermined(made, found.undetermined, p, values),
+        undetermined=_undetermined(
+            made,
+            zip((c.joint for c in eq.contacts), eq.normals, strict=True),
+            found.undetermined,
+            p,
+            values,
+        ),
+        open_reactions=_undetermined(
+            made,
+            ((name, ca.vertcat(*wrench)) for name, wrench in eq.reactions.items()),
+            found.undetermined,
+            p,
+            values,
+        ),
         singular=found.singular,
         problems=tuple(_fixed_already(made, constraints, found.undetermined)),
     )
@@ -221,17 +236,21 @@ def _fixed_already(made: Prepared, constraints: Sequence[Constraint], free: Arra
                 )
 
 
-def _undetermined(made: Prepared, free: Array, p: ca.SX, values: ca.DM) -> tuple[str, ...]:
-    """Joints whose normal force changes with combinations `free` of the multipliers."""
+def _undetermined(
+    made: Prepared, rows: Iterable[tuple[str, ca.SX]], free: Array, p: ca.SX, values: ca.DM
+) -> tuple[str, ...]:
+    """Joints whose `rows` change with combinations `free` of the multipliers."""
     eq, rng = made.eq, np.random.default_rng(1)
-    normals = ca.substitute(ca.vertcat(NONE, *eq.normals), eq.kin.t, ca.SX(0))
+    pairs = [(name, ca.vec(row)[i]) for name, row in rows for i in range(row.numel())]
+    column = ca.substitute(ca.vertcat(NONE, *(row for _, row in pairs)), eq.kin.t, ca.SX(0))
     slope = ca.Function(
-        "slope", [eq.q, eq.qd, eq.a, eq.lam, p], [ca.densify(ca.jacobian(normals, eq.lam))],
+        "slope", [eq.q, eq.qd, eq.a, eq.lam, p], [ca.densify(ca.jacobian(column, eq.lam))],
         {"allow_free": True},
     )  # fmt: skip
     some = rng.standard_normal(eq.n), rng.standard_normal(eq.m)
     change = np.abs(slope.call([made.q0, made.qd0, *some, values])[0].full() @ free).max(axis=1)
-    return tuple(c.joint for c, x in zip(eq.contacts, change, strict=True) if x > 1e-7)
+    found = (name for (name, _), x in zip(pairs, change, strict=True) if x > 1e-7)
+    return tuple(dict.fromkeys(found))
 
 
 def labels_of(eq: Equations) -> tuple[str, ...]:

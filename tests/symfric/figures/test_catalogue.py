@@ -5,6 +5,7 @@ import pytest
 
 from symfric import ALL_LAWS, Coulomb, LuGre, figure, law_from_text
 from symfric.figures import FIGURES, phenomena
+from symfric.laws import GenericAsperity, RandomBristles
 
 NEEDS = {
     "profile": set(ALL_LAWS),
@@ -50,6 +51,23 @@ def test_a_law_that_shows_it_has_finite_columns_of_one_length(law: str, name: st
 def test_a_law_that_cannot_show_it_is_refused(law: str, name: str) -> None:
     with pytest.raises(ValueError, match=r"expected a law (that|with)"):
         figure(law_from_text(law), name)
+
+
+REFERENCES = {"generic_asperity": GenericAsperity(count=60), "random_bristles": RandomBristles()}
+
+
+@pytest.mark.parametrize("name", [n for n in FIGURES if not n.startswith("sweep")])
+@pytest.mark.parametrize("law", REFERENCES)
+def test_a_population_has_the_figures_of_its_phenomena(law: str, name: str) -> None:
+    reference = REFERENCES[law]
+    needed = SHOWN_WITH.get(name)
+    if needed and not needed & set(phenomena(reference)):
+        with pytest.raises(ValueError, match="expected a law that"):
+            figure(reference, name)
+        return
+    for curve in figure(reference, name).curves:
+        assert curve.law == law
+        assert all(np.isfinite(values).all() for values in curve.columns.values())
 
 
 def test_the_refusal_says_what_is_missing_and_who_has_it() -> None:

@@ -6,6 +6,7 @@ import symfric
 import symfric.laws
 from symfric import Coulomb, LuGre, with_values
 from symfric.figures import FigureData, compare
+from symfric.laws import GenericAsperity
 
 
 def test_all_laws_get_the_motion_of_the_first() -> None:
@@ -63,3 +64,14 @@ def test_it_is_reached_from_the_front_and_from_the_laws() -> None:
     with pytest.raises(AttributeError, match=r"symfric\.laws.* 'compose_'"):
         _ = symfric.laws.compose_
     assert isinstance(symfric.compare(["coulomb"]), FigureData)
+
+
+def test_a_population_is_compared_by_name_and_as_an_instance() -> None:
+    own = GenericAsperity(count=200, seed=3)
+    data = compare(["gms", own, "generic_asperity"], "hysteresis")
+    assert {c.law for c in data.curves} == {"gms", "generic_asperity_2", "generic_asperity_3"}
+
+
+def test_a_population_is_refused_in_a_scene() -> None:
+    with pytest.raises(ValueError, match="scene rabinowicz, got generic_asperity, a population"):
+        compare(["gms", "generic_asperity"], "rabinowicz")

@@ -8,14 +8,14 @@ import pytest
 from law_cases import CASES
 
 from symfric import ALL_LAWS, Coulomb, Viscous
-from symfric.laws import BAM
+from symfric.laws import BAM, POPULATIONS
 from symfric.laws.cost import cost
 
 TABLE = Path(__file__).parents[2] / "golden" / "instructions.json"
 
 
 def counted() -> dict[str, dict[str, int]]:
-    return {name: asdict(cost(kind())) for name, kind in ALL_LAWS.items()}
+    return {name: asdict(cost(kind())) for name, kind in (ALL_LAWS | POPULATIONS).items()}
 
 
 def test_instructions_of_every_law_are_those_of_the_table(request: pytest.FixtureRequest) -> None:

@@ -3,7 +3,7 @@
 import pytest
 
 from symfric import ALL_LAWS, Asymmetric, Coulomb, LoadDependent, StaticLaw, law_from_text
-from symfric.laws import law_name
+from symfric.laws import POPULATIONS, RandomBristles, any_from_text, law_name
 from symfric.numeric import Scalar
 
 
@@ -28,6 +28,19 @@ def test_name_gives_the_law_with_default_parameters(name: str) -> None:
 )
 def test_text_and_law_name_are_inverse(text: str) -> None:
     assert law_name(law_from_text(text)) == text
+
+
+@pytest.mark.parametrize("name", POPULATIONS)
+def test_a_population_has_a_name_and_no_scene(name: str) -> None:
+    assert type(any_from_text(name)) is POPULATIONS[name]
+    assert law_name(any_from_text(name)) == name
+    with pytest.raises(ValueError, match=rf"expected a law with equations, got {name}, a popul"):
+        law_from_text(name)
+
+
+def test_another_name_of_a_population_is_known() -> None:
+    assert isinstance(any_from_text("haessig_friedland_bristles"), RandomBristles)
+    assert any_from_text(" adams ") is not None
 
 
 def test_spaces_are_ignored() -> None:

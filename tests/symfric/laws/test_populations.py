@@ -1,9 +1,10 @@
 """Random contacts: what the asperities show together, and what they refuse."""
 
+import casadi as ca
 import numpy as np
 import pytest
 
-from symfric.laws.populations import GenericAsperity, RandomBristles
+from symfric.laws.populations import GenericAsperity, Population, RandomBristles
 
 N = 10.0
 
@@ -88,16 +89,16 @@ def test_velocity_that_swings_opens_a_loop() -> None:
 def test_bristles_slide_at_a_mean_force_below_their_limit() -> None:
     law = RandomBristles(count=500)
     t, x = sliding(1e-4, 3e-4)
-    F = law.force(t, x)
+    F = law.force(t, x, N)
     assert 0.3 < F[-100:].mean() < 0.7
     assert F.max() < 1.0
-    mirrored = law.force(t, -x)
+    mirrored = law.force(t, -x, N)
     assert mirrored[-100:].mean() == pytest.approx(-F[-100:].mean(), rel=0.1)
 
 
 def test_bristles_that_do_not_snap_are_a_spring() -> None:
     x = np.linspace(0.0, 1e-9, 11)
-    F = RandomBristles().force(np.arange(11.0), x)
+    F = RandomBristles().force(np.arange(11.0), x, N)
     assert F - F[0] == pytest.approx(1e5 * x, abs=1e-15)
 
 
@@ -106,11 +107,68 @@ def test_bristles_that_do_not_snap_are_a_spring() -> None:
     [
         ([0.0, 1.0], [0.0], "rising times t and as many positions x, got shapes"),
         ([0.0, 0.0], [0.0, 1e-7], "rising times"),
-        ([0.0, 1.0], [0.0, 1e-5], "expected steps of x up to 1e-06 m, got 1e-05 m; give the"),
     ],
 )
 def test_bad_motion_is_refused(t: list[float], x: list[float], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         GenericAsperity().force(t, x, N)
     with pytest.raises(ValueError, match="RandomBristles: expected"):
-        RandomBristles().force(t, [2 * y for y in x])
+        RandomBristles().force(t, x, N)
+
+
+@pytest.mark.parametrize("kind", [GenericAsperity, RandomBristles])
+def test_a_broken_count_is_refused(kind: type[Population]) -> None:
+    with pytest.raises(ValueError, match=r"count: expected a whole number, got 2.5"):
+        kind(count=2.5)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(ValueError, match=r"count: expected 1 <= count"):
+        kind(count=0)
+
+
+@pytest.mark.parametrize("law", [GenericAsperity(count=50), RandomBristles()])
+def test_a_long_way_is_made_in_steps(law: Population) -> None:
+    one, F = law.advance(law.begin(), 7.3 * law.step, 1e-3, N)
+    other = law.begin()
+    for _ in range(8):
+        other, G = law.advance(other, 7.3 * law.step / 8, 1e-3 / 8, N)
+    np.testing.assert_allclose(one.z, other.z, rtol=1e-12, atol=1e-18)
+    assert pytest.approx(G, rel=1e-12) == F
+
+
+def test_one_contact_is_the_same_as_an_array_and_as_an_expression() -> None:
+    law = GenericAsperity()
+    z, r, dx = ca.SX.sym("z", 3), ca.SX.sym("r"), ca.SX.sym("dx")
+    step = ca.Function("step", [z, r, dx], [law.contact(z, r, dx, 1e-3, N)])
+    start = law.begin()
+    after = law.contact(start.z, start.r, 3e-7, 1e-3, N)
+    for i in (0, 17, 999):
+        one = step(start.z[:, i], start.r[i], 3e-7).full().ravel()
+        np.testing.assert_allclose(one, after[:, i], rtol=1e-14, atol=1e-300)
+
+
+def test_a_single_old_asperity_slips_at_its_closed_form() -> None:
+    """In the middle of its contact it bears pi/(2 duty) N and slips at mu_inf of that."""
+    law = GenericAsperity(count=1, k=1e12, tau_c=1e-9)
+    z = np.array([[0.299], [0.0], [1.0]])
+    F = law.contact(z, np.zeros(1), 0.001 * law.lam, 1.0, N)[-1]
+    assert F[0] == pytest.approx(0.2 * N * np.pi / 1.2, rel=1e-9)
+
+
+def test_steady_force_of_stiff_old_asperities_is_that_of_coulomb() -> None:
+    law = GenericAsperity(k=1e9, tau_c=1e-9)
+    F = law.steady_force([-1e-3, 0.0, 1e-3], N)
+    assert list(F) == pytest.approx([-0.2 * N, 0.0, 0.2 * N], rel=2e-3)
+
+
+def test_rest_makes_the_next_break_away_harder() -> None:
+    law, peaks = GenericAsperity(), []
+    for rest in (1e-3, 0.02, 0.5):
+        contacts = law.begin()
+        for _ in range(60):
+            contacts, _ = law.advance(contacts, law.step, law.step / 1e-2, N)
+        contacts, _ = law.advance(contacts, 0.0, rest, N)
+        forces = []
+        for _ in range(40):
+            contacts, F = law.advance(contacts, law.step / 4, law.step / 4e-2, N)
+            forces.append(F)
+        peaks.append(max(forces))
+    assert peaks[0] < 0.8 * peaks[1] < 0.64 * peaks[2]

@@ -1,0 +1,334 @@
+"""A URDF file as data: links, joints, and what else it says."""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import cos, isfinite, sin
+from pathlib import Path
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+SINGLE = KINDS[:3]
+"""Joints of one coordinate."""
+LIMITS = ("lower", "upper", "effort", "velocity")
+APPEARANCE = {"visual", "collision", "material"}
+"""Tags that no mechanism has a place for and nobody misses there."""
+SNAP = 1e-15
+"""Entries of rotation matrices nearer to 0 are 0: a quarter turn must not leave 6e-17 behind."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Inertial:
+    """Mass [kg], centre of mass [m] and inertia about it [kg m^2], in the axes of the link."""
+
+    mass: float
+    com: Array
+    J: Array
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Mimic:
+    """A joint that follows another one: q = multiplier q_joint + offset."""
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class UrdfJoint:
+    """A joint tag.
+
+    Attributes:
+        kind: one of `KINDS`.
+        parent, child: links.
+        R, p: pose of the child link in the parent link while the joint is at zero.
+        axis: unit vector in the axes of the child link.
+        damping: [N s/m] or [N m s/rad].
+        friction: [N] or [N m].
+        limits: lower and upper [m, rad], effort [N, N m], velocity [m/s, rad/s], where given.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    R: Array
+    p: Array
+    axis: Array
+    damping: float
+    friction: float
+    limits: Mapping[str, float]
+    mimic: Mimic | None
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Urdf:
+    """A robot as its file describes it.
+
+    Attributes:
+        name: of the robot.
+        links: what each link weighs; None for a massless one.
+        joints: every link but the root is the child of one.
+        left_out: tags that say something which is not in here, each with where it stands.
+    """
+
+    name: str
+    links: Mapping[str, Inertial | None]
+    joints: tuple[UrdfJoint, ...]
+    left_out: tuple[str, ...]
+
+    @property
+    def root(self) -> str:
+        """The link that is nobody's child."""
+        children = {joint.child for joint in self.joints}
+        return next(link for link in self.links if link not in children)
+
+    def zero(self, joint: UrdfJoint) -> float:
+        """Where a joint stands while all joints that mimic no other are at zero [m, rad]."""
+        if joint.mimic is None:
+            return 0.0
+        leader = next(other for other in self.joints if other.name == joint.mimic.joint)
+        return joint.mimic.multiplier * self.zero(leader) + joint.mimic.offset
+
+    def outwards(self) -> Iterator[UrdfJoint]:
+        """The joints, each after the one that carries its parent."""
+        below: dict[str, list[UrdfJoint]] = {}
+        for joint in self.joints:
+            below.setdefault(joint.parent, []).append(joint)
+        waiting = [self.root]
+        while waiting:
+            for joint in below.get(waiting.pop(0), []):
+                waiting.append(joint.child)
+                yield joint
+
+
+def parse(source: str | Path) -> Urdf:
+    """Read a URDF file.
+
+    Args:
+        source: path of a file, or its text (which begins with "<").
+
+    Raises:
+        ValueError: no XML, no tree of links, or numbers that cannot be, all problems at once, each
+            with its path ("urdf 'arm' > joint 'elbow' > axis").
+        OSError: the file cannot be read.
+    """
+    is_text = isinstance(source, str) and source.lstrip().startswith("<")
+    where = "urdf" if is_text else f"urdf '{source}'"
+    content = source.strip() if is_text else Path(source).read_bytes()  # type: ignore[union-attr]
+    try:
+        robot = ET.fromstring(content)
+    except ET.ParseError as error:
+        raise ValueError(f"{where}: expected XML, got {error}") from None
+    if robot.tag != "robot":
+        raise ValueError(f"{where}: expected <robot> as its outermost tag, got <{robot.tag}>")
+    name = robot.get("name") or ("robot" if is_text else Path(source).stem)
+    notes = _Notes()
+    links = {tag.get("name", ""): _inertial(tag, notes) for tag in robot.findall("link")}
+    joints = tuple(_joint(tag, notes) for tag in robot.findall("joint"))
+    notes.others("", robot, {"link", "joint"})
+    _check_names(robot, notes)
+    if not notes.problems:
+        notes.problems.extend([*_tree_problems(links, joints), *_mimic_problems(joints)])
+    if notes.problems:
+        raise ValueError("\n".join(f"urdf '{name}' > {text}" for text in notes.problems))
+    left = tuple(
+        f"<{tag}>" + (f" of {', '.join(at)}" if any(at) else "")
+        for tag, at in notes.left_out.items()
+    )
+    return Urdf(name, links, joints, left)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Notes:
+    """What is wrong, and what is left out: tag -> where it stands."""
+
+    problems: list[str] = field(default_factory=list[str])
+    left_out: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
+
+    def others(self, where: str, tag: ET.Element, known: Iterable[str]) -> None:
+        """Note the tags inside `tag` that are not known."""
+        for other in tag:
+            if "xacro" in other.tag:
+                self.problems.append("<xacro>: expected plain URDF; expand the file with xacro")
+            elif other.tag not in {*known, *APPEARANCE}:
+                self.left(other.tag, where)
+
+    def left(self, tag: str, where: str) -> None:
+        """Note a tag that is left out, once for every place."""
+        places = self.left_out.setdefault(tag, [])
+        if where not in places:
+            places.append(where)
+
+    def numbers(self, where: str, tag: ET.Element | None, key: str, default: str) -> Array:
+        """The numbers in an attribute, as many as in `default`, which stands for a missing one."""
+        text = default if tag is None else tag.get(key, default)
+        n = len(default.split())
+        try:
+            found = [float(word) for word in text.split()]
+        except ValueError:
+            found = []
+        if len(found) != n or not all(isfinite(x) for x in found):
+            several = "a number" if n == 1 else f"{n} numbers"
+            self.problems.append(f"{where}: expected {several} in {key}, got '{text}'")
+            found = [float(word) for word in default.split()]
+        return np.array(found)
+
+    def number(self, where: str, tag: ET.Element | None, key: str, default: str = "0") -> float:
+        """The number in an attribute."""
+        return float(self.numbers(where, tag, key, default)[0])
+
+    def pose(self, where: str, tag: ET.Element) -> tuple[Array, Array]:
+        """Rotation and position in the tag <origin> of `tag`."""
+        origin, at = tag.find("origin"), f"{where} > origin"
+        turn = rotation(*self.numbers(at, origin, "rpy", "0 0 0"))
+        return turn, self.numbers(at, origin, "xyz", "0 0 0")
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> Array:
+    """R_z(yaw) R_y(pitch) R_x(roll): turns about the fixed axes x, y, z, one after the other."""
+    (cr, sr), (cp, sp), (cy, sy) = ((cos(a), sin(a)) for a in (roll, pitch, yaw))
+    R = np.array([
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ])  # fmt: skip
+    return np.where(np.abs(R) < SNAP, 0.0, R)
+
+
+def _inertial(tag: ET.Element, notes: _Notes) -> Inertial | None:
+    link = f"link '{tag.get('name', '')}'"
+    notes.others(link, tag, {"inertial"})
+    inertial = tag.find("inertial")
+    if inertial is None:
+        return None
+    where = f"{link} > inertial"
+    notes.others(link, inertial, {"origin", "mass", "inertia"})
+    for key in ("mass", "inertia"):
+        if inertial.find(key) is None:
+            notes.problems.append(f"{where} > {key}: expected a tag, found none")
+    R, com = notes.pose(where, inertial)
+    mass = notes.number(f"{where} > mass", inertial.find("mass"), "value")
+    inertia, at = inertial.find("inertia"), f"{where} > inertia"
+    xx, yy, zz, xy, xz, yz = (
+        notes.number(at, inertia, key) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    )
+    J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    principal = np.linalg.eigvalsh(J)
+    if mass < 0:
+        notes.problems.append(f"{where} > mass: expected >= 0 kg, got {mass:g}")
+    if principal[0] < -1e-9 * abs(principal[2]):
+        text = ", ".join(f"{x:g}" for x in principal)
+        notes.problems.append(f"{at}: expected no negative principal moment, got {text}")
+    return Inertial(mass, com, R @ J @ R.T) if mass or J.any() else None
+
+
+def _joint(tag: ET.Element, notes: _Notes) -> UrdfJoint:
+    name, kind = tag.get("name", ""), tag.get("type", "")
+    where = f"joint '{name}'"
+    known = {"origin", "parent", "child", "axis", "dynamics", "limit", "mimic"}
+    notes.others(where, tag, known)
+    if kind not in KINDS:
+        notes.problems.append(f"{where} > type: expected one of {', '.join(KINDS)}, got '{kind}'")
+    dynamics, limit = tag.find("dynamics"), tag.find("limit")
+    for key in () if dynamics is None else dynamics.keys():
+        if key not in ("damping", "friction"):
+            notes.left(f"dynamics {key}", where)
+    if limit is not None:
+        notes.left("limit", where)
+    axis = notes.numbers(f"{where} > axis", tag.find("axis"), "xyz", "1 0 0")
+    length = float(np.linalg.norm(axis))
+    if not length > 1e-12:
+        notes.problems.append(f"{where} > axis: expected a direction, got '0 0 0'")
+    damping, friction = (
+        notes.number(f"{where} > dynamics", dynamics, key) for key in ("damping", "friction")
+    )
+    for key, value in (("damping", damping), ("friction", friction)):
+        if value < 0:
+            notes.problems.append(f"{where} > dynamics > {key}: expected >= 0, got {value:g}")
+    ends = {key: _end(where, tag.find(key), key, notes) for key in ("parent", "child")}
+    R, p = notes.pose(where, tag)
+    return UrdfJoint(
+        name, kind, ends["parent"], ends["child"], R, p, axis / (length or 1.0), damping, friction,
+        {key: notes.number(f"{where} > limit", limit, key) for key in LIMITS
+         if limit is not None and key in limit.attrib},
+        _mimic(where, tag.find("mimic"), notes),
+    )  # fmt: skip
+
+
+def _end(where: str, tag: ET.Element | None, key: str, notes: _Notes) -> str:
+    link = "" if tag is None else tag.get("link", "")
+    if not link:
+        notes.problems.append(f"{where} > {key}: expected the name of a link, found none")
+    return link
+
+
+def _mimic(where: str, tag: ET.Element | None, notes: _Notes) -> Mimic | None:
+    if tag is None:
+        return None
+    at = f"{where} > mimic"
+    return Mimic(
+        tag.get("joint", ""), notes.number(at, tag, "multiplier", "1"),
+        notes.number(at, tag, "offset"),
+    )  # fmt: skip
+
+
+def _check_names(robot: ET.Element, notes: _Notes) -> None:
+    """Every link and every joint has a name of its own."""
+    for kind in ("link", "joint"):
+        names = [tag.get("name", "") for tag in robot.findall(kind)]
+        for name in dict.fromkeys(names):
+            if not name:
+                notes.problems.append(f"{kind}: expected a name, found none")
+            elif names.count(name) > 1:
+                notes.problems.append(f"{kind} '{name}': expected every name once")
+        if kind == "link" and not names:
+            notes.problems.append("link: expected at least one, found none")
+
+
+def _tree_problems(links: Iterable[str], joints: Sequence[UrdfJoint]) -> Iterator[str]:
+    """Why the joints do not make a tree of the links."""
+    carriers: dict[str, list[str]] = {link: [] for link in links}
+    for joint in joints:
+        for key, link in (("parent", joint.parent), ("child", joint.child)):
+            if link not in carriers:
+                yield f"joint '{joint.name}' > {key}: expected a link, got '{link}'"
+        carriers.setdefault(joint.child, []).append(joint.name)
+    for link, above in carriers.items():
+        for first, second in pairwise(above):
+            yield f"link '{link}': expected one joint that carries it, got {first}, {second}"
+    roots = [link for link, above in carriers.items() if not above]
+    if len(roots) != 1:
+        yield f"expected one link that no joint carries, got {', '.join(roots) or 'a closed loop'}"
+        return
+    reached = {roots[0]}
+    while more := {j.child for j in joints if j.parent in reached} - reached:
+        reached |= more
+    for link in carriers:
+        if link not in reached:
+            yield f"link '{link}': expected joints that lead to '{roots[0]}', got a closed loop"
+
+
+def _mimic_problems(joints: Sequence[UrdfJoint]) -> Iterator[str]:
+    """Followers whose chain of leaders does not end in a joint that turns or slides."""
+    along = {joint.name: joint for joint in joints if joint.kind in SINGLE}
+    for joint in joints:
+        leader, steps = joint, 0
+        while leader is not None and leader.mimic is not None and steps <= len(joints):
+            leader, steps = along.get(leader.mimic.joint), steps + 1
+        if joint.mimic is not None and (leader is None or leader.mimic or joint.name not in along):
+            yield (
+                f"joint '{joint.name}' > mimic: expected joints of kind {', '.join(SINGLE)} whose "
+                f"chain ends in one that mimics no other, got '{joint.mimic.joint}'"
+            )
