@@ -81,12 +81,16 @@ class Holonomic:
         phi: SX (m, 1); no rows for a tree.
         a: SX symbols (n, 1).
         implicit: SX (n + nz, 1), the equations above in q, q', the other states, a, z, u, p, t.
+        index: 0 has it integrated in the tangent space of its constraints, in as many unknowns as
+            there are degrees of freedom; 1 in all coordinates, which are put back onto the
+            constraints at the end of every step. The solution is the same, to the tolerance.
     """
 
     n: int
     phi: ca.SX
     a: ca.SX
     implicit: ca.SX
+    index: int = 1
 
 
 @dataclass(frozen=True, eq=False)

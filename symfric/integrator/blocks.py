@@ -58,7 +58,7 @@ def signs(system: System, gamma: float) -> Signs:
     block, rows = blocks(system, gamma), system.algebraic[0]
     y, d, lu = system.y, system.d, block.lu
     sign = ca.Function("sign", [lu.packed_symbol], [lu.sign(), lu.sign(len(rows))])
-    if {row for row, _ in lu.order[: len(rows)]} == set(rows):
+    if system.is_semi_explicit and {row for row, _ in lu.order[: len(rows)]} == set(rows):
         return lambda y, h, d: sign(block.factor(y, h, d))
     matrix = ca.densify(system.mass)
     matrix[rows, :] = -system.J[rows, :]

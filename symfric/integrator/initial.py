@@ -50,7 +50,7 @@ def consistent(system: System | Equations, where: str, y: Array, d: Array) -> Ar
     if manifold is not None:
         y = _assembled(system, manifold, where, y, d)
     y = _solved(system, where, y, d)
-    if manifold is not None and manifold.m:
+    if manifold is not None and manifold.charted:
         phi_q = manifold.slope(y, d)[manifold.n : manifold.n + manifold.m, : manifold.n].full()
         # the trailing right singular vectors span the null space
         y[manifold.basis] = np.linalg.svd(phi_q)[2][manifold.m :].ravel()

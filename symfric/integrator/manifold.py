@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.lu import factorise
-from symfric.model import Model
+from symfric.model import Holonomic, Model
 
 Array = NDArray[np.float64]
 DEPENDENT = 1e-5
@@ -53,8 +53,13 @@ class Manifold:
     n: int
     m: int
     first: int
-    basis: slice
+    basis: range
     slope: ca.Function
+
+    @property
+    def charted(self) -> bool:
+        """Whether it is integrated in charts of the tangent space."""
+        return len(self.basis) > 0
 
 
 def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
@@ -70,8 +75,7 @@ def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
     f = ca.vertcat(x[n : 2 * n], mechanics.a, model.ode[2 * n :], mechanics.implicit)
     names = [v.name for v in model.x]
     names += [f"{v.name}_dot" for v in model.x[n : 2 * n]] + [v.name for v in model.z]
-    m = mechanics.phi.numel()
-    V = ca.SX.sym("V", n * (n - m) if m else 0)
+    V = ca.SX.sym("V", _of_basis(mechanics))
     mass = ca.diagcat(ca.SX.eye(x.numel()), ca.SX(*2 * [n + len(model.z)]), ca.SX.eye(V.numel()))
     return (
         ca.vertcat(x, mechanics.a, model.vector("z"), V),
@@ -79,6 +83,12 @@ def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
         mass,
         [*names, *(f"V_{i}" for i in range(V.numel()))],
     )
+
+
+def _of_basis(mechanics: Holonomic) -> int:
+    """Length of V: a column of n for each degree of freedom, where there is a chart at all."""
+    n, m = mechanics.n, mechanics.phi.numel()
+    return n * (n - m) if m and mechanics.index == 0 else 0
 
 
 def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX) -> Manifold:
@@ -111,7 +121,7 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX) -> Manifold:
         n,
         m,
         nx,
-        slice(algebraic[-1] + 1, algebraic[-1] + 1 + (n * (n - m) if m else 0)),
+        range(algebraic[-1] + 1, algebraic[-1] + 1 + _of_basis(mechanics)),
         slope,
     )
 

@@ -10,6 +10,7 @@ or rejects (h shrinks). `fixed(y, h, d) -> y_next` is the bare step, for derivat
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -32,25 +33,32 @@ KAPPA = 0.1
 
 
 def steps(system: System, method: Method) -> Trials:
-    """The steps of a method, those of a mechanism with constraints in a chart of each step."""
-    chart = tangent(system)
-    if chart is None:
-        return method.trials(system)
-    inside = method.trials(chart.reduced)
+    """The steps of a method; those of a mechanism end on its constraints."""
+    chart, manifold = tangent(system), system.manifold
+    if chart is not None:
+        inside = method.trials(chart.reduced)
 
-    def trial(y: Any, h: Any, d: Any) -> Trial:
-        data = chart.open(y, d)
-        return chart.trial(inside(chart.enter(y, data), h, data), y, h, data)
+        def in_chart(y: Any, h: Any, d: Any) -> Trial:
+            data = chart.open(y, d)
+            return chart.trial(inside(chart.enter(y, data), h, data), y, h, data)
 
-    return trial
+        return in_chart
+    free = method.trials(system)
+    if manifold is None or not manifold.m:
+        return free
+
+    def projected(y: Any, h: Any, d: Any) -> Trial:
+        found = free(y, h, d)
+        return replace(found, end=manifold.project(found.end, d))
+
+    return projected
 
 
-Signs = Callable[[Any, Any, Any], Any]
-"""(y, h, d) -> negative where a step must not end at y."""
+def obstacles(system: System, method: Method) -> Callable[[Any, Any, Any], Any] | None:
+    """What forbids a step over h to end at y although its error is small; None where nothing can.
 
-
-def obstacles(system: System, method: Method) -> Signs | None:
-    """What forbids to accept a step although its error is small; None where nothing can.
+    Returns:
+        (y, h, d) -> a number that is negative where something does.
 
     Breaking away would be missed without a sign of it: where a contact turns unstable, a long step
     stays on the solution that sticks, and estimates no error; `signs` tells. And where the loop
@@ -191,7 +199,7 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
         ca.if_else(ca.logic_or(accept, left <= 0), 0, 1),
     )
     S_next = ca.vertcat(memory, ca.if_else(accept, y_new, y))
-    outputs: Any = [S_next, ca.vertcat(*trial.dense)]
+    outputs: Any = [ca.densify(S_next), ca.densify(ca.vertcat(*trial.dense))]
     if kind is ca.SX:
         outputs = ca.cse(outputs)
     return ca.Function("symfric_step", [S, R], outputs, ["S", "R"], ["S_next", "D"])

@@ -72,6 +72,12 @@ class System:
         return bool((ca.DM(self.mass).full() == np.eye(self.n)).all())
 
     @cached_property
+    def is_semi_explicit(self) -> bool:
+        """Whether the mass matrix is the identity but for zeros on its diagonal."""
+        M = ca.DM(self.mass).full()
+        return bool((M == np.diag(np.diag(M))).all() and np.isin(np.diag(M), (0.0, 1.0)).all())
+
+    @cached_property
     def algebraic(self) -> tuple[list[int], list[int]]:
         """Rows without rates (equations) and columns without rates (unknowns) of M y' = f."""
         pattern = ca.DM(self.mass.sparsity(), 1).full() != 0

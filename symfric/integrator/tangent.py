@@ -24,6 +24,7 @@ Source: Haug, Mech. Based Des. Struct. Mach., 2016-2018 (tangent-space index-0 D
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, final
 
 import casadi as ca
@@ -183,10 +184,11 @@ class _Chart:
         return self.V @ (self.V.T @ x)
 
 
+@lru_cache(maxsize=2)
 def tangent(system: System) -> Tangent | None:
-    """The tangent-space form of a mechanism with constraints; None of any other system."""
+    """The tangent-space form of a mechanism that asks for it; None of any other system."""
     manifold = system.manifold
-    if manifold is None or not manifold.m:
+    if manifold is None or not manifold.charted:
         return None
     rows = _Rows.of(system, manifold)
     constraints = _Constraints.of(system, manifold, rows)
@@ -197,7 +199,7 @@ def tangent(system: System) -> Tangent | None:
     at = ca.vertcat(q, qd, others, ca.vec(chart.V), t)
     inside = ca.vertcat(ca.SX(nv, 1), chart.V.T @ y[n : 2 * n], y[rows.others], y[list(rows.time)])
     w, wd, others, t = _parts(reduced.y, rows)
-    change = ca.vertcat(chart.V @ w, chart.V @ wd, others, ca.SX(len(rows.basis), 1), t)
+    change = ca.vertcat(chart.V @ w, chart.V @ wd, others, ca.SX.zeros(len(rows.basis)), t)
     return Tangent(
         reduced,
         _open(system, rows, constraints, chart),
@@ -322,7 +324,7 @@ def _bend(system: System, data: ca.SX, rows: _Rows, chart: _Chart) -> ca.Functio
     """Cubics through positions and velocities at both ends, normal to the chart."""
     n, h = rows.n, ca.SX.sym("h")
     y0, y1 = system.y, ca.SX.sym("y1", system.n)
-    first, second = ca.SX(system.n, 1), ca.SX(system.n, 1)
+    first, second = ca.SX.zeros(system.n), ca.SX.zeros(system.n)
     a = rows.algebraic.start
     for at, slope in ((0, n), (n, a)):
         rise = y1[at : at + n] - y0[at : at + n]

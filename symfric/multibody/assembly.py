@@ -133,6 +133,7 @@ def assemble(
     p: Variables,
     u: Variables,
     more: tuple[Details, Drawn],
+    index: int,
 ) -> Model:
     """The model of a mechanism.
 
@@ -141,6 +142,7 @@ def assemble(
         labels: names of the multipliers.
         guess: multipliers "lam" and normal forces "N" without friction, at the start.
         more: what writes further results and the sketch.
+        index: 0 or 1, see `Holonomic`.
     """
     contacts = slips(eq, guess["N"].tolist())
     multipliers = tuple(
@@ -182,7 +184,7 @@ def assemble(
         t=eq.kin.t,
         details=lambda: more[0](p_column, put),
         sketch=lambda: more[1](names),
-        holonomic=Holonomic(eq.n, eq.phi, eq.a, ca.vertcat(balance, algebraic)),
+        holonomic=Holonomic(eq.n, eq.phi, eq.a, ca.vertcat(balance, algebraic), index),
     )
 
 

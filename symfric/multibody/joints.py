@@ -2,7 +2,8 @@
 
 A joint connects a frame P on its parent body with a frame C on its child body. Its pose (R_PC,
 p_PC) is a function of the joint coordinates q; its motion subspace (H_w, H_v) gives the relative
-angular velocity w_PC = H_w q' and the velocity p_PC' = H_v q', both in P. The constraints are
+angular velocity w_PC_C = H_w q' in components of C, where Euler parameters have it simplest, and
+the velocity p_PC' = H_v q' in those of P. The constraints are
 expressions of the pose that vanish for every q; they close a loop, where the joint has no
 coordinates. The axis of a joint is z of both frames.
 """
