@@ -102,14 +102,21 @@ def evaluate(function: ca.Function, *arguments: NDArray[np.float64]) -> NDArray[
 
     Five times faster than calling the Function with arrays, which copies each into a matrix.
     """
-    result = np.zeros(function.numel_out(0))
+    return evaluate_all(function, *arguments)[0].ravel(order="F")
+
+
+def evaluate_all(
+    function: ca.Function, *arguments: NDArray[np.float64]
+) -> list[NDArray[np.float64]]:
+    """All outputs of `function`, which must be dense, as matrices; see `evaluate`."""
+    results = [np.zeros(function.size_out(i)[::-1]) for i in range(function.n_out())]
     buffer, call = cast(tuple[Any, Any], function.buffer())
-    for i, argument in enumerate(arguments):
-        if argument.size:
-            buffer.set_arg(i, flat_view(argument))
-    buffer.set_res(0, flat_view(result))
+    for place, arrays in ((buffer.set_arg, arguments), (buffer.set_res, results)):
+        for i, array in enumerate(arrays):
+            if array.size:
+                place(i, flat_view(array))
     call()
-    return result
+    return [result.T for result in results]
 
 
 def flat_view(array: NDArray[np.float64]) -> Any:

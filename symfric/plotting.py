@@ -1,4 +1,4 @@
-"""Pictures of results, labelled with units. The only module that imports Matplotlib."""
+"""Pictures of results, with units. With `symfric.animation` all that imports Matplotlib."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from symfric.files import written
+from symfric.kinds import CONSTRAINTS, is_mechanism, kinds
 from symfric.laws import steady_force
-from symfric.parameters import check_names, parameters
+from symfric.parameters import parameters
 
 if TYPE_CHECKING:
     from symfric.figures import FigureData
@@ -54,21 +55,23 @@ def plot_trajectories(
 
     Args:
         trajectories: legend entry -> trajectory.
-        names: signals to show, a panel each; those that all trajectories share if none is given,
-            then a panel per unit where they are many.
+        names: signals or details to show, a panel each; the signals that all trajectories share
+            if none is given. Where these are many there is a panel per unit; of mechanisms per
+            kind, without multipliers and sliding velocities.
         path: image file.
     """
     first = next(iter(trajectories.values()))
-    shared = [n for n in first.signals if all(n in t.signals for t in trajectories.values())]
-    check_names(f"plot of '{first.scene}'", names, shared)
+    for trajectory in trajectories.values():
+        trajectory.check(names)
+    shared = [n for n in first.units if all(n in t.units for t in trajectories.values())]
     shown = list(names) or shared
     if len(shown) > PANELS and not names:
-        return save(_by_unit(trajectories, shown), path)
+        return save(_grouped(trajectories, shown), path)
     figure, axes = panels(len(shown))
     for axis, name in zip(axes, shown, strict=True):
         for label, trajectory in trajectories.items():
             axis.plot(trajectory.t, trajectory[name], label=label, linewidth=1.2)
-        axis.set_ylabel(f"{name} [{first.units[name]}]")
+        axis.set_ylabel(f"{name} [{first.unit(name)}]")
     axes[0].set_title(first.scene, loc="left")
     if list(trajectories) != [first.scene]:
         axes[0].legend(
@@ -79,25 +82,43 @@ def plot_trajectories(
     return save(figure, path)
 
 
-def _by_unit(trajectories: "Mapping[str, Trajectory]", shown: Sequence[str]) -> Figure:
-    """Many signals: a panel per unit, a colour per signal, a line style per simulation."""
-    first = next(iter(trajectories.values()))
+def _groups(trajectory: "Trajectory", shown: Sequence[str]) -> dict[str, list[str]]:
+    """Panels of many signals: title -> names."""
+    found = {name: "" for name in shown}
+    if is_mechanism(trajectory.model):
+        found = {name: kind for name, kind in kinds(trajectory.model).items() if name in shown}
     groups: dict[str, list[str]] = {}
-    for name in shown:
-        groups.setdefault(first.units[name], []).append(name)
+    for name, kind in found.items():
+        unit = trajectory.units[name]
+        title = f"{kind} [{unit}]" if unit else "[several units]"
+        groups.setdefault(kind if kind == CONSTRAINTS else title.strip(), []).append(name)
+    return groups
+
+
+def _grouped(trajectories: "Mapping[str, Trajectory]", shown: Sequence[str]) -> Figure:
+    """Many signals: a panel per kind, a colour per signal, a line style per simulation."""
+    first = next(iter(trajectories.values()))
+    groups = _groups(first, shown)
     figure, axes = panels(len(groups), width=9.5, height=2.3)
-    for axis, (unit, members) in zip(axes, groups.items(), strict=True):
+    for axis, (title, members) in zip(axes, groups.items(), strict=True):
         for k, name in enumerate(members):
             for style, trajectory in zip(
                 ("-", "--", ":", "-."), trajectories.values(), strict=False
             ):
-                label = name if style == "-" else None
+                label = f"|{name}|" if title == CONSTRAINTS else name
+                label = label if style == "-" else None
+                dots = title == CONSTRAINTS
                 axis.plot(
-                    trajectory.t, trajectory[name], style, color=f"C{k % 10}", label=label,
-                    linewidth=1.1,
+                    trajectory.t, trajectory[name], "." if dots else style, color=f"C{k % 10}",
+                    label=label, linewidth=1.1, markersize=1.5,
                 )  # fmt: skip
-        axis.set_ylabel(f"[{unit}]" if unit else "[several units]")
-        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize="x-small")
+        if title == CONSTRAINTS:
+            axis.set_yscale("log", nonpositive="mask")
+        axis.set_ylabel(title)
+        axis.legend(
+            loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize="x-small",
+            markerscale=4,
+        )  # fmt: skip
     styles = ", ".join(
         f"{label} {style}"
         for label, style in zip(trajectories, ("-", "- -", ":", "- ."), strict=False)

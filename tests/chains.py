@@ -90,7 +90,7 @@ class Solved:
 def solve(eq: Equations, q: Array, qd: Array, rounds: int = 60) -> Solved:
     """Solve the equations of motion with friction laws in the contacts by Newton's method."""
     N = ca.SX.sym("N", len(eq.contacts))
-    forces = [c.friction.law.force(c.slip, N[k]) for k, c in enumerate(eq.contacts)]
+    forces = [c.law.force(c.slip, N[k]) for k, c in enumerate(eq.contacts)]
     unknowns = ca.vertcat(eq.a, eq.lam, N)
     rows = ca.vertcat(eq.balance, eq.phi_ddot, ca.vertcat(ca.SX(0, 1), *eq.normals) - N)
     rows = ca.substitute(rows, eq.F, ca.vertcat(ca.SX(0, 1), *forces))

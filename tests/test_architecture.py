@@ -43,6 +43,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "symfric.animation",  # on request, when a trajectory draws itself
         "symfric.plotting",  # likewise
     },
+    "symfric.kinds": {"symfric.model"},
     "symfric.strokes": {"symfric.sketch"},
     "symfric.animation": {
         "symfric.files",
@@ -56,6 +57,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "symfric.parameters",
         "symfric.figures",  # types only
         "symfric.integrator",  # types only
+        "symfric.kinds",
         "symfric.laws",
     },
     "symfric.figures": {

@@ -4,4 +4,7 @@ from symfric.bench.ensemble import EnsembleRow as EnsembleRow
 from symfric.bench.integrator import Benchmark as Benchmark
 from symfric.bench.integrator import Row as Row
 from symfric.bench.integrator import bench_integrator as bench_integrator
+from symfric.bench.jitter import jitter as jitter
+from symfric.bench.multibody import MultibodyBenchmark as MultibodyBenchmark
+from symfric.bench.multibody import bench_multibody as bench_multibody
 from symfric.bench.sensitivities import SensitivityRow as SensitivityRow

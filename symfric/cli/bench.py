@@ -1,70 +1,107 @@
 """`symfric bench`: run time against error, as ratios measured in one run."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from symfric.cli import output
+from symfric.cli import bench_tables, output
 from symfric.cli.options import JsonOption, PlotOption, check_outputs
 from symfric.parameters import check_names
 
-SUBJECTS = ("integrator",)
+SUBJECTS = ("integrator", "multibody", "jitter")
 
 
 def bench(
-    subject: Annotated[str, typer.Argument(help="What to measure: integrator.")] = "integrator",
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer points, no SciPy.")] = False,
+    subject: Annotated[
+        str, typer.Argument(help=f"What to measure: {', '.join(SUBJECTS)}.")
+    ] = "integrator",
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer points, fewer others.")] = False,
+    links: Annotated[
+        str | None,
+        typer.Option("--links", metavar="N,N,...", help="Lengths of chains; multibody only."),
+    ] = None,
     plot: PlotOption = None,
+    csv: Annotated[
+        Path | None,
+        typer.Option("--csv", metavar="FILE.csv", help="Write the runs; multibody only."),
+    ] = None,
     json: JsonOption = None,
 ) -> None:
     """Measure symfric beside other integrators: time, error and ratios at equal error.
 
-    Example: symfric bench integrator --plot bench.png
+    integrator: stick-slip of one mass, ensembles and derivatives. multibody: mechanisms, the cost
+    of their steps, what they do not need, published numbers. jitter: total variation of
+    accelerations against law, step and transition velocity.
+
+    Example: symfric bench multibody --plot bench.png --csv runs.csv
     """
+    check_names("bench", [subject], SUBJECTS)
+    given = [o for o, value in (("--links", links), ("--csv", csv)) if value is not None]
+    if given and subject != "multibody":
+        raise ValueError(f"bench {subject}: expected no {', '.join(given)}, got one")
+    check_outputs(json, csv, picture=plot)
+    if subject == "integrator":
+        _integrator(quick, plot, json)
+    elif subject == "multibody":
+        _multibody(quick, links, plot, csv, json)
+    else:
+        _jitter(quick, plot, json)
+    output.say_written(plot, csv, json)
+
+
+def _integrator(quick: bool, plot: Path | None, json: str | None) -> None:
     from symfric.bench import bench_integrator  # noqa: PLC0415  (only this command needs it)
 
-    check_names("bench", [subject], SUBJECTS)
-    check_outputs(json, picture=plot)
     with output.progress("measuring") as tell:
         result = bench_integrator(quick=quick, progress=lambda _, fraction: tell(fraction))
     if plot:
         result.plot(plot)
     output.emit_json(result.to_dict(), json)
     if json != "-":
-        output.show_table(
-            ["case", "integrator", "rtol", "error", "time [ms]", "steps"],
-            [
-                [r.case, r.integrator, r.rtol, float(f"{r.error:.2g}"), 1e3 * r.time_s, r.steps]
-                for r in result.rows
-            ],
-            "Time of a run of 20 s against its error",
+        bench_tables.integrator(result)
+
+
+def _multibody(
+    quick: bool, links: str | None, plot: Path | None, csv: Path | None, json: str | None
+) -> None:
+    from symfric.bench import bench_multibody  # noqa: PLC0415  (only this command needs it)
+    from symfric.bench.chains import SIZES  # noqa: PLC0415
+
+    sizes = lengths(links) if links else SIZES
+    with output.progress("measuring") as tell:
+        result = bench_multibody(
+            quick=quick, links=sizes, progress=lambda _, fraction: tell(fraction)
         )
-        output.show_table(
-            ["case", "error", "integrator", "time [ms]", "ratio"],
-            [
-                [r["case"], r["error"], r["integrator"], 1e3 * r["time_s"], round(r["ratio"], 2)]
-                for r in result.to_dict()["ratios"]
-            ],
-            "At equal error, time over that of symfric compiled",
-        )
-        output.show_table(
-            ["case", "members", "threads", "us each", "efficiency", "cvodes"],
-            [
-                [r.case, r.members, r.workers, round(1e6 * r.member_s, 1), round(r.efficiency, 2),
-                 round(r.ratio, 1)]
-                for r in result.ensemble
-            ],
-            "Ensembles; cvodes: time of a Python loop over cvodes at the same rtol over ours",
-        )  # fmt: skip
-        output.show_table(
-            ["case", "integrator", "p", "run [ms]", "forward", "adjoint"],
-            [
-                [r.case, r.integrator, r.parameters, round(1e3 * r.plain_s, 3),
-                 round(r.forward, 1), "failed" if r.adjoint is None else f"{r.adjoint:.1f}"]
-                for r in result.sensitivities
-            ],
-            "Derivatives by p parameters: time of the run with them over that of the run alone",
-        )  # fmt: skip
-        for name, why in result.skipped.items():
-            output.show(f"{name}: not run, {why}")
-    output.say_written(plot, json)
+    if plot:
+        result.plot(plot)
+    if csv:
+        result.write_csv(csv)
+    output.emit_json(result.to_dict(), json)
+    if json != "-":
+        bench_tables.multibody(result)
+
+
+def _jitter(quick: bool, plot: Path | None, json: str | None) -> None:
+    from symfric.bench.jitter import SCALES, jitter, plot_jitter  # noqa: PLC0415
+
+    scales = SCALES[1::2] if quick else SCALES
+    with output.progress("measuring") as tell:
+        data = jitter(scales, progress=lambda _, fraction: tell(fraction))
+    if plot:
+        plot_jitter(data, plot)
+    output.emit_json(data.to_dict(), json)
+    if json != "-":
+        bench_tables.jitter(data)
+
+
+def lengths(text: str) -> tuple[int, ...]:
+    """The numbers of `--links`, increasing.
+
+    Raises:
+        ValueError: something else than positive whole numbers with commas between them.
+    """
+    parts = text.split(",")
+    if not all(part.strip().isdigit() and int(part) > 0 for part in parts):
+        raise ValueError(f"--links: expected positive whole numbers such as 2,4,8, got '{text}'")
+    return tuple(sorted({int(part) for part in parts}))

@@ -8,10 +8,9 @@ import typer
 
 from symfric.cli import output
 from symfric.cli.options import JsonOption, LawOption, SetOption, check_folder, law_with, numbers
-from symfric.cli.run import scenes_with
+from symfric.cli.run import kind_of, scenes_with
 from symfric.codegen import Block, Generated, Verification, generate, plant_block, verify
 from symfric.parameters import check_names, parameters
-from symfric.scenes import ALL_SCENES
 
 REALS = {"double": ("double",), "float": ("float",), "both": ("double", "float")}
 
@@ -22,7 +21,9 @@ def codegen(
     settings: SetOption = None,
     scene: Annotated[
         str | None,
-        typer.Option("--scene", metavar="NAME", help="The plant of this scene with the law."),
+        typer.Option(
+            "--scene", metavar="NAME", help="The plant of this scene, or FILE.urdf, with the law."
+        ),
     ] = None,
     method: Annotated[
         str | None,
@@ -85,7 +86,7 @@ def plant(
     free: list[str] | None,
 ) -> Block:
     """The plant of a scene, whose other parameters are listed as constants."""
-    check_names("--scene", [scene], ALL_SCENES)
+    kind_of(scene, "--scene")
     machine = scenes_with(scene, [law], values)[law]
     block = plant_block(machine.model(free or ()), h=h, method=method or "rodas3", name=name)
     known = {n: float(p.value) for n, p in parameters(machine).items() if n not in (free or ())}

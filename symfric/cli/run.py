@@ -1,5 +1,6 @@
 """`symfric run`: simulate a scene with one friction law, or compare several."""
 
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,12 +22,21 @@ from symfric.cli.options import (
 from symfric.figures.scene import DEFAULT_INPUT, DEFAULT_T_END
 from symfric.integrator import Input
 from symfric.integrator.inputs import Sampled
+from symfric.multibody.urdf import relative
 from symfric.parameters import check_names
-from symfric.scenes import ALL_SCENES, Scene
+from symfric.scenes import ALL_SCENES, Robot, Scene
+
+ROBOT_T_END = 2.0
+"""Time [s] that shows how a robot moves."""
 
 
 def run(
-    scene: Annotated[str, typer.Argument(metavar="SCENE", help=f"One of {', '.join(ALL_SCENES)}.")],
+    scene: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENE", help=f"One of {', '.join(ALL_SCENES)}, or a robot's FILE.urdf."
+        ),
+    ],
     law: Annotated[
         list[str],
         typer.Option("--law", metavar="NAME", help="Friction law; repeat it to compare several."),
@@ -70,11 +80,15 @@ def run(
 ) -> None:
     """Simulate SCENE with a friction law.
 
-    --set takes parameters of the scene and of the law.
+    --set takes parameters of the scene and of the law. In a robot, the law breaks away at the
+    friction tag of each joint (--set level=0.5 for joints without one): its coefficients are
+    relative to the largest.
 
     Example: symfric run rabinowicz --law lugre --set mu_s=0.2 --plot stick_slip.png
+
+    Example: symfric run arm.urdf --law lugre --x0 elbow=0.3 --input tau_elbow=2 --out arm.csv
     """
-    check_names("scene", [scene], ALL_SCENES)
+    kind_of(scene)
     if len(law) > 1 and (out or json):
         raise ValueError(
             f"--out and --json: expected one --law, got {len(law)}; compare several with --plot"
@@ -116,6 +130,18 @@ def run(
             raise SolveError(trajectory.message, trajectory.status, trajectory)
 
 
+def kind_of(scene: str, where: str = "scene") -> Callable[[Law], Scene]:
+    """What makes the scene of a law: a scene by its name, or the robot of a URDF file.
+
+    Raises:
+        ValueError: neither.
+    """
+    if scene.endswith(".urdf"):
+        return lambda law: Robot(relative(law), scene)
+    check_names(where, [scene], ALL_SCENES)
+    return ALL_SCENES[scene]
+
+
 def scenes_with(scene: str, laws: list[str], values: dict[str, float]) -> dict[str, Scene]:
     """The scene with each of the laws by name, parameters set wherever they occur.
 
@@ -124,7 +150,8 @@ def scenes_with(scene: str, laws: list[str], values: dict[str, float]) -> dict[s
     """
     if len(set(laws)) != len(laws):
         raise ValueError(f"--law: expected every law once, got {', '.join(laws)}")
-    machines = {text: ALL_SCENES[scene](law_from_text(text)) for text in laws}
+    kind = kind_of(scene)
+    machines = {text: kind(law_from_text(text)) for text in laws}
     known = {text: parameters(machine) for text, machine in machines.items()}
     check_names(f"--set of {scene}", values, {n: None for names in known.values() for n in names})
     return {
@@ -146,7 +173,7 @@ def _inputs(scene: str, texts: list[str] | None) -> tuple[dict[str, Input], dict
 def _default_t_end(scene: str, signals: dict[str, Input]) -> float:
     """The last sample of the inputs, else what shows the scene."""
     ends = [float(np.max(s.t)) for s in signals.values() if isinstance(s, Sampled)]
-    return max(ends, default=DEFAULT_T_END[scene])
+    return max(ends, default=DEFAULT_T_END.get(scene, ROBOT_T_END))
 
 
 def to_dict(law: str, scene: Scene, trajectory: Trajectory) -> dict[str, Any]:

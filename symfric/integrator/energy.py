@@ -44,10 +44,10 @@ class EnergyBalance:
 
         defect(t) = E(t) - E(0) - W(t),   W the sum of all work
 
-    W is the integral of the powers over the dense output, independent of the integrator's error
-    control, so that the defect shows the error of the simulation: it falls with the tolerance and
-    has, between steps, the order of the dense output. A power that does not belong to the motion
-    shows in it. Energy that an event's reset takes at once counts as defect.
+    W is the integral of the powers over the dense output, which error control does not see, so
+    that the defect shows the error of the simulation. It falls with the step as the method does,
+    with order 5 (rodas5p, radau5), 4 (rodas4p) or 3 (rodas3), and is up to a hundred times larger
+    inside the steps than at their ends. Energy that an event's reset takes at once is defect.
 
     Attributes:
         t: times [s], shape (n,).

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from symfric.integrator.columns import Columns
 from symfric.integrator.manifold import Manifold, jammed
 from symfric.integrator.system import System
-from symfric.numeric import evaluate
+from symfric.numeric import evaluate, evaluate_all
 
 Array = NDArray[np.float64]
 ITERATIONS = 50
@@ -66,7 +66,7 @@ def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array
         return y
     y, last = y.copy(), np.inf
     for _ in range(ITERATIONS):
-        step = _newton_step(system, y, d)
+        step, residual = _newton_step(system, y, d)
         size = float(np.max(np.abs(step) / (np.abs(y[columns]) + 1e-14)))
         if not np.isfinite(size):
             break
@@ -74,7 +74,9 @@ def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array
             y[columns] -= step
             if size < CONVERGED or size > last / 2:  # no longer quadratic: rounding
                 return y
-        elif not _descend(system, y, d, step):
+        elif not _descend(system, y, d, step, residual):
+            if np.abs(step).max() < CONVERGED * np.abs(y[columns]).max():
+                return y  # what is left of an unknown that is zero is rounding
             break
         last = size
     names = ", ".join(system.names[i] for i in columns)
@@ -156,19 +158,20 @@ def _assembled(
     )
 
 
-def _newton_step(system: System | Equations, y: Array, d: Array) -> Array:
-    """Full step of Newton's method, NaN where the derivatives are singular."""
-    g, J = (m.full() for m in system.constraints.call([y, d]))
+def _newton_step(system: System | Equations, y: Array, d: Array) -> tuple[Array, float]:
+    """Full step of Newton's method, NaN where the derivatives are singular, and the residual."""
+    g, J = evaluate_all(system.constraints, y, d)
+    residual = float(np.linalg.norm(g))
     try:
-        return np.linalg.solve(J, g[:, 0])
+        return np.linalg.solve(J, g[:, 0]).astype(float), residual
     except np.linalg.LinAlgError:
-        return np.full(g.shape[0], np.nan)
+        return np.full(g.shape[0], np.nan), residual
 
 
-def _descend(system: System | Equations, y: Array, d: Array, step: Array) -> bool:
+def _descend(system: System | Equations, y: Array, d: Array, step: Array, before: float) -> bool:
     """Go along `step`, in place, as far as the residual shrinks; whether it does at all."""
     columns = system.algebraic[1]
-    before, start = _residual(system, y, d), y[columns].copy()
+    start = y[columns].copy()
     for part in 0.5 ** np.arange(12):
         y[columns] = start - part * step
         if _residual(system, y, d) < before:
@@ -177,7 +180,7 @@ def _descend(system: System | Equations, y: Array, d: Array, step: Array) -> boo
 
 
 def _residual(system: System | Equations, y: Array, d: Array) -> float:
-    return float(np.linalg.norm(system.constraints(y, d)[0].full()))
+    return float(np.linalg.norm(evaluate(system.constraints, y, d)))
 
 
 def first_step(span: float) -> float:

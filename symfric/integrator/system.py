@@ -87,12 +87,11 @@ class System:
 
     @cached_property
     def constraints(self) -> ca.Function:
-        """(y, d) -> algebraic equations, and their derivatives by the algebraic unknowns."""
+        """(y, d) -> algebraic equations, and their derivatives by the algebraic unknowns; dense."""
         rows, columns = self.algebraic
         g = self.f[rows]
-        return ca.Function(
-            "constraints", [self.y, self.d], [g, ca.jacobian(g, self.y[columns])], {"cse": True}
-        )
+        both = [ca.densify(g), ca.densify(ca.jacobian(g, self.y[columns]))]
+        return ca.Function("constraints", [self.y, self.d], both, {"cse": True})
 
 
 def system(model: Model, inputs: Drivers) -> System:

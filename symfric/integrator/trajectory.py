@@ -161,16 +161,15 @@ class Trajectory:
             return self.t
         if name not in self.units:
             self.check([name])
-            if name not in self._found:
-                self._found[name] = self.of(self.model.expression(name))
-            return self._found[name]
+            return self._further[name]
         states = self._own_states
         return states[name] if name in states else self.signals[name]
 
     @cached_property
-    def _found(self) -> dict[str, Array]:
-        """Details that have been asked for."""
-        return {}
+    def _further(self) -> dict[str, Array]:
+        """All details at `t`; one by one they would cost almost as much each."""
+        column = ca.vertcat(*(o.expression for o in self.model.further.values()), 0)
+        return dict(zip(self.model.further, self.of(column), strict=False))
 
     @cached_property
     def details(self) -> dict[str, str]:

@@ -17,6 +17,7 @@ import casadi as ca
 import numpy as np
 
 from symfric.laws import Law
+from symfric.laws.planar import Spatial
 from symfric.model import Event, Holonomic, Model, Monitor, Output, Variables
 from symfric.multibody.body import GROUND
 from symfric.multibody.equations import Equations
@@ -44,7 +45,7 @@ class Slip:
         N: normal force as the law gets it.
         normal: the expression of it in terms of accelerations and multipliers.
         states, rate: of the law.
-        force: friction force [N].
+        force: friction force [N], of a ball a vector.
     """
 
     contact: Contact
@@ -102,16 +103,19 @@ def slips(eq: Equations, normal_at_start: Sequence[float]) -> tuple[Slip, ...]:
     found: list[Slip] = []
     unknowns: dict[str, Variable] = {}
     for contact, normal, start in zip(eq.contacts, eq.normals, normal_at_start, strict=True):
-        law, joint = contact.friction.law, contact.joint
+        law, pressed = contact.law, contact.pressed
         unknown: Variables = ()
         pressing = normal
-        if ca.depends_on(normal, ca.vertcat(eq.a, eq.lam, eq.F)) and depends_on_load(law):
-            if joint not in unknowns:
+        if ca.depends_on(normal, ca.vertcat(eq.a, eq.lam, eq.F)) and depends_on_load(
+            contact.friction.law
+        ):
+            if pressed not in unknowns:
                 scale = max(1.0, abs(start))
-                doc = f"normal force of joint '{joint}' with {type(law).__name__}"
-                made = Variable(f"{joint}_N", "N", start=start, nominal=scale, doc=doc)
-                unknowns[joint], unknown = made, (made,)
-            pressing = unknowns[joint].symbol
+                kind = type(contact.friction.law).__name__
+                doc = f"normal force of joint '{contact.joint}' with {kind}"
+                made = Variable(f"{pressed}_N", "N", start=start, nominal=scale, doc=doc)
+                unknowns[pressed], unknown = made, (made,)
+            pressing = unknowns[pressed].symbol
         begin = ca.SX(law.steady_state(contact.slip, start))
         states = tuple(
             Variable(f"{contact.name}_{s.name}", s.unit, start=begin[i], nominal=s.nominal)
@@ -179,7 +183,7 @@ def assemble(
         ode=ca.vertcat(qd_column, acceleration, rates),
         alg=ca.substitute(algebraic, eq.a, acceleration),
         outputs=_outputs(eq, contacts, put),
-        monitors=tuple(Monitor(s.contact.slip, x) for s, x in scales),
+        monitors=tuple(Monitor(v, x) for s, x in scales for v in ca.vertsplit(s.contact.slip)),
         events=tuple(e for s in contacts for e in _switches(s, qd)),
         t=eq.kin.t,
         details=lambda: more[0](p_column, put),
@@ -209,8 +213,17 @@ def _switches(slip: Slip, qd: Variables) -> tuple[Event, ...]:
             reset={f"{contact.name}_{state}": value for state, value in s.reset.items()}
             | (rest if s.halts else {}),
         )
-        for s in contact.friction.law.switches(contact.slip, slip.N, z)
+        for s in contact.law.switches(contact.slip, slip.N, z)
     )
+
+
+def _sizes(slip: Slip) -> tuple[ca.SX, ca.SX]:
+    """Sliding velocity and friction force; their smooth sizes where they are vectors."""
+    law = slip.contact.law
+    if not isinstance(law, Spatial):
+        return slip.contact.slip, slip.force
+    speed = ca.sqrt(ca.sumsqr(slip.contact.slip) + law.v_eps**2)
+    return speed, slip.contact.friction.magnitude(*ca.vertsplit(slip.force))
 
 
 def _outputs(eq: Equations, contacts: Sequence[Slip], put: Put) -> dict[str, Output]:
@@ -221,10 +234,11 @@ def _outputs(eq: Equations, contacts: Sequence[Slip], put: Put) -> dict[str, Out
     for slip, normal in zip(contacts, expressions, strict=False):
         contact, name = slip.contact, slip.contact.name
         if slip.N is slip.normal:
-            found[f"{contact.joint}_N"] = Output(normal, "N", "normal force")
-        found[f"{name}_slip"] = Output(contact.slip, "m/s", "sliding velocity")
-        found[f"{name}_friction"] = Output(slip.force, "N", "friction force opposing the slip")
-        power = slip.force * contact.slip
+            found[f"{contact.pressed}_N"] = Output(normal, "N", "normal force")
+        speed, size = _sizes(slip)
+        found[f"{name}_slip"] = Output(speed, "m/s", "sliding velocity, of a ball its size")
+        found[f"{name}_friction"] = Output(size, "N", "friction force opposing the slip")
+        power = ca.dot(slip.force, contact.slip)
         found[f"{name}_power"] = Output(power, "W", "power taken by friction")
     found["kinetic"] = Output(eq.kinetic, "J", "kinetic energy")
     found["potential"] = Output(eq.potential, "J", "potential energy")

@@ -90,7 +90,7 @@ def numbers(bodies: Sequence[Body], joints: Sequence[Joint], p: ca.SX, v: ca.DM)
             if bad:
                 yield f"joint '{joint.name}' > {what}: expected finite numbers, got {bad[0]!r}"
         if joint.friction is not None:
-            for text in joint.friction.problems(joint.slides, joint.turns):
+            for text in joint.friction.problems(joint.rubs):
                 yield f"joint '{joint.name}' > friction: {text}"
 
 

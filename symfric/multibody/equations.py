@@ -6,6 +6,7 @@ from typing import final
 
 import casadi as ca
 
+from symfric.laws.planar import Spatial
 from symfric.multibody.constraints import Constraint, Held
 from symfric.multibody.dynamics import (
     Loop,
@@ -19,7 +20,7 @@ from symfric.multibody.forces import Axial, Force, Load
 from symfric.multibody.friction import Contact
 from symfric.multibody.joints import Joint
 from symfric.multibody.kinematics import Kinematics, kinematics
-from symfric.multibody.topology import Topology
+from symfric.multibody.topology import Topology, body_of, frame_at
 
 
 @final
@@ -121,7 +122,7 @@ def equations(
         every[row] = lam[k]
     contacts = tuple(_contacts(kin, joints))
     loads: list[Load | Axial] = [load for f in forces for load in f.loads(kin, by_name)]
-    loads += [Axial(by_name[c.joint], c.direction, c.load) for c in contacts]
+    loads += [load for c in contacts for load in _rubbing(kin, by_name[c.joint], c)]
     power = _power(kin, loads) + ca.dot(every, ca.jacobian(phi, t))
     loads += _holding(held, every[sum(loop.phi.numel() for loop in closed) :, 0])
     rows, world = balance(kin, loads, closed, every)
@@ -145,7 +146,7 @@ def equations(
         ca.jtimes(phi, q, a) + ca.jtimes(phi_dot, q, qd) + ca.jacobian(phi_dot, t),
         ca.densify(rows),
         contacts,
-        tuple(_normal(c, by_name[c.joint], reactions) for c in contacts),
+        tuple(_normal(kin, c, by_name[c.joint], reactions) for c in contacts),
         kinetic_energy(kin),
         sum((f.energy(kin, by_name) for f in forces), ca.SX(0)),
         power,
@@ -187,20 +188,38 @@ def _contacts(kin: Kinematics, joints: Sequence[Joint]) -> list[Contact]:
     for joint in joints:
         if joint.friction is None:
             continue
-        directions = [d for d, has in (("slide", joint.slides), ("turn", joint.turns)) if has]
-        for direction in directions:
-            name = joint.name if len(directions) == 1 else f"{joint.name}_{direction}"
-            slip = kin.along(joint, direction)[1]
-            if direction == "turn":
-                slip = joint.friction.arm * slip
-            symbol = ca.SX.sym(f"{name}_friction")
-            found.append(Contact(name, joint.name, direction, joint.friction, slip, symbol))
+        friction = joint.friction
+        for direction in joint.rubs:
+            name = joint.name if len(joint.rubs) == 1 else f"{joint.name}_{direction}"
+            rate = kin.spin(joint) if direction == "ball" else kin.along(joint, direction)[1]
+            slip = rate if direction == "slide" else friction.arm * rate
+            law = Spatial(friction.law) if direction == "ball" else friction.law
+            pressed = name if direction in ("x", "y") else joint.name
+            F = ca.SX.sym(f"{name}_friction", slip.numel())
+            found.append(Contact(name, joint.name, direction, friction, law, pressed, slip, F))
     return found
 
 
-def _normal(contact: Contact, joint: Joint, reactions: dict[str, Wrench]) -> ca.SX:
+def _rubbing(kin: Kinematics, joint: Joint, contact: Contact) -> list[Load | Axial]:
+    """Friction on the child of a joint, and on the parent."""
+    if contact.direction != "ball":
+        return [Axial(joint, contact.direction, contact.load)]
+    parent, child = body_of(joint.parent), body_of(joint.child)
+    R_WP = kin.motion[parent].R @ frame_at(kin.topology.bodies, joint.parent).R
+    moment, none = R_WP @ contact.load, ca.SX(3, 1)
+    return [
+        Load(body, none, kin.motion[body].p, sign * moment, none)
+        for body, sign in ((child, 1), (parent, -1))
+    ]
+
+
+def _normal(kin: Kinematics, contact: Contact, joint: Joint, reactions: dict[str, Wrench]) -> ca.SX:
+    """Normal force of a contact [N]."""
     F, T = reactions[joint.name]
-    return contact.friction.normal_force(joint.slides, joint.turns, F, T)
+    if contact.direction not in ("x", "y"):
+        return contact.friction.normal_force(joint.rubs, F, T)
+    R = joint.bearing(contact.direction, kin.rotation(joint))
+    return contact.friction.normal_force(("turn",), R @ F, R @ T)
 
 
 def _power(kin: Kinematics, loads: Sequence[Load | Axial]) -> ca.SX:

@@ -8,12 +8,16 @@ child's frame, presses the bearing at two stations a apart on z:
     cylindrical: N = |f_1| + |f_2|
     revolute:    N = |f_1| + |f_2| + |F_z|                   (thrust face)
     prismatic:   N = |f_x1 + T_z/b| + |f_y1| + |f_x2| + |f_y2| + |T_z/b|    (guide of width b)
+    universal:   of each of its two axes as a revolute joint; the cross between them is massless
+    spherical:   N = |F|
 
-Friction opposes sliding with -F(v, N) along z, and with the moment -R F(R w, N) about it.
+Friction opposes sliding with -F(v, N) along z, and with the moment -R F(R w, N) about it. The ball
+of a spherical joint slips with v = R w, a vector in the axes of the socket, the parent's frame: the
+moment is -R F(v, N), with F along v for laws without states and bristles that are vectors.
 Source: Haug, Mech. Based Des. Struct. Mach., 2018, joint friction from multipliers.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import final
 
@@ -21,6 +25,7 @@ import casadi as ca
 
 from symfric.laws import Law
 from symfric.laws.base import check_law
+from symfric.laws.planar import Spatial, is_isotropic
 from symfric.numeric import Scalar, is_number, is_symbolic
 
 
@@ -51,17 +56,23 @@ class JointFriction:
     def __post_init__(self) -> None:
         check_law("friction", self.law)
 
-    def problems(self, slides: bool, turns: bool) -> Iterator[str]:
-        """What is wrong for a joint that slides along or turns about z."""
-        if not (slides or turns):
-            yield "expected a revolute, prismatic or cylindrical joint"
+    def problems(self, rubs: Sequence[str]) -> Iterator[str]:
+        """What is wrong for a joint in which friction acts in the directions `rubs`."""
+        if not rubs:
+            yield "expected a revolute, prismatic, cylindrical, universal or spherical joint"
         if self.law.inputs:
             needs = ", ".join(i.name for i in self.law.inputs)
             yield (
                 f"law: expected one that needs v and N alone, got {type(self.law).__name__}, which "
                 f"needs {needs}; a joint has no such input"
             )
-        if turns and self.radius is None:
+        elif "ball" in rubs and not is_isotropic(self.law):
+            yield (
+                "law: expected an odd one that is affine in its states, got "
+                f"{type(self.law).__name__}; a ball slips in any direction, and only such a law "
+                "says what others in line with it do; LuGre and all laws without states serve"
+            )
+        if any(direction != "slide" for direction in rubs) and self.radius is None:
             yield "radius: expected the bearing's radius [m], got none"
         limits = {
             "radius": (self.radius, True), "length": (self.length, True),
@@ -91,17 +102,22 @@ class JointFriction:
         fx2, fy2 = -T[1] / self.length, T[0] / self.length
         return -F[0] - fx2, -F[1] - fy2, fx2, fy2
 
-    def normal_force(self, slides: bool, turns: bool, F: ca.SX, T: ca.SX) -> ca.SX:
-        """Sum of the bearing forces under the reaction F, T in the child's frame [N]."""
+    def normal_force(self, rubs: Sequence[str], F: ca.SX, T: ca.SX) -> ca.SX:
+        """Sum of the bearing forces [N] under the reaction F, T.
+
+        Components are those of the child's frame, of a universal joint those of the bearing.
+        """
         if self.normal is not None:
             return ca.SX(self.normal)
         fx1, fy1, fx2, fy2 = self.stations(F, T)
-        f3 = ca.SX(0) if turns or self.width is None else T[2] / self.width
         forces: list[tuple[ca.SX, ...]]
-        if turns:
-            thrust = ca.SX(0) if slides else F[2]
+        if "ball" in rubs:
+            forces = [(F[0], F[1], F[2])]
+        elif rubs != ("slide",):
+            thrust = ca.SX(0) if "slide" in rubs else F[2]
             forces = [(fx1, fy1), (fx2, fy2), (thrust,)]
         else:
+            f3 = ca.SX(0) if self.width is None else T[2] / self.width
             forces = [(fx1 + f3,), (fy1,), (fx2,), (fy2,), (f3,)]
         pressing = [f for f in forces if not ca.vertcat(*f).is_zero()]
         return sum((self.magnitude(*f) for f in pressing), start=ca.SX(self.preload))
@@ -110,25 +126,29 @@ class JointFriction:
 @final
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Friction of a joint in one direction: along z ("slide") or about z ("turn").
+    """Friction of a joint in one of the directions in which it rubs.
 
     Attributes:
         name: of its results.
         joint: the joint it belongs to.
-        direction: "slide" or "turn".
+        direction: "slide", "turn", "x", "y" or "ball".
         friction: law and geometry.
-        slip: sliding velocity [m/s].
-        F: symbol of the friction force [N].
+        law: the law, for a ball in its form for vectors.
+        pressed: what its normal force is called; directions of one bearing share it.
+        slip: sliding velocity [m/s], shape (1, 1), of a ball (3, 1).
+        F: symbols of the friction force [N], of the same shape.
     """
 
     name: str
     joint: str
     direction: str
     friction: JointFriction
+    law: Law | Spatial
+    pressed: str
     slip: ca.SX
     F: ca.SX
 
     @property
     def load(self) -> ca.SX:
-        """Force [N] along z or moment [N m] about z on the child."""
+        """Force [N] along or moment [N m] about its axis on the child; of a ball a vector."""
         return -self.F if self.direction == "slide" else -self.friction.arm * self.F

@@ -61,10 +61,8 @@ class Joint(ABC):
     """Number of constraints; the spanning tree keeps the joints with most."""
     closes: ClassVar[bool] = False
     """Whether it can only close loops, having no coordinates of its own."""
-    slides: ClassVar[bool] = False
-    """Whether friction acts along z."""
-    turns: ClassVar[bool] = False
-    """Whether friction acts about z."""
+    rubs: ClassVar[tuple[str, ...]] = ()
+    """Directions in which friction acts; "ball" is that of a ball in its socket."""
     directions: ClassVar[Mapping[str, int]] = {}
     """Where forces and motions may be prescribed: "slide", "turn", ... -> joint coordinate."""
     quaternion: ClassVar[int | None] = None
@@ -96,6 +94,10 @@ class Joint(ABC):
     def axis(self, direction: str, R: ca.SX) -> ca.SX:
         """Axis of a direction in P, shape (3, 1)."""
         return _unit("xyz".index(direction) if direction in "xyz" else 2)
+
+    def bearing(self, direction: str, R: ca.SX) -> ca.SX:
+        """Turns components in C into those of the bearing, whose own axis is the last."""
+        return ca.SX.eye(3)
 
     def displacement(self, direction: str, R: ca.SX, p: ca.SX) -> ca.SX:
         """The coordinate of a direction at a pose; an angle between -pi and pi."""
@@ -134,7 +136,7 @@ class Revolute(Joint):
 
     coordinates: ClassVar[tuple[tuple[str, str], ...]] = (ANGLE,)
     constrains: ClassVar[int] = 5
-    turns: ClassVar[bool] = True
+    rubs: ClassVar[tuple[str, ...]] = ("turn",)
     directions: ClassVar[Mapping[str, int]] = {"turn": 0}
 
     def pose(self, q: ca.SX) -> Pair:
@@ -157,7 +159,7 @@ class Prismatic(Joint):
 
     coordinates: ClassVar[tuple[tuple[str, str], ...]] = (LENGTH,)
     constrains: ClassVar[int] = 5
-    slides: ClassVar[bool] = True
+    rubs: ClassVar[tuple[str, ...]] = ("slide",)
     directions: ClassVar[Mapping[str, int]] = {"slide": 0}
 
     def pose(self, q: ca.SX) -> Pair:
@@ -180,8 +182,7 @@ class Cylindrical(Joint):
 
     coordinates: ClassVar[tuple[tuple[str, str], ...]] = (("slide", "m"), ("angle", "rad"))
     constrains: ClassVar[int] = 4
-    slides: ClassVar[bool] = True
-    turns: ClassVar[bool] = True
+    rubs: ClassVar[tuple[str, ...]] = ("slide", "turn")
     directions: ClassVar[Mapping[str, int]] = {"slide": 0, "turn": 1}
 
     def pose(self, q: ca.SX) -> Pair:
@@ -204,6 +205,7 @@ class Spherical(Joint):
 
     coordinates: ClassVar[tuple[tuple[str, str], ...]] = EULER
     constrains: ClassVar[int] = 3
+    rubs: ClassVar[tuple[str, ...]] = ("ball",)
     quaternion: ClassVar[int | None] = 0
 
     def pose(self, q: ca.SX) -> Pair:
@@ -226,6 +228,7 @@ class Universal(Joint):
 
     coordinates: ClassVar[tuple[tuple[str, str], ...]] = (("x", "rad"), ("y", "rad"))
     constrains: ClassVar[int] = 4
+    rubs: ClassVar[tuple[str, ...]] = ("x", "y")
     directions: ClassVar[Mapping[str, int]] = {"x": 0, "y": 1}
 
     def pose(self, q: ca.SX) -> Pair:
@@ -244,6 +247,10 @@ class Universal(Joint):
     def axis(self, direction: str, R: ca.SX) -> ca.SX:
         """The parent's x, the child's y."""
         return _unit(0) if direction == "x" else R[:, 1]
+
+    def bearing(self, direction: str, R: ca.SX) -> ca.SX:
+        """One on the parent's x, one on the child's y; a massless cross between them."""
+        return R[[1, 2, 0], :] if direction == "x" else ca.SX.eye(3)[[2, 0, 1], :]
 
     def displacement(self, direction: str, R: ca.SX, p: ca.SX) -> ca.SX:
         """Angle about the parent's x, angle about the child's y."""
@@ -343,7 +350,7 @@ class Closing(Joint):
 class Distance(Closing):
     """A massless rod with ball joints at both ends: (d'd - length^2) / 2 = 0; 1 constraint.
 
-    Its multiplier [N/m] times the length is the force in the rod, positive under pressure.
+    Its multiplier [N/m] times the length is the force in the rod, positive under tension.
     """
 
     constrains: ClassVar[int] = 1

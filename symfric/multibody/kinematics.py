@@ -110,6 +110,18 @@ class Kinematics:
             p_WC,
         )
 
+    def rotation(self, joint: Joint) -> ca.SX:
+        """R_PC of a joint."""
+        link = self.topology.link_of.get(joint.name)
+        return self.relative(joint).R if link is None else joint.pose(self.q[link.rows, 0])[0]
+
+    def spin(self, joint: Joint) -> ca.SX:
+        """Relative angular velocity w_PC of a joint, in the parent's components."""
+        link = self.topology.link_of.get(joint.name)
+        if link is None:
+            return self.relative(joint).w
+        return joint.subspace(self.q[link.rows, 0])[0] @ self.qd[link.rows, 0]
+
     def along(self, joint: Joint, direction: str) -> tuple[ca.SX, ca.SX]:
         """Displacement or angle of a joint in one of its `directions`, and its rate.
 

@@ -1,6 +1,7 @@
 """Results of a mechanism that are written only when somebody asks for one of them.
 
     joint_Fx ... joint_Mz   what a joint's constraints transmit to its child
+    rod_tension             force in a massless rod, negative under pressure
     body_x ... body_vz      position and velocity of a centre of mass in the world
     force_work_rate         power that a force which is not conservative puts into the bodies
     friction_work_rate      the same of friction in all joints, at most zero
@@ -96,6 +97,10 @@ def _reactions(eq: Equations, joints: Sequence[Joint]) -> Iterator[tuple[str, Ou
             value = column[COMPONENTS.index(component)]
             doc = f"{what} of joint '{joint.name}' on its child along {component[1]} of its frame"
             yield f"{joint.name}_{component}", Output(value, unit, doc)
+        if isinstance(joint, Distance):
+            relative = eq.kin.relative(joint)
+            along = ca.dot(relative.R @ column[:3], relative.p)
+            yield f"{joint.name}_tension", Output(-along / joint.length, "N", "force in the rod")
 
 
 def _centres(eq: Equations) -> Iterator[tuple[str, Output]]:
@@ -136,7 +141,7 @@ def _work(
             power += ca.jtimes(energy, kin.q, kin.qd)
         yield f"{force.name}_work_rate", Output(power, "W", f"power put in by '{force.name}'")
     if eq.contacts:
-        taken = sum((-c.F * c.slip for c in eq.contacts), ca.SX(0))
+        taken = sum((-ca.dot(c.F, c.slip) for c in eq.contacts), ca.SX(0))
         yield "friction_work_rate", Output(taken, "W", "power put in by friction, at most zero")
     if eq.m and not eq.phi_t.is_zero():
         drive = ca.dot(eq.lam, eq.phi_t)

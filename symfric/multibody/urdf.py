@@ -18,7 +18,7 @@ from symfric.multibody.joints import Free, Joint, Planar, Prismatic, Revolute
 from symfric.multibody.mechanism import Mechanism
 from symfric.multibody.spatial import Vector
 from symfric.multibody.urdf_file import Array, Inertial, Urdf, UrdfJoint, parse
-from symfric.numeric import is_number
+from symfric.numeric import Scalar, equals, is_number
 from symfric.parameters import check_names, parameters, with_values
 
 KINDS: dict[str, type[Joint]] = {
@@ -36,6 +36,7 @@ def read_urdf(
     source: str | Path,
     *,
     law: Law | None = None,
+    level: Scalar = 0.0,
     bearings: Mapping[str, JointFriction] | None = None,
     floating: bool = False,
     gravity: Vector = (0.0, 0.0, -9.81),
@@ -56,6 +57,7 @@ def read_urdf(
         source: path of the file, or its text.
         law: instead of Coulomb; its normal force is f, so with mu_d = 1 it slides at the file's
             level (`relative` scales a law so).
+        level: f of the joints whose tag has none [N m, N].
         bearings: joint name -> friction, instead of what the file says of this joint.
         floating: whether the root link moves freely (joint `floating_base`); otherwise it is the
             ground, whatever it weighs. A massless root always is.
@@ -89,10 +91,10 @@ def read_urdf(
         m.joint(Free(FLOATING, GROUND, names.links[urdf.root]))
     left = list(urdf.left_out)
     for joint in moved:
-        friction = (bearings or {}).get(joint.name) or tag_friction(joint, law)
+        friction = (bearings or {}).get(joint.name) or tag_friction(joint, law, level)
         left += _hang(m, joint, names, carried, friction, urdf.zero(joint))
     _couple(m, moved, names)
-    if law is not None and not any(joint.friction for joint in moved):
+    if law is not None and equals(level, 0.0) and not any(joint.friction for joint in moved):
         left.append(f"{type(law).__name__}, because no joint has <dynamics friction>")
     changes = [f"{old} to {new}" for old, new in names.changed.items()]
     texts = [("left out", left), ("names changed", changes)]
@@ -102,19 +104,20 @@ def read_urdf(
     return m
 
 
-def tag_friction(joint: UrdfJoint, law: Law | None = None) -> JointFriction | None:
+def tag_friction(
+    joint: UrdfJoint, law: Law | None = None, level: Scalar = 0.0
+) -> JointFriction | None:
     """The friction of `<dynamics damping friction>`, as `read_urdf` says; None without it."""
     laws: list[Law] = []
-    if joint.friction > 0:
+    normal = joint.friction or level
+    if not equals(normal, 0.0):
         laws.append(Coulomb(mu_d=1.0) if law is None else law)
-    if joint.damping > 0:
+    if joint.damping:
         laws.append(Viscous(sigma_2=joint.damping))
     if not laws or joint.kind in ("planar", "floating"):
         return None
     whole = laws[0] if len(laws) == 1 else Sum(tuple(laws))
-    return JointFriction(
-        whole, radius=None if joint.kind == "prismatic" else 1.0, normal=joint.friction
-    )
+    return JointFriction(whole, radius=None if joint.kind == "prismatic" else 1.0, normal=normal)
 
 
 def relative(law: Law) -> Law:
@@ -261,10 +264,10 @@ def _hang(
     m.frame(ends[0], _plain(p), _plain(R @ z), _plain(R @ x))
     m.frame(ends[1], (0.0, 0.0, 0.0), _plain(z), _plain(x))
     kind = KINDS[joint.kind]
-    single = bool(kind.turns or kind.slides)
+    single = len(kind.directions) == 1
     m.joint(kind(name, *ends, start=start if single else None, friction=friction))
     if single and joint.mimic is None:
-        torque = m.input(f"tau_{name}", "N m" if kind.turns else "N")
+        torque = m.input(f"tau_{name}", "N m" if "turn" in kind.directions else "N")
         motor = JointSpringDamper(f"motor_{name}", name, _direction(kind), actuator=torque)
         m.force(motor)
     elif not single and (joint.damping or joint.friction):
@@ -272,7 +275,7 @@ def _hang(
 
 
 def _direction(kind: type[Joint]) -> str:
-    return "turn" if kind.turns else "slide"
+    return "turn" if "turn" in kind.directions else "slide"
 
 
 def _couple(m: Mechanism, moved: Iterable[UrdfJoint], names: _Names) -> None:

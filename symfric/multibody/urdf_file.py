@@ -7,6 +7,7 @@ from itertools import pairwise
 from math import cos, isfinite, sin
 from pathlib import Path
 from typing import final
+from xml.parsers import expat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,10 +126,10 @@ def parse(source: str | Path) -> Urdf:
     """
     is_text = isinstance(source, str) and source.lstrip().startswith("<")
     where = "urdf" if is_text else f"urdf '{source}'"
-    content = source.strip() if is_text else Path(source).read_bytes()  # type: ignore[union-attr]
+    content = str(source).strip().encode() if is_text else Path(source).read_bytes()
     try:
-        robot = ET.fromstring(content)
-    except ET.ParseError as error:
+        robot = _tags(content, "utf-8" if is_text else None)
+    except expat.ExpatError as error:
         raise ValueError(f"{where}: expected XML, got {error}") from None
     if robot.tag != "robot":
         raise ValueError(f"{where}: expected <robot> as its outermost tag, got <{robot.tag}>")
@@ -149,6 +150,15 @@ def parse(source: str | Path) -> Urdf:
     return Urdf(name, links, joints, left)
 
 
+def _tags(content: bytes, encoding: str | None) -> ET.Element:
+    """The outermost tag; prefixes need not be declared, because many files do not."""
+    builder, parser = ET.TreeBuilder(), expat.ParserCreate(encoding)
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    parser.CharacterDataHandler = builder.data
+    parser.Parse(content, True)
+    return builder.close()
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class _Notes:
@@ -160,7 +170,7 @@ class _Notes:
     def others(self, where: str, tag: ET.Element, known: Iterable[str]) -> None:
         """Note the tags inside `tag` that are not known."""
         for other in tag:
-            if "xacro" in other.tag:
+            if other.tag.startswith("xacro:"):
                 self.problems.append("<xacro>: expected plain URDF; expand the file with xacro")
             elif other.tag not in {*known, *APPEARANCE}:
                 self.left(other.tag, where)

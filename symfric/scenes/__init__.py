@@ -18,6 +18,7 @@ from symfric.scenes.pendulum import Pendulum as Pendulum
 from symfric.scenes.pendulum_box import PendulumBox as PendulumBox
 from symfric.scenes.quarter_car import QuarterCar as QuarterCar
 from symfric.scenes.rabinowicz import Rabinowicz as Rabinowicz
+from symfric.scenes.robot import Robot as Robot
 from symfric.scenes.slider_crank import SliderCrank as SliderCrank
 
 MECHANISMS: dict[str, type[MechanismScene]] = {

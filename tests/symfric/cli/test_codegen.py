@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from robots import SMALL
 
 from symfric.cli import main
 from symfric.cli.codegen import bits
@@ -93,3 +94,11 @@ def test_bad_plants_are_refused_in_one_sentence(
     error = capsys.readouterr().err
     assert message in error
     assert "Traceback" not in error
+
+
+def test_robot_of_a_file_is_a_plant(tmp_path: Path) -> None:
+    path = tmp_path / "small.urdf"
+    path.write_text(SMALL)
+    line = f"codegen --scene {path} --law lugre --out {tmp_path} --step-size 0.001"
+    assert main(line.split()) == 0
+    assert "tau_hinge" in (tmp_path / "small_f64.h").read_text()

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from robots import SMALL
 
 from symfric import Linear, LuGre, drive, rabinowicz, simulate
 from symfric.cli import main
-from symfric.scenes import ALL_SCENES
+from symfric.scenes import ALL_SCENES, Robot
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -142,3 +143,47 @@ def test_a_law_that_may_push_is_warned_about_with_the_bound(
     assert "= 95" in words
     assert main(["run", "rabinowicz", "--law", "lugre_passive", "--t-end", "0.1"]) == 0
     assert "Warning" not in capsys.readouterr().out
+
+
+def test_a_robot_runs_from_its_file_with_the_law_at_its_friction_tags(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "small.urdf"
+    path.write_text(SMALL)
+    line = f"{path} --law lugre --x0 hinge=1.2 --t-end 0.5 --input tau_hinge=1"
+    result = found(capsys, *line.split())
+    model = Robot(LuGre(mu_s=1.0, mu_d=0.1 / 0.15), SMALL).model()
+    assert result["final"] == simulate(model, 0.5, x0={"hinge": 1.2}, u={"tau_hinge": 1.0}).final
+    assert result["scene"] == "small"
+    assert (result["parameters"]["mu_s"], result["parameters"]["level"]) == (1.0, 0.0)
+
+
+@pytest.mark.filterwarnings("default")
+def test_what_a_robot_leaves_out_is_warned_about(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "small.urdf"
+    path.write_text(SMALL.replace("</joint>", '<limit lower="0"/></joint>'))
+    assert main(["run", str(path), "--law", "viscous", "--t-end", "0.1"]) == 0
+    err = capsys.readouterr().err
+    assert err == "symfric: warning: urdf 'small': left out: <limit> of joint 'hinge'\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (None, "arm.urdf': No such file or directory"),
+        ("<robot>", "expected XML, got no element found"),
+        (SMALL.replace("0 1 0", "0 1"), "urdf 'small' > joint 'hinge' > axis: expected 3 numbers"),
+    ],
+)
+def test_a_bad_robot_file_is_one_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str | None, message: str
+) -> None:
+    path = tmp_path / "arm.urdf"
+    if text is not None:
+        path.write_text(text)
+    assert main(["run", str(path), "--law", "lugre"]) == 2
+    err = capsys.readouterr().err
+    assert message in err
+    assert len(err.splitlines()) == 1

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from symfric import ALL_LAWS, BrownMcPhee, Coulomb, Dahl, LuGre, StaticLaw, Sum, Viscous
 from symfric.laws import GMS, Bristle2D, Karnopp
-from symfric.laws.planar import Planar
+from symfric.laws.planar import Planar, Spatial
 
 N = 7.848
 PLANAR = [
@@ -99,6 +99,25 @@ def test_states_are_numbered_by_axis() -> None:
         "z_2_y",
     ]
     assert Planar(BrownMcPhee()).states == ()
+
+
+@each
+@pytest.mark.parametrize("plane", [(0, 1), (1, 2), (2, 0)])
+def test_slip_in_a_plane_of_space_is_slip_in_the_plane(name: str, plane: tuple[int, int]) -> None:
+    flat, law = Planar(ALL_LAWS[name]()), Spatial(ALL_LAWS[name]())
+    v, z = np.array([0.03, -0.04]), bent(flat, np.array([0.5, 0.2]))
+    n = len(flat.states) // 2
+    v_3, z_3 = np.zeros(3), np.zeros(3 * n)
+    v_3[list(plane)] = v
+    for k, axis in enumerate(plane):
+        z_3[axis * n : (axis + 1) * n] = z[k * n : (k + 1) * n]
+    F, rate = law.force(v_3, N, z_3), np.asarray(law.rate(v_3, N, z_3))
+    assert F[list(plane)] == pytest.approx(flat.force(v, N, z), rel=1e-12)
+    assert np.delete(F, plane) == pytest.approx([0.0])
+    expected = np.asarray(flat.rate(v, N, z)).ravel()
+    for k, axis in enumerate(plane):
+        own = rate[axis * n : (axis + 1) * n]
+        assert own == pytest.approx(expected[k * n : (k + 1) * n], rel=1e-12)
 
 
 @pytest.mark.parametrize("law", [GMS(), Bristle2D(), Karnopp(), Dahl(n=2.0)])

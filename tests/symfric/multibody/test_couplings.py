@@ -195,7 +195,7 @@ def test_couplings_that_cannot_be_are_described_with_their_path(
 def test_an_offset_is_part_of_a_consistent_start() -> None:
     m = gearbox(2.0)
     m.constraints = [Gear("gear", "r0", "r1", 2.0, 0.5)]
-    with pytest.raises(ValueError, match="positions that satisfy gear_moment, got 0.5; near it"):
+    with pytest.raises(ValueError, match=r"positions that satisfy gear_moment, got 0\.5; near it"):
         m.build()
     start = m.assembled().build().initial_state()
     assert start[1] == pytest.approx(2.0 * start[0] + 0.5)

@@ -1,18 +1,27 @@
 """Normal forces of bearings from reactions, and what friction asks of a joint."""
 
-import casadi as ca
-import pytest
+from dataclasses import replace
 
-from symfric import BrownMcPhee
-from symfric.laws import Karnopp
-from symfric.multibody import JointFriction
+import casadi as ca
+import numpy as np
+import pytest
+from chains import chain, solve
+
+from symfric import BrownMcPhee, Dahl, LuGre, Trajectory, simulate
+from symfric.laws import GMS, Karnopp, Law
+from symfric.multibody import JointFriction, Mechanism, Spherical, Universal
+
+in_both = pytest.mark.parametrize("formulation", ["joint", "absolute"])
 
 LAW = BrownMcPhee()
 F, T = ca.SX([3.0, -4.0, 5.0]), ca.SX([0.6, -0.8, 0.2])
 
 
-def load(friction: JointFriction, slides: bool, turns: bool) -> float:
-    return float(ca.DM(friction.normal_force(slides, turns, F, T)))
+SLIDE, TURN, BOTH = ("slide",), ("turn",), ("slide", "turn")
+
+
+def load(friction: JointFriction, rubs: tuple[str, ...]) -> float:
+    return float(ca.DM(friction.normal_force(rubs, F, T)))
 
 
 BEARING = JointFriction(LAW, radius=0.1, length=0.2, width=0.1, eps=1e-9)
@@ -20,59 +29,206 @@ BEARING = JointFriction(LAW, radius=0.1, length=0.2, width=0.1, eps=1e-9)
 
 
 @pytest.mark.parametrize(
-    ("slides", "turns", "expected"),
+    ("rubs", "expected"),
     [
-        (True, True, 50.0**0.5 + 5.0),
-        (False, True, 50.0**0.5 + 5.0 + 5.0),
-        (True, False, 5.0 + 1.0 + 4.0 + 3.0 + 2.0),
+        (BOTH, 50.0**0.5 + 5.0),
+        (TURN, 50.0**0.5 + 5.0 + 5.0),
+        (SLIDE, 5.0 + 1.0 + 4.0 + 3.0 + 2.0),
+        (("ball",), 50.0**0.5),
     ],
-    ids=["cylindrical", "revolute", "prismatic"],
+    ids=["cylindrical", "revolute", "prismatic", "spherical"],
 )
-def test_bearings_press_at_two_stations(slides: bool, turns: bool, expected: float) -> None:
-    assert load(BEARING, slides, turns) == pytest.approx(expected, rel=1e-7)
+def test_bearings_press_at_two_stations(rubs: tuple[str, ...], expected: float) -> None:
+    assert load(BEARING, rubs) == pytest.approx(expected, rel=1e-7)
 
 
 def test_without_a_length_only_forces_press() -> None:
-    assert load(JointFriction(LAW, radius=0.1, eps=1e-9), True, True) == pytest.approx(5.0)
+    assert load(JointFriction(LAW, radius=0.1, eps=1e-9), BOTH) == pytest.approx(5.0)
 
 
 def test_preload_adds_and_a_constant_force_replaces() -> None:
     preloaded = JointFriction(LAW, radius=0.1, preload=7.0, eps=1e-9)
-    assert load(preloaded, True, True) == pytest.approx(12.0)
-    assert load(JointFriction(LAW, normal=2.5), True, False) == 2.5
+    assert load(preloaded, BOTH) == pytest.approx(12.0)
+    assert load(JointFriction(LAW, normal=2.5), SLIDE) == 2.5
 
 
 def test_an_unloaded_bearing_does_not_press_and_has_a_slope() -> None:
     f = ca.SX.sym("f", 3)
-    N = JointFriction(LAW, radius=0.1).normal_force(False, True, f, ca.SX(3, 1))
+    N = JointFriction(LAW, radius=0.1).normal_force(TURN, f, ca.SX(3, 1))
     value, slope = ca.Function("N", [f], [N, ca.gradient(N, f)]).call([[0.0, 0.0, 0.0]])
     assert float(value) == 0.0
     assert slope.full() == pytest.approx(0.0)
 
 
 def test_absent_reactions_leave_no_trace() -> None:
-    N = BEARING.normal_force(True, False, ca.SX(3, 1), ca.SX(3, 1))
+    N = BEARING.normal_force(SLIDE, ca.SX(3, 1), ca.SX(3, 1))
     assert N.is_constant()
 
 
 @pytest.mark.parametrize(
-    ("friction", "slides", "turns", "message"),
+    ("friction", "rubs", "message"),
     [
-        (JointFriction(LAW), False, True, "radius: expected the bearing's radius"),
-        (JointFriction(Karnopp()), True, False, "got Karnopp, which needs F_e"),
-        (JointFriction(LAW), False, False, "expected a revolute, prismatic or cylindrical joint"),
-        (JointFriction(LAW, radius=-1.0), False, True, "radius: expected a number > 0, got -1"),
-        (JointFriction(LAW, length=0.0), True, False, "length: expected a number > 0"),
-        (JointFriction(LAW, preload=-1.0), True, False, "preload: expected a number >= 0"),
-        (JointFriction(LAW, normal=float("nan")), True, False, "normal: expected a number >= 0"),
+        (JointFriction(LAW), TURN, "radius: expected the bearing's radius"),
+        (JointFriction(Karnopp()), SLIDE, "got Karnopp, which needs F_e"),
+        (JointFriction(LAW), (), "expected a revolute, prismatic, cylindrical, universal or"),
+        (JointFriction(LAW, radius=-1.0), TURN, "radius: expected a number > 0, got -1"),
+        (JointFriction(LAW, length=0.0), SLIDE, "length: expected a number > 0"),
+        (JointFriction(LAW, preload=-1.0), SLIDE, "preload: expected a number >= 0"),
+        (JointFriction(LAW, normal=float("nan")), SLIDE, "normal: expected a number >= 0"),
     ],
 )
 def test_bad_bearings_are_described(
-    friction: JointFriction, slides: bool, turns: bool, message: str
+    friction: JointFriction, rubs: tuple[str, ...], message: str
 ) -> None:
-    assert any(message in problem for problem in friction.problems(slides, turns))
+    assert any(message in problem for problem in friction.problems(rubs))
 
 
 def test_what_is_not_a_law_is_refused() -> None:
     with pytest.raises(ValueError, match="friction: expected a law such as"):
         JointFriction("lugre")  # type: ignore[arg-type]
+
+
+KINETIC = BrownMcPhee(mu_s=0.2, mu_d=0.2, mu_v=0.0, v_t=1e-3)
+"""0.2 N at any speed well above a millimetre per second."""
+
+
+def rotor(formulation: str, law: Law = KINETIC, **friction: float) -> Trajectory:
+    """A rotor of J = 0.05 kg m^2 on a ball of 2 cm, pressed by 20 N, spinning about a skew axis."""
+    m = Mechanism("rotor", gravity=(0.0, 0.0, -10.0))
+    m.body("wheel", 2.0, (0.05, 0.05, 0.05))
+    bearing = JointFriction(law, radius=0.02, **friction)
+    rate = tuple(0.5 * w for w in SPIN)
+    m.joint(Spherical("ball", "ground", "wheel", rate=(0.0, *rate), friction=bearing))
+    return simulate(m.build(formulation=formulation), 2.0, rtol=1e-7, samples=201)
+
+
+SPIN = np.array([1.0, -4.0, 8.0])
+"""9 rad/s."""
+
+
+@in_both
+def test_a_spinning_ball_slows_down_linearly(formulation: str) -> None:
+    """J w' = -R mu N: from 9 rad/s with 1.6 rad/s^2."""
+    run = rotor(formulation)
+    assert run["ball_slip"] == pytest.approx(0.02 * (9.0 - 1.6 * run.t), rel=2e-5)
+    assert run["ball_N"] == pytest.approx(20.0, abs=1e-3)
+    assert run["ball_friction"] == pytest.approx(0.2 * 20.0, rel=1e-3)
+    assert run["ball_power"] == pytest.approx(run["ball_slip"] * run["ball_friction"], rel=1e-4)
+    assert run["friction_work_rate"] == pytest.approx(-run["ball_power"])
+
+
+@in_both
+def test_preload_presses_a_ball_too(formulation: str) -> None:
+    run = rotor(formulation, preload=10.0)
+    assert run["ball_slip"][-1] == pytest.approx(0.02 * (9.0 - 2 * 2.4), rel=1e-4)
+
+
+def test_bristles_of_a_ball_are_vectors() -> None:
+    """LuGre slows the rotor down as Coulomb, once its bristles lie against the motion."""
+    law = LuGre(mu_s=0.2, mu_d=0.2, sigma_2=0.0)
+    run = rotor("joint", law)
+    assert run["ball_slip"][-1] == pytest.approx(0.02 * (9.0 - 1.6 * 2), rel=1e-3)
+    bristles = np.array([run[f"ball_z_{axis}"][-1] for axis in "xyz"])
+    assert bristles / np.linalg.norm(bristles) == pytest.approx(SPIN / 9.0, abs=1e-6)
+    other = rotor("absolute", law)
+    assert other["ball_slip"] == pytest.approx(run["ball_slip"], rel=1e-4)
+
+
+def test_a_ball_that_sticks_stays_where_it_is() -> None:
+    """A pendulum tilted by 0.1 rad; up to 0.2 rad friction holds what hangs 10 cm below."""
+    m = Mechanism("held", gravity=(0.0, 0.0, -10.0))
+    m.body("bob", 2.0, (0.05, 0.05, 0.05), com=(0.0, 0.0, -0.1))
+    tilt = (np.cos(0.05), 0.6 * np.sin(0.05), 0.8 * np.sin(0.05), 0.0)
+    bearing = JointFriction(LuGre(mu_s=0.2, mu_d=0.15), radius=0.1)
+    m.joint(Spherical("ball", "ground", "bob", start=tilt, friction=bearing))
+    run = simulate(m.build(), 3.0, rtol=1e-6, samples=50)
+    assert run["ball_e1"] == pytest.approx(tilt[1], rel=1e-2)  # bristles bend by 0.03 mm
+    assert np.ptp(run["ball_e1"][25:]) < 1e-8
+    assert run["ball_slip"][-1] < 1e-4
+    # the couple of the weight, 2 x 10 x 0.1 sin(0.1), is what friction at 10 cm carries
+    assert run["ball_friction"][-1] == pytest.approx(20.0 * np.sin(0.1), rel=1e-2)
+
+
+@in_both
+def test_a_shaft_on_a_cross_slows_down_linearly(formulation: str) -> None:
+    """It turns about the horizontal x; both of its bearings carry 20 N across their axes."""
+    m = Mechanism("cross", gravity=(0.0, 0.0, -10.0))
+    m.body("shaft", 2.0, (0.05, 0.05, 0.05))
+    bearing = JointFriction(KINETIC, radius=0.02)
+    m.joint(Universal("cross", "ground", "shaft", rate=(9.0, 0.0), friction=bearing))
+    run = simulate(m.build(formulation=formulation), 2.0, rtol=1e-7, samples=101)
+    assert run["cross_x_slip"] == pytest.approx(0.02 * (9.0 - 1.6 * run.t), rel=2e-5)
+    assert run["cross_y_slip"] == pytest.approx(0.0, abs=1e-9)
+    # y turns with the shaft: what is thrust there now is across a quarter of a turn later
+    assert run["cross_x_N"] == pytest.approx(20.0, abs=1e-3)
+    assert run["cross_y_N"].max() <= 20.0 * 2**0.5
+
+
+def test_bearings_of_a_cross_feel_what_it_transmits() -> None:
+    """Force (1, 2, 3) N, moment (0, 0, 0.4) N m normal to both axes, stations 0.1 m apart."""
+    friction = JointFriction(LAW, radius=0.02, length=0.1, eps=1e-9)
+    joint = Universal("u", "a", "b")
+    force, moment = ca.SX([1.0, 2.0, 3.0]), ca.SX([0.0, 0.0, 0.4])
+    loads = {}
+    for direction in "xy":
+        R = joint.bearing(direction, ca.SX.eye(3))
+        N = friction.normal_force(("turn",), R @ force, R @ moment)
+        loads[direction] = float(ca.DM(N))
+    # about x: across (y, z) = (2, 3), thrust 1, a couple of 4 N in the plane of y
+    assert loads["x"] == pytest.approx(np.hypot(2 - 4, 3) + 4 + 1, rel=1e-6)
+    assert loads["y"] == pytest.approx(np.hypot(3, 1 + 4) + 4 + 2, rel=1e-6)
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_friction_in_all_joints_is_the_same_in_both_formulations(reverse: bool) -> None:
+    m = chain(reverse)
+    law = BrownMcPhee(mu_s=0.03, mu_d=0.02, v_t=0.5)
+    bearing = JointFriction(law, radius=0.05, length=0.5, width=0.5)
+    m.joints = [replace(j, friction=bearing if j.rubs else None) for j in m.joints]
+    made = [m.prepare(formulation=f) for f in ("joint", "absolute")]
+    tree, whole = (solve(one.eq, one.q0, one.qd0) for one in made)
+    names = [c.name for c in made[0].eq.contacts]
+    assert names == ["j0", "j1", "j2_slide", "j2_turn", "j3_x", "j3_y", "j5"]
+    assert pytest.approx(whole.N, rel=1e-12) == tree.N
+    for body, motion in tree.bodies.items():
+        assert motion == pytest.approx(whole.bodies[body], rel=1e-10, abs=1e-10), body
+
+
+@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+def test_friction_in_balls_and_crosses_takes_energy(formulation: str) -> None:
+    """A double pendulum in space: what is missing is what friction took."""
+    m = Mechanism("double")
+    bearing = JointFriction(BrownMcPhee(mu_s=0.3, mu_d=0.2, v_t=0.01), radius=0.05, length=0.1)
+    for name in ("upper", "lower"):
+        m.body(name, 1.0, (0.02, 0.02, 0.01), com=(0.0, 0.0, -0.2))
+        m.frame(f"{name}.end", at=(0.0, 0.0, -0.4))
+    m.joint(Universal("cross", "ground", "upper", (0.8, 0.3), (1.0, 2.0), friction=bearing))
+    m.joint(Spherical("ball", "upper.end", "lower", rate=(0.0, 2.0, 1.0, 3.0), friction=bearing))
+    run = simulate(m.build(formulation=formulation), 1.0, rtol=1e-7, samples=2001)
+    powers = [run[f"{name}_power"] for name in ("cross_x", "cross_y", "ball")]
+    assert min(power.min() for power in powers) >= 0.0
+    taken = np.trapezoid(sum(powers), run.t)
+    assert run["energy"][0] - run["energy"][-1] == pytest.approx(taken, rel=1e-5)
+    assert taken > 0.5
+
+
+@pytest.mark.parametrize("law", [GMS(), Dahl(n=2.0)], ids=lambda law: type(law).__name__)
+def test_laws_without_a_form_for_vectors_are_refused_in_a_ball_by_name(law: Law) -> None:
+    m = Mechanism("rotor")
+    m.body("wheel", 2.0, (0.05, 0.05, 0.05))
+    m.joint(Spherical("ball", "ground", "wheel", friction=JointFriction(law, radius=0.1)))
+    path = "mechanism 'rotor' > joint 'ball' > friction: law: expected an odd one that is affine"
+    with pytest.raises(ValueError, match=path) as caught:
+        m.build()
+    assert f"got {type(law).__name__}" in str(caught.value)
+
+
+def test_friction_independent_of_the_reaction_adds_no_unknown_to_balls_and_crosses() -> None:
+    m = chain()
+    bearing = JointFriction(BrownMcPhee(v_t=0.5), radius=0.05, normal=20.0)
+    m.joints = [replace(j, friction=bearing if j.name in ("j3", "j5") else None) for j in m.joints]
+    model = m.build()
+    assert [v.name for v in model.z if v.name.endswith("_N")] == []
+    pressed = replace(bearing, normal=None)
+    m.joints = [replace(j, friction=j.friction and pressed) for j in m.joints]
+    assert [v.name for v in m.build().z if v.name.endswith("_N")] == ["j3_x_N", "j3_y_N", "j5_N"]

@@ -89,12 +89,12 @@ MISTAKES: dict[str, tuple[Callable[[Mechanism], object], str]] = {
         "> body 'bob': expected joints with coordinates that lead to the ground, found none; "
         "a Free joint lets it move freely",
     ),
-    "friction of a ball": (
+    "friction of nothing": (
         lambda m: (
             m.body("bob", 1.0, (1.0, 1.0, 1.0)),
-            m.joint(Spherical("ball", "rod", "bob", friction=JointFriction(LAW))),
+            m.joint(Free("pose", "rod", "bob", friction=JointFriction(LAW))),
         ),
-        "> joint 'ball' > friction: expected a revolute, prismatic or cylindrical joint",
+        "> joint 'pose' > friction: expected a revolute, prismatic, cylindrical, universal or",
     ),
     "start of another size": (
         lambda m: (

@@ -70,10 +70,11 @@ def test_inertia_is_turned_into_the_axes_of_the_link() -> None:
 def test_appearance_is_passed_over_and_everything_else_is_named() -> None:
     inside = '<dynamics damping="1" spring_stiffness="2"/><calibration rising="0"/>'
     link = LINK.replace("<inertial>", "<visual/><collision/><sensor/><inertial>")
-    more = '<material name="red"/><gazebo/><gazebo/><transmission name="t"/>'
+    more = '<material name="red"/><gazebo/><gazebo/><drake:actuator/><transmission name="t"/>'
     urdf = parse(small(more, joint(inside), link))
     assert sorted(urdf.left_out) == [
         "<calibration> of joint 'wrist'",
+        "<drake:actuator>",
         "<dynamics spring_stiffness> of joint 'wrist'",
         "<gazebo>",
         "<sensor> of link 'tip'",
@@ -121,7 +122,7 @@ def test_appearance_is_passed_over_and_everything_else_is_named() -> None:
                joint(name="ab").replace("arm", "a").replace("tip", "b"),
                joint(name="ba").replace("arm", "b").replace("tip", "a")),
          r"link 'a': expected joints that lead to 'world', got a closed loop"),
-        (small('<x:property xmlns:x="http://www.ros.org/wiki/xacro" name="a"/>'),
+        (small('<xacro:property name="a"/>'),
          r"<xacro>: expected plain URDF; expand the file with xacro"),
     ],
 )  # fmt: skip

@@ -1,0 +1,172 @@
+"""Who solves a mechanism: ours, and CasADi's integrators on the same equations.
+
+Each is made for one tolerance and then called as often as the clock wants. Time of a call is what a
+user waits for once everything is built: ours starts from names and ends in named signals, CasADi's
+integrators get a consistent start for nothing.
+"""
+
+import os
+import subprocess
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.integrator.casadi_backend import peer
+from symfric.integrator.compiler import FLAGS, find_compiler
+from symfric.integrator.initial import consistent
+from symfric.integrator.inputs import Drivers, drivers
+from symfric.integrator.run import Tolerances
+from symfric.integrator.simulate import simulate
+from symfric.integrator.system import System, system
+from symfric.model import Model
+
+Array = NDArray[np.float64]
+Solve = Callable[[], tuple[Array, int]]
+"""() -> watched states at the times, shape (watched, times), and the number of steps."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Contender:
+    """A solver made for one tolerance; `compile_s` is what the C compiler took for it [s]."""
+
+    solve: Solve
+    compile_s: float = 0.0
+
+
+def ours(model: Model, times: Array, watched: tuple[str, ...], rtol: float) -> Contender:
+    """`simulate` in the compiled engine; the step is compiled once for all tolerances."""
+
+    def solve() -> tuple[Array, int]:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # loose tolerances are measured on purpose
+            run = simulate(model, float(times[-1]), rtol=rtol, t_eval=times, backend="compiled")
+        return np.array([run[name] for name in watched]), run.statistics.steps
+
+    solve()
+    return Contender(solve)
+
+
+def rosenbrock(
+    model: Model, times: Array, watched: tuple[str, ...], rtol: float, explicit: bool
+) -> Contender:
+    """CasADi's `rosenbrock`, compiled whole.
+
+    Args:
+        explicit: eliminate the accelerations, x' = ode(x, z), instead of solving for them along
+            with multipliers and normal forces.
+    """
+    whole, inputs, y0 = _start(model, times)
+    problem = peer(whole, inputs, np.zeros(0), _tolerances(whole, rtol), "rosenbrock")
+    dae, scale, skip = problem.dae, whole.nominal, whole.nx
+    if explicit and model.ode is not None and model.holonomic is not None:
+        x, z = model.vector("x"), model.vector("z")
+        dae = {"x": x, "z": z, "ode": model.ode, "alg": model.alg}
+        scale, skip = np.ones(whole.nx), whole.nx + model.holonomic.n
+    solver = ca.integrator("peer", "rosenbrock", dae, 0.0, times.tolist(), problem.options)
+    generated, seconds = compiled(solver)
+    x0, z0 = y0[: whole.nx] / scale, y0[skip : whole.nx + len(whole.algebraic[1])]
+    rows = [whole.names.index(name) for name in watched]
+    solver(x0=x0, z0=z0)
+    steps = int(solver.stats()["n_steps"])
+
+    def solve() -> tuple[Array, int]:
+        found = generated(x0=x0, z0=z0)["xf"].full()
+        return found[rows] * scale[rows, None], steps
+
+    return Contender(solve, seconds)
+
+
+def idas(
+    model: Model, times: Array, watched: tuple[str, ...], rtol: float, backend: str
+) -> Contender:
+    """SUNDIALS' idas, which cannot be compiled: "sundials" for index 1, "ggl" for index 2.
+
+    Raises:
+        RuntimeError: it fails.
+    """
+    whole, inputs, y0 = _start(model, times)
+    problem = peer(whole, inputs, np.zeros(0), _tolerances(whole, rtol), backend)
+    y0 = np.concatenate([y0, np.zeros(problem.system.n - whole.n)])
+    solver, data = problem.over(np.concatenate([[0.0], times]), y0)
+    columns = problem.system.algebraic[1]
+    x0, z0 = y0[: whole.nx] / whole.nominal, y0[columns]
+    rows = [whole.names.index(name) for name in watched]
+
+    def solve() -> tuple[Array, int]:
+        found = solver(x0=x0, z0=z0, u=data)["xf"].full()
+        return found[rows] * whole.nominal[rows, None], int(solver.stats()["nsteps"])
+
+    solve()
+    return Contender(solve)
+
+
+def _tolerances(whole: System, rtol: float) -> Tolerances:
+    return Tolerances(rtol, 0.1 * rtol * whole.nominal, 0.0, 10_000_000)
+
+
+def _start(model: Model, times: Array) -> tuple[System, Drivers, Array]:
+    """System, inputs and consistent start of a model without parameters and inputs."""
+    inputs = drivers(model, None, 0.0, float(times[-1]))
+    whole = system(model, inputs)
+    y = np.zeros(whole.n)
+    y[: whole.nx] = model.initial_state()
+    guesses = {v.name: float(v.start) for v in model.z}
+    for i, name in enumerate(whole.names):
+        y[i] = guesses.get(name, y[i])
+    return whole, inputs, consistent(whole, "bench", y, np.zeros(whole.d.numel()))
+
+
+MAKERS: dict[str, tuple[str, Callable[..., Contender]]] = {
+    "symfric, joint": ("joint", ours),
+    "symfric, absolute": ("absolute", ours),
+    "casadi rosenbrock, absolute": ("absolute", partial(rosenbrock, explicit=False)),
+    "casadi rosenbrock, absolute, explicit": ("absolute", partial(rosenbrock, explicit=True)),
+    "casadi rosenbrock, joint": ("joint", partial(rosenbrock, explicit=False)),
+    "casadi rosenbrock, joint, explicit": ("joint", partial(rosenbrock, explicit=True)),
+    "idas GGL, absolute": ("absolute", partial(idas, backend="ggl")),
+    "idas GGL, joint": ("joint", partial(idas, backend="ggl")),
+    "idas index 1, absolute": ("absolute", partial(idas, backend="sundials")),
+    "idas index 1, joint": ("joint", partial(idas, backend="sundials")),
+}
+"""Name -> formulation, and how a solver is made of its model."""
+
+
+def compiled(function: ca.Function) -> tuple[ca.Function, float]:
+    """`function` from generated C, and what the compiler took [s]; never from a cache.
+
+    Raises:
+        RuntimeError: no compiler.
+    """
+    with TemporaryDirectory() as folder:
+        generator = ca.CodeGenerator(f"{function.name()}.c")
+        generator.add(function)
+        generator.generate(folder + "/")
+        source = (Path(folder) / f"{function.name()}.c").read_text(encoding="utf-8")
+        library = Path(folder) / "generated.so"
+        seconds = compile_time(source, library)
+        return ca.external(function.name(), str(library)), seconds
+
+
+def compile_time(source: str, target: str | Path = os.devnull) -> float:
+    """Processor time [s] of the C compiler on `source`, with the flags of the package."""
+    compiler = find_compiler()
+    if compiler is None:
+        raise RuntimeError("bench: expected a C compiler, found none")
+    before = os.times()
+    subprocess.run(
+        [*compiler, *FLAGS, "-x", "c", "-", "-o", str(target), "-lm"],
+        input=source.encode(),
+        check=True,
+    )
+    after = os.times()
+    user = after.children_user - before.children_user
+    return user + after.children_system - before.children_system

@@ -1,0 +1,151 @@
+"""Tables of the benchmarks."""
+
+from typing import TYPE_CHECKING
+
+from symfric.cli import output
+from symfric.figures import FigureData
+
+if TYPE_CHECKING:
+    from symfric.bench import Benchmark, MultibodyBenchmark
+
+
+def integrator(result: "Benchmark") -> None:
+    """Runs, ratios, ensembles and derivatives."""
+    output.show_table(
+        ["case", "integrator", "rtol", "error", "time [ms]", "steps"],
+        [
+            [r.case, r.integrator, r.rtol, _short(r.error), 1e3 * r.time_s, r.steps]
+            for r in result.rows
+        ],
+        "Time of a run of 20 s against its error",
+    )
+    output.show_table(
+        ["case", "error", "integrator", "time [ms]", "ratio"],
+        [
+            [r["case"], r["error"], r["integrator"], 1e3 * r["time_s"], round(r["ratio"], 2)]
+            for r in result.to_dict()["ratios"]
+        ],
+        "At equal error, time over that of symfric compiled",
+    )
+    output.show_table(
+        ["case", "members", "threads", "us each", "efficiency", "cvodes"],
+        [
+            [r.case, r.members, r.workers, round(1e6 * r.member_s, 1), round(r.efficiency, 2),
+             round(r.ratio, 1)]
+            for r in result.ensemble
+        ],
+        "Ensembles; cvodes: time of a Python loop over cvodes at the same rtol over ours",
+    )  # fmt: skip
+    output.show_table(
+        ["case", "integrator", "p", "run [ms]", "forward", "adjoint"],
+        [
+            [r.case, r.integrator, r.parameters, round(1e3 * r.plain_s, 3),
+             round(r.forward, 1), "failed" if r.adjoint is None else f"{r.adjoint:.1f}"]
+            for r in result.sensitivities
+        ],
+        "Derivatives by p parameters: time of the run with them over that of the run alone",
+    )  # fmt: skip
+    _skipped(result.skipped)
+
+
+def multibody(result: "MultibodyBenchmark") -> None:
+    """Runs, ratios, compilation, counts, chains, published numbers, constraints and energy."""
+    output.show_table(
+        ["case", "integrator", "rtol", "error", "time [ms]", "steps", "gcc [s]"],
+        [
+            [r.case, r.integrator, r.setting, _short(r.error), _short(1e3 * r.time_s), r.steps,
+             round(r.compile_s, 2)]
+            for r in result.runs
+        ],
+        "Time of a run against its error; rtol: for Exudyn the number of steps",
+    )  # fmt: skip
+    output.show_table(
+        ["case", "bound", "integrator", "rtol", "error", "steps", "time [ms]", "ratio"],
+        [
+            [r.case, r.bound, r.integrator, r.setting, _short(r.error), r.steps,
+             _short(1e3 * r.time_s), round(r.ratio, 1)]
+            for r in result.ratios()
+        ],
+        "The loosest tolerance that keeps an error, time over that of ours in joint coordinates",
+    )  # fmt: skip
+    output.show_table(
+        ["mechanism", "coordinates", "build [s]", "lines of C", "gcc [s]"],
+        [
+            [r.mechanism, r.formulation, _short(r.build_s), r.lines, round(r.compile_s, 2)]
+            for r in result.compiled
+        ],
+        "Our step as machine code, once for all tolerances and parameters",
+    )
+    _costs(result)
+    _accuracy(result)
+    _skipped(result.skipped)
+
+
+def _costs(result: "MultibodyBenchmark") -> None:
+    output.show_table(
+        ["mechanism", "variant", "coordinates", "x", "z", "ode", "step", "nonzeros"],
+        [
+            [r.mechanism, r.variant, r.formulation, r.states, r.algebraic, r.ode, r.step,
+             r.nonzeros]
+            for r in result.counts
+        ],
+        "What a mechanism needs: states, algebraic variables, CasADi instructions, nonzeros",
+    )  # fmt: skip
+    growth = ", ".join(f"{name} {value:.2f}" for name, value in result.exponents().items())
+    output.show_table(
+        ["links", "build [s]", "instructions", "step [us]"],
+        [
+            [r.links, _short(r.build_s), r.instructions, _short(1e6 * r.step_s)]
+            for r in result.chains
+        ],
+        f"A step of a chain in the virtual machine; exponents: {growth or 'of two lengths only'}",
+    )
+
+
+def _accuracy(result: "MultibodyBenchmark") -> None:
+    output.show_table(
+        ["case", "t [s]", "signal", "ours", "published", "difference", "digits"],
+        [
+            [r.case, r.t, r.signal, f"{r.value:.9g}", f"{r.published:.9g}",
+             _short(r.value - r.published), r.digits]
+            for r in result.facts
+        ],
+        "Published numbers; digits: what they are good for",
+    )  # fmt: skip
+    output.show_table(
+        ["case", "coordinates", "phi [m]", "phi_dot, relative", "phi_ddot, relative"],
+        [
+            [r.case, r.formulation, *map(_short, (r.phi, r.phi_dot, r.phi_ddot))]
+            for r in result.norms
+        ],
+        "Largest norms of the constraints",
+    )
+    output.show_table(
+        ["case", "rtol", "t_end [s]", "steps", "relative change"],
+        [[r.case, r.rtol, r.t_end, r.steps, _short(r.relative)] for r in result.drifts],
+        "Energy of frictionless mechanisms",
+    )
+
+
+def jitter(data: FigureData) -> None:
+    """Total variations, a line for each law, way of stepping and velocity."""
+    columns = list(data.units)
+    output.show_table(
+        ["law", "steps", *(f"{name} [{data.units[name]}]" for name in columns)],
+        [
+            [c.law, c.case, *(_short(float(c[name][k])) for name in columns)]
+            for c in data.curves
+            for k in range(c[columns[0]].size)
+        ],
+        data.title,
+    )
+
+
+def _skipped(reasons: dict[str, str]) -> None:
+    for name, why in reasons.items():
+        output.show(f"{name}: not run, {why}")
+
+
+def _short(value: float) -> float:
+    """Three digits."""
+    return float(f"{value:.3g}")

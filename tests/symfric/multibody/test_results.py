@@ -1,0 +1,216 @@
+"""Results on request: reactions, centres of mass, powers, against statics and closed forms."""
+
+from dataclasses import replace
+from math import cos, sin
+
+import casadi as ca
+import numpy as np
+import pytest
+from chains import TREE, chain, solve, state
+
+from symfric import BrownMcPhee, simulate
+from symfric.integrator.initial import consistent
+from symfric.integrator.inputs import drivers
+from symfric.integrator.system import system
+from symfric.model import Model
+from symfric.multibody import (
+    Distance,
+    Fixed,
+    JointFriction,
+    JointSpringDamper,
+    Mechanism,
+    PointOnLine,
+    Prismatic,
+    Revolute,
+    SpringDamper,
+    UserForce,
+)
+from symfric.multibody.joints import Joint
+from symfric.multibody.results import COMPONENTS, TRANSMITTED
+from symfric.scenes import MECHANISMS, FourMass
+
+Y = (0.0, 1.0, 0.0)
+LAW = BrownMcPhee(v_t=0.5)
+
+
+def at_start(model: Model) -> dict[str, float]:
+    """All details at the start."""
+    mechanics = model.holonomic
+    assert mechanics is not None
+    nx, n = len(model.x), mechanics.n
+    made = system(model, drivers(model, None, 0.0, 1.0))
+    y = np.zeros(made.n)
+    y[:nx] = model.initial_state()
+    y[nx + n : nx + n + len(model.z)] = [v.start for v in model.z]
+    y = consistent(made, "start", y, model.values("u"))
+    names = list(model.further)
+    column = ca.vertcat(*(model.expression(name) for name in names))
+    arguments = [model.t, *(model.vector(letter) for letter in "xzu")]
+    values = ca.Function("details", arguments, [column])
+    found = values(0.0, y[:nx], y[nx + n : nx + n + len(model.z)], model.values("u"))
+    return dict(zip(names, found.full().ravel().tolist(), strict=True))
+
+
+def pendulum(angle: float, rate: float) -> Mechanism:
+    m = Mechanism("pendulum")
+    m.body("bob", 2.0, (0.1, 0.2, 0.3))
+    m.frame("ground.pivot", z=Y, x=(0.0, 0.0, -1.0))
+    m.frame("bob.pivot", at=(0.0, 0.0, 0.4), z=Y, x=(0.0, 0.0, -1.0))
+    m.joint(Revolute("hinge", "ground.pivot", "bob.pivot", start=angle, rate=rate))
+    return m
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7, -2.0])
+def test_hinge_of_a_pendulum_pulls_with_weight_and_centrifugal_force(angle: float) -> None:
+    """Along the rod m g cos + m L w^2, across it the weight that does not accelerate the bob."""
+    m, L, J, g, w = 2.0, 0.4, 0.2, 9.81, 3.0
+    found = at_start(pendulum(angle, w).build())
+    alpha = -m * g * L * sin(angle) / (J + m * L * L)
+    assert found["hinge_Fx"] == pytest.approx(-(m * g * cos(angle) + m * L * w * w))
+    assert abs(found["hinge_Fy"]) == pytest.approx(abs(m * L * alpha + m * g * sin(angle)))
+    assert [found[f"hinge_{c}"] for c in ("Fz", "Mx", "My")] == pytest.approx([0, 0, 0], abs=1e-9)
+    assert "hinge_Mz" not in found
+
+
+@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+def test_clamped_beam_carries_weight_and_moment(formulation: str) -> None:
+    """A cantilever of 3 kg that reaches 0.5 m beyond its clamp, pushed sideways with 7 N."""
+    m = Mechanism("beam")
+    m.body("beam", 3.0, (0.1, 0.1, 0.1))
+    m.frame("beam.root", at=(-0.5, 0.0, 0.0))
+    m.joint(Fixed("clamp", "ground", "beam.root"))
+    m.force(UserForce("push", "beam", lambda kin: ((0.0, 7.0, 0.0), (0.0, 0.0, 0.0))))
+    m.body("weight", 1.0, (0.1, 0.1, 0.1))  # something that moves
+    m.joint(Prismatic("lift", "ground", "weight"))
+    found = at_start(m.build(formulation=formulation))
+    wrench = [found[f"clamp_{c}"] for c in COMPONENTS]
+    expected = [0.0, -7.0, 3 * 9.81, 0.0, -0.5 * 3 * 9.81, -0.5 * 7.0]
+    assert wrench == pytest.approx(expected, abs=1e-9)
+
+
+def test_guide_takes_what_does_not_point_along_it() -> None:
+    """A slider on x under its weight and a force that acts 0.2 m above the guide."""
+    m = Mechanism("guide")
+    for place in ("ground.rail", "slider.rail"):
+        m.frame(place, z=(1.0, 0.0, 0.0), x=(0.0, 0.0, 1.0))
+    m.body("slider", 4.0, (0.1, 0.1, 0.1))
+    m.frame("slider.top", at=(0.0, 0.0, 0.2))
+    m.joint(Prismatic("x", "ground.rail", "slider.rail"))
+    m.force(UserForce("pull", "slider.top", lambda kin: ((8.0, 3.0, 0.0), (0.0, 0.0, 0.0))))
+    found = at_start(m.build())
+    # frame: x up, y = z x x = -y of the world
+    assert found["x_Fx"] == pytest.approx(4 * 9.81)
+    assert found["x_Fy"] == pytest.approx(3.0)
+    assert found["x_Mx"] == pytest.approx(0.0, abs=1e-9)
+    assert found["x_My"] == pytest.approx(0.2 * 8.0)
+    assert found["x_Mz"] == pytest.approx(0.2 * 3.0)
+
+
+@pytest.mark.parametrize(("start", "tension"), [(-1.5, 19.62), (1.5, -19.62)])
+def test_rod_is_pulled_or_pressed(start: float, tension: float) -> None:
+    m = Mechanism("rod")
+    m.body("bob", 2.0, (0.1, 0.1, 0.1))
+    m.joint(Prismatic("lift", "ground", "bob", start=start))
+    m.joint(Distance("rod", "ground", "bob", length=1.5))
+    found = at_start(m.build())
+    assert found["rod_tension"] == pytest.approx(tension)
+    assert [found[f"rod_F{c}"] for c in "xyz"] == pytest.approx([0, 0, 2 * 9.81])
+
+
+@pytest.mark.parametrize("kind", TREE, ids=lambda kind: kind.__name__)
+def test_components_left_out_are_those_a_joint_cannot_transmit(kind: type[Joint]) -> None:
+    made = chain().prepare()
+    eq, name = made.eq, f"j{TREE.index(kind)}"
+    q, qd = state(made)
+    values = solve(eq, q, qd).reactions[name]
+    given = TRANSMITTED.get(kind, COMPONENTS)
+    for component, value in zip(COMPONENTS, values, strict=True):
+        if component in given:
+            assert abs(value) > 1e-6, component
+        else:
+            assert abs(value) < 1e-9 * np.abs(values).max(initial=1.0), component
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_both_formulations_give_the_same_details(name: str) -> None:
+    mechanism = MECHANISMS[name](LAW).mechanism()
+    ours, expected = (at_start(mechanism.build(formulation=f)) for f in ("joint", "absolute"))
+    largest = max(abs(x) for x in ours.values())
+    for detail, value in ours.items():
+        if detail in expected:  # absolute coordinates are centres of mass already
+            assert value == pytest.approx(expected[detail], rel=1e-12, abs=1e-12 * largest), detail
+    left = {d for d in ours if d not in expected}
+    bodies = [b.name for b in mechanism.bodies]
+    assert left == {f"{b}_{axis}" for b in bodies[1:] for axis in "xyz"}
+
+
+def test_centres_of_mass_move_as_the_angle_says() -> None:
+    found = at_start(pendulum(0.3, 2.0).build())
+    assert [found["bob_x"], found["bob_z"]] == pytest.approx([-0.4 * sin(0.3), -0.4 * cos(0.3)])
+    velocity = [-0.8 * cos(0.3), 0.0, 0.8 * sin(0.3)]
+    assert [found[f"bob_v{axis}"] for axis in "xyz"] == pytest.approx(velocity)
+
+
+def test_details_cost_the_model_nothing_until_they_are_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    calls: list[str] = []
+    monkeypatch.setattr("symfric.multibody.results._reactions", lambda *_: calls.append("r") or ())
+    model = FourMass(LAW).model()
+    run = simulate(model, 0.01)
+    assert not {n for n in model.signals if n.endswith(("_Fx", "_work_rate", "_vx"))}
+    assert run["energy"].size and not calls
+    assert run["slider_1_x"][0] == pytest.approx(4.0)
+    assert calls == ["r"]
+
+
+def test_a_detail_put_into_the_outputs_is_carried_along() -> None:
+    """For derivatives and C, as the docstring of `Model` says."""
+    model = pendulum(0.3, 0.0).build()
+    pull = model.further["hinge_Fx"]
+    more = replace(model, outputs={**model.outputs, "pull": pull})
+    run = simulate(more, 0.5, sensitivities=["x0.hinge"])
+    assert run["pull"] == pytest.approx(run["hinge_Fx"])
+    assert np.isfinite(run.sensitivities["x0.hinge"]["pull"]).all()
+
+
+def test_reactions_that_redundant_constraints_leave_open_are_not_given() -> None:
+    """A door on two hinges: who carries how much is not determined."""
+    m = Mechanism("door")
+    m.body("door", 10.0, (1.0, 1.0, 1.0))
+    for name, height in (("low", 0.2), ("high", 1.8)):
+        m.frame(f"ground.{name}", at=(0.0, 0.0, height))
+        m.frame(f"door.{name}", at=(-0.4, 0.0, height))
+        m.joint(Revolute(name, f"ground.{name}", f"door.{name}"))
+    m.body("bob", 1.0, (0.1, 0.1, 0.1))
+    m.joint(Revolute("own", "ground", "bob"))
+    found = at_start(m.build())
+    assert not [n for n in found if n.startswith(("low_", "high_"))]
+    assert found["own_Fz"] == pytest.approx(9.81)
+
+
+def test_a_pin_that_closes_a_loop_has_forces_alone() -> None:
+    assert TRANSMITTED[PointOnLine] == ("Fx", "Fy", "Fz")
+
+
+def powers(m: Mechanism) -> set[str]:
+    names = m.build().further
+    return {n.removesuffix("_work_rate") for n in names if n.endswith("_work_rate")}
+
+
+def test_only_what_is_not_conserved_has_a_power() -> None:
+    m = pendulum(0.3, 0.0)
+    m.force(JointSpringDamper("torsion", "hinge", stiffness=3.0))
+    m.force(SpringDamper("spring", "ground", "bob", stiffness=2.0, free_length=0.1))
+    assert powers(m) == set()
+    m.force(JointSpringDamper("damper", "hinge", damping=0.1))
+    m.force(SpringDamper("winch", "ground", "bob", actuator=m.input("pull", "N")))
+    m.joints[0] = replace(m.joints[0], friction=JointFriction(LAW, radius=0.1))
+    assert powers(m) == {"damper", "winch", "friction"}
+
+
+def test_a_spring_whose_rest_is_an_input_does_work() -> None:
+    """Who winds it up is not in the model, so that its potential is none."""
+    m = pendulum(0.3, 0.0)
+    m.force(JointSpringDamper("wound", "hinge", stiffness=3.0, rest=m.input("rest", "rad")))
+    assert powers(m) == {"wound"}

@@ -1,0 +1,43 @@
+"""Robots of URDF files as scenes: the law at the level of every joint, parameters by name."""
+
+import pytest
+from robots import MOVING, SMALL, random_robot
+
+from symfric import BrownMcPhee, LuGre, parameters, simulate
+from symfric.multibody.urdf import relative
+from symfric.scenes import Robot
+
+BARE = SMALL.replace(' friction="0.2"', "")
+
+
+@pytest.mark.parametrize(("text", "level", "expected"), [(SMALL, 5.0, 0.2), (BARE, 5.0, 5.0)])
+def test_tag_comes_before_the_level_of_all_joints(text: str, level: float, expected: float) -> None:
+    run = simulate(Robot(LuGre(), text, level=level).model(), 0.01)
+    assert run["hinge_N"][0] == expected
+
+
+def test_joint_with_less_torque_than_its_level_stays_where_it_is() -> None:
+    """The rod pulls with 1.45 N m, twice that as it is let go; 3 N m hold it, 1 N m do not."""
+    law = relative(LuGre())
+    ends = [
+        simulate(Robot(law, BARE, level=level).model(), 1.0, x0={"hinge": 0.3}).final["hinge"]
+        for level in (3.0, 1.0)
+    ]
+    assert ends[0] == pytest.approx(0.3, abs=1e-4)
+    assert abs(ends[1] - 0.3) > 0.1
+
+
+def test_without_tag_and_level_the_law_leaves_no_trace() -> None:
+    with pytest.warns(UserWarning, match="left out: BrownMcPhee"):
+        model = Robot(BrownMcPhee(), BARE).model()
+    assert not model.monitors
+
+
+def test_every_parameter_can_be_free() -> None:
+    scene = Robot(LuGre(), random_robot(2, 5, MOVING), level=1.0)
+    names = list(parameters(scene))
+    free, fixed = scene.model(names), scene.model()
+    assert [p.name for p in free.p] == names
+    assert free.initial_state() == pytest.approx(fixed.initial_state(), abs=1e-12)
+    last = [simulate(model, 0.2, rtol=1e-8).final for model in (free, fixed)]
+    assert last[0] == pytest.approx(last[1], rel=1e-5, abs=1e-6)
