@@ -56,15 +56,22 @@ def signs(system: System, gamma: float) -> Signs:
     step only damps away.
     """
     block, rows = blocks(system, gamma), system.algebraic[0]
-    y, d, lu = system.y, system.d, block.lu
-    sign = ca.Function("sign", [lu.packed_symbol], [lu.sign(), lu.sign(len(rows))])
-    if system.is_semi_explicit and {row for row, _ in lu.order[: len(rows)]} == set(rows):
-        return lambda y, h, d: sign(block.factor(y, h, d))
-    matrix = ca.densify(system.mass)
+    lu, first = block.lu, {row for row, _ in block.lu.order[: len(rows)]}
+    alone = system.is_semi_explicit and first == set(rows)
+    tiny = lu.sign(len(rows)) if alone else _tiny(system)
+    symbols = [lu.packed_symbol, system.y, system.d]
+    both = ca.Function("signs", symbols, [lu.sign(), tiny], {"cse": True})
+
+    def at(y: Any, h: Any, d: Any) -> tuple[Any, Any]:
+        of_step, of_tiny_step = both(block.factor(y, h, d), y, d)
+        return of_step, of_tiny_step
+
+    return at
+
+
+def _tiny(system: System) -> ca.SX:
+    """Sign of det W for a tiny step."""
+    matrix, rows = ca.densify(system.mass), system.algebraic[0]
     matrix[rows, :] = -system.J[rows, :]
-    first = factorise(ca.sparsify(matrix), system.pivots)
-    tiny = ca.Function(
-        "tiny", [y, d], [ca.substitute(first.sign(), first.packed_symbol, first.packed)],
-        {"cse": True},
-    )  # fmt: skip
-    return lambda y, h, d: (sign(block.factor(y, h, d))[0], tiny(y, d))
+    lu = factorise(ca.sparsify(matrix), system.pivots)
+    return ca.substitute(lu.sign(), lu.packed_symbol, lu.packed)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import final
 
 import casadi as ca
-import numpy as np
 
 
 @final

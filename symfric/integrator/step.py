@@ -68,16 +68,12 @@ def obstacles(system: System, method: Method) -> Callable[[Any, Any, Any], Any] 
     gamma, manifold, chart = method.diagonal, system.manifold, tangent(system)
     if gamma is None or (manifold is not None and not system.rubs):
         return None
-    if chart is None:
-        both = signs(system, gamma)
-    else:
-        inner = signs(chart.reduced, gamma)
-
-        def both(y: Any, h: Any, d: Any) -> Any:
-            data = chart.open(y, d)
-            return inner(chart.enter(y, data), h, data)
+    both = signs(system if chart is None else chart.reduced, gamma)
 
     def sign(y: Any, h: Any, d: Any) -> Any:
+        if chart is not None:
+            d = chart.open(y, d)
+            y = chart.enter(y, d)
         own, tiny = both(y, h, d)
         if manifold is None:
             return own * tiny

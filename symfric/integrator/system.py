@@ -75,7 +75,7 @@ class System:
     def is_semi_explicit(self) -> bool:
         """Whether the mass matrix is the identity but for zeros on its diagonal."""
         M = ca.DM(self.mass).full()
-        return bool((M == np.diag(np.diag(M))).all() and np.isin(np.diag(M), (0.0, 1.0)).all())
+        return bool((np.diag(np.diag(M)) == M).all() and np.isin(np.diag(M), (0.0, 1.0)).all())
 
     @cached_property
     def algebraic(self) -> tuple[list[int], list[int]]:

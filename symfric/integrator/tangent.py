@@ -1,8 +1,8 @@
 """The tangent-space form of a constrained mechanism: index 0, in a chart made for every step.
 
-At (q0, t0) on the constraints, with U = phi_q(q0)', B = (U'U)^-1 and the columns of V an orthonormal
-basis of the tangent space, phi_q(q0) V = 0, positions and velocities near it are functions of as
-many numbers w, w' as there are degrees of freedom:
+At (q0, t0) on the constraints, with U = phi_q(q0)', B = (U'U)^-1 and the columns of V an
+orthonormal basis of the tangent space, phi_q(q0) V = 0, positions and velocities near it are
+functions of as many numbers w, w' as there are degrees of freedom:
 
     q  = q0 + V w - U u,    u with phi(q, t) = 0:            u  <- u + B phi
     q' = V w' - U s,        s with phi_q q' + phi_t = 0:     s  <- s + B (phi_q q' + phi_t)
@@ -172,7 +172,7 @@ class _Chart:
     @property
     def symbols(self) -> ca.SX:
         """All as one column."""
-        return ca.vertcat(self.q0, ca.vec(self.V), *self.phi_q.nonzeros(), self.lu)
+        return ca.vertcat(self.q0, ca.vec(self.V), _entries(self.phi_q), self.lu)
 
     def across(self, r: ca.SX) -> ca.SX:
         """U B r, column by column."""
@@ -208,6 +208,11 @@ def tangent(system: System) -> Tangent | None:
         ca.Function("lift", [reduced.y, data], [change]),
         _bend(system, data, rows, chart),
     )
+
+
+def _entries(matrix: ca.SX) -> ca.SX:
+    """The nonzeros as a column."""
+    return ca.vec(ca.SX(matrix.nz[:]))
 
 
 def _parts(y_c: ca.SX, rows: _Rows) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
@@ -298,25 +303,23 @@ def _slope(
     return ca.sparsify(ca.vertcat(rates, moved, ca.SX(t.numel(), y_c.numel())))
 
 
-def _open(
-    system: System, rows: _Rows, constraints: _Constraints, chart: _Chart
-) -> ca.Function:
+def _open(system: System, rows: _Rows, constraints: _Constraints, chart: _Chart) -> ca.Function:
     """The chart at y: its V projected onto the tangent space there and made orthonormal."""
     y, d, n = system.y, system.d, rows.n
     before = ca.SX.sym("before", n, rows.nv)
-    V = before - chart.across(chart.phi_q @ before)
+    projected = before - chart.across(chart.phi_q @ before)
     columns: list[ca.SX] = []
     for i in range(rows.nv):
-        v = V[:, i]
+        v = projected[:, i]
         for earlier in columns:
             v = v - earlier * ca.dot(earlier, v)
         columns.append(v / ca.sqrt(ca.dot(v, v)))
     turned = ca.Function("turned", [before, chart.phi_q, chart.lu], [ca.horzcat(*columns)])
     phi_q = constraints.slopes(y[:n], y[n : 2 * n], y[list(rows.time)], d)[0]
     lu = chart.factor(phi_q)
-    V = turned(ca.reshape(y[list(rows.basis)], n, rows.nv), phi_q, lu)
+    basis = turned(ca.reshape(y[list(rows.basis)], n, rows.nv), phi_q, lu)
     return ca.Function(
-        "open", [y, d], [ca.vertcat(d, y[:n], ca.vec(V), *phi_q.nonzeros(), lu)], {"cse": True}
+        "open", [y, d], [ca.vertcat(d, y[:n], ca.vec(basis), _entries(phi_q), lu)], {"cse": True}
     )
 
 

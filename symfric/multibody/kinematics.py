@@ -120,7 +120,8 @@ class Kinematics:
         link = self.topology.link_of.get(joint.name)
         if link is None:
             return self.relative(joint).w
-        return joint.subspace(self.q[link.rows, 0])[0] @ self.qd[link.rows, 0]
+        q, qd = self.q[link.rows, 0], self.qd[link.rows, 0]
+        return joint.pose(q)[0] @ (joint.subspace(q)[0] @ qd)
 
     def along(self, joint: Joint, direction: str) -> tuple[ca.SX, ca.SX]:
         """Displacement or angle of a joint in one of its `directions`, and its rate.
