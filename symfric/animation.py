@@ -99,12 +99,22 @@ def _film(
     figure: Figure, show: Callable[[int], None], count: int, fps: float, path: str | Path
 ) -> None:
     """Write a GIF or MP4."""
-    mp4 = Path(path).suffix.lower() == ".mp4"
-    writer: AbstractMovieWriter = FFMpegWriter(fps) if mp4 else PillowWriter(fps)  # type: ignore[arg-type]
-    with written(path) as temporary, writer.saving(figure, str(temporary), dpi=100):
+
+    def grab(writer: AbstractMovieWriter) -> None:
         for k in range(count):
             show(k)
             writer.grab_frame()
+
+    with written(path) as temporary:
+        if Path(path).suffix.lower() == ".mp4":
+            program = FFMpegWriter(fps)  # type: ignore[arg-type]
+            with program.saving(figure, str(temporary), dpi=100):
+                grab(program)
+        else:  # `saving` would put a film together even after an interrupt
+            film = PillowWriter(fps)  # type: ignore[arg-type]
+            film.setup(figure, str(temporary), dpi=100)
+            grab(film)
+            film.finish()
 
 
 def _page(figure: Figure, show: Callable[[int], None], count: int, fps: float) -> str:
@@ -206,7 +216,7 @@ def _legend(figure: Figure) -> None:
     ]
     flat = figure.get_layout_engine() is not None
     figure.legend(
-        handles=entries, loc="outside lower right" if flat else "lower right", ncols=2,
+        handles=entries, loc="outside lower right" if flat else "upper right", ncols=2,
         frameon=False, fontsize="small", handletextpad=0.2,
     )  # fmt: skip
 

@@ -3,7 +3,7 @@
 from symfric.model import Model
 
 CONSTRAINTS = "constraints"
-NORMS = ("phi", "phi_dot", "phi_ddot")
+NORMS = ("constraint_position", "constraint_velocity", "constraint_acceleration")
 """Norms of the constraints on positions, velocities and accelerations."""
 ENDINGS = {"_N": "normal force", "_friction": "friction", "_power": "friction"}
 

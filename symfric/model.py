@@ -84,6 +84,9 @@ class Holonomic:
         index: 0 has it integrated in the tangent space of its constraints, in as many unknowns as
             there are degrees of freedom; 1 in all coordinates, which are put back onto the
             constraints at the end of every step. The solution is the same, to the tolerance.
+        pressing: SX (k, 1), normal forces over their typical size, which must not be negative.
+        pressed: what they are, in words.
+        advice: what to try where friction and reactions have no solution; may be empty.
     """
 
     n: int
@@ -91,6 +94,9 @@ class Holonomic:
     a: ca.SX
     implicit: ca.SX
     index: int = 1
+    pressing: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    pressed: tuple[str, ...] = ()
+    advice: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -105,8 +105,7 @@ def _grouped(trajectories: "Mapping[str, Trajectory]", shown: Sequence[str]) -> 
             for style, trajectory in zip(
                 ("-", "--", ":", "-."), trajectories.values(), strict=False
             ):
-                label = f"|{name}|" if title == CONSTRAINTS else name
-                label = label if style == "-" else None
+                label = name if style == "-" else None
                 dots = title == CONSTRAINTS
                 axis.plot(
                     trajectory.t, trajectory[name], "." if dots else style, color=f"C{k % 10}",

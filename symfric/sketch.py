@@ -32,10 +32,10 @@ class Mark:
 
     Attributes:
         kind: "revolute", "prismatic", ..., "distance", "spring", "damper".
-        a, b: indices of the places on parent and child.
+        a, b: indices of its two places; the first is on the ground if one is.
         slips: name of the sliding velocity of each contact and the velocity [m/s] below which it
             counts as sticking.
-        grounded: whether `a` does not move.
+        grounded: whether one is.
     """
 
     name: str

@@ -20,6 +20,9 @@ ELEVATION, AZIMUTH = 22.0, -58.0
 UPRIGHT = 0.99
 """Component of the view along z beyond which z is no direction on the picture."""
 SLIDING = ("prismatic", "cylindrical")
+ANCHORED = ("revolute", "spherical", "universal", "fixed", "pointonline", "distance", "spring",
+            "damper")  # fmt: skip
+"""What shows where it hangs on the ground."""
 MARKERS = {"revolute": "o", "prismatic": "s", "cylindrical": "s", "spherical": "o",
            "universal": "o", "planar": "D", "fixed": "s", "pointonline": "o"}  # fmt: skip
 
@@ -176,7 +179,7 @@ def _behind(mark: Mark, poses: Poses, view: View) -> Iterator[Stroke]:
         yield Stroke("rod" if mark.kind == "distance" else "damper", np.stack([a, b]))
     elif mark.kind == "spring":
         yield Stroke("spring", _zigzag(a, b, view))
-    if mark.grounded and mark.kind not in SLIDING:
+    if mark.grounded and mark.kind in ANCHORED:
         yield Stroke("anchor", a[None])
 
 

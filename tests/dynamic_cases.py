@@ -34,9 +34,7 @@ DYNAMIC: dict[str, Law] = {
 
 SETTLED = {
     "gonthier": 6e-3,
-    "bristle_2d": 0.2,
-    "bristle_2d, kappa 0.2": 2.0,
-    "stick_slip": 1e-3,
-    "stick_slip, published": 1e-3,
+    "bristle_2d": 1e-6,
+    "bristle_2d, kappa 0.2": 1e-6,
 }
 """Speed [m/s] from which the steady state of a law is exact, as its docstring says."""

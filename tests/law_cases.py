@@ -75,13 +75,11 @@ def state_symbols(law: Law) -> ca.SX:
     return ca.vertcat(ca.SX(0, 1), *(ca.SX.sym(s.name) for s in law.states))
 
 
-def has_exact_step(law: Law) -> bool:
-    """Whether force and rate are affine in the states, each state alone in its rate, no modes."""
-    v, N, z = ca.SX.sym("v"), ca.SX.sym("N"), state_symbols(law)
-    slope = ca.jacobian(ca.SX(law.rate(v, N, z)), z)
-    slopes = ca.veccat(slope, ca.jacobian(ca.SX(law.force(v, N, z)), z))
-    affine = not ca.depends_on(slopes, z) and slope.sparsity().is_diag()
-    return affine and not law.switches(v, N, z)
+NO_STEP = {
+    *("leuven", "gms", "bristle_2d", "bristle_2d, kappa 0.2", "armstrong"),
+    *("exact_coulomb", "karnopp, event", "leine_switch, event"),
+}
+"""Cases that cannot be C, see the tests of `law_block`."""
 
 
 EXAMPLE_INPUTS = {

@@ -17,6 +17,15 @@ SMALL = """<robot name="small">
 """A rod on a hinge with friction and damping."""
 
 
+def rod(**changes: str) -> str:
+    """The rod with some of its text replaced."""
+    text = SMALL
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    return text
+
+
 def numbers(values: object) -> str:
     """Texts that read back as the same numbers."""
     return " ".join(repr(float(x)) for x in np.atleast_1d(np.asarray(values)))

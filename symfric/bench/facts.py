@@ -154,7 +154,10 @@ def norms(formulations: tuple[str, ...] = ("joint", "absolute")) -> list[NormRow
             rates = _largest(run, [v.name for v in model.x if v.name.endswith("_rate")])
             steepest = max(float(np.abs(np.gradient(run[n], run.t)).max()) for n in rates)
             fastest = max(rates.values())
-            phi, phi_dot, phi_ddot = (float(run[n].max()) for n in ("phi", "phi_dot", "phi_ddot"))
+            phi, phi_dot, phi_ddot = (
+                float(run[n].max())
+                for n in ("constraint_position", "constraint_velocity", "constraint_acceleration")
+            )
             rows.append(NormRow(case, formulation, phi, phi_dot / fastest, phi_ddot / steepest))
     return rows
 

@@ -22,9 +22,10 @@ from symfric.cli.options import (
 from symfric.figures.scene import DEFAULT_INPUT, DEFAULT_T_END
 from symfric.integrator import Input
 from symfric.integrator.inputs import Sampled
+from symfric.kinds import is_mechanism, kinds, norms
 from symfric.multibody.urdf import relative
 from symfric.parameters import check_names
-from symfric.scenes import ALL_SCENES, Robot, Scene
+from symfric.scenes import ALL_SCENES, MECHANISMS, Robot, Scene
 
 ROBOT_T_END = 2.0
 """Time [s] that shows how a robot moves."""
@@ -67,7 +68,9 @@ def run(
     ] = "auto",
     backend: Annotated[
         str,
-        typer.Option("--backend", help="auto, vm, compiled, or CasADi's rosenbrock, sundials, ggl."),
+        typer.Option(
+            "--backend", help="auto, vm, compiled, or CasADi's rosenbrock, sundials, ggl."
+        ),
     ] = "auto",
     samples: Annotated[
         int, typer.Option("--samples", help="Number of equally spaced times of the result.")
@@ -76,6 +79,10 @@ def run(
         Path | None, typer.Option("--out", metavar="FILE.csv", help="Write the signals.")
     ] = None,
     plot: PlotOption = None,
+    movie: Annotated[
+        Path | None,
+        typer.Option("--animate", metavar="FILE.gif", help="Film a mechanism: .gif, .html, .mp4."),
+    ] = None,
     json: JsonOption = None,
 ) -> None:
     """Simulate SCENE with a friction law.
@@ -89,11 +96,13 @@ def run(
     Example: symfric run arm.urdf --law lugre --x0 elbow=0.3 --input tau_elbow=2 --out arm.csv
     """
     kind_of(scene)
-    if len(law) > 1 and (out or json):
+    if len(law) > 1 and (out or json or movie):
         raise ValueError(
-            f"--out and --json: expected one --law, got {len(law)}; compare several with --plot"
+            f"--out, --json and --animate: expected one --law, got {len(law)}; compare several "
+            "with --plot"
         )
-    check_outputs(out, json, picture=plot)
+    check_outputs(out, json, movie, picture=plot)
+    check_movie(movie, scene)
     machines = scenes_with(scene, law, numbers("--set", settings))
     signals, described = _inputs(scene, inputs)
     until = _default_t_end(scene, signals) if t_end is None else t_end
@@ -119,12 +128,15 @@ def run(
         from symfric.plotting import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
 
         plot_trajectories(found, path=plot)
+    if movie:
+        with output.progress(f"{movie}") as tell:
+            next(iter(found.values())).animate(movie, progress=tell)
     for name, trajectory in found.items():
         output.emit_json(to_dict(name, machines[name], trajectory) | {"inputs": described}, json)
         if json != "-":
             show_trajectory(name, trajectory)
             show_warnings(name, machines[name])
-    output.say_written(out, plot, json)
+    output.say_written(out, plot, movie, json)
     for trajectory in found.values():
         if not trajectory.status.ok:
             raise SolveError(trajectory.message, trajectory.status, trajectory)
@@ -160,6 +172,21 @@ def scenes_with(scene: str, laws: list[str], values: dict[str, float]) -> dict[s
     }
 
 
+def check_movie(path: Path | None, scene: str) -> None:
+    """Refuse a film that cannot be made, before any work is spent on it.
+
+    Raises:
+        ValueError: a scene without bodies, or a kind of file that is not written.
+    """
+    if path is None:
+        return
+    if scene not in MECHANISMS and not scene.endswith(".urdf"):
+        raise ValueError(f"--animate: expected one of {', '.join(MECHANISMS)}, got {scene}")
+    from symfric.animation import check_format  # noqa: PLC0415  (matplotlib is slow)
+
+    check_format(path)
+
+
 def _inputs(scene: str, texts: list[str] | None) -> tuple[dict[str, Input], dict[str, str]]:
     """Inputs by name, and the texts that describe them."""
     given = assignments("--input", texts)
@@ -178,6 +205,10 @@ def _default_t_end(scene: str, signals: dict[str, Input]) -> float:
 
 def to_dict(law: str, scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
     """What `--json` holds."""
+    books: dict[str, Any] = {}
+    if is_mechanism(trajectory.model):
+        books["energy_balance"] = trajectory.energy_balance().to_dict()
+        books["constraints"] = largest_norms(trajectory)
     return {
         "scene": trajectory.scene,
         "law": law,
@@ -187,7 +218,12 @@ def to_dict(law: str, scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
         "statistics": trajectory.statistics.to_dict(),
         "t_end": float(trajectory.t[-1]),
         "final": trajectory.final,
-    }
+    } | books
+
+
+def largest_norms(trajectory: Trajectory) -> dict[str, float]:
+    """The largest violation of the constraints on each level."""
+    return {name: float(trajectory[name].max()) for name in norms(trajectory.model)}
 
 
 def show_warnings(law: str, scene: Scene) -> None:
@@ -198,19 +234,50 @@ def show_warnings(law: str, scene: Scene) -> None:
             output.show(f"Warning: {law}: {warning}.\n")
 
 
+TABLE = ("position", "rate", "normal force", "friction", "energy")
+"""Kinds of signals of a mechanism that the table shows; --out and --json have all."""
+
+
 def show_trajectory(law: str, trajectory: Trajectory) -> None:
-    """Print the range of every signal, how the simulation ended and what it cost."""
-    s = trajectory.statistics
+    """Print the range of every signal, how the simulation ended and what it cost.
+
+    Of mechanisms the table has what matters, and the books of constraints and energy follow.
+    """
+    s, names = trajectory.statistics, list(trajectory.units)
+    mechanism = is_mechanism(trajectory.model)
+    if mechanism:
+        kind = kinds(trajectory.model)
+        names = [n for n in names if kind.get(n) in TABLE and trajectory.units[n] != "W"]
     output.show_table(
         ["signal", "final", "least", "greatest", "unit"],
         [
             (name, float(y[-1]), float(y.min()), float(y.max()), trajectory.units[name])
-            for name, y in trajectory.signals.items()
+            for name, y in ((name, trajectory[name]) for name in names)
         ],
         title=f"{trajectory.scene} with {law}, 0 ... {trajectory.t[-1]:g} s",
     )
+    if mechanism:
+        show_books(trajectory)
     output.show(
         f"{trajectory.message}\n{s.method} ({s.backend}): {s.steps} steps, "
         f"{s.rejections} rejected, built in {s.build_time + s.compile_time:.2f} s, "
         f"run in {s.run_time:.2f} s\n"
+    )
+
+
+def show_books(trajectory: Trajectory) -> None:
+    """Print how well the constraints hold, and where the energy went."""
+    levels = largest_norms(trajectory)
+    if levels:
+        text = ", ".join(
+            f"{name.removeprefix('constraint_')} {x:.1e} {trajectory.units[name]}".rstrip()
+            for name, x in levels.items()
+        )
+        output.show(f"Constraints hold to: {text}")
+    balance = trajectory.energy_balance()
+    work = "".join(f", {name} {w[-1]:+.6g} J" for name, w in balance.work.items() if w.any())
+    output.show(
+        f"Energy: {balance.energy[0]:.6g} -> {balance.energy[-1]:.6g} J{work}; "
+        f"unexplained at most {np.abs(balance.defect).max():.1e} J "
+        f"({balance.relative:.1e} of what moved)"
     )

@@ -1,4 +1,4 @@
-"""A friction law as a block: one stateless function, or a step that is exact for held inputs."""
+"""A friction law as a block: one stateless function, or a step of its states for held inputs."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
@@ -9,8 +9,7 @@ import casadi as ca
 
 from symfric.codegen.block import Block
 from symfric.codegen.folding import runtime_parameters
-from symfric.codegen.graph import LEAVES, graph, rebuild
-from symfric.integrator.exponential import phi1_phi2
+from symfric.codegen.held_step import force_of_rate, held_step
 from symfric.laws import Law, law_name
 from symfric.model import Output, Variables, finite
 from symfric.numeric import is_casadi
@@ -32,16 +31,21 @@ def law_block(
 ) -> Block:
     """The discrete-time block of `law` with inputs v, N, those of the law, and output F.
 
-    A law without states becomes F(v, N). The rate of a law with states must be affine in each of
-    them by itself, dz/dt = a(v, N) - lambda(v, N) z; then the step is exact for v and N held over
-    it, however large lambda h is (for LuGre that is sigma_0 |v| h / g, often far above 2, where
-    explicit Euler diverges):
+    A law without states becomes F(v, N). A law with states makes a step with v and N held, however
+    large its rates times h are (for LuGre sigma_0 |v| h / g is often far above 2, where explicit
+    Euler diverges). Where the rates are affine in the states, each by itself,
+    dz/dt = a(v, N) - lambda(v, N) z, the step is exact:
 
         phi1(x) = (exp(x) - 1) / x,   phi2(x) = (phi1(x) - 1) / x,   x = -lambda h
         r  = phi1(x) (a - lambda z)          mean rate over the step
         z+ = z + h r
         zm = z + h phi2(x) (a - lambda z)    mean state over the step
         F  = force(v, N, zm)                 mean force over the step, with r for the rate in it
+
+    Otherwise (elasto-plastic, Bouc-Wen, Maxwell-slip, Dahl's law with n != 1 and others) lambda is
+    the derivative at z and the step ends at the place of rest, if it gets there: of second order,
+    and bounded for every h. So is the force where it is not affine in the states. The event forms
+    of Maxwell-slip, reset integrator and GMS know their steps exactly.
 
     F h is the impulse and F v h the work of the step. The bristle damping sees r = (z+ - z) / h,
     which is bounded by the bristle's travel, and not the rate at one instant, which after a jump is
@@ -61,8 +65,10 @@ def law_block(
 
     Raises:
         ValueError: symbols in the law; names in `free` that are unknown, repeated or without
-            effect; a rate that is not affine in the states (Dahl's law with n != 1) or couples
-            them; a force that is not finite at rest (a smoothing width of 0 left variable).
+            effect; states that act on each other in a circle (Leuven, smooth GMS, 2-D bristle) or
+            are not affine and depend on others (Armstrong); modes that follow zero crossings of v
+            within the step (exact Coulomb, Karnopp and Leine by events); a force that is not finite
+            at rest (a smoothing width of 0 left variable).
     """
     where = f"codegen '{law_name(law)}'"
     known = parameters(law)
@@ -121,57 +127,39 @@ def _step(law: Law, runtime: Variables, h: float | None, where: str) -> Block:
     z = ca.vertcat(*(state.symbol for state in states))
     given = _given(inputs)
     rate = ca.SX(law.rate(v.symbol, N.symbol, z, **given))
-    phi1, phi2 = phi1_phi2(duration * _decay(rate, z, where))
-    mean_rate = phi1 * rate
-    mean_state = z + duration * (phi2 * rate)
-    force, r = _force_of_rate(ca.SX(law.force(v.symbol, N.symbol, z, **given)), rate, z, where)
-    mean_force = ca.substitute(force, ca.vertcat(z, r), ca.vertcat(mean_state, mean_rate))
+    end, mean, mean_rate = _advanced(law, inputs, z, rate, duration, where)
+    force, r = force_of_rate(ca.SX(law.force(v.symbol, N.symbol, z, **given)), rate, z)
+    mean_force = ca.substitute(force, ca.vertcat(z, r), ca.vertcat(mean, mean_rate))
     return Block(
         "F",
         states=states,
         inputs=inputs,
         parameters=runtime + ((size,) if h is None else ()),
-        next=z + duration * mean_rate,
+        next=end,
         outputs={"F": Output(mean_force, "N", FORCE + ", mean over the step")},
         resets={"init_sliding": (ca.SX(law.steady_state(v.symbol, N.symbol)), SLIDING)},
         constants={} if h is None else {"h": float(h)},
     )
 
 
-def _decay(rate: ca.SX, z: ca.SX, where: str) -> ca.SX:
-    """Derivative of the rates by z, of uncoupled affine states, as a column."""
-    jacobian = ca.jacobian(rate, z)
-    if ca.depends_on(jacobian, z):
+def _advanced(
+    law: Law, inputs: Variables, z: ca.SX, rate: ca.SX, h: ca.SX | float, where: str
+) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """States at the end of the step, their means, and their mean rates."""
+    v, N, given = inputs[0].symbol, inputs[1].symbol, _given(inputs)
+    known = law.held_step(v, N, z, h)
+    if known is not None:
+        end, mean = map(ca.SX, known)
+        return end, mean, (end - z) / h
+    if law.switches(v, N, z, **given):
         raise ValueError(
-            f"{where}: expected rates affine in the states, so that the step is exact, got rates "
-            "that are not (such as Dahl's law with n != 1); simulate it with smaller steps instead"
+            f"{where}: expected a law without modes, or one that knows its step, got one whose "
+            "modes follow zero crossings within the step; karnopp and leine_switch with "
+            "form = 'original' are functions of v, N and F_e"
         )
-    if not jacobian.sparsity().is_diag():
-        raise ValueError(
-            f"{where}: expected states that do not act on each other, got coupled ones"
-        )
-    return ca.densify(ca.diag(jacobian))
-
-
-def _force_of_rate(force: ca.SX, rate: ca.SX, z: ca.SX, where: str) -> tuple[ca.SX, ca.SX]:
-    """The force with symbols r for the rates that occur in it, and r.
-
-    Its mean is then taken at the mean rates and not at the rates of the mean state, which are equal
-    but, in float at high velocities, the difference of two large numbers.
-    """
-    r = ca.SX.sym("r", rate.numel())
-    others = ca.veccat(*(s for s in ca.symvar(ca.vertcat(force, rate)) if not ca.depends_on(z, s)))
-    source = graph(ca.Function("law", [z, others], [ca.densify(rate), ca.densify(force)]))
-    rates = {
-        number: r[i]
-        for i, number in enumerate(source.results[0])
-        if source.nodes[number].op not in LEAVES
-    }
-    force = rebuild(source, [z, others], rates)[1]
-    unknowns = ca.vertcat(z, r)
-    if ca.depends_on(ca.jacobian(force, unknowns), unknowns):
-        raise ValueError(f"{where}: expected a force affine in the states, got one that is not")
-    return force, r
+    rest = ca.SX(law.steady_state(v, N))
+    end, mean, mean_rate = held_step(rate, z, h, rest, where)
+    return end, mean, mean_rate
 
 
 def _check_at_rest(block: Block, where: str) -> None:

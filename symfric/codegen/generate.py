@@ -70,7 +70,7 @@ def generate(
         free: parameters that stay variable at run time; default see `runtime_parameters`.
 
     Raises:
-        ValueError: bad input, a law whose step is not exact, an operation that C99 lacks, a
+        ValueError: bad input, a law that has no step, an operation that C99 lacks, a
             constant outside the range of float.
     """
     names = (real,) if isinstance(real, str) else tuple(dict.fromkeys(real))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from symfric.integrator.blocks import blocks
 from symfric.integrator.initial import consistent
 from symfric.integrator.integrator import Integrator
-from symfric.integrator.manifold import jammed, singular
+from symfric.integrator.manifold import grows, pulls, singular
 from symfric.integrator.system import System
 from symfric.status import Status
 
@@ -27,16 +27,24 @@ def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> t
         (Status.STEP_TOO_SMALL, _unbounded(system, y, f, h)),
         (Status.NOT_FINITE, _not_finite(integrator, y, d, h)),
         (Status.NOT_FINITE, _steep(system, y, d)),
+        (Status.JAMMED, _pulled(system, y, d)),
         (Status.SINGULAR, _singular(integrator, y, d, h)),
     ):
         if cause:
-            return status, f"{where}: {cause}"
+            helps = status is Status.JAMMED or "algebraic equations" in cause
+            return status, f"{where}: {cause}{_advice(integrator) if helps else ''}"
     fastest = system.names[int(np.argmax(np.abs(f[: system.nx]) / system.nominal))]
     return (
         Status.STEP_TOO_SMALL,
         f"{where}: the step fell to {h:.1e} s, fastest equation {fastest}; a discontinuity is "
-        "near, give the law a smooth form or the model an event there",
+        "near, give the law a smooth form or the model an event there" + _advice(integrator),
     )
+
+
+def _advice(integrator: Integrator) -> str:
+    """What a mechanism says about friction without a solution."""
+    mechanics = integrator.model.holonomic
+    return f"; {mechanics.advice}" if mechanics is not None and mechanics.advice else ""
 
 
 def _dead_centre(system: System, y: Array, d: Array) -> str:
@@ -50,10 +58,15 @@ def _jammed(integrator: Integrator, y: Array, d: Array) -> str:
     manifold = integrator.system.manifold
     if manifold is None:
         return ""
-    cause = jammed(manifold, integrator.system.names, y, d, NEARLY)
+    cause = grows(manifold, integrator.system.names, y, d, NEARLY)
     for variable in integrator.model.z:
         cause = cause.replace(f"through {variable.name}:", f"through the {variable.doc}:")
     return cause
+
+
+def _pulled(system: System, y: Array, d: Array) -> str:
+    """Normal forces that are about to be negative."""
+    return "" if system.manifold is None else pulls(system.manifold, y, d, NEARLY)
 
 
 def _unbounded(system: System, y: Array, f: Array, h: float) -> str:

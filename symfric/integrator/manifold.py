@@ -27,6 +27,8 @@ from symfric.model import Holonomic, Model
 Array = NDArray[np.float64]
 DEPENDENT = 1e-5
 """Ratio of singular values of phi_q at which a mechanism that cannot go on is called singular."""
+PULLING = 1e-3
+"""Negative normal forces up to this times their typical size are errors of a step."""
 ITERATIONS = 4
 """Of Newton's method with frozen derivatives: from 1e-3 to 1e-13."""
 
@@ -45,6 +47,8 @@ class Manifold:
             are accelerations, multipliers, normal forces, in this order after the states.
         basis: where y holds V, a basis of the tangent space, column by column.
         slope: (y, d) -> derivatives of the algebraic equations by the algebraic unknowns.
+        pressing: (y, d) -> normal forces over their typical size, which must not be negative.
+        pressed: what they are, in words.
     """
 
     project: ca.Function
@@ -55,6 +59,8 @@ class Manifold:
     first: int
     basis: range
     slope: ca.Function
+    pressing: ca.Function
+    pressed: tuple[str, ...]
 
     @property
     def charted(self) -> bool:
@@ -91,8 +97,15 @@ def _of_basis(mechanics: Holonomic) -> int:
     return n * (n - m) if m and mechanics.index == 0 else 0
 
 
-def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX) -> Manifold:
-    """The constraints of a holonomic model as Functions of the unknowns of its system."""
+def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
+    """The constraints of a holonomic model as Functions of the unknowns of its system.
+
+    Args:
+        model: its equations.
+        y, d: unknowns and constants of a run.
+        f: right-hand sides.
+        u: inputs in terms of y and d.
+    """
     mechanics = model.holonomic
     if mechanics is None:
         raise ValueError(f"model '{model.name}': expected a holonomic model")
@@ -114,6 +127,8 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX) -> Manifold:
         lu = factorise(slope(column, d), (range(n), range(n, n + m)))
         step = ca.substitute(lu.solve(implicit(column, d)), lu.packed_symbol, lu.packed)
         column = ca.vertcat(column[:nx], column[algebraic] - step, column[algebraic[-1] + 1 :, 0])
+    pressing = ca.substitute(mechanics.pressing, model.vector("u"), u)
+    passable = regular * whole.sign()
     return Manifold(
         project,
         ca.Function("refine", [y, d], [column], {"cse": True}),
@@ -123,6 +138,8 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX) -> Manifold:
         nx,
         range(algebraic[-1] + 1, algebraic[-1] + 1 + _of_basis(mechanics)),
         slope,
+        ca.Function("pressing", [y, d], [pressing]),
+        mechanics.pressed,
     )
 
 
@@ -142,7 +159,25 @@ def _projected(at: ca.Function, q: ca.SX, qd: ca.SX, d: ca.SX) -> tuple[ca.SX, c
 
 
 def jammed(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array, margin: float) -> str:
-    """What jams at y, in words; empty where det(I - dN/dN) > margin."""
+    """What jams or pulls at y, in words; empty where det(I - dN/dN) > margin and N > 0."""
+    return grows(manifold, names, y, d, margin) or pulls(manifold, y, d, margin)
+
+
+def pulls(manifold: Manifold, y: Array, d: Array, margin: float) -> str:
+    """Normal forces that are negative; with a margin those that have almost vanished, too."""
+    limit = PULLING if margin > 0.0 else -PULLING
+    values = manifold.pressing(y, d).full().ravel()
+    for share, what in zip(values, manifold.pressed, strict=True):
+        if share < limit:
+            return (
+                f"the {what} falls below zero ({share:.3g} times its typical size): it would "
+                "pull, and its friction would drive"
+            )
+    return ""
+
+
+def grows(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array, margin: float) -> str:
+    """Normal forces that grow with the friction that they cause."""
     A, k = manifold.slope(y, d).full(), manifold.n + manifold.m
     if A.shape[0] == k or not np.isfinite(A).all():
         return ""

@@ -17,6 +17,7 @@ import casadi as ca
 import numpy as np
 
 from symfric.integrator.blocks import signs
+from symfric.integrator.manifold import PULLING
 from symfric.integrator.method import Method, Trial, Trials
 from symfric.integrator.system import System
 from symfric.integrator.tangent import tangent
@@ -63,7 +64,8 @@ def obstacles(system: System, method: Method) -> Callable[[Any, Any, Any], Any] 
     Breaking away would be missed without a sign of it: where a contact turns unstable, a long step
     stays on the solution that sticks, and estimates no error; `signs` tells. And where the loop
     from normal forces over friction to reactions and back, det(I - dN/dN), is negative, friction
-    has jammed: that solution is none of the machine. Mechanisms without friction have neither.
+    has jammed: that solution is none of the machine, nor is one where a bearing pulls. Mechanisms
+    without friction have none of this.
     """
     gamma, manifold, chart = method.diagonal, system.manifold, tangent(system)
     if gamma is None or (manifold is not None and not system.rubs):
@@ -71,14 +73,16 @@ def obstacles(system: System, method: Method) -> Callable[[Any, Any, Any], Any] 
     both = signs(system if chart is None else chart.reduced, gamma)
 
     def sign(y: Any, h: Any, d: Any) -> Any:
+        here, data = y, d
         if chart is not None:
-            d = chart.open(y, d)
-            y = chart.enter(y, d)
-        own, tiny = both(y, h, d)
+            data = chart.open(y, d)
+            here = chart.enter(y, data)
+        own, tiny = both(here, h, data)
         if manifold is None:
             return own * tiny
         # with a definite mass matrix and no friction, that of n accelerations is (-1)^n
-        return ca.fmin(own * tiny, (-1) ** manifold.n * tiny)
+        signs_of = [own * tiny, (-1) ** manifold.n * tiny]
+        return ca.mmin(ca.vertcat(*signs_of, manifold.pressing(y, d) + PULLING))
 
     return sign
 

@@ -128,7 +128,7 @@ def system(model: Model, inputs: Drivers) -> System:
         model.nominal("x"),
         ca.substitute(monitors, model.vector("u"), inputs.expression),
         np.array([nominal for _, nominal in watched], dtype=float),
-        manifold(model, unknowns, d, f) if mechanics else None,
+        manifold(model, unknowns, d, f, inputs.expression) if mechanics else None,
         ((*own, *range(nx, nx + n)), tuple(range(nx + n, nx + n + m))),
         rubs=bool(model.monitors),
     )

@@ -142,6 +142,13 @@ class Law(Parametric, ABC):
         """The changes of mode; none for a law whose rate says it all."""
         return ()
 
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """States after a step of `h` [s] with v and N held, and their means over it.
+
+        None where they are not known in closed form; for laws with modes, whose rates do not say.
+        """
+        return None
+
     def warnings(self) -> tuple[str, ...]:
         """What the present numbers give away, such as passivity, one sentence each."""
         return ()

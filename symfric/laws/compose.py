@@ -174,6 +174,10 @@ class Asymmetric(Law):
         """The changes of mode of the law."""
         return self._at(v).switches(v, N, z, **inputs)
 
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """That of the law."""
+        return self._at(v).held_step(v, N, z, h)
+
     def warnings(self) -> tuple[str, ...]:
         """Those of the law."""
         return self.positive.warnings() + self.negative.warnings()
@@ -241,6 +245,10 @@ class LoadDependent(Law):
     ) -> tuple[Switch, ...]:
         """The changes of mode of the law."""
         return self.law.switches(v, self._load(N), z, **inputs)
+
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """That of the law."""
+        return self.law.held_step(v, self._load(N), z, h)
 
     def warnings(self) -> tuple[str, ...]:
         """Those of the law."""

@@ -19,6 +19,8 @@ class Lagged(Law):
     Gives frictional lag to any static law: while the velocity rises the force is that of a lower
     velocity, and after a reversal it keeps its sign for about tau_L, so it may push for an instant.
     Limits: the law itself for v that changes slowly against tau_L; tau_L of bearings 1 to 50 ms.
+    As C in float the force is as uncertain as w, 1e-7 of the largest velocity: use double where
+    that is not small against the smoothing velocity.
     Source: Hess and Soom, ASME J. Tribol. 112(1), 1990 (pure delay); first-order form constructed.
     """
 
@@ -140,6 +142,10 @@ class TemperatureDependent(Law):
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Steady states of the law."""
         return self.at_temperature().steady_state(v, N)
+
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """That of the law."""
+        return self.at_temperature().held_step(v, N, z, h)
 
     def warnings(self) -> tuple[str, ...]:
         """Those of the law at this temperature."""

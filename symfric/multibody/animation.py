@@ -41,9 +41,8 @@ def sketch(
         columns.append(_centre(eq.kin, name))
     marks = [_joint(eq, joint, used, scales) for joint in joints]
     for force in drawn:
-        elastic = not equals(force.stiffness, 0.0)
-        marks.append(Mark(force.name, "spring" if elastic else "damper", used[force.a],
-                          used[force.b]))  # fmt: skip
+        kind = "damper" if equals(force.stiffness, 0.0) else "spring"
+        marks.append(_mark(force.name, kind, (force.a, force.b), used))
     return Sketch(ca.horzcat(*columns), tuple(parts), tuple(marks))
 
 
@@ -53,8 +52,22 @@ def _joint(eq: Equations, joint: Joint, used: dict[str, int], scales: Mapping[st
         for c in eq.contacts
         if c.joint == joint.name and c.name in scales
     )
-    kind, grounded = type(joint).__name__.lower(), body_of(joint.parent) == GROUND
-    return Mark(joint.name, kind, used[joint.parent], used[joint.child], slips, grounded)
+    return _mark(joint.name, type(joint).__name__.lower(), (joint.parent, joint.child), used, slips)
+
+
+def _mark(
+    name: str,
+    kind: str,
+    ends: tuple[str, str],
+    used: dict[str, int],
+    slips: tuple[tuple[str, float], ...] = (),
+) -> Mark:
+    """A mark whose first end is on the ground, if one is."""
+    grounded = GROUND in (body_of(end) for end in ends)
+    # the axes of a universal joint belong one to each end, which are at one point anyway
+    if grounded and body_of(ends[0]) != GROUND and kind != "universal":
+        ends = ends[1], ends[0]
+    return Mark(name, kind, used[ends[0]], used[ends[1]], slips, grounded)
 
 
 def _frame(kin: Kinematics, place: str) -> ca.SX:

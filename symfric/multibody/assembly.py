@@ -26,6 +26,7 @@ from symfric.multibody.joints import Free
 from symfric.multibody.results import Put
 from symfric.multibody.spatial import euler_e
 from symfric.multibody.topology import Topology
+from symfric.numeric import is_symbolic
 from symfric.parameters import Variable
 from symfric.sketch import Sketch
 
@@ -78,6 +79,13 @@ def depends_on_load(law: Law) -> bool:
     N, z = ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
     v = ca.SX.sym("v")
     return ca.depends_on(ca.vertcat(law.force(v, N, z), law.rate(v, N, z)), N)
+
+
+def keeps_deflection(law: Law) -> bool:
+    """Whether bristles deflect with the load, and the force at given deflection varies with it."""
+    N, z, v = ca.SX.sym("N"), ca.SX.sym("z", len(law.states)), ca.SX.sym("v")
+    slope = ca.jacobian(ca.SX(law.force(v, N, z)), N)
+    return ca.depends_on(slope, z) and ca.depends_on(ca.SX(law.steady_state(v, N)), N)
 
 
 def solve_mass(eq: Equations, right: ca.SX) -> ca.SX:
@@ -149,8 +157,15 @@ def assemble(
         index: 0 or 1, see `Holonomic`.
     """
     contacts = slips(eq, guess["N"].tolist())
+    units = {label: part.unit for part in eq.held for label in part.labels}
     multipliers = tuple(
-        Variable(label, "", start=float(x), nominal=max(1.0, abs(float(x))), doc="multiplier")
+        Variable(
+            label,
+            units.get(label, ""),
+            start=float(x),
+            nominal=max(1.0, abs(float(x))),
+            doc="multiplier",
+        )
         for label, x in zip(labels, guess["lam"], strict=True)
     )
     pressed = [s for s in contacts if s.unknown]
@@ -188,7 +203,14 @@ def assemble(
         t=eq.kin.t,
         details=lambda: more[0](p_column, put),
         sketch=lambda: more[1](names),
-        holonomic=Holonomic(eq.n, eq.phi, eq.a, ca.vertcat(balance, algebraic), index),
+        holonomic=Holonomic(
+            eq.n,
+            eq.phi,
+            eq.a,
+            ca.vertcat(balance, algebraic),
+            index,
+            *_pressing(contacts, ca.vertcat(eq.a, before)),
+        ),
     )
 
 
@@ -198,6 +220,29 @@ def _scale(slip: Slip, p: Variables) -> float:
     values = ca.vertcat(NONE, *(v.start for v in p))
     law = slip.contact.friction.law
     return float(ca.DM(ca.substitute(ca.SX(law.velocity_scale), symbols, ca.SX(values))))
+
+
+def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[str, ...], str]:
+    """Normal forces that could turn negative, what they are, and what to try where none fits.
+
+    Those are the unknown ones, and those that inputs or parameters give; a sum of absolute values
+    of reactions that no law asks for cannot.
+    """
+    values, words, advice = [NONE], list[str](), list[str]()
+    for s in contacts:
+        friction, joint = s.contact.friction, s.contact.joint
+        law = type(friction.law).__name__
+        given = is_symbolic(friction.normal) or is_symbolic(friction.preload)
+        if s.unknown or (given and not ca.depends_on(s.N, reactive)):
+            values.append(s.N / (s.unknown[0].nominal if s.unknown else 1.0))
+            words.append(f"normal force of joint '{joint}' with {law}")
+        if s.unknown and keeps_deflection(friction.law):
+            advice.append(
+                f"bristles of {law} in joint '{joint}' keep the deflection of a larger load, and "
+                "their damping then grows without bound as the load falls: lugre_normalised, "
+                "whose deflection does not depend on the load, goes on (so do dahl and sigma_1 = 0)"
+            )
+    return ca.vertcat(*values), tuple(words), "; ".join(dict.fromkeys(advice))
 
 
 def _switches(slip: Slip, qd: Variables) -> tuple[Event, ...]:
@@ -229,7 +274,11 @@ def _sizes(slip: Slip) -> tuple[ca.SX, ca.SX]:
 def _outputs(eq: Equations, contacts: Sequence[Slip], put: Put) -> dict[str, Output]:
     """Results of the contacts, energies, and what is left of the constraints."""
     found: dict[str, Output] = {}
-    norms = (("phi", eq.phi, "m"), ("phi_dot", eq.phi_dot, "m/s"), ("phi_ddot", eq.phi_ddot, ""))
+    norms = (
+        ("constraint_position", eq.phi, "m"),
+        ("constraint_velocity", eq.phi_dot, "m/s"),
+        ("constraint_acceleration", eq.phi_ddot, ""),
+    )
     expressions = put([*(s.normal for s in contacts), *(x for _, x, _ in norms)])
     for slip, normal in zip(contacts, expressions, strict=False):
         contact, name = slip.contact, slip.contact.name

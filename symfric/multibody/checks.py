@@ -1,6 +1,6 @@
 """What can be wrong with a mechanism: names, numbers, connections, start values, redundancy."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import final
@@ -49,19 +49,22 @@ def naming(
     for force in forces:
         for end in force.places():
             yield from _place(f"force '{force.name}'", end, known)
-        for name in force.joints():
-            if name not in [j.name for j in joints]:
-                yield f"force '{force.name}': expected a joint, got {name}"
-    moving = {joint.name: joint.directions for joint in joints}
+        yield from _moving(f"force '{force.name}'", force.joints(), joints)
     for constraint in constraints:
         where = f"{constraint.kind} '{constraint.name}'"
-        for name, direction in constraint.joints():
-            if name not in moving:
-                yield f"{where}: expected a joint, got {name}"
-            elif direction not in moving[name]:
-                known_ones = " or ".join(moving[name]) or "a joint that moves along an axis"
-                yield f"{where} > direction: expected {known_ones}, got {direction}"
+        yield from _moving(where, constraint.joints(), joints)
         yield from (f"{where} > {text}" for text in constraint.problems())
+
+
+def _moving(where: str, pairs: Iterable[tuple[str, str]], joints: Sequence[Joint]) -> Iterator[str]:
+    """Joints that do not exist, and directions in which they do not move."""
+    known = {joint.name: joint.directions for joint in joints}
+    for name, direction in pairs:
+        if name not in known:
+            yield f"{where}: expected a joint, got {name}"
+        elif direction not in known[name]:
+            expected = " or ".join(known[name]) or "a joint that moves along an axis"
+            yield f"{where} > direction: expected {expected}, got {direction}"
 
 
 def _place(where: str, place: str, bodies: Mapping[str, Body]) -> Iterator[str]:

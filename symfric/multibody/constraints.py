@@ -35,18 +35,20 @@ class Held:
         phi: SX (m, 1).
         labels: names of its multipliers.
         loads: multipliers (m, 1) -> loads on the bodies.
+        unit: of the multipliers, as text.
         problems: why it cannot be; then it has no rows.
     """
 
     phi: ca.SX
     labels: tuple[str, ...]
     loads: Callable[[ca.SX], Loads]
+    unit: str = ""
     problems: tuple[str, ...] = ()
 
 
 def impossible(*problems: str) -> Held:
     """No equations, and why."""
-    return Held(ca.SX(0, 1), (), lambda lam: (), problems)
+    return Held(ca.SX(0, 1), (), lambda lam: (), problems=problems)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,19 +78,25 @@ Term = tuple[Joint, str, Scalar]
 
 
 def linear(
-    kin: Kinematics, label: str, terms: Sequence[Term], rest: Scalar, period: Scalar | None
+    kin: Kinematics, name: str, terms: Sequence[Term], rest: Scalar, period: Scalar | None
 ) -> Held:
-    """The constraint rest - sum c_j s_j = 0, modulo `period` if there is one."""
+    """The constraint rest - sum c_j s_j = 0, modulo `period` if there is one.
+
+    Its multiplier is the force or moment on the last of the joints.
+    """
     phi = ca.SX(rest)
     for joint, direction, c in terms:
         phi -= c * kin.along(joint, direction)[0]
     if period is not None:
         # the derivative of floor is zero, so that those of phi stay what they are
         phi -= period * ca.floor(phi / period + 0.5)
+    last, along, _ = terms[-1]
+    what, unit = ("force", "N") if last.linear(along) else ("moment", "N m")
     return Held(
         phi,
-        (label,),
+        (f"{name}_{what}",),
         lambda lam: [Axial(joint, direction, c * lam) for joint, direction, c in terms],
+        unit,
     )
 
 
@@ -127,9 +135,8 @@ class PrescribedMotion(Constraint):
         joint, target = joints[self.joint], ca.SX(self.motion(kin.t))
         if target.numel() != 1:
             return impossible(f"motion: expected one expression, got {target.numel()}")
-        label = f"{self.name}_{'force' if joint.linear(self.direction) else 'moment'}"
         period = 2 * pi if wraps(kin, joint, self.direction) else None
-        return linear(kin, label, [(joint, self.direction, 1.0)], target, period)
+        return linear(kin, self.name, [(joint, self.direction, 1.0)], target, period)
 
 
 @final

@@ -83,8 +83,7 @@ class Coupling(Constraint):
             ratio, period = float(fraction), 2 * pi / fraction.denominator
         elif any(cyclic):
             period = 2 * pi * ratio if cyclic[0] else 2 * pi
-        label = f"{self.name}_{'force' if b.linear(along_b) else 'moment'}"
-        return linear(kin, label, [(a, along_a, -ratio), (b, along_b, 1.0)], offset, period)
+        return linear(kin, self.name, [(a, along_a, -ratio), (b, along_b, 1.0)], offset, period)
 
 
 def _fraction(ratio: Scalar) -> Fraction:

@@ -66,8 +66,8 @@ class Force(ABC):
         """The "body.frame" texts it names."""
         return ()
 
-    def joints(self) -> Iterable[str]:
-        """The joints it names."""
+    def joints(self) -> Iterable[tuple[str, str]]:
+        """The joints it names, each with a direction."""
         return ()
 
     @property
@@ -166,7 +166,7 @@ class SpringDamper(Force):
 @final
 @dataclass(frozen=True, eq=False)
 class JointSpringDamper(Force):
-    """Spring, damper and actuator along ("slide") or about ("turn") the axis of a joint.
+    """Spring, damper and actuator in one of the directions of a joint: "slide", "turn", ...
 
         f = -stiffness (s - rest) - damping s' + actuator
 
@@ -181,9 +181,9 @@ class JointSpringDamper(Force):
     damping: Scalar = 0.0
     actuator: Scalar = 0.0
 
-    def joints(self) -> Iterable[str]:
+    def joints(self) -> Iterable[tuple[str, str]]:
         """Its joint."""
-        return (self.joint,)
+        return ((self.joint, self.direction),)
 
     @property
     def conservative(self) -> bool:

@@ -32,11 +32,14 @@ from symfric.numeric import Scalar, is_number, is_symbolic
 @final
 @dataclass(frozen=True, eq=False)
 class JointFriction:
-    """A friction law in a joint.
+    """A friction law in a joint; in a universal joint the same in both of its bearings.
+
+    A normal force that falls below zero, through an input, a parameter or a negative preload, is
+    an error at its time, not friction that drives.
 
     Attributes:
-        law: any friction law.
-        radius: of the bearing [m], for friction about z.
+        law: any friction law of v and N; in a spherical joint an isotropic one, `Spatial`.
+        radius: of the bearing or ball [m], for friction about an axis or a point.
         length: distance a of the two bearing stations [m]; None: moments do not load the bearing.
         width: width b of a guide that takes the moment about z [m]; None: it does not load it.
         preload: normal force in addition to the reactions [N].

@@ -70,8 +70,8 @@ def read_urdf(
 
     Warns:
         UserWarning: once, of all that is left out (tags such as `<limit>`: nothing stops a joint
-            there; not of visual, collision and material) and of names that are no C identifiers
-            and are changed.
+            there, `parse` has the numbers; not of visual, collision and material) and of names
+            that are no C identifiers and are changed.
     """
     urdf = parse(source)
     check_names(f"urdf '{urdf.name}' bearings", bearings or {}, [j.name for j in urdf.joints])

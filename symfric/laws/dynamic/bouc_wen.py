@@ -72,8 +72,9 @@ class BoucWen(Law):
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Rate of the load share [1/s], shape (1, 1)."""
         used = smooth.power(z[0], self.n, self.z_eps)
-        loading = smooth.magnitude(v, self.v_eps) * smooth.sign(z[0], self.z_eps)
-        stretch = self.A * v - used * (self.beta * loading + self.gamma * v)
+        t = smooth.sign(v, self.v_eps)
+        yielded = self.beta * smooth.sign(z[0], self.z_eps) + self.gamma * t
+        stretch = self.A * v - used * (v * t) * yielded
         return column(self.sigma_0 / (self.mu_d * N) * stretch)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:

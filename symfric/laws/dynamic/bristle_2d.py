@@ -5,8 +5,11 @@ from typing import ClassVar, final
 
 from symfric.laws import smooth
 from symfric.laws.base import Facts, Law, State
-from symfric.numeric import Scalar, column, exp, sqrt
+from symfric.numeric import Scalar, column, equals, exp, sqrt
 from symfric.parameters import param
+
+ROOT_STEPS = 40
+"""Steps of Newton's method that reach a cubic root of 1e-15 of its start."""
 
 
 @final
@@ -82,6 +85,18 @@ class Bristle2D(Law):
         return self.planar_rate((v, 0.0 * v), N, z)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Deflection in steady straight slip [m]."""
-        z = self._level(v * v, N) / self.sigma_0 * smooth.sign(v, self.kappa * self.v_s)
-        return column(z, 0.0 * v)
+        """Deflection in steady straight slip [m], exact to rounding of g.
+
+        Its force F solves F = sat(F + sigma_1 v). With t = (F + sigma_1 v - g) / (2 kappa g) + 1/2,
+        the place in the corner of sat, it is the root of t^3 (2 - t) = sigma_1 |v| / (kappa g) in
+        [0, 1], convex, by Newton's method from t = 1.
+        """
+        g, drawn = self._level(v * v, N), self.sigma_1 * smooth.magnitude(v, 0.0)
+        held = g
+        if not equals(self.kappa, 0.0):
+            t, corner = 1.0 + 0.0 * v, self.kappa * g
+            target = smooth.clip(drawn / corner, 0.0, 1.0)
+            for _ in range(ROOT_STEPS):
+                t = t - (t * (2 - t) - target / (t * t)) / (6 - 4 * t)
+            held = smooth.choose(drawn >= corner, g, g + corner * (2 * t - 1) - drawn)
+        return column(held / self.sigma_0 * smooth.sign(v, 0.0), 0.0 * v)

@@ -5,7 +5,8 @@ from typing import ClassVar, final
 
 from symfric.laws import smooth
 from symfric.laws.base import Facts, Law, State, Switch
-from symfric.numeric import Scalar, column
+from symfric.laws.dynamic.element import stretched
+from symfric.numeric import Scalar, column, exp
 from symfric.parameters import Parametric, option, param
 
 
@@ -124,6 +125,26 @@ class GMS(Law):
         direction = self._direction(v)
         forces = [alpha * self.level(v, N) * direction for alpha in self.shares()]
         return column(*forces, *(direction**2 for _ in forces))
+
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """Exact in the event form: stick up to the limit, or exponential slip towards it."""
+        if self.form == "smooth":
+            return None
+        count, g, direction = len(self.elements), self.level(v, N), self._direction(v)
+        x = -self.C * h / g
+        ends: list[Scalar] = []
+        means: list[Scalar] = []
+        modes: list[Scalar] = []
+        for i, (e, alpha) in enumerate(zip(self.elements, self.shares(), strict=True)):
+            F, p, limit = z[i], z[count + i], alpha * g
+            end, mean, reached = stretched(F, e.k * v * h, limit)
+            load = direction * F
+            slips = smooth.choose(load >= limit, direction * direction, p * (load > 0))
+            goal, beyond = limit * direction, F - limit * direction
+            ends.append(smooth.choose(slips, goal + beyond * exp(x), end))
+            means.append(smooth.choose(slips, goal + beyond * smooth.phi1(x), mean))
+            modes.append(smooth.choose(v == 0, p, smooth.choose(slips, 1.0, reached)))
+        return column(*ends, *modes), column(*means, *modes)
 
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
         """Slip of each element at its limit, stick of all when v passes through zero."""

@@ -89,6 +89,10 @@ class Gonthier(Law):
         return smooth.hold(bristle, self._level(N, z[1]) + rounding, rounding) + self.sigma_2 * v
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Bristle and dwell memory in steady sliding; the force is at its limit."""
+        """Dwell memory s(v), and the deflection F_C dir/sigma_0 at which the force is at its limit.
+
+        Above 6 v_s both rest, to rounding. In creep the deflection goes on growing, to
+        sigma_1 v s/(1 - s)/sigma_0 more, which adds less than kappa F_C to the saturated force.
+        """
         s = self._sticking(v)
         return column(self._level(N, s) / self.sigma_0 * self._direction(v), s)

@@ -6,7 +6,7 @@ from typing import ClassVar, final
 
 from symfric.laws import smooth
 from symfric.laws.base import Facts, Law, State, Switch
-from symfric.laws.dynamic.element import yielding
+from symfric.laws.dynamic.element import stretched, yielding
 from symfric.numeric import Scalar, column
 from symfric.parameters import option, param
 
@@ -84,6 +84,14 @@ class HaessigFriedland(Law):
         direction = smooth.sign(v, 0.0 if self.form == "event" else self.v_eps)
         z = self.mu_d * N / self.sigma_0 * direction
         return column(z, direction**2) if self.form == "event" else column(z)
+
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """Exact in the event form; the mode counts as that at the end of the step."""
+        if self.form == "smooth":
+            return None
+        end, mean, slips = stretched(z[0], v * h, self.mu_d * N / self.sigma_0)
+        slip = smooth.choose(v == 0, z[1], slips)
+        return column(end, slip), column(mean, slip)
 
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
         """Slip at the limit, stick when v changes sign."""

@@ -5,7 +5,7 @@ from typing import ClassVar, final
 
 from symfric.laws import smooth
 from symfric.laws.base import Facts, Law, State, Switch
-from symfric.laws.dynamic.element import yielding
+from symfric.laws.dynamic.element import stretched, yielding
 from symfric.numeric import Scalar, column
 from symfric.parameters import Parametric, option, param
 
@@ -111,6 +111,15 @@ class MaxwellSlip(Law):
         )
         sticking = {f"slip_{i + 1}": 0.0 for i in range(count)}
         return (*slips, Switch("reversal", v, reset=sticking))
+
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """Exact in the event form."""
+        if self.form == "smooth":
+            return None
+        count = len(self.elements)
+        parts = [stretched(z[i], e.k * v * h, e.mu * N) for i, e in enumerate(self.elements)]
+        modes = [smooth.choose(v == 0, z[count + i], part[2]) for i, part in enumerate(parts)]
+        return column(*(p[0] for p in parts), *modes), column(*(p[1] for p in parts), *modes)
 
     def update(self, F: Scalar, dx: Scalar, N: Scalar) -> Scalar:
         """The spring forces after the slip `dx` [m] in one direction, exactly."""

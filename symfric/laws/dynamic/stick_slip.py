@@ -9,6 +9,9 @@ from symfric.laws.dynamic.element import yielding
 from symfric.numeric import Scalar, column
 from symfric.parameters import option, param
 
+ROOT_STEPS = 10
+"""Steps of Newton's method that reach a root to rounding for every sharpness allowed."""
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -83,6 +86,12 @@ class StickSlip(Law):
         return column((1 - slip) * stretch - slip * forgotten)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """None left beyond v_s; below it, about the stuck share of D_max, shape (1, 1)."""
-        stuck = 1 - self._slipping(v)
-        return column(self.D_max * stuck * smooth.sign(v, self.v_eps))
+        """Where growth and loss are equal, none left beyond v_s, shape (1, 1).
+
+        The root of slip r + (1 - slip) (r^n - 1), convex, by Newton's method from r = 1.
+        """
+        slip, r = self._slipping(v), 1.0 + 0.0 * v
+        for _ in range(ROOT_STEPS):
+            spent = (1 - slip) * smooth.power(r, self.n, self.r_eps)
+            r = r - (slip * r + spent - (1 - slip)) / (slip + self.n * spent / (r + self.r_eps))
+        return column(self.D_max * r * smooth.sign(v, self.v_eps))

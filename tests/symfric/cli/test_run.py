@@ -187,3 +187,54 @@ def test_a_bad_robot_file_is_one_sentence(
     err = capsys.readouterr().err
     assert message in err
     assert len(err.splitlines()) == 1
+
+
+def test_a_mechanism_is_told_short_with_its_books(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "four_mass", "--law", "brown_mcphee", "--t-end", "0.5"]) == 0
+    out = capsys.readouterr().out
+    rows = [line.split()[0] for line in out.splitlines()[3:] if line]
+    assert {"x1", "x1_rate", "x1_N", "x1_friction", "energy"} <= set(rows)
+    assert not {"x1_slip", "x1_power", "rod_12_lambda", "constraint_position"} & set(rows)
+    assert "Constraints hold to: position " in out
+    assert "J, friction -" in out
+    assert "unexplained at most" in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_the_books_of_a_mechanism_are_in_the_json(capsys: pytest.CaptureFixture[str]) -> None:
+    line = "four_mass --law brown_mcphee --t-end 0.5 --rtol 1e-8"
+    result = found(capsys, *line.split())
+    balance = result["energy_balance"]
+    gained = balance["end"] - balance["start"]
+    assert gained == pytest.approx(balance["work"]["friction"], rel=1e-6)
+    assert 0 < balance["relative"] < 1e-7
+    assert max(result["constraints"].values()) < 1e-11
+    assert result["final"]["energy"] == pytest.approx(balance["end"])
+    line = "drive --law lugre --t-end 0.1"
+    assert "energy_balance" not in found(capsys, *line.split())
+
+
+def test_a_film_is_written_and_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "motion.gif"
+    line = "run pendulum --law brown_mcphee --t-end 2 --animate"
+    assert main([*line.split(), str(path)]) == 0
+    assert path.read_bytes().startswith(b"GIF89a")
+    assert capsys.readouterr().err == f"wrote {path}\n"
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("drive --law lugre --animate x.gif", "--animate: expected one of pendulum,"),
+        ("pendulum --law lugre --animate x.avi", "ending in .gif, .html, .mp4, got '.avi'"),
+        ("pendulum --law coulomb --law viscous --animate x.gif", "expected one --law, got 2"),
+    ],
+)
+def test_a_film_that_cannot_be_is_refused_at_once(
+    line: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", *line.split()]) == 2
+    assert why in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from symfric import BrownMcPhee, Dahl, LuGre, Output, Variable, parameters
+from symfric import BrownMcPhee, LuGre, Output, Variable, parameters
 from symfric.codegen import Block, generate, law_block
+from symfric.laws import GMS
 
 
 def test_writes_header_and_source_for_each_type_and_a_manifest(tmp_path):
@@ -65,7 +66,7 @@ def test_a_block_is_generated_as_it_is(tmp_path):
         (LuGre(), {"real": "half"}, "expected one of double, float, got half"),
         (LuGre(), {"real": ()}, "expected double, float or both, got none"),
         (LuGre(), {"free": ("mu",)}, "got mu"),
-        (Dahl(n=2.0), {}, "affine in the states"),
+        (GMS(), {}, "act on each other in a circle"),
         (LuGre(mu_s=0.3), {"free": (), "h": 1e-60}, "would become 0"),
         (Block("b", outputs={"y": Output(1.0, "m")}), {"h": 1e-3}, "with a law only, got a block"),
     ],

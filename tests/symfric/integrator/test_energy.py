@@ -9,7 +9,15 @@ import pytest
 from symfric import BrownMcPhee, Hold, LuGre, Trajectory, rabinowicz, simulate
 from symfric.integrator.energy import WORK
 from symfric.model import Event, Model, Output
-from symfric.multibody import JointSpringDamper, Mechanism, Prismatic, Revolute
+from symfric.multibody import (
+    JointFriction,
+    JointSpringDamper,
+    Mechanism,
+    PrescribedMotion,
+    Prismatic,
+    Revolute,
+    Spherical,
+)
 from symfric.parameters import Variable
 from symfric.scenes import MECHANISMS, FourBar, FourMass, Pendulum, SliderCrank
 
@@ -80,6 +88,32 @@ def test_motor_that_moves_its_spring_counts_with_its_whole_power() -> None:
     assert balance.energy == pytest.approx(run["kinetic"])
     assert np.ptp(balance.work["wound"]) > 1.0
     assert balance.relative < 1e-8
+
+
+@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+def test_drive_lifts_and_pays_for_friction(formulation: str) -> None:
+    """A rod swung by a drive: angle 0.8 sin(2 t), friction in its hinge."""
+    m = Pendulum(LAW).mechanism()
+    m.joints[0] = replace(m.joints[0], start=0.0, rate=1.6)
+    m.constraint(PrescribedMotion("motor", "phi", lambda t: 0.8 * ca.sin(2 * t)))
+    balance = simulate(m.build(formulation=formulation), 2.0, rtol=1e-9).energy_balance()
+    angle, rate = 0.8 * np.sin(2 * balance.t), 1.6 * np.cos(2 * balance.t)
+    assert balance.energy == pytest.approx(rate**2 / 6 - 9.81 * 0.5 * np.cos(angle), abs=1e-8)
+    assert balance.work["friction"][-1] < -0.05
+    assert set(balance.work) == {"drive", "friction"}
+    assert balance.relative < 1e-8
+
+
+def test_friction_of_a_ball_explains_its_loss() -> None:
+    m = Mechanism("ball")
+    m.body("bob", 1.0, (0.01, 0.01, 0.02))
+    m.frame("bob.neck", at=(0.0, 0.0, 0.5))
+    friction = JointFriction(BrownMcPhee(v_t=0.01), radius=0.03)
+    rate = (0.0, 1.0, 0.5, 1.5)
+    m.joint(Spherical("ball", "ground", "bob.neck", rate=rate, friction=friction))
+    balance = simulate(m.build(), 2.0, rtol=1e-9).energy_balance()
+    assert balance.work["friction"][-1] < -0.1
+    assert balance.relative < 1e-7
 
 
 SCENES = {"four_mass": (FourMass(LAW), 4.0), "slider_crank": (SliderCrank(LAW), 0.25),

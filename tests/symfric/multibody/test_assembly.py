@@ -61,7 +61,9 @@ def test_operations_grow_with_what_is_asked_for() -> None:
 def test_bristles_add_their_states() -> None:
     model = four_mass("x1 y2", JointFriction(LuGre())).build()
     assert [v.name for v in model.x[8:]] == ["x1_z", "y2_z"]
-    assert {"x1_slip", "x1_friction", "x1_power", "energy", "phi"} <= set(model.outputs)
+    assert {"x1_slip", "x1_friction", "x1_power", "energy", "constraint_position"} <= set(
+        model.outputs
+    )
 
 
 def test_absolute_coordinates_cost_many_times_as_much() -> None:

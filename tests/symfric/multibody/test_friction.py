@@ -7,9 +7,21 @@ import numpy as np
 import pytest
 from chains import chain, solve
 
-from symfric import BrownMcPhee, Dahl, LuGre, Trajectory, simulate
-from symfric.laws import GMS, Karnopp, Law
-from symfric.multibody import JointFriction, Mechanism, Spherical, Universal
+from symfric import (
+    BrownMcPhee,
+    Dahl,
+    LuGre,
+    SolveError,
+    Status,
+    Trajectory,
+    Variable,
+    Viscous,
+    simulate,
+)
+from symfric.laws import GMS, Karnopp, Law, LuGreNormalised
+from symfric.multibody import JointFriction, Mechanism, Revolute, Spherical, Universal
+from symfric.scenes import FourBar, SliderCrank
+from symfric.scenes.mechanism import MechanismScene
 
 in_both = pytest.mark.parametrize("formulation", ["joint", "absolute"])
 
@@ -232,3 +244,71 @@ def test_friction_independent_of_the_reaction_adds_no_unknown_to_balls_and_cross
     pressed = replace(bearing, normal=None)
     m.joints = [replace(j, friction=j.friction and pressed) for j in m.joints]
     assert [v.name for v in m.build().z if v.name.endswith("_N")] == ["j3_x_N", "j3_y_N", "j5_N"]
+
+
+def brake(formulation: str = "joint") -> Mechanism:
+    """A disc on a shaft, pressed by an input."""
+    m = Mechanism("brake", gravity=(0.0, 0.0, 0.0))
+    m.body("disc", 1.0, (0.1, 0.1, 0.1))
+    clamp = JointFriction(KINETIC, radius=0.1, normal=m.input("clamp", "N", start=10.0))
+    m.joint(Revolute("shaft", "ground", "disc", rate=20.0, friction=clamp))
+    return m
+
+
+@in_both
+def test_a_brake_that_pulls_is_an_error_at_its_time(formulation: str) -> None:
+    """The clamp falls through zero at 2 s; friction would drive the disc from then on."""
+    model = brake().build(formulation=formulation)
+    pressed = simulate(model, 1.9, u={"clamp": lambda t: 10.0 - 5.0 * t})
+    assert pressed["shaft_power"].min() >= 0.0
+    message = "normal force of joint 'shaft' with BrownMcPhee falls below zero"
+    with pytest.raises(SolveError, match=message) as caught:
+        simulate(model, 3.0, u={"clamp": lambda t: 10.0 - 5.0 * t})
+    assert caught.value.status is Status.JAMMED
+    assert caught.value.partial.t[-1] == pytest.approx(2.0, abs=1e-3)
+    with pytest.raises(ValueError, match=r"falls below zero \(-4 times its typical size\)"):
+        simulate(model, 1.0, u={"clamp": -4.0})
+
+
+def test_a_negative_preload_is_an_error_where_it_outweighs_the_reaction() -> None:
+    preload = Variable("preload", "N", start=0.0)
+    m = Mechanism("m", gravity=(0.0, 0.0, -10.0))
+    m.body("wheel", 2.0, (0.05, 0.05, 0.05))
+    friction = JointFriction(KINETIC, radius=0.02, preload=preload.symbol)
+    m.joint(Spherical("ball", "ground", "wheel", friction=friction))
+    model = m.build((preload,))
+    assert simulate(model, 0.1, p={"preload": -19.0})["ball_N"][-1] == pytest.approx(1.0, abs=1e-3)
+    with pytest.raises(ValueError, match="force of joint 'ball' with BrownMcPhee falls below"):
+        simulate(model, 0.1, p={"preload": -25.0})
+
+
+@pytest.mark.parametrize("scene", [SliderCrank(LuGre()), FourBar(LuGre())], ids=["crank", "bar"])
+def test_bristles_that_keep_the_deflection_of_another_load_are_named(scene: MechanismScene) -> None:
+    """Their damping makes the reaction loop singular; what to take instead stands in the error."""
+    with pytest.raises(SolveError, match=r"bristles of LuGre in joint '[a-z_]*crank' keep") as e:
+        simulate(scene.model(), 0.5)
+    assert "lugre_normalised" in str(e.value)
+    assert simulate(replace(scene, law=LuGreNormalised()).model(), 0.1).t[-1] == 0.1
+
+
+def test_bristles_without_damping_by_the_load_need_no_advice() -> None:
+    for law in (LuGre(sigma_1=0.0), LuGreNormalised(), Dahl(), KINETIC):
+        mechanics = SliderCrank(law).model().holonomic
+        assert mechanics is not None
+        assert mechanics.advice == ""
+
+
+def test_normal_forces_that_cannot_be_negative_are_not_watched() -> None:
+    watched = {}
+    for name, friction in {
+        "constant": JointFriction(KINETIC, radius=0.02, normal=5.0),
+        "reaction": JointFriction(KINETIC, radius=0.02),
+        "viscous": JointFriction(Viscous(), radius=0.02),
+    }.items():
+        m = Mechanism("m")
+        m.body("wheel", 2.0, (0.05, 0.05, 0.05))
+        m.joint(Revolute("pin", "ground", "wheel", friction=friction))
+        mechanics = m.build().holonomic
+        assert mechanics is not None
+        watched[name] = mechanics.pressing.numel()
+    assert watched == {"constant": 0, "reaction": 0, "viscous": 0}

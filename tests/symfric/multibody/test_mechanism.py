@@ -84,6 +84,14 @@ MISTAKES: dict[str, tuple[Callable[[Mechanism], object], str]] = {
         lambda m: m.force(JointSpringDamper("motor", "hing")),
         "> force 'motor': expected a joint, got hing",
     ),
+    "turning a slide": (
+        lambda m: (
+            m.body("block", 1.0, (1.0, 1.0, 1.0)),
+            m.joint(Prismatic("rail", "ground", "block")),
+            m.force(JointSpringDamper("motor", "rail")),
+        ),
+        "> force 'motor' > direction: expected slide, got turn",
+    ),
     "loose body": (
         lambda m: m.body("bob", 1.0, (1.0, 1.0, 1.0)),
         "> body 'bob': expected joints with coordinates that lead to the ground, found none; "
@@ -290,6 +298,6 @@ def test_a_free_body_spins_as_it_must(formulation: str) -> None:
     m.joint(Free("pose", "ground", "stone", rate=(1.0, 0.0, 0.0, 0.0, *rate)))
     run = simulate(m.build(formulation=formulation), 5.0, rtol=1e-9)
     assert np.ptp(run["kinetic"]) < 1e-7
-    assert run["phi"].max() < 1e-12
+    assert run["constraint_position"].max() < 1e-12
     name = "pose" if formulation == "joint" else "stone"
     assert run[f"{name}_x"] == pytest.approx(run.t, abs=1e-9)

@@ -1,0 +1,208 @@
+"""Imported robots beside Pinocchio: mass, bias, inverse and forward dynamics, frames, energies."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from robots import MOVING, random_robot, rod
+
+from symfric import Coulomb, Law
+from symfric.multibody import Mechanism, functions
+from symfric.multibody.spatial import euler_g, rotation
+from symfric.multibody.urdf import read_urdf
+from symfric.multibody.urdf_file import parse
+
+pin: Any = pytest.importorskip("pinocchio", reason="needs Pinocchio (extra urdf-check)")
+Array = NDArray[np.float64]
+LIMIT = '<limit lower="-9" upper="9" effort="9" velocity="9"/></joint>'
+EASY = Coulomb(mu_d=1.0, v_eps=0.1)
+each_robot = pytest.mark.parametrize("seed", range(12))
+each_gravity = pytest.mark.parametrize("g", [9.81, 0.0])
+
+
+@dataclass(frozen=True)
+class Twin:
+    """A robot here and in Pinocchio, in one random state; `rows` are its velocities there."""
+
+    model: Any
+    data: Any
+    mechanism: Mechanism
+    names: list[str]
+    rows: list[int]
+    q: Array
+    qd: Array
+    q_there: Array
+    qd_there: Array
+
+
+def twin(text: str, seed: int, g: float = 9.81, law: Law | None = None) -> Twin:
+    model = pin.buildModelFromXML(text.replace("</joint>", LIMIT))  # it demands limits
+    model.gravity.linear = np.array([0.0, 0.0, -g])
+    mechanism = read_urdf(text, law=law, gravity=(0.0, 0.0, -g))
+    names = [v.name for v in mechanism.prepare().q]
+    q, qd = np.random.default_rng(seed + 1000).normal(size=(2, len(names)))
+    q_there, qd_there = np.zeros(model.nq), np.zeros(model.nv)
+    rows: list[int] = []
+    for i, name in enumerate(names):
+        joint = model.joints[model.getJointId(name)]
+        at = slice(joint.idx_q, joint.idx_q + joint.nq)
+        q_there[at] = q[i] if joint.nq == 1 else (np.cos(q[i]), np.sin(q[i]))
+        qd_there[joint.idx_v] = qd[i]
+        rows.append(joint.idx_v)
+    return Twin(
+        model, model.createData(), mechanism, names, rows, q, qd, q_there, qd_there
+    )  # fmt: skip
+
+
+def robot(seed: int) -> str:
+    return random_robot(seed, n=3 + seed % 10)
+
+
+def close(found: Array, expected: Array) -> bool:
+    return bool(np.abs(found - expected).max() <= 1e-10 * np.abs(expected).max())
+
+
+def friction(text: str, t: Twin) -> Array:
+    """Damping and Coulomb friction of every joint, in closed form."""
+    tags = {joint.name: joint for joint in parse(text).joints}
+    levels = [(tags[name].damping, tags[name].friction) for name in t.names]
+    return np.array([d * w + f * np.tanh(w / 0.1) for (d, f), w in zip(levels, t.qd, strict=True)])
+
+
+@each_robot
+def test_mass_matrix_is_that_of_pinocchio(seed: int) -> None:
+    t = twin(robot(seed), seed)
+    M = pin.crba(t.model, t.data, t.q_there)
+    M = np.triu(M) + np.triu(M, 1).T
+    assert close(functions(t.mechanism)["mass"](t.q, []).full(), M[np.ix_(t.rows, t.rows)])
+
+
+@each_robot
+@each_gravity
+def test_bias_is_that_of_pinocchio(seed: int, g: float) -> None:
+    t = twin(robot(seed), seed, g)
+    expected = pin.nonLinearEffects(t.model, t.data, t.q_there, t.qd_there)[t.rows]
+    still = np.zeros(len(t.mechanism.inputs))
+    found = functions(t.mechanism)["bias"](t.q, t.qd, still, []).full().ravel()
+    assert np.abs(found - expected).max() <= 1e-10 * max(1.0, np.abs(expected).max())
+
+
+@each_robot
+@each_gravity
+def test_inverse_dynamics_are_those_of_pinocchio_and_friction(seed: int, g: float) -> None:
+    text = robot(seed)
+    t = twin(text, seed, g, law=EASY)
+    a = np.random.default_rng(seed).normal(size=t.q.size)
+    a_there = np.zeros(t.model.nv)
+    a_there[t.rows] = a
+    expected = pin.rnea(t.model, t.data, t.q_there, t.qd_there, a_there)[t.rows]
+    inverse = functions(t.mechanism)["inverse_dynamics"]
+    still = np.zeros(len(t.mechanism.inputs))
+    found = inverse(t.q, t.qd, a, [], [], still, []).full().ravel()
+    assert close(found, expected + friction(text, t))
+
+
+@each_robot
+@each_gravity
+def test_forward_dynamics_are_those_of_pinocchio_with_friction(seed: int, g: float) -> None:
+    text = robot(seed)
+    t = twin(text, seed, g, law=EASY)
+    torque = np.random.default_rng(seed).normal(size=t.q.size) * 5
+    there = np.zeros(t.model.nv)
+    there[t.rows] = torque - friction(text, t)
+    expected = pin.aba(t.model, t.data, t.q_there, t.qd_there, there)[t.rows]
+    model = t.mechanism.build()
+    u = dict(zip(t.names, torque, strict=True))
+    inputs = [u[v.name.removeprefix("tau_")] for v in model.u]
+    found = model.function("ode")(0, np.hstack([t.q, t.qd]), [], inputs, []).full().ravel()
+    assert len(model.z) == 0
+    assert close(found[t.q.size :], expected)
+
+
+@each_robot
+def test_every_link_is_where_pinocchio_puts_it(seed: int) -> None:
+    text = robot(seed)
+    t = twin(text, seed)
+    pin.framesForwardKinematics(t.model, t.data, t.q_there)
+    eq = t.mechanism.prepare().eq
+    frames = {f"{place.split('.')[-1]}": (place, f) for place, f in t.mechanism.frames}
+    for link in parse(text).links:
+        place, frame = frames[link]
+        motion = eq.kin.motion[place.partition(".")[0]]
+        pose = ca.Function("pose", [eq.q], [motion.R @ frame.R, eq.kin.point(place)[0]])
+        expected = t.data.oMf[t.model.getFrameId(link)]
+        R, p = (x.full() for x in pose.call([t.q]))
+        assert expected.rotation == pytest.approx(R, abs=1e-12), link
+        assert expected.translation == pytest.approx(p.ravel(), abs=1e-12), link
+
+
+def test_random_robots_have_branches_and_every_kind_of_joint() -> None:
+    every = [joint for seed in range(12) for joint in parse(robot(seed)).joints]
+    assert {joint.kind for joint in every} == {*MOVING, "fixed"}
+    assert any(j.damping and j.friction for j in every)
+    parents = [j.parent for j in parse(robot(8)).joints]
+    assert len(set(parents)) < len(parents) - 2
+
+
+def test_floating_joints_move_as_pinocchio_says() -> None:
+    """Energies, and the accelerations of the joints that turn and slide."""
+    text = random_robot(7, 5, ("floating", *MOVING))
+    there = pin.buildModelFromXML(text.replace("</joint>", LIMIT))
+    rng = np.random.default_rng(1)
+    mechanism = read_urdf(text)
+    made, f = mechanism.prepare(), functions(mechanism)
+    q, qd = np.zeros(made.eq.n), np.zeros(made.eq.n)
+    q_there, qd_there = pin.neutral(there), np.zeros(there.nv)
+    columns = {v.name: i for i, v in enumerate(made.q)}
+    rows = {}
+    for joint in parse(text).joints:
+        if joint.kind == "fixed":
+            continue
+        j = there.joints[there.getJointId(joint.name)]
+        at, at_v = j.idx_q, j.idx_v
+        if joint.kind == "floating":
+            p, e, v, w = (rng.normal(size=n) for n in (3, 4, 3, 3))
+            e /= np.linalg.norm(e)
+            here = slice(columns[f"{joint.name}_x"], columns[f"{joint.name}_x"] + 7)
+            R, G = (ca.DM(x(ca.SX(e))).full() for x in (rotation, euler_g))
+            q[here] = [*p, *e]
+            qd[here] = [*(R @ v), *(G.T @ w / 2)]
+            q_there[at : at + 7] = [*p, *e[1:], e[0]]
+            qd_there[at_v : at_v + 6] = [*v, *w]
+            continue
+        angle, rate = rng.normal(size=2)
+        q[columns[joint.name]], qd[columns[joint.name]] = angle, rate
+        q_there[at : at + j.nq] = angle if j.nq == 1 else (np.cos(angle), np.sin(angle))
+        qd_there[at_v] = rate
+        rows[columns[joint.name]] = at_v
+    data = there.createData()
+    kinetic, potential = (float(x) for x in f["energy"].call([q, qd, []]))
+    assert kinetic == pytest.approx(pin.computeKineticEnergy(there, data, q_there, qd_there))
+    assert potential == pytest.approx(pin.computePotentialEnergy(there, data, q_there))
+    still = np.zeros(len(mechanism.inputs))
+    M, b = f["mass"](q, []).full(), f["bias"](q, qd, still, []).full().ravel()
+    J = f["constraints"].call([q, []])[1].full()
+    m = J.shape[0]
+    drift = [sum(qd[k] ** 2 for k in np.flatnonzero(row)) for row in J]
+    matrix = np.block([[M, J.T], [J, np.zeros((m, m))]])
+    a = np.linalg.solve(matrix, np.hstack([-b, -np.array(drift)]))
+    expected = pin.aba(there, data, q_there, qd_there, np.zeros(there.nv))
+    assert a[list(rows)] == pytest.approx(expected[list(rows.values())], rel=1e-10)
+
+
+def test_planar_joint_has_the_energies_of_pinocchio() -> None:
+    """With its axis along z: Pinocchio takes no other."""
+    tag = '<dynamics damping="0.3" friction="0.2"/>'
+    text = rod(
+        **{"revolute": "planar", "0 1 0": "0 0 1", '"0 0 1"/>': '"0 0 1" rpy="3 2 1"/>', tag: ""}
+    )
+    there = pin.buildModelFromXML(text.replace("</joint>", LIMIT))
+    c, s = np.cos(0.7), np.sin(0.7)
+    q, v = np.array([0.3, -0.2, c, s]), np.array([0.5 * c + 0.4 * s, 0.4 * c - 0.5 * s, -0.9])
+    kinetic = pin.computeKineticEnergy(there, there.createData(), q, v)
+    potential = pin.computePotentialEnergy(there, there.createData(), q)
+    found = functions(read_urdf(text))["energy"].call([[0.3, -0.2, 0.7], [0.5, 0.4, -0.9], []])
+    assert [float(x) for x in found] == pytest.approx([kinetic, potential], rel=1e-12)
