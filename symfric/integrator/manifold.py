@@ -128,7 +128,6 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
         step = ca.substitute(lu.solve(implicit(column, d)), lu.packed_symbol, lu.packed)
         column = ca.vertcat(column[:nx], column[algebraic] - step, column[algebraic[-1] + 1 :, 0])
     pressing = ca.substitute(mechanics.pressing, model.vector("u"), u)
-    passable = regular * whole.sign()
     return Manifold(
         project,
         ca.Function("refine", [y, d], [column], {"cse": True}),
