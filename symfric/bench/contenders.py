@@ -1,8 +1,9 @@
 """Who solves a mechanism: ours, and CasADi's integrators on the same equations.
 
 Each is made for one tolerance and then called as often as the clock wants. Time of a call is what a
-user waits for once everything is built: ours starts from names and ends in named signals, CasADi's
-integrators get a consistent start for nothing.
+user waits for once everything is built: `simulate` starts from names, solves for a consistent start
+and ends in named signals, CasADi's integrators get that start and end in states. So does our "loop
+alone", which is what to compare where a run takes less than some milliseconds.
 """
 
 import os
@@ -19,11 +20,15 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.integrator.arguments import chosen
 from symfric.integrator.casadi_backend import peer
 from symfric.integrator.compiler import FLAGS, find_compiler
-from symfric.integrator.initial import consistent
+from symfric.integrator.dense import from_records
+from symfric.integrator.engine import Stop
+from symfric.integrator.initial import consistent, first_step
 from symfric.integrator.inputs import Drivers, drivers
-from symfric.integrator.run import Tolerances
+from symfric.integrator.integrator import Integrator
+from symfric.integrator.run import ATTEMPTS, GROWTH_MEMORY, ROWS, Tolerances
 from symfric.integrator.simulate import simulate
 from symfric.integrator.system import System, system
 from symfric.model import Model
@@ -50,6 +55,32 @@ def ours(model: Model, times: Array, watched: tuple[str, ...], rtol: float) -> C
             warnings.simplefilter("ignore")  # loose tolerances are measured on purpose
             run = simulate(model, float(times[-1]), rtol=rtol, t_eval=times, backend="compiled")
         return np.array([run[name] for name in watched]), run.statistics.steps
+
+    solve()
+    return Contender(solve)
+
+
+def loop(model: Model, times: Array, watched: tuple[str, ...], rtol: float) -> Contender:
+    """The compiled loop of `simulate` alone, from a consistent start to states: as peers run."""
+    whole, inputs, y0 = _start(model, times)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        made = Integrator(model, inputs, chosen("bench", "auto", rtol))
+    engine, end = made.compiled(), float(times[-1])
+    R = np.concatenate([[end, rtol], 0.1 * rtol * whole.nominal, np.zeros(whole.d.numel())])
+    rows = [whole.names.index(name) for name in watched]
+
+    def solve() -> tuple[Array, int]:
+        h, pieces = first_step(end), list[Array]()
+        S = np.concatenate([[0.0, h, h, GROWTH_MEMORY, 0.0], y0])
+        reason = Stop.FULL
+        while reason in (Stop.FULL, Stop.ATTEMPTS):
+            records, _, reason = engine.run(S, R, ROWS, ATTEMPTS["compiled"], 1e-15 * end)
+            pieces.append(records)
+        if reason is not Stop.END:
+            raise RuntimeError(f"the step became too small at t = {S[0]:g} s")
+        every = np.vstack(pieces)
+        return from_records(every, whole.n)(times)[rows], every.shape[0]
 
     solve()
     return Contender(solve)
@@ -127,6 +158,7 @@ def _start(model: Model, times: Array) -> tuple[System, Drivers, Array]:
 
 MAKERS: dict[str, tuple[str, Callable[..., Contender]]] = {
     "symfric, joint": ("joint", ours),
+    "symfric, joint, loop alone": ("joint", loop),
     "symfric, absolute": ("absolute", ours),
     "casadi rosenbrock, absolute": ("absolute", partial(rosenbrock, explicit=False)),
     "casadi rosenbrock, absolute, explicit": ("absolute", partial(rosenbrock, explicit=True)),

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from functools import partial
 from importlib.util import find_spec
-from math import inf
+from math import inf, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-OURS, EXUDYN = "symfric, joint", "exudyn"
+OURS, LOOP, EXUDYN = "symfric, joint", "symfric, joint, loop alone", "exudyn"
 ERRORS = (1e-4, 2e-5, 1e-5)
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 STEPS = (250, 500, 1000, 1250, 2500, 5000)
@@ -92,7 +92,8 @@ class Ratio:
 
     Attributes:
         bound: the error that is kept.
-        ratio: its time over that of ours in joint coordinates.
+        ratio: its time over that of `simulate` in joint coordinates.
+        loop_ratio: its time over that of our compiled loop alone, without what Python adds.
     """
 
     case: str
@@ -103,6 +104,7 @@ class Ratio:
     steps: int
     time_s: float
     ratio: float
+    loop_ratio: float
 
 
 @final
@@ -142,14 +144,14 @@ class MultibodyBenchmark:
         found: list[Ratio] = []
         for case in dict.fromkeys(r.case for r in self.runs):
             for bound in ERRORS:
-                base = self.loosest(case, OURS, bound)
+                base, alone = (self.loosest(case, name, bound) for name in (OURS, LOOP))
                 for name in dict.fromkeys(r.integrator for r in self.runs if r.case == case):
                     row = self.loosest(case, name, bound)
                     if row and base:
-                        ratio = row.time_s / base.time_s
+                        ratios = (row.time_s / b.time_s if b else nan for b in (base, alone))
                         found.append(
                             Ratio(case, bound, name, row.setting, row.error, row.steps,
-                                  row.time_s, ratio)
+                                  row.time_s, *ratios)
                         )  # fmt: skip
         return found
 

@@ -62,6 +62,8 @@ class Radau(Method):
         basis = eigenbasis(self.A)
         block, (factor, solve) = blocks(system, self.diagonal), _pair(system, basis)
         n, T, inverse = system.n, basis.T, np.linalg.inv(basis.T)
+        # what algebraic equations leave over where a step begins is no error of the step
+        rates = ca.DM([float(i not in system.algebraic[0]) for i in range(n)])
 
         def trial(y: Any, h: Any, d: Any) -> Trial:
             kind, per_h = type(y), 1 / h
@@ -82,7 +84,7 @@ class Radau(Method):
                 w = [old + new for old, new in zip(w, change, strict=True)]
                 z = [combination(row, w, kind) for row in T]
                 corrections.append(combination(T[-1], change, kind))
-            error = block.solve(lu, first, per_h * combination(self.E, z, kind))
+            error = block.solve(lu, rates * first, per_h * combination(self.E, z, kind))
             dense = tuple(combination(row, z, kind) for row in self.H)
             return Trial(y + z[-1], error, dense, tuple(corrections[-2:]))
 

@@ -8,8 +8,8 @@
     drive_work_rate         the same of prescribed motions
     conserved               kinetic and potential energy without potentials of time or inputs
 
-Carried along always, the reactions alone would more than double the operations of all signals of
-a six-joint arm (408 to 938) and its number of signals (45 to 75).
+Carried along always, the reactions alone would take the outputs of a six-joint arm from 377 to
+1910 operations and from 21 to 51 in number; written when asked for, all details take 5 ms.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence

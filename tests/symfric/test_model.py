@@ -175,3 +175,28 @@ def test_finite_takes_numbers(value: object) -> None:
 def test_finite_refuses_everything_else(value: object) -> None:
     with pytest.raises(ValueError, match="here: expected a finite number, got "):
         finite("here", value)
+
+
+def test_details_are_written_when_asked_for_and_once() -> None:
+    x, calls = Variable("x", "m"), []
+
+    def more() -> dict[str, Output]:
+        calls.append("written")
+        return {"twice": Output(2 * x.symbol, "m")}
+
+    model = Model("m", x=(x,), ode=-x.symbol, details=more)
+    assert float(model.function("ode")(0, 3, [], [], [])) == -3
+    assert not calls
+    assert float(model.function("twice")(0, 3, [], [], [])) == 6
+    assert ca.is_equal(model.expression("x"), x.symbol)
+    assert ca.is_equal(model.expression("twice"), 2 * x.symbol, 2)
+    assert calls == ["written"]
+    with pytest.raises(ValueError, match="got twce; did you mean twice"):
+        model.expression("twce")
+
+
+def test_details_with_known_names_are_refused() -> None:
+    x = Variable("x", "m")
+    model = Model("m", x=(x,), ode=-x.symbol, details=lambda: {"x": Output(x.symbol, "m")})
+    with pytest.raises(ValueError, match="model 'm': details: expected new names, got x"):
+        model.expression("y")

@@ -8,6 +8,7 @@ from matplotlib.image import imread
 
 from symfric import BrownMcPhee, LuGre, Trajectory, Viscous, rabinowicz, simulate
 from symfric.plotting import panels, plot_catalogue, plot_laws, plot_trajectories, save
+from symfric.scenes import FourMass
 
 
 @pytest.fixture(autouse=True)
@@ -100,3 +101,12 @@ def test_catalogue_has_a_panel_of_its_own_scale_for_every_law() -> None:
     for k, axis in enumerate(shown):
         assert axis.lines[0].get_xdata().max() == pytest.approx(5 * 10.0**-k)
         assert axis.lines[0].get_ydata().max() == pytest.approx(0.3, rel=1e-2)
+
+
+def test_mechanisms_have_a_panel_per_kind_and_constraints_on_a_logarithmic_scale() -> None:
+    run = simulate(FourMass(BrownMcPhee()).model(), 0.1, samples=11)
+    axes = {axis.get_ylabel(): axis for axis in run.plot().axes}
+    assert list(axes) == ["position [m]", "rate [m/s]", "normal force [N]", "friction [N]",
+                          "friction [W]", "energy [J]", "constraints"]  # fmt: skip
+    assert [line.get_label() for line in axes["position [m]"].lines] == ["x1", "y2", "z3", "x4"]
+    assert [axis.get_yscale() for axis in axes.values()] == 6 * ["linear"] + ["log"]

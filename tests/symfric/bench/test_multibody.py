@@ -2,14 +2,14 @@
 
 import csv
 import json
-from math import isfinite
+from math import isfinite, isnan
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from symfric.bench import MultibodyBenchmark
-from symfric.bench.multibody import OURS, RunRow
+from symfric.bench.multibody import LOOP, OURS, RunRow
 from symfric.cli import main
 from symfric.integrator.compiler import find_compiler
 
@@ -73,6 +73,7 @@ def test_everyone_is_given_the_loosest_tolerance_that_keeps_the_error() -> None:
         run(OURS, 1e-6, 1e-7, 3.0),
         run(OURS, 1e-4, 9e-5, 1.0),
         run(OURS, 1e-3, 2e-4, 0.5),
+        run(LOOP, 1e-4, 9e-5, 0.5),
         run("other", 1e-2, 5e-5, 4.0),
         run("exudyn", 500, 2e-4, 10.0),
         run("exudyn", 5000, 1e-6, 100.0),
@@ -80,6 +81,9 @@ def test_everyone_is_given_the_loosest_tolerance_that_keeps_the_error() -> None:
     )
     benchmark = MultibodyBenchmark(rows)
     found = {(r.integrator, r.bound): (r.setting, r.ratio) for r in benchmark.ratios()}
+    loops = {(r.integrator, r.bound): r.loop_ratio for r in benchmark.ratios()}
+    assert loops["other", 1e-4] == 8.0
+    assert isnan(loops["exudyn", 1e-5])
     assert found[OURS, 1e-4] == (1e-4, 1.0)
     assert found["other", 1e-4] == (1e-2, 4.0)
     assert found["exudyn", 1e-4] == (1000, 20.0)

@@ -164,6 +164,16 @@ def test_details_cost_the_model_nothing_until_they_are_asked_for(
     assert calls == ["r"]
 
 
+def test_reactions_of_an_arm_cost_several_times_its_outputs() -> None:
+    """Why they are not among them."""
+    model = MECHANISMS["arm"](LAW).model()
+    reactions = {n: o for n, o in model.further.items() if n.endswith(COMPONENTS)}
+    assert len(reactions) == 30
+    more = replace(model, outputs={**model.outputs, **reactions})
+    few, many = (m.function("signals").n_instructions() for m in (model, more))
+    assert many > 4 * few
+
+
 def test_a_detail_put_into_the_outputs_is_carried_along() -> None:
     """For derivatives and C, as the docstring of `Model` says."""
     model = pendulum(0.3, 0.0).build()
