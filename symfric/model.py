@@ -81,6 +81,9 @@ class Holonomic:
         phi: SX (m, 1); no rows for a tree.
         a: SX symbols (n, 1).
         implicit: SX (n + nz, 1), the equations above in q, q', the other states, a, z, u, p, t.
+        index: 0 has it integrated in the tangent space of its constraints, in as many unknowns as
+            there are degrees of freedom; 1 in all coordinates, which are put back onto the
+            constraints at the end of every step. The solution is the same, to the tolerance.
         pressing: SX (k, 1), normal forces over their typical size, which must not be negative.
         pressed: what they are, in words.
         advice: what to try where friction and reactions have no solution; may be empty.
@@ -90,6 +93,7 @@ class Holonomic:
     phi: ca.SX
     a: ca.SX
     implicit: ca.SX
+    index: int = 1
     pressing: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
     pressed: tuple[str, ...] = ()
     advice: str = ""

@@ -19,6 +19,10 @@ class BackwardEuler(Method):
 
     iterations: int
 
+    @property
+    def diagonal(self) -> None:
+        """None."""
+
     def work(self, system: System) -> tuple[int, int, int]:
         """Right-hand sides, Jacobians and factorisations of a step."""
         return self.iterations, self.iterations, self.iterations

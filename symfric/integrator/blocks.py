@@ -1,11 +1,13 @@
 """The Functions an implicit step is made of: with SX they inline, with MX they stay calls."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import final
+from functools import lru_cache
+from typing import Any, final
 
 import casadi as ca
 
-from symfric.integrator.lu import factorise
+from symfric.integrator.lu import SymbolicLU, factorise
 from symfric.integrator.system import System
 
 
@@ -18,30 +20,58 @@ class Blocks:
         f: (y, d) -> right-hand side.
         factor: (y, h, d) -> factors of W.
         solve: (factors, right, memory) -> k with W k = right + M memory.
-        orientation: (y, h, d) -> sign of det W relative to that of a tiny step.
+        lu: the factors as expressions.
     """
 
     f: ca.Function
     factor: ca.Function
     solve: ca.Function
-    orientation: ca.Function
+    lu: SymbolicLU
 
 
+@lru_cache(maxsize=2)
 def blocks(system: System, gamma: float) -> Blocks:
     """The blocks of a method with the diagonal coefficient `gamma`."""
     h = ca.SX.sym("h")
     right, memory = ca.SX.sym("right", system.n), ca.SX.sym("memory", system.n)
-    J = system.J
-    W = ca.sparsify(system.mass / (gamma * h) - J)
-    lu = factorise(W, system.pivots)
-    tiny, rows = ca.densify(system.mass), system.algebraic[0]
-    tiny[rows, :] = -J[rows, :]
-    reference = factorise(ca.sparsify(tiny), system.pivots).sign()
+    lu = factorise(ca.sparsify(system.mass / (gamma * h) - system.J), system.pivots)
     return Blocks(
         ca.Function("f", [system.y, system.d], [system.f], {"cse": True}),
         ca.Function("factor", [system.y, h, system.d], [lu.packed], {"cse": True}),
         ca.Function(
             "solve", [lu.packed_symbol, right, memory], [lu.solve(right + system.mass @ memory)]
         ),
-        ca.Function("orientation", [system.y, h, system.d], [lu.sign() * reference], {"cse": True}),
+        lu,
     )
+
+
+Signs = Callable[[Any, Any, Any], tuple[Any, Any]]
+"""(y, h, d) -> signs of det W and of det W for a tiny step."""
+
+
+def signs(system: System, gamma: float) -> Signs:
+    """Signs of det W and of the same for a tiny step, which only algebraic rows have.
+
+    Where they differ, a mode grows faster than exp(t / (gamma h)), which an L-stable method of this
+    step only damps away.
+    """
+    block, rows = blocks(system, gamma), system.algebraic[0]
+    lu, first = block.lu, {row for row, _ in block.lu.order[: len(rows)]}
+    alone = system.is_semi_explicit and first == set(rows)
+    tiny = lu.sign(len(rows)) if alone else _tiny(system)
+    symbols = [lu.packed_symbol, system.y, system.d]
+    both = ca.Function("signs", symbols, [lu.sign(), tiny], {"cse": True})
+
+    def at(y: Any, h: Any, d: Any) -> tuple[Any, Any]:
+        of_step, of_tiny_step = both(block.factor(y, h, d), y, d)
+        return of_step, of_tiny_step
+
+    return at
+
+
+def _tiny(system: System) -> ca.SX:
+    """Sign of det W for a tiny step."""
+    matrix, rows = ca.densify(system.mass), system.algebraic[0]
+    matrix[rows, :] = -system.J[rows, :]
+    lu = factorise(ca.sparsify(matrix), system.pivots)
+    return ca.substitute(lu.sign(), lu.packed_symbol, lu.packed)

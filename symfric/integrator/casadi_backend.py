@@ -85,7 +85,8 @@ class Peer:
 
 def rates_of(system: System) -> tuple[list[int], Array]:
     """Which unknowns are differential states, and their nominal values."""
-    rates = [i for i in range(system.n) if i not in system.algebraic[1]]
+    still = {*system.algebraic[1], *(system.manifold.basis if system.manifold else ())}
+    rates = [i for i in range(system.n) if i not in still]
     nominal = np.ones(system.n)
     nominal[: system.nx] = system.nominal
     return rates, nominal[rates]
@@ -105,7 +106,7 @@ def peer(system: System, inputs: Drivers, p: Array, tolerances: Tolerances, back
         system = stabilised(system)
     rows, columns = system.algebraic
     rates, nominal = rates_of(system)
-    mass = ca.DM(system.mass)
+    mass = ca.DM(system.mass)[rates, rates]
     if rows != columns or mass.nnz() != len(rates):
         raise ValueError(
             "simulate: expected a diagonal mass matrix for this backend, got coupled rates; "
@@ -127,7 +128,7 @@ def peer(system: System, inputs: Drivers, p: Array, tolerances: Tolerances, back
     if backend == "ggl":
         # multipliers of index 2 carry an error / h, which no step size brings below a tolerance
         options |= {"suppress_algebraic": True, "calc_ic": False}
-    ode = f[rates] / (scale * ca.diag(mass)[rates])
+    ode = f[rates] / (scale * ca.diag(mass))
     dae = {
         "x": scaled,
         "z": system.y[columns],

@@ -33,6 +33,10 @@ class Explicit(Method):
         """Number of stages s."""
         return self.A.shape[0]
 
+    @property
+    def diagonal(self) -> None:
+        """None."""
+
     def work(self, system: System) -> tuple[int, int, int]:
         """Right-hand sides, Jacobians and factorisations of a step."""
         return self.stages, 0, 0

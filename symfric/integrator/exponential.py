@@ -42,6 +42,10 @@ class Exponential(Method):
 
     dae: ClassVar[bool] = False
 
+    @property
+    def diagonal(self) -> None:
+        """None."""
+
     def work(self, system: System) -> tuple[int, int, int]:
         """Right-hand sides, Jacobians (their diagonals) and factorisations of a step."""
         return 1, 1, 0

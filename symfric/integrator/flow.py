@@ -4,6 +4,7 @@ import casadi as ca
 import numpy as np
 
 from symfric.integrator.inputs import Drivers
+from symfric.integrator.manifold import Manifold
 from symfric.integrator.step import build_fixed
 from symfric.integrator.system import System, system
 from symfric.integrator.tableaux import METHODS
@@ -56,7 +57,7 @@ def _start(model: Model, whole: System, x0: ca.MX, data: ca.MX) -> ca.MX:
     rows, columns = whole.algebraic
     unknowns = [x0[i] if i < whole.nx else ca.MX(0) for i in range(whole.n)]
     if whole.manifold is not None:
-        on = whole.manifold.project(ca.vertcat(*unknowns), data)
+        on = _on_constraints(whole, whole.manifold)(ca.vertcat(*unknowns), data)
         unknowns = [on[i] for i in range(whole.n)]
     if columns:
         guesses = {v.name: float(v.start) for v in model.z}
@@ -72,3 +73,13 @@ def _start(model: Model, whole: System, x0: ca.MX, data: ca.MX) -> ca.MX:
         for row, i in enumerate(columns):
             unknowns[i] = found[row]
     return ca.vertcat(*unknowns)
+
+
+def _on_constraints(whole: System, manifold: Manifold) -> ca.Function:
+    """(y, d) -> y on the constraints, with a basis of the tangent space where one is needed."""
+    y = ca.SX(manifold.project(whole.y, whole.d))
+    if manifold.charted:
+        phi = manifold.defect(whole.y, whole.d)[: manifold.m]
+        slope = ca.Function("slope", [whole.y, whole.d], [ca.jacobian(phi, whole.y[: manifold.n])])
+        y[list(manifold.basis)] = ca.vec(ca.nullspace(ca.densify(slope(y, whole.d))))
+    return ca.Function("on_constraints", [whole.y, whole.d], [y], {"cse": True})

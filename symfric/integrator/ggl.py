@@ -35,12 +35,12 @@ def stabilised(system: System) -> System:
     phi, phi_dot = both[:m], both[m:]
     f = ca.SX(system.f)
     f[:n] += ca.jacobian(phi, system.y[:n]).T @ eta
-    f[list(system.safe[1])] = phi
+    f[list(system.pivots[1])] = phi
     return replace(
         system,
         y=ca.vertcat(system.y, eta),
         f=ca.vertcat(f, phi_dot),
         mass=ca.diagcat(system.mass, ca.SX(m, m)),
         timed=False,
-        names=(*system.names, *(f"{system.names[i]}_eta" for i in system.safe[1])),
+        names=(*system.names, *(f"{system.names[i]}_eta" for i in system.pivots[1])),
     )

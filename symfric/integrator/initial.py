@@ -50,6 +50,8 @@ def consistent(system: System | Equations, where: str, y: Array, d: Array) -> Ar
     if manifold is not None:
         y = _assembled(system, manifold, where, y, d)
     y = _solved(system, where, y, d)
+    if manifold is not None and manifold.charted:
+        y = _charted(manifold, y, d)
     if manifold is not None and (cause := jammed(manifold, system.names, y, d, 0.0)):
         raise ValueError(f"{where}: {cause}")
     return y
@@ -132,6 +134,15 @@ def _newton_steps(g: Array, J: Array) -> Array:
         return np.linalg.solve(matrices, g[:, :, None])[:, :, 0].astype(float)
     except np.linalg.LinAlgError:
         return np.full((members, n), np.nan)
+
+
+def _charted(manifold: Manifold, y: Array, d: Array) -> Array:
+    """`y` with an orthonormal basis of the tangent space."""
+    n, m, y = manifold.n, manifold.m, y.copy()
+    phi_q = manifold.slope(y, d)[n : n + m, :n].full()
+    # the trailing right singular vectors span the null space
+    y[manifold.basis] = np.linalg.svd(phi_q)[2][m:].ravel()
+    return y
 
 
 def _assembled(

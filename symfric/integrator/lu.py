@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import final
 
 import casadi as ca
-import numpy as np
 
 
 @final
@@ -28,7 +27,7 @@ class SymbolicLU:
     packed_symbol: ca.SX
 
     def sign(self, leading: int | None = None) -> ca.SX:
-        """Sign of the determinant, in terms of `packed`.
+        """Sign of the determinant, in terms of `packed_symbol`.
 
         Args:
             leading: only of the block that the first pivots eliminate, whose rows and columns are
@@ -37,7 +36,7 @@ class SymbolicLU:
         order = self.order[:leading]
         sign, at = ca.SX(_parity(dict(order))), 0
         for others, below in zip(self.rows[:leading], self.columns[:leading], strict=True):
-            sign = sign * ca.sign(self.packed[at])
+            sign = sign * ca.sign(self.packed_symbol[at])
             at += 1 + len(others) + len(below)
         return sign
 

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.lu import factorise
-from symfric.model import Model
+from symfric.model import Holonomic, Model
 
 Array = NDArray[np.float64]
 DEPENDENT = 1e-5
@@ -45,11 +45,8 @@ class Manifold:
         defect: (y, d) -> constraints and their rates.
         n, m, first: numbers of accelerations, of multipliers and of states. The algebraic unknowns
             are accelerations, multipliers, normal forces, in this order after the states.
+        basis: where y holds V, a basis of the tangent space, column by column.
         slope: (y, d) -> derivatives of the algebraic equations by the algebraic unknowns.
-        passable: (y, d) -> sign of det(I - dN/dN), the loop from normal forces over friction to
-            reactions and back. At zero friction jams: the normal forces grow without bound; the
-            solution beyond has the wrong sign and is none of the machine. Negative also where a
-            normal force is.
         pressing: (y, d) -> normal forces over their typical size, which must not be negative.
         pressed: what they are, in words.
     """
@@ -60,14 +57,23 @@ class Manifold:
     n: int
     m: int
     first: int
+    basis: range
     slope: ca.Function
-    passable: ca.Function
     pressing: ca.Function
     pressed: tuple[str, ...]
 
+    @property
+    def charted(self) -> bool:
+        """Whether it is integrated in charts of the tangent space."""
+        return len(self.basis) > 0
 
-def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, list[str]]:
-    """Unknowns (x, a, z) of a holonomic model, their right-hand sides and names."""
+
+def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
+    """Unknowns (x, a, z, V) of a holonomic model, right-hand sides, mass matrix and names.
+
+    V is a basis of the tangent space of the constraints, column by column, at the start of the step
+    before; it has no rates. Without constraints it has no rows.
+    """
     mechanics, x = model.holonomic, model.vector("x")
     if mechanics is None or model.ode is None:
         raise ValueError(f"model '{model.name}': expected a holonomic model with an ode")
@@ -75,7 +81,20 @@ def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, list[str]]:
     f = ca.vertcat(x[n : 2 * n], mechanics.a, model.ode[2 * n :], mechanics.implicit)
     names = [v.name for v in model.x]
     names += [f"{v.name}_dot" for v in model.x[n : 2 * n]] + [v.name for v in model.z]
-    return ca.vertcat(x, mechanics.a, model.vector("z")), f, names
+    V = ca.SX.sym("V", _of_basis(mechanics))
+    mass = ca.diagcat(ca.SX.eye(x.numel()), ca.SX(*2 * [n + len(model.z)]), ca.SX.eye(V.numel()))
+    return (
+        ca.vertcat(x, mechanics.a, model.vector("z"), V),
+        ca.vertcat(f, ca.SX.zeros(V.numel())),
+        mass,
+        [*names, *(f"V_{i}" for i in range(V.numel()))],
+    )
+
+
+def _of_basis(mechanics: Holonomic) -> int:
+    """Length of V: a column of n for each degree of freedom, where there is a chart at all."""
+    n, m = mechanics.n, mechanics.phi.numel()
+    return n * (n - m) if m and mechanics.index == 0 else 0
 
 
 def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
@@ -103,18 +122,12 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
     implicit = ca.Function("implicit", [y, d], [f[algebraic]])
     J = ca.jacobian(f[algebraic], y[algebraic])
     slope = ca.Function("slope", [y, d], [J])
-    whole = factorise(J, (range(n), range(n, n + m)))
-    # with a definite mass matrix the sign without friction is (-1) ^ rows without rates
-    regular = -1 if (len(algebraic) - n) % 2 else 1
     column = projected
     for _ in range(2):
         lu = factorise(slope(column, d), (range(n), range(n, n + m)))
         step = ca.substitute(lu.solve(implicit(column, d)), lu.packed_symbol, lu.packed)
         column = ca.vertcat(column[:nx], column[algebraic] - step, column[algebraic[-1] + 1 :, 0])
     pressing = ca.substitute(mechanics.pressing, model.vector("u"), u)
-    passable = regular * whole.sign()
-    for N in ca.vertsplit(pressing):
-        passable = ca.if_else(N > -PULLING, passable, -1)
     return Manifold(
         project,
         ca.Function("refine", [y, d], [column], {"cse": True}),
@@ -122,8 +135,8 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
         n,
         m,
         nx,
+        range(algebraic[-1] + 1, algebraic[-1] + 1 + _of_basis(mechanics)),
         slope,
-        ca.Function("passable", [y, d], [passable], {"cse": True}),
         ca.Function("pressing", [y, d], [pressing]),
         mechanics.pressed,
     )

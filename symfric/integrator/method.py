@@ -22,16 +22,12 @@ class Trial:
         end: the solution after the step.
         error: estimate of its error; None from a method of fixed steps.
         dense: coefficients d_1, d_2, ... of the dense output (see `Dense`).
-        orientation: sign of det W at `end` relative to that of a tiny step; negative where a mode
-            grows faster than exp(t / (gamma h)), which an L-stable method only damps away. None
-            from a method that follows such modes.
         corrections: the last two Newton corrections of `end`; empty where nothing is iterated.
     """
 
     end: Any
     error: Any = None
     dense: tuple[Any, ...] = ()
-    orientation: Any = None
     corrections: tuple[Any, ...] = ()
 
 
@@ -61,6 +57,14 @@ class Method(ABC):
     dense_dae: int = 0
     H: Array = field(default_factory=lambda: np.zeros((0, 0)))
     source: str
+
+    @property
+    @abstractmethod
+    def diagonal(self) -> float | None:
+        """The coefficient gamma of its iteration matrix W = M / (gamma h) - J.
+
+        None of a method without one, and of methods of fixed steps.
+        """
 
     dae: ClassVar[bool] = True
     """Whether algebraic unknowns and mass matrices are allowed."""

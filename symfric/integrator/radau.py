@@ -41,6 +41,11 @@ class Radau(Method):
         vandermonde: Array = np.vander(self.c, increasing=True)
         return moments @ np.linalg.inv(vandermonde)
 
+    @property
+    def diagonal(self) -> float:
+        """That of its real block."""
+        return 1 / eigenbasis(self.A).gamma
+
     def work(self, system: System) -> tuple[int, int, int]:
         """Right-hand sides, Jacobians and factorisations (a real and a complex one) of a step."""
         return 3 * self._iterations(system) - 2, 1, 2
@@ -55,7 +60,7 @@ class Radau(Method):
         first iteration is the solution.
         """
         basis = eigenbasis(self.A)
-        block, (factor, solve) = blocks(system, 1 / basis.gamma), _pair(system, basis)
+        block, (factor, solve) = blocks(system, self.diagonal), _pair(system, basis)
         n, T, inverse = system.n, basis.T, np.linalg.inv(basis.T)
         # what algebraic equations leave over where a step begins is no error of the step
         rates = ca.DM([float(i not in system.algebraic[0]) for i in range(n)])
@@ -81,8 +86,7 @@ class Radau(Method):
                 corrections.append(combination(T[-1], change, kind))
             error = block.solve(lu, rates * first, per_h * combination(self.E, z, kind))
             dense = tuple(combination(row, z, kind) for row in self.H)
-            end = y + z[-1]
-            return Trial(end, error, dense, block.orientation(end, h, d), tuple(corrections[-2:]))
+            return Trial(y + z[-1], error, dense, tuple(corrections[-2:]))
 
         return trial
 

@@ -29,6 +29,11 @@ class Rosenbrock(Method):
     C: Array
 
     @property
+    def diagonal(self) -> float:
+        """Gamma."""
+        return self.gamma
+
+    @property
     def stages(self) -> int:
         """Number of stages s."""
         return self.A.shape[0]
@@ -54,7 +59,6 @@ class Rosenbrock(Method):
                         memory = memory + C[i, j] * k[j]
                 k.append(block.solve(lu, block.f(argument, d), memory * per_h))
             dense = tuple(combination(row, k, type(y)) for row in self.H)
-            end = argument + k[-1]
-            return Trial(end, k[-1], dense, block.orientation(end, h, d))
+            return Trial(argument + k[-1], k[-1], dense)
 
         return trial

@@ -16,8 +16,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from symfric.integrator.blocks import signs
+from symfric.integrator.manifold import PULLING
 from symfric.integrator.method import Method, Trial, Trials
 from symfric.integrator.system import System
+from symfric.integrator.tangent import tangent
 
 MEMORY = 5
 """Rows of S before y: t, h, h_old, growth_old, rejected."""
@@ -31,19 +34,57 @@ KAPPA = 0.1
 
 
 def steps(system: System, method: Method) -> Trials:
-    """The steps of a method, which end on the constraints of a mechanism where there are any."""
-    free, manifold = method.trials(system), system.manifold
-    if manifold is None:
+    """The steps of a method; those of a mechanism end on its constraints."""
+    chart, manifold = tangent(system), system.manifold
+    if chart is not None:
+        inside = method.trials(chart.reduced)
+
+        def in_chart(y: Any, h: Any, d: Any) -> Trial:
+            data = chart.open(y, d)
+            return chart.trial(inside(chart.enter(y, data), h, data), y, h, data)
+
+        return in_chart
+    free = method.trials(system)
+    if manifold is None or not manifold.m:
         return free
 
-    def trial(y: Any, h: Any, d: Any) -> Trial:
+    def projected(y: Any, h: Any, d: Any) -> Trial:
         found = free(y, h, d)
-        sign = manifold.passable(found.end, d)
-        if found.orientation is not None:
-            sign = ca.fmin(sign, found.orientation)
-        return replace(found, end=manifold.project(found.end, d), orientation=sign)
+        return replace(found, end=manifold.project(found.end, d))
 
-    return trial
+    return projected
+
+
+def obstacles(system: System, method: Method) -> Callable[[Any, Any, Any], Any] | None:
+    """What forbids a step over h to end at y although its error is small; None where nothing can.
+
+    Returns:
+        (y, h, d) -> a number that is negative where something does.
+
+    Breaking away would be missed without a sign of it: where a contact turns unstable, a long step
+    stays on the solution that sticks, and estimates no error; `signs` tells. And where the loop
+    from normal forces over friction to reactions and back, det(I - dN/dN), is negative, friction
+    has jammed: that solution is none of the machine, nor is one where a bearing pulls. Mechanisms
+    without friction have none of this.
+    """
+    gamma, manifold, chart = method.diagonal, system.manifold, tangent(system)
+    if gamma is None or (manifold is not None and not system.rubs):
+        return None
+    both = signs(system if chart is None else chart.reduced, gamma)
+
+    def sign(y: Any, h: Any, d: Any) -> Any:
+        here, data = y, d
+        if chart is not None:
+            data = chart.open(y, d)
+            here = chart.enter(y, data)
+        own, tiny = both(here, h, data)
+        if manifold is None:
+            return own * tiny
+        # with a definite mass matrix and no friction, that of n accelerations is (-1)^n
+        signs_of = [own * tiny, (-1) ** manifold.n * tiny]
+        return ca.mmin(ca.vertcat(*signs_of, manifold.pressing(y, d) + PULLING))
+
+    return sign
 
 
 def build_fixed(system: System, method: Method, kind: Any = ca.SX) -> ca.Function:
@@ -128,10 +169,9 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
     norm = error_norm(system, y, y_new, atol, rtol, d)
     e2 = norm(trial.error)
     sound = e2 <= 1e20
-    if trial.orientation is not None:
-        # breaking away would be missed without a sign of it: where a contact turns unstable, a
-        # long step stays on the solution that sticks, and estimates no error
-        sound = ca.logic_and(sound, ca.logic_not(trial.orientation < 0))
+    obstacle = obstacles(system, method)
+    if obstacle is not None:
+        sound = ca.logic_and(sound, ca.logic_not(obstacle(y_new, h, d) < 0))
     if unwatched := system.algebraic[1]:
         sound = ca.logic_and(sound, ca.sumsqr(y_new[unwatched]) < np.inf)
     if trial.corrections:
@@ -159,7 +199,7 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
         ca.if_else(ca.logic_or(accept, left <= 0), 0, 1),
     )
     S_next = ca.vertcat(memory, ca.if_else(accept, y_new, y))
-    outputs: Any = [S_next, ca.vertcat(*trial.dense)]
+    outputs: Any = [ca.densify(S_next), ca.densify(ca.vertcat(*trial.dense))]
     if kind is ca.SX:
         outputs = ca.cse(outputs)
     return ca.Function("symfric_step", [S, R], outputs, ["S", "R"], ["S_next", "D"])

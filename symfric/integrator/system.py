@@ -34,8 +34,10 @@ class System:
             and its algebraic variables.
         monitor_nominal: their typical magnitudes, shape (m,).
         manifold: where the solution of a holonomic model lies.
-        safe: groups of algebraic rows with a safe pivot on the diagonal, each once those before it
-            are eliminated: those of a mass matrix, those of constraints.
+        pivots: groups of rows with a safe pivot on the diagonal, each once those before it are
+            eliminated: rates of their own unknown and mass matrices, then constraints.
+        rubs: whether something slides in it that its model names (`Model.monitors`).
+        slope: Jacobian of f where it is not to be derived from f.
     """
 
     y: ca.SX
@@ -49,7 +51,10 @@ class System:
     monitors: ca.SX
     monitor_nominal: NDArray[np.float64]
     manifold: Manifold | None = None
-    safe: tuple[tuple[int, ...], ...] = ()
+    pivots: tuple[tuple[int, ...], ...] = ()
+    slope: ca.SX | None = None
+
+    rubs: bool = False
 
     @property
     def n(self) -> int:
@@ -59,19 +64,18 @@ class System:
     @cached_property
     def J(self) -> ca.SX:
         """Jacobian of f, shape (n, n)."""
-        return ca.jacobian(self.f, self.y)
-
-    @cached_property
-    def pivots(self) -> tuple[tuple[int, ...], ...]:
-        """Groups of rows that pivot on the diagonal: rates of their own unknown and masses first."""
-        own = tuple(i for i in range(self.nx) if self.mass.sparsity().has_nz(i, i))
-        first, *then = self.safe or ((),)
-        return ((*own, *first), *then)
+        return ca.jacobian(self.f, self.y) if self.slope is None else self.slope
 
     @cached_property
     def is_ode(self) -> bool:
         """Whether the mass matrix is the identity."""
         return bool((ca.DM(self.mass).full() == np.eye(self.n)).all())
+
+    @cached_property
+    def is_semi_explicit(self) -> bool:
+        """Whether the mass matrix is the identity but for zeros on its diagonal."""
+        M = ca.DM(self.mass).full()
+        return bool((np.diag(np.diag(M)) == M).all() and np.isin(np.diag(M), (0.0, 1.0)).all())
 
     @cached_property
     def algebraic(self) -> tuple[list[int], list[int]]:
@@ -112,6 +116,7 @@ def system(model: Model, inputs: Drivers) -> System:
     monitors = ca.vertcat(ca.SX(0, 1), *(ca.SX(expression) for expression, _ in watched))
     d = ca.vertcat(model.vector("p"), inputs.data)
     n, m = (mechanics.n, phi.numel()) if mechanics else (0, 0)
+    own = (i for i in range(nx) if mass.sparsity().has_nz(i, i))
     return System(
         unknowns,
         d,
@@ -124,7 +129,8 @@ def system(model: Model, inputs: Drivers) -> System:
         ca.substitute(monitors, model.vector("u"), inputs.expression),
         np.array([nominal for _, nominal in watched], dtype=float),
         manifold(model, unknowns, d, f, inputs.expression) if mechanics else None,
-        (tuple(range(nx, nx + n)), tuple(range(nx + n, nx + n + m))),
+        ((*own, *range(nx, nx + n)), tuple(range(nx + n, nx + n + m))),
+        rubs=bool(model.monitors),
     )
 
 
@@ -133,9 +139,7 @@ def _columns(model: Model) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
     x, z = model.vector("x"), model.vector("z")
     nx, names = x.numel(), [v.name for v in (*model.x, *model.z)]
     if model.holonomic is not None:
-        unknowns, f, names = holonomic_columns(model)
-        algebraic = f.numel() - nx
-        return unknowns, f, ca.diagcat(ca.SX.eye(nx), ca.SX(algebraic, algebraic)), names
+        return holonomic_columns(model)
     if model.ode is not None:
         f = ca.vertcat(model.ode, model.alg)
         return ca.vertcat(x, z), f, ca.diagcat(ca.SX.eye(nx), ca.SX(z.numel(), z.numel())), names

@@ -145,6 +145,7 @@ def assemble(
     p: Variables,
     u: Variables,
     more: tuple[Details, Drawn],
+    index: int,
 ) -> Model:
     """The model of a mechanism.
 
@@ -153,6 +154,7 @@ def assemble(
         labels: names of the multipliers.
         guess: multipliers "lam" and normal forces "N" without friction, at the start.
         more: what writes further results and the sketch.
+        index: 0 or 1, see `Holonomic`.
     """
     contacts = slips(eq, guess["N"].tolist())
     units = {label: part.unit for part in eq.held for label in part.labels}
@@ -206,6 +208,7 @@ def assemble(
             eq.phi,
             eq.a,
             ca.vertcat(balance, algebraic),
+            index,
             *_pressing(contacts, ca.vertcat(eq.a, before)),
         ),
     )

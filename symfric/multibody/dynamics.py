@@ -16,10 +16,10 @@ from typing import final
 
 import casadi as ca
 
-from symfric.multibody.body import GROUND
+from symfric.multibody.body import GROUND, Body
 from symfric.multibody.forces import Axial, Load
-from symfric.multibody.joints import Joint
-from symfric.multibody.kinematics import Kinematics, Relative
+from symfric.multibody.joints import Free, Joint
+from symfric.multibody.kinematics import Kinematics, Motion, Relative
 from symfric.multibody.spatial import skew
 from symfric.multibody.topology import Link, body_of, frame_at
 
@@ -131,26 +131,64 @@ def balance(
         on_child = frame_at(kin.topology.bodies, loop.joint.child).p
         loads.append(Load(body_of(loop.joint.child), force, at, moment, on_child))
         loads.append(Load(body_of(loop.joint.parent), -force, at, -moment))
-    carried = {link.body: _inertial(kin, link, loads) for link in links}
+    carrying = {link.base for link in links}
+    carried: dict[str, Wrench] = {}
     rows: list[ca.SX] = [ca.SX(0, 1)] * len(links)
     for k in range(len(links) - 1, -1, -1):
         link = links[k]
+        if _floats(kin, link) and link.body not in carrying:
+            rows[k] = _floating(kin, link, loads)
+            reactions[link.joint.name] = ca.SX(3, 1), ca.SX(3, 1)
+            continue
+        force, moment = _inertial(kin, link, loads)
+        if link.body in carried:
+            more_force, more_moment = carried[link.body]
+            force, moment = force + more_force, moment + more_moment
+        carried[link.body] = force, moment
         rows[k], reactions[link.joint.name] = _project(kin, link, carried, axial)
     return ca.vertcat(ca.SX(0, 1), *rows), reactions
+
+
+def _floats(kin: Kinematics, link: Link) -> bool:
+    """Whether the coordinates of a link are those of its centre of mass in the world."""
+    centred = (link.at_body.p - kin.topology.bodies[link.body].c).is_zero()
+    return isinstance(link.joint, Free) and link.base == GROUND and not link.reverse and centred
+
+
+def _floating(kin: Kinematics, link: Link, loads: list[Load]) -> ca.SX:
+    """Balance of a body that nothing hangs on and that hangs on nothing.
+
+    Its forces stay in world components: turned into the body and back, R R' would be multiplied out
+    in every derivative.
+    """
+    body, motion, rows = kin.topology.bodies[link.body], kin.motion[link.body], link.rows
+    force = body.mass * (link.at_base.R @ kin.qdd[rows, 0][:3])
+    moment = body.J @ motion.dw_B + ca.cross(motion.w_B, body.J @ motion.w_B)
+    for load in loads:
+        if load.body == link.body:
+            force -= load.force
+            moment -= _moment_about(body, motion, load)
+    H_w, _ = link.subspace(kin.q[rows, 0])
+    return ca.vertcat(link.at_base.R.T @ force, H_w[:, 3:].T @ (link.at_body.R.T @ moment))
+
+
+def _moment_about(body: Body, motion: Motion, load: Load) -> ca.SX:
+    """Moment of a load about the centre of mass, in the body's components."""
+    com = motion.point(body.c)[0]
+    arm = motion.R.T @ (load.point - com) if load.arm is None else load.arm - body.c
+    return motion.R.T @ load.moment + ca.cross(arm, motion.R.T @ load.force)
 
 
 def _inertial(kin: Kinematics, link: Link, loads: list[Load]) -> Wrench:
     """Inertial minus applied wrench of a body about its centre of mass, in its components."""
     body, motion = kin.topology.bodies[link.body], kin.motion[link.body]
-    com, _ = motion.point(body.c)
     w, J = motion.w_B, body.J
     force = body.mass * motion.acceleration(body.c)
     moment = J @ motion.dw_B + ca.cross(w, J @ w)
     for load in loads:
         if load.body == link.body:
             force -= motion.R.T @ load.force
-            arm = motion.R.T @ (load.point - com) if load.arm is None else load.arm - body.c
-            moment -= motion.R.T @ load.moment + ca.cross(arm, motion.R.T @ load.force)
+            moment -= _moment_about(body, motion, load)
     return force, moment
 
 
@@ -172,11 +210,11 @@ def _project(
     if link.base != GROUND:
         R_AP, base = link.at_base.R, kin.topology.bodies[link.base]
         arm = link.at_base.p + R_AP @ p - base.c
-        f, m = carried[link.base]
+        f, m = carried.get(link.base, (ca.SX(3, 1), ca.SX(3, 1)))
         passed = R_AP @ force_P
         carried[link.base] = f + passed, m + R_AP @ about_P + ca.cross(arm, passed)
     H_w, H_v = link.subspace(q)
-    rows = (R_PC.T @ H_w).T @ about_C + (R_PC.T @ H_v).T @ force_C
+    rows = H_w.T @ about_C + H_v.T @ force_P
     for load in axial.get(link.joint.name, ()):
         rows[load.joint.directions[load.direction]] -= load.value
     if not link.reverse:

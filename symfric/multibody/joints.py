@@ -2,7 +2,8 @@
 
 A joint connects a frame P on its parent body with a frame C on its child body. Its pose (R_PC,
 p_PC) is a function of the joint coordinates q; its motion subspace (H_w, H_v) gives the relative
-angular velocity w_PC = H_w q' and the velocity p_PC' = H_v q', both in P. The constraints are
+angular velocity w_PC_C = H_w q' in components of C, where Euler parameters have it simplest, and
+the velocity p_PC' = H_v q' in those of P. The constraints are
 expressions of the pose that vanish for every q; they close a loop, where the joint has no
 coordinates. The axis of a joint is z of both frames.
 """
@@ -16,7 +17,7 @@ import casadi as ca
 
 from symfric.multibody.friction import JointFriction
 from symfric.multibody.spatial import (
-    euler_e,
+    euler_g,
     rotation,
     rotation_x,
     rotation_y,
@@ -212,8 +213,8 @@ class Spherical(Joint):
         return rotation(q), ca.SX(3, 1)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """W = 2 E q'."""
-        return 2 * euler_e(q), ca.SX(3, 4)
+        """W' = 2 G q'."""
+        return 2 * euler_g(q), ca.SX(3, 4)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
         """One point in common."""
@@ -235,8 +236,8 @@ class Universal(Joint):
         return rotation_x(q[0]) @ rotation_y(q[1]), ca.SX(3, 1)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Rotation about x, and about y turned by q[0]."""
-        axes = ca.horzcat(ca.vertcat(1, 0, 0), ca.vertcat(0, ca.cos(q[0]), ca.sin(q[0])))
+        """Rotation about y, and about x before it."""
+        axes = ca.horzcat(ca.vertcat(ca.cos(q[1]), 0, ca.sin(q[1])), ca.vertcat(0, 1, 0))
         return axes, ca.SX(3, 2)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
@@ -318,9 +319,9 @@ class Free(Joint):
         return rotation(q[3:]), q[:3]
 
     def subspace(self, q: ca.SX) -> Pair:
-        """V = q[:3]', w = 2 E q[3:]'."""
+        """V = q[:3]', w' = 2 G q[3:]'."""
         return (
-            ca.horzcat(ca.SX(3, 3), 2 * euler_e(q[3:])),
+            ca.horzcat(ca.SX(3, 3), 2 * euler_g(q[3:])),
             ca.horzcat(ca.SX.eye(3), ca.SX(3, 4)),
         )
 

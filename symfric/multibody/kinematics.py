@@ -80,6 +80,7 @@ class Kinematics:
     topology: Topology
     q: ca.SX
     qd: ca.SX
+    qdd: ca.SX
     motion: dict[str, Motion]
     t: ca.SX
 
@@ -119,7 +120,8 @@ class Kinematics:
         link = self.topology.link_of.get(joint.name)
         if link is None:
             return self.relative(joint).w
-        return joint.subspace(self.q[link.rows, 0])[0] @ self.qd[link.rows, 0]
+        q, qd = self.q[link.rows, 0], self.qd[link.rows, 0]
+        return joint.pose(q)[0] @ (joint.subspace(q)[0] @ qd)
 
     def along(self, joint: Joint, direction: str) -> tuple[ca.SX, ca.SX]:
         """Displacement or angle of a joint in one of its `directions`, and its rate.
@@ -142,7 +144,7 @@ def kinematics(topology: Topology, q: ca.SX, qd: ca.SX, qdd: ca.SX, t: ca.SX) ->
     motion = {GROUND: Motion(ca.SX.eye(3), zero, zero, zero, zero, zero)}
     for link in topology.links:
         motion[link.body] = _carried(motion[link.base], link, q, qd, qdd)
-    return Kinematics(topology, q, qd, motion, t)
+    return Kinematics(topology, q, qd, qdd, motion, t)
 
 
 def _carried(base: Motion, link: Link, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> Motion:
@@ -155,13 +157,15 @@ def _carried(base: Motion, link: Link, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> Motio
     R_PC, p = link.pose(q)
     H_w, H_v = link.subspace(q)
     drift_w, drift_v = (ca.sparsify(ca.jtimes(H @ qd, q, qd)) for H in (H_w, H_v))
+    if link.joint.quaternion is not None and not link.reverse:
+        drift_w = ca.SX(3, 1)  # G(p') p' = 0
     R_AP, R_BC, to_body = link.at_base.R, link.at_body.R, -link.at_body.p
     R_BP = ca.sparsify(R_BC @ R_PC.T)
     R_BA = ca.sparsify(R_BP @ R_AP.T)
     arm = link.at_base.p + R_AP @ p
-    w_A, own_w, own_v = base.w_B, R_BP @ (H_w @ qd), R_BP @ (H_v @ qd)
+    w_A, own_w, own_v = base.w_B, R_BC @ (H_w @ qd), R_BP @ (H_v @ qd)
     w = R_BA @ w_A + own_w
-    dw = R_BA @ base.dw_B + ca.cross(R_BA @ w_A, own_w) + R_BP @ (H_w @ qdd + drift_w)
+    dw = R_BA @ base.dw_B + ca.cross(R_BA @ w_A, own_w) + R_BC @ (H_w @ qdd + drift_w)
     dv = R_BA @ (base.dv_B + ca.cross(base.dw_B, arm) + ca.cross(w_A, ca.cross(w_A, arm)))
     dv += 2 * ca.cross(R_BA @ w_A, own_v) + R_BP @ (H_v @ qdd + drift_v)
     R_WB = ca.sparsify(base.R @ R_BA.T)

@@ -93,7 +93,9 @@ class Mechanism:
         self.inputs.append(variable)
         return variable.symbol
 
-    def build(self, p: Variables = (), formulation: str = "joint") -> Model:
+    def build(
+        self, p: Variables = (), formulation: str = "joint", index: int | None = None
+    ) -> Model:
         """Write the model.
 
         Args:
@@ -101,16 +103,23 @@ class Mechanism:
             formulation: "joint" has the coordinates of the joints of a spanning tree and
                 constraints for its loops; "absolute" has position and Euler parameters of every
                 body and constraints for every joint, several times dearer.
+            index: how constraints are kept; 0 integrates in their tangent space, 1 in all
+                coordinates with a projection at the end of every step; None takes what is faster,
+                0 for absolute coordinates and 1 for those of joints. Same solution, to the
+                tolerance.
 
         Raises:
             ValueError: all mistakes at once, each with its path.
         """
+        if index not in (None, 0, 1):
+            raise ValueError(f"mechanism '{self.name}': index: expected 0 or 1, got {index!r}")
+        chosen = (0 if formulation == "absolute" else 1) if index is None else index
         made = self.prepare(p, formulation)
         u = tuple(self.inputs)
         guess = without_friction(made, p, u)
         parts = made.eq, tuple(self.joints), tuple(self.forces)
         more = partial(results, *parts, made.open_reactions), partial(sketch, *parts)
-        return assemble(self.name, made.eq, made.q, made.qd, made.labels, guess, p, u, more)
+        return assemble(self.name, made.eq, made.q, made.qd, made.labels, guess, p, u, more, chosen)
 
     def prepare(self, p: Variables = (), formulation: str = "joint") -> Prepared:
         """The equations of motion with their variables, checked.

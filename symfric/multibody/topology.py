@@ -65,7 +65,7 @@ class Link:
         if not self.reverse:
             return H_w, H_v
         R, p = self.joint.pose(q)
-        return -R.T @ H_w, -R.T @ (H_v + skew(p) @ H_w)
+        return -R @ H_w, -R.T @ H_v - skew(R.T @ p) @ H_w
 
 
 @final

@@ -65,7 +65,7 @@ def test_accelerations_are_unknowns_and_no_mass_matrix_is_inverted() -> None:
     s = unknowns(LOOPS["four_mass"])
     assert s.names[8:12] == ("x1_rate_dot", "y2_rate_dot", "z3_rate_dot", "x4_rate_dot")
     assert (s.n, s.nx, s.manifold is not None) == (8 + 4 + 2, 8, True)
-    assert (s.safe, s.then) == ((8, 9, 10, 11), (12, 13))
+    assert s.pivots == (tuple(range(12)), (12, 13))
 
 
 def test_projection_is_the_nearest_point() -> None:
