@@ -67,6 +67,25 @@ class Event:
 
 
 @dataclass(frozen=True, eq=False)
+class Inner:
+    """Equations with inner unknowns l, so that each knows its neighbours only.
+
+        0 = f(y, l),   l_k = g_k(y, l_1 ... l_{k-1})
+
+    Attributes:
+        l: SX symbols (k, 1).
+        values: SX (k, 1), g.
+        f: SX, what is written with l.
+        groups: symbols of unknowns and of l, in the order in which they are best eliminated.
+    """
+
+    l: ca.SX  # noqa: E741
+    values: ca.SX
+    f: ca.SX
+    groups: tuple[ca.SX, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Holonomic:
     """What a mechanical model knows beyond its equations: constraints on its coordinates.
 
@@ -84,6 +103,8 @@ class Holonomic:
         index: 0 has it integrated in the tangent space of its constraints, in as many unknowns as
             there are degrees of freedom; 1 in all coordinates, which are put back onto the
             constraints at the end of every step. The solution is the same, to the tolerance.
+        inner: the same equations for long chains, whose derivatives are sparse only with inner
+            unknowns; None elsewhere.
         pressing: SX (k, 1), normal forces over their typical size, which must not be negative.
         pressed: what they are, in words.
         advice: what to try where friction and reactions have no solution; may be empty.
@@ -94,6 +115,7 @@ class Holonomic:
     a: ca.SX
     implicit: ca.SX
     index: int = 1
+    inner: Inner | None = None
     pressing: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
     pressed: tuple[str, ...] = ()
     advice: str = ""

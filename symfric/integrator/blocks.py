@@ -1,6 +1,6 @@
 """The Functions an implicit step is made of: with SX they inline, with MX they stay calls."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, final
@@ -9,6 +9,9 @@ import casadi as ca
 
 from symfric.integrator.lu import SymbolicLU, factorise
 from symfric.integrator.system import System
+
+
+NONE = ca.SX(0, 1)
 
 
 @final
@@ -34,15 +37,64 @@ def blocks(system: System, gamma: float) -> Blocks:
     """The blocks of a method with the diagonal coefficient `gamma`."""
     h = ca.SX.sym("h")
     right, memory = ca.SX.sym("right", system.n), ca.SX.sym("memory", system.n)
-    lu = factorise(ca.sparsify(system.mass / (gamma * h) - system.J), system.pivots)
+    lu = _factorised(system, system.mass / (gamma * h), range(system.n))
+    packed = with_inner(system, lu.packed, h)
+    whole = ca.vertcat(right + system.mass @ memory, ca.SX(len(lu.order) - system.n, 1))
     return Blocks(
         ca.Function("f", [system.y, system.d], [system.f], {"cse": True}),
-        ca.Function("factor", [system.y, h, system.d], [lu.packed], {"cse": True}),
-        ca.Function(
-            "solve", [lu.packed_symbol, right, memory], [lu.solve(right + system.mass @ memory)]
-        ),
+        ca.Function("factor", [system.y, h, system.d], [packed], {"cse": True}),
+        ca.Function("solve", [lu.packed_symbol, right, memory], [lu.solve(whole)[: system.n]]),
         lu,
     )
+
+
+def _factorised(system: System, mass: ca.SX, rows: Sequence[int]) -> SymbolicLU:
+    """Factors of `mass` - J, with J in `rows` alone, and of the equations of inner unknowns."""
+    W, inner = ca.SX(mass), system.inner
+    if inner is None:
+        W[list(rows), :] -= system.J[list(rows), :]
+        return factorise(ca.sparsify(W), system.pivots)
+    f, k = inner.f, inner.l.numel()
+    W[list(rows), :] -= ca.jacobian(f, system.y)[list(rows), :]
+    to_l = ca.SX(system.n, k)
+    to_l[list(rows), :] = -ca.jacobian(f, inner.l)[list(rows), :]
+    own = ca.SX.eye(k) - ca.jacobian(inner.values, inner.l)
+    whole = ca.blockcat([[W, to_l], [-ca.jacobian(inner.values, system.y), own]])
+    unknowns = ca.vertsplit(ca.vertcat(system.y, inner.l))
+    place = {ca.SX(s).__hash__(): i for i, s in enumerate(unknowns)}
+    groups = [[place[ca.SX(s).__hash__()] for s in ca.vertsplit(g)] for g in inner.groups]
+    return factorise(ca.sparsify(whole), groups)
+
+
+def with_inner(system: System, expression: ca.SX, h: ca.SX = NONE) -> ca.SX:
+    """`expression` with the values of inner unknowns put in."""
+    inner = system.inner
+    if inner is None:
+        return expression
+    (values,), _ = ca.substitute_inplace([inner.l], [inner.values], [NONE])
+    put = ca.Function("put", [inner.l, system.y, h, system.d], [expression])
+    return put(values, system.y, h, system.d)
+
+
+@lru_cache(maxsize=2)
+def refinement(system: System) -> ca.Function:
+    """(y, d) -> y of a mechanism on its constraints, with its algebraic unknowns exact.
+
+    Two steps of Newton's method for accelerations, multipliers and normal forces.
+    """
+    y, d, rows = ca.SX(system.y), system.d, system.algebraic[0]
+    lu = _factorised(system, system.mass, rows)
+    f = ca.Function("f", [system.y, d], [system.f[rows]])
+    factor = ca.Function("factor", [system.y, d], [with_inner(system, lu.packed)])
+    right = ca.SX.sym("right", len(rows))
+    whole = ca.SX(len(lu.order), 1)
+    whole[rows] = right
+    solve = ca.Function("solve", [lu.packed_symbol, right], [lu.solve(whole)[: system.n]])
+    if system.manifold is not None:
+        y = ca.SX(system.manifold.project(y, d))
+    for _ in range(2):
+        y = y + solve(factor(y, d), f(y, d))
+    return ca.Function("refine", [system.y, d], [y], {"cse": True})
 
 
 Signs = Callable[[Any, Any, Any], tuple[Any, Any]]
@@ -71,7 +123,6 @@ def signs(system: System, gamma: float) -> Signs:
 
 def _tiny(system: System) -> ca.SX:
     """Sign of det W for a tiny step."""
-    matrix, rows = ca.densify(system.mass), system.algebraic[0]
-    matrix[rows, :] = -system.J[rows, :]
-    lu = factorise(ca.sparsify(matrix), system.pivots)
-    return ca.substitute(lu.sign(), lu.packed_symbol, lu.packed)
+    lu = _factorised(system, system.mass, system.algebraic[0])
+    packed = with_inner(system, lu.packed)
+    return ca.substitute(lu.sign(), lu.packed_symbol, packed)

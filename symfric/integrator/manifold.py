@@ -41,7 +41,6 @@ class Manifold:
     Attributes:
         project: (y, d) -> y with positions and velocities on the constraints; the same y where
             there are none.
-        refine: (y, d) -> y, also its accelerations, multipliers and normal forces exact.
         defect: (y, d) -> constraints and their rates.
         n, m, first: numbers of accelerations, of multipliers and of states. The algebraic unknowns
             are accelerations, multipliers, normal forces, in this order after the states.
@@ -52,7 +51,6 @@ class Manifold:
     """
 
     project: ca.Function
-    refine: ca.Function
     defect: ca.Function
     n: int
     m: int
@@ -119,18 +117,11 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
     project = ca.Function("project", [y, d], [projected], {"cse": True})
 
     algebraic = list(range(nx, nx + n + len(model.z)))
-    implicit = ca.Function("implicit", [y, d], [f[algebraic]])
     J = ca.jacobian(f[algebraic], y[algebraic])
     slope = ca.Function("slope", [y, d], [J])
-    column = projected
-    for _ in range(2):
-        lu = factorise(slope(column, d), (range(n), range(n, n + m)))
-        step = ca.substitute(lu.solve(implicit(column, d)), lu.packed_symbol, lu.packed)
-        column = ca.vertcat(column[:nx], column[algebraic] - step, column[algebraic[-1] + 1 :, 0])
     pressing = ca.substitute(mechanics.pressing, model.vector("u"), u)
     return Manifold(
         project,
-        ca.Function("refine", [y, d], [column], {"cse": True}),
         ca.Function("defect", [y, d], [ca.vertcat(phi, rate)]),
         n,
         m,
