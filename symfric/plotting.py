@@ -239,6 +239,11 @@ def plot_figure(data: "FigureData", path: str | Path | None = None) -> Figure:
     return save(figure, path)
 
 
+def _filled(number: int) -> str | None:
+    """Hollow markers from the eleventh line on, which has the colour of the first."""
+    return "none" if number >= 10 else None
+
+
 def plot_work_precision(
     lines: Mapping[str, Mapping[str, Sequence[tuple[float, float]]]],
     path: str | Path | None = None,
@@ -251,6 +256,7 @@ def plot_work_precision(
     """
     figure, axes = plt.subplots(1, len(lines), squeeze=False, sharey=True, figsize=(11, 4.8))
     figure.set_layout_engine("constrained")
+    names = list(dict.fromkeys(name for integrators in lines.values() for name in integrators))
     for axis, (case, integrators) in zip(axes[0], lines.items(), strict=True):
         for name, points in integrators.items():
             error, time = zip(*sorted(points), strict=True)
@@ -258,6 +264,7 @@ def plot_work_precision(
             axis.loglog(
                 error, [1e3 * t for t in time], marker="o", markersize=4 if bold else 3,
                 linewidth=2.0 if bold else 1.0, linestyle="-" if bold else "--", label=name,
+                color=f"C{names.index(name) % 10}", markerfacecolor=_filled(names.index(name)),
             )  # fmt: skip
         axis.set_title(case)
         axis.set_xlabel("relative position error [1]")

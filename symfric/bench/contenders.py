@@ -2,8 +2,8 @@
 
 Each is made for one tolerance and then called as often as the clock wants. Time of a call is what a
 user waits for once everything is built: `simulate` starts from names, solves for a consistent start
-and ends in named signals, CasADi's integrators get that start and end in states. So does our "loop
-alone", which is what to compare where a run takes less than some milliseconds.
+and ends in named signals, CasADi's integrators get that start and end in states. So does our
+compiled loop alone, "symfric loop": to compare with where a run takes some milliseconds or less.
 """
 
 import os
@@ -157,19 +157,19 @@ def _start(model: Model, times: Array) -> tuple[System, Drivers, Array]:
 
 
 MAKERS: dict[str, tuple[str, Callable[..., Contender]]] = {
-    "symfric, joint": ("joint", ours),
-    "symfric, joint, loop alone": ("joint", loop),
-    "symfric, absolute": ("absolute", ours),
-    "casadi rosenbrock, absolute": ("absolute", partial(rosenbrock, explicit=False)),
-    "casadi rosenbrock, absolute, explicit": ("absolute", partial(rosenbrock, explicit=True)),
-    "casadi rosenbrock, joint": ("joint", partial(rosenbrock, explicit=False)),
-    "casadi rosenbrock, joint, explicit": ("joint", partial(rosenbrock, explicit=True)),
-    "idas GGL, absolute": ("absolute", partial(idas, backend="ggl")),
-    "idas GGL, joint": ("joint", partial(idas, backend="ggl")),
-    "idas index 1, absolute": ("absolute", partial(idas, backend="sundials")),
-    "idas index 1, joint": ("joint", partial(idas, backend="sundials")),
+    "symfric": ("joint", ours),
+    "symfric loop": ("joint", loop),
+    "symfric absolute": ("absolute", ours),
+    "rosenbrock absolute": ("absolute", partial(rosenbrock, explicit=False)),
+    "rosenbrock absolute ode": ("absolute", partial(rosenbrock, explicit=True)),
+    "rosenbrock joint": ("joint", partial(rosenbrock, explicit=False)),
+    "rosenbrock joint ode": ("joint", partial(rosenbrock, explicit=True)),
+    "idas GGL absolute": ("absolute", partial(idas, backend="ggl")),
+    "idas GGL joint": ("joint", partial(idas, backend="ggl")),
+    "idas absolute": ("absolute", partial(idas, backend="sundials")),
+    "idas joint": ("joint", partial(idas, backend="sundials")),
 }
-"""Name -> formulation, and how a solver is made of its model."""
+"""Name -> formulation, and how a solver is made of its model; "ode": accelerations eliminated."""
 
 
 def compiled(function: ca.Function) -> tuple[ca.Function, float]:

@@ -85,8 +85,8 @@ def turned_pendulum() -> Mechanism:
 
 VARIANTS: tuple[tuple[str, str, Mechanism], ...] = (
     ("four_mass", "frictionless", four_mass()),
-    ("four_mass", "constant normal force in all", four_mass(ALL, JointFriction(LAW, normal=50.0))),
-    ("four_mass", "reactions in one joint", four_mass(("x1",))),
+    ("four_mass", "constant normal", four_mass(ALL, JointFriction(LAW, normal=50.0))),
+    ("four_mass", "reactions in one", four_mass(("x1",))),
     ("four_mass", "reactions in all", four_mass(ALL)),
     ("double_pendulum", "planar", DoublePendulum(LAW).mechanism()),
     ("double_pendulum", "spatial", turned_pendulum()),

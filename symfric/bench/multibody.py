@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-OURS, LOOP, EXUDYN = "symfric, joint", "symfric, joint, loop alone", "exudyn"
+OURS, LOOP, EXUDYN = "symfric", "symfric loop", "exudyn"
 ERRORS = (1e-4, 2e-5, 1e-5)
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 STEPS = (250, 500, 1000, 1250, 2500, 5000)

@@ -59,16 +59,18 @@ def multibody(result: "MultibodyBenchmark") -> None:
         ],
         "Time of a run against its error; rtol: for Exudyn the number of steps",
     )  # fmt: skip
-    output.show_table(
-        ["case", "bound", "integrator", "rtol", "error", "steps", "time [ms]", "ratio", "to loop"],
-        [
-            [r.case, r.bound, r.integrator, r.setting, _short(r.error), r.steps,
-             _short(1e3 * r.time_s), round(r.ratio, 1), round(r.loop_ratio, 1)]
-            for r in result.ratios()
-        ],
-        "The loosest tolerance that keeps an error; ratio: over the time of `simulate` in joint "
-        "coordinates, to loop: over that of its compiled loop alone",
-    )  # fmt: skip
+    for case in dict.fromkeys(r.case for r in result.runs):
+        output.show_table(
+            ["bound", "integrator", "rtol", "error", "steps", "time [ms]", "ratio", "to loop"],
+            [
+                [r.bound, r.integrator, r.setting, _short(r.error), r.steps,
+                 _short(1e3 * r.time_s), round(r.ratio, 1), round(r.loop_ratio, 1)]
+                for r in result.ratios()
+                if r.case == case
+            ],
+            f"{case}: the loosest tolerance that keeps an error; ratio: over the time of "
+            "`simulate` in joint coordinates, to loop: over that of its compiled loop alone",
+        )  # fmt: skip
     output.show_table(
         ["mechanism", "coordinates", "build [s]", "lines of C", "gcc [s]"],
         [
@@ -84,7 +86,7 @@ def multibody(result: "MultibodyBenchmark") -> None:
 
 def _costs(result: "MultibodyBenchmark") -> None:
     output.show_table(
-        ["mechanism", "variant", "coordinates", "x", "z", "ode", "step", "nonzeros"],
+        ["mechanism", "variant", "in", "x", "z", "ode", "step", "nonzeros"],
         [
             [r.mechanism, r.variant, r.formulation, r.states, r.algebraic, r.ode, r.step,
              r.nonzeros]
@@ -105,14 +107,13 @@ def _costs(result: "MultibodyBenchmark") -> None:
 
 def _accuracy(result: "MultibodyBenchmark") -> None:
     output.show_table(
-        ["case", "t [s]", "signal", "ours", "published", "difference", "digits"],
+        ["case", "t", "signal", "published", "off by", "digits"],
         [
-            [r.case, r.t, r.signal, f"{r.value:.9g}", f"{r.published:.9g}",
-             _short(r.value - r.published), r.digits]
+            [r.case, r.t, r.signal, f"{r.published:.9g}", _short(r.value - r.published), r.digits]
             for r in result.facts
         ],
-        "Published numbers; digits: what they are good for",
-    )  # fmt: skip
+        "Published numbers and what ours differ by; digits: what they are good for",
+    )
     output.show_table(
         ["case", "coordinates", "phi [m]", "phi_dot, relative", "phi_ddot, relative"],
         [

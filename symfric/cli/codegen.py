@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from symfric.cli import output
-from symfric.cli.options import JsonOption, LawOption, SetOption, check_folder, law_with, numbers
+from symfric.cli.options import JsonOption, LawOption, SetOption, any_with, check_folder, numbers
 from symfric.cli.run import kind_of, scenes_with
 from symfric.codegen import Block, Generated, Verification, generate, plant_block, verify
 from symfric.parameters import check_names, parameters
@@ -65,7 +65,7 @@ def codegen(
         raise ValueError("--method: expected with --scene only: the step of a law is exact")
     else:
         generated = generate(
-            law_with(law, settings), out, name=name, real=REALS[kind], h=step_size, free=free
+            any_with(law, settings), out, name=name, real=REALS[kind], h=step_size, free=free
         )
     verification = verify(generated, compiler=compiler)
     output.emit_json(to_dict(law, generated, verification), json)

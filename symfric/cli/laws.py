@@ -159,7 +159,7 @@ def show_list(chosen: dict[str, AnyLaw]) -> None:
                 law.facts.smoothness.split()[0],
                 cost(law).value,
                 cost(law).gradient,
-                split(r";| \(| for ", law.facts.confidence)[0],
+                split(r"[;,]| \(| for | from ", law.facts.confidence)[0],
             )
             for name, law in chosen.items()
         ],

@@ -10,9 +10,10 @@ from typing import Any, final
 from symfric.codegen.block import Block
 from symfric.codegen.c99 import REALS, Real
 from symfric.codegen.from_law import law_block
+from symfric.codegen.from_population import contact_block
 from symfric.codegen.source import header, members, prefix, routines, source
 from symfric.files import write_text
-from symfric.laws import Law
+from symfric.laws import AnyLaw, Population
 from symfric.parameters import check_names
 
 
@@ -45,7 +46,7 @@ class Generated:
 
 
 def generate(
-    law: Law | Block,
+    law: AnyLaw | Block,
     out: str | Path,
     *,
     name: str | None = None,
@@ -62,12 +63,13 @@ def generate(
     a program; the manifest is then that of the last one.
 
     Args:
-        law: a friction law, see `law_block`; or a block.
+        law: a friction law, see `law_block`; a population, see `contact_block`; or a block.
         out: folder, made where it is missing; files of the same names are replaced.
         name: C identifier; default the name of the law.
         real: "double", "float" or both.
         h: step size [s] as a constant instead of a parameter (laws with states).
-        free: parameters that stay variable at run time; default see `runtime_parameters`.
+        free: parameters that stay variable at run time; default see `runtime_parameters`. Those of
+            a population are constants.
 
     Raises:
         ValueError: bad input, a law that has no step, an operation that C99 lacks, a
@@ -81,6 +83,10 @@ def generate(
         if name is not None or h is not None or free is not None:
             raise ValueError("codegen: expected name, h and free with a law only, got a block")
         block = law
+    elif isinstance(law, Population):
+        if free:
+            raise ValueError(f"codegen: free: expected none with a population, got {free}")
+        block = contact_block(law, name=name, h=h)
     else:
         block = law_block(law, name=name, h=h, free=free)
     texts: dict[str, str] = {}

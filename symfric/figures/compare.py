@@ -8,7 +8,7 @@ from symfric.figures.data import FigureData
 from symfric.figures.requirements import check_any
 from symfric.figures.scales import NORMAL_FORCE, scales
 from symfric.figures.scene import scene_figure
-from symfric.laws import AnyLaw, Law, Population, any_from_text, law_name
+from symfric.laws import AnyLaw, Law, Population, any_from_text, law_name, steady_inputs
 from symfric.parameters import check_names, distinct
 from symfric.scenes import ALL_SCENES
 
@@ -47,7 +47,17 @@ def compare(
         return scene_figure(machines, scenario)
     given = scales(next(iter(named.values())), N)
     shown = [FIGURES[scenario](law, N, given).named(name) for name, law in named.items()]
-    return replace(shown[0], curves=tuple(curve for one in shown for curve in one.curves))
+    title = _title(list(named.values()), shown)
+    return replace(
+        shown[0], title=title, curves=tuple(curve for one in shown for curve in one.curves)
+    )
+
+
+def _title(laws: Sequence[AnyLaw], shown: Sequence[FigureData]) -> str:
+    """The title of the first, with the further inputs of all that say theirs."""
+    inputs = [steady_inputs(law) for law in laws]
+    said = [text for text, data in zip(inputs, shown, strict=True) if data.title.endswith(text)]
+    return shown[0].title.removesuffix(inputs[0]) + "".join(dict.fromkeys(said))
 
 
 def _named(laws: Sequence[AnyLaw | str] | Mapping[str, AnyLaw]) -> dict[str, AnyLaw]:

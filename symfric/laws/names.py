@@ -26,6 +26,13 @@ ALIASES = {
     "bo_pavelescu": "stribeck",
     "adams": "velocity_based",
     "smooth_coulomb": "coulomb",
+    "leine": "leine_switch",
+    "simscape": "simscape_breakaway",
+    "seven_parameter": "armstrong",
+    "iwan": "maxwell_slip",
+    "reset_integrator": "haessig_friedland",
+    "set_valued_coulomb": "exact_coulomb",
+    "dieterich_ruina": "rate_and_state",
     "haessig_friedland_bristles": "random_bristles",
 }
 """Other names of the same law, as papers and programs use them."""

@@ -48,7 +48,9 @@ class GMS(Law):
     that slows down stretches the springs in time, by a little more than the work done on them.
     Limits: steady state g sign(v) + sigma_2 v; C -> inf and mu_s = mu_d is `MaxwellSlip`; at rest
     and in pre-sliding its forces are those of `MaxwellSlip` with limits alpha_i g(0). Not valid
-    for N = 0.
+    for N = 0. Nothing damps a body that the springs hold: it rings with sqrt(sum k_i/m), and every
+    turn is a switch. The block of `Rabinowicz` takes 40 000 steps over 20 s, 20 000 with
+    sigma_2 = 0.5 N s/m and 3 700 with 2 N s/m, which ends its stick-slip.
     Source: Lampaert, Al-Bender, Swevers, Phys. Conf. 2003; Al-Bender, Lampaert, Swevers, IEEE TAC
     50(11), 2005. The smooth form is constructed here; it is not that of Boegli et al.
     """

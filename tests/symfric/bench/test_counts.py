@@ -13,8 +13,8 @@ def rows() -> dict[tuple[str, str], CountRow]:
 
 FOUR = (
     "frictionless",
-    "constant normal force in all",
-    "reactions in one joint",
+    "constant normal",
+    "reactions in one",
     "reactions in all",
 )
 

@@ -75,3 +75,9 @@ def test_a_population_is_compared_by_name_and_as_an_instance() -> None:
 def test_a_population_is_refused_in_a_scene() -> None:
     with pytest.raises(ValueError, match="scene rabinowicz, got generic_asperity, a population"):
         compare(["gms", "generic_asperity"], "rabinowicz")
+
+
+def test_the_title_says_the_inputs_of_all_laws() -> None:
+    title = compare(["coulomb", "karnopp", "awrejcewicz", "bam"], "profile").title
+    assert title.endswith("N = 7.848 N, F_e = 1 N, tau_m = 1 N m, tau_e = 0.5 N m")
+    assert compare(["karnopp", "lugre"], "rabinowicz").title == "rabinowicz"

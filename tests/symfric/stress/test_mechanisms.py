@@ -1,0 +1,279 @@
+"""Mechanisms at the edge: each runs to an oracle's result or says why it does not, never NaN."""
+
+from math import atan, exp, sqrt
+
+import numpy as np
+import pytest
+from mechanics import Rates, brown_mcphee, four_mass, pendulum_box, pendulum_period, slider_crank
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from symfric import BrownMcPhee, Law, SolveError, Status, Trajectory, Viscous, simulate
+from symfric.laws import LuGre, LuGreNormalised
+from symfric.multibody import Mechanism
+from symfric.scenes import (
+    MECHANISMS,
+    DoublePendulum,
+    FourBar,
+    FourMass,
+    MechanismScene,
+    Pendulum,
+    PendulumBox,
+    SliderCrank,
+)
+
+pytestmark = pytest.mark.slow
+SMOOTH = Viscous(sigma_2=0.0)
+G = 9.81
+
+
+def finite(run: Trajectory) -> bool:
+    return all(np.isfinite(run[name]).all() for name in run.units)
+
+
+def sound(run: Trajectory) -> None:
+    """Numbers everywhere, loops closed, pressed contacts, no energy out of nothing."""
+    assert finite(run)
+    if "constraint_position" in run.units:
+        assert run["constraint_position"].max() < 1e-11
+    assert all(run[name].min() >= 0 for name in run.units if name.endswith("_N"))
+    assert np.diff(run["energy"]).max() < 1e-6 * np.ptp(run["energy"]) + 1e-9
+
+
+def oracle(rates: Rates, y0: list[float], times: np.ndarray) -> np.ndarray:
+    run = solve_ivp(
+        rates, (0.0, times[-1]), y0, method="Radau", rtol=1e-8, atol=1e-10, t_eval=times
+    )
+    assert run.success
+    return run.y
+
+
+VELOCITIES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+LEVELS = (0.3, 0.7, 1.0, 1.5)
+
+
+def law(mu_s: float, v_t: float) -> tuple[BrownMcPhee, Rates]:
+    def mu(v: float) -> float:
+        return brown_mcphee(v, mu_s, 0.8 * mu_s, v_t)
+
+    return BrownMcPhee(mu_s=mu_s, mu_d=0.8 * mu_s, v_t=v_t), mu  # type: ignore[return-value]
+
+
+def compare_box(mu_s: float, v_t: float) -> None:
+    friction, mu = law(mu_s, v_t)
+    times = np.linspace(0.1, 3.0, 16)
+    expected = oracle(pendulum_box(6.0, 20.0, 0.3, 0.01, G, mu), [0, np.pi / 6, 0, 0], times)  # type: ignore[arg-type]
+    run = simulate(PendulumBox(friction).model(), 3.0, rtol=1e-9, t_eval=times)
+    sound(run)
+    assert run["x"] == pytest.approx(expected[0], abs=2e-6)
+    assert run["phi"] == pytest.approx(expected[1], abs=2e-6)
+
+
+@pytest.mark.parametrize("v_t", VELOCITIES)
+def test_pendulum_box_at_narrow_transitions(v_t: float) -> None:
+    compare_box(0.15, v_t)
+
+
+@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")  # of SciPy's differences
+@pytest.mark.parametrize("mu_s", LEVELS)
+def test_pendulum_box_under_strong_friction(mu_s: float) -> None:
+    compare_box(mu_s, 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("mu_s", "v_t"), [(0.12, v) for v in VELOCITIES[:4]] + [(mu, 1e-2) for mu in LEVELS]
+)
+def test_four_mass_system_at_narrow_transitions_and_under_strong_friction(
+    mu_s: float, v_t: float
+) -> None:
+    friction, mu = law(mu_s, v_t)
+    times = np.linspace(0.1, 2.0, 20)
+    th, x4, *_ = oracle(four_mass(mu), [np.arctan2(3, 4), 5.0, 0.0, -1.0], times)  # type: ignore[arg-type]
+    run = simulate(FourMass(friction).model(), 2.0, rtol=1e-9, t_eval=times)
+    sound(run)
+    assert run["x1"] == pytest.approx(5 * np.cos(th), abs=5e-6)
+    assert run["x4"] == pytest.approx(x4, abs=5e-6)
+
+
+@pytest.mark.parametrize(
+    ("mu_s", "v_t"), [(0.1, v) for v in VELOCITIES] + [(mu, 1e-2) for mu in LEVELS]
+)
+def test_slider_crank_at_narrow_transitions_and_under_strong_friction(
+    mu_s: float, v_t: float
+) -> None:
+    friction, mu = law(mu_s, v_t)
+    times = np.linspace(0.01, 0.25, 25)
+    th, _ = oracle(slider_crank(mu), [0.0, 120.0], times)  # type: ignore[arg-type]
+    run = simulate(SliderCrank(friction).model(), 0.25, rtol=1e-9, t_eval=times)
+    sound(run)
+    assert run["crank"] == pytest.approx(th, rel=1e-6, abs=1e-6)
+
+
+def light_box(ratio: float, mu: float = 0.12) -> MechanismScene:
+    return PendulumBox(BrownMcPhee(mu_s=mu, mu_d=mu, v_t=1e-3), hinge=SMOOTH, m_box=20.0 * ratio)
+
+
+def reserve(phi: float, ratio: float, mu: float = 0.12) -> float:
+    """Factor of x'' while the box slides: m_box / m + sin(phi) (sin(phi) - mu cos(phi))."""
+    return ratio + np.sin(phi) * (np.sin(phi) - mu * np.cos(phi))
+
+
+@pytest.mark.parametrize("ratio", [1e-6, 1e-4, 1e-3])
+def test_a_light_box_jams_where_the_closed_form_says(ratio: float) -> None:
+    """Painleve: below m_box/m = (sqrt(1 + mu^2) - 1)/2 the sliding box has no acceleration."""
+    assert ratio < (sqrt(1 + 0.12**2) - 1) / 2
+    with pytest.raises(SolveError, match=r"friction jams.*joint 'x' with BrownMcPhee") as caught:
+        simulate(light_box(ratio).model(), 3.0, rtol=1e-8)
+    run = caught.value.partial
+    assert isinstance(run, Trajectory)
+    assert caught.value.status is Status.JAMMED
+    sound(run)
+    last = run.at([float(run.steps[-1])])["phi"][0]
+    top = atan(0.12) / 2  # where the reserve is smallest
+    assert last == pytest.approx(brentq(reserve, top, 0.5, args=(ratio,)), abs=1e-4)
+    assert (reserve(run["phi"], ratio) > 0).all()
+
+
+@pytest.mark.parametrize("ratio", [4e-3, 1e-2])
+def test_a_box_just_heavy_enough_goes_on(ratio: float) -> None:
+    sound(simulate(light_box(ratio).model(), 1.0, rtol=1e-8))
+
+
+@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+def test_a_weight_under_a_box_without_mass_falls_freely(formulation: str) -> None:
+    """Without friction the rod carries nothing: L (cos phi - cos phi_0) = g t^2 / 2."""
+    scene = PendulumBox(SMOOTH, hinge=SMOOTH, m_box=20e-6)
+    times = np.linspace(0.01, 0.08, 8)
+    mechanism = scene.mechanism()
+    model = mechanism.build(formulation=formulation)
+    run = simulate(model, 0.08, rtol=1e-9, t_eval=times)
+    fallen = run["potential"] / (20 * G)
+    assert fallen - fallen[0] == pytest.approx(-G * (times**2 - times[0] ** 2) / 2, abs=1e-6)
+
+
+def test_a_box_of_a_million_pendulums_is_a_wall() -> None:
+    period = pendulum_period(sqrt(G / 0.3), np.pi / 6)
+    run = simulate(
+        PendulumBox(SMOOTH, hinge=SMOOTH, m_box=20e6).model(), period, rtol=1e-10, t_eval=[period]
+    )
+    assert run["phi"][0] == pytest.approx(np.pi / 6, abs=1e-5)
+
+
+def uneven(ratio: float) -> Mechanism:
+    """The double pendulum, its lower rod `ratio` times as heavy."""
+    m = DoublePendulum(SMOOTH).mechanism()
+    heavy = Mechanism(m.name)
+    heavy.forces, heavy.frames, heavy.joints = m.forces, m.frames, m.joints
+    for body in m.bodies[1:]:
+        by = ratio if body.name == "lower" else 1.0
+        heavy.body(body.name, by * body.mass, tuple(by * J for J in body.inertia))
+    return heavy
+
+
+@pytest.mark.parametrize("ratio", [1e-6, 1e-3, 1e3, 1e6])
+def test_uneven_pendulums_keep_their_energy_in_both_formulations(ratio: float) -> None:
+    runs = [
+        simulate(uneven(ratio).build(formulation=f), 0.5, rtol=1e-9) for f in ("joint", "absolute")
+    ]
+    for run in runs:
+        assert finite(run)
+        assert np.ptp(run["energy"]) < 1e-6 * run["kinetic"].max()
+    kinetic = [run["kinetic"] / run["kinetic"].max() for run in runs]
+    assert kinetic[0] == pytest.approx(kinetic[1], abs=1e-6)
+
+
+@pytest.mark.parametrize("length", [0.2215, 0.22143, 0.2214214])
+def test_slider_crank_near_its_dead_point_keeps_energy_and_closed_form(length: float) -> None:
+    """The rod just reaches over: slider^2 falls to a few parts in a million of l^2."""
+    scene = SliderCrank(SMOOTH, l=length)
+    run = simulate(scene.model(), 0.25, rtol=1e-9)
+    th = run["crank"]
+    square = length**2 - (0.1 - 0.08 * np.sin(th)) ** 2 - (0.1 + 0.08 * np.cos(th)) ** 2
+    assert run["slider"] ** 2 == pytest.approx(square, abs=1e-13)
+    assert run["slider"].min() < 0.03 * length
+    assert np.ptp(run["energy"]) < 1e-7 * run["energy"][0]
+
+
+def test_slider_crank_swings_through_the_dead_point_it_cannot_turn_over() -> None:
+    run = simulate(SliderCrank(SMOOTH, l=0.22).model(), 0.25, rtol=1e-9)
+    assert run["slider"].min() < -0.2
+    assert np.ptp(run["crank"]) < 2 * np.pi
+    assert np.ptp(run["energy"]) < 1e-7 * run["energy"][0]
+
+
+@pytest.mark.parametrize("length", [0.22143, 0.2214214])
+def test_slider_crank_with_friction_jams_near_its_dead_point_and_says_so(length: float) -> None:
+    scene = SliderCrank(BrownMcPhee(mu_s=0.1, mu_d=0.08, v_t=0.01), l=length)
+    with pytest.raises(SolveError, match=r"friction jams.*joint 'crank' with BrownMcPhee") as e:
+        simulate(scene.model(), 0.25, rtol=1e-8)
+    assert isinstance(e.value.partial, Trajectory)
+    sound(e.value.partial)
+
+
+def test_an_exact_parallelogram_stops_where_its_links_lie_in_line() -> None:
+    scene = FourBar(SMOOTH, crank=0.2, coupler=0.4, rocker=0.2, base=0.4)
+    with pytest.raises(SolveError, match=r"the configuration is singular.*pin_lambda") as caught:
+        simulate(scene.model(), 3.0, rtol=1e-8)
+    run = caught.value.partial
+    assert isinstance(run, Trajectory)
+    assert finite(run)
+    assert run["theta_crank"] == pytest.approx(run["theta_rocker"], abs=1e-9)
+    reached = run.at([float(run.steps[-1])])["theta_crank"][0]
+    assert reached == pytest.approx(np.pi, abs=1e-5)
+
+
+@pytest.mark.parametrize("excess", [1e-8, 1e-4, 1e-2])
+def test_near_parallelograms_go_through_on_their_own_branch(excess: float) -> None:
+    """Energy and loop closed; beyond the line the rocker turns against the crank."""
+    scene = FourBar(SMOOTH, crank=0.2, coupler=0.4, rocker=0.2 * (1 + excess), base=0.4)
+    run = simulate(scene.model(), 3.0, rtol=1e-8)
+    assert run["constraint_position"].max() < 1e-12
+    assert np.ptp(run["energy"]) < 1e-6 * run["kinetic"].max()
+    assert run["theta_crank"][-1] > 30.0
+
+
+@pytest.mark.parametrize(("v_t", "t_end"), [(1e-6, 1e3), (1e-7, 1e4), (1e-8, 1e5)])
+def test_a_velocity_law_creeps_as_its_slope_at_rest_says(v_t: float, t_end: float) -> None:
+    """phi' = -phi m g L / (R^2 N mu'(0)): no static law holds for ever, for 1e5 s neither."""
+    mu_s, mu_d, R, L = 0.15, 0.12, 0.02, 0.5
+    slope = (4 * mu_d + (mu_s - mu_d) / 0.75**2) / v_t
+    run = simulate(
+        Pendulum(BrownMcPhee(mu_s=mu_s, mu_d=mu_d, v_t=v_t), phi_0=1e-4).model(), t_end, rtol=1e-8
+    )
+    sound(run)
+    expected = 1e-4 * np.exp(-run.t * L / (R * R * slope))
+    assert run["phi"][1:] == pytest.approx(expected[1:], rel=1e-4)
+    assert expected[-1] / 1e-4 == pytest.approx(exp(-t_end * L / (R * R * slope)))
+
+
+@pytest.mark.parametrize("friction", [LuGre(), LuGreNormalised()], ids=["lugre", "normalised"])
+def test_bristles_hold_a_pendulum_for_a_day(friction: Law) -> None:
+    """At rest weight and bristles balance, and nothing moves between an hour and 1e5 s."""
+    run = simulate(
+        Pendulum(friction, phi_0=0.002).model(), 1e5, rtol=1e-8, t_eval=[100.0, 3600.0, 1e5]
+    )
+    assert finite(run)
+    phi = run["phi"]
+    assert np.ptp(phi) < 1e-9
+    assert abs(phi[-1]) > 1e-4
+    assert 0.5 * G * np.sin(phi) == pytest.approx(-0.02 * run["phi_friction"], rel=1e-5)
+    short = simulate(Pendulum(friction, phi_0=0.002).model(), 100.0, rtol=1e-9)["phi"][-1]
+    assert phi[-1] == pytest.approx(short, abs=1e-7)
+
+
+LONG = ("pendulum", "pendulum_box", "four_mass", "slider_crank", "four_bar", "arm")
+
+
+@pytest.mark.parametrize("name", LONG)
+@pytest.mark.parametrize(
+    "friction", [BrownMcPhee(), LuGreNormalised(), LuGre()], ids=lambda law: type(law).__name__
+)
+def test_every_mechanism_rests_for_a_day_or_says_why_not(name: str, friction: Law) -> None:
+    run = simulate(MECHANISMS[name](friction).model(), 1e5, throw=False)
+    assert finite(run)
+    if run.status.ok:
+        assert run["kinetic"][-1] < 1e-8
+        assert run["energy"][-1] == pytest.approx(run["energy"][1000], abs=1e-2)
+    else:
+        assert isinstance(friction, LuGre)
+        assert "lugre_normalised" in run.message
