@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from symfric.figures import FigureData
 from symfric.figures.data import Curve
+from symfric.integrator.blocks import refinement
 from symfric.integrator.initial import consistent
 from symfric.integrator.inputs import drivers
-from symfric.integrator.blocks import refinement
 from symfric.integrator.simulate import simulate
 from symfric.integrator.step import build_fixed
 from symfric.integrator.system import System, system

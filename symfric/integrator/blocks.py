@@ -10,7 +10,6 @@ import casadi as ca
 from symfric.integrator.lu import SymbolicLU, factorise
 from symfric.integrator.system import System
 
-
 NONE = ca.SX(0, 1)
 
 

@@ -144,9 +144,7 @@ def _with_inputs(model: Model, inputs: Drivers, f: ca.SX) -> Inner | None:
     if mechanics is None or mechanics.inner is None:
         return None
     inner, nx = mechanics.inner, len(model.x)
-    own, values = ca.substitute(
-        [inner.f, inner.values], [model.vector("u")], [inputs.expression]
-    )
+    own, values = ca.substitute([inner.f, inner.values], [model.vector("u")], [inputs.expression])
     after = nx + own.numel()
     return replace(inner, values=values, f=ca.vertcat(f[:nx], own, f[after:, 0]))
 

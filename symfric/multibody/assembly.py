@@ -217,10 +217,8 @@ def assemble(
     )
 
 
-def _inner(
-    cut: Equations, eq: Equations, contacts: Sequence[Slip], forces: ca.SX
-) -> Inner | None:
-    """Balance and normal forces with inner unknowns, to be eliminated link by link from the tips."""
+def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip], forces: ca.SX) -> Inner | None:
+    """Balance and normal forces with inner unknowns, eliminated link by link from the tips."""
     cuts, links = cut.kin.cuts, eq.kin.topology.links
     if cuts is None:
         return None

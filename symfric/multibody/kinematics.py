@@ -10,7 +10,6 @@ from symfric.multibody.cuts import Cuts
 from symfric.multibody.joints import Joint
 from symfric.multibody.topology import Link, Topology, body_of, frame_at
 
-
 ZERO = ca.SX(3, 1)
 
 

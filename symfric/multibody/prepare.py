@@ -207,9 +207,7 @@ def written(
     )
 
 
-def with_cuts(
-    made: Prepared, joints: Sequence[Joint], forces: Sequence[Force]
-) -> Equations | None:
+def with_cuts(made: Prepared, joints: Sequence[Joint], forces: Sequence[Force]) -> Equations | None:
     """The equations of a long open chain with cuts; None where they would not pay."""
     eq, topology = made.eq, made.eq.kin.topology
     if eq.m or topology.depth < LONG:
