@@ -9,8 +9,73 @@ import casadi as ca
 
 from symfric.integrator.lu import SymbolicLU, factorise
 from symfric.integrator.system import System
+from symfric.model import Inner
 
 NONE = ca.SX(0, 1)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """Jacobian of a system, bordered by that of its inner unknowns l where it has some.
+
+        [ f_y  f_l     ]
+        [ g_y  g_l - I ]
+
+    Attributes:
+        J: with a symbol for every entry that is more than a number.
+        entries: these symbols.
+        values: (y, d) -> what they stand for.
+        pivots: groups of rows as `factorise` takes them.
+    """
+
+    J: ca.SX
+    entries: ca.SX
+    values: ca.Function
+    pivots: tuple[tuple[int, ...], ...]
+
+    def factorised(self, mass: ca.SX, without: Sequence[int] = ()) -> SymbolicLU:
+        """Factors of `mass` - J, in terms of `entries`; J without the rows `without`."""
+        kept, inner = ca.SX(self.J), self.J.shape[0] - mass.shape[0]
+        kept[list(without), :] = 0
+        return factorise(ca.sparsify(ca.diagcat(mass, ca.SX(inner, inner)) - kept), self.pivots)
+
+
+@lru_cache(maxsize=2)
+def slopes(system: System) -> Slopes:
+    """The Jacobian of `system`."""
+    y, d, inner = system.y, system.d, system.inner
+    slope, pivots, l, put = system.J, system.pivots, NONE, NONE  # noqa: E741
+    if inner is not None:
+        l, pivots = inner.l, _places(y, inner)  # noqa: E741
+        to_l = ca.vertcat(
+            ca.jacobian(inner.f, l), ca.jacobian(inner.values, l) - ca.SX.eye(l.numel())
+        )
+        slope = ca.horzcat(ca.jacobian(ca.vertcat(inner.f, inner.values), y), to_l)
+        (put,), _ = ca.substitute_inplace([l], [inner.values], [NONE])
+    named, entries, values = _named(ca.sparsify(slope))
+    of_l = ca.Function("slopes", [l, y, d], [values])
+    return Slopes(
+        named, entries, ca.Function("slopes", [y, d], [of_l(put, y, d)], {"cse": True}), pivots
+    )
+
+
+def _named(matrix: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """`matrix` with symbols for its entries that are no numbers, these symbols, and the entries."""
+    named = ca.SX(matrix)
+    places = [k for k in range(matrix.nnz()) if not ca.SX(matrix.nz[k]).is_constant()]
+    entries = ca.SX.sym("J", len(places))
+    for i, k in enumerate(places):
+        named.nz[k] = entries[i]
+    return named, entries, ca.vec(ca.SX(matrix.nz[places]))
+
+
+def _places(y: ca.SX, inner: Inner) -> tuple[tuple[int, ...], ...]:
+    """Groups of unknowns as numbers of rows."""
+    unknowns = ca.vertsplit(ca.vertcat(y, inner.l))
+    place = {ca.SX(s).__hash__(): i for i, s in enumerate(unknowns)}
+    groups = (ca.vertsplit(group) for group in inner.groups)
+    return tuple(tuple(place[ca.SX(s).__hash__()] for s in group) for group in groups)
 
 
 @final
@@ -20,59 +85,50 @@ class Blocks:
 
     Attributes:
         f: (y, d) -> right-hand side.
-        factor: (y, h, d) -> factors of W.
+        slopes: (y, d) -> entries of J.
+        pack: (entries of J, h) -> factors of W.
         solve: (factors, right, memory) -> k with W k = right + M memory.
         lu: the factors as expressions.
     """
 
     f: ca.Function
-    factor: ca.Function
+    slopes: ca.Function
+    pack: ca.Function
     solve: ca.Function
     lu: SymbolicLU
+
+    def factor(self, y: Any, h: Any, d: Any) -> Any:
+        """Factors of W."""
+        return self.pack(self.slopes(y, d), h)
+
+    @property
+    def instructions(self) -> int:
+        """Of Jacobian and factors."""
+        return self.slopes.n_instructions() + self.pack.n_instructions()
 
 
 @lru_cache(maxsize=2)
 def blocks(system: System, gamma: float) -> Blocks:
     """The blocks of a method with the diagonal coefficient `gamma`."""
-    h = ca.SX.sym("h")
+    h, own = ca.SX.sym("h"), slopes(system)
     right, memory = ca.SX.sym("right", system.n), ca.SX.sym("memory", system.n)
-    lu = _factorised(system, system.mass / (gamma * h), range(system.n))
-    packed = with_inner(system, lu.packed, h)
-    whole = ca.vertcat(right + system.mass @ memory, ca.SX(len(lu.order) - system.n, 1))
+    lu = own.factorised(system.mass / (gamma * h))
     return Blocks(
         ca.Function("f", [system.y, system.d], [system.f], {"cse": True}),
-        ca.Function("factor", [system.y, h, system.d], [packed], {"cse": True}),
-        ca.Function("solve", [lu.packed_symbol, right, memory], [lu.solve(whole)[: system.n]]),
+        own.values,
+        ca.Function("pack", [own.entries, h], [lu.packed], {"cse": True}),
+        ca.Function(
+            "solve", [lu.packed_symbol, right, memory],
+            [_solved(lu, right + system.mass @ memory)],
+        ),
         lu,
-    )
+    )  # fmt: skip
 
 
-def _factorised(system: System, mass: ca.SX, rows: Sequence[int]) -> SymbolicLU:
-    """Factors of `mass` - J, with J in `rows` alone, and of the equations of inner unknowns."""
-    W, inner = ca.SX(mass), system.inner
-    if inner is None:
-        W[list(rows), :] -= system.J[list(rows), :]
-        return factorise(ca.sparsify(W), system.pivots)
-    f, k = inner.f, inner.l.numel()
-    W[list(rows), :] -= ca.jacobian(f, system.y)[list(rows), :]
-    to_l = ca.SX(system.n, k)
-    to_l[list(rows), :] = -ca.jacobian(f, inner.l)[list(rows), :]
-    own = ca.SX.eye(k) - ca.jacobian(inner.values, inner.l)
-    whole = ca.blockcat([[W, to_l], [-ca.jacobian(inner.values, system.y), own]])
-    unknowns = ca.vertsplit(ca.vertcat(system.y, inner.l))
-    place = {ca.SX(s).__hash__(): i for i, s in enumerate(unknowns)}
-    groups = [[place[ca.SX(s).__hash__()] for s in ca.vertsplit(g)] for g in inner.groups]
-    return factorise(ca.sparsify(whole), groups)
-
-
-def with_inner(system: System, expression: ca.SX, h: ca.SX = NONE) -> ca.SX:
-    """`expression` with the values of inner unknowns put in."""
-    inner = system.inner
-    if inner is None:
-        return expression
-    (values,), _ = ca.substitute_inplace([inner.l], [inner.values], [NONE])
-    put = ca.Function("put", [inner.l, system.y, h, system.d], [expression])
-    return put(values, system.y, h, system.d)
+def _solved(lu: SymbolicLU, right: ca.SX) -> ca.SX:
+    """The unknowns of a system, where nothing stands on the right-hand sides of inner ones."""
+    n = right.numel()
+    return lu.solve(ca.vertcat(right, ca.SX(len(lu.order) - n, 1)))[:n]
 
 
 @lru_cache(maxsize=2)
@@ -81,18 +137,18 @@ def refinement(system: System) -> ca.Function:
 
     Two steps of Newton's method for accelerations, multipliers and normal forces.
     """
-    y, d, rows = ca.SX(system.y), system.d, system.algebraic[0]
-    lu = _factorised(system, system.mass, rows)
-    f = ca.Function("f", [system.y, d], [system.f[rows]])
-    factor = ca.Function("factor", [system.y, d], [with_inner(system, lu.packed)])
-    right = ca.SX.sym("right", len(rows))
-    whole = ca.SX(len(lu.order), 1)
-    whole[rows] = right
-    solve = ca.Function("solve", [lu.packed_symbol, right], [lu.solve(whole)[: system.n]])
+    own, (rows, _), right = slopes(system), system.algebraic, ca.SX.sym("right", system.n)
+    lu = own.factorised(system.mass, [i for i in range(system.n) if i not in rows])
+    pack = ca.Function("pack", [own.entries], [lu.packed])
+    solve = ca.Function("solve", [lu.packed_symbol, right], [_solved(lu, right)])
+    residual = ca.SX(system.n, 1)
+    residual[rows] = system.f[rows]
+    f = ca.Function("f", [system.y, system.d], [residual])
+    y, d = ca.SX(system.y), system.d
     if system.manifold is not None:
         y = ca.SX(system.manifold.project(y, d))
     for _ in range(2):
-        y = y + solve(factor(y, d), f(y, d))
+        y = y + solve(pack(own.values(y, d)), f(y, d))
     return ca.Function("refine", [system.y, d], [y], {"cse": True})
 
 
@@ -106,22 +162,20 @@ def signs(system: System, gamma: float) -> Signs:
     Where they differ, a mode grows faster than exp(t / (gamma h)), which an L-stable method of this
     step only damps away.
     """
-    block, rows = blocks(system, gamma), system.algebraic[0]
-    lu, first = block.lu, {row for row, _ in block.lu.order[: len(rows)]}
-    alone = system.is_semi_explicit and first == set(rows)
-    tiny = lu.sign(len(rows)) if alone else _tiny(system)
-    symbols = [lu.packed_symbol, system.y, system.d]
-    both = ca.Function("signs", symbols, [lu.sign(), tiny], {"cse": True})
+    own, block, (rows, _) = slopes(system), blocks(system, gamma), system.algebraic
+    tiny = own.factorised(system.mass, [i for i in range(system.n) if i not in rows])
+    of_tiny_step = ca.substitute(tiny.sign(), tiny.packed_symbol, tiny.packed)
+    first = {row for row, _ in block.lu.order[: len(rows)]}
+    if system.is_semi_explicit and first == set(rows):
+        of_tiny_step = block.lu.sign(len(rows))
+    both = ca.Function(
+        "signs", [block.lu.packed_symbol, own.entries], [block.lu.sign(), of_tiny_step],
+        {"cse": True},
+    )  # fmt: skip
 
     def at(y: Any, h: Any, d: Any) -> tuple[Any, Any]:
-        of_step, of_tiny_step = both(block.factor(y, h, d), y, d)
-        return of_step, of_tiny_step
+        entries = block.slopes(y, d)
+        of_step, of_tiny = both(block.pack(entries, h), entries)
+        return of_step, of_tiny
 
     return at
-
-
-def _tiny(system: System) -> ca.SX:
-    """Sign of det W for a tiny step."""
-    lu = _factorised(system, system.mass, system.algebraic[0])
-    packed = with_inner(system, lu.packed)
-    return ca.substitute(lu.sign(), lu.packed_symbol, packed)

@@ -29,8 +29,9 @@ DEPENDENT = 1e-5
 """Ratio of singular values of phi_q at which a mechanism that cannot go on is called singular."""
 PULLING = 1e-3
 """Negative normal forces up to this times their typical size are errors of a step."""
-ITERATIONS = 4
-"""Of Newton's method with frozen derivatives: from 1e-3 to 1e-13."""
+ITERATIONS, NEARBY = (4, 3), (2, 2)
+"""Of Newton's method with frozen derivatives, on positions and velocities: from 1e-3 to 1e-13, and
+from 1e-5."""
 
 
 @final
@@ -41,6 +42,7 @@ class Manifold:
     Attributes:
         project: (y, d) -> y with positions and velocities on the constraints; the same y where
             there are none.
+        polish: the same from nearby.
         defect: (y, d) -> constraints and their rates.
         n, m, first: numbers of accelerations, of multipliers and of states. The algebraic unknowns
             are accelerations, multipliers, normal forces, in this order after the states.
@@ -51,6 +53,7 @@ class Manifold:
     """
 
     project: ca.Function
+    polish: ca.Function
     defect: ca.Function
     n: int
     m: int
@@ -113,15 +116,18 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
     fixed = ca.vertcat(model.t, d)
     at = ca.Function("at", [q, qd, fixed], [phi, ca.jacobian(phi, q), rate])
     m = phi.numel()
-    projected = ca.vertcat(*_projected(at, q, qd, fixed), y[2 * n :]) if m else y
-    project = ca.Function("project", [y, d], [projected], {"cse": True})
+
+    def projection(name: str, iterations: tuple[int, int]) -> ca.Function:
+        on = ca.vertcat(*_projected(at, q, qd, fixed, iterations), y[2 * n :]) if m else y
+        return ca.Function(name, [y, d], [on], {"cse": True})
 
     algebraic = list(range(nx, nx + n + len(model.z)))
     J = ca.jacobian(f[algebraic], y[algebraic])
     slope = ca.Function("slope", [y, d], [J])
     pressing = ca.substitute(mechanics.pressing, model.vector("u"), u)
     return Manifold(
-        project,
+        projection("project", ITERATIONS),
+        projection("polish", NEARBY),
         ca.Function("defect", [y, d], [ca.vertcat(phi, rate)]),
         n,
         m,
@@ -133,7 +139,9 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
     )
 
 
-def _projected(at: ca.Function, q: ca.SX, qd: ca.SX, d: ca.SX) -> tuple[ca.SX, ca.SX]:
+def _projected(
+    at: ca.Function, q: ca.SX, qd: ca.SX, d: ca.SX, iterations: tuple[int, int]
+) -> tuple[ca.SX, ca.SX]:
     """Positions and velocities on the constraints near q and qd."""
     _, J, _ = at(q, qd, d)
     lu = factorise(ca.sparsify(J @ J.T), [range(J.size1())])
@@ -141,9 +149,9 @@ def _projected(at: ca.Function, q: ca.SX, qd: ca.SX, d: ca.SX) -> tuple[ca.SX, c
     def across(defect: ca.SX) -> ca.SX:
         return J.T @ ca.substitute(lu.solve(defect), lu.packed_symbol, lu.packed)
 
-    for _ in range(ITERATIONS):
+    for _ in range(iterations[0]):
         q = q - across(at(q, qd, d)[0])
-    for _ in range(ITERATIONS - 1):
+    for _ in range(iterations[1]):
         qd = qd - across(at(q, qd, d)[2])
     return q, qd
 

@@ -21,8 +21,9 @@ from symfric.multibody.topology import Topology
 
 Array = NDArray[np.float64]
 NONE = ca.SX(0, 1)
-LONG = 12
-"""Links of a chain from which on cuts pay: below, full derivatives take fewer operations."""
+LONG, LONG_WITH_FRICTION = 16, 9
+"""Links of a chain from which on cuts pay: below, full derivatives take fewer operations. Friction
+from reactions makes them dearer."""
 
 
 @final
@@ -210,7 +211,8 @@ def written(
 def with_cuts(made: Prepared, joints: Sequence[Joint], forces: Sequence[Force]) -> Equations | None:
     """The equations of a long open chain with cuts; None where they would not pay."""
     eq, topology = made.eq, made.eq.kin.topology
-    if eq.m or topology.depth < LONG:
+    loaded = ca.depends_on(ca.vertcat(NONE, *eq.normals), eq.a)
+    if eq.m or topology.depth < (LONG_WITH_FRICTION if loaded else LONG):
         return None
     return equations(topology, joints, forces, (), eq.q, eq.qd, eq.kin.t, cuts=Cuts())
 
