@@ -18,7 +18,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "symfric.parameters": {"symfric.numeric"},
     "symfric.laws": {"symfric.numeric", "symfric.parameters"},
     "symfric.sketch": set(),
-    "symfric.model": {"symfric.numeric", "symfric.parameters", "symfric.sketch"},
+    "symfric.holonomic": set(),
+    "symfric.model": {
+        "symfric.holonomic",
+        "symfric.numeric",
+        "symfric.parameters",
+        "symfric.sketch",
+    },
     "symfric.scenes": {
         "symfric.laws",
         "symfric.model",
@@ -27,6 +33,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "symfric.parameters",
     },
     "symfric.multibody": {
+        "symfric.holonomic",
         "symfric.laws",
         "symfric.model",
         "symfric.numeric",
@@ -34,6 +41,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "symfric.sketch",
     },
     "symfric.integrator": {
+        "symfric.holonomic",
         "symfric.model",
         "symfric.numeric",
         "symfric.parameters",

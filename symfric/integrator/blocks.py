@@ -7,9 +7,9 @@ from typing import Any, final
 
 import casadi as ca
 
+from symfric.holonomic import Inner
 from symfric.integrator.lu import SymbolicLU, factorise
 from symfric.integrator.system import System
-from symfric.model import Inner
 
 NONE = ca.SX(0, 1)
 

@@ -21,8 +21,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.holonomic import Holonomic
 from symfric.integrator.lu import factorise
-from symfric.model import Holonomic, Model
+from symfric.model import Model
 
 Array = NDArray[np.float64]
 DEPENDENT = 1e-5

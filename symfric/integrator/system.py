@@ -8,9 +8,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.holonomic import Inner
 from symfric.integrator.inputs import Drivers
 from symfric.integrator.manifold import Manifold, holonomic_columns, manifold
-from symfric.model import Inner, Model
+from symfric.model import Model
 
 
 @final

@@ -16,9 +16,10 @@ from typing import final
 import casadi as ca
 import numpy as np
 
+from symfric.holonomic import Holonomic, Inner
 from symfric.laws import Law
 from symfric.laws.planar import Spatial
-from symfric.model import Event, Holonomic, Inner, Model, Monitor, Output, Variables
+from symfric.model import Event, Model, Monitor, Output, Variables
 from symfric.multibody.body import GROUND
 from symfric.multibody.equations import Equations
 from symfric.multibody.friction import Contact
