@@ -1,6 +1,6 @@
 """The Functions an implicit step is made of: with SX they inline, with MX they stay calls."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, final
@@ -45,33 +45,35 @@ def blocks(system: System, gamma: float) -> Blocks:
     )
 
 
-Signs = Callable[[Any, Any, Any], tuple[Any, Any]]
-"""(y, h, d) -> signs of det W and of det W for a tiny step."""
+Signs = Callable[[Any, Any, Any], tuple[Any, Any, Any]]
+"""(y, h, d) -> signs of det W and of det W for a tiny step, pivots of rows in the latter."""
 
 
-def signs(system: System, gamma: float) -> Signs:
+def signs(system: System, gamma: float, watched: Sequence[int] = ()) -> Signs:
     """Signs of det W and of the same for a tiny step, which only algebraic rows have.
 
     Where they differ, a mode grows faster than exp(t / (gamma h)), which an L-stable method of this
-    step only damps away.
+    step only damps away. The pivots of the rows `watched`, which are there anyway, say how far the
+    latter is from zero.
     """
     block, rows = blocks(system, gamma), system.algebraic[0]
     lu, first = block.lu, {row for row, _ in block.lu.order[: len(rows)]}
     alone = system.is_semi_explicit and first == set(rows)
-    tiny = lu.sign(len(rows)) if alone else _tiny(system)
+    tiny = (lu.sign(len(rows)), lu.pivots(watched)) if alone else _tiny(system, watched)
     symbols = [lu.packed_symbol, system.y, system.d]
-    both = ca.Function("signs", symbols, [lu.sign(), tiny], {"cse": True})
+    every = ca.Function("signs", symbols, [lu.sign(), *tiny], {"cse": True})
 
-    def at(y: Any, h: Any, d: Any) -> tuple[Any, Any]:
-        of_step, of_tiny_step = both(block.factor(y, h, d), y, d)
-        return of_step, of_tiny_step
+    def at(y: Any, h: Any, d: Any) -> tuple[Any, Any, Any]:
+        of_step, of_tiny_step, pivots = every(block.factor(y, h, d), y, d)
+        return of_step, of_tiny_step, pivots
 
     return at
 
 
-def _tiny(system: System) -> ca.SX:
-    """Sign of det W for a tiny step."""
+def _tiny(system: System, watched: Sequence[int]) -> list[ca.SX]:
+    """Sign of det W for a tiny step, and pivots of the rows `watched` in it."""
     matrix, rows = ca.densify(system.mass), system.algebraic[0]
     matrix[rows, :] = -system.J[rows, :]
     lu = factorise(ca.sparsify(matrix), system.pivots)
-    return ca.substitute(lu.sign(), lu.packed_symbol, lu.packed)
+    both = [lu.sign(), lu.pivots(watched)]
+    return ca.substitute(both, [lu.packed_symbol], [lu.packed])
