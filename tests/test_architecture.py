@@ -14,9 +14,10 @@ TESTS = sorted((ROOT / "tests").rglob("*.py"))
 MAY_IMPORT: dict[str, set[str]] = {
     "symfric.status": set(),
     "symfric.files": set(),
-    "symfric.numeric": set(),
+    "symfric.vector": set(),
+    "symfric.numeric": {"symfric.vector"},
     "symfric.parameters": {"symfric.numeric"},
-    "symfric.laws": {"symfric.numeric", "symfric.parameters"},
+    "symfric.laws": {"symfric.numeric", "symfric.parameters", "symfric.vector"},
     "symfric.sketch": set(),
     "symfric.holonomic": set(),
     "symfric.model": {

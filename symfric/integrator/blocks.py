@@ -152,30 +152,31 @@ def refinement(system: System) -> ca.Function:
     return ca.Function("refine", [system.y, d], [y], {"cse": True})
 
 
-Signs = Callable[[Any, Any, Any], tuple[Any, Any]]
-"""(y, h, d) -> signs of det W and of det W for a tiny step."""
+Signs = Callable[[Any, Any, Any], tuple[Any, Any, Any]]
+"""(y, h, d) -> signs of det W and of det W for a tiny step, pivots of rows in the latter."""
 
 
-def signs(system: System, gamma: float) -> Signs:
+def signs(system: System, gamma: float, watched: Sequence[int] = ()) -> Signs:
     """Signs of det W and of the same for a tiny step, which only algebraic rows have.
 
     Where they differ, a mode grows faster than exp(t / (gamma h)), which an L-stable method of this
-    step only damps away.
+    step only damps away. The pivots of the rows `watched`, which are there anyway, say how far the
+    latter is from zero.
     """
     own, block, (rows, _) = slopes(system), blocks(system, gamma), system.algebraic
-    tiny = own.factorised(system.mass, [i for i in range(system.n) if i not in rows])
-    of_tiny_step = ca.substitute(tiny.sign(), tiny.packed_symbol, tiny.packed)
-    first = {row for row, _ in block.lu.order[: len(rows)]}
+    lu, first = block.lu, {row for row, _ in block.lu.order[: len(rows)]}
     if system.is_semi_explicit and first == set(rows):
-        of_tiny_step = block.lu.sign(len(rows))
-    both = ca.Function(
-        "signs", [block.lu.packed_symbol, own.entries], [block.lu.sign(), of_tiny_step],
-        {"cse": True},
-    )  # fmt: skip
+        tiny = [lu.sign(len(rows)), lu.pivots(watched)]
+    else:
+        own_lu = own.factorised(system.mass, [i for i in range(system.n) if i not in rows])
+        in_symbols = [own_lu.sign(), own_lu.pivots(watched)]
+        tiny = ca.substitute(in_symbols, [own_lu.packed_symbol], [own_lu.packed])
+    symbols = [lu.packed_symbol, own.entries]
+    every = ca.Function("signs", symbols, [lu.sign(), *tiny], {"cse": True})
 
-    def at(y: Any, h: Any, d: Any) -> tuple[Any, Any]:
+    def at(y: Any, h: Any, d: Any) -> tuple[Any, Any, Any]:
         entries = block.slopes(y, d)
-        of_step, of_tiny = both(block.pack(entries, h), entries)
-        return of_step, of_tiny
+        of_step, of_tiny_step, pivots = every(block.pack(entries, h), entries)
+        return of_step, of_tiny_step, pivots
 
     return at

@@ -52,7 +52,7 @@ def consistent(system: System | Equations, where: str, y: Array, d: Array) -> Ar
     y = _solved(system, where, y, d)
     if manifold is not None and manifold.charted:
         y = _charted(manifold, y, d)
-    if manifold is not None and (cause := jammed(manifold, system.names, y, d, 0.0)):
+    if manifold is not None and (cause := jammed(manifold, system.names, y, d)):
         raise ValueError(f"{where}: {cause}")
     return y
 

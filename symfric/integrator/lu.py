@@ -1,6 +1,6 @@
 """Sparse LU factors written out as expressions: no pivot search and no index at run time."""
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from typing import final
 
@@ -39,6 +39,15 @@ class SymbolicLU:
             sign = sign * ca.sign(self.packed_symbol[at])
             at += 1 + len(others) + len(below)
         return sign
+
+    def pivots(self, rows: Container[int]) -> ca.SX:
+        """Pivots of `rows` in elimination order, in terms of `packed_symbol`."""
+        found, at = [ca.SX(0, 1)], 0
+        for (row, _), others, below in zip(self.order, self.rows, self.columns, strict=True):
+            if row in rows:
+                found.append(1 / self.packed_symbol[at])
+            at += 1 + len(others) + len(below)
+        return ca.vertcat(*found)
 
     def solve(self, right: ca.SX) -> ca.SX:
         """X with A x = right, in terms of `packed_symbol` in place of the factors."""

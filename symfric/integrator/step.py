@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 
 from symfric.integrator.blocks import signs
-from symfric.integrator.manifold import PULLING
+from symfric.integrator.manifold import PULLING, SHOCK
 from symfric.integrator.method import Method, Trial, Trials
 from symfric.integrator.system import System
 from symfric.integrator.tangent import tangent
@@ -64,25 +64,27 @@ def obstacles(system: System, method: Method) -> Callable[[Any, Any, Any], Any] 
     Breaking away would be missed without a sign of it: where a contact turns unstable, a long step
     stays on the solution that sticks, and estimates no error; `signs` tells. And where the loop
     from normal forces over friction to reactions and back, det(I - dN/dN), is negative, friction
-    has jammed: that solution is none of the machine, nor is one where a bearing pulls. Mechanisms
-    without friction have none of this.
+    has jammed: that solution is none of the machine, nor is one where a bearing pulls. A pivot of
+    I - dN/dN below `SHOCK` is on the way there. Mechanisms without friction have none of this.
     """
     gamma, manifold, chart = method.diagonal, system.manifold, tangent(system)
     if gamma is None or (manifold is not None and not system.rubs):
         return None
-    both = signs(system if chart is None else chart.reduced, gamma)
+    inside = system if chart is None else chart.reduced
+    loop = [] if manifold is None else inside.algebraic[0][manifold.n + manifold.m :]
+    every = signs(inside, gamma, loop)
 
     def sign(y: Any, h: Any, d: Any) -> Any:
         here, data = y, d
         if chart is not None:
             data = chart.open(y, d)
             here = chart.enter(y, data)
-        own, tiny = both(here, h, data)
+        own, tiny, pivots = every(here, h, data)
         if manifold is None:
             return own * tiny
         # with a definite mass matrix and no friction, that of n accelerations is (-1)^n
         signs_of = [own * tiny, (-1) ** manifold.n * tiny]
-        return ca.mmin(ca.vertcat(*signs_of, manifold.pressing(y, d) + PULLING))
+        return ca.mmin(ca.vertcat(*signs_of, pivots - SHOCK, manifold.pressing(y, d) + PULLING))
 
     return sign
 

@@ -36,7 +36,7 @@ class System:
         monitor_nominal: their typical magnitudes, shape (m,).
         manifold: where the solution of a holonomic model lies.
         pivots: groups of rows with a safe pivot on the diagonal, each once those before it are
-            eliminated: rates of their own unknown and mass matrices, then constraints.
+            eliminated: rates of their own unknown and mass matrices, constraints, normal forces.
         rubs: whether something slides in it that its model names (`Model.monitors`).
         inner: f with inner unknowns, whose derivatives are sparse; None where f itself serves. Its
             groups take the place of `pivots`.
@@ -121,6 +121,7 @@ def system(model: Model, inputs: Drivers) -> System:
     d = ca.vertcat(model.vector("p"), inputs.data)
     n, m = (mechanics.n, phi.numel()) if mechanics else (0, 0)
     own = (i for i in range(nx) if mass.sparsity().has_nz(i, i))
+    loop = tuple(range(nx + n + m, nx + n + len(model.z))) if mechanics else ()
     return System(
         unknowns,
         d,
@@ -133,7 +134,7 @@ def system(model: Model, inputs: Drivers) -> System:
         ca.substitute(monitors, model.vector("u"), inputs.expression),
         np.array([nominal for _, nominal in watched], dtype=float),
         manifold(model, unknowns, d, f, inputs.expression) if mechanics else None,
-        ((*own, *range(nx, nx + n)), tuple(range(nx + n, nx + n + m))),
+        ((*own, *range(nx, nx + n)), tuple(range(nx + n, nx + n + m)), loop),
         rubs=bool(model.monitors),
         inner=_with_inputs(model, inputs, f) if mechanics and mechanics.inner else None,
     )

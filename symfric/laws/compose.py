@@ -92,6 +92,14 @@ class Sum(Law):
                 found.append(replace(switch, reset=reset))
         return tuple(found)
 
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """Those of the terms below each other, where every term with states knows its own."""
+        known = [law.held_step(v, N, part, h) for law, part in self._split(z) if law.states]
+        steps = [step for step in known if step is not None]
+        if not steps or len(steps) < len(known):
+            return None
+        return _join(v, [end for end, _ in steps]), _join(v, [mean for _, mean in steps])
+
     def warnings(self) -> tuple[str, ...]:
         """Those of the terms."""
         return tuple(warning for law in self.laws for warning in law.warnings())

@@ -238,8 +238,8 @@ def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip], forces: ca.S
     for k, link in reversed(list(enumerate(links))):
         # inner unknowns first: nothing stands on their right-hand sides, so they cost no stage
         groups.append(ca.vertcat(NONE, *(cuts.symbols[i] for i in kept if cuts.links[i] == k)))
-        own = (column[link.rows] for column in (eq.q, eq.qd, eq.a))
-        groups.append(ca.vertcat(*own, *of_link[link.joint.name]))
+        groups.append(ca.vertcat(*(column[link.rows] for column in (eq.q, eq.qd, eq.a))))
+        groups.append(ca.vertcat(NONE, *of_link[link.joint.name]))
     return Inner(cuts.symbols[kept], values[kept], f, tuple(groups))
 
 

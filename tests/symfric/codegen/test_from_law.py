@@ -15,7 +15,6 @@ from symfric.laws import (
     GMS,
     Armstrong,
     BoucWen,
-    Bristle2D,
     ElastoPlastic,
     Element,
     ExactCoulomb,
@@ -298,7 +297,6 @@ def test_parameters_without_effect_do_not_appear():
     [
         (GMS(), {}, "gms.*states that act on each other in a circle; gms with form = 'event'"),
         (Leuven(), {}, "act on each other in a circle"),
-        (Bristle2D(), {}, "act on each other in a circle"),
         (Armstrong(), {}, "got states that depend on others"),
         (ExactCoulomb(), {}, "modes follow zero crossings within the step; karnopp and leine"),
         (Karnopp(form="event"), {}, "got one whose modes follow zero crossings"),

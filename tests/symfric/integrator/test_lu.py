@@ -154,3 +154,14 @@ def test_singular_numbers_give_infinity_not_a_wrong_answer() -> None:
     """The step rejects what is not finite."""
     values = np.array([[1.0, 2.0], [2.0, 4.0]])
     assert not np.isfinite(solver(values)[1](sparse(values), [1.0, 1.0]).full()).any()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_pivots_of_all_rows_multiply_to_the_determinant(seed: int) -> None:
+    values = random_sparse(7, 0.4, seed)
+    lu = factorise(A := symbols(values))
+    pivots = ca.substitute(lu.pivots(range(7)), lu.packed_symbol, lu.packed)
+    found = ca.Function("pivots", [A], [pivots])(sparse(values)).full()
+    assert abs(np.prod(found)) == pytest.approx(abs(np.linalg.det(values)))
+    assert lu.pivots([]).shape == (0, 1)
+    assert lu.pivots([lu.order[2][0], lu.order[5][0]]).numel() == 2

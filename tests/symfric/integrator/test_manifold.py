@@ -65,7 +65,7 @@ def test_accelerations_are_unknowns_and_no_mass_matrix_is_inverted() -> None:
     s = unknowns(LOOPS["four_mass"])
     assert s.names[8:12] == ("x1_rate_dot", "y2_rate_dot", "z3_rate_dot", "x4_rate_dot")
     assert (s.n, s.nx, s.manifold is not None) == (8 + 4 + 2, 8, True)
-    assert s.pivots == (tuple(range(12)), (12, 13))
+    assert s.pivots == (tuple(range(12)), (12, 13), ())
 
 
 def test_projection_is_the_nearest_point() -> None:
@@ -99,17 +99,18 @@ def test_a_start_that_closes_no_loop_is_refused() -> None:
         simulate(model, 0.1, p={"length": 1.9})
 
 
-def drawer(mu_s: float, rate: float = 1.0) -> Model:
+def drawer(mu_s: float, rate: float = 1.0, names: tuple[str, ...] = ("slide",)) -> Model:
     """A drawer with its weight beside its guide, pulled back: N = 2 m c |a| / length.
 
     While it slides forward, a (1 - 2 mu c / length) = -F / m: with c = length it jams where the
-    coefficient of friction reaches 1/2.
+    coefficient of friction reaches 1/2. More `names` make more of them, all alike.
     """
     m = Mechanism("drawer", gravity=(0.0, 0.0, 0.0))
-    m.body("drawer", 2.0, (0.01, 0.01, 0.01), com=(0.1, 0.0, 0.0))
     friction = JointFriction(BrownMcPhee(mu_s=mu_s, mu_d=0.1, v_t=0.01), length=0.1)
-    m.joint(Prismatic("slide", "ground", "drawer", rate=rate, friction=friction))
-    m.force(JointSpringDamper("pull", "slide", "slide", actuator=-5.0))
+    for name in names:
+        m.body(f"{name}r", 2.0, (0.01, 0.01, 0.01), com=(0.1, 0.0, 0.0))
+        m.joint(Prismatic(name, "ground", f"{name}r", rate=rate, friction=friction))
+        m.force(JointSpringDamper(f"pull_{name}", name, "slide", actuator=-5.0))
     return m.build()
 
 
@@ -130,6 +131,11 @@ def test_jamming_ends_with_joint_law_and_time(method: str) -> None:
     run = caught.value.partial
     assert run["slide_rate"][-1] == pytest.approx(0.0205, abs=2e-4)
     assert (run["slide_N"] >= 0).all()
+
+
+def test_two_that_jam_at_once_are_seen_though_the_determinant_stays_positive() -> None:
+    with pytest.raises(SolveError, match=r"stopped at t = 0\.309.*joint '(left|right)' with"):
+        simulate(drawer(0.6, names=("left", "right")), 1.0, rtol=1e-8)
 
 
 def test_no_start_beyond_jamming_is_accepted() -> None:
