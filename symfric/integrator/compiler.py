@@ -15,7 +15,7 @@ from pathlib import Path
 from symfric.files import written
 
 FLAGS = (
-    "-O2", "-march=native", "-fno-math-errno", "-freciprocal-math", "-fno-tree-pre", "-fno-gcse",
+    "-O2", "-march=native", "-fno-math-errno", "-freciprocal-math", "-fno-tree-pre", "-fno-code-hoisting", "-fno-gcse",
     "-fPIC", "-shared",
 )  # fmt: skip
 """Reciprocals instead of repeated divisions save a fifth of a step; looking for common parts in

@@ -21,7 +21,7 @@ from symfric.multibody.topology import Topology
 
 Array = NDArray[np.float64]
 NONE = ca.SX(0, 1)
-LONG, LONG_WITH_FRICTION = 16, 9
+LONG, LONG_WITH_FRICTION = 16, 12
 """Links of a chain from which on cuts pay: below, full derivatives take fewer operations. Friction
 from reactions makes them dearer."""
 
