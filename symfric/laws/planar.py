@@ -30,9 +30,9 @@ class Isotropic(Parametric):
     LuGre, Dahl, Gonthier those of the literature. Further inputs, as F_e, are vectors (d, 1).
     In components: vector states along x, then along y, then along z, then the states that are
     numbers.
-    Limits: slip along a line is the law itself. Equivariant under rotations. States and forces stay
-    within the bounds they have in straight slip, except the elements of `Leuven`, which share one
-    level. v_eps is for laws without states; the others have their own.
+    Limits: slip along a line is the law itself. Equivariant under rotations. Every vector state
+    stays within the bound that it has in straight slip. v_eps is for laws without states; the
+    others have their own.
 
     Raises:
         ValueError: a law that tells forward from backward, has modes (they change where v passes

@@ -22,6 +22,7 @@ from symfric.laws import (
     ExactCoulomb,
     Karnopp,
     Lagged,
+    Leuven,
     MaxwellSlip,
     Slider,
     StaticLaw,
@@ -167,26 +168,18 @@ def test_a_closed_circle_takes_energy(name: str, radius: float) -> None:
     _, F, work = along_path(name, 2, at_rest(law), v)
     assert np.isfinite(F).all()
     second = work[0, COUNT // 2 :].sum()
-    stored = 1e-3 * np.abs(work).sum()
-    assert second >= -stored
+    assert second >= 0.0
 
 
 def limits(law: Law) -> np.ndarray:
-    """The largest size of each vector state in steady sliding at any velocity."""
+    """The largest size of each vector state in straight slip."""
+    if isinstance(law, Leuven):
+        return np.array([e.mu * N for e in law.elements])
     found = [np.abs(np.asarray(law.steady_state(v, N)).ravel()) for v in np.logspace(-7, 0, 200)]
     return np.max(found, axis=0)[directed(law)]
 
 
-UNBOUNDED = {
-    "leuven": "elements that share a level",
-    "gonthier": "deflection grows in creep, its force does not",
-    "lagged": "follows a velocity",
-    "armstrong": "one state follows a velocity",
-    "bristle_2d": "own form",
-}
-
-
-@pytest.mark.parametrize("name", [n for n in DYNAMIC if not any(part in n for part in UNBOUNDED)])
+@each_dynamic
 @given(seed=st.integers(0, 9))
 def test_states_never_leave_the_ball_of_their_limit_in_curved_slip(name: str, seed: int) -> None:
     law, rng = Planar(LAWS[name]), np.random.default_rng(seed)
@@ -196,7 +189,7 @@ def test_states_never_leave_the_ball_of_their_limit_in_curved_slip(name: str, se
     z, _, _ = along_path(name, 2, at_rest(law), speed * np.array([np.cos(angle), np.sin(angle)]))
     n = sum(directed(law.law))
     sizes = np.hypot(z[:n], z[n : 2 * n]).max(axis=1)
-    assert (sizes <= limits(law.law) * (1 + 1e-3)).all()
+    assert (sizes <= limits(law.law) * (1 + 1e-6)).all()
 
 
 @each
@@ -382,13 +375,19 @@ def test_every_law_without_sides_and_modes_has_a_vector_form() -> None:
     assert missing == {"capstan", "quarter_car_general", "exact_coulomb"}
 
 
-@pytest.mark.parametrize("name", ["maxwell_slip", "dahl", "bouc_wen", "gms", "lugre"])
-@given(v=pair, scale=logs, z=pair)
+STATIC_LEVEL = ["lugre", "dahl", "dahl, n 0.5", "dahl, n 2", "elasto_plastic", "bouc_wen"]
+STATIC_LEVEL += ["maxwell_slip", "gms", "haessig_friedland", "stick_slip", "gonthier", "bristle_2d"]
+
+
+@pytest.mark.parametrize("name", STATIC_LEVEL)
+@given(v=pair, scale=logs, z=pair, w=pair)
 def test_force_stays_within_the_static_level(
-    name: str, v: np.ndarray, scale: float, z: np.ndarray
+    name: str, v: np.ndarray, scale: float, z: np.ndarray, w: np.ndarray
 ) -> None:
-    known = parameters(LAWS[name])
-    one = with_values(LAWS[name], {"sigma_1": 0.0}) if "sigma_1" in known else LAWS[name]
-    law = Planar(one)
-    size = max(np.hypot(*z), 1.0)
-    assert np.hypot(*law.force(scale * v, N, bent(law, z / size))) <= 0.15 * N * (1 + 1e-9)
+    """Without damping of the bristles and for all loads of the elements below their limits."""
+    damped = "sigma_1" in parameters(LAWS[name]) and name not in ("gonthier", "bristle_2d")
+    law = Planar(with_values(LAWS[name], {"sigma_1": 0.0}) if damped else LAWS[name])
+    below = [a / max(np.hypot(*a), 1.0) for a in (z, w)]
+    rounding = 1e-3 if name == "gonthier" else 1e-9
+    F = law.force(scale * v, N, bent(law, *below))
+    assert np.hypot(*F) <= 0.15 * N * (1 + rounding)

@@ -19,7 +19,16 @@ from symfric import (
     Viscous,
     simulate,
 )
-from symfric.laws import GMS, Karnopp, Law, LuGreNormalised
+from symfric.laws import (
+    GMS,
+    ElastoPlastic,
+    Gonthier,
+    Karnopp,
+    Law,
+    LuGreNormalised,
+    MaxwellSlip,
+    Slider,
+)
 from symfric.multibody import JointFriction, Mechanism, Revolute, Spherical, Universal
 from symfric.scenes import FourBar, SliderCrank
 from symfric.scenes.mechanism import MechanismScene
@@ -145,6 +154,21 @@ def test_bristles_of_a_ball_are_vectors() -> None:
     assert bristles / np.linalg.norm(bristles) == pytest.approx(SPIN / 9.0, abs=1e-6)
     other = rotor("absolute", law)
     assert other["ball_slip"] == pytest.approx(run["ball_slip"], rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        GMS(mu_s=0.2, mu_d=0.2),
+        MaxwellSlip((Slider(1e5, 0.15), Slider(5e4, 0.05))),
+        Dahl(mu_d=0.2, n=1.5),
+        ElastoPlastic(mu_s=0.2, mu_d=0.2),
+        Gonthier(mu_s=0.2, mu_d=0.2),
+    ],
+    ids=lambda law: type(law).__name__,
+)
+def test_elements_that_yield_slow_a_ball_down_as_coulomb(law: Law) -> None:
+    assert rotor("joint", law)["ball_slip"][-1] == pytest.approx(0.02 * (9.0 - 1.6 * 2), rel=1e-3)
 
 
 def test_a_ball_that_sticks_stays_where_it_is() -> None:
