@@ -57,6 +57,7 @@ from symfric.laws import MakkarDixon as MakkarDixon
 from symfric.laws import MaxwellSlip as MaxwellSlip
 from symfric.laws import ModifiedThrelfall as ModifiedThrelfall
 from symfric.laws import Planar as Planar
+from symfric.laws import Spatial as Spatial
 from symfric.laws import PoppStelter as PoppStelter
 from symfric.laws import Population as Population
 from symfric.laws import PowerLawViscous as PowerLawViscous
