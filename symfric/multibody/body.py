@@ -7,7 +7,7 @@ from typing import Any, final
 import casadi as ca
 import numpy as np
 
-from symfric.multibody.spatial import Frame, Vector, vector
+from symfric.multibody.spatial import Frame, Vector, is_scalar, is_vector, vector
 from symfric.numeric import Scalar
 
 GROUND = "ground"
@@ -50,8 +50,9 @@ class Body:
 
     def problems(self, p: ca.SX, values: ca.DM) -> Iterator[str]:
         """What is wrong with the numbers, symbols `p` replaced by `values`."""
-        if len(self.inertia) not in (3, 6):
-            yield f"inertia: expected 3 or 6 numbers, got {len(self.inertia)}"
+        wrong = list(self._no_numbers())
+        if wrong:
+            yield from wrong
             return
         both = ca.substitute(ca.vertcat(self.mass, ca.vec(ca.densify(self.J))), p, ca.SX(values))
         numbers = ca.DM(both).full().ravel()
@@ -67,6 +68,19 @@ class Body:
                 "inertia: expected the largest principal moment to be at most the sum of the "
                 f"others, got {', '.join(_short(principal))} kg m^2"
             )
+
+    def _no_numbers(self) -> Iterator[str]:
+        """What is no number or not as many as it should."""
+        given: Any = self.inertia
+        if not is_scalar(self.mass):
+            yield f"mass: expected a number [kg], got {self.mass!r}"
+        count = len(given) if hasattr(given, "__len__") else 0
+        if count not in (3, 6):
+            yield f"inertia: expected 3 or 6 numbers, got {count or given!r}"
+        elif not all(map(is_scalar, given)):
+            yield f"inertia: expected 3 or 6 numbers [kg m^2], got {given!r}"
+        if not is_vector(self.com):
+            yield f"com: expected three numbers [m], got {self.com!r}"
 
 
 def _short(numbers: Any) -> list[str]:

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from symfric.multibody.body import GROUND, Body
 from symfric.multibody.constraints import Constraint
+from symfric.model import Variables
 from symfric.multibody.forces import Force
+from symfric.multibody.friction import JointFriction
 from symfric.multibody.joints import Joint
 from symfric.multibody.topology import Topology, body_of
 from symfric.numeric import is_number, is_symbolic
@@ -30,13 +32,15 @@ def naming(
     joints: Sequence[Joint],
     forces: Sequence[Force],
     constraints: Sequence[Constraint],
+    inputs: Variables = (),
 ) -> Iterator[str]:
     """Names that are repeated or no C identifiers, places and joints that do not exist."""
     names = [("body", b.name) for b in bodies] + [("joint", j.name) for j in joints]
     names += [("force", f.name) for f in forces] + [(c.kind, c.name) for c in constraints]
+    names += [("input", v.name) for v in inputs]
     every = [name for _, name in names]
     for kind, name in names:
-        if not (name.isascii() and name.isidentifier()):
+        if not _identifier(name):
             yield f"{kind} '{name}': expected a name that is a C identifier"
         if every.count(name) > 1:
             yield f"{kind} '{name}': expected every name once"
@@ -50,10 +54,15 @@ def naming(
         for end in force.places():
             yield from _place(f"force '{force.name}'", end, known)
         yield from _moving(f"force '{force.name}'", force.joints(), joints)
+        yield from (f"force '{force.name}' > {text}" for text in force.problems())
     for constraint in constraints:
         where = f"{constraint.kind} '{constraint.name}'"
         yield from _moving(where, constraint.joints(), joints)
         yield from (f"{where} > {text}" for text in constraint.problems())
+
+
+def _identifier(name: object) -> bool:
+    return isinstance(name, str) and name.isascii() and name.isidentifier()
 
 
 def _moving(where: str, pairs: Iterable[tuple[str, str]], joints: Sequence[Joint]) -> Iterator[str]:
@@ -78,12 +87,24 @@ def _place(where: str, place: str, bodies: Mapping[str, Body]) -> Iterator[str]:
         yield f"{where}: expected one of the frames {', '.join(near) or '(none)'}, got {place}"
 
 
-def numbers(bodies: Sequence[Body], joints: Sequence[Joint], p: ca.SX, v: ca.DM) -> Iterator[str]:
-    """Masses, inertias, friction and start values that cannot be."""
+def weights(bodies: Sequence[Body], p: ca.SX, values: ca.DM) -> Iterator[str]:
+    """Masses and inertias that cannot be."""
     for body in bodies:
-        if body.name != GROUND:
-            yield from (f"body '{body.name}' > {text}" for text in body.problems(p, v))
+        if body.name == GROUND:
+            continue
+        where = f"body '{body.name}'"
+        given = (body.mass, body.inertia, body.com, *(f.p for f in body.frames.values()))
+        stray = list(undeclared(where, given, p, "parameters"))
+        yield from stray or (f"{where} > {text}" for text in body.problems(p, values))
+
+
+def bearings(joints: Sequence[Joint], p: ca.SX, u: ca.SX) -> Iterator[str]:
+    """Start values, lengths and friction that cannot be."""
     for joint in joints:
+        where = f"joint '{joint.name}'"
+        own = [value for name, value in vars(joint).items() if name != "friction"]
+        yield from undeclared(where, own, p, "parameters")
+        yield from (f"{where} > {text}" for text in joint.problems())
         n = len(joint.coordinates)
         for what, given in (("start", joint.start), ("rate", joint.rate)):
             values = joint.starts if what == "start" else joint.rates
@@ -93,8 +114,32 @@ def numbers(bodies: Sequence[Body], joints: Sequence[Joint], p: ca.SX, v: ca.DM)
             if bad:
                 yield f"joint '{joint.name}' > {what}: expected finite numbers, got {bad[0]!r}"
         if joint.friction is not None:
-            for text in joint.friction.problems(joint.rubs):
-                yield f"joint '{joint.name}' > friction: {text}"
+            yield from _rubbing(f"{where} > friction", joint, joint.friction, ca.vertcat(p, u))
+
+
+def _rubbing(where: str, joint: Joint, friction: object, known: ca.SX) -> Iterator[str]:
+    if not isinstance(friction, JointFriction):
+        yield f"{where}: expected JointFriction(law, radius=...), got {friction!r}"
+        return
+    yield from (f"{where}: {text}" for text in friction.problems(joint.rubs))
+    law, v, N = friction.law, ca.SX.sym("v"), ca.SX.sym("N")
+    z = ca.SX.sym("z", len(law.states))
+    given = [value for name, value in vars(friction).items() if name != "law"]
+    if not law.inputs:
+        given += [law.force(v, N, z), law.rate(v, N, z)]
+    yield from undeclared(where, given, ca.vertcat(v, N, z, known), "parameters and inputs")
+
+
+def undeclared(
+    where: str, values: Iterable[object], known: ca.SX, expected: str
+) -> Iterator[str]:
+    """Symbols in `values` that nobody declared."""
+    names = {s.__hash__() for s in ca.symvar(known)}
+    flat = [x for value in values for x in (value if isinstance(value, tuple | list) else [value])]
+    used = [s for x in flat if isinstance(x, ca.SX) for s in ca.symvar(x)]
+    stray = dict.fromkeys(str(s) for s in used if s.__hash__() not in names)
+    if stray:
+        yield f"{where}: expected only declared {expected}, got {', '.join(stray)}; see build(p)"
 
 
 def _finite(x: object) -> bool:
@@ -102,14 +147,16 @@ def _finite(x: object) -> bool:
 
 
 def connected(bodies: Sequence[Body], topology: Topology) -> Iterator[str]:
-    """Bodies that hang on nothing."""
+    """Bodies that hang on nothing; nothing that could move."""
     hung = {GROUND, *(link.body for link in topology.links)}
-    for body in bodies:
-        if body.name not in hung:
-            yield (
-                f"body '{body.name}': expected joints with coordinates that lead to the ground, "
-                "found none; a Free joint lets it move freely"
-            )
+    loose = [body.name for body in bodies if body.name not in hung]
+    for name in loose:
+        yield (
+            f"body '{name}': expected joints with coordinates that lead to the ground, found "
+            "none; a Free joint lets it move freely"
+        )
+    if not loose and not topology.n:
+        yield "expected bodies that can move, got none"
 
 
 @final

@@ -130,6 +130,11 @@ class PrescribedMotion(Constraint):
         """Its joint."""
         return ((self.joint, self.direction),)
 
+    def problems(self) -> Iterator[str]:
+        """A motion that is no function."""
+        if not callable(self.motion):
+            yield f"motion: expected a function of time, got {self.motion!r}; write lambda t: ..."
+
     def held(self, kin: Kinematics, joints: dict[str, Joint]) -> Held:
         """motion(t) - s = 0."""
         joint, target = joints[self.joint], ca.SX(self.motion(kin.t))
@@ -154,6 +159,11 @@ class UserConstraint(Constraint):
     """
 
     expression: Callable[[Kinematics], Scalar]
+
+    def problems(self) -> Iterator[str]:
+        """An expression that is no function."""
+        if not callable(self.expression):
+            yield f"expression: expected a function of the kinematics, got {self.expression!r}"
 
     def held(self, kin: Kinematics, joints: dict[str, Joint]) -> Held:
         """The expressions, and their derivatives by the pose of every body."""

@@ -137,7 +137,7 @@ def equations(
     rows += along @ (every[phi.numel() - norms.numel() :, 0])
     pushed = along.T @ a + ca.jtimes(along.T @ qd, q, qd)
     rows += along @ (inertia * pushed)
-    phi = phi[list(kept)]
+    phi = phi[list(kept), 0]
     phi_dot = ca.jtimes(phi, q, qd) + ca.jacobian(phi, t)
     reactions = {name: _without(world[name], name, kin, loads) for name in by_name}
     return Equations(

@@ -7,7 +7,7 @@ conservative, power = -dV/dt (a test checks it for every force).
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import final
 
 import casadi as ca
@@ -17,7 +17,7 @@ from symfric.multibody.joints import Joint
 from symfric.multibody.kinematics import Kinematics
 from symfric.multibody.spatial import Vector, vector
 from symfric.multibody.topology import body_of
-from symfric.numeric import Scalar, equals
+from symfric.numeric import Scalar, equals, is_number, is_symbolic
 
 ZERO = ca.SX(3, 1)
 
@@ -69,6 +69,14 @@ class Force(ABC):
     def joints(self) -> Iterable[tuple[str, str]]:
         """The joints it names, each with a direction."""
         return ()
+
+    def problems(self) -> Iterator[str]:
+        """Numbers that are not finite."""
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if item.type == "Scalar" or item.type is Scalar:
+                if not is_symbolic(value) and not (is_number(value) and abs(value) < ca.inf):
+                    yield f"{item.name}: expected a finite number, got {value!r}"
 
     @property
     def conservative(self) -> bool:
@@ -219,6 +227,11 @@ class UserForce(Force):
 
     place: str
     expression: Callable[[Kinematics], tuple[Vector, Vector]]
+
+    def problems(self) -> Iterator[str]:
+        """An expression that is no function."""
+        if not callable(self.expression):
+            yield f"expression: expected a function of the kinematics, got {self.expression!r}"
 
     def places(self) -> Iterable[str]:
         """Where it acts."""

@@ -9,7 +9,7 @@ coordinates. The axis of a joint is z of both frames.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, final
 
@@ -23,7 +23,7 @@ from symfric.multibody.spatial import (
     rotation_y,
     rotation_z,
 )
-from symfric.numeric import Scalar, is_number
+from symfric.numeric import Scalar, is_number, is_symbolic
 
 Pair = tuple[ca.SX, ca.SX]
 NONE = ca.SX(3, 0)
@@ -86,6 +86,10 @@ class Joint(ABC):
     @abstractmethod
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
         """Expressions of R_PC and p_PC that must vanish, shape (m, 1)."""
+
+    def problems(self) -> Iterator[str]:
+        """What is wrong with its own numbers."""
+        return iter(())
 
     def linear(self, direction: str) -> bool:
         """Whether motion in this direction is a translation [m], not a rotation [rad]."""
@@ -356,6 +360,11 @@ class Distance(Closing):
     constrains: ClassVar[int] = 1
 
     length: Scalar = 1.0
+
+    def problems(self) -> Iterator[str]:
+        """A length that is none."""
+        if not is_symbolic(self.length) and not (is_number(self.length) and self.length > 0):
+            yield f"length: expected > 0 m, got {self.length!r}"
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
         """The squared distance."""

@@ -21,15 +21,15 @@ from symfric.multibody.prepare import (
     Prepared,
     in_absolute_coordinates,
     numeric,
-    start_problems,
+    strays,
     with_cuts,
     without_friction,
     written,
 )
 from symfric.multibody.results import results
-from symfric.multibody.spatial import Frame, Vector
+from symfric.multibody.spatial import Frame, Vector, is_vector
 from symfric.multibody.topology import Topology, absolute, spanning_tree
-from symfric.numeric import Scalar
+from symfric.numeric import Scalar, equals
 from symfric.parameters import Variable, check_names
 
 Array = NDArray[np.float64]
@@ -57,7 +57,10 @@ class Mechanism:
         self.constraints: list[Constraint] = []
         self.inputs: list[Variable] = []
         self.frames: list[tuple[str, Frame]] = []
-        if not all(isinstance(g, float | int) and g == 0 for g in gravity):  # type: ignore[union-attr]
+        self._wrong: list[str] = []
+        if not is_vector(gravity):
+            self._wrong.append(f"gravity: expected three numbers [m/s^2], got {gravity!r}")
+        elif not all(equals(gravity[i], 0.0) for i in range(3)):
             self.forces.append(Gravity("gravity", gravity))
 
     def body(
@@ -74,19 +77,30 @@ class Mechanism:
         x: Sequence[float] | None = None,
     ) -> None:
         """Add the frame "body.frame"; see `Frame`."""
-        self.frames.append((place, Frame(at, z, x)))
+        try:
+            self.frames.append((place, Frame(at, z, x)))
+        except ValueError as error:
+            self.frames.append((place, Frame()))
+            self._wrong.append(str(error).replace("frame", f"frame '{place}' >", 1).replace(">:", ">"))
 
     def joint(self, joint: Joint) -> None:
         """Add a joint."""
-        self.joints.append(joint)
+        self._take(self.joints, joint, Joint)
 
     def force(self, force: Force) -> None:
         """Add a force."""
-        self.forces.append(force)
+        self._take(self.forces, force, Force)
 
     def constraint(self, constraint: Constraint) -> None:
         """Add a constraint that is no joint: prescribed motion, a coupling, an expression."""
-        self.constraints.append(constraint)
+        self._take(self.constraints, constraint, Constraint)
+
+    def _take(self, group: list[Any], part: object, kind: type) -> None:
+        if isinstance(part, kind):
+            group.append(part)
+            return
+        what = kind.__name__
+        self._wrong.append(f"{what.lower()}: expected a {what} of symfric.multibody, got {part!r}")
 
     def input(self, name: str, unit: str, start: float = 0.0, nominal: float = 1.0) -> ca.SX:
         """Add an input and return its symbol, for actuators and user forces."""
@@ -132,17 +146,15 @@ class Mechanism:
             ValueError: all mistakes at once, each with its path.
         """
         check_names(f"mechanism '{self.name}' formulation", [formulation], FORMULATIONS)
-        bodies, problems = self._placed()
         symbols = ca.vertcat(NONE, *(v.symbol for v in p))
         values = ca.DM(ca.vertcat(NONE, *(v.start for v in p)))
-        problems += checks.naming(bodies, self.joints, self.forces, self.constraints)
-        problems += checks.numbers(bodies, self.joints, symbols, values)
-        self._refuse(problems)
-        by_name = {body.name: body for body in bodies}
-        topology = spanning_tree(by_name, self.joints)
-        self._refuse(checks.connected(bodies, topology))
-        made = self._consistent(topology, symbols, values)
+        bodies, tree = self._hung(symbols, values)
+        made = self._written(tree, symbols, values)
+        u = ca.vertcat(NONE, *(v.symbol for v in self.inputs))
+        loose = strays(made.eq, self.joints, self.forces, symbols, u)
+        self._refuse([*made.problems, *made.misfits, *_left_open(made), *loose])
         if formulation == "absolute":
+            by_name = {body.name: body for body in bodies}
             names = [body.name for body in bodies if body.name != GROUND]
             made = in_absolute_coordinates(
                 absolute(by_name, self.joints, names), made, self.joints, self.forces,
@@ -153,18 +165,47 @@ class Mechanism:
         return made
 
     def _refuse(self, problems: Iterable[str]) -> None:
-        found = [f"mechanism '{self.name}' > {problem}" for problem in problems]
+        found = dict.fromkeys(f"mechanism '{self.name}' > {problem}" for problem in problems)
         if found:
             raise ValueError("\n".join(found))
 
+    def _hung(self, p: ca.SX, values: ca.DM) -> tuple[list[Body], Topology]:
+        """The bodies in their places and the tree on which they hang.
+
+        Raises:
+            ValueError: all mistakes that can be told without equations, and those of the start.
+        """
+        bodies, problems = self._placed()
+        u = ca.vertcat(NONE, *(v.symbol for v in self.inputs))
+        problems += checks.naming(
+            bodies, self.joints, self.forces, self.constraints, self.inputs
+        )
+        weights = list(checks.weights(bodies, p, values))
+        bearings = list(checks.bearings(self.joints, p, u))
+        self._refuse([*problems, *weights, *bearings] if problems else ())
+        tree = spanning_tree({body.name: body for body in bodies}, self.joints)
+        loose = list(checks.connected(bodies, tree))
+        if weights and not bearings and not loose:
+            # the start does not depend on masses
+            unit = {b.name: replace(b, mass=1.0, inertia=(1.0, 1.0, 1.0)) for b in bodies}
+            made = self._written(replace(tree, bodies=unit), p, values)
+            weights += [*made.problems, *made.misfits]
+        self._refuse([*weights, *bearings, *loose])
+        return bodies, tree
+
     def _placed(self) -> tuple[list[Body], list[str]]:
         """Bodies with their frames."""
-        problems: list[str] = []
+        problems = list(self._wrong)
+        if not self.name.isidentifier():
+            problems.append("name: expected a C identifier")
         names = [body.name for body in self.bodies]
-        for place, _ in self.frames:
+        places = [place for place, _ in self.frames]
+        for place in places:
             body, _, frame = place.partition(".")
             if body not in names or not frame:
                 problems.append(f"frame '{place}': expected 'body.frame' of a known body")
+            if places.count(place) > 1:
+                problems.append(f"frame '{place}': expected every name once")
         placed = [
             replace(
                 body,
@@ -179,28 +220,26 @@ class Mechanism:
         ]
         return placed, problems
 
-    def _consistent(self, topology: Topology, p: ca.SX, values: ca.DM) -> Prepared:
-        """Equations in joint coordinates, their start values checked."""
-        q, qd = coordinates(topology)
-        made = written(topology, self.joints, self.forces, self.constraints, q, qd, p, values)
-        self._refuse(made.problems)
-        self._refuse([*start_problems(made, p, values), *_left_open(made)])
-        return made
+    def _written(self, tree: Topology, p: ca.SX, values: ca.DM) -> Prepared:
+        """Equations in joint coordinates."""
+        q, qd = coordinates(tree)
+        return written(tree, self.joints, self.forces, self.constraints, q, qd, p, values)
 
-    def assembled(self) -> "Mechanism":
+    def assembled(self, p: Variables = ()) -> "Mechanism":
         """A copy whose joints start at the nearest position and velocity that close all loops.
 
+        Args:
+            p: parameters, at whose start values they close.
+
         Raises:
-            ValueError: there is none near.
+            ValueError: all mistakes at once, each with its path; there is no position near.
         """
-        bodies, _ = self._placed()
-        topology = spanning_tree({body.name: body for body in bodies}, self.joints)
-        q, qd = coordinates(topology)
-        made = written(
-            topology, self.joints, self.forces, self.constraints, q, qd, NONE, ca.DM(0, 1)
-        )
+        symbols = ca.vertcat(NONE, *(v.symbol for v in p))
+        values = ca.DM(ca.vertcat(NONE, *(v.start for v in p)))
+        _, tree = self._hung(symbols, values)
+        made = self._written(tree, symbols, values)
         self._refuse(made.problems)
-        at = numeric(made.eq, NONE, ca.DM(0, 1))
+        at = numeric(made.eq, symbols, values)
         near = checks.project(at, made.q0)
         if near is None:
             self._refuse(["start: expected positions from which the loops can be closed"])
@@ -214,7 +253,7 @@ class Mechanism:
                 start=tuple(near[link.rows].tolist()),
                 rate=tuple(rates[link.rows].tolist()),
             )
-            for link in topology.links
+            for link in tree.links
         }
         copy = Mechanism(self.name)
         copy.bodies, copy.forces, copy.inputs = self.bodies, self.forces, self.inputs

@@ -14,7 +14,7 @@ from symfric.multibody.assembly import coordinates
 from symfric.multibody.constraints import Constraint
 from symfric.multibody.cuts import Cuts
 from symfric.multibody.equations import Equations, equations
-from symfric.multibody.forces import Force
+from symfric.multibody.forces import Axial, Force
 from symfric.multibody.joints import Joint
 from symfric.multibody.spatial import euler_parameters
 from symfric.multibody.topology import Topology
@@ -41,6 +41,7 @@ class Prepared:
         open_reactions: joints whose reactions they leave open.
         singular: whether constraints that are independent nearby are not at the start.
         problems: constraints that cannot be.
+        misfits: why the start violates constraints, redundant ones included.
     """
 
     eq: Equations
@@ -54,14 +55,12 @@ class Prepared:
     open_reactions: tuple[str, ...] = ()
     singular: bool = False
     problems: tuple[str, ...] = ()
+    misfits: tuple[str, ...] = ()
 
 
-def start_problems(made: Prepared, p: ca.SX, values: ca.DM) -> Iterator[str]:
+def _misfits(made: Prepared, at: checks.Position) -> Iterator[str]:
     """Start positions or velocities that violate constraints; offers the nearest that fit."""
-    at = numeric(made.eq, p, values)
     phi, J, phi_t = (m.full() for m in at(made.q0))
-    if not phi.size:
-        return
     worst = int(np.abs(phi).argmax())
     if abs(phi[worst, 0]) > checks.FITS:
         near = checks.project(at, made.q0)
@@ -69,9 +68,10 @@ def start_problems(made: Prepared, p: ca.SX, values: ca.DM) -> Iterator[str]:
         if near is not None:
             pairs = zip(made.q, near, strict=True)
             offer = "near it " + ", ".join(f"{v.name} = {x:.10g}" for v, x in pairs)
+            offer += "; `assembled()` takes it"
         yield (
             f"start: expected positions that satisfy {made.labels[worst]}, got "
-            f"{phi[worst, 0]:.3g}; {offer}; `assembled()` takes it"
+            f"{phi[worst, 0]:.3g}; {offer}"
         )
         return
     speed = J @ made.qd0 + phi_t[:, 0]
@@ -121,6 +121,20 @@ def in_absolute_coordinates(
     topology = replace(topology, links=links)
     q, qd = coordinates(topology)
     return written(topology, joints, forces, constraints, q, qd, p, values)
+
+
+def strays(
+    eq: Equations, joints: Sequence[Joint], forces: Sequence[Force], p: ca.SX, u: ca.SX
+) -> Iterator[str]:
+    """Symbols in forces that nobody declared."""
+    by_name = {joint.name: joint for joint in joints}
+    known = ca.vertcat(eq.q, eq.qd, p, u, eq.kin.t)
+    for force in forces:
+        parts: list[ca.SX] = []
+        for load in force.loads(eq.kin, by_name):
+            parts += [load.value] if isinstance(load, Axial) else [load.force, load.moment]
+        expected = "positions, velocities, time, parameters and inputs"
+        yield from checks.undeclared(f"force '{force.name}'", parts, known, expected)
 
 
 def without_friction(made: Prepared, p: Variables, u: Variables) -> dict[str, Array]:
@@ -181,7 +195,9 @@ def written(
     made = Prepared(eq, q, qd, q0, qd0, labels, (), problems=tuple(_held(eq, constraints, p)))
     if not eq.m or made.problems:
         return made
-    found = checks.rank(numeric(eq, p, values), q0)
+    at = numeric(eq, p, values)
+    made = replace(made, misfits=tuple(_misfits(made, at)))
+    found = checks.rank(at, q0)
     if not found.redundant:
         return replace(made, singular=found.singular)
     return replace(

@@ -14,6 +14,8 @@ from typing import Any, final
 
 import casadi as ca
 
+from symfric.numeric import is_number, is_symbolic
+
 Vector = Sequence[Any] | ca.SX | ca.DM
 """Three numbers or symbols."""
 
@@ -21,6 +23,18 @@ Vector = Sequence[Any] | ca.SX | ca.DM
 def vector(values: Vector) -> ca.SX:
     """`values` as a column (3, 1)."""
     return ca.SX(ca.vertcat(*(values[i] for i in range(3))))
+
+
+def is_vector(values: Any) -> bool:
+    """Whether `values` are three numbers or scalar symbols."""
+    if isinstance(values, ca.SX | ca.DM):
+        return values.numel() == 3
+    return hasattr(values, "__len__") and len(values) == 3 and all(map(is_scalar, values))
+
+
+def is_scalar(value: Any) -> bool:
+    """Whether `value` is a number or one symbol."""
+    return is_number(value) or (isinstance(value, ca.SX | ca.DM) and value.numel() == 1)
 
 
 def skew(a: ca.SX) -> ca.SX:
@@ -107,20 +121,26 @@ class Frame:
     p: ca.SX = field(init=False)
 
     def __post_init__(self) -> None:
-        z = _unit("z", ca.DM(self.z))
+        if not is_vector(self.at):
+            raise ValueError(f"frame: at: expected three numbers [m], got {self.at}")
+        z = _unit("z", self.z)
         if self.x is None:
             smallest = min(range(3), key=lambda i: abs(float(z[i])))
             # cyclic, so that the axes of the body stay the axes of a frame without directions
             x = ca.DM([float(i == (smallest if abs(float(z[2])) < 1 else 0)) for i in range(3)])
         else:
-            x = ca.DM(self.x)
-        x = _unit("x", x - ca.dot(x, z) * z)
+            x = _unit("x", self.x)
+        x -= ca.dot(x, z) * z
+        if not float(ca.norm_2(x)) > 1e-12:
+            raise ValueError(f"frame: x: expected a direction not parallel to z, got {self.x}")
+        x = x / ca.norm_2(x)
         object.__setattr__(self, "R", ca.SX(ca.sparsify(ca.horzcat(x, ca.cross(z, x), z))))
         object.__setattr__(self, "p", vector(self.at))
 
 
-def _unit(name: str, a: ca.DM) -> ca.DM:
-    length = float(ca.norm_2(a)) if a.numel() == 3 else 0.0
-    if not length > 1e-12:
-        raise ValueError(f"frame: {name}: expected three numbers, not parallel to z, got {a}")
-    return a / length
+def _unit(name: str, a: Any) -> ca.DM:
+    numbers = is_vector(a) and not any(map(is_symbolic, ca.vertsplit(ca.SX(vector(a)))))
+    length = float(ca.norm_2(ca.DM(vector(a)))) if numbers else 0.0
+    if not 0.0 < length < ca.inf:
+        raise ValueError(f"frame: {name}: expected three numbers that are not all zero, got {a}")
+    return ca.DM(vector(a)) / length
