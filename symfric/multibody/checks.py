@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.model import Variables
 from symfric.multibody.body import GROUND, Body
 from symfric.multibody.constraints import Constraint
-from symfric.model import Variables
 from symfric.multibody.forces import Force
 from symfric.multibody.friction import JointFriction
 from symfric.multibody.joints import Joint
@@ -130,9 +130,7 @@ def _rubbing(where: str, joint: Joint, friction: object, known: ca.SX) -> Iterat
     yield from undeclared(where, given, ca.vertcat(v, N, z, known), "parameters and inputs")
 
 
-def undeclared(
-    where: str, values: Iterable[object], known: ca.SX, expected: str
-) -> Iterator[str]:
+def undeclared(where: str, values: Iterable[object], known: ca.SX, expected: str) -> Iterator[str]:
     """Symbols in `values` that nobody declared."""
     names = {s.__hash__() for s in ca.symvar(known)}
     flat = [x for value in values for x in (value if isinstance(value, tuple | list) else [value])]

@@ -74,9 +74,9 @@ class Force(ABC):
         """Numbers that are not finite."""
         for item in fields(self):
             value = getattr(self, item.name)
-            if item.type == "Scalar" or item.type is Scalar:
-                if not is_symbolic(value) and not (is_number(value) and abs(value) < ca.inf):
-                    yield f"{item.name}: expected a finite number, got {value!r}"
+            good = is_symbolic(value) or (is_number(value) and abs(value) < ca.inf)
+            if item.type is Scalar and not good:
+                yield f"{item.name}: expected a finite number, got {value!r}"
 
     @property
     def conservative(self) -> bool:

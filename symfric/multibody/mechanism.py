@@ -81,7 +81,9 @@ class Mechanism:
             self.frames.append((place, Frame(at, z, x)))
         except ValueError as error:
             self.frames.append((place, Frame()))
-            self._wrong.append(str(error).replace("frame", f"frame '{place}' >", 1).replace(">:", ">"))
+            self._wrong.append(
+                str(error).replace("frame", f"frame '{place}' >", 1).replace(">:", ">")
+            )
 
     def joint(self, joint: Joint) -> None:
         """Add a joint."""
@@ -178,7 +180,7 @@ class Mechanism:
         bodies, problems = self._placed()
         u = ca.vertcat(NONE, *(v.symbol for v in self.inputs))
         problems += checks.naming(
-            bodies, self.joints, self.forces, self.constraints, self.inputs
+            bodies, self.joints, self.forces, self.constraints, tuple(self.inputs)
         )
         weights = list(checks.weights(bodies, p, values))
         bearings = list(checks.bearings(self.joints, p, u))

@@ -99,7 +99,22 @@ def test_a_frame_without_directions_has_those_of_the_body() -> None:
     assert full(Frame().R) == pytest.approx(np.eye(3))
 
 
-@pytest.mark.parametrize(("z", "x"), [((0, 0, 0), None), ((0, 0, 1), (0, 0, 2)), ((1, 0), None)])
-def test_axes_that_say_nothing_are_refused(z: tuple[float, ...], x: tuple[float, ...]) -> None:
-    with pytest.raises(ValueError, match=r"frame: [zx]: expected three numbers, not parallel"):
+@pytest.mark.parametrize(
+    ("z", "x", "message"),
+    [
+        ((0, 0, 0), None, "z: expected three numbers that are not all zero, got (0, 0, 0)"),
+        ((1, 0), None, "z: expected three numbers that are not all zero, got (1, 0)"),
+        ((0, 0, 1), (0, 0, 2), "x: expected a direction not parallel to z, got (0, 0, 2)"),
+    ],
+)
+def test_axes_that_say_nothing_are_refused(
+    z: tuple[float, ...], x: tuple[float, ...] | None, message: str
+) -> None:
+    with pytest.raises(ValueError) as caught:
         Frame(z=z, x=x)
+    assert message in str(caught.value)
+
+
+def test_a_place_needs_three_numbers() -> None:
+    with pytest.raises(ValueError, match="frame: at: expected three numbers"):
+        Frame(at=(1.0, 2.0))
