@@ -68,6 +68,7 @@ from symfric.laws import RuiWang as RuiWang
 from symfric.laws import SelfTuning as SelfTuning
 from symfric.laws import SimscapeBreakaway as SimscapeBreakaway
 from symfric.laws import Slider as Slider
+from symfric.laws import Spatial as Spatial
 from symfric.laws import Specker as Specker
 from symfric.laws import StaticLaw as StaticLaw
 from symfric.laws import SteadyStateLuGre as SteadyStateLuGre

@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.holonomic import Holonomic
 from symfric.numeric import Scalar, evaluate
 from symfric.parameters import Variable, check_names
 from symfric.sketch import Sketch
@@ -64,39 +65,6 @@ class Event:
     direction: int = 0
     terminal: bool = False
     reset: Mapping[str, Scalar] = field(default_factory=dict[str, Scalar])
-
-
-@dataclass(frozen=True, eq=False)
-class Holonomic:
-    """What a mechanical model knows beyond its equations: constraints on its coordinates.
-
-    The states of the model begin with coordinates q and their rates q', its algebraic variables
-    with the multipliers lam of the constraints phi(q, t) = 0. With the accelerations a as symbols
-    no mass matrix needs to be inverted:
-
-        M a + phi_q' lam = Q,   d^2 phi / dt^2 = phi_q a + ... = 0,   further algebraic equations
-
-    Attributes:
-        n: number of coordinates.
-        phi: SX (m, 1); no rows for a tree.
-        a: SX symbols (n, 1).
-        implicit: SX (n + nz, 1), the equations above in q, q', the other states, a, z, u, p, t.
-        index: 0 has it integrated in the tangent space of its constraints, in as many unknowns as
-            there are degrees of freedom; 1 in all coordinates, which are put back onto the
-            constraints at the end of every step. The solution is the same, to the tolerance.
-        pressing: SX (k, 1), normal forces over their typical size, which must not be negative.
-        pressed: what they are, in words.
-        advice: what to try where friction and reactions have no solution; may be empty.
-    """
-
-    n: int
-    phi: ca.SX
-    a: ca.SX
-    implicit: ca.SX
-    index: int = 1
-    pressing: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    pressed: tuple[str, ...] = ()
-    advice: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,8 +13,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.vector import Rows, Vector
+
 Scalar = Any
-"""A real number: float, NumPy array (element-wise), SX, MX or DM."""
+"""A real number: float, NumPy array (element-wise), SX, MX or DM; a `Vector` where laws take it."""
 
 _CASADI = (ca.SX, ca.MX, ca.DM)
 
@@ -47,6 +49,8 @@ def _dispatch(name: str, numpy_name: str | None = None) -> Callable[..., Any]:
     of_numpy: Callable[..., Any] = getattr(np, numpy_name or name)
 
     def function(*args: Scalar) -> Scalar:
+        if isinstance(args[0], Vector):
+            return args[0].apply(function, name)
         return of_casadi(*args) if is_casadi(*args) else of_numpy(*args)
 
     function.__name__ = name
@@ -71,11 +75,15 @@ _erf_of_numbers = np.vectorize(erf_of_float, otypes=[float])
 
 def erf(x: Scalar) -> Scalar:
     """The error function of floats, arrays, SX, MX or DM."""
+    if isinstance(x, Vector):
+        return x.apply(erf, "erf")
     return ca.erf(x) if is_casadi(x) else _erf_of_numbers(x)[()]
 
 
 def column(*rows: Scalar) -> Scalar:
     """Stack `rows` into a column: shape (n, 1) for CasADi, (n, ...) for arrays."""
+    if any(isinstance(row, Vector) for row in rows):
+        return Rows(rows)
     if is_casadi(*rows):
         return ca.vertcat(*rows)
     return np.stack(np.broadcast_arrays(*rows)) if rows else np.zeros(0)
@@ -86,6 +94,8 @@ def empty(like: Scalar) -> Scalar:
 
     A DM joins SX and MX columns without a trace, so absent states cost nothing.
     """
+    if isinstance(like, Vector):
+        return Rows()
     return ca.DM(0, 1) if is_casadi(like) else np.zeros((0, *np.shape(like)))
 
 

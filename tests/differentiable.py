@@ -3,7 +3,7 @@
 import casadi as ca
 
 from symfric import Model, Output, Variable
-from symfric.model import Holonomic
+from symfric.holonomic import Holonomic
 
 
 def oscillator() -> Model:

@@ -76,7 +76,7 @@ def state_symbols(law: Law) -> ca.SX:
 
 
 NO_STEP = {
-    *("leuven", "gms", "bristle_2d", "bristle_2d, kappa 0.2", "armstrong"),
+    *("leuven", "gms", "armstrong"),
     *("exact_coulomb", "karnopp, event", "leine_switch, event"),
 }
 """Cases that cannot be C, see the tests of `law_block`."""

@@ -14,11 +14,18 @@ TESTS = sorted((ROOT / "tests").rglob("*.py"))
 MAY_IMPORT: dict[str, set[str]] = {
     "symfric.status": set(),
     "symfric.files": set(),
-    "symfric.numeric": set(),
+    "symfric.vector": set(),
+    "symfric.numeric": {"symfric.vector"},
     "symfric.parameters": {"symfric.numeric"},
-    "symfric.laws": {"symfric.numeric", "symfric.parameters"},
+    "symfric.laws": {"symfric.numeric", "symfric.parameters", "symfric.vector"},
     "symfric.sketch": set(),
-    "symfric.model": {"symfric.numeric", "symfric.parameters", "symfric.sketch"},
+    "symfric.holonomic": set(),
+    "symfric.model": {
+        "symfric.holonomic",
+        "symfric.numeric",
+        "symfric.parameters",
+        "symfric.sketch",
+    },
     "symfric.scenes": {
         "symfric.laws",
         "symfric.model",
@@ -27,6 +34,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "symfric.parameters",
     },
     "symfric.multibody": {
+        "symfric.holonomic",
         "symfric.laws",
         "symfric.model",
         "symfric.numeric",
@@ -34,6 +42,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "symfric.sketch",
     },
     "symfric.integrator": {
+        "symfric.holonomic",
         "symfric.model",
         "symfric.numeric",
         "symfric.parameters",

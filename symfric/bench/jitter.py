@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from symfric.figures import FigureData
 from symfric.figures.data import Curve
+from symfric.integrator.blocks import refinement
 from symfric.integrator.initial import consistent
 from symfric.integrator.inputs import drivers
-from symfric.integrator.manifold import Manifold
 from symfric.integrator.simulate import simulate
 from symfric.integrator.step import build_fixed
 from symfric.integrator.system import System, system
@@ -157,7 +157,7 @@ class _Runs:
         y = step.mapaccum("run", count)(self.y0, np.full((1, count), h), d).full()
         every = max(1, round(1e-3 / h))
         samples = np.hstack([self.y0[:, None], y[:, every - 1 :: every]])
-        accelerations = _manifold(self.whole).refine.map(samples.shape[1])(samples, 0).full()
+        accelerations = refinement(self.whole).map(samples.shape[1])(samples, 0).full()
         offset = self.whole.nx - len(self.model.x) // 2
         return tuple(variation(accelerations[offset + i]) for i in self.rows)
 
@@ -165,7 +165,7 @@ class _Runs:
 def runge_kutta_4(whole: System) -> ca.Function:
     """The step (y, h, d) -> y_next of the classical method, on the constraints at every stage."""
     y, h, d = ca.SX.sym("y", whole.n), ca.SX.sym("h"), ca.SX.sym("d", whole.d.numel())
-    refine, f = _manifold(whole).refine, ca.Function("f", [whole.y, whole.d], [whole.f])
+    refine, f = refinement(whole), ca.Function("f", [whole.y, whole.d], [whole.f])
     nx = whole.nx
 
     def at(k: ca.SX, part: float) -> ca.SX:
@@ -183,9 +183,3 @@ def variation(a: Array) -> float:
     """Total variation of samples; NaN where they are not finite."""
     total = float(np.abs(np.diff(a)).sum())
     return total if np.isfinite(total) else float("nan")
-
-
-def _manifold(whole: System) -> Manifold:
-    if whole.manifold is None:
-        raise ValueError("jitter: expected a mechanism, got a system without constraints")
-    return whole.manifold

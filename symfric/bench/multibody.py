@@ -211,7 +211,7 @@ def bench_multibody(
         tuple(runs),
         tuple(compile_rows(formulations)),
         tuple(counts(formulations)),
-        tuple(scaling(chain, links)),
+        tuple(scaling(partial(chain, law=BrownMcPhee(v_t=0.01)), links)),
         tuple(facts()),
         tuple(norms(formulations)),
         tuple(drifts(1.0 if quick else DRIFT_S)),

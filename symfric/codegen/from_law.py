@@ -10,7 +10,8 @@ import casadi as ca
 from symfric.codegen.block import Block
 from symfric.codegen.folding import runtime_parameters
 from symfric.codegen.held_step import force_of_rate, held_step
-from symfric.laws import Law, law_name
+from symfric.laws import Law, Sum, law_name
+from symfric.laws.base import chosen
 from symfric.model import Output, Variables, finite
 from symfric.numeric import is_casadi
 from symfric.parameters import Variable, check_names, parameters, symbolise
@@ -65,7 +66,7 @@ def law_block(
 
     Raises:
         ValueError: symbols in the law; names in `free` that are unknown, repeated or without
-            effect; states that act on each other in a circle (Leuven, smooth GMS, 2-D bristle) or
+            effect; states that act on each other in a circle (Leuven, smooth GMS) or
             are not affine and depend on others (Armstrong); modes that follow zero crossings of v
             within the step (exact Coulomb, Karnopp and Leine by events); a force that is not finite
             at rest (a smoothing width of 0 left variable).
@@ -145,8 +146,17 @@ def _step(law: Law, runtime: Variables, h: float | None, where: str) -> Block:
 def _advanced(
     law: Law, inputs: Variables, z: ca.SX, rate: ca.SX, h: ca.SX | float, where: str
 ) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """States at the end of the step, their means, and their mean rates."""
-    v, N, given = inputs[0].symbol, inputs[1].symbol, _given(inputs)
+    """States at the end of the step, their means, and their mean rates; of a sum term by term."""
+    if isinstance(law, Sum):
+        terms = zip(law.laws, law.terms(z), law.terms(rate), strict=True)
+        parts = [
+            _advanced(term, inputs, own, rates, h, where)
+            for term, (_, own), (_, rates) in terms
+            if term.states
+        ]
+        end, mean, mean_rate = (ca.vertcat(*column) for column in zip(*parts, strict=True))
+        return end, mean, mean_rate
+    v, N, given = inputs[0].symbol, inputs[1].symbol, chosen(law, _given(inputs))
     known = law.held_step(v, N, z, h)
     if known is not None:
         end, mean = map(ca.SX, known)

@@ -14,8 +14,12 @@ from pathlib import Path
 
 from symfric.files import written
 
-FLAGS = ("-O2", "-march=native", "-fno-math-errno", "-freciprocal-math", "-fPIC", "-shared")
-"""Reciprocals instead of repeated divisions save a fifth of a step. Nothing here lets the compiler
+FLAGS = (
+    "-O2", "-march=native", "-fno-math-errno", "-freciprocal-math",
+    "-fno-tree-pre", "-fno-code-hoisting", "-fno-gcse", "-fPIC", "-shared",
+)  # fmt: skip
+"""Reciprocals instead of repeated divisions save a fifth of a step; looking for common parts in
+code that has none left would take a third of the compiler's time. Nothing here lets the compiler
 assume finite numbers: rejecting a step that returned NaN relies on them."""
 
 

@@ -114,7 +114,7 @@ def _singular(integrator: Integrator, y: Array, d: Array, h: float) -> str:
     """Algebraic equations that cannot be solved, or do not determine their unknowns."""
     system = integrator.system
     names = _named(system, np.array(system.algebraic[1], dtype=int))
-    factors = blocks(system, 1.0).factor(y, max(h, 1e-12), d).full()
+    factors = ca.DM(blocks(system, 1.0).factor(y, max(h, 1e-12), d)).full()
     if not np.isfinite(factors).all():
         return (
             f"the iteration matrix is singular in {names or 'the states'}; the constraints may be "

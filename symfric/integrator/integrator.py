@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.integrator.blocks import refinement
 from symfric.integrator.columns import Columns
 from symfric.integrator.compiler import find_compiler, library_path
 from symfric.integrator.engine import CompiledEngine, Engine, VmEngine, c_source
@@ -91,7 +92,7 @@ class Integrator:
         if manifold is None:
             return signals
         t, y, d = ca.SX.sym("t"), ca.SX.sym("y", self.system.n), ca.SX.sym("d", signals.numel_in(2))
-        return ca.Function("signals", [t, y, d], [signals(t, manifold.refine(y, d), d)])
+        return ca.Function("signals", [t, y, d], [signals(t, refinement(self.system)(y, d), d)])
 
     @cached_property
     def signal_columns(self) -> Columns:

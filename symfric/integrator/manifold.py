@@ -22,8 +22,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.holonomic import Holonomic
 from symfric.integrator.lu import factorise
-from symfric.model import Holonomic, Model
+from symfric.model import Model
 from symfric.numeric import evaluate
 
 Array = NDArray[np.float64]
@@ -37,8 +38,9 @@ much friction multiplies a load on a bearing. On its way to 0 that load stops th
 microseconds, through a pivot that falls exponentially with the sliding velocity before: some runs
 would pass and others not, by their tolerance. Machines that move stay above 0.4, near jamming above
 0.02 (`tests/symfric/stress/test_jamming.py`)."""
-ITERATIONS = 4
-"""Of Newton's method with frozen derivatives: from 1e-3 to 1e-13."""
+ITERATIONS, NEARBY = (4, 3), (2, 2)
+"""Of Newton's method with frozen derivatives, on positions and velocities: from 1e-3 to 1e-13, and
+from 1e-5."""
 
 
 @final
@@ -49,7 +51,7 @@ class Manifold:
     Attributes:
         project: (y, d) -> y with positions and velocities on the constraints; the same y where
             there are none.
-        refine: (y, d) -> y, also its accelerations, multipliers and normal forces exact.
+        polish: the same from nearby.
         defect: (y, d) -> constraints and their rates.
         n, m, first: numbers of accelerations, of multipliers and of states. The algebraic unknowns
             are accelerations, multipliers, normal forces, in this order after the states.
@@ -60,7 +62,7 @@ class Manifold:
     """
 
     project: ca.Function
-    refine: ca.Function
+    polish: ca.Function
     defect: ca.Function
     n: int
     m: int
@@ -123,22 +125,18 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
     fixed = ca.vertcat(model.t, d)
     at = ca.Function("at", [q, qd, fixed], [phi, ca.jacobian(phi, q), rate])
     m = phi.numel()
-    projected = ca.vertcat(*_projected(at, q, qd, fixed), y[2 * n :]) if m else y
-    project = ca.Function("project", [y, d], [projected], {"cse": True})
+
+    def projection(name: str, iterations: tuple[int, int]) -> ca.Function:
+        on = ca.vertcat(*_projected(at, q, qd, fixed, iterations), y[2 * n :]) if m else y
+        return ca.Function(name, [y, d], [on], {"cse": True})
 
     algebraic = list(range(nx, nx + n + len(model.z)))
-    implicit = ca.Function("implicit", [y, d], [f[algebraic]])
     J = ca.jacobian(f[algebraic], y[algebraic])
     slope = ca.Function("slope", [y, d], [J])
-    column = projected
-    for _ in range(2):
-        lu = factorise(slope(column, d), (range(n), range(n, n + m)))
-        step = ca.substitute(lu.solve(implicit(column, d)), lu.packed_symbol, lu.packed)
-        column = ca.vertcat(column[:nx], column[algebraic] - step, column[algebraic[-1] + 1 :, 0])
     pressing = ca.substitute(mechanics.pressing, model.vector("u"), u)
     return Manifold(
-        project,
-        ca.Function("refine", [y, d], [column], {"cse": True}),
+        projection("project", ITERATIONS),
+        projection("polish", NEARBY),
         ca.Function("defect", [y, d], [ca.vertcat(phi, rate)]),
         n,
         m,
@@ -150,7 +148,9 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
     )
 
 
-def _projected(at: ca.Function, q: ca.SX, qd: ca.SX, d: ca.SX) -> tuple[ca.SX, ca.SX]:
+def _projected(
+    at: ca.Function, q: ca.SX, qd: ca.SX, d: ca.SX, iterations: tuple[int, int]
+) -> tuple[ca.SX, ca.SX]:
     """Positions and velocities on the constraints near q and qd."""
     _, J, _ = at(q, qd, d)
     lu = factorise(ca.sparsify(J @ J.T), [range(J.size1())])
@@ -158,9 +158,9 @@ def _projected(at: ca.Function, q: ca.SX, qd: ca.SX, d: ca.SX) -> tuple[ca.SX, c
     def across(defect: ca.SX) -> ca.SX:
         return J.T @ ca.substitute(lu.solve(defect), lu.packed_symbol, lu.packed)
 
-    for _ in range(ITERATIONS):
+    for _ in range(iterations[0]):
         q = q - across(at(q, qd, d)[0])
-    for _ in range(ITERATIONS - 1):
+    for _ in range(iterations[1]):
         qd = qd - across(at(q, qd, d)[2])
     return q, qd
 

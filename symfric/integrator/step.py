@@ -41,7 +41,7 @@ def steps(system: System, method: Method) -> Trials:
 
         def in_chart(y: Any, h: Any, d: Any) -> Trial:
             data = chart.open(y, d)
-            return chart.trial(inside(chart.enter(y, data), h, data), y, h, data)
+            return chart.trial(inside(chart.enter(y, data), h, data), y, h, d, data)
 
         return in_chart
     free = method.trials(system)

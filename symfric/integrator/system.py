@@ -1,6 +1,6 @@
 """A model as the step sees it: one column of unknowns, one right-hand side, a mass pattern."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import final
 
@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.holonomic import Inner
 from symfric.integrator.inputs import Drivers
 from symfric.integrator.manifold import Manifold, holonomic_columns, manifold
 from symfric.model import Model
@@ -37,6 +38,8 @@ class System:
         pivots: groups of rows with a safe pivot on the diagonal, each once those before it are
             eliminated: rates of their own unknown and mass matrices, constraints, normal forces.
         rubs: whether something slides in it that its model names (`Model.monitors`).
+        inner: f with inner unknowns, whose derivatives are sparse; None where f itself serves. Its
+            groups take the place of `pivots`.
         slope: Jacobian of f where it is not to be derived from f.
     """
 
@@ -55,6 +58,7 @@ class System:
     slope: ca.SX | None = None
 
     rubs: bool = False
+    inner: Inner | None = None
 
     @property
     def n(self) -> int:
@@ -132,7 +136,19 @@ def system(model: Model, inputs: Drivers) -> System:
         manifold(model, unknowns, d, f, inputs.expression) if mechanics else None,
         ((*own, *range(nx, nx + n)), tuple(range(nx + n, nx + n + m)), loop),
         rubs=bool(model.monitors),
+        inner=_with_inputs(model, inputs, f) if mechanics and mechanics.inner else None,
     )
+
+
+def _with_inputs(model: Model, inputs: Drivers, f: ca.SX) -> Inner | None:
+    """Right-hand sides of a holonomic model with inner unknowns, in the order of `f`."""
+    mechanics = model.holonomic
+    if mechanics is None or mechanics.inner is None:
+        return None
+    inner, nx = mechanics.inner, len(model.x)
+    own, values = ca.substitute([inner.f, inner.values], [model.vector("u")], [inputs.expression])
+    after = nx + own.numel()
+    return replace(inner, values=values, f=ca.vertcat(f[:nx], own, f[after:, 0]))
 
 
 def _columns(model: Model) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:

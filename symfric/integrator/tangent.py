@@ -49,7 +49,8 @@ class Tangent:
         reduced: the system in the chart; its run data are (d, chart).
         open: (y, d) -> (d, chart) for the chart at y.
         enter: (y, data) -> y_c at its origin.
-        leave: (y_c, data) -> y, with positions and velocities on the constraints.
+        leave: (y_c, data) -> y, on the constraints to the order of the method.
+        polish: (y, d) -> y on the constraints.
         lift: (e_c, data) -> change of y, to first order.
         bend: (y0, y1, h, data) -> what the dense output needs in addition, normal to the chart:
             two columns, of a cubic with the values and rates at both ends.
@@ -59,12 +60,13 @@ class Tangent:
     open: ca.Function
     enter: ca.Function
     leave: ca.Function
+    polish: ca.Function
     lift: ca.Function
     bend: ca.Function
 
-    def trial(self, found: Trial, y: Any, h: Any, data: Any) -> Trial:
+    def trial(self, found: Trial, y: Any, h: Any, d: Any, data: Any) -> Trial:
         """What a method made of a step in the chart, in the unknowns of the mechanism."""
-        end = self.leave(found.end, data)
+        end = self.polish(self.leave(found.end, data), d)
         dense = [self.lift(row, data) for row in found.dense]
         for i, column in enumerate(self.bend(y, end, h, data)[: len(dense)]):
             dense[i] = dense[i] + column
@@ -204,7 +206,8 @@ def tangent(system: System) -> Tangent | None:
         reduced,
         _open(system, rows, constraints, chart),
         ca.Function("enter", [y, data], [inside], {"cse": True}),
-        ca.Function("leave", [reduced.y, data], [manifold.project(at, d)], {"cse": True}),
+        ca.Function("leave", [reduced.y, data], [at], {"cse": True}),
+        manifold.polish,
         ca.Function("lift", [reduced.y, data], [change]),
         _bend(system, data, rows, chart),
     )

@@ -37,6 +37,7 @@ from symfric.laws.names import any_from_text as any_from_text
 from symfric.laws.names import law_from_text as law_from_text
 from symfric.laws.names import law_name as law_name
 from symfric.laws.planar import Planar as Planar
+from symfric.laws.planar import Spatial as Spatial
 from symfric.laws.populations import AnyLaw as AnyLaw
 from symfric.laws.populations import GenericAsperity as GenericAsperity
 from symfric.laws.populations import Population as Population

@@ -51,7 +51,8 @@ class Sum(Law):
         """The further inputs of all terms, each once."""
         return tuple(dict.fromkeys(i for law in self.laws for i in law.inputs))
 
-    def _split(self, z: Scalar) -> list[tuple[Law, Scalar]]:
+    def terms(self, z: Scalar) -> list[tuple[Law, Scalar]]:
+        """The laws, each with its rows of `z`."""
         ends = [0]
         for law in self.laws:
             ends.append(ends[-1] + len(law.states))
@@ -65,17 +66,13 @@ class Sum(Law):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Friction force [N]."""
-        first, *rest = [
-            law.force(v, N, part, **chosen(law, inputs)) for law, part in self._split(z)
-        ]
+        first, *rest = [law.force(v, N, part, **chosen(law, inputs)) for law, part in self.terms(z)]
         return sum(rest, start=first)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Rates of all states."""
         rates = [
-            law.rate(v, N, part, **chosen(law, inputs))
-            for law, part in self._split(z)
-            if law.states
+            law.rate(v, N, part, **chosen(law, inputs)) for law, part in self.terms(z) if law.states
         ]
         return _join(v, rates)
 
@@ -85,12 +82,20 @@ class Sum(Law):
         """The changes of mode of all terms, by the names of the states of the sum."""
         names = iter(state.name for state in self.states)
         found: list[Switch] = []
-        for law, part in self._split(z):
+        for law, part in self.terms(z):
             new = {state.name: next(names) for state in law.states}
             for switch in law.switches(v, N, part, **chosen(law, inputs)):
                 reset = {new[name]: value for name, value in switch.reset.items()}
                 found.append(replace(switch, reset=reset))
         return tuple(found)
+
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """Those of the terms below each other, where every term with states knows its own."""
+        known = [law.held_step(v, N, part, h) for law, part in self.terms(z) if law.states]
+        steps = [step for step in known if step is not None]
+        if not steps or len(steps) < len(known):
+            return None
+        return _join(v, [end for end, _ in steps]), _join(v, [mean for _, mean in steps])
 
     def warnings(self) -> tuple[str, ...]:
         """Those of the terms."""

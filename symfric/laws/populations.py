@@ -155,7 +155,7 @@ class Population(Parametric, ABC):
         speeds = np.linspace(low, high, 2 + int(SPEEDS * (high - low) / np.log(10.0)))
         means = [self._mean_force(speed, N) for speed in np.exp(speeds)]
         at = np.interp(np.log(np.abs(np.where(v == 0, 1.0, v))), speeds, means)
-        return np.where(v == 0, 0.0, np.sign(v) * at)
+        return np.where(v == 0, 0.0, smooth.sign(v, 0.0) * at)
 
     def _mean_force(self, v: float, N: float) -> float:
         """Force [N] at the speed `v` [m/s], averaged over the second renewal of all contacts."""

@@ -8,7 +8,8 @@ float `eps = 0.0` asks for the original, non-smooth function where one is offere
 import casadi as ca
 import numpy as np
 
-from symfric.numeric import Scalar, equals, exp, expm1, is_casadi, sqrt, tanh
+from symfric.numeric import Scalar, equals, exp, expm1, is_casadi, is_number, sqrt, tanh
+from symfric.vector import ROUND, TINY, NotIsotropicError, Vector, Vectors, no_vector
 
 
 def sign(x: Scalar, eps: Scalar) -> Scalar:
@@ -17,6 +18,8 @@ def sign(x: Scalar, eps: Scalar) -> Scalar:
     The float `eps = 0.0` gives the sign itself, with value and derivative 0 at x = 0.
     """
     if equals(eps, 0.0):
+        if isinstance(x, Vector):
+            return x / x.length(TINY)
         return ca.sign(x) if is_casadi(x) else np.sign(x)
     return tanh(x / eps)
 
@@ -28,6 +31,8 @@ def magnitude(x: Scalar, eps: Scalar) -> Scalar:
     it equals |x| to rounding. The float `eps = 0.0` gives |x| itself, with its kink at x = 0.
     """
     if equals(eps, 0.0):
+        if isinstance(x, Vector):
+            return x.length(TINY)
         return ca.fabs(x) if is_casadi(x) else np.abs(x)
     return x * tanh(x / eps)
 
@@ -56,13 +61,18 @@ def positive(x: Scalar, eps: Scalar) -> Scalar:
 
     The float `eps = 0.0` gives max(x, 0) itself, with its kink at x = 0.
     """
+    no_vector("cuts", x)
     if equals(eps, 0.0):
         return ca.fmax(x, 0.0) if is_casadi(x) else np.maximum(x, 0.0)
     return (x + sqrt(x * x + eps * eps)) / 2
 
 
 def clip(x: Scalar, low: Scalar, high: Scalar) -> Scalar:
-    """`x` held between `low` and `high`; kinks at both."""
+    """`x` held between `low` and `high`; kinks at both. A vector within +-`high`, as by `hold`."""
+    if isinstance(x, Vector):
+        if is_number(low) and equals(high, -low):
+            return hold(x, high, 0.0)
+        raise NotIsotropicError("clips what has a direction")
     if is_casadi(x, low, high):
         return ca.fmin(ca.fmax(x, low), high)
     return np.minimum(np.maximum(x, low), high)
@@ -72,8 +82,10 @@ def hold(x: Scalar, top: Scalar, eps: Scalar) -> Scalar:
     """`x` held within +-`top`: exactly x up to top - eps, exactly +-top from top + eps on, C2.
 
     A contact that carries hold(F_e) in full does not creep under a load below top - eps, as it
-    would under tanh. The float `eps = 0.0` gives the kinks.
+    would under tanh. The float `eps = 0.0` gives the kinks. A vector keeps its direction.
     """
+    if isinstance(x, Vector):
+        return x.odd(lambda size: hold(size, top, eps), ROUND * top)
     if equals(eps, 0.0):
         return clip(x, -top, top)
 
@@ -100,14 +112,24 @@ def step5(x: Scalar) -> Scalar:
 
 def fraction(x: Scalar) -> Scalar:
     """`x` modulo 1, in [0, 1)."""
+    no_vector("counts", x)
     return x - (ca.floor(x) if is_casadi(x) else np.floor(x))
 
 
 def choose(condition: Scalar, yes: Scalar, no: Scalar) -> Scalar:
     """`yes` where the condition holds, else `no`: for modes and for originals that jump."""
+    if isinstance(yes, Vector) or isinstance(no, Vector):
+        return _chosen(condition, yes, no)
     if is_casadi(condition, yes, no):
         return ca.if_else(condition, yes, no)
     return np.where(condition, yes, no)[()]
+
+
+def _chosen(condition: Scalar, yes: Vectors, no: Vectors) -> Vector:
+    if not (isinstance(yes, Vector) and isinstance(no, Vector)):
+        raise NotIsotropicError("chooses between a number and what has a direction")
+    pairs = zip(yes.parts, no.parts, strict=True)
+    return Vector([choose(condition, a, b) for a, b in pairs], yes.turn)
 
 
 def stribeck(v: Scalar, v_s: Scalar, delta: Scalar, eps: Scalar) -> Scalar:

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.laws import smooth
 from symfric.laws.populations import AnyLaw, Population
 from symfric.numeric import Scalar
 
@@ -17,7 +18,7 @@ def steady_force(law: AnyLaw, v: Array, N: float) -> Array:
     """
     if isinstance(law, Population):
         return law.steady_force(v, N)
-    ahead: Scalar = np.sign(v) if law.facts.odd else 1.0
+    ahead: Scalar = smooth.sign(v, 0.0) if law.facts.odd else 1.0
     given = {i.name: i.steady * ahead for i in law.inputs}
     force = law.force(v, N, law.steady_state(v, N), **given)
     return np.array(np.broadcast_to(force, v.shape), dtype=float)

@@ -16,9 +16,10 @@ from typing import final
 import casadi as ca
 import numpy as np
 
+from symfric.holonomic import Holonomic, Inner
 from symfric.laws import Law
 from symfric.laws.planar import Spatial
-from symfric.model import Event, Holonomic, Model, Monitor, Output, Variables
+from symfric.model import Event, Model, Monitor, Output, Variables
 from symfric.multibody.body import GROUND
 from symfric.multibody.equations import Equations
 from symfric.multibody.friction import Contact
@@ -146,6 +147,7 @@ def assemble(
     u: Variables,
     more: tuple[Details, Drawn],
     index: int,
+    cut: Equations | None = None,
 ) -> Model:
     """The model of a mechanism.
 
@@ -155,6 +157,7 @@ def assemble(
         guess: multipliers "lam" and normal forces "N" without friction, at the start.
         more: what writes further results and the sketch.
         index: 0 or 1, see `Holonomic`.
+        cut: the equations of a long chain once more, with cuts.
     """
     contacts = slips(eq, guess["N"].tolist())
     units = {label: part.unit for part in eq.held for label in part.labels}
@@ -209,9 +212,35 @@ def assemble(
             eq.a,
             ca.vertcat(balance, algebraic),
             index,
+            None if cut is None else _inner(cut, eq, contacts, forces),
             *_pressing(contacts, ca.vertcat(eq.a, before)),
         ),
     )
+
+
+def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip], forces: ca.SX) -> Inner | None:
+    """Balance and normal forces with inner unknowns, eliminated link by link from the tips."""
+    cuts, links = cut.kin.cuts, eq.kin.topology.links
+    if cuts is None:
+        return None
+    pairs = zip(contacts, cut.normals, strict=True)
+    normals = (normal - s.N for s, normal in pairs if s.unknown)
+    f, values = ca.substitute(
+        [ca.vertcat(cut.balance, *normals), cuts.values],
+        [ca.vertcat(cut.a, cut.F)],
+        [ca.vertcat(eq.a, forces)],
+    )
+    kept = cuts.needed(f)
+    of_link: dict[str, list[ca.SX]] = {link.joint.name: [] for link in links}
+    for s in contacts:
+        of_link[s.contact.joint] += [v.symbol for v in (*s.unknown, *s.states)]
+    groups: list[ca.SX] = []
+    for k, link in reversed(list(enumerate(links))):
+        # inner unknowns first: nothing stands on their right-hand sides, so they cost no stage
+        groups.append(ca.vertcat(NONE, *(cuts.symbols[i] for i in kept if cuts.links[i] == k)))
+        groups.append(ca.vertcat(*(column[link.rows] for column in (eq.q, eq.qd, eq.a))))
+        groups.append(ca.vertcat(NONE, *of_link[link.joint.name]))
+    return Inner(cuts.symbols[kept], values[kept], f, tuple(groups))
 
 
 def _scale(slip: Slip, p: Variables) -> float:

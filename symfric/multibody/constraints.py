@@ -159,7 +159,8 @@ class UserConstraint(Constraint):
         """The expressions, and their derivatives by the pose of every body."""
         probe = _probe(kin)
         phi = ca.SX(self.expression(probe))
-        rates = [x for m in probe.motion.values() for x in (m.w_B, m.v_B, m.dw_B, m.dv_B)]
+        moving = (m for name, m in probe.motion.items() if name != GROUND)
+        rates = [x for m in moving for x in (m.w_B, m.v_B, m.dw_B, m.dv_B)]
         if ca.depends_on(phi, ca.vertcat(kin.qd, *rates)):
             return impossible(
                 "expression: expected positions only, got velocities; nonholonomic constraints "

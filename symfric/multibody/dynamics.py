@@ -144,6 +144,8 @@ def balance(
         if link.body in carried:
             more_force, more_moment = carried[link.body]
             force, moment = force + more_force, moment + more_moment
+        if kin.cuts is not None:
+            force, moment = kin.cuts(k, force), kin.cuts(k, moment)
         carried[link.body] = force, moment
         rows[k], reactions[link.joint.name] = _project(kin, link, carried, axial)
     return ca.vertcat(ca.SX(0, 1), *rows), reactions
@@ -162,7 +164,8 @@ def _floating(kin: Kinematics, link: Link, loads: list[Load]) -> ca.SX:
     in every derivative.
     """
     body, motion, rows = kin.topology.bodies[link.body], kin.motion[link.body], link.rows
-    force = body.mass * (link.at_base.R @ kin.qdd[rows, 0][:3])
+    ground = kin.motion[GROUND]
+    force = body.mass * (link.at_base.R @ kin.qdd[rows, 0][:3] + ground.dv_B)
     moment = body.J @ motion.dw_B + ca.cross(motion.w_B, body.J @ motion.w_B)
     for load in loads:
         if load.body == link.body:

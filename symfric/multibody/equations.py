@@ -8,6 +8,7 @@ import casadi as ca
 
 from symfric.laws.planar import Spatial
 from symfric.multibody.constraints import Constraint, Held
+from symfric.multibody.cuts import Cuts
 from symfric.multibody.dynamics import (
     Loop,
     Wrench,
@@ -16,10 +17,11 @@ from symfric.multibody.dynamics import (
     loops,
     normalisations,
 )
-from symfric.multibody.forces import Axial, Force, Load
+from symfric.multibody.forces import Axial, Force, Gravity, Load
 from symfric.multibody.friction import Contact
 from symfric.multibody.joints import Joint
 from symfric.multibody.kinematics import Kinematics, kinematics
+from symfric.multibody.spatial import vector
 from symfric.multibody.topology import Topology, body_of, frame_at
 
 
@@ -96,6 +98,7 @@ def equations(
     qd: ca.SX,
     t: ca.SX,
     kept: Sequence[int] | None = None,
+    cuts: Cuts | None = None,
 ) -> Equations:
     """Write the equations of motion of a mechanism.
 
@@ -107,12 +110,15 @@ def equations(
         q, qd: symbols of the coordinates and their rates, shape (n, 1).
         t: symbol of time.
         kept: indices of the independent constraints; None keeps all.
+        cuts: takes symbols for what bodies pass on to each other; None writes everything out.
     """
     a = ca.SX.sym("a", topology.n)
-    kin = kinematics(topology, q, qd, a, t)
+    gravity = [f for f in forces if isinstance(f, Gravity)]
+    g = sum((vector(f.g) for f in gravity), ca.SX(3, 1))
+    kin = kinematics(topology, q, qd, a, t, g, cuts)
     by_name = {joint.name: joint for joint in joints}
     closed = loops(kin)
-    norms, along, weights = normalisations(kin)
+    norms, along, inertia = normalisations(kin)
     held = tuple(c.held(kin, by_name) for c in constraints)
     phi = ca.vertcat(ca.SX(0, 1), *(part.phi for part in (*closed, *held)), norms)
     kept = range(phi.numel()) if kept is None else kept
@@ -121,14 +127,16 @@ def equations(
     for k, row in enumerate(kept):
         every[row] = lam[k]
     contacts = tuple(_contacts(kin, joints))
-    loads: list[Load | Axial] = [load for f in forces for load in f.loads(kin, by_name)]
+    rest = (f for f in forces if not isinstance(f, Gravity))
+    loads: list[Load | Axial] = [load for f in rest for load in f.loads(kin, by_name)]
     loads += [load for c in contacts for load in _rubbing(kin, by_name[c.joint], c)]
-    power = _power(kin, loads) + ca.dot(every, ca.jacobian(phi, t))
+    weights = [load for f in gravity for load in f.loads(kin, by_name)]
+    power = _power(kin, [*loads, *weights]) + ca.dot(every, ca.jacobian(phi, t))
     loads += _holding(held, every[sum(loop.phi.numel() for loop in closed) :, 0])
     rows, world = balance(kin, loads, closed, every)
     rows += along @ (every[phi.numel() - norms.numel() :, 0])
     pushed = along.T @ a + ca.jtimes(along.T @ qd, q, qd)
-    rows += along @ (weights * pushed)
+    rows += along @ (inertia * pushed)
     phi = phi[list(kept)]
     phi_dot = ca.jtimes(phi, q, qd) + ca.jacobian(phi, t)
     reactions = {name: _without(world[name], name, kin, loads) for name in by_name}

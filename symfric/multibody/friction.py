@@ -13,7 +13,8 @@ child's frame, presses the bearing at two stations a apart on z:
 
 Friction opposes sliding with -F(v, N) along z, and with the moment -R F(R w, N) about it. The ball
 of a spherical joint slips with v = R w, a vector in the axes of the socket, the parent's frame: the
-moment is -R F(v, N), with F along v for laws without states and bristles that are vectors.
+moment is -R F(v, N), with F along v for laws without states and bristles that are vectors, see
+`Isotropic`.
 Source: Haug, Mech. Based Des. Struct. Mach., 2018, joint friction from multipliers.
 """
 
@@ -25,7 +26,7 @@ import casadi as ca
 
 from symfric.laws import Law
 from symfric.laws.base import check_law
-from symfric.laws.planar import Spatial, is_isotropic
+from symfric.laws.planar import Spatial, anisotropy
 from symfric.numeric import Scalar, is_number, is_symbolic
 
 
@@ -69,11 +70,10 @@ class JointFriction:
                 f"law: expected one that needs v and N alone, got {type(self.law).__name__}, which "
                 f"needs {needs}; a joint has no such input"
             )
-        elif "ball" in rubs and not is_isotropic(self.law):
+        elif "ball" in rubs and (reason := anisotropy(self.law)):
             yield (
-                "law: expected an odd one that is affine in its states, got "
-                f"{type(self.law).__name__}; a ball slips in any direction, and only such a law "
-                "says what others in line with it do; LuGre and all laws without states serve"
+                f"law: expected an isotropic one, got {type(self.law).__name__}; a ball slips in "
+                f"any direction, and {reason}"
             )
         if any(direction != "slide" for direction in rubs) and self.radius is None:
             yield "radius: expected the bearing's radius [m], got none"

@@ -1,13 +1,16 @@
 """Positions, velocities and accelerations of all bodies: one recursion outwards from the ground."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import final
 
 import casadi as ca
 
 from symfric.multibody.body import GROUND
+from symfric.multibody.cuts import Cuts
 from symfric.multibody.joints import Joint
 from symfric.multibody.topology import Link, Topology, body_of, frame_at
+
+ZERO = ca.SX(3, 1)
 
 
 @final
@@ -18,7 +21,8 @@ class Motion:
     Attributes:
         R, p: pose R_WB, p_WB of its origin.
         w_B, v_B: angular velocity, velocity of the origin, in components of B.
-        dw_B, dv_B: angular acceleration, acceleration of the origin, in components of B.
+        dw_B, dv_B: angular acceleration, acceleration of the origin less that of gravity, in
+            components of B.
     """
 
     R: ca.SX
@@ -42,8 +46,12 @@ class Motion:
         """Position and velocity in the world of a point fixed to the body."""
         return self.p + self.R @ offset, self.R @ (self.v_B + ca.cross(self.w_B, offset))
 
+    def cut(self, cuts: Cuts, link: int) -> "Motion":
+        """The same in new symbols."""
+        return Motion(*(cuts(link, getattr(self, part.name)) for part in fields(self)))
+
     def acceleration(self, offset: ca.SX) -> ca.SX:
-        """Acceleration of a point fixed to the body, in components of B."""
+        """Acceleration, less gravity, of a point fixed to the body, in components of B."""
         w, r = self.w_B, offset
         return self.dv_B + ca.cross(self.dw_B, r) + ca.cross(w, ca.cross(w, r))
 
@@ -83,6 +91,7 @@ class Kinematics:
     qdd: ca.SX
     motion: dict[str, Motion]
     t: ca.SX
+    cuts: Cuts | None = None
 
     def point(self, place: str) -> tuple[ca.SX, ca.SX]:
         """Position and velocity in the world of the origin of the frame "body.frame"."""
@@ -138,13 +147,29 @@ class Kinematics:
         return joint.displacement(direction, relative.R, relative.p), rate
 
 
-def kinematics(topology: Topology, q: ca.SX, qd: ca.SX, qdd: ca.SX, t: ca.SX) -> Kinematics:
-    """The recursion from the ground outwards."""
-    zero = ca.SX(3, 1)
-    motion = {GROUND: Motion(ca.SX.eye(3), zero, zero, zero, zero, zero)}
-    for link in topology.links:
-        motion[link.body] = _carried(motion[link.base], link, q, qd, qdd)
-    return Kinematics(topology, q, qd, qdd, motion, t)
+def kinematics(
+    topology: Topology,
+    q: ca.SX,
+    qd: ca.SX,
+    qdd: ca.SX,
+    t: ca.SX,
+    g: ca.SX = ZERO,
+    cuts: Cuts | None = None,
+) -> Kinematics:
+    """The recursion from the ground outwards.
+
+    Args:
+        topology: tree.
+        q, qd, qdd: coordinates, rates, accelerations, shape (n, 1).
+        t: symbol of time.
+        g: gravity [m/s^2]; the ground is accelerated by -g instead, and all bodies with it.
+        cuts: takes symbols for what bodies pass on to each other.
+    """
+    motion = {GROUND: Motion(ca.SX.eye(3), ZERO, ZERO, ZERO, ZERO, ca.sparsify(-g))}
+    for k, link in enumerate(topology.links):
+        own = _carried(motion[link.base], link, q, qd, qdd)
+        motion[link.body] = own if cuts is None else own.cut(cuts, k)
+    return Kinematics(topology, q, qd, qdd, motion, t, cuts)
 
 
 def _carried(base: Motion, link: Link, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> Motion:

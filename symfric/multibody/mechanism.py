@@ -22,6 +22,7 @@ from symfric.multibody.prepare import (
     in_absolute_coordinates,
     numeric,
     start_problems,
+    with_cuts,
     without_friction,
     written,
 )
@@ -119,7 +120,10 @@ class Mechanism:
         guess = without_friction(made, p, u)
         parts = made.eq, tuple(self.joints), tuple(self.forces)
         more = partial(results, *parts, made.open_reactions), partial(sketch, *parts)
-        return assemble(self.name, made.eq, made.q, made.qd, made.labels, guess, p, u, more, chosen)
+        cut = with_cuts(made, self.joints, self.forces)
+        return assemble(
+            self.name, made.eq, made.q, made.qd, made.labels, guess, p, u, more, chosen, cut
+        )
 
     def prepare(self, p: Variables = (), formulation: str = "joint") -> Prepared:
         """The equations of motion with their variables, checked.

@@ -12,6 +12,7 @@ from symfric.model import Variables
 from symfric.multibody import checks
 from symfric.multibody.assembly import coordinates
 from symfric.multibody.constraints import Constraint
+from symfric.multibody.cuts import Cuts
 from symfric.multibody.equations import Equations, equations
 from symfric.multibody.forces import Force
 from symfric.multibody.joints import Joint
@@ -20,6 +21,9 @@ from symfric.multibody.topology import Topology
 
 Array = NDArray[np.float64]
 NONE = ca.SX(0, 1)
+LONG, LONG_WITH_FRICTION = 16, 12
+"""Links of a chain from which on cuts pay: below, full derivatives take fewer operations. Friction
+from reactions makes them dearer."""
 
 
 @final
@@ -202,6 +206,15 @@ def written(
         singular=found.singular,
         problems=tuple(_fixed_already(made, constraints, found.undetermined)),
     )
+
+
+def with_cuts(made: Prepared, joints: Sequence[Joint], forces: Sequence[Force]) -> Equations | None:
+    """The equations of a long open chain with cuts; None where they would not pay."""
+    eq, topology = made.eq, made.eq.kin.topology
+    loaded = ca.depends_on(ca.vertcat(NONE, *eq.normals), eq.a)
+    if eq.m or topology.depth < (LONG_WITH_FRICTION if loaded else LONG):
+        return None
+    return equations(topology, joints, forces, (), eq.q, eq.qd, eq.kin.t, cuts=Cuts())
 
 
 def _held(eq: Equations, constraints: Sequence[Constraint], p: ca.SX) -> Iterator[str]:

@@ -83,6 +83,14 @@ class Topology:
         return sum(link.n for link in self.links)
 
     @cached_property
+    def depth(self) -> int:
+        """Number of links of the longest chain."""
+        links = {GROUND: 0}
+        for link in self.links:
+            links[link.body] = links[link.base] + 1
+        return max(links.values())
+
+    @cached_property
     def link_of(self) -> dict[str, Link]:
         """Links by the name of their joint."""
         return {link.joint.name: link for link in self.links}

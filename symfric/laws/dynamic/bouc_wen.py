@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 from symfric.laws import smooth
 from symfric.laws.base import Facts, Law, State
+from symfric.laws.dynamic.element import onward
 from symfric.numeric import Scalar, column, is_number
 from symfric.parameters import param
 
@@ -72,8 +73,8 @@ class BoucWen(Law):
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Rate of the load share [1/s], shape (1, 1)."""
         used = smooth.power(z[0], self.n, self.z_eps)
-        t = smooth.sign(v, self.v_eps)
-        yielded = self.beta * smooth.sign(z[0], self.z_eps) + self.gamma * t
+        t, s = smooth.sign(v, self.v_eps), smooth.sign(z[0], self.z_eps)
+        yielded = (self.beta - self.gamma) * s + self.gamma * onward(t, s)
         stretch = self.A * v - used * (v * t) * yielded
         return column(self.sigma_0 / (self.mu_d * N) * stretch)
 

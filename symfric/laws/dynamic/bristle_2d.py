@@ -1,11 +1,11 @@
-"""Two-dimensional bristle friction: slip in a plane, elastic below break-away."""
+"""Two-dimensional bristle friction: elastic inside a disc of forces."""
 
 from dataclasses import dataclass
 from typing import ClassVar, final
 
 from symfric.laws import smooth
 from symfric.laws.base import Facts, Law, State
-from symfric.numeric import Scalar, column, equals, exp, sqrt
+from symfric.numeric import Scalar, column, equals, exp
 from symfric.parameters import param
 
 ROOT_STEPS = 40
@@ -15,17 +15,16 @@ ROOT_STEPS = 40
 @final
 @dataclass(frozen=True, eq=False)
 class Bristle2D(Law):
-    """Bristle friction for slip in a plane (two states).
+    """Bristle friction that slides where a disc ends (one state, in a plane a vector).
 
         g     = N [mu_d + (mu_s - mu_d) exp(-|v|^2/v_s^2)]
         F_tr  = sigma_0 z + sigma_1 v
         F     = F_tr sat(|F_tr|, g) / |F_tr|
         dz/dt = (F - sigma_0 z) / sigma_1
 
-    with vectors v, z, F of two components in `planar_force` and `planar_rate`; `force` and `rate`
-    are those of straight slip, v = (v, 0). sat is the identity up to (1 - kappa) g, so that the
-    bristle returns exactly and does not drift, and g beyond (1 + kappa) g; kappa = 0 is the
-    projection on the disc of radius g, with its kink. |F_tr| is smooth over F_eps.
+    Made for slip in a plane, with vectors v, z and F: `Planar(Bristle2D())`. sat is the identity up
+    to (1 - kappa) g, so that the bristle returns exactly and does not drift, and g beyond
+    (1 + kappa) g; kappa = 0 is the projection on the disc of radius g, with its kink.
     Limits: isotropic; steady state g v/|v| for |v| > kappa g / sigma_1, down to (1 - kappa) g in
     creep; one bristle and damper in parallel below g. sigma_1 -> 0 tends to Coulomb friction.
     Source: Kikuuwe, Takesue, Sano, Mochiyama, Fujimoto, IEEE T-RO 22(6), 2006 (elastoplastic
@@ -47,51 +46,39 @@ class Bristle2D(Law):
     sigma_0: Scalar = param(1e5, unit="N/m", doc="bristle stiffness", lower=1e-12)
     sigma_1: Scalar = param(190.0, unit="N s/m", doc="bristle damping", lower=1e-12)
     kappa: Scalar = param(0.02, unit="1", doc="rounding of the saturation", lower=0.0, upper=1.0)
-    F_eps: Scalar = param(1e-9, unit="N", doc="smoothing of |F_tr|", lower=1e-15)
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The bristle deflection along and across."""
-        return (State("z_x", "m", 1e-5), State("z_y", "m", 1e-5))
+        """The bristle deflection."""
+        return (State("z", "m", 1e-5),)
 
     @property
     def velocity_scale(self) -> Scalar:
         """The Stribeck velocity [m/s]."""
         return self.v_s
 
-    def _level(self, speed_squared: Scalar, N: Scalar) -> Scalar:
-        falling = exp(-speed_squared / self.v_s**2)
+    def _level(self, v: Scalar, N: Scalar) -> Scalar:
+        falling = exp(-((v / self.v_s) ** 2))
         return N * (self.mu_d + (self.mu_s - self.mu_d) * falling)
 
-    def planar_force(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
-        """Friction force [N], shape (2, 1), for the velocity v, shape (2, 1)."""
-        trial = [self.sigma_0 * z[i] + self.sigma_1 * v[i] for i in range(2)]
-        size = sqrt(trial[0] ** 2 + trial[1] ** 2 + self.F_eps**2)
-        g = self._level(v[0] ** 2 + v[1] ** 2, N)
-        share = smooth.hold(size, g, self.kappa * g) / size
-        return column(share * trial[0], share * trial[1])
-
-    def planar_rate(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
-        """Rate of the deflection [m/s], shape (2, 1)."""
-        F = self.planar_force(v, N, z)
-        return column(*((F[i] - self.sigma_0 * z[i]) / self.sigma_1 for i in range(2)))
-
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Friction force along straight slip [N]."""
-        return self.planar_force((v, 0.0 * v), N, z)[0]
+        """Friction force [N]."""
+        g = self._level(v, N)
+        corner = 0.0 if equals(self.kappa, 0.0) else self.kappa * g
+        return smooth.hold(self.sigma_0 * z[0] + self.sigma_1 * v, g, corner)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Rate of the deflection in straight slip [m/s]."""
-        return self.planar_rate((v, 0.0 * v), N, z)
+        """Rate of the deflection [m/s], shape (1, 1)."""
+        return column((self.force(v, N, z) - self.sigma_0 * z[0]) / self.sigma_1)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Deflection in steady straight slip [m], exact to rounding of g.
+        """Deflection in steady sliding [m], exact to rounding of g.
 
         Its force F solves F = sat(F + sigma_1 v). With t = (F + sigma_1 v - g) / (2 kappa g) + 1/2,
         the place in the corner of sat, it is the root of t^3 (2 - t) = sigma_1 |v| / (kappa g) in
         [0, 1], convex, by Newton's method from t = 1.
         """
-        g, drawn = self._level(v * v, N), self.sigma_1 * smooth.magnitude(v, 0.0)
+        g, drawn = self._level(v, N), self.sigma_1 * smooth.magnitude(v, 0.0)
         held = g
         if not equals(self.kappa, 0.0):
             t, corner = 1.0 + 0.0 * v, self.kappa * g
@@ -99,4 +86,4 @@ class Bristle2D(Law):
             for _ in range(ROOT_STEPS):
                 t = t - (t * (2 - t) - target / (t * t)) / (6 - 4 * t)
             held = smooth.choose(drawn >= corner, g, g + corner * (2 * t - 1) - drawn)
-        return column(held / self.sigma_0 * smooth.sign(v, 0.0), 0.0 * v)
+        return column(held / self.sigma_0 * smooth.sign(v, 0.0))

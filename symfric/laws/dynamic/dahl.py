@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 from symfric.laws import smooth
 from symfric.laws.base import Facts, Law, State
+from symfric.laws.dynamic.element import spent
 from symfric.numeric import Scalar, column, equals
 from symfric.parameters import param
 
@@ -59,8 +60,9 @@ class Dahl(Law):
         level = self.sigma_0 * z[0] / (self.mu_d * N)
         if equals(self.n, 1.0):
             return column(v - smooth.magnitude(v, self.v_eps) * level)
-        rho = 1 - level * smooth.sign(v, self.v_eps)
-        return column(v * smooth.signed_power(rho, self.n, self.rho_eps))
+        t = smooth.sign(v, self.v_eps)
+        lost = spent(lambda r: 1 - smooth.signed_power(1 - r, self.n, self.rho_eps), v, t, level)
+        return column(v - lost)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Bristle deflection in steady sliding [m], shape (1, 1)."""

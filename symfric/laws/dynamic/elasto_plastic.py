@@ -7,6 +7,7 @@ from typing import ClassVar, final
 from symfric.laws import smooth
 from symfric.laws.base import Facts
 from symfric.laws.dynamic.bristle import Bristle
+from symfric.laws.dynamic.element import ahead
 from symfric.numeric import Scalar, column, equals, is_number, sin
 from symfric.parameters import param
 
@@ -47,10 +48,15 @@ class ElastoPlastic(Bristle):
     def sliding_share(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
         """alpha: 0 while the bristle is elastic, 1 when it slides."""
         z_ss = self.level(v, N) / self.sigma_0
-        r = (z[0] * smooth.sign(v, self.v_eps) - self.z_ba) / (z_ss - self.z_ba)
-        if equals(self.v_eps, 0.0):
-            return (1 + sin(pi * (smooth.clip(r, 0.0, 1.0) - 0.5))) / 2
-        return smooth.step5(r)
+        elastic = self.z_ba / z_ss
+
+        def step(share: Scalar) -> Scalar:
+            r = (share - elastic) / (1 - elastic)
+            if equals(self.v_eps, 0.0):
+                return (1 + sin(pi * (smooth.clip(r, 0.0, 1.0) - 0.5))) / 2
+            return smooth.step5(r)
+
+        return ahead(step, smooth.sign(v, self.v_eps), z[0] / z_ss)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Rate of the bristle deflection [m/s], shape (1, 1)."""

@@ -1,7 +1,53 @@
 """The elastoplastic element that hysteresis laws are built of."""
 
+from collections.abc import Callable
+
 from symfric.laws import smooth
-from symfric.numeric import Scalar
+from symfric.numeric import Scalar, sqrt
+from symfric.vector import ROUND, Vector, Vectors
+
+
+def along(t: Vector, s: Vector) -> Scalar:
+    """Share a of the slip along t that loads what points along s: 1 where t = s, 0 where t = -s.
+
+        a = [1 + c + sqrt(c^2 + w^2) - sqrt(1 + w^2)] / 2,   c = t.s, w the `turn` of s
+
+    For w -> 0 it is max(c, 0): only the component of the slip along s loads.
+    """
+    c, w2 = t.dot(s), s.turn * s.turn
+    return (1 + c + sqrt(c * c + w2) - sqrt(1 + w2)) / 2
+
+
+def onward(t: Vectors, s: Vectors) -> Vectors:
+    """Twice s where slip along t loads it, 0 where it unloads: t + s, of vectors 2 a s, `along`."""
+    return 2 * along(t, s) * s if isinstance(s, Vector) else t + s
+
+
+def ahead(f: Callable[[Scalar], Scalar], t: Vectors, r: Vectors) -> Scalar:
+    """f(t r) of the load share r ahead of the slip along t.
+
+    For vectors a f(|r|) + (1 - a) f(-|r|), a = `along` of both: between loading and unloading.
+    """
+    if not isinstance(r, Vector):
+        return f(t * r)
+    x = r.length(ROUND)
+    unloaded = f(-x)
+    return unloaded + (f(x) - unloaded) * along(t, r / x)
+
+
+def spent(f: Callable[[Scalar], Scalar], v: Vectors, t: Vectors, r: Vectors) -> Vectors:
+    """What of the slip v along t does not stretch an element with the load share r: v f(t r).
+
+    For vectors |v| r/|r| [a f(|r|) - (1 - a) f(-|r|)], a = `along` of both, that is along r. Then
+    |r| grows at most as fast as in straight slip, so bounds of the scalar law hold in any slip, and
+    what is spent takes energy where it does in straight slip.
+    """
+    if not isinstance(r, Vector):
+        return v * f(t * r)
+    x = r.length(ROUND)
+    back = -f(-x)
+    e = r / x
+    return (v * t) * (back + (f(x) - back) * along(t, e)) * e
 
 
 def stretched(F: Scalar, dF: Scalar, limit: Scalar) -> tuple[Scalar, Scalar, Scalar]:
@@ -19,14 +65,14 @@ def stretched(F: Scalar, dF: Scalar, limit: Scalar) -> tuple[Scalar, Scalar, Sca
 def yielding(v: Scalar, r: Scalar, n: Scalar, v_eps: Scalar, r_eps: Scalar) -> Scalar:
     """Rate at which an element under slip velocity `v` stretches.
 
-        v [1 - |r|^n (1 + sign(v r)) / 2]
+        v - |v| |r|^n [1 + sign(v r)]/2 sign(r)
 
     r is its load over its limit. It stretches elastically while unloading and, for n -> inf, up
-    to |r| = 1, where it slips. sign is smooth over v_eps and r_eps, |r| over r_eps; at v = 0 the
-    rate is exactly zero, so that an element at rest keeps its load. At r = 1 it vanishes to
-    rounding for r_eps <= 1e-8. What is spent never drives: with t = sign(v) it is
-    |r|^n v t (t + sign(r)) / 2, so that an element beyond its limit, because the load has dropped,
-    comes back in either direction and however slowly it is moved.
+    to |r| = 1, where it slips; vectors return radially, by the slip along the load. sign is smooth
+    over v_eps and r_eps, |r| over r_eps; at v = 0 the rate is exactly zero, so that an element at
+    rest keeps its load. At r = 1 it vanishes to rounding for r_eps <= 1e-8. What is spent never
+    drives, so that an element beyond its limit, because the load has dropped, comes back in either
+    direction and however slowly it is moved.
     """
-    t = smooth.sign(v, v_eps)
-    return v - smooth.power(r, n, r_eps) / 2 * (v * t) * (t + smooth.sign(r, r_eps))
+    t, s = smooth.sign(v, v_eps), smooth.sign(r, r_eps)
+    return v - smooth.power(r, n, r_eps) / 2 * (v * t) * onward(t, s)

@@ -5,7 +5,7 @@ from typing import ClassVar, final
 
 from symfric.laws import smooth
 from symfric.laws.base import Facts, Law, State, Switch
-from symfric.laws.dynamic.element import stretched
+from symfric.laws.dynamic.element import ahead, stretched
 from symfric.numeric import Scalar, column, exp
 from symfric.parameters import Parametric, option, param
 
@@ -100,6 +100,9 @@ class GMS(Law):
     def _direction(self, v: Scalar) -> Scalar:
         return smooth.sign(v, 0.0 if self.form == "event" else self.v_eps)
 
+    def _begins(self, r: Scalar) -> Scalar:
+        return smooth.step5((r - 1) / self.rho + 1)
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         return sum((z[i] for i in range(len(self.elements))), start=self.sigma_2 * v)
@@ -113,8 +116,9 @@ class GMS(Law):
             F, p = z[i], z[count + i]
             slipping, latch = p, 0.0 * v
             if self.form == "smooth":
-                r = F * direction / (alpha * g)
-                on, off = smooth.step5((r - 1) / self.rho + 1), smooth.step5(-5 * r)
+                r = F / (alpha * g)
+                on = ahead(self._begins, direction, r)
+                off = smooth.step5(-5 * (r * direction))
                 pace = smooth.magnitude(v, self.v_eps) * e.k / (alpha * g * self.rho)
                 slipping, latch = p * (1 - off), pace * (on * (1 - p) - off * p)
             slip = self.C * direction**2 * (alpha * direction - F / g)

@@ -75,7 +75,8 @@ class StickSlip(Law):
             direction = smooth.sign(v, self.v_eps) * slip
         else:
             direction = smooth.sign(v, self.v_eps)
-        stiction = self.mu_s * (2 * smooth.step5((z[0] / self.D_max + 1) / 2) - 1)
+        u = smooth.clip(z[0] / self.D_max, -1.0, 1.0)
+        stiction = self.mu_s * u * (15 - u * u * (10 - 3 * (u * u))) / 8  # 2 step((u + 1)/2) - 1
         return N * (slip * mu * direction + (1 - slip) * stiction)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:

@@ -8,14 +8,22 @@ import pytest
 from law_cases import CASES
 from rigs import prescribed_motion
 
-from symfric import Dahl, LoadDependent, LuGre, Stribeck, law_from_text, parameters, simulate
+from symfric import (
+    Dahl,
+    LoadDependent,
+    LuGre,
+    Stribeck,
+    Sum,
+    law_from_text,
+    parameters,
+    simulate,
+)
 from symfric.codegen import law_block
 from symfric.codegen.graph import graph
 from symfric.laws import (
     GMS,
     Armstrong,
     BoucWen,
-    Bristle2D,
     ElastoPlastic,
     Element,
     ExactCoulomb,
@@ -298,7 +306,6 @@ def test_parameters_without_effect_do_not_appear():
     [
         (GMS(), {}, "gms.*states that act on each other in a circle; gms with form = 'event'"),
         (Leuven(), {}, "act on each other in a circle"),
-        (Bristle2D(), {}, "act on each other in a circle"),
         (Armstrong(), {}, "got states that depend on others"),
         (ExactCoulomb(), {}, "modes follow zero crossings within the step; karnopp and leine"),
         (Karnopp(form="event"), {}, "got one whose modes follow zero crossings"),
@@ -329,3 +336,24 @@ def test_a_preload_keeps_the_step_finite_without_load():
     states, forces = rolled(block, [1e-3, 0.0, -1e-3], 1e-3, load=0.0)
     assert np.isfinite(states).all()
     assert np.isfinite(forces).all()
+
+
+def test_sum_takes_the_step_of_each_term():
+    """Events and bristles side by side: what each block does alone, with the same constants."""
+    terms = (GMS(form="event"), LuGre())
+    state = np.array([0.01, 0.1, 0.05, 0.02, 1.0, 0.0, 1.0, 0.0]), np.array([2e-6])
+    slip = 2e-3 * np.sin(np.arange(40) / 5)
+    both = rolled(law_block(Sum(terms), free=()), slip, 1e-3, state=np.concatenate(state))
+    one, other = (
+        rolled(law_block(term, free=()), slip, 1e-3, state=z)
+        for term, z in zip(terms, state, strict=True)
+    )
+    assert both[0] == pytest.approx(np.hstack([one[0], other[0]]), rel=1e-13)
+    assert both[1] == pytest.approx(one[1] + other[1], rel=1e-13)
+
+
+def test_sum_with_a_term_that_has_no_step_is_refused_by_reason():
+    with pytest.raises(ValueError, match="modes follow zero crossings"):
+        law_block(Sum((LuGre(), ExactCoulomb())))
+    with pytest.raises(ValueError, match="act on each other in a circle"):
+        law_block(Sum((LuGre(), Leuven())))

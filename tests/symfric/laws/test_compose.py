@@ -24,7 +24,7 @@ from symfric import (
     symbolise,
     with_values,
 )
-from symfric.laws import Karnopp, ModifiedThrelfall, Table, Threlfall
+from symfric.laws import GMS, Karnopp, MaxwellSlip, ModifiedThrelfall, Table, Threlfall
 
 speeds = st.floats(-0.1, 0.1)
 
@@ -239,3 +239,20 @@ def test_what_is_not_a_law_is_refused(make: object, got: str) -> None:
 def test_bounds_hold_inside_wrappers() -> None:
     with pytest.raises(ValueError, match=r"Coulomb: mu_d: expected 0 <= mu_d <= inf \[1\], got -1"):
         with_values(LoadDependent(Coulomb()), {"mu_d": -1.0})
+
+
+def test_step_of_a_sum_is_the_steps_of_its_terms_below_each_other() -> None:
+    one, other = GMS(form="event"), MaxwellSlip(form="event")
+    z = np.linspace(0.1, 0.4, 16)
+    z[4:8], z[12:] = 1.0, 0.0
+    end, mean = Sum((one, Viscous(), other)).held_step(1e-3, 5.0, z, 2e-3) or ((), ())
+    first, second = one.held_step(1e-3, 5.0, z[:8], 2e-3), other.held_step(1e-3, 5.0, z[8:], 2e-3)
+    assert first is not None
+    assert second is not None
+    np.testing.assert_array_equal(end, [*first[0], *second[0]])
+    np.testing.assert_array_equal(mean, [*first[1], *second[1]])
+
+
+def test_sum_with_a_term_of_unknown_step_knows_none() -> None:
+    assert Sum((GMS(form="event"), LuGre())).held_step(1e-3, 5.0, np.zeros(9), 1e-3) is None
+    assert Sum((Coulomb(), Viscous())).held_step(1e-3, 5.0, (), 1e-3) is None

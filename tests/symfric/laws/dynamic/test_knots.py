@@ -26,14 +26,8 @@ KNOTS: dict[str, tuple[Law, int, float, list[float], int]] = {
     "haessig_friedland, excess gone": (HaessigFriedland(), 1, LEVEL / 1e5, [0.0], 2),
     "stick_slip, full slip": (StickSlip(), 0, 1e-3, [5e-7], 2),
     "stick_slip, dynamic level": (StickSlip(), 0, 1.5e-3, [5e-7], 2),
-    "bristle_2d, saturation begins": (
-        Bristle2D(),
-        1,
-        (0.98 * G - BENT) / 1e5,
-        [0.0, 0.0],
-        2,
-    ),
-    "bristle_2d, saturated": (Bristle2D(), 1, (1.02 * G - BENT) / 1e5, [0.0, 0.0], 2),
+    "bristle_2d, saturation begins": (Bristle2D(), 1, (0.98 * G - BENT) / 1e5, [0.0], 2),
+    "bristle_2d, saturated": (Bristle2D(), 1, (1.02 * G - BENT) / 1e5, [0.0], 2),
 }
 """Law, what varies (0 is v, 1 the first state), the knot, the states, continuous derivatives."""
 

@@ -1,0 +1,63 @@
+"""What a mechanical model knows beyond its equations."""
+
+from dataclasses import dataclass, field
+from typing import final
+
+import casadi as ca
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Inner:
+    """Equations with inner unknowns l, so that each knows its neighbours only.
+
+        0 = f(y, l),   l_k = g_k(y, l_1 ... l_{k-1})
+
+    Attributes:
+        l: SX symbols (k, 1).
+        values: SX (k, 1), g.
+        f: SX, what is written with l.
+        groups: symbols of unknowns and of l, in the order in which they are best eliminated.
+    """
+
+    l: ca.SX  # noqa: E741
+    values: ca.SX
+    f: ca.SX
+    groups: tuple[ca.SX, ...]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Holonomic:
+    """What a mechanical model knows beyond its equations: constraints on its coordinates.
+
+    The states of the model begin with coordinates q and their rates q', its algebraic variables
+    with the multipliers lam of the constraints phi(q, t) = 0. With the accelerations a as symbols
+    no mass matrix needs to be inverted:
+
+        M a + phi_q' lam = Q,   d^2 phi / dt^2 = phi_q a + ... = 0,   further algebraic equations
+
+    Attributes:
+        n: number of coordinates.
+        phi: SX (m, 1); no rows for a tree.
+        a: SX symbols (n, 1).
+        implicit: SX (n + nz, 1), the equations above in q, q', the other states, a, z, u, p, t.
+        index: 0 has it integrated in the tangent space of its constraints, in as many unknowns as
+            there are degrees of freedom; 1 in all coordinates, which are put back onto the
+            constraints at the end of every step. The solution is the same, to the tolerance.
+        inner: the same equations for long chains, whose derivatives are sparse only with inner
+            unknowns; None elsewhere.
+        pressing: SX (k, 1), normal forces over their typical size, which must not be negative.
+        pressed: what they are, in words.
+        advice: what to try where friction and reactions have no solution; may be empty.
+    """
+
+    n: int
+    phi: ca.SX
+    a: ca.SX
+    implicit: ca.SX
+    index: int = 1
+    inner: Inner | None = None
+    pressing: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    pressed: tuple[str, ...] = ()
+    advice: str = ""
