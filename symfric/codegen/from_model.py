@@ -27,8 +27,9 @@ def plant_block(
     states are the model's start values, the algebraic ones consistent with the start values of the
     inputs; they do not follow parameters that are changed at run time.
 
-    Fixed steps have no error control. Rabinowicz's stick-slip over 20 s, largest error relative to
-    the largest position, at a step of 1 ms and 0.1 ms, and operations of a step:
+    Fixed steps have no error control and do not see friction that jams. Rabinowicz's stick-slip
+    over 20 s, largest error relative to the largest position, at a step of 1 ms and 0.1 ms, and
+    operations of a step:
 
         method            order   BrownMcPhee         LuGre
         "rodas3"          3       5e-7   5e-9   125   4e-6   9e-9    189

@@ -83,7 +83,8 @@ def simulate(
             user's cache; "auto" starts in the former and goes over to the latter when that is
             predicted to pay; "rosenbrock" and "sundials" are CasADi's own integrators, under
             which the constraints of mechanisms drift, "ggl" is idas with constraints on positions
-            and velocities (`symfric.integrator.ggl`), for comparisons.
+            and velocities (`symfric.integrator.ggl`), for comparisons: they pass through friction
+            that jams without a sign of it.
         event_tolerance: how sharply events are located [s].
         max_steps: attempts allowed.
         sensitivities: free parameters by name and start values as "x0.v"; the trajectory then
