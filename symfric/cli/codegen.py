@@ -1,6 +1,7 @@
 """`symfric codegen`: a friction law, or a scene as a plant, as C99, verified on this machine."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -27,7 +28,11 @@ def codegen(
     ] = None,
     method: Annotated[
         str | None,
-        typer.Option("--method", help="How a plant advances; default rodas3."),
+        typer.Option(
+            "--method",
+            help="How a plant advances; default rodas3, of mechanisms with friction "
+            "backward_euler.",
+        ),
     ] = None,
     real: Annotated[
         str | None,
@@ -58,16 +63,17 @@ def codegen(
     kind = real or ("both" if scene is None else "double")
     check_names("--real", [kind], REALS)
     check_folder(out)
+    adjustable = None
     if scene is not None:
-        block = plant(scene, law, numbers("--set", settings), method, step_size, name, free)
-        generated = generate(block, out, real=REALS[kind])
+        made = partial(plant, scene, law, numbers("--set", settings), method or "auto", name, free)
+        generated, adjustable = generate(made(step_size), out, real=REALS[kind]), made
     elif method is not None:
         raise ValueError("--method: expected with --scene only: the step of a law is exact")
     else:
         generated = generate(
             any_with(law, settings), out, name=name, real=REALS[kind], h=step_size, free=free
         )
-    verification = verify(generated, compiler=compiler)
+    verification = verify(generated, compiler=compiler, adjustable=adjustable)
     output.emit_json(to_dict(law, generated, verification), json)
     if json != "-":
         show_verification(verification)
@@ -80,15 +86,15 @@ def plant(
     scene: str,
     law: str,
     values: dict[str, float],
-    method: str | None,
-    h: float | None,
+    method: str,
     name: str | None,
     free: list[str] | None,
+    h: float | None = None,
 ) -> Block:
     """The plant of a scene, whose other parameters are listed as constants."""
     kind_of(scene, "--scene")
     machine = scenes_with(scene, [law], values)[law]
-    block = plant_block(machine.model(free or ()), h=h, method=method or "rodas3", name=name)
+    block = plant_block(machine.model(free or ()), h=h, method=method, name=name)
     known = {n: float(p.value) for n, p in parameters(machine).items() if n not in (free or ())}
     return replace(block, constants=known | dict(block.constants))
 

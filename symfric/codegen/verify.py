@@ -1,5 +1,6 @@
 """Proof that generated C computes what CasADi computes."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,6 +13,7 @@ from symfric.codegen.block import Block
 from symfric.codegen.c99 import REALS, Real
 from symfric.codegen.compiler import CompileError, Compiler, find_compiler, needed_symbols
 from symfric.codegen.generate import Generated
+from symfric.codegen.runaway import longest_step, runs_away, step_size
 from symfric.codegen.runner import program, run_c, run_vm
 from symfric.codegen.source import prefix, routines
 from symfric.files import write_text
@@ -42,6 +44,7 @@ class Check:
             is no error of the C.
         foreign: what the object file needs besides functions of math.h in its own type; None where
             there is no `nm`.
+        runs_away: the step after which a state is huge or not finite in CasADi, too; None if none.
     """
 
     real: str
@@ -50,12 +53,13 @@ class Check:
     ulp: int | None
     error: float
     foreign: tuple[str, ...] | None
+    runs_away: int | None = None
 
     @property
     def ok(self) -> bool:
-        """No warnings, nothing foreign, equal bits in double, a small error in float."""
+        """No warnings, nothing foreign, equal bits in double, small errors in float, all finite."""
         exact = self.error <= TOLERANCE if self.ulp is None else self.ulp == 0
-        return exact and not self.warnings and not self.foreign
+        return exact and not self.warnings and not self.foreign and self.runs_away is None
 
 
 @final
@@ -106,16 +110,26 @@ VERIFIED = "verified"
 NO_COMPILER = "not verified: no C compiler found; install gcc or clang, or set CC"
 
 
-def verify(generated: Generated, *, compiler: str | None = None) -> Verification:
+def verify(
+    generated: Generated,
+    *,
+    compiler: str | None = None,
+    adjustable: Callable[[], Block] | None = None,
+) -> Verification:
     """Compile generated C, run it beside CasADi on the same inputs and compare.
 
     The inputs (a fixed pseudo-random sequence of 20 000 steps) hold slow sines, bursts, reversals,
     velocities down to 1e-12, exact zeros and a varying load. The C is compiled with -O2
     -ffp-contract=off; where a compiler may fuse multiply and add, the last bits differ.
 
+    A plant that runs away under these inputs, in CasADi as in C, fails: its step is too long for
+    it, and the status names the longest of some shorter ones that is not, where h is a parameter.
+
     Args:
         generated: what `generate` returned.
         compiler: command that takes gcc's options; default $CC where it exists, else gcc or clang.
+        adjustable: makes the same block with its step size h as a parameter, to look for a shorter
+            one where it is a constant.
 
     Returns:
         The findings. Without a compiler, or with one whose programs do not run here, the status
@@ -136,7 +150,22 @@ def verify(generated: Generated, *, compiler: str | None = None) -> Verification
         return Verification(block.name, f"not verified: {error}", str(found), tuple(checks))
     wrong = [check.real for check in checks if not check.ok]
     status = f"failed in {' and '.join(wrong)}" if wrong else VERIFIED
+    lost = [check.runs_away for check in checks if check.runs_away is not None]
+    if lost:
+        whole = block if adjustable is None or "h" not in block.constants else adjustable()
+        status = f"failed: {_too_long(whole, step_size(block), lost[0], inputs)}"
     return Verification(block.name, status, str(found), tuple(checks))
+
+
+def _too_long(block: Block, h: float | None, steps: int, inputs: Array) -> str:
+    """What became of a block that runs away, and what to try."""
+    if h is None:
+        return f"it runs away within {steps} steps, in CasADi as in C; check signs and parameters"
+    said = f"after {steps} steps of {h:g} s it runs away, in CasADi as in C: that step is too long"
+    shorter = longest_step(block, inputs, h)
+    if shorter is None:
+        return f"{said}; try a shorter one, or the method backward_euler, which is the most robust"
+    return f"{said}, {shorter:g} s is not"
 
 
 def _check(generated: Generated, real: Real, compiler: Compiler, inputs: Array) -> Check:
@@ -158,6 +187,7 @@ def _check(generated: Generated, real: Real, compiler: Compiler, inputs: Array) 
         ulp=_ulp(rows, expected) if real.size == 8 else None,
         error=_error(rows, expected),
         foreign=None if needed is None else tuple(sorted(needed - _allowed(block, real))),
+        runs_away=runs_away(block, expected),
     )
 
 

@@ -16,7 +16,7 @@ from symfric.integrator.compiler import find_compiler, library_path, load
 from symfric.numeric import flat_view
 
 Array = NDArray[np.float64]
-CHAINED, SIDE_BY_SIDE = 16, 64
+CHAINED, SIDE_BY_SIDE = 16, 32
 """Columns of one call; the last call repeats its last column."""
 
 

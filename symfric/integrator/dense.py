@@ -32,7 +32,7 @@ class Dense:
 
     def __call__(self, times: Array) -> Array:
         """Values at `times`, shape (n, m); at an event the value after it."""
-        k = np.clip(np.searchsorted(self.t0, times, side="right") - 1, 0, self.t0.size - 1)
+        k = np.searchsorted(self.t0[1:], times, side="right")
         return self.piece(k, (times - self.t0[k]) / (self.t1[k] - self.t0[k])).T
 
     def piece(self, k: NDArray[np.intp], theta: Array) -> Array:

@@ -20,7 +20,7 @@ def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Functi
     `steps` equal steps of the method; derivatives of any order by CasADi, exact for the discrete
     map. Time in the equations counts from 0. Algebraic variables start where their equations hold,
     by Newton's method from their start values. Compare a result with `simulate`: fixed steps have
-    no error control.
+    no error control, and do not see friction that jams.
 
     Args:
         model: explicit or implicit model without events.

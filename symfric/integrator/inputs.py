@@ -97,8 +97,7 @@ class Drivers:
 
     def interval(self, times: NDArray[np.float64]) -> NDArray[np.intp]:
         """Number of the interval that holds each time; at a break the later one."""
-        last = self.values.shape[1] - 1
-        return np.clip(np.searchsorted(self.breaks, times, side="right") - 1, 0, last)
+        return np.searchsorted(self.breaks[1:-1], times, side="right")
 
 
 def drivers(

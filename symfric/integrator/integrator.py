@@ -13,6 +13,7 @@ from symfric.integrator.blocks import refinement
 from symfric.integrator.columns import Columns
 from symfric.integrator.compiler import find_compiler, library_path
 from symfric.integrator.engine import CompiledEngine, Engine, VmEngine, c_source
+from symfric.integrator.initial import consistent
 from symfric.integrator.inputs import Drivers
 from symfric.integrator.method import Method
 from symfric.integrator.step import build_step
@@ -30,7 +31,7 @@ class Integrator:
     """System, step and Functions of a model with one structure of inputs.
 
     Mutable only in what it remembers: its engines, the time spent in the virtual machine, from
-    which it decides when compiling pays, and whether compiling failed.
+    which it decides when compiling pays, whether compiling failed, and the last start.
     """
 
     model: Model
@@ -41,6 +42,9 @@ class Integrator:
     vm_time: float = 0.0
     compiles: bool = True
     _engines: dict[str, Engine] = field(default_factory=dict[str, Engine])
+    _starts: dict[tuple[bytes, bytes], Array] = field(
+        default_factory=dict[tuple[bytes, bytes], Array]
+    )
 
     def __post_init__(self) -> None:
         begin = perf_counter()
@@ -99,6 +103,30 @@ class Integrator:
     def plain_signal_columns(self) -> Columns:
         """The signals at many times as they are, drift of constraints included."""
         return Columns(self.of_time("signals", self._every))
+
+    @cached_property
+    def states(self) -> Columns | None:
+        """States at many times from (y, d) there; None where those of y are what they should be.
+
+        Between steps the loops of a mechanism are closed to the tolerance only.
+        """
+        s, manifold = self.system, self.system.manifold
+        if manifold is None or not manifold.m:
+            return None
+        projected = manifold.project(s.y, s.d)[: s.nx]
+        return Columns(ca.Function("states", [s.y, s.d], [projected], {"cse": True}))
+
+    def start(self, y: Array, d: Array) -> Array:
+        """`y` with consistent algebraic unknowns; remembered, for runs from one start.
+
+        Raises:
+            ValueError: none near.
+        """
+        key = (y.tobytes(), d.tobytes())
+        if key not in self._starts:
+            found = consistent(self.system, f"model '{self.model.name}'", y, d)
+            self._starts = {key: found}
+        return self._starts[key]
 
     def vm(self) -> Engine:
         """The engine that needs no compiler."""

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from symfric.holonomic import Holonomic
 from symfric.integrator.lu import factorise
 from symfric.model import Model
+from symfric.numeric import evaluate
 
 Array = NDArray[np.float64]
 DEPENDENT = 1e-5
@@ -142,7 +143,7 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
         nx,
         range(algebraic[-1] + 1, algebraic[-1] + 1 + _of_basis(mechanics)),
         slope,
-        ca.Function("pressing", [y, d], [pressing]),
+        ca.Function("pressing", [y, d], [ca.densify(pressing)]),
         mechanics.pressed,
     )
 
@@ -171,8 +172,10 @@ def jammed(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array) -> st
 
 def pulls(manifold: Manifold, y: Array, d: Array, margin: float) -> str:
     """Normal forces that are negative; with a margin those that have almost vanished, too."""
+    if not manifold.pressed:
+        return ""
     limit = PULLING if margin > 0.0 else -PULLING
-    values = manifold.pressing(y, d).full().ravel()
+    values = evaluate(manifold.pressing, y, d)
     for share, what in zip(values, manifold.pressed, strict=True):
         if share < limit:
             return (
@@ -184,8 +187,11 @@ def pulls(manifold: Manifold, y: Array, d: Array, margin: float) -> str:
 
 def grows(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array, margin: float) -> str:
     """Normal forces that grow with the friction that they cause."""
-    A, k = manifold.slope(y, d).full(), manifold.n + manifold.m
-    if A.shape[0] == k or not np.isfinite(A).all():
+    k = manifold.n + manifold.m
+    if manifold.slope.size1_out(0) == k:
+        return ""
+    A = manifold.slope(y, d).full()
+    if not np.isfinite(A).all():
         return ""
     try:
         loop = A[k:, :k] @ np.linalg.solve(A[:k, :k], A[:k, k:]) - A[k:, k:]

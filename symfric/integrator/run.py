@@ -85,7 +85,7 @@ def integrate(
 ) -> tuple[Run, Dense]:
     """Integrate over all input intervals; the result holds whatever was reached."""
     d = np.concatenate([p, inputs.values[:, 0]])
-    y = consistent(integrator.system, f"model '{integrator.model.name}'", y0, d)
+    y = integrator.start(y0, d)
     drive = _Drive(integrator, inputs, tolerances, backend, progress, y)
     try:
         drive.whole(p)

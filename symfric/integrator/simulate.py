@@ -83,7 +83,8 @@ def simulate(
             user's cache; "auto" starts in the former and goes over to the latter when that is
             predicted to pay; "rosenbrock" and "sundials" are CasADi's own integrators, under
             which the constraints of mechanisms drift, "ggl" is idas with constraints on positions
-            and velocities (`symfric.integrator.ggl`), for comparisons.
+            and velocities (`symfric.integrator.ggl`), for comparisons: they pass through friction
+            that jams without a sign of it.
         event_tolerance: how sharply events are located [s].
         max_steps: attempts allowed.
         sensitivities: free parameters by name and start values as "x0.v"; the trajectory then
@@ -241,13 +242,16 @@ def _trajectory(
     signals = integrator.plain_signal_columns if drifts else integrator.signal_columns
 
     def states(at: Array) -> dict[str, Array]:
-        if integrator.system.manifold is not None:
-            return evaluate(at)
-        return dict(zip(names, dense(at)[: len(model.x)], strict=False))
+        y, columns = dense(at), None if drifts else integrator.states
+        if columns is not None:
+            y = columns([y.T, data(at)])[0].T
+        return dict(zip(names, y[: len(model.x)], strict=False))
+
+    def data(at: Array) -> Array:
+        return np.hstack([np.tile(p, (at.size, 1)), inputs.values[:, inputs.interval(at)].T])
 
     def rows(columns: Columns, at: Array) -> Array:
-        d = np.hstack([np.tile(p, (at.size, 1)), inputs.values[:, inputs.interval(at)].T])
-        (values,) = columns([at, dense(at).T, d])
+        (values,) = columns([at, dense(at).T, data(at)])
         return np.ascontiguousarray(values.T)
 
     def evaluate(at: Array) -> dict[str, Array]:

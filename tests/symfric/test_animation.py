@@ -26,7 +26,7 @@ def test_gif_has_a_picture_per_frame_that_differ(
     runs: dict[str, Trajectory], tmp_path: Path, name: str
 ) -> None:
     told: list[float] = []
-    path = tmp_path / "new" / "motion.gif"
+    path, open_before = tmp_path / "new" / "motion.gif", plt.get_fignums()
     runs[name].animate(path, fps=10, speed=0.5, progress=told.append)
     with Image.open(path) as film:
         assert film.n_frames == 5  # 0.2 s at half speed
@@ -38,7 +38,7 @@ def test_gif_has_a_picture_per_frame_that_differ(
     assert (first != last).any()
     assert told == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
     assert [p.name for p in path.parent.iterdir()] == ["motion.gif"]
-    assert not plt.get_fignums()
+    assert plt.get_fignums() == open_before
 
 
 def test_html_holds_its_pictures_and_needs_nothing_from_elsewhere(
@@ -54,6 +54,8 @@ def test_html_holds_its_pictures_and_needs_nothing_from_elsewhere(
 
 
 def test_a_failed_film_leaves_nothing_behind(runs: dict[str, Trajectory], tmp_path: Path) -> None:
+    open_before = plt.get_fignums()
+
     def stop(done: float) -> None:
         raise KeyboardInterrupt
 
@@ -61,7 +63,7 @@ def test_a_failed_film_leaves_nothing_behind(runs: dict[str, Trajectory], tmp_pa
         with pytest.raises(KeyboardInterrupt):
             runs["pendulum"].animate(tmp_path / f"x.{ending}", fps=5, progress=stop)
     assert list(tmp_path.iterdir()) == []
-    assert not plt.get_fignums()
+    assert plt.get_fignums() == open_before
 
 
 def test_mp4_without_its_program_names_what_needs_none(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -83,7 +83,7 @@ def test_scene_becomes_a_plant(tmp_path: Path, capsys: pytest.CaptureFixture[str
     [
         ("--method rodas3", "--method: expected with --scene only"),
         ("--scene belt", "--scene: expected one of rabinowicz, drive"),
-        ("--scene drive --method euler", "expected one of rodas5p"),
+        ("--scene drive --method euler", "expected one of auto, rodas5p"),
         ("--scene drive --set v_belt=1", "v_belt"),
     ],
 )
@@ -102,3 +102,15 @@ def test_robot_of_a_file_is_a_plant(tmp_path: Path) -> None:
     line = f"codegen --scene {path} --law lugre --out {tmp_path} --step-size 0.001"
     assert main(line.split()) == 0
     assert "tau_hinge" in (tmp_path / "small_f64.h").read_text()
+
+
+@compiled
+def test_a_step_that_is_too_long_is_named_with_one_that_is_not(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = f"codegen --scene rabinowicz --law lugre --method dopri5 --out {tmp_path}"
+    assert main(f"{line} --step-size 0.05 --json -".split()) == 1
+    status = json.loads(capsys.readouterr().out)["verification"]["status"]
+    assert "steps of 0.05 s it runs away, in CasADi as in C: that step is too long, 0.0" in status
+    shorter = status.rsplit(", ", 1)[1].split()[0]
+    assert main(f"{line} --step-size {shorter}".split()) == 0
