@@ -1,4 +1,4 @@
-"""Identify the friction of a drive from measured force and position."""
+"""Identify friction: of a drive from force and position, of any model from its motion."""
 
 from identification.data import Dataset as Dataset
 from identification.errors import ClosedLoopErrors as ClosedLoopErrors
@@ -10,6 +10,8 @@ from identification.filters import lowpass as lowpass
 from identification.identify import identify as identify
 from identification.loop import PositionLoop as PositionLoop
 from identification.loop import closed_loop as closed_loop
+from identification.motion import MotionFit as MotionFit
+from identification.motion import identify_motion as identify_motion
 from identification.read import read_data as read_data
 from identification.regress import LinearFit as LinearFit
 from identification.regress import linear_regression as linear_regression
