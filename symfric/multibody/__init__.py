@@ -27,6 +27,7 @@ from symfric.multibody.joints import Prismatic as Prismatic
 from symfric.multibody.joints import Revolute as Revolute
 from symfric.multibody.joints import Spherical as Spherical
 from symfric.multibody.joints import Universal as Universal
+from symfric.multibody.kinematics import Kinematics as Kinematics
 from symfric.multibody.mechanism import Mechanism as Mechanism
 from symfric.multibody.spatial import Frame as Frame
 from symfric.multibody.urdf import read_urdf as read_urdf
