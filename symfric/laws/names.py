@@ -92,6 +92,8 @@ def _single(term: str, text: str) -> Law:
             f"law '{text}': expected a law with equations, got {name}, a population of random "
             "contacts; it has figures and `force(t, x, N)`; gms is the law next to it"
         )
+    if name in ("asymmetric", *WRAPPERS):
+        raise ValueError(f"law '{text}': expected a law to wrap, as in {name}(stribeck), got none")
     check_names(f"law '{text}'", [name], ALL_LAWS)
     return ALL_LAWS[name]()
 

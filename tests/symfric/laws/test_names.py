@@ -65,6 +65,8 @@ def test_wrappers_start_with_equal_sides() -> None:
         ("coulomb+", "got an empty term; write one as in coulomb.viscous"),
         ("coulomb++viscous", "got an empty term"),
         ("asymmetric(coulomb+)", "law 'coulomb.': .* got an empty term"),
+        ("lagged", r"expected a law to wrap, as in lagged\(stribeck\), got none"),
+        ("coulomb+asymmetric", "expected a law to wrap"),
         ("asymmetric(coulomb", "expected balanced parentheses"),
         ("asymmetric(coulomb))", "expected balanced parentheses"),
         ("asymmetric(coulomb)(viscous)", "expected balanced parentheses"),
