@@ -75,7 +75,10 @@ class Problem:
     Raises:
         ValueError: all problems at once.
 
-    Limits: bounds on states and outputs hold at the collocation points, not between them.
+    Limits: bounds on states and outputs hold at the collocation points, not between them. The
+    constraints of a mechanism with loops hold on acceleration level and drift by the error of the
+    collocation, so that `final` and `via` must name independent coordinates only: values of all
+    would ask for more than can be met, and Ipopt does not converge.
     """
 
     model: Model
