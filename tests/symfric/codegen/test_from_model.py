@@ -23,6 +23,7 @@ from symfric.codegen.block import Block
 from symfric.codegen.compiler import Compiler
 from symfric.integrator.tableaux import METHODS
 from symfric.model import Event
+from symfric.scenes import Arm
 
 x, z, u = Variable("x", "m", start=1.0), Variable("z", "1", start=0.5), Variable("u", "m/s")
 PENDULUM = Model(
@@ -63,6 +64,22 @@ def test_double_is_equal_to_the_bit(
     block = plant_block(model, h=1e-4, method=method)
     found = verify(generate(block, tmp_path, real="double"))
     assert found.ok, found.table()
+
+
+def test_arm_with_friction_from_reactions_in_every_joint_is_verified(
+    compiler: Compiler, tmp_path: Path
+) -> None:
+    model = Arm(BrownMcPhee(v_t=0.05)).model()
+    block = plant_block(model, h=1e-3)
+    assert [v.name for v in block.states if v.name.endswith("_N")] == [
+        f"q{k}_N" for k in range(1, 7)
+    ]
+    assert [v.name for v in block.inputs] == [f"tau{k}" for k in range(1, 7)]
+    found = verify(generate(block, tmp_path, real="double"))
+    assert found.ok, found.table()
+    after, exact = advanced(block, 200, *[0.0] * 6), simulate(model, 0.2, rtol=1e-9).final
+    for k in range(1, 7):
+        assert after[f"q{k}"] == pytest.approx(exact[f"q{k}"], abs=0.01)  # order 1
 
 
 def test_float_of_a_drive_is_verified(compiler: Compiler, tmp_path: Path) -> None:
