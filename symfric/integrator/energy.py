@@ -66,9 +66,10 @@ class EnergyBalance:
 
     @property
     def relative(self) -> float:
-        """The largest defect over `scale`; 0 where nothing moved."""
+        """The largest defect over `scale`; 0 where nothing moved but rounding."""
         largest = float(np.abs(self.defect).max(initial=0.0))
-        return largest / self.scale if self.scale > 0 else 0.0
+        moved = self.scale > 1e-16 * float(np.abs(self.energy).max(initial=0.0))
+        return largest / self.scale if moved else 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """Numbers at the end [J], and the largest defect."""

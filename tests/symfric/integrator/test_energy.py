@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from symfric import BrownMcPhee, Hold, LuGre, Trajectory, rabinowicz, simulate
-from symfric.integrator.energy import WORK
+from symfric.integrator.energy import WORK, EnergyBalance
 from symfric.model import Event, Model, Output
 from symfric.multibody import (
     JointFriction,
@@ -195,3 +195,10 @@ def test_frictionless_drift_over_100_s(name: str) -> None:
     smooth = BrownMcPhee(mu_s=0.0, mu_d=0.0)
     run = simulate(MECHANISMS[name](smooth).model(), 100.0, rtol=1e-10)
     assert run.energy_balance().relative < 1e-7
+
+
+def test_a_body_that_rests_but_for_rounding_has_no_relative_defect() -> None:
+    zero = np.zeros(3)
+    books = EnergyBalance(np.arange(3.0), np.full(3, -4.9), {}, zero + 1e-48, 1e-48)
+    assert books.relative == 0.0
+    assert EnergyBalance(np.arange(3.0), zero - 4.9, {}, zero + 1e-9, 1e-3).relative == 1e-6
