@@ -11,8 +11,9 @@ Every accepted step ends on the constraints:
     q' <- q' - phi_q' (phi_q phi_q')^-1 (phi_q q' + phi_t)
 
 Limits: impacts are excluded, and with them tangential shocks, in which friction lets the reactions
-grow a thousandfold (`SHOCK`, Painleve): both end a run. A step in which phi_q loses rank is not
-accepted, or accepted on the other side without a sign of it.
+grow a thousandfold (`SHOCK`, Painleve): both end a run. A step over a position in which phi_q loses
+rank is not accepted: what lies beyond is not determined, and det(phi_q(q1) phi_q(q0)') has turned
+its sign. Not seen are two such positions within one step, and a step that ends on another branch.
 """
 
 from dataclasses import dataclass
@@ -57,6 +58,8 @@ class Manifold:
             are accelerations, multipliers, normal forces, in this order after the states.
         basis: where y holds V, a basis of the tangent space, column by column.
         slope: (y, d) -> derivatives of the algebraic equations by the algebraic unknowns.
+        branch: (y0, y1, d) -> sign of det(phi_q(q1) phi_q(q0)'), which turns where a step leads
+            over a position in which constraints depend on each other.
         pressing: (y, d) -> normal forces over their typical size, which must not be negative.
         pressed: what they are, in words.
     """
@@ -69,6 +72,7 @@ class Manifold:
     first: int
     basis: range
     slope: ca.Function
+    branch: ca.Function
     pressing: ca.Function
     pressed: tuple[str, ...]
 
@@ -133,6 +137,12 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
     algebraic = list(range(nx, nx + n + len(model.z)))
     J = ca.jacobian(f[algebraic], y[algebraic])
     slope = ca.Function("slope", [y, d], [J])
+    here, before = (
+        ca.Function("here", [y, d], [at.call([q, qd, fixed])[1]]),
+        ca.SX.sym("y0", y.numel()),
+    )
+    turned = factorise(ca.sparsify(here(y, d) @ here(before, d).T), [range(m)])
+    branch = ca.substitute(turned.sign(), turned.packed_symbol, turned.packed)
     pressing = ca.substitute(mechanics.pressing, model.vector("u"), u)
     return Manifold(
         projection("project", ITERATIONS),
@@ -143,6 +153,7 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
         nx,
         range(algebraic[-1] + 1, algebraic[-1] + 1 + _of_basis(mechanics)),
         slope,
+        ca.Function("branch", [before, y, d], [branch], {"cse": True}),
         ca.Function("pressing", [y, d], [ca.densify(pressing)]),
         mechanics.pressed,
     )

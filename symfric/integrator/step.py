@@ -171,6 +171,8 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
     norm = error_norm(system, y, y_new, atol, rtol, d)
     e2 = norm(trial.error)
     sound = e2 <= 1e20
+    if system.manifold is not None and system.manifold.m:
+        sound = ca.logic_and(sound, system.manifold.branch(y, y_new, d) > 0)
     obstacle = obstacles(system, method)
     if obstacle is not None:
         sound = ca.logic_and(sound, ca.logic_not(obstacle(y_new, h, d) < 0))

@@ -222,6 +222,17 @@ def test_an_exact_parallelogram_stops_where_its_links_lie_in_line() -> None:
     assert reached == pytest.approx(np.pi, abs=1e-5)
 
 
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8])
+@pytest.mark.parametrize(("formulation", "index"), [("joint", 1), ("joint", 0), ("absolute", 0)])
+def test_a_step_over_a_change_point_is_not_taken(formulation: str, index: int, rtol: float) -> None:
+    scene = FourBar(SMOOTH, crank=0.2, coupler=0.4, rocker=0.2, base=0.4)
+    model = scene.mechanism().build(formulation=formulation, index=index)
+    with pytest.raises(SolveError, match="the configuration is singular") as caught:
+        simulate(model, 3.0, rtol=rtol, backend="vm")
+    assert caught.value.partial is not None
+    assert caught.value.partial.steps[-1] == pytest.approx(0.206637, abs=1e-5)
+
+
 @pytest.mark.parametrize("excess", [1e-8, 1e-4, 1e-2])
 def test_near_parallelograms_go_through_on_their_own_branch(excess: float) -> None:
     """Energy and loop closed; beyond the line the rocker turns against the crank."""
