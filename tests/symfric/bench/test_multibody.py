@@ -32,6 +32,7 @@ def result(folder: Path) -> dict[str, Any]:
     return json.loads((folder / "b.json").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_everything_of_the_issue_is_there(result: dict[str, Any]) -> None:
     for table in ("runs", "ratios", "compiled", "counts", "chains", "facts", "norms", "drifts"):
         assert result[table], table
@@ -39,6 +40,7 @@ def test_everything_of_the_issue_is_there(result: dict[str, Any]) -> None:
     assert result["skipped"]["exudyn"] == "takes too long for --quick"
 
 
+@pytest.mark.slow
 def test_runs_are_finite_and_beside_their_errors(result: dict[str, Any]) -> None:
     for row in result["runs"]:
         assert all(isfinite(row[key]) for key in ("setting", "error", "time_s", "compile_s"))
@@ -47,6 +49,7 @@ def test_runs_are_finite_and_beside_their_errors(result: dict[str, Any]) -> None
         assert 0 < row["error"] < 1
 
 
+@pytest.mark.slow
 def test_ratios_are_over_ours_at_the_same_bound(result: dict[str, Any]) -> None:
     ours = {(r["case"], r["bound"]): r for r in result["ratios"] if r["integrator"] == OURS}
     assert {case for case, _ in ours} == {"slider_crank", "pendulum_box"}
@@ -56,6 +59,7 @@ def test_ratios_are_over_ours_at_the_same_bound(result: dict[str, Any]) -> None:
         assert row["ratio"] == pytest.approx(row["time_s"] / base)
 
 
+@pytest.mark.slow
 def test_files_are_written(folder: Path, result: dict[str, Any]) -> None:
     with (folder / "b.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
