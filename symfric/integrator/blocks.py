@@ -45,16 +45,17 @@ class Slopes:
 def slopes(system: System) -> Slopes:
     """The Jacobian of `system`."""
     y, d, inner = system.y, system.d, system.inner
-    slope, pivots, l, put = system.J, system.pivots, NONE, NONE  # noqa: E741
+    slope, pivots, hidden, put = system.J, system.pivots, NONE, NONE
     if inner is not None:
-        l, pivots = inner.l, _places(y, inner)  # noqa: E741
+        hidden, pivots = inner.l, _places(y, inner)
         to_l = ca.vertcat(
-            ca.jacobian(inner.f, l), ca.jacobian(inner.values, l) - ca.SX.eye(l.numel())
+            ca.jacobian(inner.f, hidden),
+            ca.jacobian(inner.values, hidden) - ca.SX.eye(hidden.numel()),
         )
         slope = ca.horzcat(ca.jacobian(ca.vertcat(inner.f, inner.values), y), to_l)
-        (put,), _ = ca.substitute_inplace([l], [inner.values], [NONE])
+        (put,), _ = ca.substitute_inplace([hidden], [inner.values], [NONE])
     named, entries, values = _named(ca.sparsify(slope))
-    of_l = ca.Function("slopes", [l, y, d], [values])
+    of_l = ca.Function("slopes", [hidden, y, d], [values])
     return Slopes(
         named, entries, ca.Function("slopes", [y, d], [of_l(put, y, d)], {"cse": True}), pivots
     )

@@ -93,8 +93,7 @@ class _Rows:
 
     @classmethod
     def of(cls, system: System, manifold: Manifold) -> "_Rows":
-        n, m, nx = manifold.n, manifold.m, manifold.first
-        basis = range(system.n - system.timed - n * (n - m), system.n - system.timed)
+        n, m, nx, basis = manifold.n, manifold.m, manifold.first, manifold.basis
         return cls(
             n, n - m, m, range(2 * n, nx), range(nx, basis.start), basis,
             range(basis.stop, system.n),
