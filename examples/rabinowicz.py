@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 from symfric import BrownMcPhee, LuGre, Trajectory, rabinowicz, simulate
-from symfric.plotting import plot_trajectories
+from symfric.results.pictures import plot_trajectories
 
 
 def period(motion: Trajectory) -> float:

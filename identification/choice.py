@@ -5,9 +5,8 @@ from dataclasses import dataclass, fields
 from math import floor, log10
 from typing import final
 
-from symfric.laws import Asymmetric, Law
-from symfric.numeric import is_symbolic
-from symfric.parameters import (
+from symfric.foundation.numeric import is_symbolic
+from symfric.foundation.parameters import (
     Parameter,
     Parametric,
     check_names,
@@ -15,6 +14,7 @@ from symfric.parameters import (
     symbolise,
     with_values,
 )
+from symfric.laws import Asymmetric, Law
 from symfric.scenes import Drive
 
 VELOCITY_SCALES = ("m/s", "s/m")

@@ -9,8 +9,8 @@ import numpy as np
 
 from identification.choice import VELOCITY_SCALES, Choice, is_coefficient, is_smoothing, parts
 from identification.data import Array
+from symfric.foundation.parameters import parameters, symbolise
 from symfric.model import Model
-from symfric.parameters import parameters, symbolise
 
 
 @final

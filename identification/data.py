@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.filters import Filter
 from identification.loop import PositionLoop
-from symfric.files import written
+from symfric.foundation.files import written
 
 Array = NDArray[np.float64]
 

@@ -15,12 +15,12 @@ from identification.regress import linear_regression
 from identification.result import Estimate, Identification
 from identification.signals import Signals, differentiate
 from identification.start import start_values
+from symfric.foundation.parameters import parameters, with_values
+from symfric.foundation.status import SolveError
 from symfric.laws import Law, law_from_text
 from symfric.laws.names import law_name
 from symfric.model import finite
-from symfric.parameters import parameters, with_values
 from symfric.scenes import Drive
-from symfric.status import SolveError
 
 Progress = Callable[[str, float], None]
 """Called with what is being done and the fraction done."""

@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike
 from identification.data import Array
 from identification.precision import precision
 from identification.result import Estimate
+from symfric.foundation.parameters import Variable, check_names
+from symfric.foundation.status import SolveError, Status
 from symfric.integrator import Input, Trajectory, simulate
 from symfric.model import Model
-from symfric.parameters import Variable, check_names
-from symfric.status import SolveError, Status
 
 AT_BOUND = 1e-9
 """Distance to a bound, relative to the parameter's scale, below which it stands there."""

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from identification.errors import predicted_force, residual_force
 from identification.result import Identification
-from symfric.plotting import panels, save
+from symfric.foundation.panels import panels, save
 
 POINTS = 6000
 """Most samples shown as points."""

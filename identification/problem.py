@@ -17,8 +17,8 @@ import numpy as np
 from identification.coordinates import Coordinates
 from identification.data import Array
 from identification.signals import Signals
+from symfric.foundation.status import Status
 from symfric.model import Model
-from symfric.status import Status
 
 STATUS = {
     "Solve_Succeeded": Status.SOLVED,

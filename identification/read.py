@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.data import UNITS, Array, Dataset
 from identification.matlab import read_mat
-from symfric.parameters import check_names
+from symfric.foundation.parameters import check_names
 
 ALIASES = {
     "t": ("t", "time"),

@@ -11,10 +11,10 @@ from identification.errors import Errors
 from identification.filters import Filter
 from identification.regress import LinearFit
 from identification.signals import Signals
-from symfric.files import write_text
+from symfric.foundation.files import write_text
+from symfric.foundation.status import Status
 from symfric.laws import Law
 from symfric.scenes import Drive
-from symfric.status import Status
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

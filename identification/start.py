@@ -7,7 +7,7 @@ from identification.coordinates import Coordinates
 from identification.data import Array
 from identification.problem import Problem
 from identification.regress import LinearFit
-from symfric.parameters import Parameter, parameters
+from symfric.foundation.parameters import Parameter, parameters
 
 SCALES = 12
 """Velocity scales tried, spaced by equal factors."""

@@ -6,9 +6,9 @@ from typing import final
 
 import casadi as ca
 
+from symfric.foundation.numeric import Scalar
+from symfric.foundation.parameters import check_names
 from symfric.model import Model
-from symfric.numeric import Scalar
-from symfric.parameters import check_names
 
 
 @final

@@ -12,8 +12,8 @@ from ocp.layout import Points
 from ocp.problem import Box, Free, Problem
 from ocp.solution import Solution
 from ocp.transcribe import Transcription
+from symfric.foundation.parameters import check_names
 from symfric.model import Model
-from symfric.parameters import check_names
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.transcribe import Transcription
-from symfric.status import Status
+from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
 Option = str | float | int

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ocp.solution import Solution
-from symfric.parameters import check_names
-from symfric.plotting import panels, save
+from symfric.foundation.panels import panels, save
+from symfric.foundation.parameters import check_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,9 +9,9 @@ from typing import Any, final
 import casadi as ca
 
 from ocp.cost import Cost
+from symfric.foundation.numeric import is_number
+from symfric.foundation.parameters import check_names
 from symfric.model import Model
-from symfric.numeric import is_number
-from symfric.parameters import check_names
 
 Range = float | tuple[float | None, float | None]
 """A value to meet, or (lower, upper) to stay between; None is no bound."""

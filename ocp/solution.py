@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from ocp.ipopt import Iterate, Statistics
 from ocp.layout import Points
 from ocp.problem import Problem
-from symfric.files import write_text, written
+from symfric.foundation.files import write_text, written
+from symfric.foundation.parameters import check_names
+from symfric.foundation.status import Status
 from symfric.integrator import Trajectory
-from symfric.parameters import check_names
-from symfric.status import Status
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

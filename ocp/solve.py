@@ -14,7 +14,7 @@ from ocp.problem import Problem
 from ocp.solution import Solution
 from ocp.transcribe import Transcription, make_mesh, transcribe
 from ocp.verify import verified
-from symfric.status import SolveError, Status
+from symfric.foundation.status import SolveError, Status
 
 Array = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ from time import perf_counter
 import numpy as np
 
 from ocp.solution import Solution
+from symfric.foundation.status import Status
 from symfric.integrator import Hold, simulate
-from symfric.status import Status
 
 RTOL = 1e-9
 """Relative tolerance of the re-simulation."""

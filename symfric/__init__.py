@@ -5,6 +5,13 @@ from importlib.metadata import version as _version
 from symfric.figures import FigureData as FigureData
 from symfric.figures import compare as compare
 from symfric.figures import figure as figure
+from symfric.foundation.parameters import Parameter as Parameter
+from symfric.foundation.parameters import Variable as Variable
+from symfric.foundation.parameters import parameters as parameters
+from symfric.foundation.parameters import symbolise as symbolise
+from symfric.foundation.parameters import with_values as with_values
+from symfric.foundation.status import SolveError as SolveError
+from symfric.foundation.status import Status as Status
 from symfric.integrator import Ensemble as Ensemble
 from symfric.integrator import Hold as Hold
 from symfric.integrator import Linear as Linear
@@ -90,14 +97,7 @@ from symfric.model import Event as Event
 from symfric.model import Model as Model
 from symfric.model import Monitor as Monitor
 from symfric.model import Output as Output
-from symfric.parameters import Parameter as Parameter
-from symfric.parameters import Variable as Variable
-from symfric.parameters import parameters as parameters
-from symfric.parameters import symbolise as symbolise
-from symfric.parameters import with_values as with_values
 from symfric.scenes import drive as drive
 from symfric.scenes import rabinowicz as rabinowicz
-from symfric.status import SolveError as SolveError
-from symfric.status import Status as Status
 
 __version__ = _version("symfric")

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric import Model, Variable
-from symfric.integrator.dense import Dense
-from symfric.integrator.inputs import drivers
-from symfric.integrator.method import Method
-from symfric.integrator.step import build_dense_step, build_fixed
-from symfric.integrator.system import System, system
+from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.system import System, system
+from symfric.integrator.methods.method import Method
+from symfric.integrator.running.dense import Dense
+from symfric.integrator.step.attempt import build_dense_step, build_fixed
 
 Array = NDArray[np.float64]
 T = 1.0

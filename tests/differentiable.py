@@ -3,7 +3,7 @@
 import casadi as ca
 
 from symfric import Model, Output, Variable
-from symfric.holonomic import Holonomic
+from symfric.model.holonomic import Holonomic
 
 
 def oscillator() -> Model:

@@ -11,93 +11,101 @@ PACKAGES = ("symfric", "ocp", "identification")
 SOURCES = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
 
-MAY_IMPORT: dict[str, set[str]] = {
-    "symfric.status": set(),
-    "symfric.files": set(),
-    "symfric.vector": set(),
-    "symfric.numeric": {"symfric.vector"},
-    "symfric.parameters": {"symfric.numeric"},
-    "symfric.laws": {"symfric.numeric", "symfric.parameters", "symfric.vector"},
-    "symfric.sketch": set(),
-    "symfric.holonomic": set(),
-    "symfric.model": {
-        "symfric.holonomic",
-        "symfric.numeric",
-        "symfric.parameters",
-        "symfric.sketch",
-    },
-    "symfric.scenes": {
+FLOORS: dict[str, set[str]] = {
+    "symfric.foundation": set(),
+    "symfric.laws.base": {"symfric.foundation"},
+    "symfric.laws.static": {"symfric.foundation", "symfric.laws.base"},
+    "symfric.laws.dynamic": {"symfric.foundation", "symfric.laws.base"},
+    "symfric.laws.composed": {"symfric.foundation", "symfric.laws.base"},
+    "symfric.laws": {"symfric.foundation"},
+    "symfric.model": {"symfric.foundation"},
+    "symfric.multibody": {"symfric.foundation", "symfric.laws", "symfric.model"},
+    "symfric.multibody.urdf": {
+        "symfric.foundation",
         "symfric.laws",
         "symfric.model",
         "symfric.multibody",
-        "symfric.numeric",
-        "symfric.parameters",
     },
-    "symfric.multibody": {
-        "symfric.holonomic",
+    "symfric.scenes": {
+        "symfric.foundation",
         "symfric.laws",
         "symfric.model",
-        "symfric.numeric",
-        "symfric.parameters",
-        "symfric.sketch",
+        "symfric.multibody",
     },
-    "symfric.integrator": {
-        "symfric.holonomic",
+    "symfric.results": {"symfric.foundation", "symfric.model"},
+    "symfric.integrator.compiled": {"symfric.foundation"},
+    "symfric.integrator.equations": {
+        "symfric.foundation",
         "symfric.model",
-        "symfric.numeric",
-        "symfric.parameters",
-        "symfric.status",
-        "symfric.files",
-        "symfric.sketch",
-        "symfric.animation",  # on request, when a trajectory draws itself
-        "symfric.plotting",  # likewise
+        "symfric.integrator.compiled",
     },
-    "symfric.kinds": {"symfric.model"},
-    "symfric.strokes": {"symfric.sketch"},
-    "symfric.animation": {
-        "symfric.files",
-        "symfric.sketch",
-        "symfric.strokes",
-        "symfric.integrator",  # types only
+    "symfric.integrator.methods": {
+        "symfric.foundation",
+        "symfric.model",
+        "symfric.integrator.equations",
     },
-    "symfric.plotting": {
-        "symfric.files",
-        "symfric.numeric",
-        "symfric.parameters",
-        "symfric.figures",  # types only
-        "symfric.integrator",  # types only
-        "symfric.kinds",
-        "symfric.laws",
+    "symfric.integrator.step": {
+        "symfric.foundation",
+        "symfric.model",
+        "symfric.integrator.equations",
+        "symfric.integrator.methods",
     },
+    "symfric.integrator.running": {
+        "symfric.foundation",
+        "symfric.model",
+        "symfric.integrator.compiled",
+        "symfric.integrator.equations",
+        "symfric.integrator.methods",
+        "symfric.integrator.step",
+    },
+    "symfric.integrator.derivatives": {
+        "symfric.foundation",
+        "symfric.model",
+        "symfric.integrator.compiled",
+        "symfric.integrator.equations",
+        "symfric.integrator.running",
+        "symfric.integrator.step",
+    },
+    "symfric.integrator.many": {
+        "symfric.foundation",
+        "symfric.model",
+        "symfric.integrator.compiled",
+        "symfric.integrator.equations",
+        "symfric.integrator.running",
+        "symfric.integrator.step",
+    },
+    "symfric.integrator.peers": {
+        "symfric.foundation",
+        "symfric.model",
+        "symfric.integrator.equations",
+        "symfric.integrator.running",
+    },
+    "symfric.integrator": {"symfric.foundation", "symfric.model", "symfric.results"},
     "symfric.figures": {
-        "symfric.integrator",
+        "symfric.foundation",
         "symfric.laws",
         "symfric.model",
-        "symfric.numeric",
-        "symfric.parameters",
-        "symfric.plotting",  # on request, when a figure draws itself
+        "symfric.results",
+        "symfric.integrator",
         "symfric.scenes",
     },
     "symfric.codegen": {
-        "symfric",
-        "symfric.files",
-        "symfric.integrator",
+        "symfric.foundation",
         "symfric.laws",
         "symfric.model",
-        "symfric.numeric",
-        "symfric.parameters",
-        "symfric.status",
+        "symfric.integrator",
     },
     "ocp": {"symfric"},
     "identification": {"symfric"},
 }
-"""Unit -> units it may import (CONVENTIONS, section 8); each may import itself."""
-
-ON_REQUEST = {"symfric.laws": {"symfric.figures"}}
-"""Module -> what it imports inside a function, when an attribute of that name is asked for."""
+"""Folder -> folders it may import (CONVENTIONS, section 8). A folder stands for its rooms,
+too, except for the rooms themselves: these name each other. A house sees its own rooms."""
 
 ON_TOP = ("symfric.cli", "symfric.bench")
 """They see all, and they may print."""
+
+FRONTS = tuple(".".join(p.parent.relative_to(ROOT).parts) for p in SOURCES if p.stem == "__init__")
+"""Folders whose `__init__` hands out names of its rooms; nobody inside enters through it."""
 
 
 def dotted(path: Path) -> str:
@@ -133,9 +141,8 @@ def parsed(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"), str(path))
 
 
-def unit_of(module: str) -> str | None:
-    units = [unit for unit in MAY_IMPORT if within(module, unit)]
-    return max(units, key=len, default=None)
+def folder_of(module: str) -> str:
+    return max((f for f in FRONTS if within(module, f)), key=len)
 
 
 each_source = pytest.mark.parametrize("path", SOURCES, ids=[dotted(p) for p in SOURCES])
@@ -145,12 +152,16 @@ def on_top(module: str) -> bool:
     return any(within(module, top) for top in ON_TOP)
 
 
-def allowed(name: str, unit: str) -> bool:
-    """Whether `unit` may import the module `name`; to parts of symfric, `symfric` is its front."""
-    known = MAY_IMPORT[unit] | {unit}
-    if unit.startswith("symfric."):
-        return name in known or any(within(name, other) for other in known - {"symfric"})
-    return not on_top(name) and any(within(name, other) for other in known)
+def allowed(name: str, folder: str) -> bool:
+    """Whether files of `folder` may import the module `name`."""
+    if folder in ("ocp", "identification"):
+        return not on_top(name) and (within(name, folder) or within(name, "symfric"))
+    rooms = [other for other in FLOORS if within(folder, other) and other != folder]
+    above = any(within(name, house) for house in rooms)
+    known = {folder} | FLOORS[folder]
+    return any(name == k if above else within(name, k) for k in known) or (
+        above and folder_of(name) in known
+    )
 
 
 @each_source
@@ -158,20 +169,30 @@ def test_imports_point_down(path: Path) -> None:
     module = dotted(path)
     if module == "symfric" or on_top(module):
         return
-    unit = unit_of(module)
-    assert unit, f"{module}: say in MAY_IMPORT what it may know"
-    wrong = sorted({name for name in imported(parsed(path)) if not allowed(name, unit)})
-    later = ON_REQUEST.get(module, set())
-    wrong = [name for name in wrong if not any(within(name, unit) for unit in later)]
+    folder = folder_of(module)
+    assert folder in FLOORS, f"{module}: say in FLOORS what it may know"
+    wrong = sorted({name for name in imported(parsed(path)) if not allowed(name, folder)})
     assert not wrong, f"{module} must not import {', '.join(wrong)}"
 
 
-@pytest.mark.parametrize("module", ON_REQUEST)
-def test_what_is_fetched_on_request_is_not_imported_before(module: str) -> None:
-    path = ROOT.joinpath(*module.split("."), "__init__.py")
-    eager = [n for n in parsed(path).body if isinstance(n, ast.Import | ast.ImportFrom)]
-    early = [name for node in eager for name in imported(node)]
-    assert not [n for n in early if any(within(n, unit) for unit in ON_REQUEST[module])]
+@each_source
+def test_nobody_enters_through_the_front_of_his_own_house(path: Path) -> None:
+    module = dotted(path)
+    if path.stem != "__init__" and not on_top(module):
+        assert not {n for n in imported(parsed(path)) if n in FRONTS and within(module, n)}
+
+
+def test_no_circle_between_folders() -> None:
+    """Fronts apart, which stand above the rooms they show."""
+    arrows: dict[str, set[str]] = {}
+    for path in SOURCES:
+        if path.stem != "__init__" and not on_top(dotted(path)):
+            here = folder_of(dotted(path))
+            there = {folder_of(name) for name in imported(parsed(path))}
+            arrows.setdefault(here, set()).update(there - {here})
+    while leaves := {f for f, to in arrows.items() if not to & arrows.keys()}:
+        arrows = {f: to for f, to in arrows.items() if f not in leaves}
+    assert not arrows
 
 
 @each_source
@@ -228,7 +249,7 @@ FORMULAS = [
 
 @pytest.mark.parametrize("path", FORMULAS, ids=[dotted(p) for p in FORMULAS])
 def test_only_the_smooth_blocks_use_nonsmooth_functions(path: Path) -> None:
-    if dotted(path) != "symfric.laws.smooth":
+    if dotted(path) != "symfric.laws.base.smooth":
         assert not NONSMOOTH & set(calls(parsed(path), beside="smooth"))
 
 

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from symfric.bench.counts import integrator
 from symfric.bench.timing import best_time
-from symfric.integrator.initial import consistent
-from symfric.integrator.integrator import Integrator
-from symfric.integrator.run import GROWTH_MEMORY
+from symfric.foundation.numeric import flat_view
+from symfric.integrator.equations.initial import consistent
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.run import GROWTH_MEMORY
 from symfric.laws import Law
 from symfric.model import Model
 from symfric.multibody import JointFriction, Mechanism, Revolute
-from symfric.numeric import flat_view
 
 Array = NDArray[np.float64]
 SIZES = (2, 4, 8, 16, 32, 64)

@@ -21,16 +21,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.arguments import chosen
-from symfric.integrator.casadi_backend import peer
-from symfric.integrator.compiler import FLAGS, find_compiler
-from symfric.integrator.dense import from_records
-from symfric.integrator.engine import Stop
-from symfric.integrator.initial import consistent, first_step
-from symfric.integrator.inputs import Drivers, drivers
-from symfric.integrator.integrator import Integrator
-from symfric.integrator.run import ATTEMPTS, GROWTH_MEMORY, ROWS, Tolerances
+from symfric.integrator.compiled.compiler import FLAGS, find_compiler
+from symfric.integrator.equations.initial import consistent, first_step
+from symfric.integrator.equations.inputs import Drivers, drivers
+from symfric.integrator.equations.system import System, system
+from symfric.integrator.peers.casadi_integrators import peer
+from symfric.integrator.running.dense import from_records
+from symfric.integrator.running.engine import Stop
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.run import ATTEMPTS, GROWTH_MEMORY, ROWS, Tolerances
 from symfric.integrator.simulate import simulate
-from symfric.integrator.system import System, system
 from symfric.model import Model
 
 Array = NDArray[np.float64]

@@ -7,11 +7,11 @@ from typing import final
 import casadi as ca
 
 from symfric.bench.contenders import compile_time
-from symfric.integrator.compiler import find_compiler
-from symfric.integrator.engine import c_source
-from symfric.integrator.inputs import drivers
-from symfric.integrator.integrator import Integrator
-from symfric.integrator.tableaux import METHODS
+from symfric.integrator.compiled.compiler import find_compiler
+from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.running.engine import c_source
+from symfric.integrator.running.integrator import Integrator
 from symfric.laws import BrownMcPhee
 from symfric.model import Model
 from symfric.multibody import JointFriction, Mechanism, Revolute

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from symfric.bench.contenders import Array, Contender
+from symfric.foundation.parameters import parameters
 from symfric.laws import BrownMcPhee
-from symfric.parameters import parameters
 from symfric.scenes import SliderCrank
 
 TINY = 1e-9

@@ -10,8 +10,8 @@ from typing import final
 import numpy as np
 
 from symfric.integrator.simulate import simulate
-from symfric.integrator.trajectory import Trajectory
 from symfric.laws import BrownMcPhee, Law, SelfTuning, Viscous
+from symfric.results.trajectory import Trajectory
 from symfric.scenes import FourMass, MechanismScene, SliderCrank
 
 SMOOTH = Viscous(sigma_2=0.0)

@@ -15,7 +15,7 @@ from symfric.bench import peers
 from symfric.bench.ensemble import EnsembleRow, measure_ensemble
 from symfric.bench.sensitivities import SensitivityRow, measure_sensitivities
 from symfric.bench.timing import best_time
-from symfric.integrator.compiler import find_compiler
+from symfric.integrator.compiled.compiler import find_compiler
 from symfric.integrator.simulate import simulate
 from symfric.laws import BrownMcPhee, Law, LuGre
 from symfric.model import Model
@@ -127,7 +127,7 @@ class Benchmark:
 
     def plot(self, path: str | Path | None = None) -> "Figure":
         """Work-precision diagram: time against error, a panel per case."""
-        from symfric.plotting import plot_work_precision  # noqa: PLC0415
+        from symfric.bench.pictures import plot_work_precision  # noqa: PLC0415
 
         lines: dict[str, dict[str, list[tuple[float, float]]]] = {}
         for row in self.rows:

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from symfric.figures import FigureData
 from symfric.figures.data import Curve
-from symfric.integrator.blocks import refinement
-from symfric.integrator.initial import consistent
-from symfric.integrator.inputs import drivers
+from symfric.integrator.equations.blocks import refinement
+from symfric.integrator.equations.initial import consistent
+from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.system import System, system
+from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.simulate import simulate
-from symfric.integrator.step import build_fixed
-from symfric.integrator.system import System, system
-from symfric.integrator.tableaux import METHODS
+from symfric.integrator.step.attempt import build_fixed
 from symfric.laws import BrownMcPhee, Law, SelfTuning
 from symfric.model import Model, Output
 from symfric.scenes import FourMass
@@ -90,7 +90,7 @@ def jitter(
 
 def plot_jitter(data: FigureData, path: str | Path | None = None) -> "Figure":
     """A panel per slider, a colour per way of stepping, the laws by line and marker."""
-    from symfric.plotting import panels, save  # noqa: PLC0415  (matplotlib is slow to import)
+    from symfric.foundation.panels import panels, save  # noqa: PLC0415  (matplotlib is slow to import)
 
     figure, axes = panels(len(data.panels), 7.5, 3.0)
     cases = list(dict.fromkeys(c.case for c in data.curves))

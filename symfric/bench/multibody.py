@@ -18,8 +18,8 @@ from symfric.bench.contenders import MAKERS, Contender
 from symfric.bench.counts import CompileRow, CountRow, compile_rows, counts
 from symfric.bench.facts import DRIFT_S, DriftRow, Fact, NormRow, drifts, facts, norms
 from symfric.bench.timing import best_time
-from symfric.files import written
-from symfric.integrator.compiler import find_compiler
+from symfric.foundation.files import written
+from symfric.integrator.compiled.compiler import find_compiler
 from symfric.integrator.simulate import simulate
 from symfric.laws import BrownMcPhee
 from symfric.scenes import MechanismScene, PendulumBox, SliderCrank
@@ -181,7 +181,7 @@ class MultibodyBenchmark:
 
     def plot(self, path: str | Path | None = None) -> "Figure":
         """Work-precision diagram: time against error, a panel per case."""
-        from symfric.plotting import plot_work_precision  # noqa: PLC0415
+        from symfric.bench.pictures import plot_work_precision  # noqa: PLC0415
 
         lines: dict[str, dict[str, list[tuple[float, float]]]] = {}
         for row in self.runs:

@@ -10,14 +10,14 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.integrator.casadi_backend import peer
-from symfric.integrator.compiler import load
-from symfric.integrator.inputs import drivers
-from symfric.integrator.run import Tolerances
+from symfric.foundation.numeric import flat_view
+from symfric.integrator.compiled.compiler import load
+from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.system import system
+from symfric.integrator.peers.casadi_integrators import peer
+from symfric.integrator.running.run import Tolerances
 from symfric.integrator.simulate import simulate
-from symfric.integrator.system import system
 from symfric.model import Model
-from symfric.numeric import flat_view
 
 Array = NDArray[np.float64]
 Solve = Callable[[float], tuple[Array, int]]

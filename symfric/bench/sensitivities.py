@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.bench.timing import best_time
-from symfric.integrator.casadi_backend import peer
-from symfric.integrator.compiler import find_compiler
-from symfric.integrator.inputs import drivers
-from symfric.integrator.run import Tolerances
+from symfric.integrator.compiled.compiler import find_compiler
+from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.system import system
+from symfric.integrator.peers.casadi_integrators import peer
+from symfric.integrator.running.run import Tolerances
 from symfric.integrator.simulate import simulate
-from symfric.integrator.system import system
-from symfric.integrator.trajectory import Trajectory
 from symfric.laws import Law
 from symfric.model import Model
+from symfric.results.trajectory import Trajectory
 from symfric.scenes import rabinowicz
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ import typer
 
 from symfric.cli import bench_tables, output
 from symfric.cli.options import JsonOption, PlotOption, check_outputs
-from symfric.parameters import check_names
+from symfric.foundation.parameters import check_names
 
 SUBJECTS = ("integrator", "multibody", "jitter")
 

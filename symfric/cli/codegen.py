@@ -11,7 +11,7 @@ from symfric.cli import output
 from symfric.cli.options import JsonOption, LawOption, SetOption, any_with, check_folder, numbers
 from symfric.cli.run import kind_of, scenes_with
 from symfric.codegen import Block, Generated, Verification, generate, plant_block, verify
-from symfric.parameters import check_names, parameters
+from symfric.foundation.parameters import check_names, parameters
 
 REALS = {"double": ("double",), "float": ("float",), "both": ("double", "float")}
 

@@ -17,7 +17,7 @@ from symfric.cli.identify import show_identification
 from symfric.cli.options import check_folder
 from symfric.cli.run import show_trajectory
 from symfric.codegen import generate, verify
-from symfric.files import write_text
+from symfric.foundation.files import write_text
 from symfric.laws import Law, law_name
 from symfric.scenes import Rabinowicz
 
@@ -96,7 +96,8 @@ def load_records(data: Path | None) -> tuple[tuple[Dataset, Dataset], tuple[str,
 
 def stick_slip(folder: Path) -> Chapter:
     """Block on a belt with a smooth law and a bristle law."""
-    from symfric.plotting import plot_laws, plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
+    from symfric.figures.pictures import plot_laws  # noqa: PLC0415  (matplotlib is slow)
+    from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
 
     laws = {name: ALL_LAWS[name]() for name in ("brown_mcphee", "lugre")}
     motions = {name: simulate(Rabinowicz(law).model(), 20.0) for name, law in laws.items()}

@@ -17,7 +17,7 @@ from symfric.cli.options import (
     check_outputs,
     numbers,
 )
-from symfric.files import write_text
+from symfric.foundation.files import write_text
 
 
 def identify(

@@ -4,9 +4,9 @@ import csv
 from pathlib import Path
 
 from symfric import Linear
+from symfric.foundation.parameters import check_names
 from symfric.integrator import Input
 from symfric.model import finite
-from symfric.parameters import check_names
 
 
 def input_from_text(name: str, text: str) -> Input:

@@ -14,11 +14,11 @@ from symfric.cli.options import JsonOption, PlotOption, SetOption, any_with, che
 from symfric.figures import FIGURES, FigureData, compare
 from symfric.figures.requirements import parts, phenomena
 from symfric.figures.scales import NORMAL_FORCE
+from symfric.foundation.parameters import check_names, options
 from symfric.laws import PHENOMENA, POPULATIONS, AnyLaw, Population, any_from_text
 from symfric.laws.cost import cost
 from symfric.laws.names import ALIASES
 from symfric.model import finite
-from symfric.parameters import check_names, options
 from symfric.scenes import ALL_SCENES
 
 
@@ -59,7 +59,7 @@ def laws(
     if settings and not name:
         raise ValueError("--set: expected the name of a law before it, got none")
     if plot:
-        from symfric.plotting import plot_catalogue, plot_laws  # noqa: PLC0415  (matplotlib is slow)
+        from symfric.figures.pictures import plot_catalogue, plot_laws  # noqa: PLC0415  (matplotlib is slow)
 
         draw = plot_laws if name else plot_catalogue
         load = 1.0 if normal_force is None else finite("--normal-force", normal_force)

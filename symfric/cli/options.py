@@ -9,9 +9,9 @@ from typing import Annotated, TypeVar
 import typer
 
 from symfric import Law, law_from_text, parameters, with_values
+from symfric.foundation.parameters import check_names, options
 from symfric.laws import AnyLaw, any_from_text
 from symfric.model import finite
-from symfric.parameters import check_names, options
 
 JsonOption = Annotated[
     str | None,

@@ -14,7 +14,7 @@ from rich.progress import Progress
 from rich.table import Table
 from rich.text import Text
 
-from symfric.files import write_text
+from symfric.foundation.files import write_text
 
 
 def number(value: float) -> str:

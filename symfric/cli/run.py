@@ -20,11 +20,11 @@ from symfric.cli.options import (
     numbers,
 )
 from symfric.figures.scene import DEFAULT_INPUT, DEFAULT_T_END
+from symfric.foundation.parameters import check_names
 from symfric.integrator import Input
-from symfric.integrator.inputs import Sampled
-from symfric.kinds import is_mechanism, kinds, norms
-from symfric.multibody.urdf import relative
-from symfric.parameters import check_names
+from symfric.integrator.equations.inputs import Sampled
+from symfric.multibody.urdf.read import relative
+from symfric.results.kinds import is_mechanism, kinds, norms
 from symfric.scenes import ALL_SCENES, MECHANISMS, Robot, Scene
 
 ROBOT_T_END = 2.0
@@ -125,7 +125,7 @@ def run(
     if out:
         next(iter(found.values())).to_csv(out)
     if plot:
-        from symfric.plotting import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
+        from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
 
         plot_trajectories(found, path=plot)
     if movie:
@@ -182,7 +182,7 @@ def check_movie(path: Path | None, scene: str) -> None:
         return
     if scene not in MECHANISMS and not scene.endswith(".urdf"):
         raise ValueError(f"--animate: expected one of {', '.join(MECHANISMS)}, got {scene}")
-    from symfric.animation import check_format  # noqa: PLC0415  (matplotlib is slow)
+    from symfric.results.animation import check_format  # noqa: PLC0415  (matplotlib is slow)
 
     check_format(path)
 

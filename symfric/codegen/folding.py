@@ -6,8 +6,8 @@ import casadi as ca
 
 from symfric.codegen.c99 import TRANSCENDENTAL
 from symfric.codegen.graph import graph
+from symfric.foundation.parameters import parameters, with_values
 from symfric.laws import Law
-from symfric.parameters import parameters, with_values
 
 
 def runtime_parameters(law: Law) -> tuple[str, ...]:

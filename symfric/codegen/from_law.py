@@ -10,11 +10,11 @@ import casadi as ca
 from symfric.codegen.block import Block
 from symfric.codegen.folding import runtime_parameters
 from symfric.codegen.held_step import force_of_rate, held_step
+from symfric.foundation.numeric import is_casadi
+from symfric.foundation.parameters import Variable, check_names, parameters, symbolise
 from symfric.laws import Law, Sum, law_name
-from symfric.laws.base import chosen
+from symfric.laws.base.law import chosen
 from symfric.model import Output, Variables, finite
-from symfric.numeric import is_casadi
-from symfric.parameters import Variable, check_names, parameters, symbolise
 
 STEP_SIZE = 1e-3
 """Default of the parameter h [s]."""

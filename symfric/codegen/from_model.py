@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from symfric.codegen.block import Block
 from symfric.codegen.from_law import STEP_SIZE
-from symfric.integrator.initial import consistent
-from symfric.integrator.inputs import Drivers
-from symfric.integrator.step import build_fixed
-from symfric.integrator.system import System, system
-from symfric.integrator.tableaux import METHODS
+from symfric.foundation.parameters import Variable, check_names
+from symfric.integrator.equations.initial import consistent
+from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.system import System, system
+from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.step.attempt import build_fixed
 from symfric.model import Model, Output, Variables, finite
-from symfric.parameters import Variable, check_names
 
 
 def plant_block(

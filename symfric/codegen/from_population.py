@@ -6,9 +6,9 @@ import casadi as ca
 
 from symfric.codegen.block import Block
 from symfric.codegen.from_law import STEP_SIZE
+from symfric.foundation.parameters import Variable, parameters
 from symfric.laws import Population, law_name
 from symfric.model import Output, finite
-from symfric.parameters import Variable, parameters
 
 LOOP = """One contact. The friction force of the population is the sum of F over an array of states,
 all with the same v and N, each with the random number r of its own in [-1, 1]. `Population.begin`

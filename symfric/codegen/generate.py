@@ -12,9 +12,9 @@ from symfric.codegen.c99 import REALS, Real
 from symfric.codegen.from_law import law_block
 from symfric.codegen.from_population import contact_block
 from symfric.codegen.source import header, members, prefix, routines, source
-from symfric.files import write_text
+from symfric.foundation.files import write_text
+from symfric.foundation.parameters import check_names
 from symfric.laws import AnyLaw, Population
-from symfric.parameters import check_names
 
 
 @final

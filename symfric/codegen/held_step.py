@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.graph import LEAVES, graph, rebuild
-from symfric.integrator.exponential import phi1_phi2
+from symfric.integrator.methods.exponential import phi1_phi2
 
 
 def held_step(rate: ca.SX, z: ca.SX, h: ca.SX | float, rest: ca.SX, where: str) -> list[ca.SX]:

@@ -16,8 +16,8 @@ from symfric.codegen.generate import Generated
 from symfric.codegen.runaway import longest_step, runs_away, step_size
 from symfric.codegen.runner import program, run_c, run_vm
 from symfric.codegen.source import prefix, routines
-from symfric.files import write_text
-from symfric.parameters import Variable
+from symfric.foundation.files import write_text
+from symfric.foundation.parameters import Variable
 
 Array = NDArray[np.float64]
 

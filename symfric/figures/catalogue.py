@@ -12,8 +12,8 @@ from symfric.figures.scales import NORMAL_FORCE, Scales
 from symfric.figures.steady_state import steady_state
 from symfric.figures.sweeps import sweep_b, sweep_c, sweep_e
 from symfric.figures.transition import transition
+from symfric.foundation.parameters import check_names
 from symfric.laws import AnyLaw
-from symfric.parameters import check_names
 
 
 class MakeFigure(Protocol):

@@ -8,8 +8,8 @@ from symfric.figures.data import FigureData
 from symfric.figures.requirements import check_any
 from symfric.figures.scales import NORMAL_FORCE, scales
 from symfric.figures.scene import scene_figure
+from symfric.foundation.parameters import check_names, distinct
 from symfric.laws import AnyLaw, Law, Population, any_from_text, law_name, steady_inputs
-from symfric.parameters import check_names, distinct
 from symfric.scenes import ALL_SCENES
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.parameters import check_names
+from symfric.foundation.parameters import check_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,7 +82,7 @@ class FigureData:
 
     def plot(self, path: str | Path | None = None) -> "Figure":
         """Draw it, labelled with units; save it to `path` if given."""
-        from symfric.plotting import plot_figure  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.figures.pictures import plot_figure  # noqa: PLC0415  (matplotlib is slow to import)
 
         return plot_figure(self, path)
 

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 
 from symfric.figures.data import Array, Curve
 from symfric.figures.random_motion import shoved, slid
+from symfric.foundation.parameters import Variable
 from symfric.integrator import simulate
-from symfric.integrator.inputs import Input
+from symfric.integrator.equations.inputs import Input
 from symfric.laws import AnyLaw, Law, Population, law_name
 from symfric.model import Event, Model, Output
-from symfric.parameters import Variable
 from symfric.scenes.base import contact
 from symfric.scenes.drive import Drive
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from symfric.figures.data import Array
 from symfric.integrator import Linear
-from symfric.integrator.inputs import Input
+from symfric.integrator.equations.inputs import Input
 from symfric.laws import Population
 from symfric.model import finite
 

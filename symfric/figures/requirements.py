@@ -3,7 +3,7 @@
 from dataclasses import fields
 
 from symfric.laws import ALL_LAWS, PHENOMENA, POPULATIONS, AnyLaw, Law, Population, law_name
-from symfric.laws.base import check_law
+from symfric.laws.base.law import check_law
 
 
 def parts(law: AnyLaw) -> list[type[AnyLaw]]:

@@ -9,9 +9,9 @@ import numpy as np
 
 from symfric.figures.data import Array
 from symfric.figures.requirements import check_any, phenomena
+from symfric.foundation.parameters import parameters
 from symfric.laws import AnyLaw, Population, steady_force
 from symfric.model import finite
-from symfric.parameters import parameters
 
 MASS = 0.8
 """Mass of the block where one is driven [kg], of seed table 2."""

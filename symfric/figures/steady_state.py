@@ -6,8 +6,8 @@ import numpy as np
 
 from symfric.figures.data import Curve, FigureData
 from symfric.figures.scales import NORMAL_FORCE, Scales, scales
+from symfric.foundation.parameters import parameters, with_values
 from symfric.laws import AnyLaw, Law, law_name, steady_force, steady_inputs
-from symfric.parameters import parameters, with_values
 
 
 def steady_state(

@@ -5,10 +5,10 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symfric.integrator.method import Method
-from symfric.integrator.tableaux import ADAPTIVE, METHODS
+from symfric.foundation.parameters import check_names
+from symfric.integrator.methods.method import Method
+from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS
 from symfric.model import finite
-from symfric.parameters import check_names
 
 Array = NDArray[np.float64]
 LOOSE = 1e-5

@@ -19,18 +19,18 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from symfric.foundation.parameters import check_names
+from symfric.foundation.status import Status
 from symfric.integrator.arguments import check_span, check_times, chosen
-from symfric.integrator.chunk import Chunk, Job, Solved, digest, solve_chunk
-from symfric.integrator.initial import first_step
-from symfric.integrator.inputs import Drivers, Input, drivers
-from symfric.integrator.integrator import Integrator
-from symfric.integrator.one_by_one import solve_one_by_one
-from symfric.integrator.run import Tolerances
-from symfric.integrator.step import GROWTH_MEMORY
-from symfric.integrator.store import Store
+from symfric.integrator.equations.initial import first_step
+from symfric.integrator.equations.inputs import Drivers, Input, drivers
+from symfric.integrator.many.chunk import Chunk, Job, Solved, digest, solve_chunk
+from symfric.integrator.many.one_by_one import solve_one_by_one
+from symfric.integrator.many.store import Store
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.run import Tolerances
+from symfric.integrator.step.attempt import GROWTH_MEMORY
 from symfric.model import Model
-from symfric.parameters import check_names
-from symfric.status import Status
 
 Array = NDArray[np.float64]
 EXECUTORS = ("serial", "threads", "processes")

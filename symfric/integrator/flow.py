@@ -3,13 +3,13 @@
 import casadi as ca
 import numpy as np
 
-from symfric.integrator.inputs import Drivers
-from symfric.integrator.manifold import Manifold
-from symfric.integrator.step import build_fixed
-from symfric.integrator.system import System, system
-from symfric.integrator.tableaux import METHODS
+from symfric.foundation.parameters import check_names
+from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.manifold import Manifold
+from symfric.integrator.equations.system import System, system
+from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.step.attempt import build_fixed
 from symfric.model import Model
-from symfric.parameters import check_names
 
 
 def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Function:

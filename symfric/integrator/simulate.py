@@ -10,20 +10,20 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symfric.integrator.adjoint import gradient
+from symfric.foundation.parameters import check_names
+from symfric.foundation.status import SolveError, Status
 from symfric.integrator.arguments import check_span, check_times, chosen
-from symfric.integrator.casadi_backend import integrate_by_peer
-from symfric.integrator.columns import Columns
-from symfric.integrator.dense import Dense
-from symfric.integrator.inputs import Drivers, Input, drivers
-from symfric.integrator.integrator import Integrator
-from symfric.integrator.method import Method
-from symfric.integrator.run import Run, Tolerances, integrate
-from symfric.integrator.sensitivity import Path, Seeds, forward, of_signals, seeds
-from symfric.integrator.trajectory import Statistics, Trajectory
+from symfric.integrator.compiled.columns import Columns
+from symfric.integrator.derivatives.adjoint import gradient
+from symfric.integrator.derivatives.sensitivity import Path, Seeds, forward, of_signals, seeds
+from symfric.integrator.equations.inputs import Drivers, Input, drivers
+from symfric.integrator.methods.method import Method
+from symfric.integrator.peers.casadi_integrators import integrate_by_peer
+from symfric.integrator.running.dense import Dense
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.run import Run, Tolerances, integrate
 from symfric.model import Model
-from symfric.parameters import check_names
-from symfric.status import SolveError, Status
+from symfric.results.trajectory import Statistics, Trajectory
 
 Array = NDArray[np.float64]
 PEERS = ("rosenbrock", "sundials", "ggl")
@@ -83,8 +83,8 @@ def simulate(
             user's cache; "auto" starts in the former and goes over to the latter when that is
             predicted to pay; "rosenbrock" and "sundials" are CasADi's own integrators, under
             which the constraints of mechanisms drift, "ggl" is idas with constraints on positions
-            and velocities (`symfric.integrator.ggl`), for comparisons: they pass through friction
-            that jams without a sign of it.
+            and velocities (`symfric.integrator.peers.ggl`), for comparisons: they pass through
+            friction that jams without a sign of it.
         event_tolerance: how sharply events are located [s].
         max_steps: attempts allowed.
         sensitivities: free parameters by name and start values as "x0.v"; the trajectory then

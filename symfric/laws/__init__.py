@@ -3,15 +3,23 @@
 Knows nothing of mechanisms, integration or optimisation; a law drops into any CasADi code.
 """
 
-from symfric.laws.base import PHENOMENA as PHENOMENA
-from symfric.laws.base import Facts as Facts
-from symfric.laws.base import Input as Input
-from symfric.laws.base import Law as Law
-from symfric.laws.base import State as State
-from symfric.laws.base import StaticLaw as StaticLaw
-from symfric.laws.compose import Asymmetric as Asymmetric
-from symfric.laws.compose import LoadDependent as LoadDependent
-from symfric.laws.compose import Sum as Sum
+from symfric.laws.base.law import PHENOMENA as PHENOMENA
+from symfric.laws.base.law import Facts as Facts
+from symfric.laws.base.law import Input as Input
+from symfric.laws.base.law import Law as Law
+from symfric.laws.base.law import State as State
+from symfric.laws.base.law import StaticLaw as StaticLaw
+from symfric.laws.composed.compose import Asymmetric as Asymmetric
+from symfric.laws.composed.compose import LoadDependent as LoadDependent
+from symfric.laws.composed.compose import Sum as Sum
+from symfric.laws.composed.planar import Planar as Planar
+from symfric.laws.composed.planar import Spatial as Spatial
+from symfric.laws.composed.populations import AnyLaw as AnyLaw
+from symfric.laws.composed.populations import GenericAsperity as GenericAsperity
+from symfric.laws.composed.populations import Population as Population
+from symfric.laws.composed.populations import RandomBristles as RandomBristles
+from symfric.laws.composed.wrap import Lagged as Lagged
+from symfric.laws.composed.wrap import TemperatureDependent as TemperatureDependent
 from symfric.laws.dynamic import GMS as GMS
 from symfric.laws.dynamic import Armstrong as Armstrong
 from symfric.laws.dynamic import BlimanSorine as BlimanSorine
@@ -36,12 +44,6 @@ from symfric.laws.names import POPULATIONS as POPULATIONS
 from symfric.laws.names import any_from_text as any_from_text
 from symfric.laws.names import law_from_text as law_from_text
 from symfric.laws.names import law_name as law_name
-from symfric.laws.planar import Planar as Planar
-from symfric.laws.planar import Spatial as Spatial
-from symfric.laws.populations import AnyLaw as AnyLaw
-from symfric.laws.populations import GenericAsperity as GenericAsperity
-from symfric.laws.populations import Population as Population
-from symfric.laws.populations import RandomBristles as RandomBristles
 from symfric.laws.static import BAM as BAM
 from symfric.laws.static import Ambrosio as Ambrosio
 from symfric.laws.static import Andersson as Andersson
@@ -81,14 +83,3 @@ from symfric.laws.static import Viscous as Viscous
 from symfric.laws.static import Wojewoda as Wojewoda
 from symfric.laws.steady import steady_force as steady_force
 from symfric.laws.steady import steady_inputs as steady_inputs
-from symfric.laws.wrap import Lagged as Lagged
-from symfric.laws.wrap import TemperatureDependent as TemperatureDependent
-
-
-def __getattr__(name: str) -> object:
-    """`compare`, which stands above the laws and is fetched when asked for."""
-    if name != "compare":
-        raise AttributeError(f"module 'symfric.laws' has no attribute '{name}'")
-    from symfric.figures import compare  # noqa: PLC0415  (laws know nothing of figures)
-
-    return compare

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from symfric.laws.populations import AnyLaw, Population
+from symfric.laws.composed.populations import AnyLaw, Population
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,13 @@
 
 from re import fullmatch
 
-from symfric.laws.base import Law
-from symfric.laws.compose import Asymmetric, LoadDependent, Sum
+from symfric.foundation.parameters import check_names
+from symfric.laws.base.law import Law
+from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum
+from symfric.laws.composed.populations import AnyLaw, GenericAsperity, RandomBristles
+from symfric.laws.composed.wrap import Lagged, TemperatureDependent
 from symfric.laws.dynamic import DYNAMIC_LAWS
-from symfric.laws.populations import AnyLaw, GenericAsperity, RandomBristles
 from symfric.laws.static import STATIC_LAWS
-from symfric.laws.wrap import Lagged, TemperatureDependent
-from symfric.parameters import check_names
 
 ALL_LAWS: dict[str, type[Law]] = {
     **STATIC_LAWS,

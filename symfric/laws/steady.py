@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.laws import smooth
-from symfric.laws.populations import AnyLaw, Population
-from symfric.numeric import Scalar
+from symfric.foundation.numeric import Scalar
+from symfric.laws.base import smooth
+from symfric.laws.composed.populations import AnyLaw, Population
 
 Array = NDArray[np.float64]
 

@@ -30,4 +30,4 @@ from symfric.multibody.joints import Universal as Universal
 from symfric.multibody.kinematics import Kinematics as Kinematics
 from symfric.multibody.mechanism import Mechanism as Mechanism
 from symfric.multibody.spatial import Frame as Frame
-from symfric.multibody.urdf import read_urdf as read_urdf
+from symfric.multibody.urdf.read import read_urdf as read_urdf

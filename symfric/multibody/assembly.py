@@ -16,10 +16,13 @@ from typing import final
 import casadi as ca
 import numpy as np
 
-from symfric.holonomic import Holonomic, Inner
+from symfric.foundation.numeric import is_symbolic
+from symfric.foundation.parameters import Variable
 from symfric.laws import Law
-from symfric.laws.planar import Spatial
+from symfric.laws.composed.planar import Spatial
 from symfric.model import Event, Model, Monitor, Output, Variables
+from symfric.model.holonomic import Holonomic, Inner
+from symfric.model.sketch import Sketch
 from symfric.multibody.body import GROUND
 from symfric.multibody.equations import Equations
 from symfric.multibody.friction import Contact
@@ -27,9 +30,6 @@ from symfric.multibody.joints import Free
 from symfric.multibody.results import Put
 from symfric.multibody.spatial import euler_e
 from symfric.multibody.topology import Topology
-from symfric.numeric import is_symbolic
-from symfric.parameters import Variable
-from symfric.sketch import Sketch
 
 NONE = ca.SX(0, 1)
 Details = Callable[[ca.SX, Put], Mapping[str, Output]]

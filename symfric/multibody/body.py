@@ -7,8 +7,8 @@ from typing import Any, final
 import casadi as ca
 import numpy as np
 
+from symfric.foundation.numeric import Scalar
 from symfric.multibody.spatial import Frame, Vector, is_scalar, is_vector, vector
-from symfric.numeric import Scalar
 
 GROUND = "ground"
 """The name of the body that does not move."""

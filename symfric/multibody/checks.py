@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.numeric import is_number, is_symbolic
 from symfric.model import Variables
 from symfric.multibody.body import GROUND, Body
 from symfric.multibody.constraints import Constraint
@@ -16,7 +17,6 @@ from symfric.multibody.forces import Force
 from symfric.multibody.friction import JointFriction
 from symfric.multibody.joints import Joint
 from symfric.multibody.topology import Topology, body_of
-from symfric.numeric import is_number, is_symbolic
 
 Array = NDArray[np.float64]
 Position = Callable[[Array], tuple[ca.DM, ca.DM, ca.DM]]

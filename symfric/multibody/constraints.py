@@ -16,12 +16,12 @@ from typing import ClassVar, final
 
 import casadi as ca
 
+from symfric.foundation.numeric import Scalar
 from symfric.multibody.body import GROUND
 from symfric.multibody.forces import Axial, Load
 from symfric.multibody.joints import Joint
 from symfric.multibody.kinematics import Kinematics, Motion
 from symfric.multibody.spatial import skew
-from symfric.numeric import Scalar
 
 Loads = Sequence[Load | Axial]
 

@@ -23,10 +23,10 @@ from typing import ClassVar, final
 
 import casadi as ca
 
+from symfric.foundation.numeric import Scalar, is_number, is_symbolic
 from symfric.multibody.constraints import Constraint, Held, impossible, linear, wraps
 from symfric.multibody.joints import Joint
 from symfric.multibody.kinematics import Kinematics
-from symfric.numeric import Scalar, is_number, is_symbolic
 
 TEETH = 1000
 """Largest denominator of a ratio where both angles are known modulo 2 pi."""

@@ -6,7 +6,7 @@ from typing import final
 
 import casadi as ca
 
-from symfric.laws.planar import Spatial
+from symfric.laws.composed.planar import Spatial
 from symfric.multibody.constraints import Constraint, Held
 from symfric.multibody.cuts import Cuts
 from symfric.multibody.dynamics import (

@@ -12,12 +12,12 @@ from typing import final
 
 import casadi as ca
 
+from symfric.foundation.numeric import Scalar, equals, is_number, is_symbolic
 from symfric.multibody.body import GROUND
 from symfric.multibody.joints import Joint
 from symfric.multibody.kinematics import Kinematics
 from symfric.multibody.spatial import Vector, vector
 from symfric.multibody.topology import body_of
-from symfric.numeric import Scalar, equals, is_number, is_symbolic
 
 ZERO = ca.SX(3, 1)
 

@@ -24,10 +24,10 @@ from typing import final
 
 import casadi as ca
 
+from symfric.foundation.numeric import Scalar, is_number, is_symbolic
 from symfric.laws import Law
-from symfric.laws.base import check_law
-from symfric.laws.planar import Spatial, anisotropy
-from symfric.numeric import Scalar, is_number, is_symbolic
+from symfric.laws.base.law import check_law
+from symfric.laws.composed.planar import Spatial, anisotropy
 
 
 @final

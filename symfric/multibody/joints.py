@@ -15,6 +15,7 @@ from typing import ClassVar, final
 
 import casadi as ca
 
+from symfric.foundation.numeric import Scalar, is_number, is_symbolic
 from symfric.multibody.friction import JointFriction
 from symfric.multibody.spatial import (
     euler_g,
@@ -23,7 +24,6 @@ from symfric.multibody.spatial import (
     rotation_y,
     rotation_z,
 )
-from symfric.numeric import Scalar, is_number, is_symbolic
 
 Pair = tuple[ca.SX, ca.SX]
 NONE = ca.SX(3, 0)

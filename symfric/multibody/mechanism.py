@@ -9,9 +9,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Scalar, equals
+from symfric.foundation.parameters import Variable, check_names
 from symfric.model import Model, Variables
 from symfric.multibody import checks
-from symfric.multibody.animation import sketch
 from symfric.multibody.assembly import assemble, coordinates
 from symfric.multibody.body import GROUND, Body
 from symfric.multibody.constraints import Constraint
@@ -27,10 +28,9 @@ from symfric.multibody.prepare import (
     written,
 )
 from symfric.multibody.results import results
+from symfric.multibody.sketch import sketch
 from symfric.multibody.spatial import Frame, Vector, is_vector
 from symfric.multibody.topology import Topology, absolute, spanning_tree
-from symfric.numeric import Scalar, equals
-from symfric.parameters import Variable, check_names
 
 Array = NDArray[np.float64]
 NONE = ca.SX(0, 1)

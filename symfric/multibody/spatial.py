@@ -14,7 +14,7 @@ from typing import Any, final
 
 import casadi as ca
 
-from symfric.numeric import is_number, is_symbolic
+from symfric.foundation.numeric import is_number, is_symbolic
 
 Vector = Sequence[Any] | ca.SX | ca.DM
 """Three numbers or symbols."""

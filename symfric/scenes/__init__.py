@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable
 
+from symfric.foundation.numeric import Scalar
+from symfric.foundation.parameters import with_values
 from symfric.laws import Law
 from symfric.model import Model
-from symfric.numeric import Scalar
-from symfric.parameters import with_values
 from symfric.scenes.arm import Arm as Arm
 from symfric.scenes.base import Scene as Scene
 from symfric.scenes.base import friction_states as friction_states

@@ -8,11 +8,11 @@ from typing import final
 
 import casadi as ca
 
+from symfric.foundation.numeric import Scalar
+from symfric.foundation.parameters import Parametric, Variable, symbolise
 from symfric.laws import Law
-from symfric.laws.base import check_law, chosen
+from symfric.laws.base.law import check_law, chosen
 from symfric.model import Event, Model, Monitor, Variables
-from symfric.numeric import Scalar
-from symfric.parameters import Parametric, Variable, symbolise
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,9 +5,9 @@ from typing import final
 
 import casadi as ca
 
+from symfric.foundation.numeric import Scalar
+from symfric.foundation.parameters import Variable, param
 from symfric.model import Model, Output, Variables
-from symfric.numeric import Scalar
-from symfric.parameters import Variable, param
 from symfric.scenes.base import Scene, contact
 
 

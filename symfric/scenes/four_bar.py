@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Any, final
 
+from symfric.foundation.numeric import Scalar, atan, cos, sin, sqrt
+from symfric.foundation.parameters import param
 from symfric.multibody import JointFriction, Mechanism, PointOnLine, Revolute
-from symfric.numeric import Scalar, atan, cos, sin, sqrt
-from symfric.parameters import param
 from symfric.scenes.mechanism import MechanismScene
 from symfric.scenes.pendulum import HINGE
 

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import final
 
+from symfric.foundation.numeric import Scalar
+from symfric.foundation.parameters import param
 from symfric.multibody import JointFriction, Mechanism, Revolute
-from symfric.numeric import Scalar
-from symfric.parameters import param
 from symfric.scenes.mechanism import MechanismScene
 
 HINGE = (0.0, -1.0, 0.0)

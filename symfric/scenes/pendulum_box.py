@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import final
 
+from symfric.foundation.numeric import Scalar
+from symfric.foundation.parameters import param
 from symfric.laws import Law
 from symfric.multibody import JointFriction, Mechanism, Prismatic, Revolute
-from symfric.numeric import Scalar
-from symfric.parameters import param
 from symfric.scenes.mechanism import MechanismScene
 from symfric.scenes.pendulum import HINGE
 

@@ -6,11 +6,11 @@ from typing import final
 
 import casadi as ca
 
-from symfric.laws import smooth
+from symfric.foundation.numeric import Scalar, sqrt, tan
+from symfric.foundation.parameters import Variable, param, parameters, with_values
+from symfric.laws.base import smooth
 from symfric.laws.static.quarter_car import tilt
 from symfric.model import Model, Output, Variables
-from symfric.numeric import Scalar, sqrt, tan
-from symfric.parameters import Variable, param, parameters, with_values
 from symfric.scenes.base import Scene, contact
 
 LINKAGE = ("k_s", "b_d", "theta", "L_d")

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import final
 
+from symfric.foundation.numeric import Scalar
+from symfric.foundation.parameters import param
 from symfric.multibody import Mechanism
-from symfric.multibody.urdf import read_urdf
-from symfric.numeric import Scalar
-from symfric.parameters import param
+from symfric.multibody.urdf.read import read_urdf
 from symfric.scenes.mechanism import MechanismScene
 
 

@@ -1,6 +1,6 @@
 """Laws with internal states."""
 
-from symfric.laws.base import Law
+from symfric.laws.base.law import Law
 from symfric.laws.dynamic.armstrong import Armstrong as Armstrong
 from symfric.laws.dynamic.bliman_sorine import BlimanSorine as BlimanSorine
 from symfric.laws.dynamic.bouc_wen import BoucWen as BoucWen

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from symfric.laws import smooth
-from symfric.laws.base import Facts, Law, State
+from symfric.foundation.numeric import Scalar, column, exp, sqrt
+from symfric.foundation.parameters import param
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Facts, Law, State
 from symfric.laws.dynamic.element import yielding
-from symfric.numeric import Scalar, column, exp, sqrt
-from symfric.parameters import param
 
 
 @final

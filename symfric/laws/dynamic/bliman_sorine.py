@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar, final
 
-from symfric.laws import smooth
-from symfric.laws.base import Facts, Law, State
-from symfric.numeric import Scalar, column
-from symfric.parameters import option, param
+from symfric.foundation.numeric import Scalar, column
+from symfric.foundation.parameters import option, param
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Facts, Law, State
 
 
 @final

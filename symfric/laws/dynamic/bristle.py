@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from symfric.laws import smooth
-from symfric.laws.base import Law, State
-from symfric.numeric import Scalar, column, is_number
-from symfric.parameters import param
+from symfric.foundation.numeric import Scalar, column, is_number
+from symfric.foundation.parameters import param
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Law, State
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar, final
 
-from symfric.laws import smooth
-from symfric.laws.base import Facts, Law, State
+from symfric.foundation.numeric import Scalar, column, equals
+from symfric.foundation.parameters import param
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Facts, Law, State
 from symfric.laws.dynamic.element import spent
-from symfric.numeric import Scalar, column, equals
-from symfric.parameters import param
 
 
 @final

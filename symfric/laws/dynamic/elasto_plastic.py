@@ -4,12 +4,12 @@ from dataclasses import dataclass
 from math import pi
 from typing import ClassVar, final
 
-from symfric.laws import smooth
-from symfric.laws.base import Facts
+from symfric.foundation.numeric import Scalar, column, equals, is_number, sin
+from symfric.foundation.parameters import param
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Facts
 from symfric.laws.dynamic.bristle import Bristle
 from symfric.laws.dynamic.element import ahead
-from symfric.numeric import Scalar, column, equals, is_number, sin
-from symfric.parameters import param
 
 
 @final

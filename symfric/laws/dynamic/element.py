@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-from symfric.laws import smooth
-from symfric.numeric import Scalar, sqrt
-from symfric.vector import ROUND, Vector, Vectors
+from symfric.foundation.numeric import Scalar, sqrt
+from symfric.foundation.vector import ROUND, Vector, Vectors
+from symfric.laws.base import smooth
 
 
 def along(t: Vector, s: Vector) -> Scalar:

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar, final
 
-from symfric.laws.base import Facts, Switch
-from symfric.laws.sticking import Sticking, held, stick_and_slip
-from symfric.numeric import Scalar
-from symfric.parameters import param
+from symfric.foundation.numeric import Scalar
+from symfric.foundation.parameters import param
+from symfric.laws.base.law import Facts, Switch
+from symfric.laws.base.sticking import Sticking, held, stick_and_slip
 
 
 @final

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from symfric.laws import smooth
-from symfric.laws.base import Facts, Law, State
-from symfric.numeric import Scalar, column, equals, exp
-from symfric.parameters import param
+from symfric.foundation.numeric import Scalar, column, equals, exp
+from symfric.foundation.parameters import param
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Facts, Law, State
 
 
 @final

@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from symfric.laws import smooth
-from symfric.laws.base import Facts, Law, State
+from symfric.foundation.numeric import Scalar, column, is_number
+from symfric.foundation.parameters import param
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Facts, Law, State
 from symfric.laws.dynamic.element import yielding
 from symfric.laws.dynamic.maxwell_slip import Slider
-from symfric.numeric import Scalar, column, is_number
-from symfric.parameters import param
 
 SLIDERS = (Slider(5e4, 0.05), Slider(2.5e4, 0.05), Slider(1.5e4, 0.05), Slider(1e4, 0.05))
 """Together 1e5 N/m and mu = 0.2, above the static level."""

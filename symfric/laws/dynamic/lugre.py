@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from symfric.laws import smooth
-from symfric.laws.base import Facts
+from symfric.foundation.numeric import Scalar, column, exp
+from symfric.foundation.parameters import param
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Facts
 from symfric.laws.dynamic.bristle import Bristle
-from symfric.numeric import Scalar, column, exp
-from symfric.parameters import param
 
 
 @final

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from symfric.laws import smooth
-from symfric.laws.base import Facts, Law, State, Switch
+from symfric.foundation.numeric import Scalar, column
+from symfric.foundation.parameters import Parametric, option, param
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Facts, Law, State, Switch
 from symfric.laws.dynamic.element import stretched, yielding
-from symfric.numeric import Scalar, column
-from symfric.parameters import Parametric, option, param
 
 
 @final

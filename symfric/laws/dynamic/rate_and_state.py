@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from symfric.laws.base import Facts, Law, State
-from symfric.numeric import Scalar, asinh, column, exp, is_number, log, sqrt
-from symfric.parameters import option, param
+from symfric.foundation.numeric import Scalar, asinh, column, exp, is_number, log, sqrt
+from symfric.foundation.parameters import option, param
+from symfric.laws.base.law import Facts, Law, State
 
 
 @final

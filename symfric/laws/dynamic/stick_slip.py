@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from symfric.laws import smooth
-from symfric.laws.base import Facts, Law, State
+from symfric.foundation.numeric import Scalar, column
+from symfric.foundation.parameters import option, param
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Facts, Law, State
 from symfric.laws.dynamic.element import yielding
-from symfric.numeric import Scalar, column
-from symfric.parameters import option, param
 
 ROOT_STEPS = 10
 """Steps of Newton's method that reach a root to rounding for every sharpness allowed."""

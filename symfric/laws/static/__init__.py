@@ -1,6 +1,6 @@
 """Memoryless laws F(v, N): one family a file."""
 
-from symfric.laws.base import Law
+from symfric.laws.base.law import Law
 from symfric.laws.static.applied_force import Awrejcewicz, Karnopp, LeineSwitch, Wojewoda
 from symfric.laws.static.brown_mcphee import BrownMcPhee
 from symfric.laws.static.coulomb import Coulomb, PowerLawViscous, Viscous

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from math import inf, pi
 from typing import ClassVar, final
 
-from symfric.laws import smooth
-from symfric.laws.base import APPLIED_FORCE, Facts, Input, StaticLaw, Switch
-from symfric.laws.sticking import Sticking, held, stick_and_slip
-from symfric.numeric import Scalar, atan, exp, is_number
-from symfric.parameters import option, param
+from symfric.foundation.numeric import Scalar, atan, exp, is_number
+from symfric.foundation.parameters import option, param
+from symfric.laws.base import smooth
+from symfric.laws.base.law import APPLIED_FORCE, Facts, Input, StaticLaw, Switch
+from symfric.laws.base.sticking import Sticking, held, stick_and_slip
 
 FORMS = ("smooth", "original")
 WITH_MODES = (*FORMS, "event")

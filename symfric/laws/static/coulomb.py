@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from math import inf, pi
 from typing import ClassVar, final
 
-from symfric.laws import smooth
-from symfric.laws.base import Facts, StaticLaw
-from symfric.numeric import Scalar, atan, equals, erf, sqrt, tanh
-from symfric.parameters import option, param
+from symfric.foundation.numeric import Scalar, atan, equals, erf, sqrt, tanh
+from symfric.foundation.parameters import option, param
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Facts, StaticLaw
 
 
 def _quadratic(u: Scalar) -> Scalar:

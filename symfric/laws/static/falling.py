@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from symfric.laws import smooth
-from symfric.laws.base import Facts, StaticLaw
-from symfric.numeric import Scalar, equals
-from symfric.parameters import param
+from symfric.foundation.numeric import Scalar, equals
+from symfric.foundation.parameters import param
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Facts, StaticLaw
 
 
 @final

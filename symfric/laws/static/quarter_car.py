@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from math import pi
 from typing import ClassVar, final
 
-from symfric.laws import smooth
-from symfric.laws.base import Facts, Input, StaticLaw
-from symfric.numeric import Scalar, asin, cos, equals, exp, sin, sqrt, tan
-from symfric.parameters import option, param
+from symfric.foundation.numeric import Scalar, asin, cos, equals, exp, sin, sqrt, tan
+from symfric.foundation.parameters import option, param
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Facts, Input, StaticLaw
 
 
 def tilt(x_rel: Scalar, theta: Scalar, L_d: Scalar) -> Scalar:

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from symfric.laws.base import Facts, StaticLaw
-from symfric.numeric import Scalar, atan, equals, sin
-from symfric.parameters import param
+from symfric.foundation.numeric import Scalar, atan, equals, sin
+from symfric.foundation.parameters import param
+from symfric.laws.base.law import Facts, StaticLaw
 
 
 @final

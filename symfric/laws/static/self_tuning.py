@@ -8,9 +8,9 @@ from math import inf, pi
 from math import sin as sin_of_float
 from typing import ClassVar, final
 
-from symfric.laws.base import Facts, StaticLaw
-from symfric.numeric import Scalar, asin, atan, equals, exp, is_casadi, sin, tan
-from symfric.parameters import param
+from symfric.foundation.numeric import Scalar, asin, atan, equals, exp, is_casadi, sin, tan
+from symfric.foundation.parameters import param
+from symfric.laws.base.law import Facts, StaticLaw
 
 
 @final

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from math import e, sqrt
 from typing import ClassVar, final
 
-from symfric.laws.base import Facts, StaticLaw
-from symfric.numeric import Scalar, exp, tanh
-from symfric.parameters import param
+from symfric.foundation.numeric import Scalar, exp, tanh
+from symfric.foundation.parameters import param
+from symfric.laws.base.law import Facts, StaticLaw
 
 
 @final

@@ -7,10 +7,10 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from symfric.laws import smooth
-from symfric.laws.base import Facts, StaticLaw
-from symfric.numeric import Scalar
-from symfric.parameters import param
+from symfric.foundation.numeric import Scalar
+from symfric.foundation.parameters import param
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Facts, StaticLaw
 
 
 @final

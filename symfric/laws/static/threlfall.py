@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from math import exp
 from typing import ClassVar, final
 
-from symfric.laws import smooth
-from symfric.laws.base import Facts, StaticLaw
-from symfric.numeric import Scalar, tanh
-from symfric.parameters import option, param
+from symfric.foundation.numeric import Scalar, tanh
+from symfric.foundation.parameters import option, param
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Facts, StaticLaw
 
 RISE = 1 - exp(-3.0)
 """What the rise 1 - exp(-3 |v|/v_r) has reached at v_r."""

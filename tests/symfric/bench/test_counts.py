@@ -3,7 +3,7 @@
 import pytest
 
 from symfric.bench.counts import CountRow, compile_rows, counts
-from symfric.integrator.compiler import find_compiler
+from symfric.integrator.compiled.compiler import find_compiler
 
 FOUR = (
     "frictionless",

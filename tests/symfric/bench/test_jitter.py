@@ -8,9 +8,9 @@ import pytest
 from symfric import Viscous, simulate
 from symfric.bench.jitter import jitter, plot_jitter, runge_kutta_4, variation
 from symfric.figures import FigureData
-from symfric.integrator.blocks import refinement
-from symfric.integrator.inputs import drivers
-from symfric.integrator.system import system
+from symfric.integrator.equations.blocks import refinement
+from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.system import system
 from symfric.scenes import SliderCrank
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from symfric.cli.options import assignments, check_folder, check_outputs, law_with, numbers
-from symfric.parameters import parameters
+from symfric.foundation.parameters import parameters
 
 
 def test_assignments_keep_text_after_the_first_equals_sign() -> None:

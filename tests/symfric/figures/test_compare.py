@@ -58,11 +58,8 @@ def test_no_law_and_no_law_at_all_are_refused() -> None:
         compare([3.0])  # pyright: ignore[reportArgumentType]
 
 
-def test_it_is_reached_from_the_front_and_from_the_laws() -> None:
+def test_it_is_reached_from_the_front() -> None:
     assert symfric.compare is compare
-    assert symfric.laws.compare is compare
-    with pytest.raises(AttributeError, match=r"symfric\.laws.* 'compose_'"):
-        _ = symfric.laws.compose_
     assert isinstance(symfric.compare(["coulomb"]), FigureData)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from oracles import rabinowicz_brown_mcphee, rabinowicz_lugre
 
 from symfric import BrownMcPhee, Law, LuGre, Model, Variable, drive, rabinowicz, simulate
-from symfric.integrator.compiler import find_compiler
+from symfric.integrator.compiled.compiler import find_compiler
 
 Array = NDArray[np.float64]
 SPAN = 20.0

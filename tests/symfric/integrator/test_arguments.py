@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from symfric.integrator.arguments import LOOSE, check_span, check_times, chosen
-from symfric.integrator.tableaux import ADAPTIVE, METHODS, RADAU5, RODAS5P
+from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS, RADAU5, RODAS5P
 
 
 def test_good_arguments_pass_without_a_word() -> None:

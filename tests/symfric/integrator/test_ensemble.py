@@ -25,7 +25,7 @@ from symfric import (
     simulate,
     simulate_many,
 )
-from symfric.integrator import chunk as chunk_module
+from symfric.integrator.many import chunk as chunk_module
 from symfric.model import Event
 
 VELOCITIES = np.linspace(-0.1, 0.1, 7)

@@ -9,7 +9,7 @@ from differentiable import oscillator, pendulum, root
 from scipy.linalg import expm
 
 from symfric import BrownMcPhee, LuGre, Model, Variable, Viscous, drive, flow, rabinowicz, simulate
-from symfric.integrator.tableaux import METHODS
+from symfric.integrator.methods.tableaux import METHODS
 from symfric.model import Event
 
 K, C, START = 4.0, 0.3, np.array([1.0, 0.5])

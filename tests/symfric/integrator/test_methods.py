@@ -16,7 +16,7 @@ from symfric import (
     simulate,
     simulate_many,
 )
-from symfric.integrator.tableaux import ADAPTIVE, METHODS
+from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS
 from symfric.model import Event
 
 each_method = pytest.mark.parametrize("method", ADAPTIVE)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from symfric import Model, Variable
-from symfric.integrator.casadi_backend import Peer, peer
-from symfric.integrator.inputs import drivers
-from symfric.integrator.run import Tolerances
-from symfric.integrator.system import system
+from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.system import system
+from symfric.integrator.peers.casadi_integrators import Peer, peer
+from symfric.integrator.running.run import Tolerances
 
 
 def hats(count: int, algebraic: bool) -> Model:

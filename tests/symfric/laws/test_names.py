@@ -3,8 +3,8 @@
 import pytest
 
 from symfric import ALL_LAWS, Asymmetric, Coulomb, LoadDependent, StaticLaw, law_from_text
+from symfric.foundation.numeric import Scalar
 from symfric.laws import POPULATIONS, RandomBristles, any_from_text, law_name
-from symfric.numeric import Scalar
 
 
 @pytest.mark.parametrize("name", ALL_LAWS)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from symfric import BrownMcPhee, LuGre, Model
-from symfric.integrator.inputs import drivers
-from symfric.integrator.step import build_step
-from symfric.integrator.system import system
-from symfric.integrator.tableaux import METHODS
+from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.system import system
+from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.step.attempt import build_step
 from symfric.multibody import JointFriction, Mechanism
 from symfric.scenes import FourMass
 

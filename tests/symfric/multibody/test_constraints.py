@@ -7,6 +7,7 @@ from chains import X, Y, Z, begin, chain, solve
 from scipy.integrate import solve_ivp
 
 from symfric import BrownMcPhee, Viscous, simulate
+from symfric.foundation.parameters import Variable
 from symfric.laws import Law
 from symfric.multibody import (
     Constraint,
@@ -22,7 +23,6 @@ from symfric.multibody import (
     functions,
 )
 from symfric.multibody.kinematics import Kinematics
-from symfric.parameters import Variable
 from symfric.scenes import FourBar, SliderCrank
 
 SMOOTH = Viscous(sigma_2=0.0)

@@ -7,6 +7,8 @@ import pytest
 from chains import X, Y, Z, solve
 
 from symfric import simulate
+from symfric.foundation.numeric import Scalar
+from symfric.foundation.parameters import Variable
 from symfric.multibody import (
     Cylindrical,
     Gear,
@@ -19,8 +21,6 @@ from symfric.multibody import (
     Rolling,
     Screw,
 )
-from symfric.numeric import Scalar
-from symfric.parameters import Variable
 
 in_both = pytest.mark.parametrize("formulation", ["joint", "absolute"])
 

@@ -6,10 +6,10 @@ import pytest
 
 from symfric import BrownMcPhee, LuGre, Model, simulate
 from symfric.bench.chains import chain
-from symfric.integrator.blocks import blocks, refinement, signs
-from symfric.integrator.inputs import drivers
-from symfric.integrator.system import System, system
-from symfric.integrator.tableaux import METHODS
+from symfric.integrator.equations.blocks import blocks, refinement, signs
+from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.system import System, system
+from symfric.integrator.methods.tableaux import METHODS
 from symfric.laws import Law
 from symfric.multibody import prepare
 from symfric.multibody.cuts import Cuts

@@ -5,8 +5,8 @@ import pytest
 from chains import chain, rod, state
 
 from symfric import BrownMcPhee, LuGre
+from symfric.foundation.parameters import Variable
 from symfric.multibody import JointFriction, functions
-from symfric.parameters import Variable
 from symfric.scenes import Arm, FourMass
 
 

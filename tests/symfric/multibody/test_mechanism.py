@@ -7,6 +7,7 @@ import pytest
 from chains import X, Y, Z, rod
 
 from symfric import BrownMcPhee, LuGre, SolveError, Viscous, simulate
+from symfric.foundation.parameters import Variable
 from symfric.multibody import (
     Distance,
     Fixed,
@@ -18,7 +19,6 @@ from symfric.multibody import (
     Prismatic,
     Revolute,
 )
-from symfric.parameters import Variable
 
 LAW = BrownMcPhee()
 

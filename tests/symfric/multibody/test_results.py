@@ -9,9 +9,9 @@ import pytest
 from chains import TREE, chain, solve, state
 
 from symfric import BrownMcPhee, simulate
-from symfric.integrator.initial import consistent
-from symfric.integrator.inputs import drivers
-from symfric.integrator.system import system
+from symfric.integrator.equations.initial import consistent
+from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.system import system
 from symfric.model import Model
 from symfric.multibody import (
     Distance,

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from symfric import BrownMcPhee, Law, LuGre, Sum, Trajectory, Viscous, parameters, simulate
+from symfric.foundation.parameters import with_values
 from symfric.laws import QuarterCarGeneral, QuarterCarSimple
 from symfric.multibody import JointFriction, JointSpringDamper, Mechanism, Prismatic, UserForce
 from symfric.multibody.kinematics import Kinematics
-from symfric.parameters import with_values
 from symfric.scenes import QuarterCar
 
 Array = NDArray[np.float64]

@@ -4,7 +4,7 @@ import pytest
 from robots import MOVING, SMALL, random_robot
 
 from symfric import BrownMcPhee, LuGre, parameters, simulate
-from symfric.multibody.urdf import relative
+from symfric.multibody.urdf.read import relative
 from symfric.scenes import Robot
 
 BARE = SMALL.replace(' friction="0.2"', "")

@@ -7,12 +7,12 @@ import pytest
 from numpy.typing import NDArray
 
 from symfric import BrownMcPhee, Model, SolveError, Status, Viscous, simulate
-from symfric.integrator.blocks import signs
-from symfric.integrator.inputs import drivers
-from symfric.integrator.integrator import Integrator
-from symfric.integrator.manifold import SHOCK, Manifold
-from symfric.integrator.run import Tolerances, integrate
-from symfric.integrator.tableaux import RODAS5P
+from symfric.integrator.equations.blocks import signs
+from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.manifold import SHOCK, Manifold
+from symfric.integrator.methods.tableaux import RODAS5P
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.run import Tolerances, integrate
 from symfric.scenes import MECHANISMS, PendulumBox
 
 Array = NDArray[np.float64]

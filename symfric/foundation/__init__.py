@@ -1,0 +1,1 @@
+"""What everything stands on: numbers, parameters, files, how a solve ended, empty panels."""

@@ -1,0 +1,303 @@
+"""Parameters of laws and scenes: value, unit, bounds, default; named sets and symbols of them.
+
+A parametric object is a frozen dataclass whose numbers are declared with `param`. A field holds a
+float (folded into every expression as a constant) or a CasADi symbol (visible to derivatives,
+identification and optimal control). Objects nest: a scene holds a law, a sum holds its terms.
+"""
+
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from difflib import get_close_matches
+from math import inf, isfinite
+from typing import Any, ClassVar, TypeVar
+
+import casadi as ca
+import numpy as np
+
+from symfric.foundation.numeric import Scalar, is_casadi, is_number, is_symbolic
+
+
+def param(default: float, *, unit: str, doc: str, lower: float = -inf, upper: float = inf) -> Any:
+    """Declare a parameter field of a `Parametric` dataclass.
+
+    Args:
+        default: value used when none is given.
+        unit: SI unit as text, "1" for a pure number.
+        doc: what it is, in a few words.
+        lower, upper: closed bounds; identification takes its box constraints from here.
+    """
+    return field(
+        default=default, metadata={"unit": unit, "doc": doc, "lower": lower, "upper": upper}
+    )
+
+
+def option(default: str, *, choices: tuple[str, ...], doc: str) -> Any:
+    """Declare a field of a `Parametric` dataclass that names one of several forms of it.
+
+    A form is chosen when the object is made and leaves no switch in the expressions.
+    """
+    return field(default=default, metadata={"choices": choices, "doc": doc})
+
+
+@dataclass(frozen=True, eq=False)
+class Parameter:
+    """One parameter as a user sees it."""
+
+    name: str
+    value: Scalar
+    unit: str
+    default: float
+    lower: float
+    upper: float
+    doc: str
+
+
+@dataclass(frozen=True, eq=False)
+class Variable:
+    """A named scalar of a model: its symbol, unit and the numbers that belong to it.
+
+    Attributes:
+        symbol: SX symbol, shape (1, 1).
+        start: initial or default value; an expression in other symbols where it depends on them.
+        nominal: typical magnitude; absolute tolerances and scalings are relative to it.
+        lower, upper: bounds for optimisation and identification.
+    """
+
+    name: str
+    unit: str
+    start: Scalar = 0.0
+    nominal: float = 1.0
+    lower: float = -inf
+    upper: float = inf
+    doc: str = ""
+    symbol: ca.SX = field(default_factory=lambda: ca.SX(0, 0))
+
+    def __post_init__(self) -> None:
+        if self.symbol.is_empty():
+            object.__setattr__(self, "symbol", ca.SX.sym(self.name))
+
+
+@dataclass(frozen=True, eq=False)
+class Parametric:
+    """A frozen dataclass with `param` fields; checks its numbers when it is made.
+
+    `eq=False` because comparing fields that hold symbols has no truth value.
+    """
+
+    ordered: ClassVar[tuple[tuple[str, str], ...]] = ()
+    """Pairs of fields (a, b) that must satisfy a <= b."""
+
+    strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = ()
+    """Pairs of fields (a, b) that must satisfy a < b."""
+
+    suffixes: ClassVar[tuple[str, ...]] = ()
+    """Fixed name endings of the children; without them a child is renamed only on a clash."""
+
+    def __post_init__(self) -> None:
+        problems = list(_problems(self))
+        if problems:
+            raise ValueError(f"{type(self).__name__}: " + "; ".join(problems))
+
+
+P = TypeVar("P", bound=Parametric)
+
+
+def _problems(obj: Parametric) -> Iterator[str]:
+    for item in fields(obj):
+        value, meta = getattr(obj, item.name), item.metadata
+        if "choices" in meta and value not in meta["choices"]:
+            yield f"{item.name}: expected one of {', '.join(meta['choices'])}, got {value!r}"
+        if "unit" not in meta:
+            continue
+        if is_casadi(value) or isinstance(value, np.ndarray):
+            continue
+        if not is_number(value) or not isfinite(value):
+            yield (
+                f"{item.name}: expected a finite number [{meta['unit']}] or a symbol, got {value!r}"
+            )
+        elif not meta["lower"] <= value <= meta["upper"]:
+            yield (
+                f"{item.name}: expected {meta['lower']:g} <= {item.name} <= {meta['upper']:g} "
+                f"[{meta['unit']}], got {value:g}"
+            )
+    for low, high in obj.ordered:
+        a, b = getattr(obj, low), getattr(obj, high)
+        if is_number(a) and is_number(b) and a > b:
+            yield f"expected {low} <= {high}, got {low} = {a:g} and {high} = {b:g}"
+    for low, high in obj.strictly_ordered:
+        a, b = getattr(obj, low), getattr(obj, high)
+        if is_number(a) and is_number(b) and a >= b:
+            yield f"expected {low} < {high}, got {low} = {a:g} and {high} = {b:g}"
+
+
+def _children(obj: Parametric) -> list[tuple[str, int | None, Parametric]]:
+    """Nested parametric objects as (field, index in a tuple or None, child)."""
+    found: list[tuple[str, int | None, Parametric]] = []
+    for item in fields(obj):
+        value = getattr(obj, item.name)
+        if isinstance(value, Parametric):
+            found.append((item.name, None, value))
+        elif isinstance(value, tuple):
+            found += [(item.name, i, v) for i, v in enumerate(value) if isinstance(v, Parametric)]
+    return found
+
+
+def _names(obj: Parametric) -> dict[str, tuple[int | None, str]]:
+    """Flat name -> (child number or None, name inside it)."""
+    own = [item.name for item in fields(obj) if "unit" in item.metadata]
+    inner = [list(_names(child)) for _, _, child in _children(obj)]
+    if obj.suffixes:
+        flat = [[f"{n}_{s}" for n in c] for c, s in zip(inner, obj.suffixes, strict=True)]
+    else:
+        flat = distinct(inner, own)
+    names: dict[str, tuple[int | None, str]] = {name: (None, name) for name in own}
+    for i, (new, old) in enumerate(zip(flat, inner, strict=True)):
+        names |= {n: (i, o) for n, o in zip(new, old, strict=True)}
+    return names
+
+
+def distinct(groups: Sequence[Sequence[str]], taken: Sequence[str] = ()) -> list[list[str]]:
+    """The names of several groups made unique: one that stands twice gets its group's number."""
+    count = Counter([*taken, *(name for group in groups for name in group)])
+    used = set(count)
+    renamed: list[list[str]] = []
+    for number, group in enumerate(groups, start=1):
+        renamed.append([])
+        for name in group:
+            flat = name
+            while count[name] > 1 and flat in used:
+                flat = f"{flat}_{number}"
+            used.add(flat)
+            renamed[-1].append(flat)
+    return renamed
+
+
+def parameters(obj: Parametric) -> dict[str, Parameter]:
+    """All parameters of `obj` and of what it holds, by flat name.
+
+    Names are the field names. Terms of a sum that share a name get `_1`, `_2`, ...; the two sides
+    of an asymmetric law get `_pos` and `_neg`.
+    """
+    found: dict[str, Parameter] = {}
+    children = [parameters(child) for _, _, child in _children(obj)]
+    own = {item.name: item for item in fields(obj)}
+    for flat, (child, name) in _names(obj).items():
+        if child is None:
+            meta = own[name].metadata
+            found[flat] = Parameter(
+                flat,
+                getattr(obj, name),
+                meta["unit"],
+                own[name].default,  # pyright: ignore[reportArgumentType]
+                meta["lower"],
+                meta["upper"],
+                meta["doc"],
+            )
+        else:
+            found[flat] = replace(children[child][name], name=flat)
+    return found
+
+
+@dataclass(frozen=True)
+class Option:
+    """One option as a user sees it."""
+
+    name: str
+    value: str
+    default: str
+    choices: tuple[str, ...]
+    doc: str
+
+
+def options(obj: Parametric) -> dict[str, Option]:
+    """The options of `obj` itself, by name."""
+    return {
+        item.name: Option(
+            item.name,
+            getattr(obj, item.name),
+            item.default,  # pyright: ignore[reportArgumentType]
+            item.metadata["choices"],
+            item.metadata["doc"],
+        )
+        for item in fields(obj)
+        if "choices" in item.metadata
+    }
+
+
+def with_values(obj: P, values: Mapping[str, Scalar]) -> P:
+    """A copy of `obj` with the parameters in `values` replaced, wherever they sit.
+
+    Raises:
+        ValueError: a name that `obj` does not have (the closest ones are offered), or a value
+            outside its bounds.
+    """
+    names = _names(obj)
+    check_names(type(obj).__name__, values, names)
+    changes: dict[str, Any] = {}
+    per_child: dict[int, dict[str, Scalar]] = {}
+    for flat, value in values.items():
+        child, name = names[flat]
+        if child is None:
+            changes[name] = value
+        else:
+            per_child.setdefault(child, {})[name] = value
+    for number, (field_name, index, child) in enumerate(_children(obj)):
+        if number not in per_child:
+            continue
+        new = with_values(child, per_child[number])
+        if index is None:
+            changes[field_name] = new
+        else:
+            items = list(changes.get(field_name, getattr(obj, field_name)))
+            items[index] = new
+            changes[field_name] = tuple(items)
+    return replace(obj, **changes)
+
+
+def symbolise(obj: P, *names: str) -> tuple[P, tuple[Variable, ...]]:
+    """A copy of `obj` in which the named parameters are SX symbols, and those symbols.
+
+    Every other parameter stays a constant of the expression, so that a term switched off by a
+    float zero leaves no trace.
+
+    Returns:
+        The copy and one `Variable` per name with start value, unit and bounds of the parameter.
+
+    Raises:
+        ValueError: unknown or repeated name.
+    """
+    known = parameters(obj)
+    check_names(type(obj).__name__, names, known)
+    if len(set(names)) != len(names):
+        raise ValueError(f"symbolise: expected every name once, got {', '.join(names)}")
+    variables = tuple(
+        Variable(
+            name,
+            known[name].unit,
+            start=known[name].value,
+            nominal=_magnitude(known[name].value),
+            lower=known[name].lower,
+            upper=known[name].upper,
+            doc=known[name].doc,
+        )
+        for name in names
+    )
+    return with_values(obj, {v.name: v.symbol for v in variables}), variables
+
+
+def _magnitude(value: Scalar) -> float:
+    return 1.0 if is_symbolic(value) or float(value) == 0.0 else abs(float(value))
+
+
+def check_names(where: str, names: Iterable[str], known: Collection[str]) -> None:
+    """Refuse names that are not in `known`, all in one error that offers the closest ones."""
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        hints = [get_close_matches(name, list(known), n=1, cutoff=0.4) for name in unknown]
+        did_you_mean = ", ".join(h[0] for h in hints if h)
+        raise ValueError(
+            f"{where}: expected one of {', '.join(known) or 'no parameters'}, "
+            f"got {', '.join(unknown)}"
+            + (f"; did you mean {did_you_mean}?" if did_you_mean else "; check the spelling")
+        )

@@ -1,0 +1,1 @@
+"""C from CasADi Functions: compiled once, kept, applied to columns of numbers."""

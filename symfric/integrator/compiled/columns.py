@@ -1,0 +1,127 @@
+"""A Function applied to many columns, or step after step, without Python in between."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any, cast, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.numeric import flat_view
+from symfric.integrator.compiled.compiler import find_compiler, library_path, load
+
+Array = NDArray[np.float64]
+CHAINED, SIDE_BY_SIDE = 16, 32
+"""Columns of one call; the last call repeats its last column."""
+
+
+@final
+@dataclass(eq=False)
+class Columns:
+    """A Function of columns, applied to the rows of arrays.
+
+    It runs in the virtual machine until compiling pays. Mutable only in what it remembers.
+
+    Attributes:
+        function: of dense columns.
+        chained: the first result of a column is the first argument of the next one.
+        spent: time [s] in the virtual machine.
+    """
+
+    function: ca.Function
+    chained: bool = False
+    spent: float = 0.0
+
+    @property
+    def size(self) -> int:
+        """Columns of one call."""
+        return CHAINED if self.chained else SIDE_BY_SIDE
+
+    @cached_property
+    def _batch(self) -> ca.Function:
+        dense = densified(self.function)
+        if self.chained:
+            return dense.mapaccum(f"{dense.name()}_{self.size}", self.size)
+        return dense.map(self.size)
+
+    @cached_property
+    def _compiled(self) -> ca.Function:
+        return external(self._batch)
+
+    def _choose(self, backend: str, count: int) -> ca.Function:
+        """The virtual machine or compiled code; "auto" compiles when that is predicted to pay."""
+        if backend == "compiled":
+            return self._compiled
+        if backend == "vm" or find_compiler() is None:
+            return self._batch
+        if "_compiled" in self.__dict__:
+            return self._compiled
+        n = self.function.n_instructions()
+        expected = self.spent + 3e-9 * n * count
+        return self._compiled if expected > 2 * (0.1 + 1.5e-4 * n) else self._batch
+
+    def __call__(
+        self, rows: Sequence[Array], first: Array | None = None, backend: str = "vm"
+    ) -> list[Array]:
+        """Results of all rows, each of shape (count, size), matrices column by column.
+
+        Args:
+            rows: an array (count, ...) for every argument, without the first one where `chained`.
+            first: where `chained`, the first argument of the first row.
+            backend: "vm", "compiled" or "auto".
+        """
+        count, most, began = rows[0].shape[0], self.size, perf_counter()
+        batch = self._choose(backend, count)
+        arguments = [np.zeros(batch.numel_in(i)) for i in range(batch.n_in())]
+        results = [np.zeros((most, batch.numel_out(i) // most)) for i in range(batch.n_out())]
+        found = [np.empty((count, result.shape[1])) for result in results]
+        blocks = [a.reshape(most, a.size // most) for a in arguments[self.chained :]]
+        if self.chained:
+            arguments[0][:] = np.ravel(cast(Array, first))
+        buffer, call = cast(tuple[Any, Any], batch.buffer())
+        for place, arrays in ((buffer.set_arg, arguments), (buffer.set_res, results)):
+            for i, array in enumerate(arrays):
+                if array.size:
+                    place(i, flat_view(array))
+        for begin in range(0, count, most):
+            size = min(most, count - begin)
+            for block, row in zip(blocks, rows, strict=True):
+                block[:size] = row[begin : begin + size].reshape(size, block.shape[1])
+                block[size:] = block[size - 1]
+            call()
+            for whole, result in zip(found, results, strict=True):
+                whole[begin : begin + size] = result[:size]
+            if self.chained:
+                arguments[0][:] = results[0][-1]
+        if batch is self._batch:
+            self.spent += perf_counter() - began
+        return found
+
+
+def densified(function: ca.Function) -> ca.Function:
+    """`function` with dense results, as buffers need them."""
+    if all(function.sparsity_out(i).is_dense() for i in range(function.n_out())):
+        return function
+    arguments = function.mx_in()
+    results = [ca.densify(result) for result in function.call(arguments)]
+    return ca.Function(function.name(), arguments, results)
+
+
+def external(function: ca.Function) -> ca.Function:
+    """`function` compiled, or loaded from the cache.
+
+    Raises:
+        RuntimeError: there is no compiler, or it failed.
+    """
+    with TemporaryDirectory() as folder:
+        generator = ca.CodeGenerator("symfric_columns.c", {"static_aux": True})
+        generator.add(function)
+        generator.generate(folder + "/")
+        source = (Path(folder) / "symfric_columns.c").read_text(encoding="utf-8")
+    load(source)
+    return ca.external(function.name(), str(library_path(source)))

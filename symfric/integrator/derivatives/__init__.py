@@ -1,0 +1,1 @@
+"""Derivatives of the steps that were taken, forwards and backwards."""

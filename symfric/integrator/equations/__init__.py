@@ -1,0 +1,1 @@
+"""A model as the step sees it: unknowns, inputs, constraints, start values, linear algebra."""

@@ -1,0 +1,183 @@
+"""The Functions an implicit step is made of: with SX they inline, with MX they stay calls."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, final
+
+import casadi as ca
+
+from symfric.integrator.equations.lu import SymbolicLU, factorise
+from symfric.integrator.equations.system import System
+from symfric.model.holonomic import Inner
+
+NONE = ca.SX(0, 1)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """Jacobian of a system, bordered by that of its inner unknowns l where it has some.
+
+        [ f_y  f_l     ]
+        [ g_y  g_l - I ]
+
+    Attributes:
+        J: with a symbol for every entry that is more than a number.
+        entries: these symbols.
+        values: (y, d) -> what they stand for.
+        pivots: groups of rows as `factorise` takes them.
+    """
+
+    J: ca.SX
+    entries: ca.SX
+    values: ca.Function
+    pivots: tuple[tuple[int, ...], ...]
+
+    def factorised(self, mass: ca.SX, without: Sequence[int] = ()) -> SymbolicLU:
+        """Factors of `mass` - J, in terms of `entries`; J without the rows `without`."""
+        kept, inner = ca.SX(self.J), self.J.shape[0] - mass.shape[0]
+        kept[list(without), :] = 0
+        return factorise(ca.sparsify(ca.diagcat(mass, ca.SX(inner, inner)) - kept), self.pivots)
+
+
+@lru_cache(maxsize=2)
+def slopes(system: System) -> Slopes:
+    """The Jacobian of `system`."""
+    y, d, inner = system.y, system.d, system.inner
+    slope, pivots, hidden, put = system.J, system.pivots, NONE, NONE
+    if inner is not None:
+        hidden, pivots = inner.l, _places(y, inner)
+        to_l = ca.vertcat(
+            ca.jacobian(inner.f, hidden),
+            ca.jacobian(inner.values, hidden) - ca.SX.eye(hidden.numel()),
+        )
+        slope = ca.horzcat(ca.jacobian(ca.vertcat(inner.f, inner.values), y), to_l)
+        (put,), _ = ca.substitute_inplace([hidden], [inner.values], [NONE])
+    named, entries, values = _named(ca.sparsify(slope))
+    of_l = ca.Function("slopes", [hidden, y, d], [values])
+    return Slopes(
+        named, entries, ca.Function("slopes", [y, d], [of_l(put, y, d)], {"cse": True}), pivots
+    )
+
+
+def _named(matrix: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """`matrix` with symbols for its entries that are no numbers, these symbols, and the entries."""
+    named = ca.SX(matrix)
+    places = [k for k in range(matrix.nnz()) if not ca.SX(matrix.nz[k]).is_constant()]
+    entries = ca.SX.sym("J", len(places))
+    for i, k in enumerate(places):
+        named.nz[k] = entries[i]
+    return named, entries, ca.vec(ca.SX(matrix.nz[places]))
+
+
+def _places(y: ca.SX, inner: Inner) -> tuple[tuple[int, ...], ...]:
+    """Groups of unknowns as numbers of rows."""
+    unknowns = ca.vertsplit(ca.vertcat(y, inner.l))
+    place = {ca.SX(s).__hash__(): i for i, s in enumerate(unknowns)}
+    groups = (ca.vertsplit(group) for group in inner.groups)
+    return tuple(tuple(place[ca.SX(s).__hash__()] for s in group) for group in groups)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Right-hand side, iteration matrix W = M/(gamma h) - J and solutions with it.
+
+    Attributes:
+        f: (y, d) -> right-hand side.
+        slopes: (y, d) -> entries of J.
+        pack: (entries of J, h) -> factors of W.
+        solve: (factors, right, memory) -> k with W k = right + M memory.
+        lu: the factors as expressions.
+    """
+
+    f: ca.Function
+    slopes: ca.Function
+    pack: ca.Function
+    solve: ca.Function
+    lu: SymbolicLU
+
+    def factor(self, y: Any, h: Any, d: Any) -> Any:
+        """Factors of W."""
+        return self.pack(self.slopes(y, d), h)
+
+    @property
+    def instructions(self) -> int:
+        """Of Jacobian and factors."""
+        return self.slopes.n_instructions() + self.pack.n_instructions()
+
+
+@lru_cache(maxsize=2)
+def blocks(system: System, gamma: float) -> Blocks:
+    """The blocks of a method with the diagonal coefficient `gamma`."""
+    h, own = ca.SX.sym("h"), slopes(system)
+    right, memory = ca.SX.sym("right", system.n), ca.SX.sym("memory", system.n)
+    lu = own.factorised(system.mass / (gamma * h))
+    return Blocks(
+        ca.Function("f", [system.y, system.d], [system.f], {"cse": True}),
+        own.values,
+        ca.Function("pack", [own.entries, h], [lu.packed], {"cse": True}),
+        ca.Function(
+            "solve", [lu.packed_symbol, right, memory],
+            [_solved(lu, right + system.mass @ memory)],
+        ),
+        lu,
+    )  # fmt: skip
+
+
+def _solved(lu: SymbolicLU, right: ca.SX) -> ca.SX:
+    """The unknowns of a system, where nothing stands on the right-hand sides of inner ones."""
+    n = right.numel()
+    return lu.solve(ca.vertcat(right, ca.SX(len(lu.order) - n, 1)))[:n]
+
+
+@lru_cache(maxsize=2)
+def refinement(system: System) -> ca.Function:
+    """(y, d) -> y of a mechanism on its constraints, with its algebraic unknowns exact.
+
+    Two steps of Newton's method for accelerations, multipliers and normal forces.
+    """
+    own, (rows, _), right = slopes(system), system.algebraic, ca.SX.sym("right", system.n)
+    lu = own.factorised(system.mass, [i for i in range(system.n) if i not in rows])
+    pack = ca.Function("pack", [own.entries], [lu.packed])
+    solve = ca.Function("solve", [lu.packed_symbol, right], [_solved(lu, right)])
+    residual = ca.SX(system.n, 1)
+    residual[rows] = system.f[rows]
+    f = ca.Function("f", [system.y, system.d], [residual])
+    y, d = ca.SX(system.y), system.d
+    if system.manifold is not None:
+        y = ca.SX(system.manifold.project(y, d))
+    for _ in range(2):
+        y = y + solve(pack(own.values(y, d)), f(y, d))
+    return ca.Function("refine", [system.y, d], [y], {"cse": True})
+
+
+Signs = Callable[[Any, Any, Any], tuple[Any, Any, Any]]
+"""(y, h, d) -> signs of det W and of det W for a tiny step, pivots of rows in the latter."""
+
+
+def signs(system: System, gamma: float, watched: Sequence[int] = ()) -> Signs:
+    """Signs of det W and of the same for a tiny step, which only algebraic rows have.
+
+    Where they differ, a mode grows faster than exp(t / (gamma h)), which an L-stable method of this
+    step only damps away. The pivots of the rows `watched`, which are there anyway, say how far the
+    latter is from zero.
+    """
+    own, block, (rows, _) = slopes(system), blocks(system, gamma), system.algebraic
+    lu, first = block.lu, {row for row, _ in block.lu.order[: len(rows)]}
+    if system.is_semi_explicit and first == set(rows):
+        tiny = [lu.sign(len(rows)), lu.pivots(watched)]
+    else:
+        own_lu = own.factorised(system.mass, [i for i in range(system.n) if i not in rows])
+        in_symbols = [own_lu.sign(), own_lu.pivots(watched)]
+        tiny = ca.substitute(in_symbols, [own_lu.packed_symbol], [own_lu.packed])
+    symbols = [lu.packed_symbol, own.entries]
+    every = ca.Function("signs", symbols, [lu.sign(), *tiny], {"cse": True})
+
+    def at(y: Any, h: Any, d: Any) -> tuple[Any, Any, Any]:
+        entries = block.slopes(y, d)
+        of_step, of_tiny_step, pivots = every(block.pack(entries, h), entries)
+        return of_step, of_tiny_step, pivots
+
+    return at

@@ -1,0 +1,195 @@
+"""Consistent start values: algebraic variables that satisfy their equations, a first step size."""
+
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.numeric import evaluate, evaluate_all
+from symfric.integrator.compiled.columns import Columns
+from symfric.integrator.equations.manifold import Manifold, jammed
+from symfric.integrator.equations.system import System
+
+Array = NDArray[np.float64]
+ITERATIONS = 50
+ASSEMBLED = 1e-12
+"""What constraints may leave over, relative to the largest state."""
+NEAR, CONVERGED = 1e-4, 1e-10
+"""Relative Newton steps below which no damping is needed, and below which it is done."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """The algebraic equations of a system, for a worker that has nothing else of it.
+
+    Attributes:
+        names: of all unknowns.
+        nx: number of differential states.
+        algebraic: rows of the equations, columns of their unknowns.
+        constraints: as `System.constraints`.
+        manifold: as `System.manifold`.
+    """
+
+    names: tuple[str, ...]
+    nx: int
+    algebraic: tuple[list[int], list[int]]
+    constraints: ca.Function
+    manifold: Manifold | None = None
+
+
+def consistent(system: System | Equations, where: str, y: Array, d: Array) -> Array:
+    """`y` with its algebraic unknowns solved for, by damped Newton from the given guess.
+
+    Raises:
+        ValueError: no solution near the guess.
+    """
+    manifold = system.manifold
+    if manifold is not None:
+        y = _assembled(system, manifold, where, y, d)
+    y = _solved(system, where, y, d)
+    if manifold is not None and manifold.charted:
+        y = _charted(manifold, y, d)
+    if manifold is not None and (cause := jammed(manifold, system.names, y, d)):
+        raise ValueError(f"{where}: {cause}")
+    return y
+
+
+def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array:
+    """`y` with its algebraic unknowns solved for, by damped Newton."""
+    columns = system.algebraic[1]
+    if not columns:
+        return y
+    y, last = y.copy(), np.inf
+    for _ in range(ITERATIONS):
+        step, residual = _newton_step(system, y, d)
+        size = float(np.max(np.abs(step) / (np.abs(y[columns]) + 1e-14)))
+        if not np.isfinite(size):
+            break
+        if size < NEAR:
+            y[columns] -= step
+            if size < CONVERGED or size > last / 2:  # no longer quadratic: rounding
+                return y
+        elif not _descend(system, y, d, step, residual):
+            if np.abs(step).max() < CONVERGED * np.abs(y[columns]).max():
+                return y  # what is left of an unknown that is zero is rounding
+            break
+        last = size
+    names = ", ".join(system.names[i] for i in columns)
+    raise ValueError(
+        f"{where}: expected consistent start values, found no solution of the algebraic "
+        f"equations for {names} near their start values; give better ones"
+    )
+
+
+def consistent_many(
+    system: System | Equations, together: Columns, where: str, y: Array, d: Array
+) -> tuple[Array, dict[int, str]]:
+    """Rows of `y` (members, n) with their algebraic unknowns solved for; number -> what failed.
+
+    Full Newton steps for all at once, while they shrink the residual; the others go alone.
+
+    Args:
+        system: whose algebraic equations.
+        together: its constraints, for many columns.
+        where: for messages.
+        y, d: guesses and run data, a row for each member.
+    """
+    columns, failed = np.array(system.algebraic[1], dtype=np.intp), dict[int, str]()
+    if not columns.size:
+        return y, failed
+    guess, y, alone = y, y.copy(), list[int]()
+    if system.manifold is not None:
+        # mechanisms are few and large: each one alone
+        alone = list(range(y.shape[0]))
+    todo = np.arange(0 if alone else y.shape[0])
+    before, last = np.full((2, y.shape[0]), np.inf)
+    while todo.size:
+        g, J = together([y[todo], d[todo]])
+        norm = np.linalg.norm(g, axis=1)
+        step = _newton_steps(g, J)
+        size = np.max(np.abs(step) / (np.abs(y[np.ix_(todo, columns)]) + 1e-14), axis=1)
+        near = size < NEAR
+        good = np.isfinite(size) & (near | (norm < before[todo]))
+        alone += todo[~good].tolist()
+        y[np.ix_(todo[good], columns)] -= step[good]
+        done = near & ((size < CONVERGED) | (size > last[todo] / 2))
+        before[todo], last[todo] = norm, size
+        todo = todo[good & ~done]
+    for m in alone:
+        try:
+            y[m] = consistent(system, where, guess[m], d[m])
+        except ValueError as error:
+            failed[m] = str(error)
+    return y, failed
+
+
+def _newton_steps(g: Array, J: Array) -> Array:
+    """Full steps of members, NaN for all where the derivatives of one are singular."""
+    members, n = g.shape
+    matrices = J.reshape(members, n, n).transpose(0, 2, 1)  # CasADi stores column by column
+    try:
+        return np.linalg.solve(matrices, g[:, :, None])[:, :, 0].astype(float)
+    except np.linalg.LinAlgError:
+        return np.full((members, n), np.nan)
+
+
+def _charted(manifold: Manifold, y: Array, d: Array) -> Array:
+    """`y` with an orthonormal basis of the tangent space."""
+    n, m, y = manifold.n, manifold.m, y.copy()
+    phi_q = manifold.slope(y, d)[n : n + m, :n].full()
+    # the trailing right singular vectors span the null space
+    y[manifold.basis] = np.linalg.svd(phi_q)[2][m:].ravel()
+    return y
+
+
+def _assembled(
+    system: System | Equations, manifold: Manifold, where: str, y: Array, d: Array
+) -> Array:
+    """`y` with positions and velocities on the constraints of a mechanism, the nearest ones.
+
+    Raises:
+        ValueError: none near.
+    """
+    defect = np.inf
+    for _ in range(ITERATIONS):
+        defect = float(np.abs(evaluate(manifold.defect, y, d)).max(initial=0.0))
+        if defect < ASSEMBLED * max(1.0, float(np.abs(y[: system.nx]).max(initial=0.0))):
+            return y
+        y = evaluate(manifold.project, y, d)
+    raise ValueError(
+        f"{where}: expected start positions and velocities from which all loops can be closed, "
+        f"got constraints that stay at {defect:.3g}; give others"
+    )
+
+
+def _newton_step(system: System | Equations, y: Array, d: Array) -> tuple[Array, float]:
+    """Full step of Newton's method, NaN where the derivatives are singular, and the residual."""
+    g, J = evaluate_all(system.constraints, y, d)
+    residual = float(np.linalg.norm(g))
+    try:
+        return np.linalg.solve(J, g[:, 0]).astype(float), residual
+    except np.linalg.LinAlgError:
+        return np.full(g.shape[0], np.nan), residual
+
+
+def _descend(system: System | Equations, y: Array, d: Array, step: Array, before: float) -> bool:
+    """Go along `step`, in place, as far as the residual shrinks; whether it does at all."""
+    columns = system.algebraic[1]
+    start = y[columns].copy()
+    for part in 0.5 ** np.arange(12):
+        y[columns] = start - part * step
+        if _residual(system, y, d) < before:
+            return True
+    return False
+
+
+def _residual(system: System | Equations, y: Array, d: Array) -> float:
+    return float(np.linalg.norm(evaluate(system.constraints, y, d)))
+
+
+def first_step(span: float) -> float:
+    """A first step [s] so small that the controller decides: it grows eightfold per step."""
+    return 1e-8 * span

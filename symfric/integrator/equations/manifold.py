@@ -1,0 +1,239 @@
+"""Constraints of a mechanism kept on all levels.
+
+A holonomic model is integrated with its accelerations as unknowns beside multipliers and normal
+forces, so that no mass matrix is inverted and no derivative goes through a factorisation:
+
+    x' = (q', a, ...),   M a + phi_q' lam = Q,   phi_q a + gamma = 0,   normal forces
+
+Every accepted step ends on the constraints:
+
+    q  <- q  - phi_q' (phi_q phi_q')^-1 phi(q)       repeated with one factorisation
+    q' <- q' - phi_q' (phi_q phi_q')^-1 (phi_q q' + phi_t)
+
+Limits: impacts are excluded, and with them tangential shocks, in which friction lets the reactions
+grow a thousandfold (`SHOCK`, Painleve): both end a run. A step over a position in which phi_q loses
+rank is not accepted: what lies beyond is not determined, and det(phi_q(q1) phi_q(q0)') has turned
+its sign. Not seen are two such positions within one step, and a step that ends on another branch.
+"""
+
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.numeric import evaluate
+from symfric.integrator.equations.lu import factorise
+from symfric.model import Model
+from symfric.model.holonomic import Holonomic
+
+Array = NDArray[np.float64]
+DEPENDENT = 1e-5
+"""Ratio of singular values of phi_q at which a mechanism that cannot go on is called singular."""
+PULLING = 1e-3
+"""Negative normal forces up to this times their typical size are errors of a step."""
+SHOCK = 1e-3
+"""Smallest pivot of I - dN/dN that is accepted; without friction it is 1. Its inverse is by how
+much friction multiplies a load on a bearing. On its way to 0 that load stops the sliding within
+microseconds, through a pivot that falls exponentially with the sliding velocity before: some runs
+would pass and others not, by their tolerance. Machines that move stay above 0.4, near jamming above
+0.02 (`tests/symfric/stress/test_jamming.py`)."""
+ITERATIONS, NEARBY = (4, 3), (2, 2)
+"""Of Newton's method with frozen derivatives, on positions and velocities: from 1e-3 to 1e-13, and
+from 1e-5."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Manifold:
+    """Functions that put a column of unknowns onto the constraints of a holonomic model.
+
+    Attributes:
+        project: (y, d) -> y with positions and velocities on the constraints; the same y where
+            there are none.
+        polish: the same from nearby.
+        defect: (y, d) -> constraints and their rates.
+        n, m, first: numbers of accelerations, of multipliers and of states. The algebraic unknowns
+            are accelerations, multipliers, normal forces, in this order after the states.
+        basis: where y holds V, a basis of the tangent space, column by column.
+        slope: (y, d) -> derivatives of the algebraic equations by the algebraic unknowns.
+        branch: (y0, y1, d) -> sign of det(phi_q(q1) phi_q(q0)'), which turns where a step leads
+            over a position in which constraints depend on each other.
+        pressing: (y, d) -> normal forces over their typical size, which must not be negative.
+        pressed: what they are, in words.
+    """
+
+    project: ca.Function
+    polish: ca.Function
+    defect: ca.Function
+    n: int
+    m: int
+    first: int
+    basis: range
+    slope: ca.Function
+    branch: ca.Function
+    pressing: ca.Function
+    pressed: tuple[str, ...]
+
+    @property
+    def charted(self) -> bool:
+        """Whether it is integrated in charts of the tangent space."""
+        return len(self.basis) > 0
+
+
+def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
+    """Unknowns (x, a, z, V) of a holonomic model, right-hand sides, mass matrix and names.
+
+    V is a basis of the tangent space of the constraints, column by column, at the start of the step
+    before; it has no rates. Without constraints it has no rows.
+    """
+    mechanics, x = model.holonomic, model.vector("x")
+    if mechanics is None or model.ode is None:
+        raise ValueError(f"model '{model.name}': expected a holonomic model with an ode")
+    n = mechanics.n
+    f = ca.vertcat(x[n : 2 * n], mechanics.a, model.ode[2 * n :], mechanics.implicit)
+    names = [v.name for v in model.x]
+    names += [f"{v.name}_dot" for v in model.x[n : 2 * n]] + [v.name for v in model.z]
+    V = ca.SX.sym("V", _of_basis(mechanics))
+    mass = ca.diagcat(ca.SX.eye(x.numel()), ca.SX(*2 * [n + len(model.z)]), ca.SX.eye(V.numel()))
+    return (
+        ca.vertcat(x, mechanics.a, model.vector("z"), V),
+        ca.vertcat(f, ca.SX.zeros(V.numel())),
+        mass,
+        [*names, *(f"V_{i}" for i in range(V.numel()))],
+    )
+
+
+def _of_basis(mechanics: Holonomic) -> int:
+    """Length of V: a column of n for each degree of freedom, where there is a chart at all."""
+    n, m = mechanics.n, mechanics.phi.numel()
+    return n * (n - m) if m and mechanics.index == 0 else 0
+
+
+def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
+    """The constraints of a holonomic model as Functions of the unknowns of its system.
+
+    Args:
+        model: its equations.
+        y, d: unknowns and constants of a run.
+        f: right-hand sides.
+        u: inputs in terms of y and d.
+    """
+    mechanics = model.holonomic
+    if mechanics is None:
+        raise ValueError(f"model '{model.name}': expected a holonomic model")
+    n, nx = mechanics.n, len(model.x)
+    q, qd, phi = y[:n], y[n : 2 * n], mechanics.phi
+    rate = ca.jtimes(phi, q, qd) + ca.jacobian(phi, model.t)
+    fixed = ca.vertcat(model.t, d)
+    at = ca.Function("at", [q, qd, fixed], [phi, ca.jacobian(phi, q), rate])
+    m = phi.numel()
+
+    def projection(name: str, iterations: tuple[int, int]) -> ca.Function:
+        on = ca.vertcat(*_projected(at, q, qd, fixed, iterations), y[2 * n :]) if m else y
+        return ca.Function(name, [y, d], [on], {"cse": True})
+
+    algebraic = list(range(nx, nx + n + len(model.z)))
+    J = ca.jacobian(f[algebraic], y[algebraic])
+    slope = ca.Function("slope", [y, d], [J])
+    here, before = (
+        ca.Function("here", [y, d], [at.call([q, qd, fixed])[1]]),
+        ca.SX.sym("y0", y.numel()),
+    )
+    turned = factorise(ca.sparsify(here(y, d) @ here(before, d).T), [range(m)])
+    branch = ca.substitute(turned.sign(), turned.packed_symbol, turned.packed)
+    pressing = ca.substitute(mechanics.pressing, model.vector("u"), u)
+    return Manifold(
+        projection("project", ITERATIONS),
+        projection("polish", NEARBY),
+        ca.Function("defect", [y, d], [ca.vertcat(phi, rate)]),
+        n,
+        m,
+        nx,
+        range(algebraic[-1] + 1, algebraic[-1] + 1 + _of_basis(mechanics)),
+        slope,
+        ca.Function("branch", [before, y, d], [branch], {"cse": True}),
+        ca.Function("pressing", [y, d], [ca.densify(pressing)]),
+        mechanics.pressed,
+    )
+
+
+def _projected(
+    at: ca.Function, q: ca.SX, qd: ca.SX, d: ca.SX, iterations: tuple[int, int]
+) -> tuple[ca.SX, ca.SX]:
+    """Positions and velocities on the constraints near q and qd."""
+    _, J, _ = at(q, qd, d)
+    lu = factorise(ca.sparsify(J @ J.T), [range(J.size1())])
+
+    def across(defect: ca.SX) -> ca.SX:
+        return J.T @ ca.substitute(lu.solve(defect), lu.packed_symbol, lu.packed)
+
+    for _ in range(iterations[0]):
+        q = q - across(at(q, qd, d)[0])
+    for _ in range(iterations[1]):
+        qd = qd - across(at(q, qd, d)[2])
+    return q, qd
+
+
+def jammed(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array) -> str:
+    """What jams or pulls at y, in words; empty where det(I - dN/dN) > SHOCK and N > 0."""
+    return grows(manifold, names, y, d, SHOCK) or pulls(manifold, y, d, 0.0)
+
+
+def pulls(manifold: Manifold, y: Array, d: Array, margin: float) -> str:
+    """Normal forces that are negative; with a margin those that have almost vanished, too."""
+    if not manifold.pressed:
+        return ""
+    limit = PULLING if margin > 0.0 else -PULLING
+    values = evaluate(manifold.pressing, y, d)
+    for share, what in zip(values, manifold.pressed, strict=True):
+        if share < limit:
+            return (
+                f"the {what} falls below zero ({share:.3g} times its typical size): it would "
+                "pull, and its friction would drive"
+            )
+    return ""
+
+
+def grows(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array, margin: float) -> str:
+    """Normal forces that grow with the friction that they cause."""
+    k = manifold.n + manifold.m
+    if manifold.slope.size1_out(0) == k:
+        return ""
+    A = manifold.slope(y, d).full()
+    if not np.isfinite(A).all():
+        return ""
+    try:
+        loop = A[k:, :k] @ np.linalg.solve(A[:k, :k], A[:k, k:]) - A[k:, k:]
+    except np.linalg.LinAlgError:
+        return ""
+    determinant = float(np.linalg.det(loop))
+    if determinant > margin:
+        return ""
+    values, vectors = np.linalg.eig(loop)
+    worst = int(np.argmax(np.abs(vectors[:, int(np.argmin(np.real(values)))])))
+    return (
+        f"friction jams, most of all through {names[manifold.first + k + worst]}: the reactions "
+        f"grow with the friction that they cause (det(I - dN/dN) = {determinant:.3g}, 1 without "
+        "friction), a tangential shock where it slides, and impacts are excluded; less friction or "
+        "a longer bearing would let it move"
+    )
+
+
+def singular(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array) -> str:
+    """Which constraints lose their independence at y, in words; empty where none do."""
+    n, m = manifold.n, manifold.m
+    phi_q = manifold.slope(y, d).full()[n : n + m, :n]
+    if not m or not np.isfinite(phi_q).all():
+        return ""
+    u, s, _ = np.linalg.svd(phi_q)
+    if s[-1] > DEPENDENT * s[0]:
+        return ""
+    worst = np.argsort(-np.abs(u[:, -1]))[:2]
+    labels = ", ".join(sorted(names[manifold.first + n + int(i)] for i in worst))
+    return (
+        f"the configuration is singular: constraints depend on each other, most of all those of "
+        f"{labels} (singular values of phi_q {s[-1]:.1e} ... {s[0]:.1e}); where the mechanism goes "
+        "from here is not determined"
+    )

@@ -1,0 +1,171 @@
+"""A model as the step sees it: one column of unknowns, one right-hand side, a mass pattern."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.manifold import Manifold, holonomic_columns, manifold
+from symfric.model import Model
+from symfric.model.holonomic import Inner
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class System:
+    """M y' = f(y, d) with y = (x, z, t): states, algebraic variables, time.
+
+    Time is an unknown with rate 1, and only where the equations depend on it, so that no method
+    needs terms for explicit time.
+
+    Attributes:
+        y: SX symbols (n, 1).
+        d: SX symbols of the constants of a run: parameters, then input data.
+        f: SX (n, 1).
+        mass: SX (n, n), constant.
+        nx: number of differential states, the first rows of y.
+        timed: whether y ends with time.
+        names: of the unknowns, for messages.
+        nominal: typical magnitude of each differential state, shape (nx,).
+        monitors: SX (m, 1), expressions whose relative error is controlled too: those of the model
+            and its algebraic variables.
+        monitor_nominal: their typical magnitudes, shape (m,).
+        manifold: where the solution of a holonomic model lies.
+        pivots: groups of rows with a safe pivot on the diagonal, each once those before it are
+            eliminated: rates of their own unknown and mass matrices, constraints, normal forces.
+        rubs: whether something slides in it that its model names (`Model.monitors`).
+        inner: f with inner unknowns, whose derivatives are sparse; None where f itself serves. Its
+            groups take the place of `pivots`.
+        slope: Jacobian of f where it is not to be derived from f.
+    """
+
+    y: ca.SX
+    d: ca.SX
+    f: ca.SX
+    mass: ca.SX
+    nx: int
+    timed: bool
+    names: tuple[str, ...]
+    nominal: NDArray[np.float64]
+    monitors: ca.SX
+    monitor_nominal: NDArray[np.float64]
+    manifold: Manifold | None = None
+    pivots: tuple[tuple[int, ...], ...] = ()
+    slope: ca.SX | None = None
+
+    rubs: bool = False
+    inner: Inner | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of unknowns."""
+        return self.y.numel()
+
+    @cached_property
+    def J(self) -> ca.SX:
+        """Jacobian of f, shape (n, n)."""
+        return ca.jacobian(self.f, self.y) if self.slope is None else self.slope
+
+    @cached_property
+    def is_ode(self) -> bool:
+        """Whether the mass matrix is the identity."""
+        return bool((ca.DM(self.mass).full() == np.eye(self.n)).all())
+
+    @cached_property
+    def is_semi_explicit(self) -> bool:
+        """Whether the mass matrix is the identity but for zeros on its diagonal."""
+        M = ca.DM(self.mass).full()
+        return bool((np.diag(np.diag(M)) == M).all() and np.isin(np.diag(M), (0.0, 1.0)).all())
+
+    @cached_property
+    def algebraic(self) -> tuple[list[int], list[int]]:
+        """Rows without rates (equations) and columns without rates (unknowns) of M y' = f."""
+        pattern = ca.DM(self.mass.sparsity(), 1).full() != 0
+        rows = [int(i) for i in np.flatnonzero(~pattern.any(axis=1))]
+        columns = [int(i) for i in np.flatnonzero(~pattern.any(axis=0))]
+        return rows, columns
+
+    @cached_property
+    def constraints(self) -> ca.Function:
+        """(y, d) -> algebraic equations, and their derivatives by the algebraic unknowns; dense."""
+        rows, columns = self.algebraic
+        g = self.f[rows]
+        both = [ca.densify(g), ca.densify(ca.jacobian(g, self.y[columns]))]
+        return ca.Function("constraints", [self.y, self.d], both, {"cse": True})
+
+
+def system(model: Model, inputs: Drivers) -> System:
+    """Put the inputs into the model and bring it into the form M y' = f(y, d).
+
+    An implicit model that is linear in x' with a constant matrix keeps that matrix as mass; any
+    other one gets its rates as additional algebraic unknowns, a holonomic one its accelerations.
+    """
+    unknowns, f, mass, names = _columns(model)
+    nx = len(model.x)
+    f = ca.substitute(f, model.vector("u"), inputs.expression)
+    mechanics = model.holonomic
+    phi = mechanics.phi if mechanics else ca.SX(0, 1)
+    timed = bool(ca.depends_on(ca.vertcat(f, phi), model.t))
+    if timed:
+        unknowns, f = ca.vertcat(unknowns, model.t), ca.vertcat(f, 1)
+        mass = ca.diagcat(mass, 1)
+        names.append("t")
+    # an algebraic unknown without influence on the states would be free to be anything
+    watched = [*((m.expression, m.nominal) for m in model.monitors)]
+    watched += [(v.symbol, v.nominal) for v in model.z]
+    monitors = ca.vertcat(ca.SX(0, 1), *(ca.SX(expression) for expression, _ in watched))
+    d = ca.vertcat(model.vector("p"), inputs.data)
+    n, m = (mechanics.n, phi.numel()) if mechanics else (0, 0)
+    own = (i for i in range(nx) if mass.sparsity().has_nz(i, i))
+    loop = tuple(range(nx + n + m, nx + n + len(model.z))) if mechanics else ()
+    return System(
+        unknowns,
+        d,
+        ca.cse(f),
+        ca.sparsify(mass),
+        nx,
+        timed,
+        tuple(names),
+        model.nominal("x"),
+        ca.substitute(monitors, model.vector("u"), inputs.expression),
+        np.array([nominal for _, nominal in watched], dtype=float),
+        manifold(model, unknowns, d, f, inputs.expression) if mechanics else None,
+        ((*own, *range(nx, nx + n)), tuple(range(nx + n, nx + n + m)), loop),
+        rubs=bool(model.monitors),
+        inner=_with_inputs(model, inputs, f) if mechanics and mechanics.inner else None,
+    )
+
+
+def _with_inputs(model: Model, inputs: Drivers, f: ca.SX) -> Inner | None:
+    """Right-hand sides of a holonomic model with inner unknowns, in the order of `f`."""
+    mechanics = model.holonomic
+    if mechanics is None or mechanics.inner is None:
+        return None
+    inner, nx = mechanics.inner, len(model.x)
+    own, values = ca.substitute([inner.f, inner.values], [model.vector("u")], [inputs.expression])
+    after = nx + own.numel()
+    return replace(inner, values=values, f=ca.vertcat(f[:nx], own, f[after:, 0]))
+
+
+def _columns(model: Model) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
+    """Unknowns without time, right-hand side, mass matrix and names."""
+    x, z = model.vector("x"), model.vector("z")
+    nx, names = x.numel(), [v.name for v in (*model.x, *model.z)]
+    if model.holonomic is not None:
+        return holonomic_columns(model)
+    if model.ode is not None:
+        f = ca.vertcat(model.ode, model.alg)
+        return ca.vertcat(x, z), f, ca.diagcat(ca.SX.eye(nx), ca.SX(z.numel(), z.numel())), names
+    matrix = ca.jacobian(model.residual, model.xdot)
+    if matrix.is_constant():
+        f = -ca.substitute(model.residual, model.xdot, ca.SX.zeros(nx))
+        mass = ca.horzcat(matrix, ca.SX(matrix.size1(), z.numel()))
+        return ca.vertcat(x, z), f, mass, names
+    f = ca.vertcat(model.xdot, model.residual)
+    mass = ca.diagcat(ca.SX.eye(nx), ca.SX(f.numel() - nx, f.numel() - nx))
+    names = [*names[:nx], *(f"{v.name}_dot" for v in model.x), *names[nx:]]
+    return ca.vertcat(x, model.xdot, z), f, mass, names

@@ -1,0 +1,1 @@
+"""Many runs of one model: members, chunks, workers, stores."""

@@ -1,0 +1,1 @@
+"""The methods: coefficients with their source, and what each family makes of one step."""

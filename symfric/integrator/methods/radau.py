@@ -1,0 +1,143 @@
+"""Radau IIA collocation, solved by simplified Newton iterations in the eigenbasis of its matrix."""
+
+from dataclasses import dataclass
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+
+from symfric.integrator.equations.blocks import blocks
+from symfric.integrator.equations.lu import factorise
+from symfric.integrator.equations.system import System
+from symfric.integrator.methods.method import Array, Method, Trial, Trials, combination
+
+
+@final
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Radau(Method):
+    """Radau IIA with three stages and a fixed number of Newton iterations.
+
+        M Z_i = h sum_j a_ij f(y_0 + Z_j),      y_1 = y_0 + Z_3
+
+    The polynomial through y_0 and all y_0 + Z_i is the dense output. The error estimate is
+    (gamma M / h - J)^-1 [f(y_0) + M sum_j (e_j / h) Z_j].
+
+    Attributes:
+        c: nodes, shape (3,).
+        E: error weights, shape (3,).
+        iterations: simplified Newton iterations a step. Each gains two orders in the states and one
+            in the algebraic unknowns, so these get one more.
+    """
+
+    c: Array
+    E: Array
+    iterations: int
+
+    @property
+    def A(self) -> Array:
+        """Integrals from 0 to each node of the Lagrange polynomials through all nodes."""
+        powers = np.arange(1, self.c.size + 1)
+        moments: Array = self.c[:, None] ** powers / powers
+        vandermonde: Array = np.vander(self.c, increasing=True)
+        return moments @ np.linalg.inv(vandermonde)
+
+    @property
+    def diagonal(self) -> float:
+        """That of its real block."""
+        return 1 / eigenbasis(self.A).gamma
+
+    def work(self, system: System) -> tuple[int, int, int]:
+        """Right-hand sides, Jacobians and factorisations (a real and a complex one) of a step."""
+        return 3 * self._iterations(system) - 2, 1, 2
+
+    def _iterations(self, system: System) -> int:
+        return self.iterations + bool(system.algebraic[1])
+
+    def trials(self, system: System) -> Trials:
+        """Its steps on a system.
+
+        The increments z = T w are iterated from 0 with the Jacobian at y_0; of a linear system the
+        first iteration is the solution.
+        """
+        basis = eigenbasis(self.A)
+        block, (factor, solve) = blocks(system, self.diagonal), _pair(system, basis)
+        n, T, inverse = system.n, basis.T, np.linalg.inv(basis.T)
+        # what algebraic equations leave over where a step begins is no error of the step
+        rates = ca.DM([float(i not in system.algebraic[0]) for i in range(n)])
+
+        def trial(y: Any, h: Any, d: Any) -> Trial:
+            kind, per_h = type(y), 1 / h
+            lu, lu_pair = block.factor(y, h, d), factor(y, h, d)
+            first = block.f(y, d)
+            slopes, corrections = [first] * 3, list[Any]()
+            w = z = [kind.zeros(n)] * 3
+            for _ in range(self._iterations(system)):
+                if corrections:
+                    slopes = [block.f(y + stage, d) for stage in z]
+                right = [combination(row, slopes, kind) for row in inverse]
+                real = block.solve(lu, right[0], (-basis.gamma * per_h) * w[0])
+                turned = ca.vertcat(
+                    basis.alpha * w[1] + basis.beta * w[2], basis.alpha * w[2] - basis.beta * w[1]
+                )
+                pair = solve(lu_pair, ca.vertcat(*right[1:]), -per_h * turned)
+                change = [real, pair[:n], pair[n:]]
+                w = [old + new for old, new in zip(w, change, strict=True)]
+                z = [combination(row, w, kind) for row in T]
+                corrections.append(combination(T[-1], change, kind))
+            error = block.solve(lu, rates * first, per_h * combination(self.E, z, kind))
+            dense = tuple(combination(row, z, kind) for row in self.H)
+            return Trial(y + z[-1], error, dense, tuple(corrections[-2:]))
+
+        return trial
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Eigenbasis:
+    """T^-1 A^-1 T = [[gamma, 0, 0], [0, alpha, beta], [0, -beta, alpha]]."""
+
+    gamma: float
+    alpha: float
+    beta: float
+    T: Array
+
+
+def eigenbasis(A: Array) -> Eigenbasis:
+    """Real eigenbasis of the inverse of A, which has one real eigenvalue."""
+    values, vectors = np.linalg.eig(np.linalg.inv(A))
+    heights = np.imag(values)
+    real, upper = int(np.argmin(np.abs(heights))), int(np.argmax(heights))
+    own, turning = vectors[:, real], vectors[:, upper]
+    return Eigenbasis(
+        float(np.real(values[real])),
+        float(np.real(values[upper])),
+        float(heights[upper]),
+        np.column_stack([np.real(own), np.real(turning), np.imag(turning)]),
+    )
+
+
+def _pair(system: System, basis: Eigenbasis) -> tuple[ca.Function, ca.Function]:
+    """The complex iteration matrix (alpha - i beta) M/h - J as a real one of twice the size.
+
+    Returns:
+        (y, h, d) -> its factors; (factors, right, memory) -> k with W k = right + M memory.
+    """
+    h, n = ca.SX.sym("h"), system.n
+    J, M = system.J, system.mass / h
+    diagonal, across = basis.alpha * M - J, basis.beta * M
+    both = ca.blockcat([[diagonal, across], [-across, diagonal]])
+    lu = factorise(ca.sparsify(both), [(*rows, *(n + i for i in rows)) for rows in system.pivots])
+    right, memory = ca.SX.sym("right", 2 * n), ca.SX.sym("memory", 2 * n)
+    solution = lu.solve(right + ca.diagcat(system.mass, system.mass) @ memory)
+    return (
+        ca.Function("factor_pair", [system.y, h, system.d], [lu.packed], {"cse": True}),
+        ca.Function("solve_pair", [lu.packed_symbol, right, memory], [solution]),
+    )
+
+
+def through(c: Array) -> Array:
+    """Coefficients H of the cubic through 0 and the increments at the nodes, the last one 1."""
+    inner, rows = c[:-1], np.eye(c.size)
+    values = (rows[:-1] - inner[:, None] * rows[-1]) / (inner * (1 - inner))[:, None]
+    vandermonde: Array = np.vander(inner, increasing=True)
+    return np.linalg.solve(vandermonde, values)

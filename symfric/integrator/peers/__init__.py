@@ -1,0 +1,1 @@
+"""Integrators of others on the same model, as a second opinion: CasADi's and SUNDIALS'."""

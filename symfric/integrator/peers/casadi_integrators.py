@@ -1,0 +1,209 @@
+"""CasADi's own implicit integrators as a second opinion: rosenbrock, SUNDIALS' cvodes and idas.
+
+Mechanisms are integrated in the form of index 1, whose constraints drift, or with idas in the
+stabilised form of index 2 (`symfric.integrator.peers.ggl`). Nothing is projected: the norms of the
+constraints among the results show what each of them makes of it.
+"""
+
+from dataclasses import dataclass
+from re import sub
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.status import Status
+from symfric.integrator.equations.initial import consistent, first_step
+from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.system import System
+from symfric.integrator.peers.ggl import stabilised
+from symfric.integrator.running.dense import Dense, hermite
+from symfric.integrator.running.run import Run, Tolerances
+
+Array = NDArray[np.float64]
+CHUNKS = 32
+COUNTS: tuple[str, ...] = ("steps", "rejections", "evaluations", "jacobians", "factorisations")
+STEPS_PER_INTERVAL = 100_000
+"""SUNDIALS would otherwise spend minutes in front of a singularity."""
+HINTS = {
+    1: "look for a discontinuity or a NaN there, or loosen rtol",
+    2: "its corrector seldom converges below rtol = 1e-8 in this form of index 2, loosen rtol; "
+    "or look for a discontinuity there",
+}
+"""What to try when CasADi's integrator stops, by the index of the equations."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Peer:
+    """A system for `casadi.integrator`, its differential states scaled by nominal values."""
+
+    system: System
+    inputs: Drivers
+    p: Array
+    plugin: str
+    dae: dict[str, ca.SX]
+    options: dict[str, Any]
+    index: int = 1
+
+    def over(self, grid: Array, y: Array | None = None) -> tuple[ca.Function, Array]:
+        """Integrator from grid[0] over grid[1:], and the input data for it.
+
+        Args:
+            grid: times [s].
+            y: consistent unknowns at the first of them; index 2 needs them.
+        """
+        first = self.inputs.interval((grid[:-1] + grid[1:]) / 2)
+        extra: dict[str, Any] = {}
+        if self.plugin == "rosenbrock":
+            first, counts = np.unique(first, return_counts=True)
+            extra["control_group_size"] = counts.tolist()
+        if self.index == 2 and y is not None:
+            extra = self._begin(grid, y, self.inputs.values[:, first[0]])
+        solver = ca.integrator(
+            "solver",
+            self.plugin,
+            self.dae,
+            float(grid[0]),
+            grid[1:].tolist(),
+            {**self.options, **extra},
+        )
+        return solver, self.inputs.values[:, first]
+
+    def _begin(self, grid: Array, y: Array, data: Array) -> dict[str, Any]:
+        """A start that spares idas a search for consistent values, which index 2 makes singular."""
+        rates, nominal = rates_of(self.system)
+        f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
+        slope = f(y, np.concatenate([self.p, data])).full().ravel()[rates] / nominal
+        # its own guess of a first step is so long that tight tolerances are never met
+        return {
+            "init_xdot": slope.tolist(),
+            "step0": first_step(float(grid[-1] - grid[0])),
+        }
+
+
+def rates_of(system: System) -> tuple[list[int], Array]:
+    """Which unknowns are differential states, and their nominal values."""
+    still = {*system.algebraic[1], *(system.manifold.basis if system.manifold else ())}
+    rates = [i for i in range(system.n) if i not in still]
+    nominal = np.ones(system.n)
+    nominal[: system.nx] = system.nominal
+    return rates, nominal[rates]
+
+
+def peer(system: System, inputs: Drivers, p: Array, tolerances: Tolerances, backend: str) -> Peer:
+    """Semi-explicit DAE of `system` for CasADi, with time as its own variable.
+
+    Args:
+        backend: "rosenbrock", "sundials" or "ggl".
+
+    Raises:
+        ValueError: a mass matrix that is not diagonal, which CasADi does not take, or "ggl" for
+            what is no mechanism.
+    """
+    if backend == "ggl":
+        system = stabilised(system)
+    rows, columns = system.algebraic
+    rates, nominal = rates_of(system)
+    mass = ca.DM(system.mass)[rates, rates]
+    if rows != columns or mass.nnz() != len(rates):
+        raise ValueError(
+            "simulate: expected a diagonal mass matrix for this backend, got coupled rates; "
+            "use backend='auto'"
+        )
+    scale = ca.DM(nominal)
+    scaled = ca.SX.sym("x", len(rates))
+    f = ca.substitute(system.f, system.y[rates], scale * scaled)
+    n_p = p.size
+    plugin = "rosenbrock" if backend == "rosenbrock" else ("idas" if columns else "cvodes")
+    options: dict[str, Any] = {
+        "reltol": tolerances.rtol,
+        "abstol": float(np.min(tolerances.atol / system.nominal)),
+        "max_num_steps": min(tolerances.max_steps, STEPS_PER_INTERVAL),
+    }
+    if plugin != "rosenbrock":
+        # without it SUNDIALS adjoints of several parameters are silently wrong (casadi#4383)
+        options["quad_err_con"] = True
+    if backend == "ggl":
+        # multipliers of index 2 carry an error / h, which no step size brings below a tolerance
+        options |= {"suppress_algebraic": True, "calc_ic": False}
+    ode = f[rates] / (scale * ca.diag(mass))
+    dae = {
+        "x": scaled,
+        "z": system.y[columns],
+        "p": system.d[:n_p],
+        "u": system.d[n_p:],
+        "ode": ca.densify(ode),
+        "alg": f[rows],
+    }
+    return Peer(system, inputs, p, plugin, dae, options, 2 if backend == "ggl" else 1)
+
+
+def integrate_by_peer(
+    system: System,
+    inputs: Drivers,
+    y0: Array,
+    p: Array,
+    times: Array,
+    tolerances: Tolerances,
+    backend: str,
+) -> tuple[Run, Dense, dict[str, int]]:
+    """Integrate with CasADi over `times`; a failure keeps what came before it."""
+    problem = peer(system, inputs, p, tolerances, backend)
+    (rates, nominal), columns = rates_of(problem.system), problem.system.algebraic[1]
+    y = consistent(system, "simulate", y0, np.concatenate([p, inputs.values[:, 0]]))
+    y = np.concatenate([y, np.zeros(problem.system.n - system.n)])
+    grid = np.unique(np.concatenate([inputs.breaks, times]))
+    run = Run(engine=f"casadi {problem.plugin}")
+    found, counts = y[:, None], dict.fromkeys(COUNTS, 0)
+    pieces = [np.arange(1, grid.size)]
+    while pieces:
+        piece = pieces.pop(0)
+        solver, data = problem.over(grid[[piece[0] - 1, *piece]], found[:, -1])
+        try:
+            result = solver(x0=found[rates, -1] / nominal, z0=found[columns, -1], p=p, u=data)
+        except RuntimeError as error:
+            if piece.size == grid.size - 1 > 1:
+                # again in pieces, so that everything before the failure is kept
+                pieces = np.array_split(piece, min(CHUNKS, piece.size))
+                continue
+            last = [line for line in str(error).splitlines() if line.strip()][-1]
+            last = sub(r"^.*\.cpp:\d+: |\. Consult .*$", "", last.strip())
+            run.stop(
+                Status.SOLVER_FAILED,
+                f"simulate: {problem.plugin} stopped after t = {grid[piece[0] - 1]:g} s ({last}); "
+                f"{HINTS[problem.index]}",
+            )
+            break
+        part = np.zeros((problem.system.n, piece.size))
+        part[rates] = result["xf"].full() * nominal[:, None]
+        part[columns] = result["zf"].full()
+        found = np.hstack([found, part])
+        for name, value in _counts(solver).items():
+            counts[name] += value
+    return run, _dense(system, inputs, p, grid[: found.shape[1]], found[: system.n]), counts
+
+
+def _counts(solver: ca.Function) -> dict[str, int]:
+    stats = solver.stats()
+    jacobians = int(stats.get("n_jac", stats.get("nlinsetups", 0)))
+    return {
+        "steps": int(stats.get("n_steps", stats.get("nsteps", 0))),
+        "rejections": int(stats.get("n_reject", stats.get("netfails", 0))),
+        "evaluations": int(stats.get("n_rhs", stats.get("nfevals", 0))),
+        "jacobians": jacobians,
+        "factorisations": jacobians,
+    }
+
+
+def _dense(system: System, inputs: Drivers, p: Array, grid: Array, y: Array) -> Dense:
+    """Cubic interpolation of the rates' columns on the grid, linear of the algebraic ones."""
+    if grid.size < 2:
+        return Dense(grid, grid + 1e-300, y.T, y.T, np.zeros((1, 2, system.n)))
+    d = np.vstack([np.tile(p[:, None], (1, grid.size)), inputs.values[:, inputs.interval(grid)]])
+    f = ca.Function("f", [system.y, system.d], [system.f])
+    slope = f.map(grid.size)(y, d).full()
+    columns = system.algebraic[1]
+    slope[columns] = np.gradient(y[columns], grid, axis=1) if columns else slope[columns]
+    return hermite(grid, y, slope)

@@ -1,0 +1,134 @@
+"""Why an integration could not go on, in one sentence."""
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.status import Status
+from symfric.integrator.equations.blocks import blocks
+from symfric.integrator.equations.initial import consistent
+from symfric.integrator.equations.manifold import grows, pulls, singular
+from symfric.integrator.equations.system import System
+from symfric.integrator.running.integrator import Integrator
+
+Array = NDArray[np.float64]
+NEARLY = 0.1
+"""A step that shrinks to nothing with this little left of det(I - dN/dN) has jammed."""
+
+
+def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> tuple[Status, str]:
+    """Status and sentence for a step that shrank to nothing at time `t`."""
+    system, name = integrator.system, integrator.model.name
+    where = f"simulate '{name}': stopped at t = {t:.9g} s"
+    f = integrator.f(y, d).full().ravel()
+    for status, cause in (
+        (Status.SINGULAR, _dead_centre(system, y, d)),
+        (Status.JAMMED, _jammed(integrator, y, d)),
+        (Status.STEP_TOO_SMALL, _unbounded(system, y, f, h)),
+        (Status.NOT_FINITE, _not_finite(integrator, y, d, h)),
+        (Status.NOT_FINITE, _steep(system, y, d)),
+        (Status.JAMMED, _pulled(system, y, d)),
+        (Status.SINGULAR, _singular(integrator, y, d, h)),
+    ):
+        if cause:
+            helps = status is Status.JAMMED or "algebraic equations" in cause
+            return status, f"{where}: {cause}{_advice(integrator) if helps else ''}"
+    fastest = system.names[int(np.argmax(np.abs(f[: system.nx]) / system.nominal))]
+    return (
+        Status.STEP_TOO_SMALL,
+        f"{where}: the step fell to {h:.1e} s, fastest equation {fastest}; a discontinuity is "
+        "near, give the law a smooth form or the model an event there" + _advice(integrator),
+    )
+
+
+def _advice(integrator: Integrator) -> str:
+    """What a mechanism says about friction without a solution."""
+    mechanics = integrator.model.holonomic
+    return f"; {mechanics.advice}" if mechanics is not None and mechanics.advice else ""
+
+
+def _dead_centre(system: System, y: Array, d: Array) -> str:
+    """Constraints of a mechanism that depend on each other here."""
+    manifold = system.manifold
+    return "" if manifold is None else singular(manifold, system.names, y, d)
+
+
+def _jammed(integrator: Integrator, y: Array, d: Array) -> str:
+    """Contacts whose normal forces grow with their own friction; with joint and law."""
+    manifold = integrator.system.manifold
+    if manifold is None:
+        return ""
+    cause = grows(manifold, integrator.system.names, y, d, NEARLY)
+    for variable in integrator.model.z:
+        cause = cause.replace(f"through {variable.name}:", f"through the {variable.doc}:")
+    return cause
+
+
+def _pulled(system: System, y: Array, d: Array) -> str:
+    """Normal forces that are about to be negative."""
+    return "" if system.manifold is None else pulls(system.manifold, y, d, NEARLY)
+
+
+def _unbounded(system: System, y: Array, f: Array, h: float) -> str:
+    """States that are huge, or large and growing ever faster."""
+    x, rate = y[: system.nx], np.nan_to_num(f[: system.nx], posinf=0.0, neginf=0.0)
+    huge = np.abs(x) > 1e10 * system.nominal
+    runaway = (
+        (np.abs(x) > 1e3 * system.nominal) & (x * rate > 0) & (np.abs(x) < 1e3 * h * abs(rate))
+    )
+    grown = ", ".join(f"{system.names[i]} = {x[i]:.3g}" for i in np.flatnonzero(huge | runaway))
+    return f"{grown} grows without bound; check signs and parameters" if grown else ""
+
+
+def _not_finite(integrator: Integrator, y: Array, d: Array, h: float) -> str:
+    """Equations that are not finite here, or along the slope a few of the last steps ahead."""
+    system = integrator.system
+    f = integrator.f(y, d).full().ravel()
+    rates = np.linalg.pinv(ca.DM(system.mass).full()) @ np.nan_to_num(f, posinf=0.0, neginf=0.0)
+    for ahead in (0.0, *(10.0**k * h for k in range(5))):
+        f = integrator.f(y + ahead * rates, d).full().ravel()
+        broken = _named(system, np.flatnonzero(~np.isfinite(f)))
+        if broken:
+            when = "returned" if ahead == 0.0 else "is about to return"
+            return (
+                f"the equation of {broken} {when} NaN or infinity; "
+                "look for a division by zero or a root of a negative number there"
+            )
+    return ""
+
+
+def _steep(system: System, y: Array, d: Array) -> str:
+    """Derivatives of equations that are not finite."""
+    J = ca.Function("J", [system.y, system.d], [ca.jacobian(system.f, system.y)])(y, d).full()
+    rows, columns = np.nonzero(~np.isfinite(J))
+    if not rows.size:
+        return ""
+    return (
+        f"the derivative of the equation of {_named(system, rows[:1])} with respect to "
+        f"{_named(system, columns[:1])} is NaN or infinite; give the root or power there a "
+        "smooth form"
+    )
+
+
+def _singular(integrator: Integrator, y: Array, d: Array, h: float) -> str:
+    """Algebraic equations that cannot be solved, or do not determine their unknowns."""
+    system = integrator.system
+    names = _named(system, np.array(system.algebraic[1], dtype=int))
+    factors = ca.DM(blocks(system, 1.0).factor(y, max(h, 1e-12), d)).full()
+    if not np.isfinite(factors).all():
+        return (
+            f"the iteration matrix is singular in {names or 'the states'}; the constraints may be "
+            "redundant or the configuration singular"
+        )
+    try:
+        consistent(system, "", y, d)
+    except ValueError:
+        return (
+            f"the algebraic equations for {names} have no solution near their last one; "
+            "the configuration is singular or jams there"
+        )
+    return ""
+
+
+def _named(system: System, rows: NDArray[np.intp]) -> str:
+    return ", ".join(system.names[i] for i in rows)

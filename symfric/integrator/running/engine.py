@@ -1,0 +1,221 @@
+"""Run many attempts of a step without Python in between: in CasADi's virtual machine or compiled.
+
+Both engines advance S in place and write a row (t0, t1, y0, y1, D) per accepted step.
+"""
+
+import ctypes
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+from string import Template
+from tempfile import TemporaryDirectory
+from typing import Any, Protocol, cast, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.numeric import flat_view
+from symfric.integrator.compiled.compiler import load
+from symfric.integrator.step.attempt import MEMORY
+
+Array = NDArray[np.float64]
+
+
+class Stop(IntEnum):
+    """Why an engine returned."""
+
+    END = 0
+    FULL = 1
+    ATTEMPTS = 2
+    STEP_TOO_SMALL = 3
+
+
+class Engine(Protocol):
+    """Runs attempts until the end time, a full record, a number of attempts or a tiny step."""
+
+    @property
+    def name(self) -> str:
+        """What ran: vm or compiled."""
+        ...
+
+    def run(
+        self, S: Array, R: Array, rows: int, attempts: int, h_min: float
+    ) -> tuple[Array, int, Stop]:
+        """Advance S; return the records, the attempts made and why it stopped."""
+        ...
+
+
+def width(n: int, dense_rows: int) -> int:
+    """Length of a record row."""
+    return 2 + 2 * n + dense_rows * n
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class VmEngine:
+    """Attempts in CasADi's virtual machine, in batches of one call; needs no compiler."""
+
+    step: ca.Function
+    batch: ca.Function
+    name: str = "vm"
+
+    @classmethod
+    def of(cls, step: ca.Function, size: int = 32) -> "VmEngine":
+        """The engine for a step Function."""
+        return cls(step, step.mapaccum("batch", size))
+
+    def run(
+        self, S: Array, R: Array, rows: int, attempts: int, h_min: float
+    ) -> tuple[Array, int, Stop]:
+        """Advance S; return the records, the attempts made and why it stopped."""
+        size = self.batch.size2_out(0)
+        n = S.size - MEMORY
+        S_out, D = np.zeros((size, S.size)), np.zeros((size, self.step.numel_out(1)))
+        every = np.tile(R, size)
+        buffer, evaluate = cast(tuple[Any, Any], self.batch.buffer())
+        buffer.set_arg(0, flat_view(S))
+        buffer.set_arg(1, flat_view(every))
+        buffer.set_res(0, flat_view(S_out))
+        if D.size:
+            buffer.set_res(1, flat_view(D))
+        found: list[Array] = []
+        count = made = 0
+        while S[0] < R[0] and count < rows and made < attempts and S[1] >= h_min:
+            evaluate()
+            before = np.vstack([S, S_out[:-1]])
+            used = before[:, 0] < R[0]
+            took = S_out[:, 0] > before[:, 0]
+            found.append(
+                np.hstack(
+                    [
+                        before[took, :1],
+                        S_out[took, :1],
+                        before[took, MEMORY : MEMORY + n],
+                        S_out[took, MEMORY:],
+                        D[took],
+                    ]
+                )
+            )
+            count += found[-1].shape[0]
+            made += int(used.sum())
+            S[:] = S_out[-1]
+        records = np.vstack(found) if found else np.zeros((0, width(n, D.shape[1] // n)))
+        return records, made, _reason(S, R, count >= rows, h_min)
+
+
+def _reason(S: Array, R: Array, full: bool, h_min: float) -> Stop:
+    if S[0] >= R[0]:
+        return Stop.END
+    if not S[1] >= h_min:
+        return Stop.STEP_TOO_SMALL
+    return Stop.FULL if full else Stop.ATTEMPTS
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class CompiledEngine:
+    """Attempts in a compiled loop around the generated C of the step; releases the GIL."""
+
+    library: ctypes.CDLL
+    row: int
+    name: str = "compiled"
+
+    @classmethod
+    def of(cls, step: ca.Function, dense_rows: int) -> "CompiledEngine":
+        """Compile the step, or load it from the cache."""
+        return cls.of_source(c_source(step, dense_rows), step.numel_in(0) - MEMORY, dense_rows)
+
+    @classmethod
+    def of_source(cls, source: str, n: int, dense_rows: int) -> "CompiledEngine":
+        """The engine of generated C, for `n` unknowns."""
+        library = load(source)
+        library.symfric_run.restype = ctypes.c_int
+        library.symfric_run.argtypes = [
+            *[ctypes.c_void_p] * 3,
+            *[ctypes.c_longlong] * 2,
+            ctypes.c_double,
+            ctypes.c_void_p,
+        ]
+        return cls(library, width(n, dense_rows))
+
+    def run(
+        self, S: Array, R: Array, rows: int, attempts: int, h_min: float
+    ) -> tuple[Array, int, Stop]:
+        """Advance S; return the records, the attempts made and why it stopped."""
+        records = np.empty((rows, self.row))
+        counts = np.zeros(2, dtype=np.int64)
+        reason = self.library.symfric_run(
+            S.ctypes.data,
+            R.ctypes.data,
+            records.ctypes.data,
+            rows,
+            attempts,
+            h_min,
+            counts.ctypes.data,
+        )
+        return records[: counts[0]], int(counts[1]), Stop(reason)
+
+
+def c_source(step: ca.Function, dense_rows: int, *others: ca.Function) -> str:
+    """C of the step as CasADi generates it, with the loop that calls it until it must stop.
+
+    `others` are Functions that further C calls by their names.
+    """
+    n = step.numel_in(0) - MEMORY
+    with TemporaryDirectory() as folder:
+        generator = ca.CodeGenerator("symfric_step.c", {"static_aux": True})
+        for function in (step, *others):
+            generator.add(function)
+        generator.generate(folder + "/")
+        code = (Path(folder) / "symfric_step.c").read_text(encoding="utf-8")
+    return code + Template(_LOOP).substitute(
+        n=n,
+        memory=MEMORY,
+        width=width(n, dense_rows),
+        dense=2 + 2 * n,
+        dense_rows=dense_rows,
+        arg=step.sz_arg(),
+        res=step.sz_res(),
+        iw=max(1, step.sz_iw()),
+        w=max(1, step.sz_w()),
+    )
+
+
+_LOOP = """
+/* Attempts from S towards R[0]; a row (t0, t1, y0, y1, D) per accepted step. */
+int symfric_run(double *S, const double *R, double *rows, long long max_rows,
+                long long max_attempts, double h_min, long long *counts)
+{
+  enum { N = $n, MEM = $memory, WIDTH = $width };
+  double next[MEM + N], w[$w];
+  casadi_int iw[$iw];
+  const double *arg[$arg];
+  double *res[$res];
+  long long i, count = 0, made = 0;
+  while (S[0] < R[0] && count < max_rows && made < max_attempts && S[1] >= h_min) {
+    double *row = rows + count * WIDTH;
+    arg[0] = S;
+    arg[1] = R;
+    res[0] = next;
+    res[1] = row + $dense;
+    symfric_step(arg, res, iw, w, 0);
+    ++made;
+    if (next[0] > S[0]) {
+      row[0] = S[0];
+      row[1] = next[0];
+      for (i = 0; i < N; ++i) {
+        row[2 + i] = S[MEM + i];
+        row[2 + N + i] = next[MEM + i];
+      }
+      ++count;
+    }
+    for (i = 0; i < MEM + N; ++i) S[i] = next[i];
+  }
+  counts[0] = count;
+  counts[1] = made;
+  if (S[0] >= R[0]) return 0;
+  if (!(S[1] >= h_min)) return 3;
+  return count >= max_rows ? 1 : 2;
+}
+"""

@@ -1,0 +1,188 @@
+"""The adaptive integrator of one model: built once, run for any numbers."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from time import perf_counter
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.integrator.compiled.columns import Columns
+from symfric.integrator.compiled.compiler import find_compiler, library_path
+from symfric.integrator.equations.blocks import refinement
+from symfric.integrator.equations.initial import consistent
+from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.system import System, system
+from symfric.integrator.methods.method import Method
+from symfric.integrator.running.engine import CompiledEngine, Engine, VmEngine, c_source
+from symfric.integrator.step.attempt import build_step
+from symfric.model import Model
+
+Array = NDArray[np.float64]
+INLINE = 6000
+"""Steps with more instructions are compiled as calls of blocks, which compile much faster."""
+
+
+@final
+@dataclass(eq=False)
+class Integrator:
+    """System, step and Functions of a model with one structure of inputs.
+
+    Mutable only in what it remembers: its engines, the time spent in the virtual machine, from
+    which it decides when compiling pays, whether compiling failed, and the last start.
+    """
+
+    model: Model
+    inputs: Drivers
+    tableau: Method
+    build_time: float = 0.0
+    compile_time: float = 0.0
+    vm_time: float = 0.0
+    compiles: bool = True
+    _engines: dict[str, Engine] = field(default_factory=dict[str, Engine])
+    _starts: dict[tuple[bytes, bytes], Array] = field(
+        default_factory=dict[tuple[bytes, bytes], Array]
+    )
+
+    def __post_init__(self) -> None:
+        begin = perf_counter()
+        self.system: System = system(self.model, self.inputs)
+        self.step = build_step(self.system, self.tableau)
+        self.f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
+        self.events = self._event_function()
+        self.resets = [
+            {state: self.of_time("reset", ca.SX(new)) for state, new in event.reset.items()}
+            for event in self.model.events
+        ]
+        self.build_time = perf_counter() - begin
+
+    def _event_function(self) -> ca.Function:
+        """Event expressions as a Function (t, y, d)."""
+        values = ca.vertcat(ca.SX(0, 1), *(ca.SX(e.expression) for e in self.model.events))
+        return self.of_time("events", values)
+
+    def of_time(self, name: str, expression: ca.SX) -> ca.Function:
+        """`expression` of the model as a Function (t, y, d), inputs put in."""
+        s, t = self.system, ca.SX.sym("time")
+        driven = ca.substitute(expression, self.model.vector("u"), self.inputs.expression)
+        if s.timed:
+            return ca.Function(name, [t, s.y, s.d], [driven])
+        return ca.Function(name, [self.model.t, s.y, s.d], [driven])
+
+    @property
+    def _every(self) -> ca.SX:
+        """All signals of the model."""
+        m = self.model
+        outputs = (ca.SX(o.expression) for o in m.outputs.values())
+        return ca.vertcat(m.vector("x"), m.vector("z"), m.vector("u"), *outputs)
+
+    @cached_property
+    def signals(self) -> ca.Function:
+        """All signals of the model as a Function (t, y, d), refined."""
+        return self.refined(self._every)
+
+    def refined(self, expression: ca.SX) -> ca.Function:
+        """`expression` of the model as a Function (t, y, d), that of a mechanism refined.
+
+        Between steps the constraints of a mechanism hold to the tolerance only, at results exactly.
+        """
+        signals, manifold = self.of_time("signals", expression), self.system.manifold
+        if manifold is None:
+            return signals
+        t, y, d = ca.SX.sym("t"), ca.SX.sym("y", self.system.n), ca.SX.sym("d", signals.numel_in(2))
+        return ca.Function("signals", [t, y, d], [signals(t, refinement(self.system)(y, d), d)])
+
+    @cached_property
+    def signal_columns(self) -> Columns:
+        """The signals at many times."""
+        return Columns(self.signals)
+
+    @cached_property
+    def plain_signal_columns(self) -> Columns:
+        """The signals at many times as they are, drift of constraints included."""
+        return Columns(self.of_time("signals", self._every))
+
+    @cached_property
+    def states(self) -> Columns | None:
+        """States at many times from (y, d) there; None where those of y are what they should be.
+
+        Between steps the loops of a mechanism are closed to the tolerance only.
+        """
+        s, manifold = self.system, self.system.manifold
+        if manifold is None or not manifold.m:
+            return None
+        projected = manifold.project(s.y, s.d)[: s.nx]
+        return Columns(ca.Function("states", [s.y, s.d], [projected], {"cse": True}))
+
+    def start(self, y: Array, d: Array) -> Array:
+        """`y` with consistent algebraic unknowns; remembered, for runs from one start.
+
+        Raises:
+            ValueError: none near.
+        """
+        key = (y.tobytes(), d.tobytes())
+        if key not in self._starts:
+            found = consistent(self.system, f"model '{self.model.name}'", y, d)
+            self._starts = {key: found}
+        return self._starts[key]
+
+    def vm(self) -> Engine:
+        """The engine that needs no compiler."""
+        if "vm" not in self._engines:
+            self._engines["vm"] = VmEngine.of(self.step)
+        return self._engines["vm"]
+
+    def compiled(self) -> Engine:
+        """The compiled engine; compiles, or loads from the cache, on first use.
+
+        Raises:
+            RuntimeError: there is no compiler, or it failed.
+        """
+        if "compiled" not in self._engines:
+            begin = perf_counter()
+            self._engines["compiled"] = CompiledEngine.of(
+                self.step_to_compile(), self.tableau.H.shape[0]
+            )
+            self.compile_time = perf_counter() - begin
+        return self._engines["compiled"]
+
+    def step_to_compile(self) -> ca.Function:
+        """The step in the form that compiles fast."""
+        if self.step.n_instructions() <= INLINE:
+            return self.step
+        return build_step(self.system, self.tableau, ca.MX)
+
+    def choose(self, backend: str, left: float) -> Engine:
+        """The engine for `backend`; "auto" compiles when that is predicted to pay.
+
+        Args:
+            backend: "vm", "compiled" or "auto".
+            left: predicted time [s] that the virtual machine still needs, 0 where unknown.
+        """
+        if backend == "compiled":
+            return self.compiled()
+        if backend == "vm" or not self.compiles or find_compiler() is None:
+            return self.vm()
+        if "compiled" in self._engines:
+            return self._engines["compiled"]
+        try:
+            return self._best(left)
+        except RuntimeError:  # a broken compiler is no reason not to simulate
+            self.compiles = False
+            return self.vm()
+
+    def _best(self, left: float) -> Engine:
+        """The compiled engine where it pays or lies in the cache, else the virtual machine."""
+        n = self.step.n_instructions()
+        look_up, compile_ = 2e-3 + 1e-5 * n, 0.1 + 1.5e-4 * n
+        expected = max(left, self.vm_time)
+        if expected > 2 * compile_:
+            return self.compiled()
+        if expected > 2 * look_up and "looked up" not in self._engines:
+            self._engines["looked up"] = self.vm()
+            path = library_path(c_source(self.step_to_compile(), self.tableau.H.shape[0]))
+            if path is not None and path.exists():
+                return self.compiled()
+        return self.vm()

@@ -1,0 +1,228 @@
+"""Drive an integrator from start to end: input intervals, events, progress, failures."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.status import Status
+from symfric.integrator.equations.initial import consistent, first_step
+from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.running.dense import Dense, from_records, join
+from symfric.integrator.running.diagnosis import explain
+from symfric.integrator.running.engine import Stop
+from symfric.integrator.running.events import (
+    Crossing,
+    EventStorm,
+    first_crossing,
+    resets,
+    values,
+)
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.step.attempt import GROWTH_MEMORY, MEMORY
+
+Array = NDArray[np.float64]
+ROWS, EVENT_ROWS = 2048, 64
+ATTEMPTS = {"vm": 2_000, "compiled": 50_000}
+"""Attempts between two looks at progress and interrupts: tens of milliseconds."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Tolerances:
+    """What a run has to meet.
+
+    Attributes:
+        rtol: relative tolerance.
+        atol: absolute tolerance of each state, shape (nx,).
+        event: tolerance of event times [s].
+        max_steps: attempts allowed.
+    """
+
+    rtol: float
+    atol: Array
+    event: float
+    max_steps: int
+
+
+@final
+@dataclass(eq=False)
+class Run:
+    """What a run has produced so far; a mutable record that survives interrupts and failures."""
+
+    dense: list[Dense] = field(default_factory=list[Dense])
+    happened: list[tuple[float, str]] = field(default_factory=list[tuple[float, str]])
+    steps: int = 0
+    attempts: int = 0
+    smallest: float = np.inf
+    engine: str = ""
+    status: Status = Status.SUCCESS
+    message: str = Status.SUCCESS.value
+
+    def keep(self, piece: Dense) -> None:
+        """Add accepted steps."""
+        if piece.t0.size:
+            self.dense.append(piece)
+            self.steps += piece.t0.size
+            self.smallest = min(self.smallest, float((piece.t1 - piece.t0).min()))
+
+    def stop(self, status: Status, message: str | None = None) -> None:
+        """End with `status`."""
+        self.status, self.message = status, message or status.value
+
+
+def integrate(
+    integrator: Integrator,
+    inputs: Drivers,
+    y0: Array,
+    p: Array,
+    tolerances: Tolerances,
+    backend: str,
+    progress: Callable[[float], None] | None,
+) -> tuple[Run, Dense]:
+    """Integrate over all input intervals; the result holds whatever was reached."""
+    d = np.concatenate([p, inputs.values[:, 0]])
+    y = integrator.start(y0, d)
+    drive = _Drive(integrator, inputs, tolerances, backend, progress, y)
+    try:
+        drive.whole(p)
+    except KeyboardInterrupt:
+        reached = f"{Status.INTERRUPTED.value} It reaches t = {drive.S[0]:g} s."
+        drive.run.stop(Status.INTERRUPTED, reached)
+    run = drive.run
+    if not run.dense:
+        empty = np.zeros((1, integrator.tableau.H.shape[0], y.size))
+        start = inputs.breaks[:1]
+        run.dense.append(Dense(start, start + 1e-300, y[None], y[None], empty))
+    return run, join(run.dense)
+
+
+@final
+class _Drive:
+    """One run under way: the step's memory and unknowns S, and what it has produced."""
+
+    def __init__(
+        self,
+        integrator: Integrator,
+        inputs: Drivers,
+        tolerances: Tolerances,
+        backend: str,
+        progress: Callable[[float], None] | None,
+        y: Array,
+    ) -> None:
+        self.integrator, self.inputs, self.tolerances = integrator, inputs, tolerances
+        self.backend, self.progress = backend, progress
+        self.t_start, self.t_end = float(inputs.breaks[0]), float(inputs.breaks[-1])
+        self.h_min = 1e-15 * max(abs(self.t_start), abs(self.t_end), 1e-3)
+        h = first_step(self.t_end - self.t_start)
+        self.S = np.concatenate([[self.t_start, h, h, GROWTH_MEMORY, 0.0], y])
+        self.eventful = bool(integrator.model.events)
+        self.storm = EventStorm(self.t_end - self.t_start, tolerances.event)
+        self.run, self.d = Run(), np.zeros(0)
+
+    def whole(self, p: Array) -> None:
+        """Integrate over all input intervals, each with its own run data d = (p, data)."""
+        for k in range(self.inputs.breaks.size - 1):
+            before, self.d = self.d, np.concatenate([p, self.inputs.values[:, k]])
+            old = self.jump(before) if k else None
+            if self.run.status is Status.SUCCESS:
+                self.interval(float(self.inputs.breaks[k + 1]), old)
+            if self.run.status is not Status.SUCCESS:
+                return
+
+    def interval(self, end: float, old: Array | None) -> None:
+        """Integrate up to `end`, on which d is constant.
+
+        `old` holds the values of the event expressions before the jump that led here, if one did.
+        """
+        S, n, left = self.S, self.integrator.system.n, 0.0
+        R = np.concatenate([[end, self.tolerances.rtol], self.tolerances.atol, self.d])
+        while S[0] < end:
+            records, reason, left = self.attempts(R, left)
+            if self.run.status is not Status.SUCCESS:
+                return
+            piece = from_records(records, n)
+            crossing = self.crossing(piece, old) if self.eventful else None
+            if crossing is not None:
+                old = self.happen(piece, crossing)
+            else:
+                self.run.keep(piece)
+                old = None if piece.t0.size else old
+                if reason is Stop.STEP_TOO_SMALL:
+                    self.run.stop(*explain(self.integrator, S[0], S[MEMORY:], self.d, S[1]))
+            if self.run.status is not Status.SUCCESS:
+                return
+            if self.progress is not None:
+                self.progress((S[0] - self.t_start) / (self.t_end - self.t_start))
+
+    def attempts(self, R: Array, left: float) -> tuple[Array, Stop, float]:
+        """A batch of attempts: records, why it stopped, time [s] the VM will still need."""
+        engine = self.integrator.choose(self.backend, left)
+        self.run.engine = engine.name
+        allowed = min(ATTEMPTS[engine.name], self.tolerances.max_steps - self.run.attempts)
+        if allowed <= 0:
+            self.run.stop(
+                Status.MAX_STEPS, f"{Status.MAX_STEPS.value} It stands at t = {self.S[0]:g} s."
+            )
+            return np.zeros((0, 0)), Stop.ATTEMPTS, left
+        began, from_t = perf_counter(), self.S[0]
+        rows = EVENT_ROWS if self.eventful else ROWS
+        records, made, reason = engine.run(self.S, R, rows, allowed, self.h_min)
+        self.run.attempts += made
+        if engine.name == "vm":
+            spent, advance = perf_counter() - began, self.S[0] - from_t
+            self.integrator.vm_time += spent
+            left = spent * (self.t_end - self.S[0]) / advance if advance > 0 else left
+        return records, reason, left
+
+    def crossing(self, piece: Dense, old: Array | None) -> Crossing | None:
+        """The first event in `piece`."""
+        return first_crossing(self.integrator, piece, self.d, old, self.tolerances.event)
+
+    def happen(self, piece: Dense, crossing: Crossing) -> Array:
+        """Cut the run at an event, carry it out and go on from there."""
+        self.run.keep(crossing.before(piece))
+        # steps beyond the event say nothing; its own is a guess only, what follows may be faster
+        h = float(piece.t1[crossing.step] - piece.t0[crossing.step])
+        h = max(min(h, self.tolerances.event * 1e3), 1e-3 * h)
+        self.S[:MEMORY] = crossing.t, h, h, GROWTH_MEMORY, 0.0
+        self.S[MEMORY:] = crossing.y
+        return self.carry_out(crossing.which)
+
+    def carry_out(self, which: tuple[int, ...]) -> Array:
+        """Apply the resets of the events `which`; event values before them, NaN for themselves."""
+        events, t = self.integrator.model.events, float(self.S[0])
+        old = values(self.integrator, t, self.S[MEMORY:], self.d)
+        old[list(which)] = np.nan
+        self.S[MEMORY:] = resets(self.integrator, t, self.S[MEMORY:], self.d, which)
+        self.run.happened += [(t, events[i].name) for i in which]
+        if any(events[i].terminal for i in which):
+            self.run.stop(Status.TERMINATED)
+        elif self.storm.raged_at(t, which):
+            self.run.stop(
+                Status.EVENT_STORM,
+                f"{Status.EVENT_STORM.value} It stands at t = {t:.9g} s, "
+                f"event '{events[which[0]].name}'.",
+            )
+        else:
+            self.make_consistent()
+        return old
+
+    def jump(self, before: Array) -> Array | None:
+        """Take over new input data, which algebraic unknowns follow; event values before them."""
+        old = None
+        if self.eventful:
+            old = values(self.integrator, self.S[0], self.S[MEMORY:], before)
+        self.make_consistent()
+        return old
+
+    def make_consistent(self) -> None:
+        """Let the algebraic unknowns follow a jump, or stop the run where they cannot."""
+        where = f"simulate '{self.integrator.model.name}' at t = {self.S[0]:.9g} s"
+        try:
+            self.S[MEMORY:] = consistent(self.integrator.system, where, self.S[MEMORY:], self.d)
+        except ValueError as error:
+            self.run.stop(Status.SINGULAR, str(error))

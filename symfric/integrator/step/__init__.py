@@ -1,0 +1,1 @@
+"""One attempt of an adaptive step as one CasADi Function."""

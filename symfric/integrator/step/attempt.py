@@ -1,0 +1,209 @@
+"""One attempt of an adaptive step as ONE CasADi Function, whatever the method.
+
+State and run data are columns:
+
+    S = (t, h, h_old, growth_old, rejected, y)      what an attempt changes
+    R = (t_end, rtol, atol[nx], d)             what it does not
+
+`step(S, R) -> (S_next, D)` tries h, and either accepts (t, y advance; D holds the dense output)
+or rejects (h shrinks). `fixed(y, h, d) -> y_next` is the bare step, for derivatives and C code.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from symfric.integrator.equations.blocks import signs
+from symfric.integrator.equations.manifold import PULLING, SHOCK
+from symfric.integrator.equations.system import System
+from symfric.integrator.methods.method import Method, Trial, Trials
+from symfric.integrator.step.tangent import tangent
+
+MEMORY = 5
+"""Rows of S before y: t, h, h_old, growth_old, rejected."""
+
+SAFETY, GROW, SHRINK = 0.85, 8.0, 0.2
+E_FLOOR, GROWTH_MEMORY = 1e-6, 2.5
+"""Smallest error the controller believes, and largest growth it remembers."""
+
+KAPPA = 0.1
+"""What Newton's method may leave over, in units of the tolerance."""
+
+
+def steps(system: System, method: Method) -> Trials:
+    """The steps of a method; those of a mechanism end on its constraints."""
+    chart, manifold = tangent(system), system.manifold
+    if chart is not None:
+        inside = method.trials(chart.reduced)
+
+        def in_chart(y: Any, h: Any, d: Any) -> Trial:
+            data = chart.open(y, d)
+            return chart.trial(inside(chart.enter(y, data), h, data), y, h, d, data)
+
+        return in_chart
+    free = method.trials(system)
+    if manifold is None or not manifold.m:
+        return free
+
+    def projected(y: Any, h: Any, d: Any) -> Trial:
+        found = free(y, h, d)
+        return replace(found, end=manifold.project(found.end, d))
+
+    return projected
+
+
+def obstacles(system: System, method: Method) -> Callable[[Any, Any, Any], Any] | None:
+    """What forbids a step over h to end at y although its error is small; None where nothing can.
+
+    Returns:
+        (y, h, d) -> a number that is negative where something does.
+
+    Breaking away would be missed without a sign of it: where a contact turns unstable, a long step
+    stays on the solution that sticks, and estimates no error; `signs` tells. And where the loop
+    from normal forces over friction to reactions and back, det(I - dN/dN), is negative, friction
+    has jammed: that solution is none of the machine, nor is one where a bearing pulls. A pivot of
+    I - dN/dN below `SHOCK` is on the way there. Mechanisms without friction have none of this.
+    """
+    gamma, manifold, chart = method.diagonal, system.manifold, tangent(system)
+    if gamma is None or (manifold is not None and not system.rubs):
+        return None
+    inside = system if chart is None else chart.reduced
+    loop = [] if manifold is None else inside.algebraic[0][manifold.n + manifold.m :]
+    every = signs(inside, gamma, loop)
+
+    def sign(y: Any, h: Any, d: Any) -> Any:
+        here, data = y, d
+        if chart is not None:
+            data = chart.open(y, d)
+            here = chart.enter(y, data)
+        own, tiny, pivots = every(here, h, data)
+        if manifold is None:
+            return own * tiny
+        # with a definite mass matrix and no friction, that of n accelerations is (-1)^n
+        signs_of = [own * tiny, (-1) ** manifold.n * tiny]
+        return ca.mmin(ca.vertcat(*signs_of, pivots - SHOCK, manifold.pressing(y, d) + PULLING))
+
+    return sign
+
+
+def build_fixed(system: System, method: Method, kind: Any = ca.SX) -> ca.Function:
+    """The bare step (y, h, d) -> y_next, without error control: what derivatives are taken of."""
+    y, d = kind.sym("y", system.n), kind.sym("d", system.d.numel())
+    h = kind.sym("h")
+    end = steps(system, method)(y, h, d).end
+    return ca.Function("fixed", [y, h, d], [end], ["y", "h", "d"], ["y_next"], {"cse": True})
+
+
+def build_dense_step(system: System, method: Method) -> ca.Function:
+    """The bare step with its dense output, (y, h, d) -> all = (y_next, D), for sensitivities."""
+    y, d = ca.SX.sym("y", system.n), ca.SX.sym("d", system.d.numel())
+    h = ca.SX.sym("h")
+    trial = steps(system, method)(y, h, d)
+    everything = ca.vertcat(trial.end, *trial.dense)
+    return ca.Function("dense", [y, h, d], [everything], ["y", "h", "d"], ["all"], {"cse": True})
+
+
+Norm = Callable[[Any], Any]
+
+
+def error_norm(system: System, y: Any, y_new: Any, atol: Any, rtol: Any, d: Any) -> Norm:
+    """Mean square of an error of y_new in the states and the monitored expressions, scaled.
+
+    A state is scaled by atol + rtol max|x|, a monitored output m by rtol (nominal + min|m|): where
+    a contact sticks, its sliding velocity is resolved relative to the velocity scale of the law
+    instead of the velocity of the body, or breaking away comes too late or not at all.
+    """
+    nx, watched = system.nx, system.monitor_nominal.size
+    scale = atol + rtol * ca.fmax(ca.fabs(y[:nx]), ca.fabs(y_new[:nx]))
+
+    def of_states(error: Any) -> Any:
+        return ca.sumsqr(error[:nx] / scale)
+
+    if not watched:
+        return lambda error: of_states(error) / nx
+    direction = ca.SX.sym("direction", system.n)
+    change = ca.jtimes(system.monitors, system.y, direction)
+    value = ca.Function("monitor", [system.y, system.d], [system.monitors])
+    to_first_order = ca.Function("monitor_error", [system.y, direction, system.d], [change])
+    smallest = ca.fmin(ca.fabs(value(y, d)), ca.fabs(value(y_new, d)))
+    slip_scale = rtol * (ca.DM(system.monitor_nominal) + smallest)
+
+    def norm(error: Any) -> Any:
+        slip = to_first_order(y_new, error, d) / slip_scale
+        return (of_states(error) + ca.sumsqr(slip)) / (nx + watched)
+
+    return norm
+
+
+def converged(before: Any, last: Any) -> Any:
+    """Whether Newton's method is near enough, from the norms of its last two corrections.
+
+    Its last correction is small, or what is still to come, a geometric series with their ratio.
+    """
+    last, rate = ca.sqrt(last), ca.sqrt(last / (before + 1e-300))
+    return ca.logic_or(last <= KAPPA, last * rate <= KAPPA * (1 - rate))
+
+
+def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function:
+    """The adaptive attempt (S, R) -> (S_next, D).
+
+    Args:
+        system: what is integrated.
+        method: how; it must estimate its error.
+        kind: SX inlines everything (virtual machine, small systems), MX keeps the blocks as
+            calls, which compile faster where they are large.
+    """
+    n, nx = system.n, system.nx
+    S = kind.sym("S", MEMORY + n)
+    R = kind.sym("R", 2 + nx + system.d.numel())
+    t, h_wish, h_old, growth_old, rejected = (S[i] for i in range(MEMORY))
+    y, t_end, rtol = S[MEMORY:], R[0], R[1]
+    atol, d = R[2 : 2 + nx], R[2 + nx :]
+
+    left = t_end - t
+    h = ca.fmax(ca.fmin(h_wish, left), 1e-300)
+    order = method.embedded + 1
+    trial = steps(system, method)(y, h, d)
+    y_new = trial.end
+    norm = error_norm(system, y, y_new, atol, rtol, d)
+    e2 = norm(trial.error)
+    sound = e2 <= 1e20
+    if system.manifold is not None and system.manifold.m:
+        sound = ca.logic_and(sound, system.manifold.branch(y, y_new, d) > 0)
+    obstacle = obstacles(system, method)
+    if obstacle is not None:
+        sound = ca.logic_and(sound, ca.logic_not(obstacle(y_new, h, d) < 0))
+    if unwatched := system.algebraic[1]:
+        sound = ca.logic_and(sound, ca.sumsqr(y_new[unwatched]) < np.inf)
+    if trial.corrections:
+        halving = (2 * SAFETY) ** (2 * order)
+        done = converged(*(norm(correction) for correction in trial.corrections))
+        e2 = ca.if_else(done, e2, ca.fmax(e2, halving))
+    e2 = ca.if_else(sound, e2, 1e20)
+    accept = ca.logic_and(e2 <= 1, left > 0)
+
+    # Gustafsson's predictive controller (Hairer and Wanner, IV.8), with growth = e^(-1/order) as
+    # its memory, so that one power an attempt is enough
+    growth = ca.fmax(e2, E_FLOOR**2) ** (-0.5 / order)
+    predicted = (h / h_old) * (growth * growth / growth_old)
+    factor = ca.fmin(GROW, ca.fmax(SHRINK, SAFETY * ca.fmin(growth, predicted)))
+    factor = ca.if_else(rejected > 0, ca.fmin(factor, 1), factor)
+    # a step cut by t_end must not forget the step size it could have had
+    h_next = ca.if_else(h < h_wish, ca.fmax(h_wish, h * factor), h * factor)
+    h_less = h * ca.fmax(SHRINK, SAFETY * growth)
+
+    memory = ca.vertcat(
+        ca.if_else(accept, ca.if_else(h < h_wish, t_end, t + h), t),
+        ca.if_else(accept, h_next, ca.if_else(left > 0, h_less, h_wish)),
+        ca.if_else(accept, h, h_old),
+        ca.if_else(accept, ca.fmin(growth, GROWTH_MEMORY), growth_old),
+        ca.if_else(ca.logic_or(accept, left <= 0), 0, 1),
+    )
+    S_next = ca.vertcat(memory, ca.if_else(accept, y_new, y))
+    outputs: Any = [ca.densify(S_next), ca.densify(ca.vertcat(*trial.dense))]
+    if kind is ca.SX:
+        outputs = ca.cse(outputs)
+    return ca.Function("symfric_step", [S, R], outputs, ["S", "R"], ["S_next", "D"])

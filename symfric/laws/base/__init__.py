@@ -1,0 +1,1 @@
+"""What a law is, and the only place where it is made smooth."""

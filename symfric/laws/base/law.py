@@ -1,0 +1,194 @@
+"""What a friction law is: parameters, a force and the rate of its internal states."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from symfric.foundation.numeric import Scalar, empty
+from symfric.foundation.parameters import Parametric
+
+PHENOMENA = {
+    "D": "dynamic (kinetic) friction",
+    "S": "static friction (stiction or a break-away peak)",
+    "St": "Stribeck effect",
+    "V": "viscous friction",
+    "P": "pre-sliding displacement",
+    "M": "non-local memory (hysteresis loops inside loops close)",
+    "L": "frictional lag",
+    "B": "break-away force depends on the loading rate",
+    "N": "no drift under vibration below break-away",
+    "T": "static friction grows with the dwell time",
+}
+"""What a law can show, by the codes in `Facts.phenomena`."""
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What is known about a law, as data.
+
+    Attributes:
+        phenomena: codes of `PHENOMENA`.
+        smoothness: differentiability class in the velocity, and where it breaks.
+        confidence: how the formula was confirmed.
+        source: the publication.
+        odd: the force changes sign with v, states and further inputs together.
+        load: how the dry force follows the normal force: "proportional", "independent" or in
+            words.
+    """
+
+    phenomena: tuple[str, ...]
+    smoothness: str
+    confidence: str
+    source: str
+    odd: bool = True
+    load: str = "proportional"
+
+
+@dataclass(frozen=True)
+class State:
+    """An internal state of a law: name, unit and typical magnitude.
+
+    `even` states (a mode, an age) keep their value when the motion is mirrored; the others, such
+    as deflections and forces, change sign with it.
+    """
+
+    name: str
+    unit: str
+    nominal: float
+    even: bool = False
+
+
+@dataclass(frozen=True)
+class Input:
+    """What a law takes besides v and N, as a keyword-only argument of its methods.
+
+    `nominal` is its typical magnitude, `steady` its value in pictures of steady sliding (v > 0).
+    """
+
+    name: str
+    unit: str
+    doc: str
+    nominal: float = 1.0
+    steady: float = 0.0
+
+
+APPLIED_FORCE = Input("F_e", "N", "force that keeps the sliding velocity constant", steady=1.0)
+"""What the contact must carry for no acceleration: m dv/dt = F_e - F."""
+
+
+@dataclass(frozen=True, eq=False)
+class Switch:
+    """A change of mode: the states in `reset` jump when `expression` passes through zero.
+
+    Attributes:
+        expression: in v, N, z and the further inputs of the law.
+        direction: +1 only rising, -1 only falling, 0 both.
+        reset: state -> its value afterwards, in terms of the values before.
+        halts: the sliding velocity, zero at this instant, becomes zero without rounding.
+    """
+
+    name: str
+    expression: Scalar
+    direction: int = 0
+    reset: Mapping[str, Scalar] = field(default_factory=dict[str, Scalar])
+    halts: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Law(Parametric, ABC):
+    """A friction law F(v, N, z) with internal states dz/dt = rate(v, N, z).
+
+    Sign: `force` has the sign of the sliding velocity in steady sliding; whoever applies it to a
+    body writes the minus (m dv/dt = F_e - force).
+
+    `v` is the sliding velocity [m/s], `N` >= 0 the normal force [N], `z` the column of internal
+    states, shape (n, 1) for CasADi types and (n, ...) for arrays, n = len(states). Any of them may
+    be a float, a NumPy array, SX, MX or DM. A law that needs another input, such as the applied
+    tangential force, names it in `inputs` and takes it as a keyword-only argument with default 0.
+
+    A law with modes (stick, slip) keeps them in states of rate zero, which jump at its `switches`.
+    """
+
+    facts: ClassVar[Facts]
+
+    @property
+    @abstractmethod
+    def states(self) -> tuple[State, ...]:
+        """The internal states, in the order of the rows of `z`."""
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """Further inputs of `force`, `rate` and `switches`, by keyword."""
+        return ()
+
+    @property
+    @abstractmethod
+    def velocity_scale(self) -> Scalar:
+        """Sliding velocity [m/s] over which the force changes; inf where there is none."""
+
+    @abstractmethod
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Friction force [N] opposing the sliding velocity."""
+
+    @abstractmethod
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Time derivative of the internal states, shape (n, 1) or (n, ...)."""
+
+    @abstractmethod
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """Internal states after long sliding at constant `v`; zero at v = 0.
+
+        With a smoothing velocity the rate vanishes there to rounding beyond 20 v_eps.
+        """
+
+    def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
+        """The changes of mode; none for a law whose rate says it all."""
+        return ()
+
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """States after a step of `h` [s] with v and N held, and their means over it.
+
+        None where they are not known in closed form; for laws with modes, whose rates do not say.
+        """
+        return None
+
+    def warnings(self) -> tuple[str, ...]:
+        """What the present numbers give away, such as passivity, one sentence each."""
+        return ()
+
+
+def chosen(law: Law, inputs: Mapping[str, Scalar]) -> dict[str, Scalar]:
+    """Those of `inputs` that `law` takes."""
+    return {i.name: inputs[i.name] for i in law.inputs if i.name in inputs}
+
+
+def check_law(where: str, law: object) -> None:
+    """Refuse what is not a law: its class, or its name."""
+    if not isinstance(law, Law):
+        got = f"the class {law.__name__}" if isinstance(law, type) else repr(law)
+        raise ValueError(f"{where}: expected a law such as LuGre(), got {got}")
+
+
+@dataclass(frozen=True, eq=False)
+class StaticLaw(Law):
+    """A memoryless law: no internal states, the rate has no rows."""
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """No internal states."""
+        return ()
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
+        """No rows."""
+        return empty(v)
+
+    def switches(
+        self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
+    ) -> tuple[Switch, ...]:
+        """No modes."""
+        return ()
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """No rows."""
+        return empty(v)

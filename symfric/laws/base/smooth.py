@@ -1,0 +1,155 @@
+"""Smooth stand-ins for sign, abs, max and powers: the only home of regularisation.
+
+`fabs`, `sign`, `if_else`, `norm` and fractional powers have silently wrong or NaN derivatives at
+zero; no law uses them. A width `eps` is always a parameter of the law, in the unit of `x`. The
+float `eps = 0.0` asks for the original, non-smooth function where one is offered.
+"""
+
+import casadi as ca
+import numpy as np
+
+from symfric.foundation.numeric import Scalar, equals, exp, expm1, is_casadi, is_number, sqrt, tanh
+from symfric.foundation.vector import ROUND, TINY, NotIsotropicError, Vector, Vectors, no_vector
+
+
+def sign(x: Scalar, eps: Scalar) -> Scalar:
+    """Smooth sign tanh(x / eps); within 1 % of +-1 beyond 2.65 eps.
+
+    The float `eps = 0.0` gives the sign itself, with value and derivative 0 at x = 0.
+    """
+    if equals(eps, 0.0):
+        if isinstance(x, Vector):
+            return x / x.length(TINY)
+        return ca.sign(x) if is_casadi(x) else np.sign(x)
+    return tanh(x / eps)
+
+
+def magnitude(x: Scalar, eps: Scalar) -> Scalar:
+    """Smooth |x| = x tanh(x / eps), exactly 0 at x = 0.
+
+    Being zero at rest it does not relax a bristle that stands still (trap N6), and beyond 20 eps
+    it equals |x| to rounding. The float `eps = 0.0` gives |x| itself, with its kink at x = 0.
+    """
+    if equals(eps, 0.0):
+        if isinstance(x, Vector):
+            return x.length(TINY)
+        return ca.fabs(x) if is_casadi(x) else np.abs(x)
+    return x * tanh(x / eps)
+
+
+def power(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
+    """Smooth |x|^exponent = (x^2 + eps^2)^(exponent/2) - eps^exponent, exactly 0 at x = 0.
+
+    Finite with all derivatives in x and in the exponent (traps N1-N3). The float `exponent = 2.0`
+    gives x^2 exactly and costs one multiplication; the float `eps = 0.0` gives |x|^exponent
+    itself, without a derivative at x = 0 for exponents below 1.
+    """
+    if equals(exponent, 2.0):
+        return x * x
+    if equals(eps, 0.0):
+        return magnitude(x, 0.0) ** exponent
+    return (x * x + eps * eps) ** (exponent / 2) - eps**exponent
+
+
+def signed_power(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
+    """Smooth |x|^exponent sign(x) = x (x^2 + eps^2)^((exponent - 1)/2), exactly 0 at x = 0."""
+    return x * (x * x + eps * eps) ** ((exponent - 1) / 2)
+
+
+def positive(x: Scalar, eps: Scalar) -> Scalar:
+    """Smooth max(x, 0) = (x + sqrt(x^2 + eps^2)) / 2; value eps/2 at x = 0.
+
+    The float `eps = 0.0` gives max(x, 0) itself, with its kink at x = 0.
+    """
+    no_vector("cuts", x)
+    if equals(eps, 0.0):
+        return ca.fmax(x, 0.0) if is_casadi(x) else np.maximum(x, 0.0)
+    return (x + sqrt(x * x + eps * eps)) / 2
+
+
+def clip(x: Scalar, low: Scalar, high: Scalar) -> Scalar:
+    """`x` held between `low` and `high`; kinks at both. A vector within +-`high`, as by `hold`."""
+    if isinstance(x, Vector):
+        if is_number(low) and equals(high, -low):
+            return hold(x, high, 0.0)
+        raise NotIsotropicError("clips what has a direction")
+    if is_casadi(x, low, high):
+        return ca.fmin(ca.fmax(x, low), high)
+    return np.minimum(np.maximum(x, low), high)
+
+
+def hold(x: Scalar, top: Scalar, eps: Scalar) -> Scalar:
+    """`x` held within +-`top`: exactly x up to top - eps, exactly +-top from top + eps on, C2.
+
+    A contact that carries hold(F_e) in full does not creep under a load below top - eps, as it
+    would under tanh. The float `eps = 0.0` gives the kinks. A vector keeps its direction.
+    """
+    if isinstance(x, Vector):
+        return x.odd(lambda size: hold(size, top, eps), ROUND * top)
+    if equals(eps, 0.0):
+        return clip(x, -top, top)
+
+    def corner(y: Scalar) -> Scalar:
+        t = positive((y - top) / (2 * eps) + 0.5, 0.0)
+        return t * t * t * (2 - t) * eps
+
+    # one clip alone, so that no two of them disagree by rounding about which side of a knot it is
+    within = clip(x, -top - eps, top + eps)
+    return within - corner(within) + corner(-within)
+
+
+def step3(x: Scalar) -> Scalar:
+    """The cubic step 3x^2 - 2x^3 from 0 at x <= 0 to 1 at x >= 1, C1."""
+    t = clip(x, 0.0, 1.0)
+    return t * t * (3 - 2 * t)
+
+
+def step5(x: Scalar) -> Scalar:
+    """The quintic step 10x^3 - 15x^4 + 6x^5 from 0 at x <= 0 to 1 at x >= 1, C2."""
+    t = clip(x, 0.0, 1.0)
+    return t * t * t * (10 - t * (15 - 6 * t))
+
+
+def fraction(x: Scalar) -> Scalar:
+    """`x` modulo 1, in [0, 1)."""
+    no_vector("counts", x)
+    return x - (ca.floor(x) if is_casadi(x) else np.floor(x))
+
+
+def choose(condition: Scalar, yes: Scalar, no: Scalar) -> Scalar:
+    """`yes` where the condition holds, else `no`: for modes and for originals that jump."""
+    if isinstance(yes, Vector) or isinstance(no, Vector):
+        return _chosen(condition, yes, no)
+    if is_casadi(condition, yes, no):
+        return ca.if_else(condition, yes, no)
+    return np.where(condition, yes, no)[()]
+
+
+def _chosen(condition: Scalar, yes: Vectors, no: Vectors) -> Vector:
+    if not (isinstance(yes, Vector) and isinstance(no, Vector)):
+        raise NotIsotropicError("chooses between a number and what has a direction")
+    pairs = zip(yes.parts, no.parts, strict=True)
+    return Vector([choose(condition, a, b) for a, b in pairs], yes.turn)
+
+
+def stribeck(v: Scalar, v_s: Scalar, delta: Scalar, eps: Scalar) -> Scalar:
+    """The Stribeck weight exp(-|v / v_s|^delta): 1 at rest, 0 far above v_s.
+
+    The float `eps = 0.0` gives the original, for delta < 2 with a kink at rest.
+    """
+    width = 0.0 if equals(eps, 0.0) else eps / v_s
+    return exp(-power(v / v_s, delta, width))
+
+
+def phi1(x: Scalar) -> Scalar:
+    """(exp(x) - 1) / x, with value 1 and all derivatives right at x = 0.
+
+    A Taylor polynomial replaces the quotient for |x| < 1e-2 (next term x^5/720, 1.4e-13): the
+    usual guarded quotient has derivative 0 at x = 0 instead of 1/2.
+    """
+    series = 1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5)))
+    if not is_casadi(x):
+        near = np.abs(x) < 1e-2
+        return np.where(near, series, expm1(x) / np.where(near, 1.0, x))[()]
+    near = ca.fabs(x) < 1e-2
+    return ca.if_else(near, series, expm1(x) / ca.if_else(near, 1.0, x))

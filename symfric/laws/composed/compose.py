@@ -1,0 +1,282 @@
+"""Laws made of laws: sum, asymmetric and load-dependent. Wrap, never subclass."""
+
+from dataclasses import dataclass, fields, replace
+from itertools import pairwise
+from typing import ClassVar, final
+
+from symfric.foundation.numeric import Scalar, column, empty, is_casadi, smallest
+from symfric.foundation.parameters import Parametric, distinct, param, parameters, with_values
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Facts, Input, Law, State, Switch, check_law, chosen
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Sum(Law):
+    """Friction forces added; the states of the terms stand below each other.
+
+        F = F_1 + F_2 + ...
+
+    A sum of sums is one sum. Parameters and states that share a name get the number of their
+    term: mu_d_1, mu_d_2, ...
+    Limits: those of the terms.
+    Source: superposition, as in Coulomb + viscous friction.
+    """
+
+    facts: ClassVar[Facts] = Facts((), "that of its terms", "superposition", "superposition")
+
+    laws: tuple[Law, ...]
+
+    def __post_init__(self) -> None:
+        for law in self.laws:
+            check_law("Sum", law)
+        if len(self.laws) < 2:
+            raise ValueError(f"Sum: expected at least two laws, got {len(self.laws)}")
+        terms = (law.laws if isinstance(law, Sum) else (law,) for law in self.laws)
+        object.__setattr__(self, "laws", tuple(law for group in terms for law in group))
+        super().__post_init__()
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The states of all terms."""
+        names = distinct([[state.name for state in law.states] for law in self.laws])
+        return tuple(
+            replace(state, name=name)
+            for law, group in zip(self.laws, names, strict=True)
+            for state, name in zip(law.states, group, strict=True)
+        )
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """The further inputs of all terms, each once."""
+        return tuple(dict.fromkeys(i for law in self.laws for i in law.inputs))
+
+    def terms(self, z: Scalar) -> list[tuple[Law, Scalar]]:
+        """The laws, each with its rows of `z`."""
+        ends = [0]
+        for law in self.laws:
+            ends.append(ends[-1] + len(law.states))
+        parts = [z[a:b] for a, b in pairwise(ends)]
+        return list(zip(self.laws, parts, strict=True))
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The smallest one of the terms [m/s]."""
+        return smallest(*(law.velocity_scale for law in self.laws))
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
+        """Friction force [N]."""
+        first, *rest = [law.force(v, N, part, **chosen(law, inputs)) for law, part in self.terms(z)]
+        return sum(rest, start=first)
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
+        """Rates of all states."""
+        rates = [
+            law.rate(v, N, part, **chosen(law, inputs)) for law, part in self.terms(z) if law.states
+        ]
+        return _join(v, rates)
+
+    def switches(
+        self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
+    ) -> tuple[Switch, ...]:
+        """The changes of mode of all terms, by the names of the states of the sum."""
+        names = iter(state.name for state in self.states)
+        found: list[Switch] = []
+        for law, part in self.terms(z):
+            new = {state.name: next(names) for state in law.states}
+            for switch in law.switches(v, N, part, **chosen(law, inputs)):
+                reset = {new[name]: value for name, value in switch.reset.items()}
+                found.append(replace(switch, reset=reset))
+        return tuple(found)
+
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """Those of the terms below each other, where every term with states knows its own."""
+        known = [law.held_step(v, N, part, h) for law, part in self.terms(z) if law.states]
+        steps = [step for step in known if step is not None]
+        if not steps or len(steps) < len(known):
+            return None
+        return _join(v, [end for end, _ in steps]), _join(v, [mean for _, mean in steps])
+
+    def warnings(self) -> tuple[str, ...]:
+        """Those of the terms."""
+        return tuple(warning for law in self.laws for warning in law.warnings())
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """Steady states of all terms."""
+        return _join(v, [law.steady_state(v, N) for law in self.laws if law.states])
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Asymmetric(Law):
+    """One law with different parameters for the two directions of sliding.
+
+        p(v) = p_pos w + p_neg (1 - w),   w = [1 + tanh(v / v_blend)] / 2
+
+    Every parameter that differs between `positive` and `negative` is blended, so a bristle law
+    keeps its one state and a parameter that is equal on both sides costs nothing.
+    Limits: one-sided curves beyond 3 v_blend; keep v_blend below the smoothing velocity of the law.
+    Source: separate parameter sets per direction, usual for drives (Armstrong-Helouvry 1991).
+    """
+
+    facts: ClassVar[Facts] = Facts((), "that of its law", "constructed", "separate sets")
+    suffixes: ClassVar[tuple[str, ...]] = ("pos", "neg")
+
+    positive: Law
+    negative: Law
+    v_blend: Scalar = param(1e-4, unit="m/s", doc="blending velocity of the sides", lower=1e-12)
+
+    def __post_init__(self) -> None:
+        check_law("Asymmetric", self.positive)
+        check_law("Asymmetric", self.negative)
+        if _structure(self.positive) != _structure(self.negative):
+            raise ValueError(
+                "Asymmetric: expected the same law on both sides, got "
+                f"{type(self.positive).__name__} and {type(self.negative).__name__}; "
+                "only parameters may differ, no options and no tables"
+            )
+        super().__post_init__()
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The states of the law."""
+        return self.positive.states
+
+    def _at(self, v: Scalar) -> Law:
+        w = (1 + smooth.sign(v, self.v_blend)) / 2
+        rest = 1 - w
+        sides = zip(
+            parameters(self.positive).values(), parameters(self.negative).values(), strict=True
+        )
+        blended = {
+            pos.name: pos.value * w + neg.value * rest
+            for pos, neg in sides
+            if _differ(pos.value, neg.value)
+        }
+        return with_values(self.positive, blended)
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """The further inputs of the law."""
+        return self.positive.inputs
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """The smaller one of the sides [m/s]."""
+        return smallest(self.positive.velocity_scale, self.negative.velocity_scale)
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
+        """Friction force [N]."""
+        return self._at(v).force(v, N, z, **inputs)
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
+        """Rates of the states of the law."""
+        return self._at(v).rate(v, N, z, **inputs)
+
+    def switches(
+        self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
+    ) -> tuple[Switch, ...]:
+        """The changes of mode of the law."""
+        return self._at(v).switches(v, N, z, **inputs)
+
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """That of the law."""
+        return self._at(v).held_step(v, N, z, h)
+
+    def warnings(self) -> tuple[str, ...]:
+        """Those of the law."""
+        return self.positive.warnings() + self.negative.warnings()
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """Steady states of the law."""
+        return self._at(v).steady_state(v, N)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class LoadDependent(Law):
+    """A law under the effective normal force of a preloaded, load-carrying contact.
+
+        N_eff = N_0 + c max(N, 0)
+
+    N_0 is the preload (seal, bearing), c the share of the external load; max is smooth over N_eps
+    so that nothing divides by zero or turns negative at lift-off (with N_0 = 0 down to
+    N = -1e7 N_eps, where the difference of the square root rounds to zero).
+    Limits: N_0 = 0, c = 1, N_eps = 0 is the law itself for N >= 0.
+    Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134(5), 2012 (linear load part).
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        (), "that of its law", "memory", "Bittencourt and Gunnarsson 2012"
+    )
+
+    law: Law
+    N_0: Scalar = param(0.0, unit="N", doc="preload", lower=0.0)
+    c: Scalar = param(1.0, unit="1", doc="share of the external load", lower=0.0)
+    N_eps: Scalar = param(1e-3, unit="N", doc="smoothing of the lift-off", lower=0.0)
+
+    def __post_init__(self) -> None:
+        check_law("LoadDependent", self.law)
+        super().__post_init__()
+
+    def _load(self, N: Scalar) -> Scalar:
+        return self.N_0 + self.c * smooth.positive(N, self.N_eps)
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The states of the law."""
+        return self.law.states
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """The further inputs of the law."""
+        return self.law.inputs
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """That of the law [m/s]."""
+        return self.law.velocity_scale
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
+        """Friction force [N]."""
+        return self.law.force(v, self._load(N), z, **inputs)
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
+        """Rates of the states of the law."""
+        return self.law.rate(v, self._load(N), z, **inputs)
+
+    def switches(
+        self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
+    ) -> tuple[Switch, ...]:
+        """The changes of mode of the law."""
+        return self.law.switches(v, self._load(N), z, **inputs)
+
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """That of the law."""
+        return self.law.held_step(v, self._load(N), z, h)
+
+    def warnings(self) -> tuple[str, ...]:
+        """Those of the law."""
+        return self.law.warnings()
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """Steady states of the law."""
+        return self.law.steady_state(v, self._load(N))
+
+
+def _structure(value: object) -> object:
+    """A law without its numbers: class, options, and the same of what it holds."""
+    if isinstance(value, Parametric):
+        held = (getattr(value, item.name) for item in fields(value) if "unit" not in item.metadata)
+        return type(value), *map(_structure, held)
+    return tuple(map(_structure, value)) if isinstance(value, tuple) else value
+
+
+def _differ(a: Scalar, b: Scalar) -> bool:
+    return a is not b and (is_casadi(a, b) or bool(a != b))
+
+
+def _join(v: Scalar, columns: list[Scalar]) -> Scalar:
+    if not columns:
+        return empty(v)
+    return column(*(row for c in columns for row in (c[i] for i in range(c.shape[0]))))

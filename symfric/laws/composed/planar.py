@@ -1,0 +1,217 @@
+"""Any isotropic law for slip in a plane or in space."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from itertools import islice
+from typing import ClassVar, final
+
+import casadi as ca
+
+from symfric.foundation.numeric import Scalar, column, empty
+from symfric.foundation.parameters import Parametric, param
+from symfric.foundation.vector import NotIsotropicError, Vector, Vectors
+from symfric.laws.base.law import Input, Law, State, Switch, check_law, chosen
+from symfric.laws.composed.compose import Asymmetric, Sum
+from symfric.laws.composed.wrap import Lagged
+
+
+@dataclass(frozen=True, eq=False)
+class Isotropic(Parametric):
+    """A friction law for slip v in two or three dimensions d.
+
+        F = F(w, N)/w v,   w = sqrt(v'v + v_eps^2)      laws without states
+        F = F(v, N, z),    dz/dt = rate(v, N, z)        laws with states, v and z vectors
+
+    What changes sign with the motion, v and deflections, is a vector; what does not, an age or a
+    level, stays a number. The expressions of the law take vectors as they stand, |a| for a size,
+    a/|a| for a sign, a'b for a product: see `symfric.foundation.vector`. Elements that yield spend
+    slip along their load only, and only what of the slip goes along it (radial return, rounded
+    over `turn`).
+    So Maxwell-slip, Bouc-Wen and elasto-plastic elements are those of plasticity in the plane, and
+    LuGre, Dahl, Gonthier those of the literature. Further inputs, as F_e, are vectors (d, 1).
+    In components: vector states along x, then along y, then along z, then the states that are
+    numbers.
+    Limits: slip along a line is the law itself. Equivariant under rotations. Every vector state
+    stays within the bound that it has in straight slip. v_eps is for laws without states; the
+    others have their own.
+
+    Raises:
+        ValueError: a law that tells forward from backward, has modes (they change where v passes
+            through zero), or is written with expressions that vectors do not have.
+    """
+
+    axes: ClassVar[str] = ""
+    """Names of the dimensions."""
+
+    law: Law
+    v_eps: Scalar = param(1e-9, unit="m/s", doc="smoothing of the speed", lower=1e-15)
+    turn: Scalar = param(1e-2, unit="1", doc="rounding from unloading to loading", lower=1e-9)
+
+    def __post_init__(self) -> None:
+        name = type(self).__name__
+        check_law(name, self.law)
+        super().__post_init__()
+        reason = anisotropy(self.law)
+        if reason:
+            kind = type(self.law).__name__
+            raise ValueError(f"{name}: expected an isotropic law, got {kind}; {reason}")
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The vectors along x, then along y, and so on, then the states that are numbers."""
+        vectors = [s for s in self.law.states if not s.even]
+        numbers = tuple(s for s in self.law.states if s.even)
+        along = (State(f"{s.name}_{x}", s.unit, s.nominal) for x in self.axes for s in vectors)
+        return *along, *numbers
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """The further inputs of the law, each a vector of shape (d, 1)."""
+        return self.law.inputs
+
+    def _vector(self, a: Scalar) -> Vector:
+        return Vector([a[i] for i in range(len(self.axes))], self.turn)
+
+    def _vectors(self, z: Scalar) -> list[Vectors]:
+        """The states of the law, vectors and numbers, from the rows of `z`."""
+        d, even = len(self.axes), [s.even for s in self.law.states]
+        n = even.count(False)
+        vectors = (self._vector([z[i * n + k] for i in range(d)]) for k in range(n))
+        numbers = (z[d * n + k] for k in range(len(even) - n))
+        return [next(numbers if is_even else vectors) for is_even in even]
+
+    def _rows(self, z: Sequence[Vectors]) -> Scalar:
+        """The rows of a column of vectors and numbers."""
+        vectors = [a for a in z if isinstance(a, Vector)]
+        numbers = [a for a in z if not isinstance(a, Vector)]
+        return column(*(a.parts[i] for i in range(len(self.axes)) for a in vectors), *numbers)
+
+    def _given(self, inputs: Mapping[str, Scalar]) -> dict[str, Vector]:
+        rest = [0.0] * len(self.axes)
+        return {i.name: self._vector(inputs.get(i.name, rest)) for i in self.inputs}
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
+        """Friction force [N], shape (d, 1), for the sliding velocity v, shape (d, 1)."""
+        given = self._given(inputs)
+        return self._rows(
+            [_force(self.law, self._vector(v), N, self._vectors(z), given, self.v_eps)]
+        )
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
+        """Rates of the states, in their order."""
+        if not self.law.states:
+            return empty(v[0])
+        given = self._given(inputs)
+        return self._rows(_rate(self.law, self._vector(v), N, self._vectors(z), given))
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """States after long sliding along `v`, in their order."""
+        if not self.law.states:
+            return empty(v[0])
+        slip = self._vector(v)
+        w = slip.length(self.v_eps)
+        z = self.law.steady_state(w, N)
+        own = enumerate(self.law.states)
+        return self._rows([z[k] if s.even else z[k] / w * slip for k, s in own])
+
+    def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
+        """None: laws with modes are refused."""
+        return ()
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Planar(Isotropic):
+    """An isotropic friction law for slip in a plane, d = 2: see `Isotropic`.
+
+    Source: isotropy; LuGre in two dimensions: Velenis, Tsiotras, Canudas de Wit, Vehicle Syst. Dyn.
+    43(1), 2005; Bouc-Wen: Park, Wen, Ang, Earthq. Eng. Struct. Dyn. 14(4), 1986 (not read), with
+    one product v'z for both axes, which makes it isotropic.
+    """
+
+    axes: ClassVar[str] = "xy"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Spatial(Isotropic):
+    """An isotropic friction law for slip in space, d = 3, as of a ball in its socket: `Isotropic`.
+
+    Limits: bristles have the direction they have in the axes in which v is given.
+    Source: isotropy.
+    """
+
+    axes: ClassVar[str] = "xyz"
+
+
+def is_isotropic(law: Law) -> bool:
+    """Whether a law has a form in several dimensions by isotropy alone."""
+    return not anisotropy(law)
+
+
+def anisotropy(law: Law) -> str:
+    """Why a law has no form in several dimensions by isotropy alone; empty if it has one."""
+    if not _is_odd(law):
+        return "it tells forward from backward slip, as no direction in a plane does"
+    N, z = ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
+    if law.switches(ca.SX.sym("v"), N, z):
+        return (
+            "its modes change where v passes through zero, as a vector does not; take a form of "
+            "the law without modes"
+        )
+    v, *vectors = (Vector(ca.vertsplit(ca.SX.sym("a", 2)), 0.0) for _ in (0, *law.states))
+    states = [z[k] if s.even else vectors[k] for k, s in enumerate(law.states)]
+    inputs = {i.name: v for i in law.inputs}
+    try:
+        _force(law, v, N, states, inputs, 1e-9)
+        _rate(law, v, N, states, inputs)
+    except NotIsotropicError as error:
+        return f"it {error}"
+    return ""
+
+
+def _is_odd(law: Law) -> bool:
+    """Whether mirrored motion mirrors the force of a law and of all laws it holds."""
+    held = [getattr(law, item.name) for item in fields(law)]
+    inner = [x for value in held for x in (value if isinstance(value, tuple) else (value,))]
+    mirrored = law.facts.odd and not isinstance(law, Asymmetric)
+    return mirrored and all(_is_odd(x) for x in inner if isinstance(x, Law))
+
+
+Inputs = Mapping[str, Vector]
+
+
+def _terms(law: Law, z: Sequence[Vectors]) -> Iterator[tuple[Law, list[Vectors]]]:
+    """The terms of a sum with their states, or the law itself."""
+    states = iter(z)
+    for term in law.laws if isinstance(law, Sum) else (law,):
+        yield term, list(islice(states, len(term.states)))
+
+
+def _force(
+    law: Law, v: Vector, N: Scalar, z: Sequence[Vectors], inputs: Inputs, v_eps: Scalar
+) -> Vector:
+    """Force of a law in vectors, of a sum term by term."""
+    first, *rest = (_term(term, v, N, part, inputs, v_eps) for term, part in _terms(law, z))
+    return sum(rest, start=first)
+
+
+def _term(
+    law: Law, v: Vector, N: Scalar, z: Sequence[Vectors], inputs: Inputs, v_eps: Scalar
+) -> Vector:
+    """Without states along v, or along the velocity that lags behind it."""
+    if law.inputs or (z and not isinstance(law, Lagged)):
+        return law.force(v, N, z, **chosen(law, inputs))
+    law, slip = (law.law, z[0]) if isinstance(law, Lagged) else (law, v)
+    w = slip.length(v_eps)
+    return law.force(w, N) / w * slip
+
+
+def _rate(law: Law, v: Vector, N: Scalar, z: Sequence[Vectors], inputs: Inputs) -> list[Vectors]:
+    """Rates of the states of a law in vectors and numbers."""
+    rows: list[Vectors] = []
+    for term, part in _terms(law, z):
+        if part:
+            rate = term.rate(v, N, part, **chosen(term, inputs))
+            rows += [rate[k] for k in range(len(part))]
+    return rows

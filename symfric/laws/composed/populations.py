@@ -1,0 +1,318 @@
+"""Friction of many random contacts: seeded references, which no optimiser can use.
+
+Their force depends on a history of contacts made and lost at random. Smooth laws are identified
+from, and compared with, what they produce. One contact is an expression like a law, so that a
+population runs in NumPy, all contacts at once, and as generated C, in a loop.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from math import ceil
+from typing import ClassVar, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symfric.foundation.numeric import Scalar, column, expm1, sin
+from symfric.foundation.parameters import Parametric, param
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Facts, Input, Law, State
+
+Array = NDArray[np.float64]
+SPEEDS = 20
+"""Speeds a decade at which the mean force is computed; between them it is interpolated."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """The contacts of a population at one time.
+
+    Attributes:
+        z: their states, shape (states, count).
+        r: a random number of each, shape (count,).
+        random: where fresh ones come from.
+    """
+
+    z: Array
+    r: Array
+    random: np.random.Generator
+
+
+@dataclass(frozen=True, eq=False)
+class Population(Parametric, ABC):
+    """Friction of `count` contacts that are made and lost at random, the same for the same `seed`.
+
+    It has figures and a force along a motion, but no rate: it is no `Law`, and no scene takes it.
+    """
+
+    facts: ClassVar[Facts]
+    redraws: ClassVar[bool]
+    """Whether contacts take a fresh random number at every step."""
+
+    count: int
+    seed: int
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("count", "seed"):
+            value = getattr(self, name)
+            if value != int(value):
+                raise ValueError(
+                    f"{type(self).__name__}: {name}: expected a whole number, got {value}"
+                )
+            object.__setattr__(self, name, int(value))
+
+    @property
+    @abstractmethod
+    def states(self) -> tuple[State, ...]:
+        """The states of one contact."""
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """None."""
+        return ()
+
+    @property
+    @abstractmethod
+    def velocity_scale(self) -> float:
+        """Sliding velocity [m/s] over which the mean force changes; inf where there is none."""
+
+    @property
+    @abstractmethod
+    def stiffness(self) -> float:
+        """Stiffness at rest [N/m]."""
+
+    @property
+    @abstractmethod
+    def path(self) -> float:
+        """Way that renews every contact [m]."""
+
+    @property
+    def step(self) -> float:
+        """Longest way that is one step of a contact [m]."""
+        return self.path / 20
+
+    @abstractmethod
+    def contact(self, z: Scalar, r: Scalar, dx: Scalar, dt: Scalar, N: Scalar) -> Scalar:
+        """States of one contact after the way dx [m] in the time dt [s], and below its force [N].
+
+        `z` are its states and `r` its random number; N [N] is the load of the whole population.
+        Floats, arrays of all contacts and CasADi symbols are taken alike.
+        """
+
+    @abstractmethod
+    def _draw(self, random: np.random.Generator) -> tuple[Array, Array]:
+        """States (states, count) and random numbers (count,) of unloaded contacts."""
+
+    def begin(self) -> Contacts:
+        """Unloaded contacts, as the seed places them."""
+        random = np.random.default_rng(self.seed)
+        return Contacts(*self._draw(random), random)
+
+    def advance(self, contacts: Contacts, dx: float, dt: float, N: float) -> tuple[Contacts, float]:
+        """The contacts after the way `dx` [m] in the time `dt` [s] under N [N], and their force.
+
+        A long way is made in steps.
+        """
+        z, r, rows = contacts.z, contacts.r, np.zeros(0)
+        parts = max(1, ceil(abs(dx) / self.step * (1 - 1e-9)))
+        for _ in range(parts):
+            if self.redraws:
+                r = contacts.random.uniform(-1.0, 1.0, self.count)
+            rows = self.contact(z, r, dx / parts, dt / parts, N)
+            z = rows[:-1]
+        return Contacts(z, r, contacts.random), float(rows[-1].sum())
+
+    def force(self, t: ArrayLike, x: ArrayLike, N: float) -> Array:
+        """Friction force [N] along the motion x(t) [m] under N [N], from unloaded contacts.
+
+        Raises:
+            ValueError: t not rising, or other lengths.
+        """
+        t, x = np.asarray(t, float), np.asarray(x, float)
+        if t.ndim != 1 or t.shape != x.shape or t.size < 2 or not (np.diff(t) > 0).all():
+            raise ValueError(
+                f"{type(self).__name__}: expected rising times t and as many positions x, got "
+                f"shapes {t.shape} and {x.shape}"
+            )
+        contacts, F = self.begin(), np.zeros(t.size)
+        contacts, F[0] = self.advance(contacts, 0.0, 0.0, N)
+        for i, (dx, dt) in enumerate(zip(np.diff(x), np.diff(t), strict=True), start=1):
+            contacts, F[i] = self.advance(contacts, dx, dt, N)
+        return F
+
+    def steady_force(self, v: ArrayLike, N: float) -> Array:
+        """Mean force [N] in steady sliding at `v` [m/s]; 0 at rest.
+
+        Computed at 20 speeds a decade over the range of `v`, and interpolated between them.
+        """
+        v = np.asarray(v, float)
+        moving = np.abs(v[v != 0])
+        if not moving.size:
+            return np.zeros(v.shape)
+        low, high = np.log(moving.min()), np.log(moving.max())
+        speeds = np.linspace(low, high, 2 + int(SPEEDS * (high - low) / np.log(10.0)))
+        means = [self._mean_force(speed, N) for speed in np.exp(speeds)]
+        at = np.interp(np.log(np.abs(np.where(v == 0, 1.0, v))), speeds, means)
+        return np.where(v == 0, 0.0, smooth.sign(v, 0.0) * at)
+
+    def _mean_force(self, v: float, N: float) -> float:
+        """Force [N] at the speed `v` [m/s], averaged over the second renewal of all contacts."""
+        contacts, F, parts = self.begin(), np.zeros(80), 40
+        for i in range(F.size):
+            contacts, F[i] = self.advance(contacts, self.path / parts, self.path / parts / v, N)
+        return float(F[parts:].mean())
+
+    def warnings(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+
+AnyLaw = Law | Population
+"""What has a name, facts and figures."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class GenericAsperity(Population):
+    """Generic asperity-level friction: many elastic contacts that age (a population).
+
+        s+   = s + dx/lam  modulo 1,  in contact while s < duty
+        t_c+ = t_c + dt in contact, else 0
+        mu   = mu_0 + (mu_inf - mu_0) (1 - exp(-t_c/tau_c))
+        N_c  = N pi / (2 duty count) sin(pi s/duty)
+        d+   = d + dx within +-mu N_c/k_c in contact, else 0
+        F    = sum of k_c d over `count` asperities
+
+    Each asperity meets a counterface of period lam at a random phase s, loaded like a half sine;
+    the loads of all add up to N. In contact it is a spring of random stiffness k_c (1/2 to 3/2 of
+    the mean) that sticks, and slips at a force that grows with its age. When contact is lost its
+    energy is.
+    Limits: the force lies between mu_0 N in fast and mu_inf N in slow sliding, less what the
+    springs lack; hysteresis with memory, velocity weakening, lag and dwell come by themselves. The
+    scatter of the force falls like 1/sqrt(count). A reconstruction from words.
+    Source: Al-Bender, Lampaert, Swevers, Tribol. Lett. 16(1-2), 2004.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "St", "P", "M", "L", "B", "N", "T"),
+        smoothness="C0 in the position, random",
+        confidence="reconstruction from words",
+        source="Al-Bender, Lampaert, Swevers, Tribol. Lett. 16(1-2), 2004",
+        load="proportional in steady sliding",
+    )
+    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_0", "mu_inf"),)
+    redraws: ClassVar[bool] = False
+
+    k: Scalar = param(1e6, unit="N/m", doc="stiffness of all asperities in contact", lower=1e-12)
+    mu_0: Scalar = param(0.05, unit="1", doc="friction coefficient of a new contact", lower=0.0)
+    mu_inf: Scalar = param(0.2, unit="1", doc="friction coefficient of an old contact", lower=0.0)
+    tau_c: Scalar = param(0.05, unit="s", doc="time in which a contact ages", lower=1e-12)
+    lam: Scalar = param(2e-5, unit="m", doc="period of the counterface", lower=1e-15)
+    duty: Scalar = param(0.6, unit="1", doc="share of a period in contact", lower=1e-3, upper=1.0)
+    count: int = param(1000, unit="1", doc="number of asperities", lower=1)
+    seed: int = param(0, unit="1", doc="seed of the random numbers", lower=0)
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """Place in the period, stretch and age of one asperity."""
+        stretch = State("d", "m", 1e-6)
+        return (State("s", "1", 1.0, even=True), stretch, State("t_c", "s", 0.1, even=True))
+
+    @property
+    def velocity_scale(self) -> float:
+        """The velocity at which a contact lasts for tau_c [m/s]."""
+        return self.duty * self.lam / self.tau_c
+
+    @property
+    def stiffness(self) -> float:
+        """Stiffness of all asperities in contact [N/m]."""
+        return self.k
+
+    @property
+    def path(self) -> float:
+        """The period of the counterface [m]."""
+        return self.lam
+
+    def contact(self, z: Scalar, r: Scalar, dx: Scalar, dt: Scalar, N: Scalar) -> Scalar:
+        """Place, stretch and age of an asperity after a step, and below its force [N].
+
+        Its stiffness is (1 + r/2) times the mean, r in [-1, 1].
+        """
+        s = smooth.fraction(z[0] + dx / self.lam)
+        along, k_c = s / self.duty, self.k / (self.count * self.duty) * (1 + r / 2)
+        touches = along < 1
+        age = smooth.choose(touches, z[2] + dt, 0.0)
+        mu = self.mu_0 - (self.mu_inf - self.mu_0) * expm1(-age / self.tau_c)
+        load = N * np.pi / (2 * self.duty * self.count) * sin(np.pi * along)
+        top = smooth.choose(touches, mu * load / k_c, 0.0)
+        d = smooth.clip(z[1] + dx, -top, top)
+        return column(s, d, age, k_c * d)
+
+    def _draw(self, random: np.random.Generator) -> tuple[Array, Array]:
+        s, r = random.uniform(0.0, 1.0, self.count), random.uniform(-1.0, 1.0, self.count)
+        return np.stack([s, 0 * s, 0 * s]), r
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class RandomBristles(Population):
+    """Bristle friction of Haessig and Friedland (a population).
+
+        d+ = d + dx, or anew at random within +-delta_s where |d + dx| > delta_s
+        F  = sigma_0/count sum of d over `count` bristles
+
+    A bristle snaps when it is stretched beyond delta_s, and bonds again on either side.
+    Limits: the mean force in sliding lies between 0 and sigma_0 delta_s, about half of it; it
+    depends neither on the velocity nor on the load. `HaessigFriedland` is the reset integrator of
+    the same paper.
+    Source: Haessig and Friedland, ASME J. Dyn. Syst. Meas. Control 113(3), 1991.
+    """
+
+    facts: ClassVar[Facts] = Facts(
+        phenomena=("D", "S", "P"),
+        smoothness="jumps at random",
+        confidence="memory",
+        source="Haessig and Friedland, J. Dyn. Syst. Meas. Control 113(3), 1991",
+        load="independent",
+    )
+    redraws: ClassVar[bool] = True
+
+    sigma_0: Scalar = param(1e5, unit="N/m", doc="stiffness of all bristles", lower=1e-12)
+    delta_s: Scalar = param(1e-5, unit="m", doc="stretch at which a bristle snaps", lower=1e-15)
+    count: int = param(25, unit="1", doc="number of bristles", lower=1)
+    seed: int = param(0, unit="1", doc="seed of the random numbers", lower=0)
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The stretch of one bristle."""
+        return (State("d", "m", 1e-6),)
+
+    @property
+    def velocity_scale(self) -> float:
+        """None: the force depends on the path alone."""
+        return float("inf")
+
+    @property
+    def stiffness(self) -> float:
+        """Stiffness of all bristles [N/m]."""
+        return self.sigma_0
+
+    @property
+    def path(self) -> float:
+        """Twice the stretch at which a bristle snaps [m]."""
+        return 2 * self.delta_s
+
+    def contact(self, z: Scalar, r: Scalar, dx: Scalar, dt: Scalar, N: Scalar) -> Scalar:
+        """Stretch of a bristle after a step, and below its force [N]; it bonds anew at r delta_s.
+
+        r in [-1, 1].
+        """
+        d = z[0] + dx
+        d = smooth.choose(smooth.magnitude(d, 0.0) > self.delta_s, r * self.delta_s, d)
+        return column(d, self.sigma_0 / self.count * d)
+
+    def _draw(self, random: np.random.Generator) -> tuple[Array, Array]:
+        r = random.uniform(-1.0, 1.0, self.count)
+        return r[None] * self.delta_s, r

@@ -1,0 +1,368 @@
+"""The one interface between those who write equations and those who solve them.
+
+Scenes and mechanisms produce a `Model`; simulation, optimal control, identification and code
+generation consume it. Letters as in CasADi's DaeBuilder: time t, differential states x, algebraic
+variables z, inputs u, parameters p.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.numeric import Scalar, evaluate
+from symfric.foundation.parameters import Variable, check_names
+from symfric.model.holonomic import Holonomic
+from symfric.model.sketch import Sketch
+
+Variables = tuple[Variable, ...]
+RESERVED = {"t", "ode", "alg", "residual", "signals"}
+"""Names that `Model.function` uses itself."""
+
+
+@dataclass(frozen=True, eq=False)
+class Output:
+    """A named result of a model: an expression in t, x, z, u, p, with its unit."""
+
+    expression: Scalar
+    unit: str
+    doc: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Monitor:
+    """An expression in t, x, z, u, p whose relative error is controlled along with the states.
+
+    A sliding velocity is the difference of two velocities that may be a thousand times larger;
+    `nominal` is the scale on which the friction force changes with it.
+    """
+
+    expression: Scalar
+    nominal: float
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """Something that happens when an expression passes through zero.
+
+    A jump counts, of an input or by the reset of another event, if it leads beyond zero. Error
+    control does not look at the expression, and each step is looked at in quarters: one that
+    returns within a quarter of a step is not seen, unless the equations depend on it.
+
+    Attributes:
+        expression: in t, x, z, u, p.
+        direction: +1 only rising, -1 only falling, 0 both.
+        terminal: the simulation ends there.
+        reset: state -> its value after the event, in terms of the values before it.
+    """
+
+    name: str
+    expression: Scalar
+    direction: int = 0
+    terminal: bool = False
+    reset: Mapping[str, Scalar] = field(default_factory=dict[str, Scalar])
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A dynamic system 0 = F(t, x', x, z, u, p), explicit where it can be.
+
+    Explicit form (semi-explicit DAE of index 1; an ODE where there is no z):
+
+        x' = ode(t, x, z, u, p),   0 = alg(t, x, z, u, p)
+
+    Give `ode` and `alg`, or give `residual` with `xdot` for a fully implicit model.
+
+    Attributes:
+        name: what the scene is called.
+        x, z, u, p: named variables; an absent group is empty and costs nothing.
+        ode: SX (nx, 1), or None for an implicit model.
+        alg: SX (nz, 1).
+        xdot: SX symbols (nx, 1) of an implicit model; made by the explicit one.
+        residual: SX (nx + nz, 1).
+        outputs: named results in addition to x, z and u.
+        monitors: expressions that error control watches besides x.
+        events: what happens at zero crossings.
+        t: SX symbol of time [s].
+        holonomic: constraints on coordinates, kept by the integrator on all levels.
+        details: writes further results, such as reactions, when somebody asks for one of them; to
+            carry one along in derivatives and in C, put it into `outputs`.
+        sketch: writes what is drawn of the machine, when somebody asks for a picture of it.
+
+    Raises:
+        ValueError: all problems at once: repeated names, wrong row counts, undeclared symbols.
+    """
+
+    name: str
+    x: Variables = ()
+    z: Variables = ()
+    u: Variables = ()
+    p: Variables = ()
+    ode: ca.SX | None = None
+    alg: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    xdot: ca.SX = field(default_factory=lambda: ca.SX(0, 0))
+    residual: ca.SX = field(default_factory=lambda: ca.SX(0, 0))
+    outputs: Mapping[str, Output] = field(default_factory=dict[str, Output])
+    monitors: tuple[Monitor, ...] = ()
+    events: tuple[Event, ...] = ()
+    t: ca.SX = field(default_factory=lambda: ca.SX.sym("t"))
+    holonomic: Holonomic | None = None
+    details: Callable[[], Mapping[str, Output]] = dict[str, Output]
+    sketch: Callable[[], Sketch] | None = None
+
+    def __post_init__(self) -> None:
+        if self.ode is not None:
+            object.__setattr__(self, "ode", ca.SX(self.ode))
+            rates = [ca.SX.sym(f"{v.name}_dot") for v in self.x]
+            object.__setattr__(self, "xdot", ca.vertcat(ca.SX(0, 1), *rates))
+            if self.ode.numel() == len(self.x):
+                object.__setattr__(
+                    self, "residual", ca.vertcat(self.xdot - ca.vec(self.ode), self.alg)
+                )
+        problems = self._problems()
+        if problems:
+            raise ValueError(f"model '{self.name}': " + "; ".join(problems))
+
+    def _problems(self) -> list[str]:
+        problems = self._naming_problems()
+        nx, nz = len(self.x), len(self.z)
+        if self.ode is not None and self.ode.numel() != nx:
+            problems.append(f"ode: expected {nx} rows (one a state), got {self.ode.numel()}")
+        elif self.ode is not None and self.alg.numel() != nz:
+            problems.append(f"alg: expected {nz} rows, got {self.alg.numel()}")
+        elif self.residual.numel() != nx + nz:
+            problems.append(f"residual: expected {nx + nz} rows, got {self.residual.numel()}")
+        declared = {e.__hash__() for e in ca.symvar(self._symbols())}
+        equations = self.residual if self.ode is None else ca.veccat(self.ode, self.alg)
+        expressions = [equations, *(ca.SX(o.expression) for o in self.outputs.values())]
+        expressions += [ca.SX(m.expression) for m in self.monitors]
+        for event in self.events:
+            expressions += map(ca.SX, (event.expression, *event.reset.values()))
+        stray = [str(s) for s in ca.symvar(ca.veccat(*expressions)) if s.__hash__() not in declared]
+        if stray:
+            problems.append(
+                f"expected only declared symbols, got {', '.join(stray)}; "
+                "declare them as x, z, u or p"
+            )
+        return problems
+
+    def _naming_problems(self) -> list[str]:
+        problems: list[str] = []
+        names = [v.name for group in (self.x, self.z, self.u, self.p) for v in group]
+        names += list(self.outputs)
+        repeated = sorted({n for n in names if names.count(n) > 1} | (RESERVED & set(names)))
+        if repeated:
+            problems.append(
+                f"expected every name once and none of {', '.join(sorted(RESERVED))}, "
+                f"got {', '.join(repeated)}"
+            )
+        odd = [n for n in names if not (n.isascii() and n.isidentifier())]
+        if odd:
+            problems.append(f"expected names that are C identifiers, got {', '.join(odd)}")
+        states = [v.name for v in self.x]
+        for event in self.events:
+            missing = [n for n in event.reset if n not in states]
+            if missing:
+                problems.append(
+                    f"event '{event.name}': expected resets of {', '.join(states)}, "
+                    f"got {', '.join(missing)}"
+                )
+            if event.direction not in (-1, 0, 1):
+                problems.append(
+                    f"event '{event.name}': expected direction -1, 0 or 1, got {event.direction}"
+                )
+        long = [n for n, output in self.outputs.items() if ca.SX(output.expression).numel() != 1]
+        if long:
+            problems.append(f"outputs: expected scalar expressions, got {', '.join(long)}")
+        return problems
+
+    def _symbols(self) -> ca.SX:
+        return ca.vertcat(self.t, self.xdot, *(self.vector(letter) for letter in "xzup"))
+
+    def vector(self, letter: str) -> ca.SX:
+        """The symbols of the group "x", "z", "u" or "p" as a column (n, 1)."""
+        return self._vectors[letter]
+
+    @cached_property
+    def _vectors(self) -> dict[str, ca.SX]:
+        return {
+            letter: ca.vertcat(ca.SX(0, 1), *(v.symbol for v in getattr(self, letter)))
+            for letter in "xzup"
+        }
+
+    def nominal(self, letter: str) -> NDArray[np.float64]:
+        """Typical magnitudes of a group, shape (n,)."""
+        return np.array([v.nominal for v in getattr(self, letter)], dtype=float)
+
+    @cached_property
+    def signals(self) -> dict[str, str]:
+        """Name -> unit of everything a trajectory holds besides time: x, z, u, outputs."""
+        found = {v.name: v.unit for group in (self.x, self.z, self.u) for v in group}
+        return found | {name: output.unit for name, output in self.outputs.items()}
+
+    @cached_property
+    def further(self) -> dict[str, Output]:
+        """The `details`, written out.
+
+        Raises:
+            ValueError: one has a name that the model has already.
+        """
+        found = dict(self.details())
+        repeated = sorted(found.keys() & {*self.signals, *(v.name for v in self.p)})
+        if repeated:
+            raise ValueError(
+                f"model '{self.name}': details: expected new names, got {', '.join(repeated)}"
+            )
+        return found
+
+    def expression(self, name: str) -> ca.SX:
+        """The signal or detail `name` in the symbols of the model.
+
+        Raises:
+            ValueError: unknown name.
+        """
+        variables = {v.name: v.symbol for group in (self.x, self.z, self.u) for v in group}
+        if name in variables:
+            return variables[name]
+        outputs = self.outputs if name in self.outputs else self.further
+        check_names(f"model '{self.name}'", [name], [*self.signals, *outputs])
+        return ca.SX(outputs[name].expression)
+
+    def function(self, what: str) -> ca.Function:
+        """One CasADi Function with named arguments.
+
+        Args:
+            what: "ode" and "alg" (t, x, z, u, p), "residual" (t, xdot, x, z, u, p), "signals"
+                (t, x, z, u, p), which stacks x, z, u and the outputs in the order of `signals`,
+                or the name of one output or detail.
+
+        Raises:
+            ValueError: unknown name, or "ode" of an implicit model.
+        """
+        t, x, z, u, p = self.t, *(self.vector(letter) for letter in "xzup")
+        if what == "residual":
+            return ca.Function(
+                "residual",
+                [t, self.xdot, x, z, u, p],
+                [self.residual],
+                ["t", "xdot", "x", "z", "u", "p"],
+                ["residual"],
+            )
+        known: dict[str, Any] = {"alg": self.alg}
+        if self.ode is not None:
+            known["ode"] = self.ode
+        known["signals"] = ca.vertcat(
+            x, z, u, *(ca.SX(o.expression) for o in self.outputs.values())
+        )
+        known |= {name: ca.SX(output.expression) for name, output in self.outputs.items()}
+        if what not in known:
+            known |= {name: ca.SX(output.expression) for name, output in self.further.items()}
+        check_names(f"model '{self.name}'", [what], [*known, "residual"])
+        return ca.Function(what, [t, x, z, u, p], [known[what]], ["t", "x", "z", "u", "p"], [what])
+
+    def values(self, letter: str, given: Mapping[str, float] | None = None) -> NDArray[np.float64]:
+        """Numbers of the group "u" or "p": start values, replaced by those `given` by name."""
+        group: Variables = getattr(self, letter)
+        given = dict(given or {})
+        check_names(f"model '{self.name}' {letter}", given, [v.name for v in group])
+        numbers = {v.name: v.start for v in group} | given
+        return np.array([finite(f"{self.name}.{name}", x) for name, x in numbers.items()], float)
+
+    def initial_state(
+        self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None
+    ) -> NDArray[np.float64]:
+        """Start values of x, shape (nx,), replaced by those `given` by name.
+
+        A start value that is an expression (a bristle at steady state depends on the sliding
+        velocity) is evaluated with the given values of the other states and parameters.
+        """
+        if not given and not p:
+            return self._default_state.copy()
+        return self._checked(evaluate(self._start, *self._start_arguments(given, p)))
+
+    def _checked(self, start: NDArray[np.float64]) -> NDArray[np.float64]:
+        named = zip(self.x, start.tolist(), strict=True)
+        return np.array([finite(f"{self.name}.{v.name}", x) for v, x in named], float)
+
+    def initial_states(
+        self,
+        given: Mapping[str, NDArray[np.float64]],
+        p: Mapping[str, NDArray[np.float64]],
+        count: int,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Start values (count, nx) and parameters (count, n_p) of many members at once."""
+        check_names(f"model '{self.name}' x0", given, [v.name for v in self.x])
+        check_names(f"model '{self.name}' p", p, [v.name for v in self.p])
+        parameters = np.tile(self.values("p")[:, None], (1, count))
+        for i, v in enumerate(self.p):
+            parameters[i] = p.get(v.name, parameters[i])
+        known = np.zeros((len(self.x), count))
+        chosen = np.array([float(v.name in given) for v in self.x])
+        for i, v in enumerate(self.x):
+            known[i] = given.get(v.name, known[i])
+        every = np.tile(chosen[:, None], (1, count))
+        inputs = np.tile(self.values("u")[:, None], (1, count))
+        start = self._start.map(count)(known, every, inputs, parameters).full()
+        return start.T, parameters.T
+
+    def start_by_parameters(
+        self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None
+    ) -> NDArray[np.float64]:
+        """Derivative of `initial_state` with respect to p, shape (nx, n_p)."""
+        return self._start_slopes(*self._start_arguments(given, p))[0].full()
+
+    def start_by_state(
+        self,
+        name: str,
+        given: Mapping[str, float] | None = None,
+        p: Mapping[str, float] | None = None,
+    ) -> NDArray[np.float64]:
+        """Derivative of `initial_state` with respect to the start value of a state, shape (nx,)."""
+        i = [v.name for v in self.x].index(name)
+        chosen = dict(given or {}) | {name: float(self.initial_state(given, p)[i])}
+        return self._start_slopes(*self._start_arguments(chosen, p))[1].full()[:, i]
+
+    def _start_arguments(
+        self, given: Mapping[str, float] | None, p: Mapping[str, float] | None
+    ) -> tuple[NDArray[np.float64], ...]:
+        given = {name: finite(f"{self.name}.{name}", x) for name, x in (given or {}).items()}
+        check_names(f"model '{self.name}' x0", given, [v.name for v in self.x])
+        known = np.array([given.get(v.name, 0.0) for v in self.x])
+        chosen = np.array([float(v.name in given) for v in self.x])
+        return known, chosen, self.values("u"), self.values("p", p)
+
+    @cached_property
+    def _default_state(self) -> NDArray[np.float64]:
+        return self._checked(evaluate(self._start, *self._start_arguments(None, None)))
+
+    @cached_property
+    def _start(self) -> ca.Function:
+        """Start values as a Function of (values given, which are given, u, p)."""
+        n, x = len(self.x), self.vector("x")
+        known, chosen = ca.SX.sym("known", n), ca.SX.sym("chosen", n)
+        rows = [ca.if_else(chosen[i], known[i], v.start) for i, v in enumerate(self.x)]
+        values = ca.vertcat(ca.SX(0, 1), *rows)
+        for _ in range(2):
+            values = ca.substitute(values, x, values)
+        arguments = [known, chosen, self.vector("u"), self.vector("p")]
+        return ca.Function("start", arguments, [values], ["known", "chosen", "u", "p"], ["x"])
+
+    @cached_property
+    def _start_slopes(self) -> ca.Function:
+        """Derivatives of `_start` by p and by the values given."""
+        return self._start.factory("slopes", self._start.name_in(), ["jac:x:p", "jac:x:known"])
+
+
+def finite(where: str, value: Any) -> float:
+    """`value` as a float, or an error that says where it stands."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError, RuntimeError):
+        number = np.nan
+    if not np.isfinite(number):
+        raise ValueError(f"{where}: expected a finite number, got {value!r}")
+    return number

@@ -1,0 +1,320 @@
+"""Moving pictures of mechanisms."""
+
+from base64 import b64encode
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+from string import Template
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from symfric.foundation.files import write_text, written
+from symfric.model.sketch import Sketch
+from symfric.results.strokes import AZIMUTH, ELEVATION, Poses, Stroke, View, look, strokes
+
+if TYPE_CHECKING:
+    from symfric.results.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+ENDINGS = (".gif", ".html", ".mp4")
+Flags = NDArray[np.bool_]
+BRIEF, LONG, SHOWN = 2.0, 12.0, 6.0
+"""Motions between BRIEF and LONG [s] are shown as fast as they are, others in SHOWN."""
+PATH = 1001
+"""Points of the path of a centre of mass."""
+STILL, STICKS, SLIDES = "white", "#d62728", "#2ca02c"
+"""Fill of joints: without friction, sticking, sliding."""
+GROUND, EDGE = "#8c6d46", "#222222"
+
+
+def animate(
+    trajectory: "Trajectory",
+    path: str | Path,
+    *,
+    fps: float = 20.0,
+    speed: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> None:
+    """Write `trajectory` as a moving picture; see `Trajectory.animate`.
+
+    Raises:
+        ValueError: a model without bodies, another ending, no ffmpeg, numbers not above zero.
+    """
+    check_format(path)
+    for name, value in (("fps", fps), ("speed", speed)):
+        if value is not None and not 0 < value < np.inf:
+            raise ValueError(f"animation: {name}: expected a number > 0, got {value:g}")
+    times, speed = frame_times(float(trajectory.t[0]), float(trajectory.t[-1]), fps, speed)
+    figure, pose = picture(trajectory, times, speed)
+
+    def show(k: int) -> None:
+        pose(k)
+        if progress is not None:
+            progress((k + 1) / times.size)
+
+    try:
+        if Path(path).suffix.lower() == ".html":
+            write_text(path, _page(figure, show, times.size, fps))
+        else:
+            _film(figure, show, times.size, fps, path)
+    finally:
+        plt.close(figure)
+
+
+def check_format(path: str | Path) -> None:
+    """Refuse an ending for which there is no writer.
+
+    Raises:
+        ValueError: another ending than .gif, .html and .mp4, or .mp4 without ffmpeg.
+    """
+    ending = Path(path).suffix.lower()
+    if ending not in ENDINGS:
+        raise ValueError(
+            f"animation '{path}': expected a file ending in {', '.join(ENDINGS)}, got '{ending}'"
+        )
+    if ending == ".mp4" and not FFMpegWriter.isAvailable():
+        raise ValueError(
+            f"animation '{path}': expected the program ffmpeg for .mp4, got none; "
+            "write .gif or .html, which need nothing else"
+        )
+
+
+def frame_times(begin: float, end: float, fps: float, speed: float | None) -> tuple[Array, float]:
+    """Times of the pictures [s] and the speed of the motion relative to real time."""
+    span = end - begin
+    if speed is None:
+        speed = 1.0 if BRIEF <= span <= LONG else max(span, 1e-300) / SHOWN
+    return np.linspace(begin, end, max(2, round(span / speed * fps) + 1)), speed
+
+
+def _film(
+    figure: Figure, show: Callable[[int], None], count: int, fps: float, path: str | Path
+) -> None:
+    """Write a GIF or MP4."""
+
+    def grab(writer: AbstractMovieWriter) -> None:
+        for k in range(count):
+            show(k)
+            writer.grab_frame()
+
+    with written(path) as temporary:
+        if Path(path).suffix.lower() == ".mp4":
+            program = FFMpegWriter(fps)  # type: ignore[arg-type]
+            with program.saving(figure, str(temporary), dpi=100):
+                grab(program)
+        else:  # `saving` would put a film together even after an interrupt
+            film = PillowWriter(fps)  # type: ignore[arg-type]
+            film.setup(figure, str(temporary), dpi=100)
+            grab(film)
+            film.finish()
+
+
+def _page(figure: Figure, show: Callable[[int], None], count: int, fps: float) -> str:
+    """An HTML page that holds all pictures and needs nothing from elsewhere."""
+    pictures: list[str] = []
+    for k in range(count):
+        show(k)
+        buffer = BytesIO()
+        figure.savefig(buffer, dpi=100, format="png")
+        pictures.append(b64encode(buffer.getvalue()).decode())
+    sources = ",\n".join(f'"data:image/png;base64,{text}"' for text in pictures)
+    return PAGE.substitute(pictures=sources, last=count - 1, wait=round(1000 / fps))
+
+
+PAGE = Template("""<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><title>Mechanism in motion</title>
+<style>
+body { font-family: sans-serif; text-align: center; }
+img { max-width: 100%; }
+input { width: 24em; vertical-align: middle; }
+</style></head><body>
+<img id="picture" alt="mechanism"><br>
+<button id="play">pause</button> <input id="at" type="range" min="0" max="$last" value="0">
+<script>
+const pictures = [
+$pictures
+];
+const picture = document.getElementById("picture");
+const at = document.getElementById("at"), play = document.getElementById("play");
+let running = true;
+function show(k) { picture.src = pictures[k]; at.value = k; }
+at.oninput = () => { running = false; play.textContent = "play"; show(+at.value); };
+play.onclick = () => { running = !running; play.textContent = running ? "pause" : "play"; };
+setInterval(() => { if (running) show((+at.value + 1) % pictures.length); }, $wait);
+show(0);
+</script></body></html>
+""")
+
+
+def picture(
+    trajectory: "Trajectory", times: Array, speed: float = 1.0
+) -> tuple[Figure, Callable[[int], None]]:
+    """A figure of a mechanism, and what makes it show its pose at times[k].
+
+    Raises:
+        ValueError: a model without bodies.
+    """
+    model = trajectory.model
+    if model.sketch is None:
+        raise ValueError(
+            f"animation of '{trajectory.scene}': expected a mechanism, got a model without "
+            "bodies; plot() shows its signals"
+        )
+    sketch = model.sketch()
+    columns = trajectory.of(sketch.places, times).reshape(-1, 12, times.size)
+    centres = sketch.places[9:, [part.centre for part in sketch.parts]]
+    fine = np.linspace(times[0], times[-1], PATH)
+    paths = trajectory.of(centres, fine).reshape(-1, 3, PATH)
+    poses = Poses(columns[:, :9].reshape(-1, 3, 3, times.size), columns[:, 9:], paths)
+    sticks = _sticks(trajectory, sketch, times)
+    view = look(sketch, poses)
+    figure, canvas = _flat(view) if view.planar else _spatial(view)
+    drawn = [canvas(stroke) for stroke in strokes(sketch, poses, view, sticks)]
+    title = figure.axes[0].set_title("", loc="left", fontsize="medium")
+    factor = "" if abs(speed - 1) < 1e-9 else f"  ({speed:.3g} x)"
+    if sticks:
+        _legend(figure)
+
+    def show(k: int) -> None:
+        for put in drawn:
+            put(k)
+        title.set_text(f"{trajectory.scene}   t = {times[k]:.3f} s{factor}")
+
+    show(0)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # every picture has the layout of the first one
+    return figure, show
+
+
+def _sticks(trajectory: "Trajectory", sketch: Sketch, times: Array) -> dict[str, Flags]:
+    """Joint -> whether all its contacts move slower than the scale of their law."""
+    marks = [mark for mark in sketch.marks if mark.slips]
+    if not marks:
+        return {}
+    names = list(dict.fromkeys(name for mark in marks for name, _ in mark.slips))
+    column = ca.vertcat(*(trajectory.model.expression(name) for name in names))
+    slip = dict(zip(names, trajectory.of(ca.vertcat(column, 0), times), strict=False))
+    return {
+        mark.name: np.all([np.abs(slip[name]) < limit for name, limit in mark.slips], axis=0)
+        for mark in marks
+    }
+
+
+def _legend(figure: Figure) -> None:
+    """What the fill of a joint says."""
+    entries = [
+        Line2D([], [], linestyle="", marker="o", color=EDGE, markerfacecolor=fill, label=label)
+        for fill, label in ((SLIDES, "slides"), (STICKS, "sticks"))
+    ]
+    flat = figure.get_layout_engine() is not None
+    figure.legend(
+        handles=entries, loc="outside lower right" if flat else "upper right", ncols=2,
+        frameon=False, fontsize="small", handletextpad=0.2,
+    )  # fmt: skip
+
+
+Canvas = Callable[[Stroke], Callable[[int], None]]
+
+
+def _flat(view: View) -> tuple[Figure, Canvas]:
+    """Axes that show a plane along its normal."""
+    axes = np.stack([view.right, view.up])
+    low, high = axes @ view.low, axes @ view.high
+    low, high = np.minimum(low, high), np.maximum(low, high)
+    size = high - low
+    more = np.maximum(0.6 * size.max() - size, 0) / 2
+    low, high = low - more, high + more
+    width, height = high - low
+    scale = 6.4 / max(width, height)
+    figure, ax = plt.subplots(
+        figsize=(scale * width + 0.9, scale * height + 0.9), layout="constrained"
+    )
+    ax.set_aspect("equal")
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    ax.set(xlabel=f"{_direction(view.right)} [m]", ylabel=f"{_direction(view.up)} [m]")
+    ax.grid(alpha=0.3)
+
+    def add(stroke: Stroke) -> Callable[[int], None]:
+        points = np.einsum("ac,nck->ank", axes, stroke.points)
+        (line,) = ax.plot([], [], **_style(stroke))
+
+        def put(k: int) -> None:
+            line.set_data(points[0, :, k], points[1, :, k])
+            _fill(line, stroke, k)
+
+        return put
+
+    return figure, add
+
+
+def _spatial(view: View) -> tuple[Figure, Canvas]:
+    """Axes with three directions of one scale."""
+    figure = plt.figure(figsize=(7.2, 6.4))
+    ax: Any = figure.add_subplot(projection="3d", proj_type="ortho")
+    size = view.high - view.low
+    size = np.maximum(size, 0.15 * size.max())
+    middle = (view.low + view.high) / 2
+    for k, axis in enumerate("xyz"):
+        getattr(ax, f"set_{axis}lim")(middle[k] - size[k] / 2, middle[k] + size[k] / 2)
+        getattr(ax, f"set_{axis}label")(f"{axis} [m]")
+        getattr(ax, f"{axis}axis").set_major_locator(
+            MaxNLocator(max(2, round(6 * size[k] / size.max())))
+        )
+    ax.set_box_aspect(size, zoom=1.12)
+    figure.subplots_adjust(left=0.0, right=0.95, bottom=0.04, top=0.93)
+    ax.view_init(ELEVATION, AZIMUTH)
+
+    def add(stroke: Stroke) -> Callable[[int], None]:
+        (line,) = ax.plot([], [], [], **_style(stroke))
+
+        def put(k: int) -> None:
+            line.set_data_3d(*stroke.points[:, :, k].T)
+            _fill(line, stroke, k)
+
+        return put
+
+    return figure, add
+
+
+def _direction(axis: Array) -> str:
+    """Name of a direction: x, or its components."""
+    k = int(np.argmax(np.abs(axis)))
+    if abs(abs(axis[k]) - 1) < 1e-9:
+        return "xyz"[k] if axis[k] > 0 else f"-{'xyz'[k]}"
+    return "({:.2g}, {:.2g}, {:.2g})".format(*axis)
+
+
+def _style(stroke: Stroke) -> dict[str, Any]:
+    """How a stroke looks."""
+    colour = f"C{stroke.body % 10}" if stroke.body >= 0 else EDGE
+    styles: dict[str, dict[str, Any]] = {
+        "path": {"color": colour, "linewidth": 0.8, "alpha": 0.35},
+        "body": {"color": colour, "linewidth": 4.0, "solid_capstyle": "round"},
+        "arm": {"color": colour, "linewidth": 1.2},
+        "centre": {"color": colour, "marker": "o", "markersize": 7.0},
+        "block": {"color": colour, "linewidth": 1.2},
+        "axis": {"color": EDGE, "linewidth": 1.2},
+        "guide": {"color": EDGE, "linewidth": 1.0, "linestyle": "-."},
+        "ground": {"color": GROUND, "linewidth": 3.0, "alpha": 0.6},
+        "anchor": {"color": GROUND, "marker": "^", "markersize": 13.0, "linestyle": ""},
+        "rod": {"color": EDGE, "linewidth": 1.8},
+        "damper": {"color": EDGE, "linewidth": 1.2, "linestyle": "--"},
+        "spring": {"color": "#7f7f7f", "linewidth": 1.0},
+        "joint": {"color": EDGE, "marker": stroke.marker, "markersize": 7.0, "linestyle": "",
+                  "markerfacecolor": STILL},
+    }  # fmt: skip
+    return styles[stroke.role]
+
+
+def _fill(line: Line2D, stroke: Stroke, k: int) -> None:
+    """Colour a joint by what its contacts do."""
+    if stroke.sticks is not None:
+        line.set_markerfacecolor(STICKS if stroke.sticks[k] else SLIDES)

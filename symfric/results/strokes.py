@@ -1,0 +1,221 @@
+"""A moving sketch as lines and markers: geometry alone, so that any program may draw it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.model.sketch import Mark, Part, Sketch
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+FLAT = 1e-6
+"""Motion out of a plane below this fraction of the motion in it is none."""
+SYMBOL = 0.02
+"""Half the size of a joint's symbol, as a fraction of the whole machine."""
+ELEVATION, AZIMUTH = 22.0, -58.0
+"""From where a spatial motion is seen [degree]."""
+UPRIGHT = 0.99
+"""Component of the view along z beyond which z is no direction on the picture."""
+SLIDING = ("prismatic", "cylindrical")
+ANCHORED = ("revolute", "spherical", "universal", "fixed", "pointonline", "distance", "spring",
+            "damper")  # fmt: skip
+"""What shows where it hangs on the ground."""
+MARKERS = {"revolute": "o", "prismatic": "s", "cylindrical": "s", "spherical": "o",
+           "universal": "o", "planar": "D", "fixed": "s", "pointonline": "o"}  # fmt: skip
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Places of a sketch over the pictures.
+
+    Attributes:
+        axes: shape (places, axis, component, pictures).
+        at: positions [m], shape (places, component, pictures).
+        paths: of the centres of the parts [m], shape (parts, component, times).
+    """
+
+    axes: Array
+    at: Array
+    paths: Array
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Stroke:
+    """A line or markers.
+
+    Attributes:
+        role: what it stands for: body, arm (to the end of a spring), path, block, axis, guide,
+            rod, spring, damper, ground (a guide fixed to it), anchor, centre, or joint.
+        points: corners of the line, NaN where it is broken, shape (n, 3, pictures).
+        body: number of the body, which chooses the colour; -1 for what is no body.
+        marker: shape of a joint's marker.
+        sticks: whether the joint's contacts stick, per picture; None without friction.
+    """
+
+    role: str
+    points: Array
+    body: int = -1
+    marker: str = ""
+    sticks: Flags | None = None
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class View:
+    """How a motion is looked at.
+
+    Attributes:
+        low, high: what the picture must show [m], shape (3,).
+        eye: direction towards the eye.
+        planar: whether all moves in a plane, `eye` being its normal.
+        size: half the size of a joint's symbol [m].
+    """
+
+    low: Array
+    high: Array
+    eye: Array
+    planar: bool
+    size: float
+
+    @property
+    def up(self) -> Array:
+        """Upwards on the picture: z, or y where that is not seen."""
+        upwards = np.eye(3)[1 if abs(self.eye[2]) > UPRIGHT else 2]
+        up = upwards - (upwards @ self.eye) * self.eye
+        return np.asarray(up / np.linalg.norm(up))
+
+    @property
+    def right(self) -> Array:
+        """To the right on the picture."""
+        return np.cross(self.up, self.eye)
+
+
+def look(sketch: Sketch, poses: Poses) -> View:
+    """The view that shows all places at all times."""
+    every = np.concatenate([a.transpose(1, 0, 2).reshape(3, -1) for a in (poses.at, poses.paths)],
+                           axis=1)  # fmt: skip
+    low, high = every.min(axis=1), every.max(axis=1)
+    size = SYMBOL * max(float(np.max(high - low)), 1e-9)
+    normal = _normal(sketch, poses)
+    if normal is None:
+        e, a = np.radians([ELEVATION, AZIMUTH])
+        eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    else:
+        eye = normal
+    return View(low - 4 * size, high + 4 * size, eye, normal is not None, size)
+
+
+def _normal(sketch: Sketch, poses: Poses) -> Array | None:
+    """The normal of the plane in which all moves, towards the eye; None if there is none."""
+    moved = (poses.at - poses.at[:, :, :1]).transpose(1, 0, 2).reshape(3, -1)
+    directions, extent, _ = np.linalg.svd(moved, full_matrices=False)
+    hinges = [poses.axes[mark.b, 2] for mark in sketch.marks if mark.kind == "revolute"]
+    if extent[1] > FLAT * extent[0]:
+        normal = directions[:, 2]
+    elif hinges:
+        normal = hinges[0][:, 0]
+    else:
+        return None
+    across = [np.linalg.norm(np.cross(axis.T, normal), axis=1).max() for axis in hinges]
+    if np.abs(normal @ moved).max() > FLAT * extent[0] or max(across, default=0.0) > FLAT:
+        return None
+    view = View(normal, normal, normal, True, 0.0)
+    return normal if view.right[np.argmax(np.abs(view.right))] > 0 else -normal
+
+
+def strokes(
+    sketch: Sketch, poses: Poses, view: View, sticks: Mapping[str, Flags]
+) -> Iterator[Stroke]:
+    """Everything that is drawn, from back to front.
+
+    Args:
+        sketch, poses: what, and where.
+        view: how it is looked at.
+        sticks: joint -> whether its contacts stick, per picture.
+    """
+    moving = [part for part in sketch.parts if not part.fixed]
+    for k, path in enumerate(p for p, part in zip(poses.paths, sketch.parts, strict=True)
+                             if not part.fixed):  # fmt: skip
+        yield Stroke("path", np.repeat(path.T[:, :, None], poses.at.shape[2], axis=2), k)
+    for mark in sketch.marks:
+        yield from _behind(mark, poses, view)
+    for k, part in enumerate(moving):
+        yield from _body(sketch, part, k, poses, view)
+    for mark in sketch.marks:
+        yield from _symbol(mark, poses, view)
+        if mark.kind in MARKERS:
+            at = poses.at[mark.b][None]
+            yield Stroke("joint", at, -1, MARKERS[mark.kind], sticks.get(mark.name))
+
+
+def _body(sketch: Sketch, part: Part, k: int, poses: Poses, view: View) -> Iterator[Stroke]:
+    """Lines from the centre of mass to the places of a body; a block where they coincide."""
+    centre = poses.at[part.centre]
+    for role, places in (("arm", part.ends), ("body", part.corners)):
+        arms = [poses.at[c] for c in places]
+        arms = [arm for arm in arms if np.abs(arm - centre).max() > 1e-9 * view.size]
+        if arms:
+            gap = np.full_like(centre, np.nan)
+            yield Stroke(role, np.stack([p for arm in arms for p in (centre, arm, gap)]), k)
+    if not arms and not any(m.kind in SLIDING and m.b in part.corners for m in sketch.marks):
+        yield Stroke("block", _block(poses.axes[part.centre], centre, 1.2 * view.size), k)
+    yield Stroke("centre", centre[None], k)
+
+
+def _behind(mark: Mark, poses: Poses, view: View) -> Iterator[Stroke]:
+    """Guides, rods, springs, and where something hangs on the ground."""
+    a, b, z = poses.at[mark.a], poses.at[mark.b], poses.axes[mark.a, 2]
+    if mark.kind in SLIDING:
+        along = np.sum(z * (b - a), axis=0)
+        low, high = along.min() - 3 * view.size, along.max() + 3 * view.size
+        role = "ground" if mark.grounded else "guide"
+        yield Stroke(role, np.stack([a + low * z, a + high * z]))
+    elif mark.kind in ("distance", "damper"):
+        yield Stroke("rod" if mark.kind == "distance" else "damper", np.stack([a, b]))
+    elif mark.kind == "spring":
+        yield Stroke("spring", _zigzag(a, b, view))
+    if mark.grounded and mark.kind in ANCHORED:
+        yield Stroke("anchor", a[None])
+
+
+def _symbol(mark: Mark, poses: Poses, view: View) -> Iterator[Stroke]:
+    """Blocks and axes of joints."""
+    a, b, size = poses.axes[mark.a], poses.at[mark.b], view.size
+    if mark.kind in SLIDING:
+        yield Stroke("block", _block(poses.axes[mark.b], b, size))
+    if mark.kind in ("revolute", "pointonline", "cylindrical"):
+        z = poses.axes[mark.b, 2] if mark.kind == "revolute" else a[2]
+        yield Stroke("axis", np.stack([b - 1.6 * size * z, b + 1.6 * size * z]))
+    if mark.kind == "universal":
+        for axis in (a[0], poses.axes[mark.b, 1]):
+            yield Stroke("axis", np.stack([b - 1.6 * size * axis, b + 1.6 * size * axis]))
+    if mark.kind == "planar":
+        corners = [(1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1)]
+        yield Stroke("axis", np.stack([b + 2 * size * (i * a[0] + j * a[1]) for i, j in corners]))
+
+
+CORNERS = np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
+EDGES = [(i, j) for i in range(8) for j in range(i) if np.abs(CORNERS[i] - CORNERS[j]).sum() == 2]
+
+
+def _block(axes: Array, at: Array, size: float) -> Array:
+    """The edges of a cube."""
+    corners = at + size * np.einsum("ca,aik->cik", CORNERS, axes)
+    gap = np.full_like(at, np.nan)
+    return np.stack([point for i, j in EDGES for point in (corners[i], corners[j], gap)])
+
+
+def _zigzag(a: Array, b: Array, view: View) -> Array:
+    """A spring of 8 coils between two points, turned towards the eye."""
+    d = b - a
+    side = np.cross(d.T, view.eye)
+    length = np.linalg.norm(side, axis=1, keepdims=True)
+    side = np.where(length > 1e-6 * np.linalg.norm(d), side / np.maximum(length, 1e-300), view.up)
+    s = np.concatenate([[0.0, 0.1], np.linspace(0.125, 0.875, 16), [0.9, 1.0]])
+    swing = np.concatenate([[0.0, 0.0], np.tile([1.0, -1.0], 8), [0.0, 0.0]]) * view.size
+    return a + s[:, None, None] * d + swing[:, None, None] * side.T

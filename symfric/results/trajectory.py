@@ -1,0 +1,334 @@
+"""The result of a simulation: named signals over time that plot and write themselves."""
+
+import csv
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symfric.foundation.files import write_text, written
+from symfric.foundation.numeric import Scalar
+from symfric.foundation.parameters import check_names
+from symfric.foundation.status import Status
+from symfric.model import Model
+from symfric.results.energy import EnergyBalance, energy_balance, integrals
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What a simulation cost.
+
+    Attributes:
+        backend: what ran it.
+        method: integration method.
+        steps, rejections: accepted and rejected steps.
+        evaluations, jacobians, factorisations: calls of the right-hand side, of its Jacobian, and
+            LU factorisations.
+        events: events that happened.
+        smallest_step: smallest accepted step [s].
+        build_time, compile_time, run_time: wall time [s] for making the integrator (0 where it is
+            reused), compiling it, and running it.
+        error: measured error relative to each state's magnitude, the largest; NaN if not asked for.
+    """
+
+    backend: str
+    method: str
+    steps: int
+    rejections: int
+    evaluations: int
+    jacobians: int
+    factorisations: int
+    events: int
+    smallest_step: float
+    build_time: float
+    compile_time: float
+    run_time: float
+    error: float = float("nan")
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fields by name; an error that was not measured is left out."""
+        return {k: v for k, v in asdict(self).items() if v == v}
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Named signals of a simulated model.
+
+    `trajectory["v"]` is a signal at the times `trajectory.t`; `trajectory.at(times)` evaluates
+    all signals anywhere in the span by the dense output of the method. Signals are evaluated when
+    they are first asked for. Further results, named in `details`, are not even written before:
+    `trajectory["hinge_Fx"]` gives a reaction, and plots and CSV files take such names, too.
+
+    Attributes:
+        scene: name of the model.
+        t: times of the result [s], shape (n,).
+        units: name -> unit of every signal.
+        status: how it ended; `message` says it in a sentence.
+        statistics: steps, evaluations, times.
+        steps: ends of the accepted steps [s], shape (steps + 1,).
+        states: the states alone, at any times; cheaper than all signals.
+        evaluate: all signals at any times.
+        express: an expression of the model at any times, shape (rows, n).
+        model: the model that was simulated.
+        happened: (time [s], name) of every event.
+        differentiate: derivatives of all signals at any times, where they were asked for.
+        pull_back: gradient of a weighted sum of signals at `t`, likewise.
+    """
+
+    scene: str
+    t: Array
+    units: dict[str, str]
+    status: Status
+    message: str
+    statistics: Statistics
+    steps: Array
+    states: Callable[[Array], dict[str, Array]]
+    evaluate: Callable[[Array], dict[str, Array]]
+    express: Callable[[ca.SX, Array], Array]
+    model: Model
+    happened: tuple[tuple[float, str], ...] = ()
+    differentiate: Callable[[Array], dict[str, dict[str, Array]]] | None = None
+    pull_back: Callable[[Mapping[str, Array]], dict[str, float]] | None = None
+
+    @cached_property
+    def signals(self) -> dict[str, Array]:
+        """Name -> values at `t`, shape (n,): states, algebraic variables, inputs, outputs."""
+        return self.evaluate(self.t)
+
+    @cached_property
+    def _own_states(self) -> dict[str, Array]:
+        return self.states(self.t)
+
+    @cached_property
+    def sensitivities(self) -> dict[str, dict[str, Array]]:
+        """Derivatives at `t`: name as given to `simulate` -> signal -> values, shape (n,).
+
+        Raises:
+            ValueError: none were asked for.
+        """
+        if self.differentiate is None:
+            raise self._without_derivatives
+        return self.differentiate(self.t)
+
+    def gradient(self, weights: Mapping[str, ArrayLike]) -> dict[str, float]:
+        """Derivatives of the sum over signals s and times t_i of weights[s][i] s(t_i).
+
+        One sweep backwards over the steps, at a cost that does not grow with the number of names
+        given to `simulate`. For a cost J of the signals at `t`, the weights are dJ/ds(t_i).
+
+        Args:
+            weights: signal -> a number for every time of `t`, or one for all.
+
+        Returns:
+            Name as given to `simulate` -> derivative.
+
+        Raises:
+            ValueError: no sensitivities were asked for, an unknown signal, another length.
+        """
+        if self.pull_back is None:
+            raise self._without_derivatives
+        where = f"trajectory of '{self.scene}'"
+        check_names(f"{where}: gradient", weights, self.units)
+        given = {name: np.asarray(w, dtype=float) for name, w in weights.items()}
+        odd = {name: w.shape for name, w in given.items() if w.shape not in ((), self.t.shape)}
+        if odd:
+            raise ValueError(
+                f"{where}: gradient: expected numbers or arrays of {self.t.size} weights, got "
+                + ", ".join(f"{name} of shape {shape}" for name, shape in odd.items())
+            )
+        return self.pull_back({n: np.broadcast_to(w, self.t.shape) for n, w in given.items()})
+
+    @property
+    def _without_derivatives(self) -> ValueError:
+        return ValueError(
+            f"trajectory of '{self.scene}': expected sensitivities, got none; ask for them by "
+            "simulate(..., sensitivities=[...])"
+        )
+
+    def __getitem__(self, name: str) -> Array:
+        if name == "t":
+            return self.t
+        if name not in self.units:
+            self.check([name])
+            return self._further[name]
+        states = self._own_states
+        return states[name] if name in states else self.signals[name]
+
+    @cached_property
+    def _further(self) -> dict[str, Array]:
+        """All details at `t`; one by one they would cost almost as much each."""
+        column = ca.vertcat(*(o.expression for o in self.model.further.values()), 0)
+        return dict(zip(self.model.further, self.of(column), strict=False))
+
+    @cached_property
+    def details(self) -> dict[str, str]:
+        """Name -> unit of the further results of the model, such as reactions."""
+        return {name: output.unit for name, output in self.model.further.items()}
+
+    def unit(self, name: str) -> str:
+        """The unit of a signal or detail."""
+        return self.units[name] if name in self.units else self.details[name]
+
+    def check(self, names: Iterable[str]) -> None:
+        """Refuse what is neither a signal nor a detail.
+
+        Raises:
+            ValueError: unknown names, with the nearest known one.
+        """
+        names = list(names)
+        known = self.units if all(n in self.units for n in names) else self.units | self.details
+        check_names(f"trajectory of '{self.scene}'", names, known)
+
+    def of(self, expression: Scalar, times: ArrayLike | None = None) -> Array:
+        """Values of an expression in the symbols of the model: t, x, z, u, p.
+
+        Args:
+            expression: SX of one element, or a column (rows, 1).
+            times: where [s], shape (n,); `t` if not given.
+
+        Returns:
+            Shape (n,), or (rows, n) for a column.
+
+        Raises:
+            ValueError: a symbol that is none of the model's, a time outside the span.
+        """
+        column, model = ca.SX(expression), self.model
+        known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
+        declared = {e.__hash__() for e in ca.symvar(known)}
+        stray = [str(s) for s in ca.symvar(column) if s.__hash__() not in declared]
+        if stray:
+            raise ValueError(
+                f"trajectory of '{self.scene}': expected an expression in the symbols of its "
+                f"model, got {', '.join(stray)}"
+            )
+        values = self.express(ca.vec(column), self.t if times is None else self._inside(times))
+        return values[0] if column.is_scalar() else values
+
+    def integral(self, name: str, times: ArrayLike | None = None) -> Array:
+        """Integral of a signal or detail over time from the start, such as energy from power.
+
+        By Gauss quadrature over the dense output of every accepted step, which costs the
+        simulation nothing: `trajectory.integral("friction_power")` is a work [J].
+
+        Args:
+            name: of a signal or detail.
+            times: up to where [s], shape (n,); `t` if not given.
+
+        Raises:
+            ValueError: unknown name, a time outside the span.
+        """
+        self.check([name])
+        at = self.t if times is None else self._inside(times)
+        return integrals(self, self.model.expression(name), at)[0]
+
+    def energy_balance(self) -> EnergyBalance:
+        """Where the energy of a mechanism went, and what the books do not explain.
+
+        Raises:
+            ValueError: a model that does not keep books of its energy.
+        """
+        return energy_balance(self)
+
+    def at(self, times: ArrayLike) -> dict[str, Array]:
+        """All signals at `times` [s] inside the simulated span, by dense output.
+
+        Raises:
+            ValueError: a time outside the span.
+        """
+        return self.evaluate(self._inside(times))
+
+    def _inside(self, times: ArrayLike) -> Array:
+        at = np.atleast_1d(np.asarray(times, dtype=float))
+        first, last = self.steps[0], self.steps[-1]
+        if at.size and not (first <= at.min() and at.max() <= last):
+            raise ValueError(
+                f"trajectory of '{self.scene}': expected times in [{first:g}, {last:g}] s, "
+                f"got {at.min():g} ... {at.max():g} s"
+            )
+        return at
+
+    @cached_property
+    def final(self) -> dict[str, float]:
+        """All signals at the last time reached."""
+        return {k: float(v[0]) for k, v in self.evaluate(self.steps[-1:]).items()}
+
+    def plot(self, *names: str, path: str | Path | None = None, label: str = "") -> "Figure":
+        """One panel per signal over time, labelled with units; saved to `path` if given.
+
+        Args:
+            names: signals or details to show; all signals if none is given.
+            path: image file, its format taken from the ending.
+            label: legend entry of this trajectory.
+        """
+        from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow to import)
+
+        return plot_trajectories({label or self.scene: self}, names, path)
+
+    def animate(
+        self,
+        path: str | Path,
+        *,
+        fps: float = 20.0,
+        speed: float | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> None:
+        """Write a moving picture of a mechanism: GIF, HTML with the pictures inside, or MP4.
+
+        Planar mechanisms are seen along the normal of their plane. Joints are filled red while
+        all their contacts move slower than the velocity scale of their law, green while one slides.
+
+        Args:
+            path: file ending in .gif, .html or .mp4 (needs the program ffmpeg).
+            fps: pictures per second.
+            speed: of the motion relative to real time; what lasts between 2 and 12 s is shown as
+                fast as it is, anything else in 6 s.
+            progress: called with the fraction done.
+
+        Raises:
+            ValueError: a model without bodies, another ending, no ffmpeg, numbers not above zero.
+        """
+        from symfric.results.animation import animate  # noqa: PLC0415  (matplotlib is slow to import)
+
+        animate(self, path, fps=fps, speed=speed, progress=progress)
+
+    def to_csv(self, path: str | Path, *names: str) -> None:
+        """Write signals as columns with units in the header, such as `v [m/s]`.
+
+        Args:
+            path: file.
+            names: signals or details; all signals if none is given.
+        """
+        self.check(names)
+        columns = {name: self[name] for name in names} if names else self.signals
+        header = ["t [s]", *(f"{name} [{self.unit(name)}]" for name in columns)]
+        with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(header)
+            writer.writerows(np.column_stack([self.t, *columns.values()]).tolist())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as plain data: scene, status, statistics, units, times and signals."""
+        return {
+            "scene": self.scene,
+            "status": self.status.name,
+            "message": self.message,
+            "statistics": self.statistics.to_dict(),
+            "units": {"t": "s", **self.units},
+            "t": self.t.tolist(),
+            "signals": {name: values.tolist() for name, values in self.signals.items()},
+        }
+
+    def to_json(self, path: str | Path) -> None:
+        """Write `to_dict` as JSON."""
+        write_text(path, json.dumps(self.to_dict()))

@@ -1,0 +1,201 @@
+"""Parametric objects: checks, names, symbols."""
+
+from dataclasses import FrozenInstanceError, dataclass
+from math import inf, nan
+from typing import ClassVar
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric.foundation.numeric import Scalar
+from symfric.foundation.parameters import (
+    Parametric,
+    Variable,
+    check_names,
+    distinct,
+    option,
+    options,
+    param,
+    parameters,
+    symbolise,
+    with_values,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Spring(Parametric):
+    ordered: ClassVar[tuple[tuple[str, str], ...]] = (("soft", "hard"),)
+
+    soft: Scalar = param(1.0, unit="N/m", doc="soft stiffness", lower=0.0)
+    hard: Scalar = param(2.0, unit="N/m", doc="hard stiffness", lower=0.0, upper=100.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Pair(Parametric):
+    first: Spring
+    second: Spring
+    soft: Scalar = param(5.0, unit="1", doc="own parameter of the same name")
+
+
+@dataclass(frozen=True, eq=False)
+class Chain(Parametric):
+    links: tuple[Spring, ...]
+
+
+@pytest.mark.parametrize(
+    "value", [nan, inf, -inf, "1", None, True, np.float64(nan), np.float32(inf)]
+)
+def test_what_is_not_a_finite_number_is_refused(value: object) -> None:
+    with pytest.raises(ValueError, match=r"Spring: soft: expected a finite number \[N/m\] or a"):
+        Spring(soft=value)
+
+
+@pytest.mark.parametrize("value", [-1.0, -1, np.float64(-1.0), np.int64(-1)])
+def test_number_of_any_kind_beyond_its_bound_is_refused(value: object) -> None:
+    with pytest.raises(ValueError, match=r"soft: expected 0 <= soft <= inf \[N/m\], got -1"):
+        Spring(soft=value)
+
+
+def test_all_problems_are_reported_at_once() -> None:
+    with pytest.raises(ValueError, match=r"soft: .* got -1; hard: .* got 200$"):
+        Spring(soft=-1.0, hard=200.0)
+
+
+def test_order_is_checked_of_numbers_and_left_open_for_symbols() -> None:
+    with pytest.raises(ValueError, match=r"expected soft <= hard, got soft = 3 and hard = 2"):
+        Spring(soft=3.0)
+    assert Spring(soft=ca.SX.sym("soft")).hard == 2.0
+    assert Spring(soft=2.0).soft == 2.0
+
+
+@pytest.mark.parametrize("value", [ca.SX.sym("k"), ca.MX.sym("k"), ca.DM(3.0), np.ones(3)])
+def test_symbols_and_arrays_are_taken(value: object) -> None:
+    assert Spring(hard=value).hard is value
+
+
+def test_parameters_are_frozen_and_compared_by_identity() -> None:
+    spring = Spring()
+    with pytest.raises(FrozenInstanceError):
+        spring.soft = 2.0  # type: ignore[misc]
+    assert spring != Spring()
+    assert len({spring, Spring(soft=ca.SX.sym("k"))}) == 2
+
+
+def test_parameters_tell_value_default_unit_bounds_and_text() -> None:
+    found = parameters(Spring(hard=50.0))["hard"]
+    assert (found.name, found.value, found.default, found.unit) == ("hard", 50.0, 2.0, "N/m")
+    assert (found.lower, found.upper, found.doc) == (0.0, 100.0, "hard stiffness")
+
+
+def test_names_clash_only_where_they_stand_twice() -> None:
+    pair = Pair(Spring(), Spring(hard=3.0))
+    assert list(parameters(pair)) == ["soft", "soft_1", "hard_1", "soft_2", "hard_2"]
+    assert list(parameters(Chain((Spring(),)))) == ["soft", "hard"]
+
+
+def test_values_reach_their_owners() -> None:
+    pair = Pair(Spring(), Spring())
+    changed = with_values(pair, {"soft": 7.0, "hard_2": 4.0, "soft_2": 3.5})
+    assert (changed.soft, changed.second.soft, changed.second.hard) == (7.0, 3.5, 4.0)
+    assert changed.first is pair.first
+    assert pair.second.hard == 2.0
+    chain = with_values(Chain((Spring(), Spring())), {"hard_2": 4.0})
+    assert [link.hard for link in chain.links] == [2.0, 4.0]
+
+
+def test_values_are_checked_together() -> None:
+    """Moving both ends of an order at once must not fail half way."""
+    assert with_values(Spring(), {"soft": 50.0, "hard": 60.0}).soft == 50.0
+    with pytest.raises(ValueError, match="expected soft <= hard"):
+        with_values(Pair(Spring(), Spring()), {"soft_1": 50.0})
+
+
+def test_symbolise_gives_symbols_with_start_nominal_and_bounds() -> None:
+    spring, (hard, soft) = symbolise(Spring(soft=0.0, hard=50.0), "hard", "soft")
+    assert spring.hard is hard.symbol
+    assert spring.soft is soft.symbol
+    assert (hard.start, hard.nominal, hard.lower, hard.upper) == (50.0, 50.0, 0.0, 100.0)
+    assert (soft.start, soft.nominal) == (0.0, 1.0)
+    assert (hard.unit, hard.doc) == ("N/m", "hard stiffness")
+
+
+def test_symbolise_nothing_changes_nothing() -> None:
+    spring, variables = symbolise(Spring())
+    assert (spring.soft, spring.hard, variables) == (1.0, 2.0, ())
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (["softt"], "Spring: expected one of soft, hard, got softt; did you mean soft"),
+        (["soft", "soft"], "symbolise: expected every name once, got soft, soft"),
+    ],
+)
+def test_symbolise_refuses_unknown_and_repeated_names(names: list[str], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        symbolise(Spring(), *names)
+
+
+def test_unknown_names_are_refused_together_with_hints() -> None:
+    with pytest.raises(ValueError, match=r"here: expected one of k, mass, got masss, q; did you m"):
+        check_names("here", ["masss", "q", "k"], ["k", "mass"])
+    with pytest.raises(ValueError, match=r"expected one of no parameters, got q; check the spell"):
+        check_names("here", ["q"], [])
+    check_names("here", [], [])
+
+
+@pytest.mark.parametrize(
+    ("groups", "taken", "expected"),
+    [
+        ([["a"], ["b"]], [], [["a"], ["b"]]),
+        ([["a"], ["a"]], [], [["a_1"], ["a_2"]]),
+        ([["a"], ["b"]], ["b"], [["a"], ["b_2"]]),
+        ([["a_2"], ["a"], ["a"]], [], [["a_2"], ["a_2_2"], ["a_3"]]),
+        ([["a", "a_1"], ["a"]], [], [["a_1_1", "a_1"], ["a_2"]]),
+        ([[], ["a"]], ["a"], [[], ["a_2"]]),
+    ],
+)
+def test_distinct_names(
+    groups: list[list[str]], taken: list[str], expected: list[list[str]]
+) -> None:
+    assert distinct(groups, taken) == expected
+
+
+def test_variable_makes_its_symbol_once() -> None:
+    v = Variable("v", "m/s")
+    assert v.symbol.name() == "v"
+    assert v.symbol is v.symbol
+    given = ca.SX.sym("w")
+    assert Variable("v", "m/s", symbol=given).symbol is given
+
+
+@dataclass(frozen=True, eq=False)
+class Window(Parametric):
+    strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = (("low", "high"),)
+
+    low: Scalar = param(0.0, unit="m", doc="lower edge")
+    high: Scalar = param(1.0, unit="m", doc="upper edge")
+    form: str = option("smooth", choices=("smooth", "original"), doc="edges")
+
+
+@pytest.mark.parametrize("low", [1.0, 2.0])
+def test_strict_order_refuses_equal_values_too(low: float) -> None:
+    with pytest.raises(ValueError, match=rf"low < high, got low = {low:g} and high = 1"):
+        Window(low=low)
+
+
+def test_strict_order_is_left_open_for_symbols() -> None:
+    assert Window(low=ca.SX.sym("low")).high == 1.0
+
+
+def test_option_is_one_of_its_choices() -> None:
+    assert options(Window(form="original"))["form"].value == "original"
+    with pytest.raises(ValueError, match=r"form: expected one of smooth, original, got 'sharp'"):
+        Window(form="sharp")
+
+
+def test_option_is_no_parameter_and_stays_when_values_change() -> None:
+    window = Window(form="original")
+    assert list(parameters(window)) == ["low", "high"]
+    assert with_values(window, {"high": 3.0}).form == "original"

@@ -1,0 +1,125 @@
+"""Start values and first steps, as a simulation shows them."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from closed_forms import assemble, smooth_dae
+
+from symfric import LuGre, Model, Variable, rabinowicz, simulate
+from symfric.integrator.compiled.columns import Columns
+from symfric.integrator.equations.initial import consistent, consistent_many
+
+x = Variable("x", "m", start=1.0)
+
+
+def root(start: float, rhs: ca.SX) -> Model:
+    """0 = z^2 - rhs, with two solutions or none."""
+    z = Variable("z", "1", start=start)
+    return Model("root", x=(x,), z=(z,), ode=-x.symbol, alg=z.symbol**2 - rhs)
+
+
+@pytest.mark.parametrize(("guess", "solution"), [(0.5, 2.0), (10.0, 2.0), (-0.1, -2.0)])
+def test_start_value_of_an_algebraic_variable_chooses_the_branch(
+    guess: float, solution: float
+) -> None:
+    run = simulate(root(guess, 4 * x.symbol), 1.0, rtol=1e-8)
+    assert run["z"][0] == pytest.approx(solution, rel=1e-12)
+    assert run["z"] == pytest.approx(solution * np.exp(-run.t / 2), rel=1e-6)
+
+
+def test_inconsistent_start_is_refused_naming_the_variable() -> None:
+    with pytest.raises(
+        ValueError, match=r"model 'root': expected consistent start .* equations for z near"
+    ):
+        simulate(root(1.0, -1 - 0 * x.symbol), 1.0)
+
+
+def test_undetermined_algebraic_variable_is_refused_naming_it() -> None:
+    """The second equation does not hold it at all."""
+    z = Variable("z", "1")
+    model = Model("loose", x=(x,), z=(z,), ode=-z.symbol, alg=x.symbol - 1)
+    with pytest.raises(ValueError, match="algebraic"):
+        simulate(model, 1.0)
+
+
+def test_several_algebraic_variables_are_solved_together() -> None:
+    y, z = Variable("y", "1", start=1.0), Variable("z", "1", start=0.5)
+    equations = ca.vertcat(y.symbol**2 + z.symbol**2 - 4 * x.symbol, y.symbol - z.symbol)
+    model = Model("circle", x=(x,), z=(y, z), ode=-x.symbol, alg=equations)
+    found = consistent(assemble(model), "here", np.array([1.0, 1.0, 0.5]), np.zeros(0))
+    assert found == pytest.approx([1.0, np.sqrt(2), np.sqrt(2)], rel=1e-12)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("weight", [1e-12, 1.0, 1e12])
+def test_neither_units_of_unknowns_nor_of_equations_matter(scale: float, weight: float) -> None:
+    z = Variable("z", "1", start=3 * scale)
+    s = z.symbol / scale
+    model = Model("scaled", x=(x,), z=(z,), ode=-x.symbol, alg=weight * (s**3 + s - 10 * x.symbol))
+    found = consistent(assemble(model), "here", np.array([1.0, 30 * scale]), np.zeros(0))
+    assert found[1] == pytest.approx(2 * scale, rel=1e-14)
+
+
+@pytest.mark.parametrize("guess", [0.0, 0.5, -3.0])
+def test_solution_at_zero_is_found(guess: float) -> None:
+    z = Variable("z", "1")
+    model = Model("zero", x=(x,), z=(z,), ode=-x.symbol, alg=z.symbol + z.symbol**3)
+    found = consistent(assemble(model), "here", np.array([1.0, guess]), np.zeros(0))
+    assert found[1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_guess_is_not_changed() -> None:
+    before = np.array([1.0, 1.0, 0.3])
+    found = consistent(assemble(smooth_dae().model), "here", before, np.zeros(0))
+    assert before.tolist() == [1.0, 1.0, 0.3]
+    assert found == pytest.approx([1.0, 1.0, 1.0])
+
+
+def test_many_start_as_each_one_alone() -> None:
+    """Both branches, guesses that need damping, guesses without a solution."""
+    system = assemble(root(1.0, 4 * x.symbol))
+    starts, guesses = [1.0, 2.0, -1.0, 0.5, 1.0], [0.5, -1e-3, 1.0, 1e6, 0.0]
+    y, none = np.column_stack([starts, guesses]), np.zeros((5, 0))
+    before = y.copy()
+    found, failed = consistent_many(system, Columns(system.constraints), "here", y, none)
+    np.testing.assert_array_equal(y, before)
+    for m in range(5):
+        if m in failed:
+            with pytest.raises(ValueError, match=r"^here: expected consistent start values") as e:
+                consistent(system, "here", y[m], none[m])
+            assert failed[m] == str(e.value)
+        else:
+            alone = consistent(system, "here", y[m], none[m])
+            assert found[m] == pytest.approx(alone, rel=1e-12)
+    assert sorted(failed) == [2, 4]
+
+
+def test_bristle_starts_in_steady_sliding() -> None:
+    """At -0.1 m/s far above the Stribeck velocity: z = -mu_d N / sigma_0."""
+    run = simulate(rabinowicz(LuGre()), 1e-3)
+    assert run["z"][0] == pytest.approx(-0.1 * 0.8 * 9.81 / 1e5, rel=1e-9)
+    assert run["z"] == pytest.approx(run["z"][0], rel=1e-6)
+
+
+@pytest.mark.parametrize("rate", [1e-3, 1.0, 1e3, 1e6, 1e9])
+def test_first_steps_resolve_transients_of_any_speed(rate: float) -> None:
+    """A second passes; the fast part lasts 1 / rate."""
+    model = Model("fast", x=(x,), ode=-rate * (x.symbol - 0.25))
+    run = simulate(model, 1.0, rtol=1e-8, t_eval=np.append(0.0, np.logspace(-12, 0, 60)))
+    assert run["x"] == pytest.approx(0.25 + 0.75 * np.exp(-rate * run.t), abs=2e-8)
+
+
+@pytest.mark.parametrize("span", [1e-9, 1.0, 1e9])
+def test_span_of_any_length_is_started_and_ended(span: float) -> None:
+    model = Model("slow", x=(x,), ode=-x.symbol / span)
+    run = simulate(model, span, rtol=1e-8)
+    assert run.final["x"] == pytest.approx(np.exp(-1), rel=1e-7)
+    assert run.statistics.steps < 60
+
+
+def test_start_at_rest_in_all_derivatives_is_left() -> None:
+    """x' = 5 t^4 from zero: nothing moves at first."""
+    t, start = ca.SX.sym("t"), Variable("x", "m")
+    model = Model("late", x=(start,), ode=5 * t**4 + 0 * start.symbol, t=t)
+    run = simulate(model, 2.0, rtol=1e-8)
+    assert run["x"] == pytest.approx(run.t**5, abs=1e-6)

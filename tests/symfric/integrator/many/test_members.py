@@ -1,0 +1,119 @@
+"""The loop over members: compiled and in the virtual machine, where they stop and go on."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from differentiable import oscillator
+
+from symfric import Hold, Model, Output, Variable
+from symfric.integrator.equations.inputs import Drivers, drivers
+from symfric.integrator.many.members import (
+    CompiledMembers,
+    Members,
+    Stretch,
+    VmMembers,
+    many_source,
+)
+from symfric.integrator.methods.tableaux import RODAS5P
+from symfric.integrator.running.engine import Stop
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.step.attempt import GROWTH_MEMORY, MEMORY
+
+
+def compiled(integrator: Integrator) -> Members:
+    source = many_source(integrator.step, integrator.signals)
+    return CompiledMembers.of(source, integrator.signals.numel_out(0))
+
+
+def vm(integrator: Integrator) -> Members:
+    return VmMembers.of(integrator.step.serialize(), integrator.signals.serialize())
+
+
+each_loop = pytest.mark.parametrize("make", [vm, compiled])
+Make = Callable[[Integrator], Members]
+
+
+def columns(inputs: Drivers, model: Model, starts: list[list[float]]) -> tuple:
+    memory = [inputs.breaks[0], 1e-8, 1e-8, GROWTH_MEMORY, 0.0]
+    S = np.array([[*memory, *start] for start in starts])
+    atol = 1e-7 * model.nominal("x")
+    R = np.concatenate([[0.0, 1e-6], atol, model.values("p"), inputs.values[:, 0]])
+    return S, np.tile(R, (len(starts), 1)), np.zeros(len(starts), dtype=np.int64)
+
+
+def stretch(inputs: Drivers, times: list[float], max_steps: int = 10_000) -> Stretch:
+    return Stretch(inputs.breaks, inputs.values, np.array(times), max_steps, 1e-15)
+
+
+@each_loop
+def test_held_input_belongs_to_the_interval_that_it_begins(make: Make) -> None:
+    model = oscillator()
+    inputs = drivers(model, {"u": Hold([0.0, 0.3, 0.6], [1.0, -2.0, 3.0])}, 0.0, 1.0)
+    S, R, made = columns(inputs, model, [[1.0, 0.0], [0.0, 0.0]])
+    before = R.copy()
+    found, reason = make(Integrator(model, inputs, RODAS5P)).run(
+        S, R, made, stretch(inputs, [0.0, 0.1, 0.3, 0.5, 0.6, 1.0])
+    )
+    assert found[:, :, 2].tolist() == [[1.0, 1.0, -2.0, -2.0, 3.0, 3.0]] * 2
+    assert found[0, 0].tolist() == [1.0, 0.0, 1.0, 2.0]
+    assert reason.tolist() == [Stop.END] * 2
+    np.testing.assert_array_equal(S[:, 0], 1.0)
+    np.testing.assert_array_equal(S[:, MEMORY:], found[:, -1, :2])
+    np.testing.assert_array_equal(R, before)
+    assert (made > 0).all()
+
+
+@each_loop
+def test_attempts_made_before_count(make: Make) -> None:
+    model = oscillator()
+    inputs = drivers(model, None, 0.0, 100.0)
+    members = make(Integrator(model, inputs, RODAS5P))
+    S, R, made = columns(inputs, model, [[1.0, 0.0], [1.0, 0.0]])
+    made[1] = 64
+    found, reason = members.run(S, R, made, stretch(inputs, [0.0, 100.0], max_steps=96))
+    assert reason.tolist() == [Stop.ATTEMPTS] * 2
+    assert made.tolist() == [96, 96]
+    assert S[1, 0] < S[0, 0] < 100.0
+    assert np.isfinite(found[:, 0]).all()
+    assert np.isnan(found[:, 1]).all()
+
+
+@each_loop
+def test_two_stretches_are_one(make: Make) -> None:
+    model = oscillator()
+    inputs = drivers(model, None, 0.0, 2.0)
+    members, times = make(Integrator(model, inputs, RODAS5P)), [0.5, 1.5, 2.0]
+    S, R, made = columns(inputs, model, [[1.0, 0.0]])
+    whole, _ = members.run(S.copy(), R, made.copy(), stretch(inputs, times))
+    parts = []
+    for a, b, at in ((0.0, 1.0, [0.5]), (1.0, 2.0, [1.5, 2.0])):
+        part = Stretch(np.array([a, b]), inputs.values, np.array(at), 10_000, 1e-15)
+        parts.append(members.run(S, R, made, part)[0])
+    assert np.concatenate(parts, axis=1) == pytest.approx(whole, rel=1e-5)
+
+
+@each_loop
+def test_member_that_cannot_start_has_its_start_alone(make: Make) -> None:
+    x = Variable("x", "m", start=1.0)
+    model = Model("broken", x=(x,), ode=np.nan * x.symbol)
+    inputs = drivers(model, None, 0.0, 1.0)
+    S, R, made = columns(inputs, model, [[1.0]])
+    found, reason = make(Integrator(model, inputs, RODAS5P)).run(
+        S, R, made, stretch(inputs, [0.0, 0.5])
+    )
+    assert found[0, 0, 0] == 1.0
+    assert np.isnan(found[0, 1, 0])
+    assert reason.tolist() == [Stop.STEP_TOO_SMALL]
+    assert S[0, 0] == 0.0
+
+
+@each_loop
+def test_signals_with_structural_zeros_are_filled_in(make: Make) -> None:
+    x = Variable("x", "m", start=1.0)
+    outputs = {"none": Output(0.0, "1"), "twice": Output(2 * x.symbol, "m")}
+    model = Model("sparse", x=(x,), ode=-x.symbol, outputs=outputs)
+    inputs = drivers(model, None, 0.0, 1.0)
+    S, R, made = columns(inputs, model, [[1.0]])
+    found, _ = make(Integrator(model, inputs, RODAS5P)).run(S, R, made, stretch(inputs, [1.0]))
+    assert found[0, 0] == pytest.approx([np.exp(-1.0), 0.0, 2 * np.exp(-1.0)], rel=1e-5)

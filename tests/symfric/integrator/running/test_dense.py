@@ -1,0 +1,111 @@
+"""Dense output: pieces between steps, cut at events, joined."""
+
+import numpy as np
+import pytest
+from hybrid import ball
+from numpy.typing import NDArray
+
+from symfric import LuGre, rabinowicz, simulate
+from symfric.integrator.running.dense import Dense, from_records, hermite, join
+from symfric.integrator.running.engine import width
+from symfric.integrator.running.events import Crossing
+
+Array = NDArray[np.float64]
+RNG = np.random.default_rng(7)
+
+
+def pieces(rows: int, count: int = 3, n: int = 2) -> Dense:
+    """A continuous chain with random coefficients on [0, count] s."""
+    t, y = np.arange(count + 1.0), RNG.normal(size=(count + 1, n))
+    return Dense(t[:-1], t[1:], y[:-1], y[1:], RNG.normal(size=(count, rows, n)))
+
+
+def cubic(t: Array) -> Array:
+    return np.stack([1 + t - 2 * t**2 + t**3, 4 - t**3])
+
+
+def cubic_slope(t: Array) -> Array:
+    return np.stack([1 - 4 * t + 3 * t**2, -3 * t**2])
+
+
+def test_hermite_interpolation_reproduces_cubics() -> None:
+    t = np.array([0.0, 0.3, 1.0, 1.1, 2.5])
+    fine = np.linspace(0, 2.5, 77)
+    assert hermite(t, cubic(t), cubic_slope(t))(fine) == pytest.approx(cubic(fine), abs=1e-13)
+
+
+@pytest.mark.parametrize("rows", [0, 1, 2, 3])
+def test_ends_of_the_pieces_are_the_accepted_values(rows: int) -> None:
+    dense = pieces(rows)
+    every = np.arange(3)
+    np.testing.assert_array_equal(dense.piece(every, np.zeros(3)), dense.y0)
+    np.testing.assert_array_equal(dense.piece(every, np.ones(3)), dense.y1)
+    assert (
+        pytest.approx(np.vstack([dense.y0, dense.y1[-1:]]), abs=1e-14)
+        == dense(np.array([0.0, 1.0, 2.0, 3.0])).T
+    )
+
+
+@pytest.mark.parametrize(("rows", "degree"), [(0, 1), (1, 2), (2, 3), (3, 4)])
+def test_piece_is_a_polynomial_one_degree_above_its_rows(rows: int, degree: int) -> None:
+    s = np.linspace(0, 1, 9)
+    values = pieces(rows).piece(np.zeros(9, int), s)
+    fitted = np.polynomial.polynomial.polyfit(s, values, degree)
+    assert pytest.approx(values, abs=1e-10) == np.polynomial.polynomial.polyval(s, fitted).T
+    if rows:
+        less = np.polynomial.polynomial.polyfit(s, values, degree - 1)
+        assert np.abs(np.polynomial.polynomial.polyval(s, less).T - values).max() > 1e-4
+
+
+@pytest.mark.parametrize("rows", [0, 1, 2, 3])
+@pytest.mark.parametrize("t", [1.001, 1.37, 1.999])
+def test_piece_cut_at_an_event_keeps_its_polynomial(rows: int, t: float) -> None:
+    whole = pieces(rows)
+    y = whole(np.array([t]))[:, 0]
+    cut = Crossing(t, 1, y, (0,)).before(whole)
+    assert (cut.t0.tolist(), cut.t1.tolist()) == ([0.0, 1.0], [1.0, t])
+    times = np.linspace(0, t, 101)
+    assert cut(times) == pytest.approx(whole(times), abs=1e-12)
+
+
+def test_cut_at_the_start_of_a_piece_leaves_no_empty_piece() -> None:
+    whole = pieces(3)
+    cut = Crossing(1.0, 1, whole.y0[1], (0,)).before(whole)
+    assert cut.t1.tolist() == [1.0]
+
+
+def test_value_at_a_jump_is_that_after_it() -> None:
+    first, second = pieces(1, 1, 1), pieces(1, 1, 1)
+    both = join([first, Dense(second.t0 + 1, second.t1 + 1, second.y0, second.y1, second.D)])
+    assert both(np.array([1.0]))[0, 0] == second.y0[0, 0]
+    assert both(np.array([np.nextafter(1.0, 0)]))[0, 0] == pytest.approx(first.y1[0, 0])
+    assert both(np.array([2.0]))[0, 0] == pytest.approx(second.y1[0, 0])
+
+
+@pytest.mark.parametrize("count", [0, 1, 4])
+@pytest.mark.parametrize("rows", [0, 2, 3])
+def test_records_are_taken_apart(count: int, rows: int) -> None:
+    records = RNG.normal(size=(count, width(3, rows)))
+    dense = from_records(records, 3)
+    assert dense.D.shape == (count, rows, 3)
+    again = np.hstack(
+        [dense.t0[:, None], dense.t1[:, None], dense.y0, dense.y1, dense.D.reshape(count, rows * 3)]
+    )
+    np.testing.assert_array_equal(again, records)
+
+
+@pytest.mark.parametrize("method", ["rodas5p", "rodas4p", "rodas3"])
+def test_dense_output_is_as_accurate_as_the_steps(method: str) -> None:
+    model = rabinowicz(LuGre())
+    run = simulate(model, 8.0, method=method, rtol=1e-6)
+    reference = simulate(model, 8.0, rtol=1e-11)
+    at_steps = np.abs(run.at(run.steps)["x"] - reference.at(run.steps)["x"]).max()
+    between = np.abs(run["x"] - reference["x"]).max()
+    assert between < 3 * at_steps + 1e-6
+
+
+def test_dense_output_of_a_parabola_is_exact_across_impacts() -> None:
+    run = simulate(ball(0.5), 0.9, rtol=1e-10)
+    hit = run.happened[0][0]
+    early = run.t[run.t < hit]
+    assert run["x"][: early.size] == pytest.approx(1 - 9.81 / 2 * early**2, abs=1e-9)

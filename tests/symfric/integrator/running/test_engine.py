@@ -1,0 +1,179 @@
+"""Virtual machine and compiled loop: the same steps, the same reasons to stop."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import casadi as ca
+import numpy as np
+import pytest
+from closed_forms import assemble, smooth_dae, smooth_ode, timed_ode
+from numpy.typing import NDArray
+
+from symfric import BrownMcPhee, LuGre, Model, Variable, rabinowicz
+from symfric.integrator.compiled.compiler import find_compiler
+from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
+from symfric.integrator.running.engine import (
+    CompiledEngine,
+    Engine,
+    Stop,
+    VmEngine,
+    c_source,
+    width,
+)
+from symfric.integrator.step.attempt import MEMORY, build_step
+
+Array = NDArray[np.float64]
+ROWS = RODAS5P.H.shape[0]
+
+KINDS = ("vm", "compiled")
+needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
+each_engine = pytest.mark.parametrize(
+    "kind", ["vm", pytest.param("compiled", marks=needs_compiler)]
+)
+
+
+def engine(kind: str, model: Model, method: str = "rodas5p") -> Engine:
+    step, rows = build_step(assemble(model), ADAPTIVE[method]), ADAPTIVE[method].H.shape[0]
+    return CompiledEngine.of(step, rows) if kind == "compiled" else VmEngine.of(step)
+
+
+def start(y: tuple[float, ...], h: float = 1e-6) -> Array:
+    return np.array([0.0, h, h, 1.0, 0.0, *y])
+
+
+def data(n: int, t_end: float, rtol: float = 1e-8) -> Array:
+    return np.array([t_end, rtol, *np.full(n, 0.1 * rtol)])
+
+
+BELT = rabinowicz(BrownMcPhee())
+BRISTLE = rabinowicz(LuGre())
+CASES = {
+    "brown_mcphee": (BELT, (0.0, 0.0)),
+    "lugre": (BRISTLE, (0.0, 0.0, -1e-5)),
+    "dae": (smooth_dae().model, (1.0, 1.0, 1.0)),
+    "timed": (timed_ode().model, (1.0, 0.0)),
+}
+
+
+def trace(runner: Engine, case: str) -> tuple[Array, Array]:
+    """Records and last values of 2 s."""
+    model, y = CASES[case]
+    before = start(y)
+    records, made, stop = runner.run(before, data(len(model.x), 2.0, 1e-6), 9999, 9999, 0.0)
+    assert stop is Stop.END
+    assert made >= records.shape[0]
+    return records, before[MEMORY:]
+
+
+def agree(one: tuple[Array, Array], other: tuple[Array, Array]) -> None:
+    """Step by step at first; where a contact turns over, rounding decides on later step sizes."""
+    first, second = one[0][:20], other[0][:20]
+    scale = np.maximum(np.abs(first).max(axis=0), 1e-6)
+    assert np.abs((second - first) / scale).max() < 1e-6
+    assert other[0].shape[0] == pytest.approx(one[0].shape[0], rel=0.05)
+    assert other[1] == pytest.approx(one[1], rel=1e-5, abs=1e-7)
+
+
+@needs_compiler
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("method", ADAPTIVE)
+def test_both_engines_take_the_same_steps(method: str, case: str) -> None:
+    if case == "dae" and not ADAPTIVE[method].dae:
+        pytest.skip("an explicit method")
+    vm, compiled = (trace(engine(kind, CASES[case][0], method), case) for kind in KINDS)
+    assert vm[0].shape[1] == width(vm[1].size, ADAPTIVE[method].H.shape[0])
+    agree(vm, compiled)
+
+
+@each_engine
+def test_records_are_a_chain_from_start_to_end(kind: str) -> None:
+    S = start((1.0, 1.0))
+    records, _, _ = engine(kind, smooth_ode().model).run(S, data(2, 1.0), 9999, 9999, 0.0)
+    t0, t1, y0, y1 = records[:, 0], records[:, 1], records[:, 2:4], records[:, 4:6]
+    assert (t0[0], t1[-1], S[0]) == (0.0, 1.0, 1.0)
+    assert (t1[:-1] == t0[1:]).all()
+    assert (y1[:-1] == y0[1:]).all()
+    assert y0[0].tolist() == [1.0, 1.0]
+    assert y1[-1].tolist() == S[MEMORY:].tolist()
+    assert y1 == pytest.approx(np.array([smooth_ode().exact(t) for t in t1]), rel=1e-6)
+
+
+@each_engine
+def test_full_record_is_continued_without_a_trace(kind: str) -> None:
+    runner = engine(kind, BELT)
+    whole, made, _ = runner.run(start((0.0, 0.0)), data(2, 3.0), 9999, 99999, 0.0)
+    S, parts, attempts, stops = start((0.0, 0.0)), [], 0, []
+    while not stops or stops[-1] is not Stop.END:
+        records, count, stop = runner.run(S, data(2, 3.0), 20, 99999, 0.0)
+        parts.append(records)
+        attempts += count
+        stops.append(stop)
+    assert stops[:-1] == [Stop.FULL] * (len(stops) - 1)
+    assert len(stops) > 2
+    assert attempts == made
+    np.testing.assert_array_equal(np.vstack(parts), whole)
+
+
+@each_engine
+def test_attempts_are_limited(kind: str) -> None:
+    """The virtual machine makes them in batches."""
+    S = start((0.0, 0.0))
+    _, made, stop = engine(kind, BELT).run(S, data(2, 100.0), 9999, 40, 0.0)
+    assert stop is Stop.ATTEMPTS
+    assert 40 <= made <= 64
+    assert 0 < S[0] < 100
+
+
+@each_engine
+def test_tiny_step_stops_the_engine(kind: str) -> None:
+    """x' = 1 cannot go past the end of the domain of the root."""
+    x, y = Variable("x", "1"), Variable("y", "1")
+    edge = Model("edge", x=(x, y), ode=ca.vertcat(1, ca.sqrt(1 - x.symbol)))
+    S = start((0.0, 0.0))
+    records, _, stop = engine(kind, edge).run(S, data(2, 2.0), 9999, 9999, 1e-12)
+    assert stop is Stop.STEP_TOO_SMALL
+    assert S[0] == records[-1, 1] == pytest.approx(1.0, abs=1e-9)
+    assert np.isfinite(records).all()
+
+
+@each_engine
+def test_nothing_is_done_at_the_end(kind: str) -> None:
+    S = start((1.0, 1.0))
+    S[0] = 1.0
+    records, made, stop = engine(kind, smooth_ode().model).run(S, data(2, 1.0), 9, 9, 0.0)
+    assert (records.shape[0], made, stop) == (0, 0, Stop.END)
+    assert S[MEMORY:].tolist() == [1.0, 1.0]
+
+
+@each_engine
+def test_threads_get_what_one_after_the_other_gets(kind: str) -> None:
+    runner = engine(kind, BRISTLE)
+    velocities = np.linspace(-0.1, 0.1, 12)
+
+    def end(v: float) -> list[float]:
+        S = start((0.0, v, -1e-5))
+        runner.run(S, data(3, 5.0), 99999, 99999, 0.0)
+        return S.tolist()
+
+    serial = [end(v) for v in velocities]
+    with ThreadPoolExecutor(4) as pool:
+        parallel = list(pool.map(end, velocities))
+    assert parallel == serial
+
+
+def test_source_of_a_model_does_not_change_when_it_is_built_again() -> None:
+    """Its hash is the name in the cache."""
+    one, other = (
+        c_source(build_step(assemble(rabinowicz(LuGre())), RODAS5P), ROWS) for _ in range(2)
+    )
+    assert one == other
+
+
+@needs_compiler
+@pytest.mark.parametrize("case", CASES)
+def test_graph_of_blocks_compiles_to_the_same_steps(case: str) -> None:
+    system = assemble(CASES[case][0])
+    flat, blocks = (
+        trace(CompiledEngine.of(build_step(system, RODAS5P, kind), ROWS), case)
+        for kind in (ca.SX, ca.MX)
+    )
+    agree(flat, blocks)

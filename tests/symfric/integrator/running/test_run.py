@@ -1,0 +1,135 @@
+"""Running: intervals, progress, interrupts, statistics."""
+
+import numpy as np
+import pytest
+
+from symfric import BrownMcPhee, Hold, LuGre, Model, Status, Variable, drive, rabinowicz, simulate
+from symfric.integrator.compiled.compiler import find_compiler
+from symfric.integrator.running.integrator import Integrator
+
+x = Variable("x", "m", start=1.0)
+
+each_backend = pytest.mark.parametrize(
+    "backend",
+    [
+        "vm",
+        pytest.param(
+            "compiled", marks=pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
+        ),
+    ],
+)
+
+
+@each_backend
+def test_interrupt_keeps_what_was_reached(backend: str) -> None:
+    model = rabinowicz(LuGre())
+    whole = simulate(model, 2000.0, samples=20001)
+
+    def interrupt(fraction: float) -> None:
+        if fraction > 0.02:
+            raise KeyboardInterrupt
+
+    run = simulate(model, 2000.0, backend=backend, progress=interrupt, samples=20001)
+    assert run.status is Status.INTERRUPTED
+    assert not run.status.ok
+    assert 0.02 * 2000 < run.steps[-1] < 2000
+    assert f"reaches t = {run.steps[-1]:g} s" in run.message
+    assert run.t[-1] <= run.steps[-1]
+    early = run.t < 30
+    assert run["x"][early] == pytest.approx(whole["x"][: run.t.size][early], abs=1e-4)
+
+
+def test_interrupt_before_the_first_step_keeps_the_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Integrator, "choose", interrupt)
+    run = simulate(rabinowicz(BrownMcPhee()), 1.0)
+    assert run.status is Status.INTERRUPTED
+    assert (run.t.tolist(), run["x"].tolist()) == ([0.0], [0.0])
+
+
+@each_backend
+def test_progress_rises_to_the_end(backend: str) -> None:
+    seen: list[float] = []
+    simulate(rabinowicz(LuGre()), 500.0, backend=backend, progress=seen.append)
+    assert len(seen) > 3
+    assert seen == sorted(seen)
+    assert 0 < seen[0] < 1
+    assert seen[-1] == 1.0
+
+
+def test_progress_spans_all_intervals_of_an_input() -> None:
+    seen: list[float] = []
+    force = Hold([0.0, 1.0, 2.0, 3.0], [1.0, 2.0, 0.0, 3.0])
+    simulate(drive(BrownMcPhee()), 4.0, u={"force": force}, progress=seen.append)
+    assert seen == pytest.approx([0.25, 0.5, 0.75, 1.0])
+
+
+@each_backend
+@pytest.mark.parametrize("law", [BrownMcPhee(), LuGre()], ids=["brown_mcphee", "lugre"])
+def test_statistics_add_up(law: BrownMcPhee | LuGre, backend: str) -> None:
+    run = simulate(rabinowicz(law), 20.0, backend=backend)
+    s = run.statistics
+    attempts = s.steps + s.rejections
+    assert s.steps == run.steps.size - 1
+    assert 0 < s.rejections < s.steps
+    assert s.evaluations == 8 * attempts
+    assert s.jacobians == s.factorisations == attempts
+    assert s.smallest_step == pytest.approx(np.diff(run.steps).min(), rel=1e-9)
+    assert s.events == 0
+    assert (s.backend, s.method) == (backend, "Rodas5P")
+    assert s.error != s.error
+
+
+def test_evaluations_count_the_stages_of_the_method() -> None:
+    s = simulate(rabinowicz(BrownMcPhee()), 5.0, method="rodas4p").statistics
+    assert s.evaluations == 6 * (s.steps + s.rejections)
+
+
+def test_easy_problem_is_never_rejected() -> None:
+    s = simulate(Model("decay", x=(x,), ode=-x.symbol), 1.0).statistics
+    assert s.rejections == 0
+
+
+def test_build_time_is_counted_once() -> None:
+    model = rabinowicz(BrownMcPhee())
+    first, second = (simulate(model, 1.0).statistics for _ in range(2))
+    assert first.build_time > 0
+    assert second.build_time == 0
+
+
+def test_steps_end_at_the_ends_of_input_intervals() -> None:
+    ends = [0.3, 0.31, 1.1, 1.7]
+    force = Hold([0.0, *ends], [1.0, -3.0, 2.0, 0.5, 4.0])
+    run = simulate(drive(BrownMcPhee()), 2.0, u={"force": force})
+    assert set(ends) <= set(run.steps.tolist())
+    assert (np.diff(run.steps) > 0).all()
+    assert (run.steps[0], run.steps[-1]) == (0.0, 2.0)
+
+
+def test_algebraic_variables_follow_a_jump_of_an_input() -> None:
+    """z + z^3 = u and x' = z: u jumps from 0 to 10, z from 0 to 2."""
+    start, z, u = Variable("x", "m"), Variable("z", "1"), Variable("u", "N")
+    alg = z.symbol + z.symbol**3 - u.symbol
+    model = Model("dae", x=(start,), z=(z,), u=(u,), ode=z.symbol, alg=alg)
+    run = simulate(model, 2.0, u={"u": Hold([0.0, 1.0], [0.0, 10.0])}, t_eval=[0.9, 1.0, 1.5, 2.0])
+    assert run["z"] == pytest.approx([0, 2, 2, 2], abs=1e-9)
+    assert run["x"] == pytest.approx([0, 0, 1, 2], abs=1e-9)
+
+
+def test_jump_of_an_input_to_where_no_solution_is_fails_with_what_was_reached() -> None:
+    z, u = Variable("z", "1", start=1.0), Variable("u", "N")
+    model = Model("dae", x=(x,), z=(z,), u=(u,), ode=-z.symbol, alg=z.symbol**2 - u.symbol)
+    run = simulate(model, 2.0, u={"u": Hold([0.0, 1.0], [1.0, -1.0])}, throw=False)
+    assert run.status is Status.SINGULAR
+    assert "at t = 1 s" in run.message
+    assert run.steps[-1] == 1.0
+
+
+def test_measured_error_is_that_of_the_run() -> None:
+    """x = exp(-t) at rtol 1e-5, compared with the closed form."""
+    run = simulate(Model("decay", x=(x,), ode=-x.symbol), 3.0, rtol=1e-5, measure_error=True)
+    true = np.abs(run["x"] - np.exp(-run.t)).max()
+    assert run.statistics.error == pytest.approx(true, rel=0.05)
+    assert run.statistics.error < 1e-4

@@ -1,0 +1,393 @@
+"""Slip in a plane and in space: every isotropic law as vectors, refusals by reason."""
+
+from functools import cache
+from math import cos, pi, sin
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from law_cases import CASES, EXAMPLE_INPUTS
+
+from symfric import ALL_LAWS, Coulomb, Dahl, Law, LoadDependent, LuGre, Sum, Viscous, parameters
+from symfric.foundation.parameters import with_values
+from symfric.laws import (
+    GMS,
+    Ambrosio,
+    Asymmetric,
+    BoucWen,
+    BrownMcPhee,
+    Capstan,
+    ElastoPlastic,
+    ExactCoulomb,
+    Karnopp,
+    Lagged,
+    Leuven,
+    MaxwellSlip,
+    Slider,
+    StaticLaw,
+)
+from symfric.laws.composed.planar import Isotropic, Planar, Spatial, anisotropy, is_isotropic
+
+N = 7.848
+SUMS: dict[str, Law] = {
+    "lugre+ambrosio": Sum((LuGre(), Ambrosio())),
+    "lagged(ambrosio)": Lagged(Ambrosio()),
+    "dahl+gms+viscous": Sum((Dahl(n=1.5), GMS(), Viscous())),
+}
+LAWS = {name: law for name, law in (CASES | SUMS).items() if is_isotropic(law)}
+DYNAMIC = [name for name, law in LAWS.items() if law.states]
+each = pytest.mark.parametrize("name", LAWS)
+each_dynamic = pytest.mark.parametrize("name", DYNAMIC)
+pair = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)).map(np.array)
+triple = st.tuples(*3 * [st.floats(-1.0, 1.0)]).map(np.array)
+logs = st.floats(-6.0, 0.0).map(lambda e: 10.0**e)
+
+
+def turn(angle: float) -> np.ndarray:
+    return np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
+
+
+def directed(law: Law) -> list[bool]:
+    return [not state.even for state in law.states]
+
+
+def bent(law: Isotropic, *directions: np.ndarray) -> np.ndarray:
+    """States of a size that sliding gives, the k-th vector along the k-th direction, cyclic."""
+    odd, typical = directed(law.law), np.asarray(law.law.steady_state(1.0, N)).ravel()
+    sizes = typical[odd]
+    vectors = np.array([s * directions[k % len(directions)] for k, s in enumerate(sizes)])
+    return np.concatenate([vectors.T.ravel(), 0.7 * typical[[not x for x in odd]]])
+
+
+def given_inputs(law: Law, direction: np.ndarray) -> dict[str, np.ndarray]:
+    return {i.name: EXAMPLE_INPUTS[i.name] * direction for i in law.inputs}
+
+
+def turned(law: Isotropic, R: np.ndarray, z: np.ndarray) -> np.ndarray:
+    n = sum(directed(law.law))
+    vectors = z[: n * len(R)].reshape(len(R), n)
+    return np.concatenate([(R @ vectors).ravel(), z[n * len(R) :]])
+
+
+@each
+@given(v=pair, scale=logs, a=pair, b=pair, angle=st.floats(0.0, 2 * pi))
+def test_turned_slip_turns_force_and_rate(
+    name: str, v: np.ndarray, scale: float, a: np.ndarray, b: np.ndarray, angle: float
+) -> None:
+    law, v, R = Planar(LAWS[name]), scale * v, turn(angle)
+    z = bent(law, a, b)
+    w, w_turned = given_inputs(law.law, b), given_inputs(law.law, R @ b)
+    F, rate = law.force(v, N, z, **w), law.rate(v, N, z, **w)
+    size = np.abs(F).max() + N
+    assert law.force(R @ v, N, turned(law, R, z), **w_turned) == pytest.approx(
+        R @ F, abs=1e-9 * size
+    )
+    found = law.rate(R @ v, N, turned(law, R, z), **w_turned)
+    expected = turned(law, R, np.asarray(rate).ravel())
+    assert found == pytest.approx(expected, abs=1e-9 * (np.abs(expected).max(initial=0.0) + scale))
+
+
+STEP, COUNT = 1e-5, 2000
+
+
+@cache
+def steps_of(name: str, axes: int) -> ca.Function:
+    """COUNT Runge-Kutta steps (z, [v at 0, h/2, h]) -> (z, F), of the law itself for axes = 0."""
+    one = LAWS[name]
+    law = {0: one, 2: Planar(one), 3: Spatial(one)}[axes]
+    z, v = ca.SX.sym("z", len(law.states)), ca.SX.sym("v", max(axes, 1), 3)
+    at = [v[:, k] for k in range(3)]
+    k_1 = law.rate(at[0], N, z)
+    k_2 = law.rate(at[1], N, z + STEP / 2 * k_1)
+    k_3 = law.rate(at[1], N, z + STEP / 2 * k_2)
+    k_4 = law.rate(at[2], N, z + STEP * k_3)
+    new = z + STEP / 6 * (k_1 + 2 * k_2 + 2 * k_3 + k_4)
+    F = law.force(at[2], N, new)
+    step = ca.Function("step", [z, ca.vec(v)], [new, F, ca.dot(F, at[2]) * STEP])
+    return step.mapaccum(COUNT)
+
+
+def along_path(name: str, axes: int, z: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, ...]:
+    """States, forces and works; v has shape (axes, 2 COUNT + 1)."""
+    triples = np.concatenate([v[:, :-2:2], v[:, 1::2], v[:, 2::2]])
+    result = steps_of(name, axes)(z, triples)
+    return tuple(x.full() for x in result)
+
+
+def at_rest(law: Law) -> np.ndarray:
+    return np.zeros(len(law.states)) + [0.5 if s.even else 0.0 for s in law.states]
+
+
+TIMES = STEP / 2 * np.arange(2 * COUNT + 1)
+REVERSING = 5e-3 * np.sin(2 * pi * 100 * TIMES) + 2e-3 * np.sin(2 * pi * 330 * TIMES)
+
+
+@each_dynamic
+@pytest.mark.parametrize("direction", [(0.0, 1.0), (0.6, -0.8), (2 / 3, -1 / 3, 2 / 3)])
+def test_straight_slip_with_reversals_is_the_law_itself(
+    name: str, direction: tuple[float, ...]
+) -> None:
+    one, e = LAWS[name], np.array(direction)
+    law = Planar(one) if len(e) == 2 else Spatial(one)
+    v = REVERSING
+    z, F, _ = along_path(name, 0, at_rest(one), v[None, :])
+    states, forces, _ = along_path(name, len(e), at_rest(law), e[:, None] * v)
+    assert np.isfinite(F).all()
+    assert np.ptp(F) > 0.1
+    np.testing.assert_allclose(forces, e[:, None] * F, atol=1e-9 * np.abs(F).max())
+    odd = directed(one)
+    expected = [*(c * row for c in e for row in z[odd]), *z[[not x for x in odd]]]
+    sizes = np.abs(expected).max(axis=1, initial=1e-30)
+    np.testing.assert_allclose(states / sizes[:, None], expected / sizes[:, None], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", [n for n in LAWS if not LAWS[n].states])
+@given(v=st.floats(-1.0, 1.0), angle=st.floats(0.0, 2 * pi))
+def test_straight_slip_of_a_memoryless_law_is_the_law_itself(
+    name: str, v: float, angle: float
+) -> None:
+    one, e = LAWS[name], turn(angle)[0]
+    expected = e * one.force(v, N, **{n: x[0] for n, x in given_inputs(one, np.ones(1)).items()})
+    found = Planar(one, v_eps=1e-12).force(v * e, N, **given_inputs(one, e))
+    if abs(v) > 1e-6 or v == 0.0:
+        assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+CIRCLES = {"pre-sliding": 1e-6, "sliding": 4e-5}
+ANGLES = 2 * pi * 100 * TIMES
+
+
+@each_dynamic
+@pytest.mark.parametrize("radius", CIRCLES.values(), ids=CIRCLES.keys())
+def test_a_closed_circle_takes_energy(name: str, radius: float) -> None:
+    """The second of two turns at 100 Hz, of a size below and far above the break-away path."""
+    law = Planar(LAWS[name])
+    v = 2 * pi * 100 * radius * np.array([np.cos(ANGLES), np.sin(ANGLES)])
+    _, F, work = along_path(name, 2, at_rest(law), v)
+    assert np.isfinite(F).all()
+    second = work[0, COUNT // 2 :].sum()
+    assert second >= 0.0
+
+
+def limits(law: Law) -> np.ndarray:
+    """The largest size of each vector state in straight slip."""
+    if isinstance(law, Leuven):
+        return np.array([e.mu * N for e in law.elements])
+    found = [np.abs(np.asarray(law.steady_state(v, N)).ravel()) for v in np.logspace(-7, 0, 200)]
+    return np.max(found, axis=0)[directed(law)]
+
+
+@each_dynamic
+@given(seed=st.integers(0, 9))
+def test_states_never_leave_the_ball_of_their_limit_in_curved_slip(name: str, seed: int) -> None:
+    law, rng = Planar(LAWS[name]), np.random.default_rng(seed)
+    speed = 8e-3 * np.abs(np.sin(2 * pi * rng.uniform(20, 120) * TIMES))
+    waves = (rng.uniform(0, 3) * np.sin(2 * pi * f * TIMES + f) for f in (30.0, 110.0, 270.0))
+    angle = sum(waves, start=0.0)
+    z, _, _ = along_path(name, 2, at_rest(law), speed * np.array([np.cos(angle), np.sin(angle)]))
+    n = sum(directed(law.law))
+    sizes = np.hypot(z[:n], z[n : 2 * n]).max(axis=1)
+    assert (sizes <= limits(law.law) * (1 + 1e-6)).all()
+
+
+@each
+@pytest.mark.parametrize("share", [0.0, 1.0])
+@pytest.mark.parametrize("v", [(0.0, 0.0), (1e-300, 0.0), (-1e-12, 1e-12), (1e-9, 0.0), (0.0, 1e3)])
+def test_value_gradient_and_hessian_are_finite(
+    name: str, share: float, v: tuple[float, float]
+) -> None:
+    derivatives = second_derivatives(name)
+    law = Planar(LAWS[name])
+    z = bent(law, share * np.array([0.6, 0.8]))
+    results = derivatives(v, z, 0.1)
+    assert all(np.isfinite(result.full()).all() for result in results)
+
+
+@cache
+def second_derivatives(name: str) -> ca.Function:
+    law, v = Planar(LAWS[name]), ca.SX.sym("v", 2)
+    z, w = ca.SX.sym("z", len(law.states)), ca.SX.sym("w", 2)
+    inputs = {i.name: EXAMPLE_INPUTS[i.name] * w for i in law.inputs}
+    F, rate = law.force(v, N, z, **inputs), law.rate(v, N, z, **inputs)
+    x, y = ca.vertcat(v, z, w), ca.vertcat(F, rate)
+    hessians = [ca.hessian(y[i], x)[0] for i in range(y.numel())]
+    return ca.Function("f", [v, z, w], [y, ca.jacobian(y, x), *hessians])
+
+
+@each
+def test_no_slip_and_no_load_is_no_force(name: str) -> None:
+    law = Planar(LAWS[name])
+    z = at_rest(law)
+    assert np.abs(law.force((0.0, 0.0), N, z)).max() == 0.0
+
+
+@each
+def test_all_number_types_give_the_same(name: str) -> None:
+    law, v, e = Planar(LAWS[name]), np.array([3e-4, -2e-3]), np.array([0.6, 0.8])
+    z, w = bent(law, 0.7 * e, turn(1.0)[0]), given_inputs(LAWS[name], e)
+    n = z.size
+    F, rate = law.force(v, N, z, **w), law.rate(v, N, z, **w)
+    assert F.shape == (2,)
+    assert np.shape(rate) == (n,)
+    results = []
+    for kind in (ca.SX, ca.MX):
+        a, s = kind.sym("v", 2), kind.sym("z", n)
+        f = ca.Function("f", [a, s], [law.force(a, N, s, **w), law.rate(a, N, s, **w)])
+        results.append(f(v, z))
+    results.append((law.force(ca.DM(v), N, ca.DM(z), **w), law.rate(ca.DM(v), N, ca.DM(z), **w)))
+    many = np.tile(v[:, None], (1, 3)), np.tile(z[:, None], (1, 3))
+    results.append((law.force(many[0], N, many[1], **w)[:, 1],))
+    assert [r[0].shape[0] for r in results] == [2, 2, 2, 2]
+    for result in results:
+        for found, expected in zip(result, (F, rate), strict=False):
+            found = found if isinstance(found, np.ndarray) else found.full().ravel()
+            np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-14)
+
+
+@each
+@pytest.mark.parametrize("plane", [(0, 1), (1, 2), (2, 0)])
+def test_slip_in_a_plane_of_space_is_slip_in_the_plane(name: str, plane: tuple[int, int]) -> None:
+    flat, law = Planar(LAWS[name]), Spatial(LAWS[name])
+    P = np.eye(3)[:, list(plane)]
+    v, a, b = np.array([0.03, -0.04]), np.array([0.5, 0.2]), np.array([0.1, -0.6])
+    n = sum(directed(flat.law))
+    w, w_3 = given_inputs(flat.law, b), given_inputs(flat.law, P @ b)
+    F = law.force(P @ v, N, bent(law, P @ a, P @ b), **w_3)
+    assert pytest.approx(P @ flat.force(v, N, bent(flat, a, b), **w), rel=1e-10, abs=1e-12) == F
+    rate = np.asarray(law.rate(P @ v, N, bent(law, P @ a, P @ b), **w_3)).ravel()
+    expected = np.asarray(flat.rate(v, N, bent(flat, a, b), **w)).ravel()
+    vectors = P @ expected[: 2 * n].reshape(2, n)
+    whole = np.concatenate([vectors.ravel(), expected[2 * n :]])
+    assert rate == pytest.approx(whole, rel=1e-9, abs=1e-12)
+
+
+def test_sideways_slip_lowers_the_resistance_along() -> None:
+    """Coulomb's cone: while sliding fast across, a slow push along meets viscous friction only."""
+    law = Planar(Coulomb(mu_d=0.1, v_eps=1e-3))
+    F = law.force((0.01, 1.0), N)
+    assert F[1] == pytest.approx(0.1 * N, rel=1e-4)
+    assert F[0] == pytest.approx(0.1 * N * 0.01, rel=1e-3)
+
+
+@each_dynamic
+def test_sliding_points_against_the_motion_with_the_force_of_the_law(name: str) -> None:
+    one, e = LAWS[name], np.array([0.6, -0.8])
+    law = Planar(one)
+    expected = one.force(0.1, N, one.steady_state(0.1, N)) * e
+    assert law.force(0.1 * e, N, law.steady_state(0.1 * e, N)) == pytest.approx(expected, rel=1e-9)
+
+
+def test_states_are_vectors_by_axis_then_numbers() -> None:
+    names = [s.name for s in Planar(Sum((LuGre(), Dahl()))).states]
+    assert names == ["z_1_x", "z_2_x", "z_1_y", "z_2_y"]
+    assert Planar(BrownMcPhee()).states == ()
+    latched = [s.name for s in Spatial(GMS(elements=GMS().elements[:1])).states]
+    assert latched == ["F_1_x", "F_1_y", "F_1_z", "p_1"]
+
+
+def test_lugre_on_a_circle_lags_by_the_angle_of_its_linear_equation() -> None:
+    """dz/dt = v - lambda z with turning v: z = v/(lambda + i omega)."""
+    speed, omega = 4e-3, 2 * pi * 100
+    law = Planar(LuGre(mu_s=0.1, sigma_1=0.0))
+    pull = 1e5 * speed / (0.1 * N)
+    z = (speed / (pull + 1j * omega)) * np.exp(0.3j)
+    v = speed * np.array([cos(0.3), sin(0.3)])
+    rate = law.rate(v, N, np.array([z.real, z.imag]))
+    turning = 1j * omega * z
+    assert rate == pytest.approx([turning.real, turning.imag], rel=1e-12)
+
+
+@given(v=pair, z=pair)
+def test_bouc_wen_is_the_biaxial_element(v: np.ndarray, z: np.ndarray) -> None:
+    """Of Park, Wen, Ang with n = 2 and one product for both axes; loads along z only."""
+    law = Planar(BoucWen(n=2.0, A=1.2), turn=1e-9)
+    rate = law.rate(v, N, z) * 0.1 * N / 1e5
+    power = v @ z
+    if abs(power) < 1e-6:
+        return
+    assert rate == pytest.approx(1.2 * v - 0.5 * z * (abs(power) + power), abs=1e-6)
+
+
+def test_sharp_maxwell_slip_is_radial_return() -> None:
+    """Against steps of perfect plasticity: a spring returned to the disc after each."""
+    slider = Slider(k=1e5, mu=0.1)
+    law, limit = Planar(MaxwellSlip(elements=(slider,), n=300.0), turn=1e-4), 0.1 * N
+    t = np.linspace(0.0, 1.0, 40_001)
+    x = 3e-5 * np.array([np.sin(2 * pi * t), np.sin(6 * pi * t + 1.0) * np.cos(3 * t)])
+    v = np.diff(x) / np.diff(t)
+    exact, worst = np.zeros(2), 0.0
+    z, a = ca.SX.sym("z", 2), ca.SX.sym("v", 2)
+    dt = t[1] - t[0]
+    midpoint = z + dt * law.rate(a, N, z + dt / 2 * law.rate(a, N, z))
+    smooth = ca.Function("step", [z, a], [midpoint]).mapaccum(v.shape[1])
+    found = smooth(np.zeros(2), v).full()
+    for k in range(v.shape[1]):
+        exact = exact + 1e5 * v[:, k] * dt
+        exact *= min(1.0, limit / np.hypot(*exact))
+        worst = max(worst, np.hypot(*(found[:, k] - exact)))
+    assert worst < 0.02 * limit
+
+
+def test_elasto_plastic_returns_from_any_side_below_break_away() -> None:
+    law = Planar(ElastoPlastic(z_ba=5e-6))
+    v, z = np.array([2e-4, -1e-4]), np.array([2e-6, 3e-6])
+    assert law.rate(v, N, z) == pytest.approx(v, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("law", "reason"),
+    [
+        (Asymmetric(LuGre(), LuGre(mu_s=0.3)), "tells forward from backward"),
+        (LoadDependent(Asymmetric(Coulomb(), Coulomb(mu_d=0.3))), "tells forward"),
+        (Capstan(), "tells forward from backward"),
+        (GMS(form="event"), "modes change where v passes through zero"),
+        (ExactCoulomb(), "modes change where v passes through zero"),
+        (Karnopp(form="event"), "modes change where v passes through zero"),
+    ],
+    ids=lambda x: type(x).__name__ if isinstance(x, Law) else "",
+)
+def test_law_without_a_form_for_vectors_is_refused_by_reason(law: Law, reason: str) -> None:
+    with pytest.raises(ValueError, match=rf"Planar: .* got {type(law).__name__}; its?.*{reason}"):
+        Planar(law)
+
+
+class Crooked(StaticLaw):
+    """A law of a user who adds to v in the argument of a product."""
+
+    facts = LuGre.facts
+    velocity_scale = 1.0
+    states = LuGre().states
+
+    def force(self, v, N, z=()):
+        return z[0] * (1 + v) - z[0] * (1 - v)
+
+
+def test_expressions_without_vectors_are_refused_by_what_they_do() -> None:
+    assert anisotropy(Crooked()) == "it adds a number to what has a direction"
+    with pytest.raises(ValueError, match="Planar: expected a law such as"):
+        Planar(Viscous)  # type: ignore[arg-type]
+
+
+def test_every_law_without_sides_and_modes_has_a_vector_form() -> None:
+    missing = {name for name, kind in ALL_LAWS.items() if not is_isotropic(kind())}
+    assert missing == {"capstan", "quarter_car_general", "exact_coulomb"}
+
+
+STATIC_LEVEL = ["lugre", "dahl", "dahl, n 0.5", "dahl, n 2", "elasto_plastic", "bouc_wen"]
+STATIC_LEVEL += ["maxwell_slip", "gms", "haessig_friedland", "stick_slip", "gonthier", "bristle_2d"]
+
+
+@pytest.mark.parametrize("name", STATIC_LEVEL)
+@given(v=pair, scale=logs, z=pair, w=pair)
+def test_force_stays_within_the_static_level(
+    name: str, v: np.ndarray, scale: float, z: np.ndarray, w: np.ndarray
+) -> None:
+    """Without damping of the bristles and for all loads of the elements below their limits."""
+    damped = "sigma_1" in parameters(LAWS[name]) and name not in ("gonthier", "bristle_2d")
+    law = Planar(with_values(LAWS[name], {"sigma_1": 0.0}) if damped else LAWS[name])
+    below = [a / max(np.hypot(*a), 1.0) for a in (z, w)]
+    rounding = 1e-3 if name == "gonthier" else 1e-9
+    F = law.force(scale * v, N, bent(law, *below))
+    assert np.hypot(*F) <= 0.15 * N * (1 + rounding)

@@ -1,0 +1,105 @@
+"""The sketch of a mechanism: places where they are, and the right mark between them."""
+
+import numpy as np
+import pytest
+
+from symfric import BrownMcPhee, Viscous, simulate
+from symfric.model.sketch import Sketch
+from symfric.multibody import (
+    Distance,
+    JointFriction,
+    Mechanism,
+    Planar,
+    Prismatic,
+    Revolute,
+    SpringDamper,
+)
+from symfric.multibody.joints import ALL_JOINTS
+from symfric.results.strokes import ANCHORED, MARKERS, SLIDING
+from symfric.scenes import MECHANISMS, FourMass, Pendulum
+
+LAW = BrownMcPhee(v_t=0.05)
+
+
+def sketch(m: Mechanism) -> Sketch:
+    made = m.build().sketch
+    assert made is not None
+    return made()
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_every_body_and_joint_is_in_it(name: str) -> None:
+    mechanism = MECHANISMS[name](LAW).mechanism()
+    drawn = sketch(mechanism)
+    assert {part.name for part in drawn.parts} == {b.name for b in mechanism.bodies}
+    marks = [mark.name for mark in drawn.marks]
+    springs = [f.name for f in mechanism.forces if isinstance(f, SpringDamper)]
+    assert marks == [j.name for j in mechanism.joints] + springs
+    assert drawn.places.shape[0] == 12
+
+
+def test_places_follow_the_motion_and_the_parameters_of_the_run() -> None:
+    """The hinge stays, the bob is where angle and length say."""
+    model = Pendulum(LAW).model(["L"])
+    run = simulate(model, 1.0, p={"L": 0.7}, samples=5)
+    assert model.sketch is not None
+    drawn = model.sketch()
+    rod = next(part for part in drawn.parts if part.name == "rod")
+    bob = run.of(drawn.places[9:, rod.centre])
+    angle = run["phi"]
+    expected = np.stack([0.7 * np.sin(angle), 0 * angle, -0.7 * np.cos(angle)])
+    assert bob == pytest.approx(expected)
+    assert run.of(drawn.places[9:, drawn.marks[0].b]) == pytest.approx(np.zeros((3, 5)))
+    axes = run.of(drawn.places[:9, drawn.marks[0].b]).T.reshape(-1, 3, 3)
+    assert axes @ axes.transpose(0, 2, 1) == pytest.approx(np.tile(np.eye(3), (5, 1, 1)))
+
+
+def test_ends_of_springs_alone_are_told_from_frames() -> None:
+    far = sketch(FourMass(LAW).mechanism())
+    parts = {part.name: part for part in far.parts}
+    assert len(parts["slider_4"].ends) == 1
+    assert parts["slider_1"].ends == ()
+    assert parts["ground"].fixed and not parts["slider_1"].fixed
+
+
+def test_springs_dampers_and_rods_are_told_apart() -> None:
+    m = Mechanism("m")
+    m.body("bob", 1.0, (0.1, 0.1, 0.1))
+    m.frame("ground.wall", at=(1.0, 0.0, 0.0))
+    m.joint(Planar("plane", "ground", "bob", start=(0.0, 0.3, 0.0)))
+    m.joint(Distance("rod", "ground", "bob", length=0.3))
+    m.force(SpringDamper("spring", "ground.wall", "bob", stiffness=1.0))
+    m.force(SpringDamper("oil", "ground.wall", "bob", damping=1.0))
+    kinds = {mark.name: mark.kind for mark in sketch(m).marks}
+    assert kinds == {"plane": "planar", "rod": "distance", "spring": "spring", "oil": "damper"}
+
+
+def test_contacts_stick_below_the_scale_of_their_law() -> None:
+    marks = {mark.name: mark for mark in sketch(FourMass(LAW).mechanism()).marks}
+    assert marks["y2"].slips == (("y2_slip", 0.05),)
+    assert marks["rod_12"].slips == ()
+
+
+def test_a_law_without_a_scale_never_sticks() -> None:
+    m = Mechanism("m")
+    m.body("bob", 1.0, (0.1, 0.1, 0.1))
+    m.joint(Prismatic("x", "ground", "bob", friction=JointFriction(Viscous())))
+    assert sketch(m).marks[0].slips == ()
+
+
+def test_joints_on_the_ground_are_known_whichever_way_they_are_written() -> None:
+    m = Mechanism("m")
+    for name, ends in (("one", ("ground", "one")), ("two", ("two", "ground"))):
+        m.body(name, 1.0, (0.1, 0.1, 0.1))
+        m.joint(Revolute(f"of_{name}", *ends))
+    drawn = sketch(m)
+    assert [mark.grounded for mark in drawn.marks] == [True, True]
+    fixed = next(part for part in drawn.parts if part.fixed)
+    assert {mark.a for mark in drawn.marks} <= {*fixed.corners}
+
+
+@pytest.mark.parametrize("kind", ALL_JOINTS, ids=lambda kind: kind.__name__)
+def test_every_joint_has_a_symbol_or_is_none(kind: type) -> None:
+    name = kind.__name__.lower()
+    assert name in MARKERS or name in ("free", "distance")
+    assert name in ANCHORED or name in (*SLIDING, "planar", "free")

@@ -1,0 +1,149 @@
+"""URDF files as data: what is read, and bad files refused with the path of every mistake."""
+
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+from robots import SMALL
+
+from symfric.multibody.urdf.file import parse, rotation
+
+LINK = (
+    '<link name="tip"><inertial><mass value="1"/>'
+    '<inertia ixx="1" iyy="1" izz="1"/></inertial></link>'
+)
+
+
+def joint(inside: str = "", name: str = "wrist", kind: str = "continuous") -> str:
+    ends = '<parent link="arm"/><child link="tip"/>'
+    return f'<joint name="{name}" type="{kind}">{ends}{inside}</joint>'
+
+
+def small(*more: str) -> str:
+    return SMALL.replace("</robot>", "".join(more) + "</robot>")
+
+
+def test_numbers_of_links_and_joints_are_read() -> None:
+    limit = '<limit lower="-1" upper="2.5" effort="7"/><mimic joint="hinge" multiplier="-2"/>'
+    urdf = parse(small(joint(f'<origin xyz="1 2 3"/>{limit}'), LINK))
+    hinge, wrist = urdf.joints
+    assert (hinge.kind, hinge.damping, hinge.friction) == ("revolute", 0.3, 0.2)
+    assert (hinge.axis.tolist(), hinge.p.tolist()) == ([0, 1, 0], [0, 0, 1])
+    assert (wrist.p.tolist(), wrist.axis.tolist()) == ([1, 2, 3], [1, 0, 0])
+    assert wrist.limits == {"lower": -1.0, "upper": 2.5, "effort": 7.0}
+    assert wrist.mimic is not None
+    assert (wrist.mimic.joint, wrist.mimic.multiplier, wrist.mimic.offset) == ("hinge", -2.0, 0.0)
+    arm = urdf.links["arm"]
+    assert arm is not None
+    assert (arm.mass, arm.com.tolist(), np.diag(arm.J).tolist()) == (
+        2,
+        [0, 0, -0.25],
+        [0.1, 0.1, 0.01],
+    )
+    assert (urdf.root, urdf.links["world"]) == ("world", None)
+
+
+@pytest.mark.parametrize(
+    ("angles", "x", "z"),
+    [
+        ((pi / 2, 0, 0), (1, 0, 0), (0, -1, 0)),
+        ((0, pi / 2, 0), (0, 0, -1), (1, 0, 0)),
+        ((0, 0, pi / 2), (0, 1, 0), (0, 0, 1)),
+        ((pi / 2, 0, pi / 2), (0, 1, 0), (1, 0, 0)),
+    ],
+)
+def test_angles_turn_about_fixed_axes_and_quarter_turns_are_exact(
+    angles: tuple[float, float, float], x: tuple[int, ...], z: tuple[int, ...]
+) -> None:
+    R = rotation(*angles)
+    assert (R[:, 0].tolist(), R[:, 2].tolist()) == ([*x], [*z])
+
+
+def test_inertia_is_turned_into_the_axes_of_the_link() -> None:
+    text = SMALL.replace('xyz="0 0 -0.25"', f'rpy="0 {pi / 2} 0"')
+    arm = parse(text).links["arm"]
+    assert arm is not None
+    assert np.diag(arm.J) == pytest.approx([0.01, 0.1, 0.1])
+
+
+def test_appearance_is_passed_over_and_everything_else_is_named() -> None:
+    inside = '<dynamics damping="1" spring_stiffness="2"/><calibration rising="0"/>'
+    link = LINK.replace("<inertial>", "<visual/><collision/><sensor/><inertial>")
+    more = '<material name="red"/><gazebo/><gazebo/><drake:actuator/><transmission name="t"/>'
+    urdf = parse(small(more, joint(inside), link))
+    assert sorted(urdf.left_out) == [
+        "<calibration> of joint 'wrist'",
+        "<drake:actuator>",
+        "<dynamics spring_stiffness> of joint 'wrist'",
+        "<gazebo>",
+        "<sensor> of link 'tip'",
+        "<transmission>",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("<robot", r"^urdf: expected XML, got unclosed token: line 1, column 0"),
+        ("<sdf/>", r"^urdf: expected <robot> as its outermost tag, got <sdf>"),
+        ('<robot name="a"/>', r"urdf 'a' > link: expected at least one, found none"),
+        (small(LINK), r"expected one link that no joint carries, got world, tip"),
+        (small(joint()), r"joint 'wrist' > child: expected a link, got 'tip'"),
+        (small(LINK, joint(), joint(name="other")),
+         r"link 'tip': expected one joint that carries it, got wrist, other"),
+        (small(LINK, joint(name="hinge")), r"joint 'hinge': expected every name once"),
+        (small(LINK, LINK, joint()), r"link 'tip': expected every name once"),
+        (small(LINK, joint(name="")), r"joint: expected a name, found none"),
+        (small(LINK, joint(kind="ball")),
+         r"joint 'wrist' > type: expected one of revolute, .*, planar, got 'ball'"),
+        (small(LINK, joint('<axis xyz="0 1"/>')),
+         r"urdf 'small' > joint 'wrist' > axis: expected 3 numbers in xyz, got '0 1'"),
+        (small(LINK, joint('<axis xyz="0 0 0"/>')), r"joint 'wrist' > axis: expected a direction"),
+        (small(LINK, joint('<origin rpy="0 0 nan"/>')),
+         r"joint 'wrist' > origin: expected 3 numbers in rpy, got '0 0 nan'"),
+        (small(LINK, joint('<dynamics damping="-1"/>')),
+         r"joint 'wrist' > dynamics > damping: expected >= 0, got -1"),
+        (small(LINK, joint('<limit lower="low"/>')),
+         r"joint 'wrist' > limit: expected a number in lower, got 'low'"),
+        (small(LINK, joint('<mimic joint="elbow"/>')),
+         r"joint 'wrist' > mimic: expected joints of kind .* got 'elbow'"),
+        (small(LINK, joint('<mimic joint="wrist"/>')), r"joint 'wrist' > mimic: .* got 'wrist'"),
+        (small(LINK, joint('<mimic joint="hinge"/>', kind="fixed")), r"joint 'wrist' > mimic"),
+        (small(LINK, joint().replace('<child link="tip"/>', "")),
+         r"joint 'wrist' > child: expected the name of a link, found none"),
+        (small(LINK.replace('<mass value="1"/>', ""), joint()),
+         r"link 'tip' > inertial > mass: expected a tag, found none"),
+        (small(LINK.replace('value="1"', 'value="-1"'), joint()),
+         r"link 'tip' > inertial > mass: expected >= 0 kg, got -1"),
+        (small(LINK.replace('ixx="1"', 'ixx="-1"'), joint()),
+         r"link 'tip' > inertial > inertia: expected no negative principal moment, got -1, 1, 1"),
+        (small('<link name="a"/><link name="b"/>',
+               joint(name="ab").replace("arm", "a").replace("tip", "b"),
+               joint(name="ba").replace("arm", "b").replace("tip", "a")),
+         r"link 'a': expected joints that lead to 'world', got a closed loop"),
+        (small('<xacro:property name="a"/>'),
+         r"<xacro>: expected plain URDF; expand the file with xacro"),
+    ],
+)  # fmt: skip
+def test_bad_files_are_refused_with_the_path_of_the_mistake(text: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        parse(text)
+
+
+def test_all_mistakes_are_told_at_once() -> None:
+    text = small(LINK.replace('value="1"', 'value="-1"'), joint('<axis xyz="0 1"/>', kind="ball"))
+    with pytest.raises(ValueError, match="mass") as caught:
+        parse(text)
+    assert len(str(caught.value).splitlines()) == 3
+
+
+def test_mistakes_in_a_file_name_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text("<robot>")
+    with pytest.raises(ValueError, match=r"urdf '.*arm.urdf': expected XML, got no element found"):
+        parse(path)
+    path.write_text(SMALL.replace(' name="small"', ""))
+    assert parse(path).name == "arm"
+    with pytest.raises(FileNotFoundError):
+        parse(tmp_path / "leg.urdf")

@@ -1,0 +1,208 @@
+"""Mechanisms from URDF files against closed forms, and what the file says."""
+
+import warnings
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from robots import SMALL, rod
+
+from symfric import Coulomb, Law, LuGre, Sum, Viscous, parameters, simulate
+from symfric.laws import Stribeck
+from symfric.multibody import JointFriction, functions
+from symfric.multibody.urdf.file import parse
+from symfric.multibody.urdf.read import read_urdf, relative, tag_friction
+
+
+def test_damping_is_viscous_and_friction_a_constant_torque_without_any_unknown() -> None:
+    model = read_urdf(SMALL).build()
+    assert ([v.name for v in model.x], model.z) == (["hinge", "hinge_rate"], ())
+    assert [(v.name, v.unit) for v in model.u] == [("tau_hinge", "N m")]
+    inertia, weight = 0.1 + 2 * 0.25**2, 2 * 9.81 * 0.25
+    f = model.function("ode")
+    for rate, torque in ((0.5, 0.2 + 0.3 * 0.5), (-2.0, -0.2 - 0.3 * 2.0), (0.0, 0.0)):
+        acceleration = float(f(0, [0.3, rate], [], [0.0], [])[1])
+        assert acceleration == pytest.approx(-(weight * np.sin(0.3) + torque) / inertia, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("damping", "level", "expected"),
+    [(0.0, 0.0, None), (0.3, 0.0, Viscous), (0.0, 0.2, Coulomb), (0.3, 0.2, Sum)],
+)
+def test_tags_of_zero_add_no_friction(
+    damping: float, level: float, expected: type[Law] | None
+) -> None:
+    text = rod(**{'damping="0.3" friction="0.2"': f'damping="{damping}" friction="{level}"'})
+    friction = tag_friction(parse(text).joints[0])
+    assert friction is None if expected is None else isinstance(friction.law, expected)  # type: ignore[union-attr]
+
+
+def test_another_law_gets_the_friction_tag_as_its_normal_force() -> None:
+    run = simulate(read_urdf(SMALL, law=relative(LuGre())).build(), 0.2, x0={"hinge": 1.2})
+    assert "hinge_z" in run.units
+    rate = run["hinge_rate"][-1]
+    assert rate < -0.5
+    # sliding at mu_d/mu_s = 1/1.5 of the level, and the damping of the file
+    assert run["hinge_friction"][-1] == pytest.approx(0.3 * rate - 0.2 / 1.5, rel=1e-6)
+
+
+def test_relative_law_breaks_away_at_its_normal_force() -> None:
+    law = relative(Stribeck(mu_s=0.6, mu_d=0.15, sigma_2=0.7))
+    values = {name: p.value for name, p in parameters(law).items()}
+    assert (values["mu_s"], values["mu_d"], values["sigma_2"]) == (1.0, 0.25, 0.7)
+    assert relative(viscous := Viscous()) is viscous
+
+
+def test_bearings_replace_what_the_file_says_by_friction_of_the_reactions() -> None:
+    bearing = JointFriction(Coulomb(), radius=0.01)
+    model = read_urdf(SMALL, bearings={"hinge": bearing}).build()
+    assert [v.name for v in model.z] == ["hinge_N"]
+    weight = simulate(model, 1e-3, rtol=1e-8)["hinge_N"][0]
+    assert weight == pytest.approx(2 * 9.81, rel=1e-4)
+
+
+WELDED = """<robot name="dumb bell">
+  <link name="world"/><link name="hub-0"/>
+  <joint name="spin" type="continuous"><parent link="world"/><child link="left"/>
+    <axis xyz="0 0 2"/></joint>
+  <link name="left"><inertial><mass value="1"/>
+    <inertia ixx="0.1" iyy="0.2" izz="0.3"/></inertial></link>
+  <joint name="weld" type="fixed"><parent link="left"/><child link="hub-0"/>
+    <origin xyz="1 0 0" rpy="0 0 1.5707963267948966"/></joint>
+  <joint name="weld2" type="fixed"><parent link="hub-0"/><child link="right"/>
+    <origin xyz="0 2 0" rpy="1.5707963267948966 0 0"/></joint>
+  <link name="right"><inertial><origin xyz="0 0.5 0"/><mass value="3"/>
+    <inertia ixx="0.1" iyy="0.2" izz="0.3"/></inertial></link>
+</robot>"""
+
+
+def test_links_held_by_fixed_joints_are_one_body() -> None:
+    """Two bars turned against each other: parallel axes by hand."""
+    with pytest.warns(UserWarning, match="names changed: link 'hub-0' to hub_0"):
+        m = read_urdf(WELDED)
+    _, body = m.bodies
+    assert (m.name, body.name, body.mass) == ("dumb_bell", "left", 4.0)
+    # right is at (-1, 0, 0), its y up and its x along y; its mass half a metre above
+    assert body.com == pytest.approx((-0.75, 0.0, 0.375))
+    d2, h2 = 3 / 4, 3 / 4 * 0.5**2
+    expected = [0.1 + 0.3 + h2, 0.2 + 0.1 + d2 + h2, 0.3 + 0.2 + d2, 0.0, d2 * 0.5, 0.0]
+    assert [float(x) for x in body.inertia] == pytest.approx(expected, abs=1e-12)
+    places = {place: frame for place, frame in m.frames}
+    assert ca.DM(places["left.right"].p).full().ravel() == pytest.approx([-1.0, 0.0, 0.0])
+
+
+def test_quarter_turns_leave_zeros() -> None:
+    with pytest.warns(UserWarning, match="hub_0"):
+        m = read_urdf(WELDED)
+    assert m.bodies[1].J.nnz() == 5
+    assert functions(m)["mass"].n_instructions() <= 3
+
+
+def test_massless_root_is_the_ground_and_a_heavy_one_may_float() -> None:
+    assert [b.name for b in read_urdf(SMALL, floating=True).bodies] == ["ground", "arm"]
+    heavy = rod(**{'<link name="world"/>': '<link name="world"><inertial><mass value="1"/><inertia '
+                   'ixx="1" iyy="1" izz="1"/></inertial></link>'})  # fmt: skip
+    assert [b.name for b in read_urdf(heavy).bodies] == ["ground", "arm"]
+    model = read_urdf(heavy, floating=True, gravity=(0.0, 0.0, 0.0)).build()
+    assert [v.name for v in model.x][:4] == [f"floating_base_{k}" for k in ("x", "y", "z", "e0")]
+    run = simulate(model, 2.0, x0={"hinge_rate": 3.0, "floating_base_y_rate": 0.1}, rtol=1e-9)
+    # nothing from outside: the centre of mass moves on as it did, p_y = (3 y + 2 s) of the arm
+    assert run["energy"][0] > run["energy"][-1]
+    assert np.ptp(run["floating_base_y"] - 0.1 * run.t) < 1e-9
+
+
+MIMIC = """<robot name="gripper"><link name="palm"/>
+  <joint name="a" type="revolute"><parent link="palm"/><child link="l1"/><axis xyz="0 1 0"/></joint>
+  <link name="l1"><inertial><origin xyz="0.1 0 0"/><mass value="1"/>
+    <inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial></link>
+  <joint name="b" type="prismatic"><parent link="l1"/><child link="l2"/><axis xyz="1 0 0"/>
+    <mimic joint="a" multiplier="-0.5" offset="0.2"/></joint>
+  <link name="l2"><inertial><mass value="2"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial>
+  </link></robot>"""
+
+
+def test_mimic_joint_follows_and_its_mass_is_felt() -> None:
+    """Of both joints with b = 0.2 - a/2 put in: the equation of one coordinate."""
+    m = read_urdf(MIMIC)
+    model = m.build()
+    assert [v.name for v in model.u] == ["tau_a"]
+    run = simulate(model, 1.0, rtol=1e-10, samples=11)
+    assert run["b"] == pytest.approx(0.2 - run["a"] / 2, abs=1e-11)
+    assert np.ptp(run["energy"]) < 1e-8
+    f, s = functions(m), -0.5
+    M, bias = f["mass"]([0.0, 0.2], []).full(), f["bias"]([0.0, 0.2], [0, 0], [0], []).full()
+    T = np.array([[1.0], [s]])
+    expected = -(T.T @ bias).item() / (T.T @ M @ T).item()
+    short = simulate(model, 1e-3, rtol=1e-10, samples=2)
+    assert short["a_rate"][-1] == pytest.approx(1e-3 * expected, rel=1e-3)
+
+
+def test_all_that_is_left_out_is_said_once() -> None:
+    more = '<limit lower="-1" upper="1"/><safety_controller k_velocity="1"/></joint><gazebo/>'
+    visual = '<visual><geometry><sphere radius="1"/></geometry></visual></link>'
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        read_urdf(rod(**{"</joint>": more, "</inertial></link>": f"</inertial>{visual}"}))
+    (message,) = (str(w.message) for w in caught)
+    expected = "<safety_controller> of joint 'hinge', <limit> of joint 'hinge', <gazebo>"
+    assert message == f"urdf 'small': left out: {expected}"
+
+
+def test_law_that_no_joint_uses_is_said() -> None:
+    with pytest.warns(UserWarning, match="left out: LuGre, because no joint has <dynamics fric"):
+        read_urdf(rod(**{' friction="0.2"': ""}), law=LuGre())
+
+
+def test_planar_joint_takes_no_friction_and_says_so() -> None:
+    with pytest.warns(UserWarning, match="<dynamics> of planar joint 'hinge'"):
+        m = read_urdf(rod(revolute="planar"))
+    assert [v.name for v in m.build().x[:3]] == ["hinge_x", "hinge_y", "hinge_angle"]
+
+
+def test_names_are_kept_apart() -> None:
+    """A link and its joint of one name, and a link called ground."""
+    text = rod(arm="ground", hinge="ground").replace("world", "1 base")
+    with pytest.warns(
+        UserWarning, match="joint 'ground' to ground_joint, link 'ground' to ground_"
+    ):
+        m = read_urdf(text)
+    assert [v.name for v in m.build().x] == ["ground_joint", "ground_joint_rate"]
+    assert {place for place, _ in m.frames} >= {"ground._1_base", "ground_link.ground_link"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({'mass value="2"': 'mass value="0"', "0.1": "0", "0.01": "0"},
+         "urdf 'small' > link 'arm' > inertial: expected a mass > 0 kg, because joint 'hinge'"),
+        ({"hinge": "a-b", "</robot>": '<joint name="a_b" type="continuous"><parent link="arm"/>'
+          '<child link="x"/></joint><link name="x"><inertial><mass value="1"/><inertia ixx="1" '
+          'iyy="1" izz="1"/></inertial></link><joint name="a_b_joint" type="continuous"><parent '
+          'link="arm"/><child link="y"/></joint><link name="y"><inertial><mass value="1"/><inertia '
+          'ixx="1" iyy="1" izz="1"/></inertial></link></robot>'},
+         "joint 'a-b': expected a name that differs from that of joint 'a_b_joint' as a C ident"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_a_mechanism_is_refused(changes: dict[str, str], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        read_urdf(rod(**changes))
+
+
+def test_unknown_bearing_is_refused_with_the_joints_there_are() -> None:
+    friction = JointFriction(Coulomb(), radius=0.01)
+    with pytest.raises(ValueError, match="urdf 'small' bearings: expected one of hinge, got elbow"):
+        read_urdf(SMALL, bearings={"elbow": friction})
+
+
+def test_file_is_read_by_its_path(tmp_path: Path) -> None:
+    path = tmp_path / "small.urdf"
+    path.write_text(f'<?xml version="1.0" encoding="utf-8"?>\n<!-- ä -->{SMALL}', encoding="utf-8")
+    assert read_urdf(path).name == read_urdf(str(path)).name == "small"
+
+
+def test_inertia_that_cannot_be_is_refused_with_the_name_of_the_link() -> None:
+    with pytest.raises(
+        ValueError, match="mechanism 'small' > body 'arm' > inertia: expected the l"
+    ):
+        read_urdf(rod(**{'izz="0.01"': 'izz="0.5"'})).build()

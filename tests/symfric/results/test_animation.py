@@ -1,0 +1,141 @@
+"""Moving pictures in every format, whole or not at all."""
+
+from base64 import b64decode
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.animation import FFMpegWriter
+from PIL import Image
+
+from symfric import BrownMcPhee, LuGre, Trajectory, rabinowicz, simulate
+from symfric.results.animation import SLIDES, STICKS, check_format, frame_times, picture
+from symfric.scenes import MECHANISMS, Pendulum
+
+
+@pytest.fixture(scope="module")
+def runs() -> dict[str, Trajectory]:
+    law = BrownMcPhee(v_t=0.02)
+    names = ("pendulum", "four_mass", "four_bar")
+    return {n: simulate(MECHANISMS[n](law).model(), 0.2, samples=5) for n in names}
+
+
+@pytest.mark.parametrize("name", ["pendulum", "four_mass"])
+def test_gif_has_a_picture_per_frame_that_differ(
+    runs: dict[str, Trajectory], tmp_path: Path, name: str
+) -> None:
+    told: list[float] = []
+    path, open_before = tmp_path / "new" / "motion.gif", plt.get_fignums()
+    runs[name].animate(path, fps=10, speed=0.5, progress=told.append)
+    with Image.open(path) as film:
+        assert film.n_frames == 5  # 0.2 s at half speed
+        assert film.info["duration"] == 100
+        first = np.asarray(film.convert("RGB"))
+        film.seek(film.n_frames - 1)
+        last = np.asarray(film.convert("RGB"))
+    assert first.shape == last.shape
+    assert (first != last).any()
+    assert told == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
+    assert [p.name for p in path.parent.iterdir()] == ["motion.gif"]
+    assert plt.get_fignums() == open_before
+
+
+def test_html_holds_its_pictures_and_needs_nothing_from_elsewhere(
+    runs: dict[str, Trajectory], tmp_path: Path
+) -> None:
+    runs["pendulum"].animate(tmp_path / "motion.html", fps=10, speed=0.5)
+    text = (tmp_path / "motion.html").read_text()
+    pictures = text.split("data:image/png;base64,")[1:]
+    assert len(pictures) == 5
+    assert b64decode(pictures[0].split('"')[0]).startswith(b"\x89PNG")
+    assert "http" not in text.replace(pictures[0], "")[:2000]
+    assert 'max="4"' in text
+
+
+def test_a_failed_film_leaves_nothing_behind(runs: dict[str, Trajectory], tmp_path: Path) -> None:
+    open_before = plt.get_fignums()
+
+    def stop(done: float) -> None:
+        raise KeyboardInterrupt
+
+    for ending in ("gif", "html"):
+        with pytest.raises(KeyboardInterrupt):
+            runs["pendulum"].animate(tmp_path / f"x.{ending}", fps=5, progress=stop)
+    assert list(tmp_path.iterdir()) == []
+    assert plt.get_fignums() == open_before
+
+
+def test_mp4_without_its_program_names_what_needs_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
+    with pytest.raises(ValueError, match=r"expected the program ffmpeg for \.mp4, got none; "
+                                         r"write \.gif or \.html"):  # fmt: skip
+        check_format("x.mp4")
+
+
+@pytest.mark.skipif(not FFMpegWriter.isAvailable(), reason="needs the program ffmpeg")
+def test_mp4_is_written(runs: dict[str, Trajectory], tmp_path: Path) -> None:
+    runs["pendulum"].animate(tmp_path / "x.mp4", fps=5)
+    assert b"ftyp" in (tmp_path / "x.mp4").read_bytes()[:16]
+
+
+def test_other_endings_are_refused_before_any_work(runs: dict[str, Trajectory]) -> None:
+    with pytest.raises(ValueError, match=r"ending in \.gif, \.html, \.mp4, got '\.avi'"):
+        runs["pendulum"].animate("x.avi")
+
+
+@pytest.mark.parametrize("bad", [{"fps": 0.0}, {"speed": -1.0}, {"fps": np.nan}])
+def test_rates_must_be_above_zero(runs: dict[str, Trajectory], bad: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match=r"animation: (fps|speed): expected a number > 0"):
+        runs["pendulum"].animate("x.gif", **bad)
+
+
+def test_a_model_without_bodies_is_refused(tmp_path: Path) -> None:
+    run = simulate(rabinowicz(LuGre()), 0.1)
+    with pytest.raises(ValueError, match="'rabinowicz': expected a mechanism"):
+        run.animate(tmp_path / "x.gif")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("end", "speed", "frames"), [(4.0, 1.0, 81), (0.25, 0.25 / 6, 121),
+                                                      (60.0, 10.0, 121)])  # fmt: skip
+def test_what_is_too_fast_or_too_slow_is_shown_in_six_seconds(
+    end: float, speed: float, frames: int
+) -> None:
+    times, found = frame_times(0.0, end, 20.0, None)
+    assert found == pytest.approx(speed)
+    assert times.size == frames
+    assert (times[0], times[-1]) == (0.0, end)
+
+
+def test_planar_mechanisms_are_flat_and_labelled(runs: dict[str, Trajectory]) -> None:
+    figure, _ = picture(runs["four_bar"], np.linspace(0.0, 0.2, 3))
+    (axis,) = figure.axes
+    assert (axis.get_xlabel(), axis.get_ylabel()) == ("x [m]", "z [m]")
+    assert axis.get_aspect() == 1.0
+    plt.close(figure)
+
+
+def test_spatial_mechanisms_have_one_scale_on_three_axes(runs: dict[str, Trajectory]) -> None:
+    figure, _ = picture(runs["four_mass"], np.linspace(0.0, 0.2, 3))
+    (axis,) = figure.axes
+    assert [getattr(axis, f"get_{a}label")() for a in "xyz"] == ["x [m]", "y [m]", "z [m]"]
+    spans = np.array([np.ptp(getattr(axis, f"get_{a}lim")()) for a in "xyz"])
+    box = axis._box_aspect  # type: ignore[attr-defined]
+    assert spans / spans.max() == pytest.approx(box / box.max())
+    plt.close(figure)
+
+
+def test_time_and_speed_stand_above_and_joints_show_whether_they_stick() -> None:
+    """From rest at 1 rad: the hinge sticks first and slides then."""
+    run = simulate(Pendulum(BrownMcPhee(v_t=0.02)).model(), 0.5)
+    figure, show = picture(run, np.array([0.0, 0.5]), speed=0.1)
+    (axis,) = figure.axes
+    fills: list[str] = []
+    for k in range(2):
+        show(k)
+        found = (str(line.get_markerfacecolor()) for line in axis.lines)
+        fills += [fill for fill in found if fill in (STICKS, SLIDES)]
+    assert fills == [STICKS, SLIDES]
+    assert axis.get_title(loc="left") == "pendulum   t = 0.500 s  (0.1 x)"
+    plt.close(figure)
