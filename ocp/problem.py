@@ -11,6 +11,7 @@ import casadi as ca
 from ocp.cost import Cost
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import check_names
+from symfric.foundation.symbols import strays
 from symfric.model import Model
 
 Range = float | tuple[float | None, float | None]
@@ -206,8 +207,7 @@ class Problem:
             yield str(error)
             return
         known = ca.vertcat(self.model.t, *(self.model.vector(letter) for letter in "xzup"))
-        declared = {e.__hash__() for e in ca.symvar(known)}
-        stray = [str(s) for s in ca.symvar(costs) if s.__hash__() not in declared]
+        stray = strays(costs, known)
         if stray:
             yield f"cost: expected only signals of the model, got {', '.join(stray)}"
         chosen = ca.vertcat(*(self.model.vector(letter) for letter in "xzu"))

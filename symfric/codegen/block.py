@@ -12,6 +12,7 @@ import casadi as ca
 
 from symfric.codegen.c99 import FUNCTIONS
 from symfric.codegen.graph import graph
+from symfric.foundation.symbols import strays, symbols_of
 from symfric.model import Output, Variables, finite
 
 GROUPS = ("state", "param", "in", "out")
@@ -96,10 +97,10 @@ class Block:
                 )
         if not (expected or self.outputs):
             problems.append("expected states or outputs, got none")
-        declared = ca.veccat(*(v.symbol for v in (*self.states, *self.inputs, *self.parameters)))
-        stray = ca.Function("stray", [declared], [self.everything], {"allow_free": True}).get_free()
+        declared = symbols_of((*self.states, *self.inputs, *self.parameters))
+        stray = strays(self.everything, declared)
         if stray:
-            problems.append(f"expected only declared symbols, got {stray}")
+            problems.append(f"expected only declared symbols, got {', '.join(stray)}")
         return problems
 
     @cached_property
@@ -142,6 +143,6 @@ class Block:
 
     def _function(self, name: str, results: Mapping[str, ca.SX]) -> ca.Function:
         groups = (self.states, self.parameters, self.inputs)
-        columns = [ca.vertcat(ca.SX(0, 1), *(v.symbol for v in group)) for group in groups]
+        columns = [symbols_of(group) for group in groups]
         dense = [ca.densify(ca.SX(result)) for result in results.values()]
         return ca.Function(name, columns, dense, list(GROUPS[:3]), list(results))

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 
 import casadi as ca
 
+from symfric.foundation.symbols import stacked
+
 SELECT = -1
 """Operation of a node that stands for `if_else`, which CasADi writes as a sum of two halves."""
 
@@ -147,4 +149,4 @@ def rebuild(source: Graph, arguments: Sequence[ca.SX], replace: Mapping[int, ca.
             found.append(ca.SX.unary(node.op, *args))
         else:
             found.append(ca.SX.binary(node.op, *args))
-    return [ca.vertcat(ca.SX(0, 1), *(found[i] for i in row)) for row in source.results]
+    return [stacked(found[i] for i in row) for row in source.results]

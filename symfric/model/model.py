@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Scalar, evaluate
 from symfric.foundation.parameters import Variable, check_names
+from symfric.foundation.symbols import stacked, strays, symbols_of
 from symfric.model.holonomic import Holonomic
 from symfric.model.sketch import Sketch
 
@@ -118,7 +119,7 @@ class Model:
         if self.ode is not None:
             object.__setattr__(self, "ode", ca.SX(self.ode))
             rates = [ca.SX.sym(f"{v.name}_dot") for v in self.x]
-            object.__setattr__(self, "xdot", ca.vertcat(ca.SX(0, 1), *rates))
+            object.__setattr__(self, "xdot", stacked(rates))
             if self.ode.numel() == len(self.x):
                 object.__setattr__(
                     self, "residual", ca.vertcat(self.xdot - ca.vec(self.ode), self.alg)
@@ -136,13 +137,12 @@ class Model:
             problems.append(f"alg: expected {nz} rows, got {self.alg.numel()}")
         elif self.residual.numel() != nx + nz:
             problems.append(f"residual: expected {nx + nz} rows, got {self.residual.numel()}")
-        declared = {e.__hash__() for e in ca.symvar(self._symbols())}
         equations = self.residual if self.ode is None else ca.veccat(self.ode, self.alg)
         expressions = [equations, *(ca.SX(o.expression) for o in self.outputs.values())]
         expressions += [ca.SX(m.expression) for m in self.monitors]
         for event in self.events:
             expressions += map(ca.SX, (event.expression, *event.reset.values()))
-        stray = [str(s) for s in ca.symvar(ca.veccat(*expressions)) if s.__hash__() not in declared]
+        stray = strays(ca.veccat(*expressions), self._symbols())
         if stray:
             problems.append(
                 f"expected only declared symbols, got {', '.join(stray)}; "
@@ -189,10 +189,7 @@ class Model:
 
     @cached_property
     def _vectors(self) -> dict[str, ca.SX]:
-        return {
-            letter: ca.vertcat(ca.SX(0, 1), *(v.symbol for v in getattr(self, letter)))
-            for letter in "xzup"
-        }
+        return {letter: symbols_of(getattr(self, letter)) for letter in "xzup"}
 
     def nominal(self, letter: str) -> NDArray[np.float64]:
         """Typical magnitudes of a group, shape (n,)."""
@@ -345,7 +342,7 @@ class Model:
         n, x = len(self.x), self.vector("x")
         known, chosen = ca.SX.sym("known", n), ca.SX.sym("chosen", n)
         rows = [ca.if_else(chosen[i], known[i], v.start) for i, v in enumerate(self.x)]
-        values = ca.vertcat(ca.SX(0, 1), *rows)
+        values = stacked(rows)
         for _ in range(2):
             values = ca.substitute(values, x, values)
         arguments = [known, chosen, self.vector("u"), self.vector("p")]

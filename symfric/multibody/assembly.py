@@ -18,6 +18,7 @@ import numpy as np
 
 from symfric.foundation.numeric import is_symbolic
 from symfric.foundation.parameters import Variable
+from symfric.foundation.symbols import at_start, stacked, symbols_of
 from symfric.laws import Law
 from symfric.laws.composed.planar import Spatial
 from symfric.model import Event, Model, Monitor, Output, Variables
@@ -31,7 +32,6 @@ from symfric.multibody.results import Put
 from symfric.multibody.spatial import euler_e
 from symfric.multibody.topology import Topology
 
-NONE = ca.SX(0, 1)
 Details = Callable[[ca.SX, Put], Mapping[str, Output]]
 Drawn = Callable[[Mapping[str, float]], Sketch]
 
@@ -130,7 +130,7 @@ def slips(eq: Equations, normal_at_start: Sequence[float]) -> tuple[Slip, ...]:
             Variable(f"{contact.name}_{s.name}", s.unit, start=begin[i], nominal=s.nominal)
             for i, s in enumerate(law.states)
         )
-        z = ca.vertcat(NONE, *(s.symbol for s in states))
+        z = symbols_of(states)
         rate, force = law.rate(contact.slip, pressing, z), law.force(contact.slip, pressing, z)
         found.append(Slip(contact, unknown, pressing, normal, states, ca.SX(rate), ca.SX(force)))
     return tuple(found)
@@ -172,12 +172,12 @@ def assemble(
         for label, x in zip(labels, guess["lam"], strict=True)
     )
     pressed = [s for s in contacts if s.unknown]
-    forces = ca.vertcat(NONE, *(s.force for s in contacts))
-    symbols = ca.vertcat(NONE, *(v.symbol for v in multipliers))
+    forces = stacked(s.force for s in contacts)
+    symbols = symbols_of(multipliers)
     before, after = ca.vertcat(eq.lam, eq.F), ca.vertcat(symbols, forces)
-    p_column = ca.vertcat(NONE, *(v.symbol for v in p))
+    p_column = symbols_of(p)
     balance, normals, phi_ddot = ca.substitute(
-        [eq.balance, ca.vertcat(NONE, *(s.normal - s.N for s in pressed)), eq.phi_ddot],
+        [eq.balance, stacked(s.normal - s.N for s in pressed), eq.phi_ddot],
         [before],
         [after],
     )
@@ -190,8 +190,8 @@ def assemble(
 
     scales = [(s, x) for s in contacts if np.isfinite(x := _scale(s, p))]
     names = {s.contact.name: x for s, x in scales}
-    rates = ca.vertcat(NONE, *(s.rate for s in contacts))
-    qd_column = ca.vertcat(NONE, *(v.symbol for v in qd))
+    rates = stacked(s.rate for s in contacts)
+    qd_column = symbols_of(qd)
     return Model(
         name=name,
         x=(*q, *qd, *(v for s in contacts for v in s.states)),
@@ -237,18 +237,15 @@ def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip], forces: ca.S
     groups: list[ca.SX] = []
     for k, link in reversed(list(enumerate(links))):
         # inner unknowns first: nothing stands on their right-hand sides, so they cost no stage
-        groups.append(ca.vertcat(NONE, *(cuts.symbols[i] for i in kept if cuts.links[i] == k)))
+        groups.append(stacked(cuts.symbols[i] for i in kept if cuts.links[i] == k))
         groups.append(ca.vertcat(*(column[link.rows] for column in (eq.q, eq.qd, eq.a))))
-        groups.append(ca.vertcat(NONE, *of_link[link.joint.name]))
+        groups.append(stacked(of_link[link.joint.name]))
     return Inner(cuts.symbols[kept], values[kept], f, tuple(groups))
 
 
 def _scale(slip: Slip, p: Variables) -> float:
     """Sliding velocity on which the law changes, at the start values of `p` [m/s]."""
-    symbols = ca.vertcat(NONE, *(v.symbol for v in p))
-    values = ca.vertcat(NONE, *(v.start for v in p))
-    law = slip.contact.friction.law
-    return float(ca.DM(ca.substitute(ca.SX(law.velocity_scale), symbols, ca.SX(values))))
+    return float(at_start(slip.contact.friction.law.velocity_scale, p))
 
 
 def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[str, ...], str]:
@@ -257,7 +254,7 @@ def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[s
     Those are the unknown ones, and those that inputs or parameters give; a sum of absolute values
     of reactions that no law asks for cannot.
     """
-    values, words, advice = [NONE], list[str](), list[str]()
+    values, words, advice = list[ca.SX](), list[str](), list[str]()
     for s in contacts:
         friction, joint = s.contact.friction, s.contact.joint
         law = type(friction.law).__name__
@@ -271,13 +268,13 @@ def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[s
                 "their damping then grows without bound as the load falls: lugre_normalised, "
                 "whose deflection does not depend on the load, goes on (so do dahl and sigma_1 = 0)"
             )
-    return ca.vertcat(*values), tuple(words), "; ".join(dict.fromkeys(advice))
+    return stacked(values), tuple(words), "; ".join(dict.fromkeys(advice))
 
 
 def _switches(slip: Slip, qd: Variables) -> tuple[Event, ...]:
     """Mode changes of the law, with its states under their names in the model."""
     contact = slip.contact
-    z = ca.vertcat(NONE, *(s.symbol for s in slip.states))
+    z = symbols_of(slip.states)
     rest = {v.name: 0.0 for v in qd if v.name == f"{contact.name}_rate"}
     return tuple(
         Event(

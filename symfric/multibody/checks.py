@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.numeric import is_number, is_symbolic
+from symfric.foundation.symbols import strays
 from symfric.model import Variables
 from symfric.multibody.body import GROUND, Body
 from symfric.multibody.constraints import Constraint
@@ -132,10 +133,8 @@ def _rubbing(where: str, joint: Joint, friction: object, known: ca.SX) -> Iterat
 
 def undeclared(where: str, values: Iterable[object], known: ca.SX, expected: str) -> Iterator[str]:
     """Symbols in `values` that nobody declared."""
-    names = {s.__hash__() for s in ca.symvar(known)}
     flat = [x for value in values for x in (value if isinstance(value, tuple | list) else [value])]
-    used = [s for x in flat if isinstance(x, ca.SX) for s in ca.symvar(x)]
-    stray = dict.fromkeys(str(s) for s in used if s.__hash__() not in names)
+    stray = strays(ca.veccat(*(x for x in flat if isinstance(x, ca.SX))), known)
     if stray:
         yield f"{where}: expected only declared {expected}, got {', '.join(stray)}; see build(p)"
 

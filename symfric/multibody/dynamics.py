@@ -16,6 +16,7 @@ from typing import final
 
 import casadi as ca
 
+from symfric.foundation.symbols import stacked
 from symfric.multibody.body import GROUND, Body
 from symfric.multibody.forces import Axial, Load
 from symfric.multibody.joints import Free, Joint
@@ -148,7 +149,7 @@ def balance(
             force, moment = kin.cuts(k, force), kin.cuts(k, moment)
         carried[link.body] = force, moment
         rows[k], reactions[link.joint.name] = _project(kin, link, carried, axial)
-    return ca.vertcat(ca.SX(0, 1), *rows), reactions
+    return stacked(rows), reactions
 
 
 def _floats(kin: Kinematics, link: Link) -> bool:

@@ -6,6 +6,7 @@ from typing import final
 
 import casadi as ca
 
+from symfric.foundation.symbols import stacked
 from symfric.laws.composed.planar import Spatial
 from symfric.multibody.constraints import Constraint, Held
 from symfric.multibody.cuts import Cuts
@@ -148,7 +149,7 @@ def equations(
         qd,
         a,
         lam,
-        ca.vertcat(ca.SX(0, 1), *(c.F for c in contacts)),
+        stacked(c.F for c in contacts),
         ca.densify(phi),
         phi_dot,
         ca.jtimes(phi, q, a) + ca.jtimes(phi_dot, q, qd) + ca.jacobian(phi_dot, t),

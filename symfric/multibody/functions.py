@@ -2,12 +2,11 @@
 
 import casadi as ca
 
+from symfric.foundation.symbols import stacked, symbols_of
 from symfric.model import Variables
 from symfric.multibody.assembly import slips
 from symfric.multibody.body import GROUND
 from symfric.multibody.mechanism import Mechanism
-
-NONE = ca.SX(0, 1)
 
 
 def functions(
@@ -38,14 +37,12 @@ def functions(
     """
     eq = mechanism.prepare(p, formulation).eq
     q, qd, a, lam = eq.q, eq.qd, eq.a, eq.lam
-    u, parameters = (
-        ca.vertcat(NONE, *(v.symbol for v in group)) for group in (mechanism.inputs, p)
-    )
+    u, parameters = (symbols_of(group) for group in (mechanism.inputs, p))
     still = [ca.SX.zeros(x.numel()) for x in (a, lam, eq.F)]
     (bias,) = ca.substitute([eq.balance], [a, lam, eq.F], still)
     contacts = slips(eq, [1.0] * len(eq.contacts))
-    z = ca.vertcat(NONE, *(s.symbol for c in contacts for s in c.states))
-    forces = ca.vertcat(NONE, *(c.force for c in contacts))
+    z = stacked(s.symbol for c in contacts for s in c.states)
+    forces = stacked(c.force for c in contacts)
     for c in contacts:
         if c.N is not c.normal:
             forces = ca.substitute(forces, c.N, c.normal)

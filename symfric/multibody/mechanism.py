@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Scalar, equals
 from symfric.foundation.parameters import Variable, check_names
+from symfric.foundation.symbols import starts_of, symbols_of
 from symfric.model import Model, Variables
 from symfric.multibody import checks
 from symfric.multibody.assembly import assemble, coordinates
@@ -22,7 +23,7 @@ from symfric.multibody.prepare import (
     Prepared,
     in_absolute_coordinates,
     numeric,
-    strays,
+    undeclared,
     with_cuts,
     without_friction,
     written,
@@ -33,7 +34,6 @@ from symfric.multibody.spatial import Frame, Vector, is_vector
 from symfric.multibody.topology import Topology, absolute, spanning_tree
 
 Array = NDArray[np.float64]
-NONE = ca.SX(0, 1)
 FORMULATIONS = ("joint", "absolute")
 
 
@@ -148,12 +148,12 @@ class Mechanism:
             ValueError: all mistakes at once, each with its path.
         """
         check_names(f"mechanism '{self.name}' formulation", [formulation], FORMULATIONS)
-        symbols = ca.vertcat(NONE, *(v.symbol for v in p))
-        values = ca.DM(ca.vertcat(NONE, *(v.start for v in p)))
+        symbols = symbols_of(p)
+        values = ca.DM(starts_of(p))
         bodies, tree = self._hung(symbols, values)
         made = self._written(tree, symbols, values)
-        u = ca.vertcat(NONE, *(v.symbol for v in self.inputs))
-        loose = strays(made.eq, self.joints, self.forces, symbols, u)
+        u = symbols_of(self.inputs)
+        loose = undeclared(made.eq, self.joints, self.forces, symbols, u)
         self._refuse([*made.problems, *made.misfits, *_left_open(made), *loose])
         if formulation == "absolute":
             by_name = {body.name: body for body in bodies}
@@ -178,7 +178,7 @@ class Mechanism:
             ValueError: all mistakes that can be told without equations, and those of the start.
         """
         bodies, problems = self._placed()
-        u = ca.vertcat(NONE, *(v.symbol for v in self.inputs))
+        u = symbols_of(self.inputs)
         problems += checks.naming(
             bodies, self.joints, self.forces, self.constraints, tuple(self.inputs)
         )
@@ -236,8 +236,8 @@ class Mechanism:
         Raises:
             ValueError: all mistakes at once, each with its path; there is no position near.
         """
-        symbols = ca.vertcat(NONE, *(v.symbol for v in p))
-        values = ca.DM(ca.vertcat(NONE, *(v.start for v in p)))
+        symbols = symbols_of(p)
+        values = ca.DM(starts_of(p))
         _, tree = self._hung(symbols, values)
         made = self._written(tree, symbols, values)
         self._refuse(made.problems)

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.symbols import stacked, starts_of, strays, symbols_of
 from symfric.model import Variables
 from symfric.multibody import checks
 from symfric.multibody.assembly import coordinates
@@ -20,7 +21,6 @@ from symfric.multibody.spatial import euler_parameters
 from symfric.multibody.topology import Topology
 
 Array = NDArray[np.float64]
-NONE = ca.SX(0, 1)
 LONG, LONG_WITH_FRICTION = 16, 12
 """Links of a chain from which on cuts pay: below, full derivatives take fewer operations. Friction
 from reactions makes them dearer."""
@@ -123,7 +123,7 @@ def in_absolute_coordinates(
     return written(topology, joints, forces, constraints, q, qd, p, values)
 
 
-def strays(
+def undeclared(
     eq: Equations, joints: Sequence[Joint], forces: Sequence[Force], p: ca.SX, u: ca.SX
 ) -> Iterator[str]:
     """Symbols in forces that nobody declared."""
@@ -142,15 +142,15 @@ def without_friction(made: Prepared, p: Variables, u: Variables) -> dict[str, Ar
     eq = made.eq
     unknowns = ca.vertcat(eq.a, eq.lam)
     rows = ca.vertcat(eq.balance, eq.phi_ddot)
-    zero = [ca.SX.zeros(eq.F.numel()), ca.SX(ca.vertcat(NONE, *(v.start for v in u))), ca.SX(0)]
-    symbols = [eq.F, ca.vertcat(NONE, *(v.symbol for v in u)), eq.kin.t]
-    rows, normals = ca.substitute([rows, ca.vertcat(NONE, *eq.normals)], symbols, zero)
+    zero = [ca.SX.zeros(eq.F.numel()), ca.SX(starts_of(u)), ca.SX(0)]
+    symbols = [eq.F, symbols_of(u), eq.kin.t]
+    rows, normals = ca.substitute([rows, stacked(eq.normals)], symbols, zero)
     solve = ca.Function(
         "start",
-        [unknowns, eq.q, eq.qd, ca.vertcat(NONE, *(v.symbol for v in p))],
+        [unknowns, eq.q, eq.qd, symbols_of(p)],
         [rows, ca.jacobian(rows, unknowns), normals],
     )
-    values = ca.DM(ca.vertcat(NONE, *(v.start for v in p)))
+    values = ca.DM(starts_of(p))
     x = np.zeros(unknowns.numel())
     right, matrix, _ = solve(x, made.q0, made.qd0, values)
     x = -np.linalg.lstsq(matrix.full(), right.full()[:, 0], rcond=None)[0]
@@ -186,8 +186,8 @@ def written(
     values: ca.DM,
 ) -> Prepared:
     """Equations of independent constraints."""
-    q_symbols, qd_symbols = (ca.vertcat(NONE, *(v.symbol for v in g)) for g in (q, qd))
-    starts = (ca.vertcat(NONE, *(v.start for v in g)) for g in (q, qd))
+    q_symbols, qd_symbols = (symbols_of(g) for g in (q, qd))
+    starts = (starts_of(g) for g in (q, qd))
     q0, qd0 = (ca.DM(ca.substitute(s, p, ca.SX(values))).full().ravel() for s in starts)
     arguments = topology, joints, forces, constraints, q_symbols, qd_symbols, ca.SX.sym("t")
     eq = equations(*arguments)
@@ -227,7 +227,7 @@ def written(
 def with_cuts(made: Prepared, joints: Sequence[Joint], forces: Sequence[Force]) -> Equations | None:
     """The equations of a long open chain with cuts; None where they would not pay."""
     eq, topology = made.eq, made.eq.kin.topology
-    loaded = ca.depends_on(ca.vertcat(NONE, *eq.normals), eq.a)
+    loaded = ca.depends_on(stacked(eq.normals), eq.a)
     if eq.m or topology.depth < (LONG_WITH_FRICTION if loaded else LONG):
         return None
     return equations(topology, joints, forces, (), eq.q, eq.qd, eq.kin.t, cuts=Cuts())
@@ -235,11 +235,11 @@ def with_cuts(made: Prepared, joints: Sequence[Joint], forces: Sequence[Force]) 
 
 def _held(eq: Equations, constraints: Sequence[Constraint], p: ca.SX) -> Iterator[str]:
     """Why constraints cannot be held, or what they depend on besides coordinates and time."""
-    known = {s.__hash__() for s in ca.symvar(ca.vertcat(eq.q, eq.kin.t, p))}
+    known = ca.vertcat(eq.q, eq.kin.t, p)
     for constraint, part in zip(constraints, eq.held, strict=True):
         where = f"{constraint.kind} '{constraint.name}'"
         yield from (f"{where} > {text}" for text in part.problems)
-        stray = [str(s) for s in ca.symvar(part.phi) if s.__hash__() not in known]
+        stray = strays(part.phi, known)
         if stray:
             yield (
                 f"{where}: expected an expression of positions, time and parameters, got "
@@ -271,7 +271,7 @@ def _undetermined(
     """Joints whose `rows` change with combinations `free` of the multipliers."""
     eq, rng = made.eq, np.random.default_rng(1)
     pairs = [(name, ca.vec(row)[i]) for name, row in rows for i in range(row.numel())]
-    column = ca.substitute(ca.vertcat(NONE, *(row for _, row in pairs)), eq.kin.t, ca.SX(0))
+    column = ca.substitute(stacked(row for _, row in pairs), eq.kin.t, ca.SX(0))
     slope = ca.Function(
         "slope", [eq.q, eq.qd, eq.a, eq.lam, p], [ca.densify(ca.jacobian(column, eq.lam))],
         {"allow_free": True},

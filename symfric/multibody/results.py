@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import casadi as ca
 
+from symfric.foundation.symbols import strays
 from symfric.model import Output
 from symfric.multibody.body import GROUND
 from symfric.multibody.equations import Equations
@@ -126,7 +127,7 @@ def _work(
     kin, conserved = eq.kin, eq.kinetic
     for force in forces:
         energy = ca.SX(force.energy(kin, joints))
-        own = not _strange(energy, still)
+        own = not strays(energy, still)
         if own:
             conserved += energy
         if own and force.conservative:
@@ -147,9 +148,3 @@ def _work(
         drive = ca.dot(eq.lam, eq.phi_t)
         yield "drive_work_rate", Output(drive, "W", "power put in by prescribed motions")
     yield "conserved", Output(conserved, "J", "energy without potentials of time or inputs")
-
-
-def _strange(expression: ca.SX, known: ca.SX) -> bool:
-    """Whether `expression` has symbols that are not `known`."""
-    declared = {s.__hash__() for s in ca.symvar(known)}
-    return any(s.__hash__() not in declared for s in ca.symvar(expression))

@@ -7,6 +7,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.symbols import stacked
+
 if TYPE_CHECKING:
     from symfric.results.trajectory import Trajectory
 
@@ -97,7 +99,7 @@ def energy_balance(trajectory: "Trajectory") -> EnergyBalance:
     start = trajectory.steps[:1]
     model, at = trajectory.model, np.concatenate([start, trajectory.t])
     rates = {name.removesuffix(WORK): name for name in details if name.endswith(WORK)}
-    column = ca.vertcat(ca.SX(0, 1), *(model.expression(name) for name in rates.values()))
+    column = stacked(model.expression(name) for name in rates.values())
     energy, kinetic = trajectory.of(
         ca.vertcat(model.expression("conserved"), model.expression("kinetic")), at
     )

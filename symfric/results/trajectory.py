@@ -16,6 +16,7 @@ from symfric.foundation.files import write_text, written
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import check_names
 from symfric.foundation.status import Status
+from symfric.foundation.symbols import strays
 from symfric.model import Model
 from symfric.results.energy import EnergyBalance, energy_balance, integrals
 
@@ -205,8 +206,7 @@ class Trajectory:
         """
         column, model = ca.SX(expression), self.model
         known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
-        declared = {e.__hash__() for e in ca.symvar(known)}
-        stray = [str(s) for s in ca.symvar(column) if s.__hash__() not in declared]
+        stray = strays(column, known)
         if stray:
             raise ValueError(
                 f"trajectory of '{self.scene}': expected an expression in the symbols of its "

@@ -10,6 +10,7 @@ import casadi as ca
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Parametric, Variable, symbolise
+from symfric.foundation.symbols import at_start, symbols_of
 from symfric.laws import Law
 from symfric.laws.base.law import check_law, chosen
 from symfric.model import Event, Model, Monitor, Variables
@@ -101,9 +102,7 @@ def slip_monitor(law: Law, v: Scalar, p: Variables) -> tuple[Monitor, ...]:
 
     The scale is taken at the start values of `p`; a law without one adds nothing.
     """
-    symbols = ca.vertcat(ca.SX(0, 1), *(variable.symbol for variable in p))
-    values = ca.vertcat(ca.SX(0, 1), *(variable.start for variable in p))
-    scale = float(ca.DM(ca.substitute(ca.SX(law.velocity_scale), symbols, ca.SX(values))))
+    scale = float(at_start(law.velocity_scale, p))
     return (Monitor(v, scale),) if isfinite(scale) else ()
 
 
@@ -114,4 +113,4 @@ def friction_states(law: Law, v: Scalar, N: Scalar) -> tuple[Variables, ca.SX]:
         Variable(s.name, s.unit, start=start[i], nominal=s.nominal, doc="internal friction state")
         for i, s in enumerate(law.states)
     )
-    return variables, ca.vertcat(ca.SX(0, 1), *(v.symbol for v in variables))
+    return variables, symbols_of(variables)

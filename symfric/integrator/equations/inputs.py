@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation.parameters import check_names
+from symfric.foundation.symbols import stacked
 from symfric.model import Model, finite
 
 
@@ -141,12 +142,12 @@ def drivers(
         else:
             rows.append(ca.SX(signal(model.t)))
             key.append(signal)
-    expression = ca.vertcat(ca.SX(0, 1), *rows)
+    expression = stacked(rows)
     if ca.depends_on(expression, start):
         symbols, values = [*symbols, start], [*values, breaks[:-1]]
     return Drivers(
         expression,
-        ca.vertcat(ca.SX(0, 1), *symbols),
+        stacked(symbols),
         breaks,
         np.vstack(values) if values else np.zeros((0, breaks.size - 1)),
         tuple(key),
@@ -155,7 +156,4 @@ def drivers(
 
 def _undriven(t_start: float, t_end: float) -> Drivers:
     """The drivers of a model without inputs."""
-    return Drivers(_NONE, _NONE, np.array([t_start, t_end]), np.zeros((0, 1)), ())
-
-
-_NONE = ca.SX(0, 1)
+    return Drivers(stacked(()), stacked(()), np.array([t_start, t_end]), np.zeros((0, 1)), ())

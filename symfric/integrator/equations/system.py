@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.symbols import stacked
 from symfric.integrator.equations.inputs import Drivers
 from symfric.integrator.equations.manifold import Manifold, holonomic_columns, manifold
 from symfric.model import Model
@@ -117,7 +118,7 @@ def system(model: Model, inputs: Drivers) -> System:
     # an algebraic unknown without influence on the states would be free to be anything
     watched = [*((m.expression, m.nominal) for m in model.monitors)]
     watched += [(v.symbol, v.nominal) for v in model.z]
-    monitors = ca.vertcat(ca.SX(0, 1), *(ca.SX(expression) for expression, _ in watched))
+    monitors = stacked(ca.SX(expression) for expression, _ in watched)
     d = ca.vertcat(model.vector("p"), inputs.data)
     n, m = (mechanics.n, phi.numel()) if mechanics else (0, 0)
     own = (i for i in range(nx) if mass.sparsity().has_nz(i, i))

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.symbols import stacked
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.compiled.compiler import find_compiler, library_path
 from symfric.integrator.equations.blocks import refinement
@@ -60,7 +61,7 @@ class Integrator:
 
     def _event_function(self) -> ca.Function:
         """Event expressions as a Function (t, y, d)."""
-        values = ca.vertcat(ca.SX(0, 1), *(ca.SX(e.expression) for e in self.model.events))
+        values = stacked(ca.SX(e.expression) for e in self.model.events)
         return self.of_time("events", values)
 
     def of_time(self, name: str, expression: ca.SX) -> ca.Function:
