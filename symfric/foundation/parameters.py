@@ -6,15 +6,15 @@ identification and optimal control). Objects nest: a scene holds a law, a sum ho
 """
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from difflib import get_close_matches
 from math import inf, isfinite
 from typing import Any, ClassVar, TypeVar
 
 import casadi as ca
 import numpy as np
 
+from symfric.foundation.checks import check_names
 from symfric.foundation.numeric import Scalar, is_casadi, is_number, is_symbolic
 
 
@@ -288,16 +288,3 @@ def symbolise(obj: P, *names: str) -> tuple[P, tuple[Variable, ...]]:
 
 def _magnitude(value: Scalar) -> float:
     return 1.0 if is_symbolic(value) or float(value) == 0.0 else abs(float(value))
-
-
-def check_names(where: str, names: Iterable[str], known: Collection[str]) -> None:
-    """Refuse names that are not in `known`, all in one error that offers the closest ones."""
-    unknown = [name for name in names if name not in known]
-    if unknown:
-        hints = [get_close_matches(name, list(known), n=1, cutoff=0.4) for name in unknown]
-        did_you_mean = ", ".join(h[0] for h in hints if h)
-        raise ValueError(
-            f"{where}: expected one of {', '.join(known) or 'no parameters'}, "
-            f"got {', '.join(unknown)}"
-            + (f"; did you mean {did_you_mean}?" if did_you_mean else "; check the spelling")
-        )

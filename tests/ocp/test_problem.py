@@ -30,7 +30,7 @@ def implicit() -> Model:
         ({"initial": {"vv": 1.0}}, r"initial: .* got vv; did you mean v\?"),
         ({"initial": {"a": 1.0}}, "initial: expected one of x, v, got a"),
         ({"bounds": {"powr": 1.0}}, r"bounds: .* got powr; did you mean power\?"),
-        ({"p": {"m": 1.0}}, "p: expected one of no parameters, got m"),
+        ({"p": {"m": 1.0}}, "p: expected no names, got m"),
         ({"via": {0.5: {"z": 1.0}}}, r"via 0\.5: expected one of x, v, got z"),
         ({"via": {1.5: {"x": 1.0}}}, r"via: expected fractions of T between 0 and 1, got 1\.5"),
         ({"via": {0.5: {"x": (2, 1)}}}, r"via 0\.5: expected x as a finite number or \(lower"),

@@ -254,7 +254,7 @@ def test_failed_solve_is_returned_where_nothing_is_to_be_thrown() -> None:
         ({"x0": {"vel": 1.0}}, r"model 'drive' x0: .* got vel"),
         ({"x0": {"v": np.inf}}, r"drive.v: expected a finite number, got inf"),
         ({"u": {"torque": 1.0}}, r"model 'drive' u: expected one of force, got torque"),
-        ({"p": {"m": 1.0}}, r"model 'drive' p: expected one of no parameters, got m"),
+        ({"p": {"m": 1.0}}, r"model 'drive' p: expected no names, got m"),
         ({"t_eval": [0.0, 0.5, 0.5]}, r"t_eval: expected increasing times in \[0, 1\] s"),
         ({"t_eval": [0.0, 2.0]}, r"t_eval: expected increasing times in \[0, 1\] s"),
         ({"t_eval": []}, r"t_eval: expected increasing times"),

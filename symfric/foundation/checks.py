@@ -1,0 +1,293 @@
+"""What the public doors ask of their arguments, each question in one place.
+
+Every check takes `where` first ("simulate: rtol"), returns the value in the type the door works
+with, and refuses with one sentence:
+
+    <where>: expected <what>, got <value>; <hint>
+
+Numbers are what NumPy and CasADi users hold in their hands: int, float, NumPy scalars of any real
+type, arrays without dimension, constant CasADi scalars. Truth values, texts and complex numbers
+are none.
+"""
+
+import operator
+from collections.abc import Collection, Iterable, Mapping
+from difflib import get_close_matches
+from math import inf, isfinite
+from numbers import Real
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any, TypeVar
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+
+LONGEST = 60
+"""Characters of a value that are shown in an error."""
+LISTED = 16
+"""Names that are listed in an error; of more only the closest are offered."""
+
+
+def refused(where: str, what: str, value: object, hint: str = "") -> ValueError:
+    """The error that says what was expected and what came instead."""
+    return ValueError(f"{where}: expected {what}, got {shown(value)}" + (f"; {hint}" * bool(hint)))
+
+
+def shown(value: object) -> str:
+    """`value` in a few words, whatever it is."""
+    if isinstance(value, type):
+        return f"the class {value.__name__}"
+    if isinstance(value, np.ndarray) and value.ndim:
+        kind = "" if value.dtype.kind in "iuf" else f" of {value.dtype}"
+        return f"an array of shape {value.shape}{kind}"
+    if isinstance(value, ca.SX | ca.MX):
+        size = "" if value.numel() == 1 else f" of shape {value.shape}"
+        return f"the expression {_cut(str(value))}{size}"
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.item()
+    if callable(value) and hasattr(value, "__name__"):
+        return f"the function {value.__name__}"
+    text = repr(value)
+    if text.startswith("<") or "\n" in text:
+        return f"an object of type {type(value).__name__}"
+    return _cut(text)
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+
+
+def as_number(value: object) -> float | None:
+    """`value` as a float where it is a number as told above, finite or not; else None."""
+    if isinstance(value, bool | np.bool_):
+        return None
+    if isinstance(value, Real):
+        try:
+            return float(value)
+        except OverflowError:
+            return inf  # a whole number of more than 308 digits
+    if isinstance(value, np.ndarray):
+        return float(value) if value.ndim == 0 and value.dtype.kind in "iuf" else None
+    if isinstance(value, ca.DM) or (isinstance(value, ca.SX) and value.is_constant()):
+        return float(value) if value.is_scalar() else None
+    return None
+
+
+def number(
+    where: str,
+    value: object,
+    *,
+    unit: str = "",
+    lower: float = -inf,
+    upper: float = inf,
+    above: float | None = None,
+    hint: str = "",
+) -> float:
+    """`value` as a finite float.
+
+    Args:
+        where: for the message.
+        unit: likewise.
+        lower, upper: closed bounds.
+        above: open lower bound.
+        hint: what to do instead.
+
+    Raises:
+        ValueError: no number, NaN, infinite, or out of bounds.
+    """
+    found, unit = as_number(value), f" [{unit}]" * bool(unit)
+    if found is None or not isfinite(found):
+        raise refused(where, f"a finite number{unit}", value, hint)
+    if above is not None and not found > above:
+        raise refused(where, f"a number > {above:g}{unit}", value, hint)
+    if not lower <= found <= upper:
+        least = f"{lower:g} <= " if lower > -inf else ""
+        most = f" <= {upper:g}" if upper < inf else ""
+        what = f"{least}number{most}" if least and most else f"a number {_bound(lower, upper)}"
+        raise refused(where, what + unit, value, hint)
+    return found
+
+
+def _bound(lower: float, upper: float) -> str:
+    return f">= {lower:g}" if lower > -inf else f"<= {upper:g}"
+
+
+def count(
+    where: str, value: object, *, least: int = 1, most: int | None = None, hint: str = ""
+) -> int:
+    """`value` as an int; 1e6 is one.
+
+    Raises:
+        ValueError: no whole number, or out of bounds.
+    """
+    found: int | None = None
+    real = as_number(value)
+    if real is not None and isfinite(real) and real == int(real):
+        exact = isinstance(value, int | np.integer)
+        found = operator.index(value) if exact else int(real)
+    bounds = f" >= {least}" if most is None else f" from {least} to {most}"
+    if found is None or found < least or (most is not None and found > most):
+        raise refused(where, f"a whole number{bounds}", value, hint)
+    return found
+
+
+def flag(where: str, value: object) -> bool:
+    """`value` as a bool: True or False, nothing that merely counts as one."""
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    raise refused(where, "True or False", value)
+
+
+def text(where: str, value: object, what: str = "a text", hint: str = "") -> str:
+    """`value` as a text that is not empty."""
+    if isinstance(value, str) and value.strip():
+        return str(value)
+    raise refused(where, what, value, hint)
+
+
+def choice(where: str, value: object, choices: Collection[str]) -> str:
+    """`value` as one of the texts in `choices`; the nearest one is offered."""
+    if not isinstance(value, str):
+        raise refused(where, _one_of(choices), value)
+    check_names(where, [value], choices)
+    return value
+
+
+def kind(where: str, value: object, wanted: type[T], such_as: str) -> T:
+    """`value`, which must be an instance of `wanted`.
+
+    `such_as` is an article, a noun and an example: "a model, such as rabinowicz(LuGre())".
+    """
+    if isinstance(value, wanted):
+        return value
+    hint = ""
+    if isinstance(value, type) and issubclass(value, wanted):
+        hint = f"write {value.__name__}(...) with parentheses"
+    raise refused(where, such_as, value, hint)
+
+
+def named(where: str, value: object, known: Collection[str] | None = None) -> dict[str, Any]:
+    """`value`, a mapping from names to anything or None, as a dict; unknown names are refused."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        raise refused(where, "values by name, such as {'v': 0.1}", value)
+    given: dict[Any, Any] = dict(value)  # pyright: ignore[reportUnknownArgumentType]
+    odd = [name for name in given if not isinstance(name, str)]
+    if odd:
+        raise refused(where, "texts as names", odd[0])
+    if known is not None:
+        check_names(where, given, known)
+    return given
+
+
+def many(where: str, value: object, what: str) -> tuple[Any, ...]:
+    """`value`, a sequence of `what`, as a tuple; a single text is not taken for its letters."""
+    if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
+        raise refused(where, f"a sequence of {what}", value)
+    return tuple(value)  # pyright: ignore[reportUnknownArgumentType, reportUnknownVariableType]
+
+
+def names(
+    where: str, value: object, known: Collection[str] | None = None, hint: str = ""
+) -> tuple[str, ...]:
+    """`value`, a sequence of texts, as a tuple, each known and there once."""
+    if isinstance(value, str):
+        raise refused(where, "a sequence of names", value, f"write [{value!r}]")
+    given = many(where, value, "names")
+    for name in given:
+        text(where, name, "names")
+    if len(set(given)) != len(given):
+        raise ValueError(f"{where}: expected every name once, got {', '.join(given)}")
+    if known is not None:
+        check_names(where, given, known, hint)
+    return given
+
+
+def array(where: str, value: object, *, ndim: int | None = 1, unit: str = "") -> Array:
+    """`value` as an array of finite floats; `ndim` None takes any number of dimensions.
+
+    Raises:
+        ValueError: no numbers, NaN, infinite, another number of dimensions.
+    """
+    what = {0: "a number", 1: "a sequence of numbers", 2: "a matrix of numbers"}.get(
+        -1 if ndim is None else ndim, "numbers"
+    ) + f" [{unit}]" * bool(unit)
+    if isinstance(value, ca.DM):
+        value = value.full().squeeze()
+    try:
+        found = np.asarray(value)
+    except (ValueError, TypeError, RuntimeError):  # ragged; CasADi's own refusals
+        raise refused(where, what, value) from None
+    if found.dtype.kind not in "iuf" and found.size:
+        raise refused(where, what, value)
+    if ndim is not None and found.ndim != ndim:
+        raise refused(where, what, found if found.ndim else value)
+    numbers = found.astype(float)
+    if not np.isfinite(numbers).all():
+        k = tuple(int(i) for i in np.argwhere(~np.isfinite(numbers))[0])
+        place = f" at {', '.join(map(str, k))}" if k else ""
+        raise ValueError(f"{where}: expected finite numbers, got {numbers[k]}{place}")
+    return numbers
+
+
+def times(where: str, value: object, first: float = -inf, last: float = inf) -> Array:
+    """`value` as an array of increasing times [s] in [first, last], at least one."""
+    found = array(where, value, unit="s")
+    if not found.size:
+        raise ValueError(f"{where}: expected at least one time [s], got none")
+    steps = np.diff(found)
+    if (steps <= 0).any():
+        k = int(np.argmax(steps <= 0))
+        raise ValueError(
+            f"{where}: expected increasing times, got {found[k + 1]:g} after {found[k]:g} s"
+        )
+    if found[0] < first or found[-1] > last:
+        raise ValueError(
+            f"{where}: expected times in [{first:g}, {last:g}] s, "
+            f"got {found[0]:g} ... {found[-1]:g} s"
+        )
+    return found
+
+
+def path(where: str, value: object) -> Path:
+    """`value` as the path of a file or folder."""
+    name = fspath(value) if isinstance(value, str | PathLike) else None
+    if not isinstance(name, str) or not name or "\0" in name:
+        raise refused(where, "a path, such as 'run.csv'", value)
+    return Path(name)
+
+
+def function(where: str, value: object, what: str) -> Any:
+    """`value`, which can be called."""
+    if callable(value) and not isinstance(value, type):
+        return value
+    raise refused(where, what, value)
+
+
+def check_names(where: str, given: Iterable[str], known: Collection[str], hint: str = "") -> None:
+    """Refuse names that are not in `known`, all in one error that offers the closest ones."""
+    unknown = [str(name) for name in given if name not in known]
+    if not unknown:
+        return
+    close = [get_close_matches(name, list(known), n=1, cutoff=0.4) for name in unknown]
+    offers = ", ".join(c[0] for c in close if c)
+    advice = f"did you mean {offers}?" if offers else ("check the spelling" if known else "")
+    if hint:
+        advice = f"{advice} {hint}" if offers else hint
+    got = ", ".join(_cut(name) for name in unknown)
+    raise ValueError(
+        f"{where}: expected {_one_of(known)}, got {got}" + f"; {advice}" * bool(advice)
+    )
+
+
+def _one_of(known: Collection[str]) -> str:
+    if not known:
+        return "no names"
+    if len(known) > LISTED:
+        return f"one of {len(known)} known names"
+    return f"one of {', '.join(known)}"

@@ -1,0 +1,146 @@
+"""The checks every public door shares: what they accept, and the sentence they refuse with."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric.foundation import checks
+
+NUMBERS: list[Any] = [
+    2,
+    2.0,
+    np.float32(2),
+    np.float64(2),
+    np.int64(2),
+    np.uint8(2),
+    np.array(2.0),
+    np.array(2),
+    ca.DM(2),
+    ca.SX(2),
+]
+NO_NUMBERS: list[Any] = [
+    None,
+    "2",
+    [2.0],
+    (2.0,),
+    {},
+    True,
+    np.True_,
+    2j,
+    object(),
+    float,
+    np.array([2.0]),
+    np.array("2"),
+    np.array(None),
+    ca.SX.sym("a"),
+    ca.MX.sym("a"),
+    ca.DM([1, 2]),
+    float("nan"),
+    float("inf"),
+    10**400,
+    lambda: 2,
+]
+
+
+def test_every_real_scalar_is_a_number_and_nothing_else_is() -> None:
+    for value in NUMBERS:
+        found = checks.number("here", value)
+        assert found == 2.0
+        assert type(found) is float
+    for value in NO_NUMBERS:
+        with pytest.raises(ValueError, match=r"^here: expected a finite number \[m\], got .+; do"):
+            checks.number("here", value, unit="m", hint="do")
+
+
+def test_counts_are_whole_and_flags_are_truth_values() -> None:
+    for value in [*NUMBERS, 2e0]:
+        found = checks.count("here", value)
+        assert found == 2
+        assert type(found) is int
+    assert checks.count("here", 10**30) == 10**30
+    for value in [*NO_NUMBERS, 2.5, 0, -1]:
+        with pytest.raises(ValueError, match=r"^here: expected a whole number >= 1, got "):
+            checks.count("here", value)
+    with pytest.raises(ValueError, match="whole number from 1 to 3, got 4"):
+        checks.count("here", 4, most=3)
+    assert checks.flag("here", np.True_) is True
+    for value in (None, 1, "yes", [], np.array(1)):
+        with pytest.raises(ValueError, match=r"^here: expected True or False, got "):
+            checks.flag("here", value)
+
+
+REFUSED: list[tuple[Callable[[], object], str]] = [
+    (lambda: checks.number("w", -1, lower=0.0), "w: expected a number >= 0, got -1"),
+    (lambda: checks.number("w", 2, upper=1.0, unit="m"), r"a number <= 1 \[m\], got 2"),
+    (lambda: checks.number("w", 2, lower=0.0, upper=1.0), "expected 0 <= number <= 1, got 2"),
+    (lambda: checks.number("w", 0, above=0.0, unit="s"), r"expected a number > 0 \[s\], got 0"),
+    (lambda: checks.choice("w", "bb", ("aa", "b")), "one of aa, b, got bb; did you mean b"),
+    (lambda: checks.choice("w", 3, ("aa", "b")), "expected one of aa, b, got 3$"),
+    (lambda: checks.choice("w", ["aa"], ("aa", "b")), r"got \['aa'\]$"),
+    (lambda: checks.text("w", " "), "expected a text, got ' '"),
+    (lambda: checks.kind("w", int, int, "a whole, such as 3"), r"got the class int; write int\("),
+    (lambda: checks.kind("w", "3", int, "a whole, such as 3"), "a whole, such as 3, got '3'$"),
+    (lambda: checks.named("w", [1]), r"expected values by name, such as .*, got \[1\]"),
+    (lambda: checks.named("w", {1: 2}), "expected texts as names, got 1"),
+    (lambda: checks.named("w", {"a": 2}, ()), "w: expected no names, got a$"),
+    (lambda: checks.names("w", "mu"), r"a sequence of names, got 'mu'; write \['mu'\]"),
+    (lambda: checks.names("w", 3), "expected a sequence of names, got 3"),
+    (lambda: checks.names("w", ["a", 3]), "expected names, got 3"),
+    (lambda: checks.names("w", ["a", "a"]), "expected every name once, got a, a"),
+    (lambda: checks.names("w", ["a"], ["b"]), "expected one of b, got a"),
+    (lambda: checks.many("w", "ab", "laws"), "expected a sequence of laws, got 'ab'"),
+    (lambda: checks.array("w", [1, [2, 3]]), "expected a sequence of numbers, got "),
+    (lambda: checks.array("w", [1, None]), "expected a sequence of numbers, got .1, None"),
+    (lambda: checks.array("w", ["1"]), "expected a sequence of numbers, got "),
+    (lambda: checks.array("w", [[1.0]]), r"got an array of shape \(1, 1\)"),
+    (lambda: checks.array("w", 1.0), "expected a sequence of numbers, got 1.0"),
+    (lambda: checks.array("w", [1.0, np.nan]), "expected finite numbers, got nan at 1"),
+    (lambda: checks.array("w", ca.SX.sym("a", 2)), "expected a sequence of numbers, got "),
+    (lambda: checks.times("w", []), r"expected at least one time \[s\], got none"),
+    (lambda: checks.times("w", [1, 1]), "expected increasing times, got 1 after 1 s"),
+    (lambda: checks.times("w", [1, 3], 0, 2), r"times in \[0, 2\] s, got 1 ... 3 s"),
+    (lambda: checks.path("w", ""), "expected a path, such as 'run.csv', got ''"),
+    (lambda: checks.path("w", 3), "expected a path, such as 'run.csv', got 3"),
+    (lambda: checks.path("w", b"a"), "expected a path"),
+    (lambda: checks.function("w", 3, "a function of t"), "expected a function of t, got 3"),
+]
+
+
+def test_every_check_says_where_what_and_what_came() -> None:
+    for call, message in REFUSED:
+        with pytest.raises(ValueError, match=message):
+            call()
+
+
+def test_what_is_right_comes_back_in_one_type() -> None:
+    assert checks.number("w", -3) == -3.0
+    assert checks.choice("w", "a", ("a", "b")) == "a"
+    assert checks.named("w", None) == {}
+    assert checks.named("w", {"a": 1}, ["a"]) == {"a": 1}
+    assert checks.names("w", (n for n in ("a", "b")), ["a", "b"]) == ("a", "b")
+    for rows in ([1, 2], (1.0, 2.0), np.array([1, 2], np.float32), range(1, 3), ca.DM([1, 2])):
+        found = checks.array("w", rows)
+        assert found.dtype == np.float64
+        assert found.tolist() == [1.0, 2.0]
+    assert checks.array("w", []).shape == (0,)
+    assert checks.times("w", [0, 1], 0, 1).tolist() == [0.0, 1.0]
+    assert checks.path("w", "a.csv") == Path("a.csv")
+
+
+def test_many_names_are_not_all_listed_and_the_closest_is_offered() -> None:
+    """An unknown law used to print all fifty-three before the suggestion."""
+    known = [f"law_{i}" for i in range(53)]
+    with pytest.raises(ValueError, match="one of 53 known names, got law_7x; did you mean law_7"):
+        checks.check_names("law 'law_7x'", ["law_7x"], known)
+    with pytest.raises(ValueError, match="one of 53 known names, got qqq; symfric laws lists them"):
+        checks.check_names("law 'qqq'", ["qqq"], known, "symfric laws lists them")
+
+
+def test_a_long_value_is_cut() -> None:
+    with pytest.raises(ValueError, match=r"got 'xxxxx.*\.\.\.$") as caught:
+        checks.number("w", "x" * 10_000)
+    assert len(str(caught.value)) < 120
