@@ -1,17 +1,27 @@
 # make demo, test, check, stress: each makes its own virtual environment .venv when there is none.
-# PYTHON=... chooses the interpreter (3.11 or newer).
+# PYTHON=... chooses the interpreter (3.11 or newer). make newest: the fast half of the tests on the
+# newest interpreter there is, with the newest NumPy, in .venv-newest.
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test check stress clean
+.PHONY: demo test newest check stress clean
 
 demo: $(VENV)/.runtime
 	$(BIN)/symfric demo --out out
 
 test: $(VENV)/.test
 	$(BIN)/python -m pytest
+
+newest:
+	@newest="$$(sh .ci/newest-python "$(PYTHON)")"; \
+	if [ -z "$$newest" ]; then echo "newest: no interpreter newer than $(PYTHON), nothing run"; else \
+		echo "newest: $$($$newest --version)"; \
+		$(MAKE) VENV=.venv-newest PYTHON="$$newest" .venv-newest/.test && \
+		.venv-newest/bin/python -m pip install --quiet --upgrade numpy && \
+		.venv-newest/bin/python -c 'import numpy; print("newest: NumPy", numpy.__version__)' && \
+		.venv-newest/bin/python -m pytest -p no:cacheprovider -m "not slow and not heavy"; fi
 
 stress: $(VENV)/.test
 	$(BIN)/python -m pytest -m slow
@@ -22,7 +32,7 @@ check: $(VENV)/.dev
 	$(BIN)/basedpyright --pythonpath $(BIN)/python
 
 clean:
-	rm -rf $(VENV) out dist build .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .venv-newest out dist build .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The stages build on each other, so that `make -j` never runs two installers at once.

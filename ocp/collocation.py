@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import final
 
+import casadi as ca
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
@@ -56,9 +57,7 @@ def radau(degree: int) -> Radau:
     """
     if degree not in range(1, MAX_DEGREE + 1):
         raise ValueError(f"radau: expected a degree in 1 ... {MAX_DEGREE}, got {degree!r}")
-    zeros = legendre.legroots([0.0] * (degree - 1) + [-1.0, 1.0])  # of P_d - P_(d-1)
-    points = (np.sort(zeros) + 1) / 2
-    points[-1] = 1.0
+    points = np.array(ca.collocation_points(degree, "radau"))  # zeros of P_d - P_(d-1)
     nodes = np.concatenate([[0.0], points])
     moments = np.eye(degree)[0]  # of the shifted Legendre polynomials over [0, 1]
     weights = np.linalg.solve(legendre.legvander(2 * points - 1, degree - 1).T, moments)

@@ -1,7 +1,5 @@
 """Friction laws as CasADi expressions, from simulation to optimal control and embedded C."""
 
-from importlib.metadata import version as _version
-
 from symfric.figures import FigureData as FigureData
 from symfric.figures import compare as compare
 from symfric.figures import figure as figure
@@ -100,4 +98,4 @@ from symfric.model import Output as Output
 from symfric.scenes import drive as drive
 from symfric.scenes import rabinowicz as rabinowicz
 
-__version__ = _version("symfric")
+__version__ = "0.1.0"
