@@ -14,7 +14,7 @@ from symfric.bench.timing import best_time
 from symfric.foundation.numeric import flat_view
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.run import GROWTH_MEMORY
+from symfric.integrator.step.layout import Given, State
 from symfric.laws import Law
 from symfric.model import Model
 from symfric.multibody import JointFriction, Mechanism, Revolute
@@ -103,8 +103,8 @@ def step_time(made: Integrator) -> float:
         y[i] = guesses.get(name, y[i])
     d = np.zeros(whole.d.numel())
     y = consistent(whole, "bench", y, d)
-    S = np.concatenate([[0.0, 1e-4, 1e-4, GROWTH_MEMORY, 0.0], y])
-    R = np.concatenate([[1.0, 1e-6], 1e-7 * whole.nominal, d])
+    S = State.at(0.0, 1e-4, y)
+    R = Given.of(1.0, 1e-6, 1.0, 1e-7 * whole.nominal, d)
     S_out, D = np.zeros(S.size), np.zeros(made.step.numel_out(1))
     buffer, evaluate = cast(tuple[Any, Any], made.step.buffer())
     for i, column in enumerate((S, R)):

@@ -29,8 +29,9 @@ from symfric.integrator.peers.casadi_integrators import peer
 from symfric.integrator.running.dense import from_records
 from symfric.integrator.running.engine import Stop
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.run import ATTEMPTS, GROWTH_MEMORY, ROWS, Tolerances
+from symfric.integrator.running.run import ATTEMPTS, ROWS, Tolerances
 from symfric.integrator.simulate import simulate
+from symfric.integrator.step.layout import Given, State
 from symfric.model import Model
 
 Array = NDArray[np.float64]
@@ -67,18 +68,17 @@ def loop(model: Model, times: Array, watched: tuple[str, ...], rtol: float) -> C
         warnings.simplefilter("ignore")
         made = Integrator(model, inputs, chosen("bench", "auto", rtol))
     engine, end = made.compiled(), float(times[-1])
-    R = np.concatenate([[end, rtol], 0.1 * rtol * whole.nominal, np.zeros(whole.d.numel())])
+    R = Given.of(end, rtol, end, 0.1 * rtol * whole.nominal, np.zeros(whole.d.numel()))
     rows = [whole.names.index(name) for name in watched]
 
     def solve() -> tuple[Array, int]:
-        h, pieces = first_step(end), list[Array]()
-        S = np.concatenate([[0.0, h, h, GROWTH_MEMORY, 0.0], y0])
+        S, pieces = State.at(0.0, first_step(end), y0), list[Array]()
         reason = Stop.FULL
         while reason in (Stop.FULL, Stop.ATTEMPTS):
             records, _, reason = engine.run(S, R, ROWS, ATTEMPTS["compiled"], 1e-15 * end)
             pieces.append(records)
         if reason is not Stop.END:
-            raise RuntimeError(f"the step became too small at t = {S[0]:g} s")
+            raise RuntimeError(f"the step became too small at t = {S[State.T]:g} s")
         every = np.vstack(pieces)
         return from_records(every, whole.n)(times)[rows], every.shape[0]
 

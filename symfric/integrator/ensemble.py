@@ -29,7 +29,7 @@ from symfric.integrator.many.one_by_one import solve_one_by_one
 from symfric.integrator.many.store import Store
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import Tolerances
-from symfric.integrator.step.attempt import GROWTH_MEMORY
+from symfric.integrator.step.layout import State
 from symfric.model import Model
 
 Array = NDArray[np.float64]
@@ -262,13 +262,8 @@ def _chunk(
     y, p = starts(pick)
     t_start, t_end = float(inputs.breaks[0]), float(inputs.breaks[-1])
     h = first_step(t_end - t_start)
-    memory = np.array([t_start, h, h, GROWTH_MEMORY, 0.0])
-    common = np.concatenate([[t_end, tolerances.rtol], tolerances.atol])
     data = np.tile(inputs.values[:, 0], (y.shape[0], 1))
-    return Chunk(
-        np.hstack([np.tile(memory, (y.shape[0], 1)), y]),
-        np.hstack([np.tile(common, (y.shape[0], 1)), p, data]),
-    )
+    return Chunk(State.at(t_start, h, y), tolerances.given(t_end, np.hstack([p, data])))
 
 
 def _identity(

@@ -24,7 +24,7 @@ from symfric.integrator.many.members import (
 )
 from symfric.integrator.running.engine import Stop
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.attempt import MEMORY
+from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -36,7 +36,7 @@ WHY = {Stop.ATTEMPTS: Status.MAX_STEPS, Stop.STEP_TOO_SMALL: Status.STEP_TOO_SMA
 @final
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """Start columns S (members, MEMORY + n) and run data R (members, size)."""
+    """Start columns S (members, rows) and run data R (members, size)."""
 
     S: Array
     R: Array
@@ -223,13 +223,15 @@ def solve_chunk(job: Job, chunk: Chunk) -> Solved:
         found, reason = runner.run(part, chunk.R[alive], made, stretch)
         S[alive], attempts[alive] = part, made
         signals[np.ix_(alive, inside)] = found
-        for m, why, t in zip(alive.tolist(), reason.tolist(), part[:, 0].tolist(), strict=True):
+        for m, why, t in zip(
+            alive.tolist(), reason.tolist(), part[:, State.T].tolist(), strict=True
+        ):
             if why in WHY:
                 failed[m] = (
                     f"{WHY[why].value} It stands at t = {t:g} s; simulate it alone for more."
                 )
         alive = alive[reason == Stop.END]
-    return Solved(signals, attempts, S[:, 0].copy(), failed)
+    return Solved(signals, attempts, S[:, State.T].copy(), failed)
 
 
 def _follow(
@@ -239,10 +241,10 @@ def _follow(
     equations, together = _equations(
         job.names, job.nx, *job.algebraic, job.constraints, job.manifold
     )
-    d = chunk.R[alive, 2 + job.nx :]
+    d = chunk.R[alive, Given.d(job.nx)]
     d[:, d.shape[1] - job.data.shape[0] :] = job.data[:, interval]
-    S[alive, MEMORY:], refused = consistent_many(
-        equations, together, job.where, S[alive, MEMORY:], d
+    S[alive, State.Y], refused = consistent_many(
+        equations, together, job.where, S[alive, State.Y], d
     )
     failed |= {int(alive[m]): message for m, message in refused.items()}
     return np.delete(alive, list(refused))

@@ -16,7 +16,7 @@ from symfric.integrator.compiled.columns import Columns, densified
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.running.dense import from_records
 from symfric.integrator.running.engine import Stop, VmEngine, c_source, width
-from symfric.integrator.step.attempt import MEMORY
+from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -50,8 +50,8 @@ class Members(Protocol):
         """Advance members over a stretch.
 
         Args:
-            S: start columns (members, MEMORY + n), advanced in place.
-            R: run data (members, size).
+            S: start columns S, one a row, advanced in place.
+            R: run data R, one a row.
             made: attempts of each member, added to in place.
             stretch: intervals and times.
 
@@ -92,10 +92,10 @@ class VmMembers:
         n_data, n_d = stretch.data.shape[0], self.signals.function.numel_in(2)
         last, stop = stretch.breaks.size - 2, Stop.END
         for k in range(last + 1):
-            R[0], R[R.size - n_data :] = stretch.breaks[k + 1], stretch.data[:, k]
-            from_t, y0 = S[0], S[MEMORY:].copy()
+            R[Given.T_END], R[R.size - n_data :] = stretch.breaks[k + 1], stretch.data[:, k]
+            from_t, y0 = S[State.T], S[State.Y].copy()
             records, made, stop = self._attempts(S, R, made, stretch)
-            at = stretch.times[(stretch.times >= stretch.breaks[k]) & (stretch.times <= S[0])]
+            at = stretch.times[(stretch.times >= stretch.breaks[k]) & (stretch.times <= S[State.T])]
             if k < last:
                 at = at[at < stretch.breaks[k + 1]]
             y, inside = np.tile(y0, (at.size, 1)), at > from_t
@@ -171,12 +171,14 @@ class CompiledMembers:
 
 def many_source(step: ca.Function, signals: ca.Function) -> str:
     """C of the step and of the signals, with the loop over members."""
-    n = step.numel_in(0) - MEMORY
+    n = step.numel_in(0) - State.MEMORY
     dense_rows = step.numel_out(1) // n
     values = densified(signals)
     return c_source(step, dense_rows, values) + Template(_MANY).substitute(
         n=n,
-        memory=MEMORY,
+        memory=State.MEMORY,
+        t=State.T,
+        t_end=Given.T_END,
         width=width(n, dense_rows),
         dense_rows=dense_rows,
         signals=values.name(),
@@ -212,7 +214,8 @@ void symfric_many(double *S, double *R, long long size_R, long long members, con
                   long long n_times, long long max_attempts, double h_min, double *out,
                   long long *reason, long long *made)
 {
-  enum { N = $n, MEM = $memory, ROWS = $dense_rows, WIDTH = $width, SIGNALS = $n_signals };
+  enum { N = $n, MEM = $memory, ROWS = $dense_rows, WIDTH = $width, SIGNALS = $n_signals,
+         T = $t, T_END = $t_end };
   double row[WIDTH], y[N];
   long long m, k, i, r, count[2];
   for (m = 0; m < members; ++m, S += MEM + N, R += size_R) {
@@ -221,16 +224,16 @@ void symfric_many(double *S, double *R, long long size_R, long long members, con
     int stop = 0;
     for (k = 0; k < intervals && stop == 0; ++k) {
       const int last = k + 1 == intervals;
-      R[0] = breaks[k + 1];
+      R[T_END] = breaks[k + 1];
       for (i = 0; i < n_data; ++i) R[size_R - n_data + i] = data[i * intervals + k];
-      for (; next < n_times && times[next] <= S[0]; ++next, out += SIGNALS)
+      for (; next < n_times && times[next] <= S[T]; ++next, out += SIGNALS)
         symfric_values(times[next], S + MEM, d, out);
       stop = 1;
       while (stop == 1) {
         stop = symfric_run(S, R, row, 1, max_attempts - made[m], h_min, count);
         made[m] += count[1];
         if (!count[0]) break;
-        for (; next < n_times && times[next] <= row[1] && (last || times[next] < R[0]);
+        for (; next < n_times && times[next] <= row[1] && (last || times[next] < R[T_END]);
              ++next, out += SIGNALS) {
           const double s = (times[next] - row[0]) / (row[1] - row[0]);
           for (i = 0; i < N; ++i) {

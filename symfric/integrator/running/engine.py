@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import flat_view
 from symfric.integrator.compiled.compiler import load
-from symfric.integrator.step.attempt import MEMORY
+from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ class VmEngine:
     ) -> tuple[Array, int, Stop]:
         """Advance S; return the records, the attempts made and why it stopped."""
         size = self.batch.size2_out(0)
-        n = S.size - MEMORY
+        n = S.size - State.MEMORY
         S_out, D = np.zeros((size, S.size)), np.zeros((size, self.step.numel_out(1)))
         every = np.tile(R, size)
         buffer, evaluate = cast(tuple[Any, Any], self.batch.buffer())
@@ -81,18 +81,19 @@ class VmEngine:
             buffer.set_res(1, flat_view(D))
         found: list[Array] = []
         count = made = 0
-        while S[0] < R[0] and count < rows and made < attempts and S[1] >= h_min:
+        T, H, t_end = State.T, State.H, R[Given.T_END]
+        while S[T] < t_end and count < rows and made < attempts and S[H] >= h_min:
             evaluate()
             before = np.vstack([S, S_out[:-1]])
-            used = before[:, 0] < R[0]
-            took = S_out[:, 0] > before[:, 0]
+            used = before[:, T] < t_end
+            took = S_out[:, T] > before[:, T]
             found.append(
                 np.hstack(
                     [
-                        before[took, :1],
-                        S_out[took, :1],
-                        before[took, MEMORY : MEMORY + n],
-                        S_out[took, MEMORY:],
+                        before[took, T, None],
+                        S_out[took, T, None],
+                        before[took, State.Y],
+                        S_out[took, State.Y],
                         D[took],
                     ]
                 )
@@ -105,9 +106,9 @@ class VmEngine:
 
 
 def _reason(S: Array, R: Array, full: bool, h_min: float) -> Stop:
-    if S[0] >= R[0]:
+    if S[State.T] >= R[Given.T_END]:
         return Stop.END
-    if not S[1] >= h_min:
+    if not S[State.H] >= h_min:
         return Stop.STEP_TOO_SMALL
     return Stop.FULL if full else Stop.ATTEMPTS
 
@@ -124,7 +125,9 @@ class CompiledEngine:
     @classmethod
     def of(cls, step: ca.Function, dense_rows: int) -> "CompiledEngine":
         """Compile the step, or load it from the cache."""
-        return cls.of_source(c_source(step, dense_rows), step.numel_in(0) - MEMORY, dense_rows)
+        return cls.of_source(
+            c_source(step, dense_rows), step.numel_in(0) - State.MEMORY, dense_rows
+        )
 
     @classmethod
     def of_source(cls, source: str, n: int, dense_rows: int) -> "CompiledEngine":
@@ -162,7 +165,7 @@ def c_source(step: ca.Function, dense_rows: int, *others: ca.Function) -> str:
 
     `others` are Functions that further C calls by their names.
     """
-    n = step.numel_in(0) - MEMORY
+    n = step.numel_in(0) - State.MEMORY
     with TemporaryDirectory() as folder:
         generator = ca.CodeGenerator("symfric_step.c", {"static_aux": True})
         for function in (step, *others):
@@ -171,7 +174,10 @@ def c_source(step: ca.Function, dense_rows: int, *others: ca.Function) -> str:
         code = (Path(folder) / "symfric_step.c").read_text(encoding="utf-8")
     return code + Template(_LOOP).substitute(
         n=n,
-        memory=MEMORY,
+        memory=State.MEMORY,
+        t=State.T,
+        h=State.H,
+        t_end=Given.T_END,
         width=width(n, dense_rows),
         dense=2 + 2 * n,
         dense_rows=dense_rows,
@@ -183,17 +189,17 @@ def c_source(step: ca.Function, dense_rows: int, *others: ca.Function) -> str:
 
 
 _LOOP = """
-/* Attempts from S towards R[0]; a row (t0, t1, y0, y1, D) per accepted step. */
+/* Attempts from S towards R[T_END]; a row (t0, t1, y0, y1, D) per accepted step. */
 int symfric_run(double *S, const double *R, double *rows, long long max_rows,
                 long long max_attempts, double h_min, long long *counts)
 {
-  enum { N = $n, MEM = $memory, WIDTH = $width };
+  enum { N = $n, MEM = $memory, WIDTH = $width, T = $t, H = $h, T_END = $t_end };
   double next[MEM + N], w[$w];
   casadi_int iw[$iw];
   const double *arg[$arg];
   double *res[$res];
   long long i, count = 0, made = 0;
-  while (S[0] < R[0] && count < max_rows && made < max_attempts && S[1] >= h_min) {
+  while (S[T] < R[T_END] && count < max_rows && made < max_attempts && S[H] >= h_min) {
     double *row = rows + count * WIDTH;
     arg[0] = S;
     arg[1] = R;
@@ -201,9 +207,9 @@ int symfric_run(double *S, const double *R, double *rows, long long max_rows,
     res[1] = row + $dense;
     symfric_step(arg, res, iw, w, 0);
     ++made;
-    if (next[0] > S[0]) {
-      row[0] = S[0];
-      row[1] = next[0];
+    if (next[T] > S[T]) {
+      row[0] = S[T];
+      row[1] = next[T];
       for (i = 0; i < N; ++i) {
         row[2 + i] = S[MEM + i];
         row[2 + N + i] = next[MEM + i];
@@ -214,8 +220,8 @@ int symfric_run(double *S, const double *R, double *rows, long long max_rows,
   }
   counts[0] = count;
   counts[1] = made;
-  if (S[0] >= R[0]) return 0;
-  if (!(S[1] >= h_min)) return 3;
+  if (S[T] >= R[T_END]) return 0;
+  if (!(S[H] >= h_min)) return 3;
   return count >= max_rows ? 1 : 2;
 }
 """

@@ -22,7 +22,7 @@ from symfric.integrator.running.events import (
     values,
 )
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.attempt import GROWTH_MEMORY, MEMORY
+from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
 ROWS, EVENT_ROWS = 2048, 64
@@ -40,12 +40,18 @@ class Tolerances:
         atol: absolute tolerance of each state, shape (nx,).
         event: tolerance of event times [s].
         max_steps: attempts allowed.
+        max_step: longest step [s].
     """
 
     rtol: float
     atol: Array
     event: float
     max_steps: int
+    max_step: float = np.inf
+
+    def given(self, t_end: float, d: Array) -> Array:
+        """What an attempt towards `t_end` does not change, for run data d (..., n_d)."""
+        return Given.of(t_end, self.rtol, self.max_step, self.atol, d)
 
 
 @final
@@ -90,7 +96,7 @@ def integrate(
     try:
         drive.whole(p)
     except KeyboardInterrupt:
-        reached = f"{Status.INTERRUPTED.value} It reaches t = {drive.S[0]:g} s."
+        reached = f"{Status.INTERRUPTED.value} It reaches t = {drive.t:g} s."
         drive.run.stop(Status.INTERRUPTED, reached)
     run = drive.run
     if not run.dense:
@@ -118,10 +124,20 @@ class _Drive:
         self.t_start, self.t_end = float(inputs.breaks[0]), float(inputs.breaks[-1])
         self.h_min = 1e-15 * max(abs(self.t_start), abs(self.t_end), 1e-3)
         h = first_step(self.t_end - self.t_start)
-        self.S = np.concatenate([[self.t_start, h, h, GROWTH_MEMORY, 0.0], y])
+        self.S = State.at(self.t_start, h, y)
         self.eventful = bool(integrator.model.events)
         self.storm = EventStorm(self.t_end - self.t_start, tolerances.event)
         self.run, self.d = Run(), np.zeros(0)
+
+    @property
+    def t(self) -> float:
+        """Time reached [s]."""
+        return float(self.S[State.T])
+
+    @property
+    def y(self) -> Array:
+        """Unknowns there; a view of S."""
+        return self.S[State.Y]
 
     def whole(self, p: Array) -> None:
         """Integrate over all input intervals, each with its own run data d = (p, data)."""
@@ -139,8 +155,8 @@ class _Drive:
         `old` holds the values of the event expressions before the jump that led here, if one did.
         """
         S, n, left = self.S, self.integrator.system.n, 0.0
-        R = np.concatenate([[end, self.tolerances.rtol], self.tolerances.atol, self.d])
-        while S[0] < end:
+        R = self.tolerances.given(end, self.d)
+        while self.t < end:
             records, reason, left = self.attempts(R, left)
             if self.run.status is not Status.SUCCESS:
                 return
@@ -152,11 +168,11 @@ class _Drive:
                 self.run.keep(piece)
                 old = None if piece.t0.size else old
                 if reason is Stop.STEP_TOO_SMALL:
-                    self.run.stop(*explain(self.integrator, S[0], S[MEMORY:], self.d, S[1]))
+                    self.run.stop(*explain(self.integrator, self.t, self.y, self.d, S[State.H]))
             if self.run.status is not Status.SUCCESS:
                 return
             if self.progress is not None:
-                self.progress((S[0] - self.t_start) / (self.t_end - self.t_start))
+                self.progress((self.t - self.t_start) / (self.t_end - self.t_start))
 
     def attempts(self, R: Array, left: float) -> tuple[Array, Stop, float]:
         """A batch of attempts: records, why it stopped, time [s] the VM will still need."""
@@ -165,17 +181,17 @@ class _Drive:
         allowed = min(ATTEMPTS[engine.name], self.tolerances.max_steps - self.run.attempts)
         if allowed <= 0:
             self.run.stop(
-                Status.MAX_STEPS, f"{Status.MAX_STEPS.value} It stands at t = {self.S[0]:g} s."
+                Status.MAX_STEPS, f"{Status.MAX_STEPS.value} It stands at t = {self.t:g} s."
             )
             return np.zeros((0, 0)), Stop.ATTEMPTS, left
-        began, from_t = perf_counter(), self.S[0]
+        began, from_t = perf_counter(), self.t
         rows = EVENT_ROWS if self.eventful else ROWS
         records, made, reason = engine.run(self.S, R, rows, allowed, self.h_min)
         self.run.attempts += made
         if engine.name == "vm":
-            spent, advance = perf_counter() - began, self.S[0] - from_t
+            spent, advance = perf_counter() - began, self.t - from_t
             self.integrator.vm_time += spent
-            left = spent * (self.t_end - self.S[0]) / advance if advance > 0 else left
+            left = spent * (self.t_end - self.t) / advance if advance > 0 else left
         return records, reason, left
 
     def crossing(self, piece: Dense, old: Array | None) -> Crossing | None:
@@ -188,16 +204,15 @@ class _Drive:
         # steps beyond the event say nothing; its own is a guess only, what follows may be faster
         h = float(piece.t1[crossing.step] - piece.t0[crossing.step])
         h = max(min(h, self.tolerances.event * 1e3), 1e-3 * h)
-        self.S[:MEMORY] = crossing.t, h, h, GROWTH_MEMORY, 0.0
-        self.S[MEMORY:] = crossing.y
+        self.S[:] = State.at(crossing.t, h, crossing.y)
         return self.carry_out(crossing.which)
 
     def carry_out(self, which: tuple[int, ...]) -> Array:
         """Apply the resets of the events `which`; event values before them, NaN for themselves."""
-        events, t = self.integrator.model.events, float(self.S[0])
-        old = values(self.integrator, t, self.S[MEMORY:], self.d)
+        events, t = self.integrator.model.events, self.t
+        old = values(self.integrator, t, self.y, self.d)
         old[list(which)] = np.nan
-        self.S[MEMORY:] = resets(self.integrator, t, self.S[MEMORY:], self.d, which)
+        self.y[:] = resets(self.integrator, t, self.y, self.d, which)
         self.run.happened += [(t, events[i].name) for i in which]
         if any(events[i].terminal for i in which):
             self.run.stop(Status.TERMINATED)
@@ -215,14 +230,14 @@ class _Drive:
         """Take over new input data, which algebraic unknowns follow; event values before them."""
         old = None
         if self.eventful:
-            old = values(self.integrator, self.S[0], self.S[MEMORY:], before)
+            old = values(self.integrator, self.t, self.y, before)
         self.make_consistent()
         return old
 
     def make_consistent(self) -> None:
         """Let the algebraic unknowns follow a jump, or stop the run where they cannot."""
-        where = f"simulate '{self.integrator.model.name}' at t = {self.S[0]:.9g} s"
+        where = f"simulate '{self.integrator.model.name}' at t = {self.t:.9g} s"
         try:
-            self.S[MEMORY:] = consistent(self.integrator.system, where, self.S[MEMORY:], self.d)
+            self.y[:] = consistent(self.integrator.system, where, self.y, self.d)
         except ValueError as error:
             self.run.stop(Status.SINGULAR, str(error))

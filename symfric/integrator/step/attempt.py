@@ -1,12 +1,8 @@
 """One attempt of an adaptive step as ONE CasADi Function, whatever the method.
 
-State and run data are columns:
-
-    S = (t, h, h_old, growth_old, rejected, y)      what an attempt changes
-    R = (t_end, rtol, atol[nx], d)             what it does not
-
-`step(S, R) -> (S_next, D)` tries h, and either accepts (t, y advance; D holds the dense output)
-or rejects (h shrinks). `fixed(y, h, d) -> y_next` is the bare step, for derivatives and C code.
+Its state S and what it is given, R, are columns (`layout`). `step(S, R) -> (S_next, D)` tries h,
+and either accepts (t, y advance; D holds the dense output) or rejects (h shrinks).
+`fixed(y, h, d) -> y_next` is the bare step, for derivatives and C code.
 """
 
 from collections.abc import Callable
@@ -20,14 +16,12 @@ from symfric.integrator.equations.blocks import signs
 from symfric.integrator.equations.manifold import PULLING, SHOCK
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import Method, Trial, Trials
+from symfric.integrator.step.layout import GROWTH_MEMORY, Given, State
 from symfric.integrator.step.tangent import tangent
 
-MEMORY = 5
-"""Rows of S before y: t, h, h_old, growth_old, rejected."""
-
 SAFETY, GROW, SHRINK = 0.85, 8.0, 0.2
-E_FLOOR, GROWTH_MEMORY = 1e-6, 2.5
-"""Smallest error the controller believes, and largest growth it remembers."""
+E_FLOOR = 1e-6
+"""Smallest error the controller believes."""
 
 KAPPA = 0.1
 """What Newton's method may leave over, in units of the tolerance."""
@@ -157,11 +151,11 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
             calls, which compile faster where they are large.
     """
     n, nx = system.n, system.nx
-    S = kind.sym("S", MEMORY + n)
-    R = kind.sym("R", 2 + nx + system.d.numel())
-    t, h_wish, h_old, growth_old, rejected = (S[i] for i in range(MEMORY))
-    y, t_end, rtol = S[MEMORY:], R[0], R[1]
-    atol, d = R[2 : 2 + nx], R[2 + nx :]
+    S = kind.sym("S", State.MEMORY + n)
+    R = kind.sym("R", Given.FIXED + nx + system.d.numel())
+    t, h_wish, h_old, growth_old, rejected = (S[i] for i in range(State.MEMORY))
+    t_end, rtol, h_max = (R[i] for i in range(Given.FIXED))
+    y, atol, d = S[State.Y], R[Given.atol(nx)], R[Given.d(nx)]
 
     left = t_end - t
     h = ca.fmax(ca.fmin(h_wish, left), 1e-300)
@@ -192,7 +186,7 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
     factor = ca.fmin(GROW, ca.fmax(SHRINK, SAFETY * ca.fmin(growth, predicted)))
     factor = ca.if_else(rejected > 0, ca.fmin(factor, 1), factor)
     # a step cut by t_end must not forget the step size it could have had
-    h_next = ca.if_else(h < h_wish, ca.fmax(h_wish, h * factor), h * factor)
+    h_next = ca.fmin(h_max, ca.if_else(h < h_wish, ca.fmax(h_wish, h * factor), h * factor))
     h_less = h * ca.fmax(SHRINK, SAFETY * growth)
 
     memory = ca.vertcat(

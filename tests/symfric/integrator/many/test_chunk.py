@@ -15,7 +15,7 @@ from symfric.integrator.equations.inputs import Input, drivers
 from symfric.integrator.many.chunk import Chunk, Job, digest, solve_chunk
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.attempt import GROWTH_MEMORY
+from symfric.integrator.step.layout import Given, State
 
 
 def task(
@@ -26,8 +26,8 @@ def task(
     integrator = Integrator(model, inputs, RODAS5P)
     times = np.array([0.0, 0.5, 1.0])
     p, atol = model.values("p"), 1e-7 * integrator.system.nominal
-    S = np.array([0.0, 1e-8, 1e-8, GROWTH_MEMORY, 0.0, *start])
-    R = np.concatenate([[1.0, 1e-6], atol, p, inputs.values[:, 0]])
+    S = State.at(0.0, 1e-8, start)
+    R = Given.of(1.0, 1e-6, 1.0, atol, [*p, *inputs.values[:, 0]])
     job = Job.of(integrator, inputs, times, backend, 10_000)
     return job, Chunk(np.tile(S, (2, 1)), np.tile(R, (2, 1)))
 

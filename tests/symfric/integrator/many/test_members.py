@@ -18,7 +18,7 @@ from symfric.integrator.many.members import (
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.engine import Stop
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.attempt import GROWTH_MEMORY, MEMORY
+from symfric.integrator.step.layout import Given, State
 
 
 def compiled(integrator: Integrator) -> Members:
@@ -35,10 +35,9 @@ Make = Callable[[Integrator], Members]
 
 
 def columns(inputs: Drivers, model: Model, starts: list[list[float]]) -> tuple:
-    memory = [inputs.breaks[0], 1e-8, 1e-8, GROWTH_MEMORY, 0.0]
-    S = np.array([[*memory, *start] for start in starts])
+    S = State.at(inputs.breaks[0], 1e-8, starts)
     atol = 1e-7 * model.nominal("x")
-    R = np.concatenate([[0.0, 1e-6], atol, model.values("p"), inputs.values[:, 0]])
+    R = Given.of(0.0, 1e-6, np.inf, atol, [*model.values("p"), *inputs.values[:, 0]])
     return S, np.tile(R, (len(starts), 1)), np.zeros(len(starts), dtype=np.int64)
 
 
@@ -59,7 +58,7 @@ def test_held_input_belongs_to_the_interval_that_it_begins(make: Make) -> None:
     assert found[0, 0].tolist() == [1.0, 0.0, 1.0, 2.0]
     assert reason.tolist() == [Stop.END] * 2
     np.testing.assert_array_equal(S[:, 0], 1.0)
-    np.testing.assert_array_equal(S[:, MEMORY:], found[:, -1, :2])
+    np.testing.assert_array_equal(S[:, State.Y], found[:, -1, :2])
     np.testing.assert_array_equal(R, before)
     assert (made > 0).all()
 

@@ -10,7 +10,8 @@ from closed_forms import assemble, observed_order, smooth_dae, smooth_ode
 from symfric import BrownMcPhee, LuGre, Model, Variable, rabinowicz, simulate, simulate_many
 from symfric.integrator.methods.radau import eigenbasis, through
 from symfric.integrator.methods.tableaux import RADAU5
-from symfric.integrator.step.attempt import KAPPA, MEMORY, build_fixed, build_step, converged
+from symfric.integrator.step.attempt import KAPPA, build_fixed, build_step, converged
+from symfric.integrator.step.layout import Given, State
 from symfric.scenes import SliderCrank
 
 x = Variable("x", "1", start=1.0)
@@ -100,10 +101,10 @@ def test_failed_iteration_is_rejected_and_the_step_halved(kind: type) -> None:
     """x' = -1000 (x - 1)^3 from 2: a Jacobian at the start says little about the end."""
     model = Model("cubic", x=(x,), ode=-1000 * (x.symbol - 1) ** 3)
     step = build_step(assemble(model), RADAU5, kind)
-    S = [0.0, 0.01, 0.01, 1.0, 0.0, 2.0]
-    after = step(S, [1.0, 0.05, 0.05])[0].full().ravel()  # an error of this size would be allowed
-    assert after[MEMORY:].tolist() == [2.0]
-    assert after[1] == pytest.approx(0.005)
+    R = Given.of(1.0, 0.05, 1.0, [0.05], [])  # an error of this size would be allowed
+    after = step(State.at(0.0, 0.01, [2.0]), R)[0].full().ravel()
+    assert after[State.Y].tolist() == [2.0]
+    assert after[State.H] == pytest.approx(0.005)
 
 
 @pytest.mark.parametrize("law", [BrownMcPhee(), LuGre()], ids=["brown_mcphee", "lugre"])

@@ -19,7 +19,8 @@ from symfric.integrator.running.engine import (
     c_source,
     width,
 )
-from symfric.integrator.step.attempt import MEMORY, build_step
+from symfric.integrator.step.attempt import build_step
+from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
 ROWS = RODAS5P.H.shape[0]
@@ -41,7 +42,7 @@ def start(y: tuple[float, ...], h: float = 1e-6) -> Array:
 
 
 def data(n: int, t_end: float, rtol: float = 1e-8) -> Array:
-    return np.array([t_end, rtol, *np.full(n, 0.1 * rtol)])
+    return Given.of(t_end, rtol, np.inf, np.full(n, 0.1 * rtol), [])
 
 
 BELT = rabinowicz(BrownMcPhee())
@@ -61,7 +62,7 @@ def trace(runner: Engine, case: str) -> tuple[Array, Array]:
     records, made, stop = runner.run(before, data(len(model.x), 2.0, 1e-6), 9999, 9999, 0.0)
     assert stop is Stop.END
     assert made >= records.shape[0]
-    return records, before[MEMORY:]
+    return records, before[State.MEMORY :]
 
 
 def agree(one: tuple[Array, Array], other: tuple[Array, Array]) -> None:
@@ -93,7 +94,7 @@ def test_records_are_a_chain_from_start_to_end(kind: str) -> None:
     assert (t1[:-1] == t0[1:]).all()
     assert (y1[:-1] == y0[1:]).all()
     assert y0[0].tolist() == [1.0, 1.0]
-    assert y1[-1].tolist() == S[MEMORY:].tolist()
+    assert y1[-1].tolist() == S[State.MEMORY :].tolist()
     assert y1 == pytest.approx(np.array([smooth_ode().exact(t) for t in t1]), rel=1e-6)
 
 
@@ -141,7 +142,7 @@ def test_nothing_is_done_at_the_end(kind: str) -> None:
     S[0] = 1.0
     records, made, stop = engine(kind, smooth_ode().model).run(S, data(2, 1.0), 9, 9, 0.0)
     assert (records.shape[0], made, stop) == (0, 0, Stop.END)
-    assert S[MEMORY:].tolist() == [1.0, 1.0]
+    assert S[State.MEMORY :].tolist() == [1.0, 1.0]
 
 
 @each_engine

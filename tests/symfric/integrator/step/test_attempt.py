@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from symfric import BrownMcPhee, LuGre, Model, Variable, rabinowicz
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
-from symfric.integrator.step.attempt import GROW, MEMORY, SHRINK, build_fixed, build_step
+from symfric.integrator.step.attempt import GROW, SHRINK, build_fixed, build_step
+from symfric.integrator.step.layout import Given, State
 from symfric.model import Monitor
 
 Array = NDArray[np.float64]
 x = Variable("x", "1", start=1.0)
-T_AT, H, H_OLD, REJECTED = 0, 1, 2, 4
-"""Rows of the attempt's state."""
+T_AT, H, H_OLD, REJECTED, MEMORY = State.T, State.H, State.H_OLD, State.REJECTED, State.MEMORY
 
 
 def column(y: Any, t: float = 0.0, h: float = 0.1, rejected: float = 0.0) -> Array:
@@ -26,7 +26,7 @@ def column(y: Any, t: float = 0.0, h: float = 0.1, rejected: float = 0.0) -> Arr
 
 
 def data(system: System, t_end: float = 10.0, rtol: float = 1e-6) -> Array:
-    return np.array([t_end, rtol, *np.full(system.nx, 0.1 * rtol)])
+    return Given.of(t_end, rtol, np.inf, np.full(system.nx, 0.1 * rtol), [])
 
 
 def attempt(
@@ -246,7 +246,9 @@ def test_absolute_tolerance_counts_where_a_state_is_small() -> None:
     system = assemble(problem.model)
     step = build_step(system, RODAS5P)
     S = column((1e-9, 1e-9), h=1.0)
-    strict, lax = (step(S, [10.0, 1e-8, a, a])[0].full().ravel() for a in (1e-17, 1e-10))
+    strict, lax = (
+        step(S, Given.of(10.0, 1e-8, np.inf, [a, a], []))[0].full().ravel() for a in (1e-17, 1e-10)
+    )
     assert (strict[REJECTED], lax[REJECTED]) == (1.0, 0.0)
 
 

@@ -1,0 +1,59 @@
+"""Where everything stands in the two columns of an attempt, so that nobody else counts rows.
+
+    S = (t, h, h_old, growth_old, rejected, y)     what an attempt changes
+    R = (t_end, rtol, h_max, atol[nx], d)          what it does not
+
+Columns of many members are the rows of a matrix.
+"""
+
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+GROWTH_MEMORY = 2.5
+"""Largest growth of the step size that the controller remembers."""
+
+
+@final
+class State:
+    """Rows of S: time, step to try, last accepted step, its growth, whether the last one failed."""
+
+    T, H, H_OLD, GROWTH_OLD, REJECTED = range(5)
+    MEMORY = 5
+    Y = slice(MEMORY, None)
+
+    @staticmethod
+    def at(t: float, h: float, y: ArrayLike) -> Array:
+        """S at the time `t` with nothing before it, to try the step `h`; y (..., n)."""
+        return _joined([t, h, h, GROWTH_MEMORY, 0.0], np.asarray(y, dtype=float))
+
+
+@final
+class Given:
+    """Rows of R: end, relative tolerance, longest step, absolute tolerances, run data."""
+
+    T_END, RTOL, H_MAX = range(3)
+    FIXED = 3
+
+    @staticmethod
+    def of(t_end: float, rtol: float, h_max: float, atol: ArrayLike, d: ArrayLike) -> Array:
+        """R for run data d (..., n_d) and atol (nx,)."""
+        return _joined([t_end, rtol, h_max, *np.asarray(atol, dtype=float)], np.asarray(d))
+
+    @staticmethod
+    def atol(nx: int) -> slice:
+        """Absolute tolerances of `nx` states."""
+        return slice(Given.FIXED, Given.FIXED + nx)
+
+    @staticmethod
+    def d(nx: int) -> slice:
+        """Run data behind the tolerances of `nx` states."""
+        return slice(Given.FIXED + nx, None)
+
+
+def _joined(common: list[float], own: Array) -> Array:
+    """The same first entries before every row of `own`."""
+    shape = (*own.shape[:-1], len(common))
+    return np.concatenate([np.broadcast_to(np.array(common), shape), own], axis=-1)
