@@ -46,15 +46,19 @@ def error(of: Trajectory, scene: str) -> float:
 @pytest.mark.parametrize("formulation", ["joint", "absolute"])
 @pytest.mark.parametrize(
     ("backend", "loose", "tight"),
-    [("rosenbrock", 2e-4, 1e-7), ("sundials", 2e-2, 1e-5), ("ggl", 5e-2, 1e-5)],
+    [("rosenbrock", 2e-4, 1e-7), ("sundials", 2e-2, 1e-5), ("ggl", 5e-2, 3e-6)],
 )
 def test_all_formulations_go_to_the_same_motion(
     scene: str, formulation: str, backend: str, loose: float, tight: float
 ) -> None:
-    """Errors measured at rtol 1e-4 and 1e-8, with a factor of about three to spare."""
+    """Errors measured at rtol 1e-4 and 1e-8, with a factor of about three to spare.
+
+    idas chooses other steps where another NumPy rounds the last bit of a coefficient otherwise: at
+    rtol 1e-8 its error on ggl is between 4e-6 and 1.3e-5, at 1e-9 between 5e-7 and 9e-7.
+    """
     with pytest.warns(UserWarning, match="stick phases"):
         far = error(run(scene, formulation, backend, 1e-4), scene)
-    near = error(run(scene, formulation, backend, 1e-8), scene)
+    near = error(run(scene, formulation, backend, 1e-9 if backend == "ggl" else 1e-8), scene)
     assert far < loose
     assert near < tight
     assert near < far / 50
@@ -80,7 +84,7 @@ def test_unknowns_of_the_stabilised_form_are_named() -> None:
 
 def test_what_idas_cannot_do_is_said() -> None:
     with pytest.raises(SolveError, match=r"idas stopped after t = .* seldom converges below rtol"):
-        run("slider_crank", "joint", "ggl", 1e-10)
+        run("slider_crank", "joint", "ggl", 1e-12)
 
 
 def test_what_is_no_mechanism_is_refused() -> None:
