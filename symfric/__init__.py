@@ -61,7 +61,7 @@ from symfric.laws import LuGrePassive as LuGrePassive
 from symfric.laws import MakkarDixon as MakkarDixon
 from symfric.laws import MaxwellSlip as MaxwellSlip
 from symfric.laws import ModifiedThrelfall as ModifiedThrelfall
-from symfric.laws import Planar as Planar
+from symfric.laws import PlanarSlip as PlanarSlip
 from symfric.laws import PoppStelter as PoppStelter
 from symfric.laws import Population as Population
 from symfric.laws import PowerLawViscous as PowerLawViscous
@@ -73,7 +73,7 @@ from symfric.laws import RuiWang as RuiWang
 from symfric.laws import SelfTuning as SelfTuning
 from symfric.laws import SimscapeBreakaway as SimscapeBreakaway
 from symfric.laws import Slider as Slider
-from symfric.laws import Spatial as Spatial
+from symfric.laws import SpatialSlip as SpatialSlip
 from symfric.laws import Specker as Specker
 from symfric.laws import StaticLaw as StaticLaw
 from symfric.laws import SteadyStateLuGre as SteadyStateLuGre

@@ -127,6 +127,7 @@ def to_dict(law: AnyLaw) -> dict[str, Any]:
             p.name: {
                 "value": p.value,
                 "unit": p.unit,
+                "role": p.role,
                 "lower": p.lower,
                 "upper": p.upper,
                 "doc": p.doc,

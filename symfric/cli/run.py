@@ -19,16 +19,12 @@ from symfric.cli.options import (
     check_outputs,
     numbers,
 )
-from symfric.figures.scene import DEFAULT_INPUT, DEFAULT_T_END
 from symfric.foundation.parameters import check_names
 from symfric.integrator import Input
 from symfric.integrator.equations.inputs import Sampled
 from symfric.multibody.urdf.read import relative
 from symfric.results.kinds import is_mechanism, kinds, norms
 from symfric.scenes import ALL_SCENES, MECHANISMS, Robot, Scene
-
-ROBOT_T_END = 2.0
-"""Time [s] that shows how a robot moves."""
 
 
 def run(
@@ -59,7 +55,7 @@ def run(
     t_end: Annotated[
         float | None,
         typer.Option(
-            "--t-end", help="Last time [s]; default 20 (rabinowicz), 4 or the last sample (drive)."
+            "--t-end", help="Last time [s]; default the last sample, or what shows the scene."
         ),
     ] = None,
     rtol: Annotated[float, typer.Option("--rtol", help="Relative tolerance of a step.")] = 1e-6,
@@ -104,8 +100,9 @@ def run(
     check_outputs(out, json, movie, picture=plot)
     check_movie(movie, scene)
     machines = scenes_with(scene, law, numbers("--set", settings))
-    signals, described = _inputs(scene, inputs)
-    until = _default_t_end(scene, signals) if t_end is None else t_end
+    machine = next(iter(machines.values()))
+    signals, described = _inputs(machine, inputs)
+    until = _default_t_end(machine, signals) if t_end is None else t_end
     start = numbers("--x0", x0)
     found: dict[str, Trajectory] = {}
     for name, machine in machines.items():
@@ -187,20 +184,19 @@ def check_movie(path: Path | None, scene: str) -> None:
     check_format(path)
 
 
-def _inputs(scene: str, texts: list[str] | None) -> tuple[dict[str, Input], dict[str, str]]:
-    """Inputs by name, and the texts that describe them."""
+def _inputs(scene: Scene, texts: list[str] | None) -> tuple[dict[str, Input], dict[str, str]]:
+    """Inputs by name, and the texts that describe them; without any those of the scene."""
     given = assignments("--input", texts)
-    signals = {name: input_from_text(name, text) for name, text in given.items()}
-    if not given and scene in DEFAULT_INPUT:
-        name, text, function = DEFAULT_INPUT[scene]
-        return {name: function}, {name: text}
-    return signals, given
+    if not given:
+        own = scene.inputs.items()
+        return {name: of.function for name, of in own}, {name: of.text for name, of in own}
+    return {name: input_from_text(name, text) for name, text in given.items()}, given
 
 
-def _default_t_end(scene: str, signals: dict[str, Input]) -> float:
+def _default_t_end(scene: Scene, signals: dict[str, Input]) -> float:
     """The last sample of the inputs, else what shows the scene."""
     ends = [float(np.max(s.t)) for s in signals.values() if isinstance(s, Sampled)]
-    return max(ends, default=DEFAULT_T_END.get(scene, ROBOT_T_END))
+    return max(ends, default=scene.t_end)
 
 
 def to_dict(law: str, scene: Scene, trajectory: Trajectory) -> dict[str, Any]:

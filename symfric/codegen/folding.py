@@ -35,10 +35,10 @@ def runtime_parameters(law: Law) -> tuple[str, ...]:
 
 
 def _alike(law: Law) -> list[list[str]]:
-    """Parameters by meaning (the text that documents them) and value."""
-    groups: dict[tuple[str, float], list[str]] = {}
-    for name, parameter in parameters(law).items():
-        groups.setdefault((parameter.doc, float(parameter.value)), []).append(name)
+    """Parameters by meaning (role, unit and the name in their own part) and value."""
+    groups: dict[tuple[str, str, str, float], list[str]] = {}
+    for name, p in parameters(law).items():
+        groups.setdefault((p.role, p.unit, p.field, float(p.value)), []).append(name)
     return list(groups.values())
 
 

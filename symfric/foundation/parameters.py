@@ -8,28 +8,59 @@ identification and optimal control). Objects nest: a scene holds a law, a sum ho
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from math import inf, isfinite
+from math import inf
 from typing import Any, ClassVar, TypeVar
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from symfric.foundation.checks import check_names
 from symfric.foundation.numeric import Scalar, is_casadi, is_number, is_symbolic
 
+ROLES = {
+    "level": "a dry friction level: a coefficient, or a force or torque",
+    "viscous": "resistance that grows with the velocity",
+    "velocity scale": "a velocity over which friction changes, or its inverse",
+    "stiffness": "force over deflection",
+    "damping": "force over velocity of a spring, a bristle or a damper",
+    "length": "a deflection or a path that friction remembers",
+    "time": "how fast friction follows: lag, dwell, ageing",
+    "shape": "an exponent, a sharpness or a share that bends a curve",
+    "width": "a smoothing width, or what stands in for rest; small against the motion",
+    "load": "a normal force, or a share of one",
+    "temperature": "a temperature, or what it changes",
+    "geometry": "a length or an angle of the machine",
+    "mass": "mass, also per length",
+    "inertia": "moment of inertia",
+    "gravity": "acceleration of gravity",
+    "offset": "a constant force beside friction",
+    "motion": "what moves the machine: a start value, a given velocity or path",
+    "sampling": "of random contacts: how many, and which random numbers",
+}
+"""What a parameter may be for, whatever it is called; "" where nobody has said."""
 
-def param(default: float, *, unit: str, doc: str, lower: float = -inf, upper: float = inf) -> Any:
+
+def param(
+    default: float, *, unit: str, doc: str, role: str = "", lower: float = -inf, upper: float = inf
+) -> Any:
     """Declare a parameter field of a `Parametric` dataclass.
 
     Args:
         default: value used when none is given.
         unit: SI unit as text, "1" for a pure number.
         doc: what it is, in a few words.
+        role: what it is for, one of `ROLES`, from which identification, temperature and the code
+            generator tell alike parameters; "" says nothing.
         lower, upper: closed bounds; identification takes its box constraints from here.
+
+    Raises:
+        ValueError: an unknown role.
     """
-    return field(
-        default=default, metadata={"unit": unit, "doc": doc, "lower": lower, "upper": upper}
-    )
+    if role and role not in ROLES:
+        raise ValueError(f"param: role: expected one of {', '.join(ROLES)}, got {role!r}")
+    meta = {"unit": unit, "doc": doc, "role": role, "lower": lower, "upper": upper}
+    return field(default=default, metadata=meta)
 
 
 def option(default: str, *, choices: tuple[str, ...], doc: str) -> Any:
@@ -42,7 +73,13 @@ def option(default: str, *, choices: tuple[str, ...], doc: str) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Parameter:
-    """One parameter as a user sees it."""
+    """One parameter as a user sees it.
+
+    Attributes:
+        name: flat name in the whole object, such as "mu_s_pos".
+        field: name in the part that declares it, such as "mu_s".
+        role: what it is for, one of `ROLES`, or "".
+    """
 
     name: str
     value: Scalar
@@ -51,6 +88,8 @@ class Parameter:
     lower: float
     upper: float
     doc: str
+    role: str = ""
+    field: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,27 +147,44 @@ def _problems(obj: Parametric) -> Iterator[str]:
         value, meta = getattr(obj, item.name), item.metadata
         if "choices" in meta and value not in meta["choices"]:
             yield f"{item.name}: expected one of {', '.join(meta['choices'])}, got {value!r}"
-        if "unit" not in meta:
+        if "unit" not in meta or is_symbolic(value):
             continue
-        if is_casadi(value) or isinstance(value, np.ndarray):
-            continue
-        if not is_number(value) or not isfinite(value):
+        numbers, unit, low, high = _numbers(value), meta["unit"], meta["lower"], meta["upper"]
+        if not numbers.size or not np.isfinite(numbers).all():
+            yield f"{item.name}: expected a finite number [{unit}] or a symbol, got {value!r}"
+        elif not ((low <= numbers) & (numbers <= high)).all():
+            beyond = numbers[(numbers < low) | (numbers > high)][0]
             yield (
-                f"{item.name}: expected a finite number [{meta['unit']}] or a symbol, got {value!r}"
+                f"{item.name}: expected {low:g} <= {item.name} <= {high:g} [{unit}], got {beyond:g}"
             )
-        elif not meta["lower"] <= value <= meta["upper"]:
-            yield (
-                f"{item.name}: expected {meta['lower']:g} <= {item.name} <= {meta['upper']:g} "
-                f"[{meta['unit']}], got {value:g}"
-            )
-    for low, high in obj.ordered:
-        a, b = getattr(obj, low), getattr(obj, high)
-        if is_number(a) and is_number(b) and a > b:
-            yield f"expected {low} <= {high}, got {low} = {a:g} and {high} = {b:g}"
-    for low, high in obj.strictly_ordered:
-        a, b = getattr(obj, low), getattr(obj, high)
-        if is_number(a) and is_number(b) and a >= b:
-            yield f"expected {low} < {high}, got {low} = {a:g} and {high} = {b:g}"
+    for pairs, sign in ((obj.ordered, "<="), (obj.strictly_ordered, "<")):
+        for low, high in pairs:
+            a, b = getattr(obj, low), getattr(obj, high)
+            if _out_of_order(a, b, strictly=sign == "<"):
+                shown = f"{low} = {_shown(a)} and {high} = {_shown(b)}"
+                yield f"expected {low} {sign} {high}, got {shown}"
+
+
+def _numbers(value: Any) -> NDArray[np.float64]:
+    """The numbers in a plain number, an array or a constant matrix; none in anything else."""
+    if is_casadi(value):
+        return ca.DM(value).full().ravel()
+    numeric = isinstance(value, np.ndarray) and value.dtype.kind in "iuf"
+    return np.array(value, float).ravel() if numeric or is_number(value) else np.zeros(0)
+
+
+def _out_of_order(a: Scalar, b: Scalar, strictly: bool) -> bool:
+    """Whether a <= b, or a < b, is broken by numbers; arrays that do not fit are left open."""
+    if is_symbolic(a) or is_symbolic(b):
+        return False
+    low, high = _numbers(a), _numbers(b)
+    if not low.size or not high.size or 1 not in (low.size, high.size, 1 + low.size - high.size):
+        return False
+    return bool(((low >= high) if strictly else (low > high)).any())
+
+
+def _shown(value: Scalar) -> str:
+    return f"{value:g}" if is_number(value) else str(value)
 
 
 def _children(obj: Parametric) -> list[tuple[str, int | None, Parametric]]:
@@ -193,6 +249,8 @@ def parameters(obj: Parametric) -> dict[str, Parameter]:
                 meta["lower"],
                 meta["upper"],
                 meta["doc"],
+                meta["role"],
+                name,
             )
         else:
             found[flat] = replace(children[child][name], name=flat)

@@ -12,8 +12,8 @@ from symfric.laws.base.law import StaticLaw as StaticLaw
 from symfric.laws.composed.compose import Asymmetric as Asymmetric
 from symfric.laws.composed.compose import LoadDependent as LoadDependent
 from symfric.laws.composed.compose import Sum as Sum
-from symfric.laws.composed.planar import Planar as Planar
-from symfric.laws.composed.planar import Spatial as Spatial
+from symfric.laws.composed.isotropic import PlanarSlip as PlanarSlip
+from symfric.laws.composed.isotropic import SpatialSlip as SpatialSlip
 from symfric.laws.composed.populations import AnyLaw as AnyLaw
 from symfric.laws.composed.populations import GenericAsperity as GenericAsperity
 from symfric.laws.composed.populations import Population as Population

@@ -105,8 +105,8 @@ class Model:
     p: Variables = ()
     ode: ca.SX | None = None
     alg: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    xdot: ca.SX = field(default_factory=lambda: ca.SX(0, 0))
-    residual: ca.SX = field(default_factory=lambda: ca.SX(0, 0))
+    xdot: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    residual: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
     outputs: Mapping[str, Output] = field(default_factory=dict[str, Output])
     monitors: tuple[Monitor, ...] = ()
     events: tuple[Event, ...] = ()
@@ -116,6 +116,8 @@ class Model:
     sketch: Callable[[], Sketch] | None = None
 
     def __post_init__(self) -> None:
+        if not self.x and self.residual.is_empty():  # algebraic equations alone are explicit
+            object.__setattr__(self, "ode", ca.SX(0, 1))
         if self.ode is not None:
             object.__setattr__(self, "ode", ca.SX(self.ode))
             rates = [ca.SX.sym(f"{v.name}_dot") for v in self.x]

@@ -20,7 +20,7 @@ from symfric.foundation.numeric import is_symbolic
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import at_start, stacked, symbols_of
 from symfric.laws import Law
-from symfric.laws.composed.planar import Spatial
+from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.model import Event, Model, Monitor, Output, Variables
 from symfric.model.holonomic import Holonomic, Inner
 from symfric.model.sketch import Sketch
@@ -291,7 +291,7 @@ def _switches(slip: Slip, qd: Variables) -> tuple[Event, ...]:
 def _sizes(slip: Slip) -> tuple[ca.SX, ca.SX]:
     """Sliding velocity and friction force; their smooth sizes where they are vectors."""
     law = slip.contact.law
-    if not isinstance(law, Spatial):
+    if not isinstance(law, SpatialSlip):
         return slip.contact.slip, slip.force
     speed = ca.sqrt(ca.sumsqr(slip.contact.slip) + law.v_eps**2)
     return speed, slip.contact.friction.magnitude(*ca.vertsplit(slip.force))

@@ -7,7 +7,7 @@ from typing import final
 import casadi as ca
 
 from symfric.foundation.symbols import stacked
-from symfric.laws.composed.planar import Spatial
+from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.multibody.constraints import Constraint, Held
 from symfric.multibody.cuts import Cuts
 from symfric.multibody.dynamics import (
@@ -202,7 +202,7 @@ def _contacts(kin: Kinematics, joints: Sequence[Joint]) -> list[Contact]:
             name = joint.name if len(joint.rubs) == 1 else f"{joint.name}_{direction}"
             rate = kin.spin(joint) if direction == "ball" else kin.along(joint, direction)[1]
             slip = rate if direction == "slide" else friction.arm * rate
-            law = Spatial(friction.law) if direction == "ball" else friction.law
+            law = SpatialSlip(friction.law) if direction == "ball" else friction.law
             pressed = name if direction in ("x", "y") else joint.name
             F = ca.SX.sym(f"{name}_friction", slip.numel())
             found.append(Contact(name, joint.name, direction, friction, law, pressed, slip, F))

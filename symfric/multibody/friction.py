@@ -27,7 +27,7 @@ import casadi as ca
 from symfric.foundation.numeric import Scalar, is_number, is_symbolic
 from symfric.laws import Law
 from symfric.laws.base.law import check_law
-from symfric.laws.composed.planar import Spatial, anisotropy
+from symfric.laws.composed.isotropic import SpatialSlip, anisotropy
 
 
 @final
@@ -39,7 +39,7 @@ class JointFriction:
     an error at its time, not friction that drives.
 
     Attributes:
-        law: any friction law of v and N; in a spherical joint an isotropic one, `Spatial`.
+        law: any friction law of v and N; in a spherical joint an isotropic one, `SpatialSlip`.
         radius: of the bearing or ball [m], for friction about an axis or a point.
         length: distance a of the two bearing stations [m]; None: moments do not load the bearing.
         width: width b of a guide that takes the moment about z [m]; None: it does not load it.
@@ -146,7 +146,7 @@ class Contact:
     joint: str
     direction: str
     friction: JointFriction
-    law: Law | Spatial
+    law: Law | SpatialSlip
     pressed: str
     slip: ca.SX
     F: ca.SX

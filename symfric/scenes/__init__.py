@@ -7,6 +7,7 @@ from symfric.foundation.parameters import with_values
 from symfric.laws import Law
 from symfric.model import Model
 from symfric.scenes.arm import Arm as Arm
+from symfric.scenes.base import GivenInput as GivenInput
 from symfric.scenes.base import Scene as Scene
 from symfric.scenes.base import friction_states as friction_states
 from symfric.scenes.drive import Drive as Drive

@@ -1,7 +1,7 @@
 """A serial arm of six joints with friction in every one."""
 
 from dataclasses import dataclass
-from typing import final
+from typing import ClassVar, final
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import param
@@ -26,10 +26,14 @@ class Arm(MechanismScene):
     depends on what the wrist does. Defaults: a made-up arm of 21 kg and 1 m that falls from rest.
     """
 
-    load: Scalar = param(0.0, unit="kg", doc="mass at the end of the arm", lower=0.0)
-    R: Scalar = param(0.03, unit="m", doc="radius of the bearings", lower=1e-12)
-    a: Scalar = param(0.08, unit="m", doc="distance of the bearing stations", lower=1e-12)
-    g: Scalar = param(9.81, unit="m/s^2", doc="gravity", lower=0.0)
+    t_end: ClassVar[float] = 1.0
+
+    load: Scalar = param(0.0, unit="kg", role="mass", doc="mass at the end of the arm", lower=0.0)
+    R: Scalar = param(0.03, unit="m", role="geometry", doc="radius of the bearings", lower=1e-12)
+    a: Scalar = param(
+        0.08, unit="m", role="geometry", doc="distance of the bearing stations", lower=1e-12
+    )
+    g: Scalar = param(9.81, unit="m/s^2", role="gravity", doc="gravity", lower=0.0)
 
     def mechanism(self) -> Mechanism:
         """Six bodies in a chain."""

@@ -1,30 +1,56 @@
 """A scene: a parametric machine that takes a friction law and gives a `Model`."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from math import isfinite
-from typing import final
+from typing import ClassVar, final
 
 import casadi as ca
 
-from symfric.foundation.numeric import Scalar
-from symfric.foundation.parameters import Parametric, Variable, symbolise
+from symfric.foundation.numeric import Scalar, is_number
+from symfric.foundation.parameters import Parametric, Variable, parameters, symbolise
 from symfric.foundation.symbols import at_start, symbols_of
 from symfric.laws import Law
 from symfric.laws.base.law import check_law, chosen
 from symfric.model import Event, Model, Monitor, Variables
 
 
+@final
+@dataclass(frozen=True, eq=False)
+class GivenInput:
+    """What drives a scene when nobody says: the function of time, and how people write it."""
+
+    text: str
+    function: Callable[[ca.SX], ca.SX]
+
+
 @dataclass(frozen=True, eq=False)
 class Scene(Parametric, ABC):
-    """A machine with one friction law; `model()` writes its equations."""
+    """A machine with one friction law; `model()` writes its equations.
+
+    Raises:
+        ValueError: a parameter of scene or law that is an array or an MX symbol; one machine has
+            one number or SX symbol each, many have an ensemble (`simulate_many`).
+    """
+
+    t_end: ClassVar[float]
+    """Time [s] that shows what the scene is about, such as three stick-slip periods."""
+
+    inputs: ClassVar[Mapping[str, GivenInput]] = {}
+    """Inputs by name, where none are given."""
 
     law: Law
 
     def __post_init__(self) -> None:
         check_law(type(self).__name__, self.law)
         super().__post_init__()
+        several = [n for n, p in parameters(self).items() if not _is_scalar(p.value)]
+        if several:
+            raise ValueError(
+                f"{type(self).__name__}: expected one number or SX symbol for each parameter, got "
+                f"an array or MX for {', '.join(several)}; simulate_many(p=...) runs many values"
+            )
 
     @abstractmethod
     def equations(self, p: Variables) -> Model:
@@ -37,6 +63,11 @@ class Scene(Parametric, ABC):
         """
         scene, p = symbolise(self, *free)
         return scene.equations(p)
+
+
+def _is_scalar(value: Scalar) -> bool:
+    one = isinstance(value, ca.SX | ca.DM) and value.numel() == 1
+    return one or is_number(value)
 
 
 @final

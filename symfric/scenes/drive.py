@@ -1,14 +1,20 @@
 """A positioning drive: one mass, a force input, friction and a constant offset."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import final
+from typing import ClassVar, final
 
 import casadi as ca
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable, param
 from symfric.model import Model, Output, Variables
-from symfric.scenes.base import Scene, contact
+from symfric.scenes.base import GivenInput, Scene, contact
+
+
+def sine(t: ca.SX) -> ca.SX:
+    """Force 2 sin(pi t) N: beyond the default break-away force of 1.18 N in both directions."""
+    return 2 * ca.sin(ca.pi * t)
 
 
 @final
@@ -23,9 +29,12 @@ class Drive(Scene):
     Defaults: mass and load of the block of seed table 2 (N = m g).
     """
 
-    m: Scalar = param(0.8, unit="kg", doc="moving mass", lower=1e-12)
-    N: Scalar = param(0.8 * 9.81, unit="N", doc="normal force", lower=0.0)
-    offset: Scalar = param(0.0, unit="N", doc="constant force opposing the input")
+    t_end: ClassVar[float] = 4.0
+    inputs: ClassVar[Mapping[str, GivenInput]] = {"force": GivenInput("2 sin(pi t)", sine)}
+
+    m: Scalar = param(0.8, unit="kg", role="mass", doc="moving mass", lower=1e-12)
+    N: Scalar = param(0.8 * 9.81, unit="N", role="load", doc="normal force", lower=0.0)
+    offset: Scalar = param(0.0, unit="N", role="offset", doc="constant force opposing the input")
 
     def equations(self, p: Variables) -> Model:
         """States x, v and those of the law; input force; outputs friction, power."""

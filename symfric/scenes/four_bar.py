@@ -1,7 +1,7 @@
 """Planar four-bar linkage in the vertical plane x, z."""
 
 from dataclasses import dataclass
-from typing import Any, final
+from typing import Any, ClassVar, final
 
 from symfric.foundation.numeric import Scalar, atan, cos, sin, sqrt
 from symfric.foundation.parameters import param
@@ -22,15 +22,25 @@ class FourBar(MechanismScene):
     Defaults: a crank-rocker (0.1 + 0.4 < 0.3 + 0.35 m) that starts with 10 rad/s.
     """
 
-    crank: Scalar = param(0.1, unit="m", doc="length of the crank", lower=1e-12)
-    coupler: Scalar = param(0.35, unit="m", doc="length of the coupler", lower=1e-12)
-    rocker: Scalar = param(0.3, unit="m", doc="length of the rocker", lower=1e-12)
-    base: Scalar = param(0.4, unit="m", doc="distance of the fixed hinges", lower=1e-12)
-    density: Scalar = param(2.0, unit="kg/m", doc="mass of the links per length", lower=1e-12)
-    R: Scalar = param(0.01, unit="m", doc="radius of the hinges", lower=1e-12)
-    angle: Scalar = param(1.0, unit="rad", doc="angle of the crank at the start")
-    omega: Scalar = param(10.0, unit="rad/s", doc="angular velocity of the crank at the start")
-    g: Scalar = param(9.81, unit="m/s^2", doc="gravity", lower=0.0)
+    t_end: ClassVar[float] = 3.0
+
+    crank: Scalar = param(0.1, unit="m", role="geometry", doc="length of the crank", lower=1e-12)
+    coupler: Scalar = param(
+        0.35, unit="m", role="geometry", doc="length of the coupler", lower=1e-12
+    )
+    rocker: Scalar = param(0.3, unit="m", role="geometry", doc="length of the rocker", lower=1e-12)
+    base: Scalar = param(
+        0.4, unit="m", role="geometry", doc="distance of the fixed hinges", lower=1e-12
+    )
+    density: Scalar = param(
+        2.0, unit="kg/m", role="mass", doc="mass of the links per length", lower=1e-12
+    )
+    R: Scalar = param(0.01, unit="m", role="geometry", doc="radius of the hinges", lower=1e-12)
+    angle: Scalar = param(1.0, unit="rad", role="motion", doc="angle of the crank at the start")
+    omega: Scalar = param(
+        10.0, unit="rad/s", role="motion", doc="angular velocity of the crank at the start"
+    )
+    g: Scalar = param(9.81, unit="m/s^2", role="gravity", doc="gravity", lower=0.0)
 
     def closed(self) -> tuple[Any, ...]:
         """Angles of crank, coupler and rocker against x at the start, and their rates."""

@@ -1,7 +1,7 @@
 """Spatial four-mass system: sliders on three axes, coupled by rods and springs."""
 
 from dataclasses import dataclass
-from typing import final
+from typing import ClassVar, final
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import param
@@ -23,13 +23,21 @@ class FourMass(MechanismScene):
     Defaults: Haug's spatial example, with friction; t_end = 4 s.
     """
 
-    m_1: Scalar = param(2.0, unit="kg", doc="mass of sliders 1 and 2", lower=1e-12)
-    m_3: Scalar = param(6.0, unit="kg", doc="mass of sliders 3 and 4", lower=1e-12)
-    k: Scalar = param(2.0, unit="N/m", doc="rate of the springs to the ground", lower=0.0)
-    k_4: Scalar = param(10.0, unit="N/m", doc="rate of the spring between 1 and 4", lower=0.0)
-    v_4: Scalar = param(-1.0, unit="m/s", doc="velocity of slider 4 at the start")
-    a: Scalar = param(0.1, unit="m", doc="distance of the bearing stations", lower=1e-12)
-    g: Scalar = param(9.8, unit="m/s^2", doc="gravity", lower=0.0)
+    t_end: ClassVar[float] = 4.0
+
+    m_1: Scalar = param(2.0, unit="kg", role="mass", doc="mass of sliders 1 and 2", lower=1e-12)
+    m_3: Scalar = param(6.0, unit="kg", role="mass", doc="mass of sliders 3 and 4", lower=1e-12)
+    k: Scalar = param(
+        2.0, unit="N/m", role="stiffness", doc="rate of the springs to the ground", lower=0.0
+    )
+    k_4: Scalar = param(
+        10.0, unit="N/m", role="stiffness", doc="rate of the spring between 1 and 4", lower=0.0
+    )
+    v_4: Scalar = param(-1.0, unit="m/s", role="motion", doc="velocity of slider 4 at the start")
+    a: Scalar = param(
+        0.1, unit="m", role="geometry", doc="distance of the bearing stations", lower=1e-12
+    )
+    g: Scalar = param(9.8, unit="m/s^2", role="gravity", doc="gravity", lower=0.0)
 
     def mechanism(self) -> Mechanism:
         """Four bodies, four guides, two rods, four springs."""

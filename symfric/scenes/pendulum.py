@@ -1,7 +1,7 @@
 """A pendulum, one or two links, with friction in its hinges."""
 
 from dataclasses import dataclass
-from typing import final
+from typing import ClassVar, final
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import param
@@ -23,12 +23,18 @@ class Pendulum(MechanismScene):
     together. Defaults: a rod of 1 kg and 1 m.
     """
 
-    m: Scalar = param(1.0, unit="kg", doc="mass", lower=1e-12)
-    L: Scalar = param(0.5, unit="m", doc="distance of hinge and centre of mass", lower=1e-12)
-    J: Scalar = param(1 / 12, unit="kg m^2", doc="inertia about the centre", lower=1e-12)
-    R: Scalar = param(0.02, unit="m", doc="radius of the bearing", lower=1e-12)
-    phi_0: Scalar = param(1.0, unit="rad", doc="angle at the start")
-    g: Scalar = param(9.81, unit="m/s^2", doc="gravity", lower=0.0)
+    t_end: ClassVar[float] = 10.0
+
+    m: Scalar = param(1.0, unit="kg", role="mass", doc="mass", lower=1e-12)
+    L: Scalar = param(
+        0.5, unit="m", role="geometry", doc="distance of hinge and centre of mass", lower=1e-12
+    )
+    J: Scalar = param(
+        1 / 12, unit="kg m^2", role="inertia", doc="inertia about the centre", lower=1e-12
+    )
+    R: Scalar = param(0.02, unit="m", role="geometry", doc="radius of the bearing", lower=1e-12)
+    phi_0: Scalar = param(1.0, unit="rad", role="motion", doc="angle at the start")
+    g: Scalar = param(9.81, unit="m/s^2", role="gravity", doc="gravity", lower=0.0)
 
     def mechanism(self) -> Mechanism:
         """One body, one hinge."""
@@ -50,11 +56,15 @@ class DoublePendulum(MechanismScene):
     motion is chaotic: small tolerances show the same path for a few seconds only.
     """
 
-    m: Scalar = param(1.0, unit="kg", doc="mass of each rod", lower=1e-12)
-    L: Scalar = param(1.0, unit="m", doc="length of each rod", lower=1e-12)
-    R: Scalar = param(0.02, unit="m", doc="radius of the bearings", lower=1e-12)
-    phi_0: Scalar = param(2.0, unit="rad", doc="angle of the straight pendulum at the start")
-    g: Scalar = param(9.81, unit="m/s^2", doc="gravity", lower=0.0)
+    t_end: ClassVar[float] = 5.0
+
+    m: Scalar = param(1.0, unit="kg", role="mass", doc="mass of each rod", lower=1e-12)
+    L: Scalar = param(1.0, unit="m", role="geometry", doc="length of each rod", lower=1e-12)
+    R: Scalar = param(0.02, unit="m", role="geometry", doc="radius of the bearings", lower=1e-12)
+    phi_0: Scalar = param(
+        2.0, unit="rad", role="motion", doc="angle of the straight pendulum at the start"
+    )
+    g: Scalar = param(9.81, unit="m/s^2", role="gravity", doc="gravity", lower=0.0)
 
     def mechanism(self) -> Mechanism:
         """Two bodies in a chain."""

@@ -1,7 +1,7 @@
 """A pendulum hinged to a box that slides on the ground."""
 
 from dataclasses import dataclass
-from typing import final
+from typing import ClassVar, final
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import param
@@ -26,14 +26,18 @@ class PendulumBox(MechanismScene):
     Limits: the ground does not pull: while N > 0 the box does not lift off, which is not checked.
     """
 
+    t_end: ClassVar[float] = 15.0
+
     hinge: Law | None = None
-    m_box: Scalar = param(6.0, unit="kg", doc="mass of the box", lower=1e-12)
-    m: Scalar = param(20.0, unit="kg", doc="mass of the pendulum", lower=1e-12)
-    L: Scalar = param(0.3, unit="m", doc="distance of hinge and mass", lower=1e-12)
-    J: Scalar = param(1e-9, unit="kg m^2", doc="inertia about the mass", lower=1e-12)
-    R: Scalar = param(0.01, unit="m", doc="radius of the hinge", lower=1e-12)
-    phi_0: Scalar = param(0.5235987755982988, unit="rad", doc="angle at the start")
-    g: Scalar = param(9.81, unit="m/s^2", doc="gravity", lower=0.0)
+    m_box: Scalar = param(6.0, unit="kg", role="mass", doc="mass of the box", lower=1e-12)
+    m: Scalar = param(20.0, unit="kg", role="mass", doc="mass of the pendulum", lower=1e-12)
+    L: Scalar = param(0.3, unit="m", role="geometry", doc="distance of hinge and mass", lower=1e-12)
+    J: Scalar = param(
+        1e-9, unit="kg m^2", role="inertia", doc="inertia about the mass", lower=1e-12
+    )
+    R: Scalar = param(0.01, unit="m", role="geometry", doc="radius of the hinge", lower=1e-12)
+    phi_0: Scalar = param(0.5235987755982988, unit="rad", role="motion", doc="angle at the start")
+    g: Scalar = param(9.81, unit="m/s^2", role="gravity", doc="gravity", lower=0.0)
 
     def mechanism(self) -> Mechanism:
         """Two bodies, a slide and a hinge."""

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from math import pi
-from typing import final
+from typing import ClassVar, final
 
 import casadi as ca
 
@@ -41,21 +41,33 @@ class QuarterCar(Scene):
     Source: Al-Zughaibi, quarter-car friction, equations 1-13 (seed 1).
     """
 
-    M_b: Scalar = param(240.0, unit="kg", doc="mass of the body", lower=1e-12)
-    M_w: Scalar = param(40.0, unit="kg", doc="mass of the wheel", lower=1e-12)
-    k_s: Scalar = param(28900.0, unit="N/m", doc="suspension stiffness", lower=0.0)
-    b_d: Scalar = param(260.0, unit="N s/m", doc="suspension damping", lower=0.0)
-    k_t: Scalar = param(920000.0, unit="N/m", doc="tyre stiffness", lower=0.0)
-    b_t: Scalar = param(3886.0, unit="N s/m", doc="tyre damping", lower=0.0)
-    theta: Scalar = param(pi / 4, unit="rad", doc="angle of the strut", lower=0.01, upper=1.56)
-    L_d: Scalar = param(0.4, unit="m", doc="length of the strut", lower=1e-12)
-    N_0: Scalar = param(1093.0, unit="N", doc="preload of the guide", lower=0.0)
-    eps: Scalar = param(1.0, unit="N", doc="rounding of the strut's side force", lower=1e-12)
-    middle: Scalar = param(0.085, unit="m", doc="height of the road after its first ramp")
-    amplitude: Scalar = param(0.05, unit="m", doc="rise of the second ramp, half fall of the third")
-    t_0: Scalar = param(0.5, unit="s", doc="start of the first ramp", lower=0.0)
-    t_ramp: Scalar = param(1.0, unit="s", doc="duration of a ramp", lower=1e-12)
-    t_hold: Scalar = param(2.0, unit="s", doc="rest after a ramp", lower=0.0)
+    t_end: ClassVar[float] = 10.0
+
+    M_b: Scalar = param(240.0, unit="kg", role="mass", doc="mass of the body", lower=1e-12)
+    M_w: Scalar = param(40.0, unit="kg", role="mass", doc="mass of the wheel", lower=1e-12)
+    k_s: Scalar = param(
+        28900.0, unit="N/m", role="stiffness", doc="suspension stiffness", lower=0.0
+    )
+    b_d: Scalar = param(260.0, unit="N s/m", role="damping", doc="suspension damping", lower=0.0)
+    k_t: Scalar = param(920000.0, unit="N/m", role="stiffness", doc="tyre stiffness", lower=0.0)
+    b_t: Scalar = param(3886.0, unit="N s/m", role="damping", doc="tyre damping", lower=0.0)
+    theta: Scalar = param(
+        pi / 4, unit="rad", role="geometry", doc="angle of the strut", lower=0.01, upper=1.56
+    )
+    L_d: Scalar = param(0.4, unit="m", role="geometry", doc="length of the strut", lower=1e-12)
+    N_0: Scalar = param(1093.0, unit="N", role="load", doc="preload of the guide", lower=0.0)
+    eps: Scalar = param(
+        1.0, unit="N", role="width", doc="rounding of the strut's side force", lower=1e-12
+    )
+    middle: Scalar = param(
+        0.085, unit="m", role="motion", doc="height of the road after its first ramp"
+    )
+    amplitude: Scalar = param(
+        0.05, unit="m", role="motion", doc="rise of the second ramp, half fall of the third"
+    )
+    t_0: Scalar = param(0.5, unit="s", role="motion", doc="start of the first ramp", lower=0.0)
+    t_ramp: Scalar = param(1.0, unit="s", role="motion", doc="duration of a ramp", lower=1e-12)
+    t_hold: Scalar = param(2.0, unit="s", role="motion", doc="rest after a ramp", lower=0.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()

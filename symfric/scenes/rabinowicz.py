@@ -1,7 +1,7 @@
 """Rabinowicz's stick-slip test: a block on a moving belt, held by a spring."""
 
 from dataclasses import dataclass
-from typing import final
+from typing import ClassVar, final
 
 import casadi as ca
 
@@ -26,10 +26,12 @@ class Rabinowicz(Scene):
     belt 0.1 m/s); the block starts at x = 0 at rest.
     """
 
-    m: Scalar = param(0.8, unit="kg", doc="mass of the block", lower=1e-12)
-    k: Scalar = param(2.1, unit="N/m", doc="spring stiffness", lower=0.0)
-    v_belt: Scalar = param(0.1, unit="m/s", doc="belt velocity")
-    g: Scalar = param(9.81, unit="m/s^2", doc="gravity", lower=0.0)
+    t_end: ClassVar[float] = 20.0
+
+    m: Scalar = param(0.8, unit="kg", role="mass", doc="mass of the block", lower=1e-12)
+    k: Scalar = param(2.1, unit="N/m", role="stiffness", doc="spring stiffness", lower=0.0)
+    v_belt: Scalar = param(0.1, unit="m/s", role="motion", doc="belt velocity")
+    g: Scalar = param(9.81, unit="m/s^2", role="gravity", doc="gravity", lower=0.0)
 
     def equations(self, p: Variables) -> Model:
         """States x, v and those of the law; outputs v_rel, friction, power."""

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import final
+from typing import ClassVar, final
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import param
@@ -21,11 +21,17 @@ class Robot(MechanismScene):
     there. `<dynamics damping>` is added. See `read_urdf` for names, inputs and limits.
     """
 
+    t_end: ClassVar[float] = 2.0
+
     source: str | Path
     level: Scalar = param(
-        0.0, unit="N m", doc="friction of joints without a tag; [N] where they slide", lower=0.0
+        0.0,
+        unit="N m",
+        role="load",
+        doc="friction of joints without a tag; [N] where they slide",
+        lower=0.0,
     )
-    g: Scalar = param(9.81, unit="m/s^2", doc="gravity", lower=0.0)
+    g: Scalar = param(9.81, unit="m/s^2", role="gravity", doc="gravity", lower=0.0)
 
     def mechanism(self) -> Mechanism:
         """Bodies, joints and motors."""

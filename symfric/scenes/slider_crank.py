@@ -1,7 +1,7 @@
 """Spatial slider-crank: a crank that turns about x drives a slider along x over a skew rod."""
 
 from dataclasses import dataclass
-from typing import final
+from typing import ClassVar, final
 
 from symfric.foundation.numeric import Scalar, sqrt
 from symfric.foundation.parameters import param
@@ -27,18 +27,26 @@ class SliderCrank(MechanismScene):
     Defaults: Haug's spatial example, friction in the bearing of the crank; t_end = 0.25 s.
     """
 
-    m_crank: Scalar = param(0.5, unit="kg", doc="mass of the crank", lower=1e-12)
-    m_slider: Scalar = param(5.0, unit="kg", doc="mass of the slider", lower=1e-12)
-    J: Scalar = param(0.2, unit="kg m^2", doc="inertia of the crank about x", lower=1e-12)
-    r: Scalar = param(0.08, unit="m", doc="crank radius", lower=1e-12)
-    l: Scalar = param(0.3, unit="m", doc="length of the rod", lower=1e-12)  # noqa: E741
-    b: Scalar = param(0.1, unit="m", doc="position of the crank along y")
-    c: Scalar = param(0.12, unit="m", doc="position of the crank along z")
-    e: Scalar = param(0.02, unit="m", doc="height of the rod's end on the slider")
-    a: Scalar = param(0.1, unit="m", doc="distance of the bearing stations", lower=1e-12)
-    R: Scalar = param(0.1, unit="m", doc="radius of the crank's bearing", lower=1e-12)
-    omega: Scalar = param(120.0, unit="rad/s", doc="angular velocity at the start")
-    g: Scalar = param(9.8, unit="m/s^2", doc="gravity", lower=0.0)
+    t_end: ClassVar[float] = 0.25
+
+    m_crank: Scalar = param(0.5, unit="kg", role="mass", doc="mass of the crank", lower=1e-12)
+    m_slider: Scalar = param(5.0, unit="kg", role="mass", doc="mass of the slider", lower=1e-12)
+    J: Scalar = param(
+        0.2, unit="kg m^2", role="inertia", doc="inertia of the crank about x", lower=1e-12
+    )
+    r: Scalar = param(0.08, unit="m", role="geometry", doc="crank radius", lower=1e-12)
+    l: Scalar = param(0.3, unit="m", role="geometry", doc="length of the rod", lower=1e-12)  # noqa: E741
+    b: Scalar = param(0.1, unit="m", role="geometry", doc="position of the crank along y")
+    c: Scalar = param(0.12, unit="m", role="geometry", doc="position of the crank along z")
+    e: Scalar = param(0.02, unit="m", role="geometry", doc="height of the rod's end on the slider")
+    a: Scalar = param(
+        0.1, unit="m", role="geometry", doc="distance of the bearing stations", lower=1e-12
+    )
+    R: Scalar = param(
+        0.1, unit="m", role="geometry", doc="radius of the crank's bearing", lower=1e-12
+    )
+    omega: Scalar = param(120.0, unit="rad/s", role="motion", doc="angular velocity at the start")
+    g: Scalar = param(9.8, unit="m/s^2", role="gravity", doc="gravity", lower=0.0)
 
     def mechanism(self) -> Mechanism:
         """Two bodies, a bearing, a guide and a rod."""

@@ -104,9 +104,17 @@ def system(model: Model, inputs: Drivers) -> System:
 
     An implicit model that is linear in x' with a constant matrix keeps that matrix as mass; any
     other one gets its rates as additional algebraic unknowns, a holonomic one its accelerations.
+
+    Raises:
+        ValueError: a model without unknowns.
     """
     unknowns, f, mass, names = _columns(model)
     nx = len(model.x)
+    if not names:
+        raise ValueError(
+            f"model '{model.name}': expected states x or unknowns z to solve for, got none; "
+            "evaluate its outputs by model.function"
+        )
     f = ca.substitute(f, model.vector("u"), inputs.expression)
     mechanics = model.holonomic
     phi = mechanics.phi if mechanics else ca.SX(0, 1)

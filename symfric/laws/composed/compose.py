@@ -8,6 +8,7 @@ from symfric.foundation.numeric import Scalar, column, empty, is_casadi, smalles
 from symfric.foundation.parameters import Parametric, distinct, param, parameters, with_values
 from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, Input, Law, State, Switch, check_law, chosen
+from symfric.laws.composed.wrapper import Wrapper
 
 
 @final
@@ -108,7 +109,7 @@ class Sum(Law):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Asymmetric(Law):
+class Asymmetric(Wrapper):
     """One law with different parameters for the two directions of sliding.
 
         p(v) = p_pos w + p_neg (1 - w),   w = [1 + tanh(v / v_blend)] / 2
@@ -124,7 +125,9 @@ class Asymmetric(Law):
 
     positive: Law
     negative: Law
-    v_blend: Scalar = param(1e-4, unit="m/s", doc="blending velocity of the sides", lower=1e-12)
+    v_blend: Scalar = param(
+        1e-4, unit="m/s", role="width", doc="blending velocity of the sides", lower=1e-12
+    )
 
     def __post_init__(self) -> None:
         check_law("Asymmetric", self.positive)
@@ -138,11 +141,12 @@ class Asymmetric(Law):
         super().__post_init__()
 
     @property
-    def states(self) -> tuple[State, ...]:
-        """The states of the law."""
-        return self.positive.states
+    def inner(self) -> Law:
+        """The law of one side."""
+        return self.positive
 
-    def _at(self, v: Scalar) -> Law:
+    def inner_at(self, v: Scalar) -> Law:
+        """The law with the numbers of the direction of `v`."""
         w = (1 + smooth.sign(v, self.v_blend)) / 2
         rest = 1 - w
         sides = zip(
@@ -156,45 +160,18 @@ class Asymmetric(Law):
         return with_values(self.positive, blended)
 
     @property
-    def inputs(self) -> tuple[Input, ...]:
-        """The further inputs of the law."""
-        return self.positive.inputs
-
-    @property
     def velocity_scale(self) -> Scalar:
         """The smaller one of the sides [m/s]."""
         return smallest(self.positive.velocity_scale, self.negative.velocity_scale)
 
-    def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Friction force [N]."""
-        return self._at(v).force(v, N, z, **inputs)
-
-    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Rates of the states of the law."""
-        return self._at(v).rate(v, N, z, **inputs)
-
-    def switches(
-        self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
-    ) -> tuple[Switch, ...]:
-        """The changes of mode of the law."""
-        return self._at(v).switches(v, N, z, **inputs)
-
-    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
-        """That of the law."""
-        return self._at(v).held_step(v, N, z, h)
-
     def warnings(self) -> tuple[str, ...]:
-        """Those of the law."""
-        return self.positive.warnings() + self.negative.warnings()
-
-    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Steady states of the law."""
-        return self._at(v).steady_state(v, N)
+        """Those of both sides, each once."""
+        return tuple(dict.fromkeys(self.positive.warnings() + self.negative.warnings()))
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class LoadDependent(Law):
+class LoadDependent(Wrapper):
     """A law under the effective normal force of a preloaded, load-carrying contact.
 
         N_eff = N_0 + c max(N, 0)
@@ -211,57 +188,22 @@ class LoadDependent(Law):
     )
 
     law: Law
-    N_0: Scalar = param(0.0, unit="N", doc="preload", lower=0.0)
-    c: Scalar = param(1.0, unit="1", doc="share of the external load", lower=0.0)
-    N_eps: Scalar = param(1e-3, unit="N", doc="smoothing of the lift-off", lower=0.0)
+    N_0: Scalar = param(0.0, unit="N", role="load", doc="preload", lower=0.0)
+    c: Scalar = param(1.0, unit="1", role="load", doc="share of the external load", lower=0.0)
+    N_eps: Scalar = param(1e-3, unit="N", role="width", doc="smoothing of the lift-off", lower=0.0)
 
     def __post_init__(self) -> None:
         check_law("LoadDependent", self.law)
         super().__post_init__()
 
-    def _load(self, N: Scalar) -> Scalar:
+    @property
+    def inner(self) -> Law:
+        """The law."""
+        return self.law
+
+    def load(self, N: Scalar) -> Scalar:
+        """The effective normal force [N]."""
         return self.N_0 + self.c * smooth.positive(N, self.N_eps)
-
-    @property
-    def states(self) -> tuple[State, ...]:
-        """The states of the law."""
-        return self.law.states
-
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        """The further inputs of the law."""
-        return self.law.inputs
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """That of the law [m/s]."""
-        return self.law.velocity_scale
-
-    def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Friction force [N]."""
-        return self.law.force(v, self._load(N), z, **inputs)
-
-    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Rates of the states of the law."""
-        return self.law.rate(v, self._load(N), z, **inputs)
-
-    def switches(
-        self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
-    ) -> tuple[Switch, ...]:
-        """The changes of mode of the law."""
-        return self.law.switches(v, self._load(N), z, **inputs)
-
-    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
-        """That of the law."""
-        return self.law.held_step(v, self._load(N), z, h)
-
-    def warnings(self) -> tuple[str, ...]:
-        """Those of the law."""
-        return self.law.warnings()
-
-    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Steady states of the law."""
-        return self.law.steady_state(v, self._load(N))
 
 
 def _structure(value: object) -> object:

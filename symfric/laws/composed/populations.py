@@ -205,14 +205,24 @@ class GenericAsperity(Population):
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_0", "mu_inf"),)
     redraws: ClassVar[bool] = False
 
-    k: Scalar = param(1e6, unit="N/m", doc="stiffness of all asperities in contact", lower=1e-12)
-    mu_0: Scalar = param(0.05, unit="1", doc="friction coefficient of a new contact", lower=0.0)
-    mu_inf: Scalar = param(0.2, unit="1", doc="friction coefficient of an old contact", lower=0.0)
-    tau_c: Scalar = param(0.05, unit="s", doc="time in which a contact ages", lower=1e-12)
-    lam: Scalar = param(2e-5, unit="m", doc="period of the counterface", lower=1e-15)
-    duty: Scalar = param(0.6, unit="1", doc="share of a period in contact", lower=1e-3, upper=1.0)
-    count: int = param(1000, unit="1", doc="number of asperities", lower=1)
-    seed: int = param(0, unit="1", doc="seed of the random numbers", lower=0)
+    k: Scalar = param(
+        1e6, unit="N/m", role="stiffness", doc="stiffness of all asperities in contact", lower=1e-12
+    )
+    mu_0: Scalar = param(
+        0.05, unit="1", role="level", doc="friction coefficient of a new contact", lower=0.0
+    )
+    mu_inf: Scalar = param(
+        0.2, unit="1", role="level", doc="friction coefficient of an old contact", lower=0.0
+    )
+    tau_c: Scalar = param(
+        0.05, unit="s", role="time", doc="time in which a contact ages", lower=1e-12
+    )
+    lam: Scalar = param(2e-5, unit="m", role="length", doc="period of the counterface", lower=1e-15)
+    duty: Scalar = param(
+        0.6, unit="1", role="shape", doc="share of a period in contact", lower=1e-3, upper=1.0
+    )
+    count: int = param(1000, unit="1", role="sampling", doc="number of asperities", lower=1)
+    seed: int = param(0, unit="1", role="sampling", doc="seed of the random numbers", lower=0)
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -279,10 +289,14 @@ class RandomBristles(Population):
     )
     redraws: ClassVar[bool] = True
 
-    sigma_0: Scalar = param(1e5, unit="N/m", doc="stiffness of all bristles", lower=1e-12)
-    delta_s: Scalar = param(1e-5, unit="m", doc="stretch at which a bristle snaps", lower=1e-15)
-    count: int = param(25, unit="1", doc="number of bristles", lower=1)
-    seed: int = param(0, unit="1", doc="seed of the random numbers", lower=0)
+    sigma_0: Scalar = param(
+        1e5, unit="N/m", role="stiffness", doc="stiffness of all bristles", lower=1e-12
+    )
+    delta_s: Scalar = param(
+        1e-5, unit="m", role="length", doc="stretch at which a bristle snaps", lower=1e-15
+    )
+    count: int = param(25, unit="1", role="sampling", doc="number of bristles", lower=1)
+    seed: int = param(0, unit="1", role="sampling", doc="seed of the random numbers", lower=0)
 
     @property
     def states(self) -> tuple[State, ...]:

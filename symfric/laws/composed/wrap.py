@@ -5,12 +5,13 @@ from typing import ClassVar, final
 
 from symfric.foundation.numeric import Scalar, column, exp
 from symfric.foundation.parameters import param, parameters, with_values
-from symfric.laws.base.law import Facts, Input, Law, State, Switch, check_law
+from symfric.laws.base.law import Facts, Law, State, check_law
+from symfric.laws.composed.wrapper import Wrapper
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Lagged(Law):
+class Lagged(Wrapper):
     """A law without states that follows the velocity with a lag (one state).
 
         dw/dt = (v - w) / tau_L
@@ -27,7 +28,7 @@ class Lagged(Law):
     facts: ClassVar[Facts] = Facts(("L",), "that of its law", "constructed", "Hess and Soom 1990")
 
     law: Law
-    tau_L: Scalar = param(0.01, unit="s", doc="time constant of the lag", lower=1e-12)
+    tau_L: Scalar = param(0.01, unit="s", role="time", doc="time constant of the lag", lower=1e-12)
 
     def __post_init__(self) -> None:
         check_law("Lagged", self.law)
@@ -39,19 +40,14 @@ class Lagged(Law):
             )
 
     @property
+    def inner(self) -> Law:
+        """The law."""
+        return self.law
+
+    @property
     def states(self) -> tuple[State, ...]:
         """The velocity that the force follows."""
         return (State("w", "m/s", 0.1),)
-
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        """The further inputs of the law."""
-        return self.law.inputs
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """That of the law [m/s]."""
-        return self.law.velocity_scale
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Friction force [N]."""
@@ -65,20 +61,20 @@ class Lagged(Law):
         """The velocity itself, shape (1, 1)."""
         return column(v)
 
-    def warnings(self) -> tuple[str, ...]:
-        """Those of the law."""
-        return self.law.warnings()
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> None:
+        """None: the rate says it all."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class TemperatureDependent(Law):
+class TemperatureDependent(Wrapper):
     """A law whose coefficients fall with the temperature.
 
-        mu(T)      = mu      exp(-k_dry (T - T_0))   every friction coefficient mu... [1]
-        sigma_2(T) = sigma_2 exp(-k_wet (T - T_0))   every viscous coefficient [N s/m]
+        mu(T)      = mu      exp(-k_dry (T - T_0))   every dry level: coefficient or force
+        sigma_2(T) = sigma_2 exp(-k_wet (T - T_0))   every viscous coefficient
 
-    T [K] is a parameter: a number, or a symbol that something else determines.
+    Which parameters these are is their `role`, "level" or "viscous". T [K] is a parameter: a
+    number, or a symbol that something else determines.
     Limits: T = T_0 is the law itself. The exponential holds over some ten kelvin, for oils with
     k_wet of 0.02 to 0.05 1/K.
     Source: Reynolds' viscosity equation; for robot joints Bittencourt and Gunnarsson, J. Dyn. Syst.
@@ -90,63 +86,32 @@ class TemperatureDependent(Law):
     )
 
     law: Law
-    T: Scalar = param(293.15, unit="K", doc="temperature", lower=0.0)
-    T_0: Scalar = param(293.15, unit="K", doc="temperature of the coefficients", lower=0.0)
-    k_dry: Scalar = param(0.0, unit="1/K", doc="fall of the friction coefficients")
-    k_wet: Scalar = param(0.03, unit="1/K", doc="fall of the viscous coefficients")
+    T: Scalar = param(293.15, unit="K", role="temperature", doc="temperature", lower=0.0)
+    T_0: Scalar = param(
+        293.15, unit="K", role="temperature", doc="temperature of the coefficients", lower=0.0
+    )
+    k_dry: Scalar = param(
+        0.0, unit="1/K", role="temperature", doc="fall of the friction coefficients"
+    )
+    k_wet: Scalar = param(
+        0.03, unit="1/K", role="temperature", doc="fall of the viscous coefficients"
+    )
 
     def __post_init__(self) -> None:
         check_law("TemperatureDependent", self.law)
         super().__post_init__()
+        if not {"level", "viscous"} & {p.role for p in parameters(self.law).values()}:
+            raise ValueError(
+                "TemperatureDependent: expected a law with a dry level or a viscous coefficient, "
+                f"got {type(self.law).__name__}, which has no parameter of either role"
+            )
 
-    def at_temperature(self) -> Law:
+    @property
+    def inner(self) -> Law:
         """The law with the coefficients of the temperature T."""
         rise = self.T - self.T_0
-        dry, wet = exp(-self.k_dry * rise), exp(-self.k_wet * rise)
-        known = parameters(self.law)
-        viscous = [n for n, p in known.items() if p.doc.startswith("viscous coefficient")]
-        coefficients = [n for n, p in known.items() if n.startswith("mu") and p.unit == "1"]
-        changed = {n: known[n].value * wet for n in viscous}
-        changed |= {n: known[n].value * dry for n in coefficients if n not in viscous}
-        return with_values(self.law, changed)
-
-    @property
-    def states(self) -> tuple[State, ...]:
-        """The states of the law."""
-        return self.law.states
-
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        """The further inputs of the law."""
-        return self.law.inputs
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """That of the law [m/s]."""
-        return self.law.velocity_scale
-
-    def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Friction force [N]."""
-        return self.at_temperature().force(v, N, z, **inputs)
-
-    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Rates of the states of the law."""
-        return self.at_temperature().rate(v, N, z, **inputs)
-
-    def switches(
-        self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
-    ) -> tuple[Switch, ...]:
-        """The changes of mode of the law."""
-        return self.at_temperature().switches(v, N, z, **inputs)
-
-    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Steady states of the law."""
-        return self.at_temperature().steady_state(v, N)
-
-    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
-        """That of the law."""
-        return self.at_temperature().held_step(v, N, z, h)
-
-    def warnings(self) -> tuple[str, ...]:
-        """Those of the law at this temperature."""
-        return self.at_temperature().warnings()
+        falls = {"level": exp(-self.k_dry * rise), "viscous": exp(-self.k_wet * rise)}
+        known = parameters(self.law).items()
+        return with_values(
+            self.law, {name: p.value * falls[p.role] for name, p in known if p.role in falls}
+        )

@@ -41,19 +41,39 @@ class Armstrong(Law):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_a", "mu_inf"),)
 
-    k_t: Scalar = param(1e5, unit="N/m", doc="tangential stiffness", lower=1e-12)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=1e-12)
-    sigma_2: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
-    mu_inf: Scalar = param(0.05, unit="1", doc="static excess after long rest", lower=0.0)
-    mu_a: Scalar = param(0.01, unit="1", doc="static excess right after slip", lower=0.0)
-    v_s: Scalar = param(1e-3, unit="m/s", doc="Stribeck velocity", lower=1e-12)
-    tau_L: Scalar = param(0.02, unit="s", doc="lag of the Stribeck curve", lower=1e-12)
-    gamma: Scalar = param(0.2, unit="s", doc="dwell that recovers half the excess", lower=1e-12)
-    v_e: Scalar = param(1e-4, unit="m/s", doc="velocity that ends the rest", lower=1e-12)
-    tau_r: Scalar = param(0.01, unit="s", doc="time that forgets the rest in slip", lower=1e-12)
-    n: Scalar = param(20.0, unit="1", doc="sharpness of the yielding", lower=1.0, upper=1e3)
-    v_eps: Scalar = param(1e-9, unit="m/s", doc="smoothing velocity of |v|", lower=0.0)
-    r_eps: Scalar = param(1e-8, unit="1", doc="smoothing of the load share", lower=1e-12)
+    k_t: Scalar = param(1e5, unit="N/m", role="stiffness", doc="tangential stiffness", lower=1e-12)
+    mu_d: Scalar = param(
+        0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=1e-12
+    )
+    sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
+    mu_inf: Scalar = param(
+        0.05, unit="1", role="level", doc="static excess after long rest", lower=0.0
+    )
+    mu_a: Scalar = param(
+        0.01, unit="1", role="level", doc="static excess right after slip", lower=0.0
+    )
+    v_s: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
+    )
+    tau_L: Scalar = param(0.02, unit="s", role="time", doc="lag of the Stribeck curve", lower=1e-12)
+    gamma: Scalar = param(
+        0.2, unit="s", role="time", doc="dwell that recovers half the excess", lower=1e-12
+    )
+    v_e: Scalar = param(
+        1e-4, unit="m/s", role="velocity scale", doc="velocity that ends the rest", lower=1e-12
+    )
+    tau_r: Scalar = param(
+        0.01, unit="s", role="time", doc="time that forgets the rest in slip", lower=1e-12
+    )
+    n: Scalar = param(
+        20.0, unit="1", role="shape", doc="sharpness of the yielding", lower=1.0, upper=1e3
+    )
+    v_eps: Scalar = param(
+        1e-9, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
+    )
+    r_eps: Scalar = param(
+        1e-8, unit="1", role="width", doc="smoothing of the load share", lower=1e-12
+    )
 
     @property
     def states(self) -> tuple[State, ...]:

@@ -39,11 +39,19 @@ class BlimanSorine(Law):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_2", "mu_1"),)
 
-    mu_1: Scalar = param(0.3, unit="1", doc="coefficient of the fast part", lower=1e-12)
-    mu_2: Scalar = param(0.2, unit="1", doc="coefficient of the slow part", lower=0.0)
-    eta: Scalar = param(0.4, unit="1", doc="path ratio, fast to slow", lower=1e-6, upper=0.999)
-    s_f: Scalar = param(1e-5, unit="m", doc="path constant of the slow part", lower=1e-15)
-    v_eps: Scalar = param(1e-9, unit="m/s", doc="smoothing velocity of |v|", lower=0.0)
+    mu_1: Scalar = param(
+        0.3, unit="1", role="level", doc="coefficient of the fast part", lower=1e-12
+    )
+    mu_2: Scalar = param(0.2, unit="1", role="level", doc="coefficient of the slow part", lower=0.0)
+    eta: Scalar = param(
+        0.4, unit="1", role="shape", doc="path ratio, fast to slow", lower=1e-6, upper=0.999
+    )
+    s_f: Scalar = param(
+        1e-5, unit="m", role="length", doc="path constant of the slow part", lower=1e-15
+    )
+    v_eps: Scalar = param(
+        1e-9, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
+    )
     order: str = option("2", choices=("1", "2"), doc="number of states")
 
     @property

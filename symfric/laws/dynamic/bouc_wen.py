@@ -37,14 +37,24 @@ class BoucWen(Law):
         load="proportional in steady sliding",
     )
 
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=1e-12)
-    sigma_0: Scalar = param(1e5, unit="N/m", doc="initial stiffness for A = 1", lower=1e-12)
-    A: Scalar = param(1.0, unit="1", doc="scale of the stiffness", lower=1e-12)
-    beta: Scalar = param(0.5, unit="1", doc="yielding while loading", lower=1e-12)
-    gamma: Scalar = param(0.5, unit="1", doc="yielding in either direction")
-    n: Scalar = param(2.0, unit="1", doc="sharpness of the yielding", lower=1.0, upper=1e3)
-    v_eps: Scalar = param(1e-9, unit="m/s", doc="smoothing velocity of |v|", lower=0.0)
-    z_eps: Scalar = param(1e-8, unit="1", doc="smoothing of the load share", lower=1e-12)
+    mu_d: Scalar = param(
+        0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=1e-12
+    )
+    sigma_0: Scalar = param(
+        1e5, unit="N/m", role="stiffness", doc="initial stiffness for A = 1", lower=1e-12
+    )
+    A: Scalar = param(1.0, unit="1", role="shape", doc="scale of the stiffness", lower=1e-12)
+    beta: Scalar = param(0.5, unit="1", role="shape", doc="yielding while loading", lower=1e-12)
+    gamma: Scalar = param(0.5, unit="1", role="shape", doc="yielding in either direction")
+    n: Scalar = param(
+        2.0, unit="1", role="shape", doc="sharpness of the yielding", lower=1.0, upper=1e3
+    )
+    v_eps: Scalar = param(
+        1e-9, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
+    )
+    z_eps: Scalar = param(
+        1e-8, unit="1", role="width", doc="smoothing of the load share", lower=1e-12
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

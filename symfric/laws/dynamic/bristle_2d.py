@@ -22,9 +22,9 @@ class Bristle2D(Law):
         F     = F_tr sat(|F_tr|, g) / |F_tr|
         dz/dt = (F - sigma_0 z) / sigma_1
 
-    Made for slip in a plane, with vectors v, z and F: `Planar(Bristle2D())`. sat is the identity up
-    to (1 - kappa) g, so that the bristle returns exactly and does not drift, and g beyond
-    (1 + kappa) g; kappa = 0 is the projection on the disc of radius g, with its kink.
+    Made for slip in a plane, with vectors v, z and F: `PlanarSlip(Bristle2D())`. sat is the
+    identity up to (1 - kappa) g, so that the bristle returns exactly and does not drift, and g
+    beyond (1 + kappa) g; kappa = 0 is the projection on the disc of radius g, with its kink.
     Limits: isotropic; steady state g v/|v| for |v| > kappa g / sigma_1, down to (1 - kappa) g in
     creep; one bristle and damper in parallel below g. sigma_1 -> 0 tends to Coulomb friction.
     Source: Kikuuwe, Takesue, Sano, Mochiyama, Fujimoto, IEEE T-RO 22(6), 2006 (elastoplastic
@@ -40,12 +40,18 @@ class Bristle2D(Law):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=1e-12)
-    v_s: Scalar = param(1e-3, unit="m/s", doc="Stribeck velocity", lower=1e-12)
-    sigma_0: Scalar = param(1e5, unit="N/m", doc="bristle stiffness", lower=1e-12)
-    sigma_1: Scalar = param(190.0, unit="N s/m", doc="bristle damping", lower=1e-12)
-    kappa: Scalar = param(0.02, unit="1", doc="rounding of the saturation", lower=0.0, upper=1.0)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(
+        0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=1e-12
+    )
+    v_s: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
+    )
+    sigma_0: Scalar = param(1e5, unit="N/m", role="stiffness", doc="bristle stiffness", lower=1e-12)
+    sigma_1: Scalar = param(190.0, unit="N s/m", role="damping", doc="bristle damping", lower=1e-12)
+    kappa: Scalar = param(
+        0.02, unit="1", role="width", doc="rounding of the saturation", lower=0.0, upper=1.0
+    )
 
     @property
     def states(self) -> tuple[State, ...]:

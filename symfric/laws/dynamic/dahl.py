@@ -35,11 +35,17 @@ class Dahl(Law):
         source="Dahl 1968, 1976",
     )
 
-    sigma_0: Scalar = param(1e5, unit="N/m", doc="bristle stiffness", lower=1e-12)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=1e-12)
-    n: Scalar = param(1.0, unit="1", doc="exponent", lower=0.0, upper=10.0)
-    v_eps: Scalar = param(1e-9, unit="m/s", doc="smoothing velocity of |v|", lower=0.0)
-    rho_eps: Scalar = param(1e-6, unit="1", doc="smoothing of |rho|, for n != 1", lower=1e-12)
+    sigma_0: Scalar = param(1e5, unit="N/m", role="stiffness", doc="bristle stiffness", lower=1e-12)
+    mu_d: Scalar = param(
+        0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=1e-12
+    )
+    n: Scalar = param(1.0, unit="1", role="shape", doc="exponent", lower=0.0, upper=10.0)
+    v_eps: Scalar = param(
+        1e-9, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
+    )
+    rho_eps: Scalar = param(
+        1e-6, unit="1", role="width", doc="smoothing of |rho|, for n != 1", lower=1e-12
+    )
 
     @property
     def states(self) -> tuple[State, ...]:

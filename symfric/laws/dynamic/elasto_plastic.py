@@ -43,7 +43,7 @@ class ElastoPlastic(Bristle):
         source="Dupont, Hayward, Armstrong, Altpeter, IEEE TAC 47(5), 2002",
     )
 
-    z_ba: Scalar = param(1e-7, unit="m", doc="break-away deflection", lower=0.0)
+    z_ba: Scalar = param(1e-7, unit="m", role="length", doc="break-away deflection", lower=0.0)
 
     def sliding_share(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
         """alpha: 0 while the bristle is elastic, 1 when it slides."""

@@ -36,9 +36,11 @@ class ExactCoulomb(Sticking):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_0: Scalar = param(1e-9, unit="m/s", doc="velocity that ends a stick", lower=1e-15)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_0: Scalar = param(
+        1e-9, unit="m/s", role="width", doc="velocity that ends a stick", lower=1e-15
+    )
 
     @property
     def has_mode(self) -> bool:

@@ -15,8 +15,8 @@ from symfric.laws.dynamic.element import ahead, stretched
 class Element(Parametric):
     """One element: a spring of stiffness k that carries the share alpha of the friction."""
 
-    k: Scalar = param(1e5, unit="N/m", doc="stiffness", lower=1e-12)
-    alpha: Scalar = param(1.0, unit="1", doc="share of the friction", lower=1e-12)
+    k: Scalar = param(1e5, unit="N/m", role="stiffness", doc="stiffness", lower=1e-12)
+    alpha: Scalar = param(1.0, unit="1", role="shape", doc="share of the friction", lower=1e-12)
 
 
 ELEMENTS = (Element(5e4, 0.25), Element(2.5e4, 0.25), Element(1.5e4, 0.25), Element(1e4, 0.25))
@@ -65,14 +65,26 @@ class GMS(Law):
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
     elements: tuple[Element, ...] = ELEMENTS
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=1e-12)
-    v_s: Scalar = param(1e-3, unit="m/s", doc="Stribeck velocity", lower=1e-12)
-    delta: Scalar = param(2.0, unit="1", doc="Stribeck exponent", lower=0.1, upper=10.0)
-    C: Scalar = param(24.0, unit="N/s", doc="attraction to the Stribeck curve", lower=1e-12)
-    sigma_2: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
-    v_eps: Scalar = param(1e-9, unit="m/s", doc="smoothing velocity of sign(v)", lower=1e-15)
-    rho: Scalar = param(0.03, unit="1", doc="share over which slip sets in", lower=1e-6, upper=0.5)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(
+        0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=1e-12
+    )
+    v_s: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
+    )
+    delta: Scalar = param(
+        2.0, unit="1", role="shape", doc="Stribeck exponent", lower=0.1, upper=10.0
+    )
+    C: Scalar = param(
+        24.0, unit="N/s", role="time", doc="attraction to the Stribeck curve", lower=1e-12
+    )
+    sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
+    v_eps: Scalar = param(
+        1e-9, unit="m/s", role="width", doc="smoothing velocity of sign(v)", lower=1e-15
+    )
+    rho: Scalar = param(
+        0.03, unit="1", role="shape", doc="share over which slip sets in", lower=1e-6, upper=0.5
+    )
     form: str = option("smooth", choices=("smooth", "event"), doc="latched, or exact with modes")
 
     @property

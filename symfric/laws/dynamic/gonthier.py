@@ -41,16 +41,28 @@ class Gonthier(Law):
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
     strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = (("v_d", "v_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=1e-12)
-    v_s: Scalar = param(1e-3, unit="m/s", doc="Stribeck velocity", lower=1e-12)
-    v_d: Scalar = param(1e-4, unit="m/s", doc="velocity of full direction", lower=1e-12)
-    sigma_0: Scalar = param(1e5, unit="N/m", doc="bristle stiffness", lower=1e-12)
-    sigma_1: Scalar = param(190.0, unit="N s/m", doc="bristle damping", lower=1e-12)
-    sigma_2: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
-    tau_dw: Scalar = param(0.1, unit="s", doc="time constant of the dwell", lower=1e-12)
-    kappa: Scalar = param(1e-3, unit="1", doc="rounding of the saturation", lower=0.0, upper=1.0)
-    s_eps: Scalar = param(1e-3, unit="1", doc="smoothing of the dwell switch", lower=1e-12)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(
+        0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=1e-12
+    )
+    v_s: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
+    )
+    v_d: Scalar = param(
+        1e-4, unit="m/s", role="velocity scale", doc="velocity of full direction", lower=1e-12
+    )
+    sigma_0: Scalar = param(1e5, unit="N/m", role="stiffness", doc="bristle stiffness", lower=1e-12)
+    sigma_1: Scalar = param(190.0, unit="N s/m", role="damping", doc="bristle damping", lower=1e-12)
+    sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
+    tau_dw: Scalar = param(
+        0.1, unit="s", role="time", doc="time constant of the dwell", lower=1e-12
+    )
+    kappa: Scalar = param(
+        1e-3, unit="1", role="width", doc="rounding of the saturation", lower=0.0, upper=1.0
+    )
+    s_eps: Scalar = param(
+        1e-3, unit="1", role="width", doc="smoothing of the dwell switch", lower=1e-12
+    )
 
     @property
     def states(self) -> tuple[State, ...]:

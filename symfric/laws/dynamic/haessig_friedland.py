@@ -39,14 +39,28 @@ class HaessigFriedland(Law):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=1e-12)
-    sigma_0: Scalar = param(1e5, unit="N/m", doc="bristle stiffness in slip", lower=1e-12)
-    sigma_1: Scalar = param(190.0, unit="N s/m", doc="bristle damping in stick", lower=0.0)
-    n: Scalar = param(50.0, unit="1", doc="sharpness of the yielding", lower=1.0, upper=1e3)
-    knee: Scalar = param(0.05, unit="1", doc="share over which excess is lost", lower=1e-6, upper=1)
-    v_eps: Scalar = param(1e-9, unit="m/s", doc="smoothing velocity of |v|", lower=0.0)
-    r_eps: Scalar = param(1e-8, unit="1", doc="smoothing of the load share", lower=1e-12)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(
+        0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=1e-12
+    )
+    sigma_0: Scalar = param(
+        1e5, unit="N/m", role="stiffness", doc="bristle stiffness in slip", lower=1e-12
+    )
+    sigma_1: Scalar = param(
+        190.0, unit="N s/m", role="damping", doc="bristle damping in stick", lower=0.0
+    )
+    n: Scalar = param(
+        50.0, unit="1", role="shape", doc="sharpness of the yielding", lower=1.0, upper=1e3
+    )
+    knee: Scalar = param(
+        0.05, unit="1", role="shape", doc="share over which excess is lost", lower=1e-6, upper=1
+    )
+    v_eps: Scalar = param(
+        1e-9, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
+    )
+    r_eps: Scalar = param(
+        1e-8, unit="1", role="width", doc="smoothing of the load share", lower=1e-12
+    )
     form: str = option("smooth", choices=("smooth", "event"), doc="rounded, or exact with modes")
 
     @property

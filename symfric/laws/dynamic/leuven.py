@@ -44,16 +44,30 @@ class Leuven(Law):
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
     elements: tuple[Slider, ...] = SLIDERS
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=1e-12)
-    v_s: Scalar = param(1e-3, unit="m/s", doc="Stribeck velocity", lower=1e-12)
-    delta: Scalar = param(2.0, unit="1", doc="Stribeck exponent", lower=0.1, upper=10.0)
-    delta_l: Scalar = param(7.0, unit="1", doc="sharpness of the transition", lower=1.0, upper=1e2)
-    sigma_1: Scalar = param(0.8, unit="N s/m", doc="bristle damping", lower=0.0)
-    sigma_2: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
-    n: Scalar = param(20.0, unit="1", doc="sharpness of the yielding", lower=1.0, upper=1e3)
-    v_eps: Scalar = param(1e-9, unit="m/s", doc="smoothing velocity of |v|", lower=0.0)
-    r_eps: Scalar = param(1e-8, unit="1", doc="smoothing of the load shares", lower=1e-12)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(
+        0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=1e-12
+    )
+    v_s: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
+    )
+    delta: Scalar = param(
+        2.0, unit="1", role="shape", doc="Stribeck exponent", lower=0.1, upper=10.0
+    )
+    delta_l: Scalar = param(
+        7.0, unit="1", role="shape", doc="sharpness of the transition", lower=1.0, upper=1e2
+    )
+    sigma_1: Scalar = param(0.8, unit="N s/m", role="damping", doc="bristle damping", lower=0.0)
+    sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
+    n: Scalar = param(
+        20.0, unit="1", role="shape", doc="sharpness of the yielding", lower=1.0, upper=1e3
+    )
+    v_eps: Scalar = param(
+        1e-9, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
+    )
+    r_eps: Scalar = param(
+        1e-8, unit="1", role="width", doc="smoothing of the load shares", lower=1e-12
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -68,9 +68,15 @@ class LuGreNormalised(Bristle):
         source="LuGre in coefficients of friction; Canudas de Wit and Tsiotras, CDC 1999",
     )
 
-    sigma_0: Scalar = param(1.274e4, unit="1/m", doc="bristle stiffness over load", lower=1e-12)
-    sigma_1: Scalar = param(24.2, unit="s/m", doc="bristle damping over load", lower=0.0)
-    sigma_2: Scalar = param(0.0, unit="s/m", doc="viscous coefficient over load", lower=0.0)
+    sigma_0: Scalar = param(
+        1.274e4, unit="1/m", role="stiffness", doc="bristle stiffness over load", lower=1e-12
+    )
+    sigma_1: Scalar = param(
+        24.2, unit="s/m", role="damping", doc="bristle damping over load", lower=0.0
+    )
+    sigma_2: Scalar = param(
+        0.0, unit="s/m", role="viscous", doc="viscous coefficient over load", lower=0.0
+    )
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Rate of the bristle deflection [m/s], shape (1, 1)."""
@@ -111,7 +117,13 @@ class LuGrePassive(Bristle):
         source="Olsson, PhD thesis, Lund 1996",
     )
 
-    v_d: Scalar = param(1e-3, unit="m/s", doc="velocity over which damping fades", lower=1e-12)
+    v_d: Scalar = param(
+        1e-3,
+        unit="m/s",
+        role="velocity scale",
+        doc="velocity over which damping fades",
+        lower=1e-12,
+    )
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Rate of the bristle deflection [m/s], shape (1, 1)."""

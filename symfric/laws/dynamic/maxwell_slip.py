@@ -15,8 +15,10 @@ from symfric.laws.dynamic.element import stretched, yielding
 class Slider(Parametric):
     """A spring of stiffness k on a slider that carries mu N."""
 
-    k: Scalar = param(1e5, unit="N/m", doc="stiffness", lower=1e-12)
-    mu: Scalar = param(0.1, unit="1", doc="friction coefficient of the slider", lower=1e-12)
+    k: Scalar = param(1e5, unit="N/m", role="stiffness", doc="stiffness", lower=1e-12)
+    mu: Scalar = param(
+        0.1, unit="1", role="level", doc="friction coefficient of the slider", lower=1e-12
+    )
 
 
 SLIDERS = (Slider(5e4, 0.025), Slider(2.5e4, 0.025), Slider(1.5e4, 0.025), Slider(1e4, 0.025))
@@ -53,9 +55,15 @@ class MaxwellSlip(Law):
     )
 
     elements: tuple[Slider, ...] = SLIDERS
-    n: Scalar = param(20.0, unit="1", doc="sharpness of the yielding", lower=1.0, upper=1e3)
-    v_eps: Scalar = param(1e-9, unit="m/s", doc="smoothing velocity of |v|", lower=0.0)
-    r_eps: Scalar = param(1e-8, unit="1", doc="smoothing of the load share", lower=1e-12)
+    n: Scalar = param(
+        20.0, unit="1", role="shape", doc="sharpness of the yielding", lower=1.0, upper=1e3
+    )
+    v_eps: Scalar = param(
+        1e-9, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
+    )
+    r_eps: Scalar = param(
+        1e-8, unit="1", role="width", doc="smoothing of the load share", lower=1e-12
+    )
     form: str = option("smooth", choices=("smooth", "event"), doc="rounded, or exact with modes")
 
     @property

@@ -39,12 +39,20 @@ class RateAndState(Law):
         load="proportional",
     )
 
-    mu_0: Scalar = param(0.12, unit="1", doc="friction coefficient at v_0", lower=1e-12)
-    a: Scalar = param(0.005, unit="1", doc="direct effect", lower=1e-6)
-    b: Scalar = param(0.01, unit="1", doc="evolution effect", lower=0.0)
-    v_0: Scalar = param(1e-6, unit="m/s", doc="reference velocity", lower=1e-15)
-    D_c: Scalar = param(1e-5, unit="m", doc="slip that renews the contacts", lower=1e-15)
-    v_eps: Scalar = param(1e-12, unit="m/s", doc="velocity that counts as rest", lower=1e-15)
+    mu_0: Scalar = param(
+        0.12, unit="1", role="level", doc="friction coefficient at v_0", lower=1e-12
+    )
+    a: Scalar = param(0.005, unit="1", role="level", doc="direct effect", lower=1e-6)
+    b: Scalar = param(0.01, unit="1", role="level", doc="evolution effect", lower=0.0)
+    v_0: Scalar = param(
+        1e-6, unit="m/s", role="velocity scale", doc="reference velocity", lower=1e-15
+    )
+    D_c: Scalar = param(
+        1e-5, unit="m", role="length", doc="slip that renews the contacts", lower=1e-15
+    )
+    v_eps: Scalar = param(
+        1e-12, unit="m/s", role="width", doc="velocity that counts as rest", lower=1e-15
+    )
     evolution: str = option("ageing", choices=("ageing", "slip"), doc="Dieterich's or Ruina's law")
 
     def __post_init__(self) -> None:

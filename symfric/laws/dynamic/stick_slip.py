@@ -43,14 +43,26 @@ class StickSlip(Law):
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
     strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = (("v_s", "v_d"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_s: Scalar = param(1e-3, unit="m/s", doc="velocity of full slip", lower=1e-12)
-    v_d: Scalar = param(1.5e-3, unit="m/s", doc="velocity of the dynamic level", lower=1e-12)
-    D_max: Scalar = param(1e-6, unit="m", doc="largest stiction deformation", lower=1e-15)
-    n: Scalar = param(20.0, unit="1", doc="sharpness of the yielding", lower=1.0, upper=1e3)
-    v_eps: Scalar = param(1e-9, unit="m/s", doc="smoothing velocity of |v|", lower=0.0)
-    r_eps: Scalar = param(1e-8, unit="1", doc="smoothing of the deformation", lower=1e-12)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_s: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="velocity of full slip", lower=1e-12
+    )
+    v_d: Scalar = param(
+        1.5e-3, unit="m/s", role="velocity scale", doc="velocity of the dynamic level", lower=1e-12
+    )
+    D_max: Scalar = param(
+        1e-6, unit="m", role="length", doc="largest stiction deformation", lower=1e-15
+    )
+    n: Scalar = param(
+        20.0, unit="1", role="shape", doc="sharpness of the yielding", lower=1.0, upper=1e3
+    )
+    v_eps: Scalar = param(
+        1e-9, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
+    )
+    r_eps: Scalar = param(
+        1e-8, unit="1", role="width", doc="smoothing of the deformation", lower=1e-12
+    )
     branch: str = option("plateau", choices=("plateau", "published"), doc="mu_v within v_s")
 
     @property

@@ -45,11 +45,15 @@ class Karnopp(Sticking):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    D_v: Scalar = param(1e-3, unit="m/s", doc="half width of the band around rest", lower=1e-12)
-    sigma_2: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
-    F_eps: Scalar = param(1e-3, unit="N", doc="rounding of the break-away", lower=1e-12)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    D_v: Scalar = param(
+        1e-3, unit="m/s", role="width", doc="half width of the band around rest", lower=1e-12
+    )
+    sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
+    F_eps: Scalar = param(
+        1e-3, unit="N", role="width", doc="rounding of the break-away", lower=1e-12
+    )
     form: str = option("smooth", choices=WITH_MODES, doc="window, hard switch, or exact with mode")
 
     @property
@@ -116,11 +120,17 @@ class Awrejcewicz(StaticLaw):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    epsilon: Scalar = param(1e-3, unit="m/s", doc="half width of the window", lower=1e-12)
-    v_s: Scalar = param(1e-2, unit="m/s", doc="Stribeck velocity", lower=1e-12)
-    F_eps: Scalar = param(1e-3, unit="N", doc="rounding of the break-away", lower=1e-12)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    epsilon: Scalar = param(
+        1e-3, unit="m/s", role="width", doc="half width of the window", lower=1e-12
+    )
+    v_s: Scalar = param(
+        1e-2, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
+    )
+    F_eps: Scalar = param(
+        1e-3, unit="N", role="width", doc="rounding of the break-away", lower=1e-12
+    )
     form: str = option("smooth", choices=FORMS, doc="quintic or cubic window")
 
     @property
@@ -171,11 +181,17 @@ class LeineSwitch(Sticking):
         source="Leine et al. 1998; the author's public code",
     )
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    delta: Scalar = param(3.0, unit="s/m", doc="steepness of the fall", lower=0.0)
-    v_eps: Scalar = param(1e-4, unit="m/s", doc="smoothing velocity", lower=1e-12)
-    eta: Scalar = param(1e-6, unit="m/s", doc="half width of the band of rest", lower=1e-15)
-    c: Scalar = param(10.0, unit="N s/m", doc="pull to the middle, original form", lower=0.0)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    delta: Scalar = param(
+        3.0, unit="s/m", role="velocity scale", doc="steepness of the fall", lower=0.0
+    )
+    v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=1e-12)
+    eta: Scalar = param(
+        1e-6, unit="m/s", role="width", doc="half width of the band of rest", lower=1e-15
+    )
+    c: Scalar = param(
+        10.0, unit="N s/m", role="damping", doc="pull to the middle, original form", lower=0.0
+    )
     form: str = option("smooth", choices=WITH_MODES, doc="arctangent, switch, or exact with mode")
 
     @property
@@ -239,12 +255,16 @@ class Wojewoda(StaticLaw):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    a_1: Scalar = param(100.0, unit="1/s", doc="decay of the hysteresis", lower=0.0)
-    a_2: Scalar = param(0.1, unit="m/s^2", doc="acceleration of half the decay", lower=1e-12)
-    v_eps: Scalar = param(1e-4, unit="m/s", doc="smoothing velocity", lower=1e-12)
-    a_eps: Scalar = param(1e-2, unit="m/s^2", doc="smoothing acceleration", lower=1e-12)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    a_1: Scalar = param(100.0, unit="1/s", role="shape", doc="decay of the hysteresis", lower=0.0)
+    a_2: Scalar = param(
+        0.1, unit="m/s^2", role="shape", doc="acceleration of half the decay", lower=1e-12
+    )
+    v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=1e-12)
+    a_eps: Scalar = param(
+        1e-2, unit="m/s^2", role="width", doc="smoothing acceleration", lower=1e-12
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -30,11 +30,13 @@ class BrownMcPhee(StaticLaw):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_t: Scalar = param(1e-3, unit="m/s", doc="transition velocity", lower=1e-12)
-    mu_v: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
-    N_t: Scalar = param(1.0, unit="N", doc="transition normal force", lower=1e-12)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_t: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="transition velocity", lower=1e-12
+    )
+    mu_v: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
+    N_t: Scalar = param(1.0, unit="N", role="load", doc="transition normal force", lower=1e-12)
 
     @property
     def velocity_scale(self) -> Scalar:

@@ -56,8 +56,8 @@ class Coulomb(StaticLaw):
         source="Amontons 1699, Coulomb 1785; regularised by tanh",
     )
 
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_eps: Scalar = param(1e-3, unit="m/s", doc="smoothing velocity", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_eps: Scalar = param(1e-3, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
     shape: str = option("tanh", choices=tuple(SHAPES), doc="smooth sign")
 
     @property
@@ -91,7 +91,7 @@ class Viscous(StaticLaw):
         load="independent",
     )
 
-    sigma_2: Scalar = param(0.4, unit="N s/m", doc="viscous coefficient", lower=0.0)
+    sigma_2: Scalar = param(0.4, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -123,9 +123,11 @@ class PowerLawViscous(StaticLaw):
         load="independent",
     )
 
-    sigma_2: Scalar = param(0.4, unit="N (s/m)^d", doc="viscous coefficient", lower=0.0)
-    d: Scalar = param(2.0, unit="1", doc="exponent", lower=0.1, upper=10.0)
-    v_eps: Scalar = param(1e-4, unit="m/s", doc="smoothing velocity", lower=1e-12)
+    sigma_2: Scalar = param(
+        0.4, unit="N (s/m)^d", role="viscous", doc="viscous coefficient", lower=0.0
+    )
+    d: Scalar = param(2.0, unit="1", role="shape", doc="exponent", lower=0.1, upper=10.0)
+    v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=1e-12)
 
     @property
     def velocity_scale(self) -> Scalar:

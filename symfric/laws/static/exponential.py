@@ -30,11 +30,13 @@ class Tustin(StaticLaw):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_s: Scalar = param(1e-3, unit="m/s", doc="Stribeck velocity", lower=1e-12)
-    v_eps: Scalar = param(1e-4, unit="m/s", doc="smoothing velocity", lower=0.0)
-    sigma_2: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_s: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
+    )
+    v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
+    sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -68,10 +70,12 @@ class Benson(StaticLaw):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    d_c: Scalar = param(1e3, unit="s/m", doc="decay coefficient", lower=1e-12)
-    v_eps: Scalar = param(1e-4, unit="m/s", doc="smoothing velocity", lower=0.0)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    d_c: Scalar = param(
+        1e3, unit="s/m", role="velocity scale", doc="decay coefficient", lower=1e-12
+    )
+    v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -106,10 +110,14 @@ class Berger(StaticLaw):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_s: Scalar = param(1e-3, unit="m/s", doc="Stribeck velocity", lower=1e-12)
-    v_t: Scalar = param(1e-4, unit="m/s", doc="transition velocity", lower=1e-12)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_s: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
+    )
+    v_t: Scalar = param(
+        1e-4, unit="m/s", role="velocity scale", doc="transition velocity", lower=1e-12
+    )
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -143,10 +151,12 @@ class DuanSingh(StaticLaw):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    c: Scalar = param(1e3, unit="s/m", doc="decay coefficient", lower=1e-12)
-    sigma: Scalar = param(1e4, unit="s/m", doc="conditioning factor", lower=1e-12)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    c: Scalar = param(1e3, unit="s/m", role="velocity scale", doc="decay coefficient", lower=1e-12)
+    sigma: Scalar = param(
+        1e4, unit="s/m", role="velocity scale", doc="conditioning factor", lower=1e-12
+    )
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -180,12 +190,16 @@ class Andersson(StaticLaw):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_s: Scalar = param(1e-3, unit="m/s", doc="Stribeck velocity", lower=1e-12)
-    p: Scalar = param(2.0, unit="1", doc="exponent", lower=0.1, upper=10.0)
-    k_t: Scalar = param(1e4, unit="s/m", doc="steepness at rest", lower=1e-12)
-    sigma_2: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_s: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
+    )
+    p: Scalar = param(2.0, unit="1", role="shape", doc="exponent", lower=0.1, upper=10.0)
+    k_t: Scalar = param(
+        1e4, unit="s/m", role="velocity scale", doc="steepness at rest", lower=1e-12
+    )
+    sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -222,12 +236,18 @@ class SteadyStateLuGre(StaticLaw):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("F_C", "F_S"),)
 
-    F_S: Scalar = param(4.4861, unit="N", doc="static level", lower=0.0)
-    F_C: Scalar = param(2.5498, unit="N", doc="dynamic level", lower=0.0)
-    v_s: Scalar = param(1.2e-3, unit="m/s", doc="Stribeck velocity", lower=1e-12)
-    sigma_2: Scalar = param(230.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
-    delta: Scalar = param(2.0, unit="1", doc="Stribeck exponent", lower=0.1, upper=10.0)
-    v_eps: Scalar = param(1e-5, unit="m/s", doc="smoothing velocity", lower=0.0)
+    F_S: Scalar = param(4.4861, unit="N", role="level", doc="static level", lower=0.0)
+    F_C: Scalar = param(2.5498, unit="N", role="level", doc="dynamic level", lower=0.0)
+    v_s: Scalar = param(
+        1.2e-3, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
+    )
+    sigma_2: Scalar = param(
+        230.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0
+    )
+    delta: Scalar = param(
+        2.0, unit="1", role="shape", doc="Stribeck exponent", lower=0.1, upper=10.0
+    )
+    v_eps: Scalar = param(1e-5, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
 
     @property
     def velocity_scale(self) -> Scalar:

@@ -30,11 +30,13 @@ class Lorentzian(StaticLaw):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_s: Scalar = param(1e-3, unit="m/s", doc="Stribeck velocity", lower=1e-12)
-    v_eps: Scalar = param(1e-4, unit="m/s", doc="smoothing velocity", lower=0.0)
-    sigma_2: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_s: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
+    )
+    v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
+    sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -68,11 +70,15 @@ class PoppStelter(StaticLaw):
         source="Popp and Stelter 1990",
     )
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    eta: Scalar = param(0.5, unit="1", doc="share that remains", lower=0.0, upper=1.0)
-    d: Scalar = param(1e3, unit="s/m", doc="steepness of the fall", lower=1e-12)
-    kappa: Scalar = param(0.0, unit="N s^2/m^2", doc="quadratic coefficient", lower=0.0)
-    v_eps: Scalar = param(1e-4, unit="m/s", doc="smoothing velocity", lower=0.0)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    eta: Scalar = param(0.5, unit="1", role="shape", doc="share that remains", lower=0.0, upper=1.0)
+    d: Scalar = param(
+        1e3, unit="s/m", role="velocity scale", doc="steepness of the fall", lower=1e-12
+    )
+    kappa: Scalar = param(
+        0.0, unit="N s^2/m^2", role="viscous", doc="quadratic coefficient", lower=0.0
+    )
+    v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
 
     @property
     def velocity_scale(self) -> Scalar:

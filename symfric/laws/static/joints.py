@@ -34,23 +34,43 @@ class Bittencourt(StaticLaw):
         load="affine",
     )
 
-    T: Scalar = param(30.0, unit="degC", doc="temperature", lower=-60.0, upper=200.0)
-    F_c0: Scalar = param(0.03, unit="N m", doc="dynamic level without load", lower=0.0)
-    F_cl: Scalar = param(0.02, unit="1", doc="dynamic level by load", lower=0.0)
-    F_sl: Scalar = param(0.1, unit="1", doc="static excess by load", lower=0.0)
-    F_s0: Scalar = param(0.0, unit="N m", doc="static excess at 0 degC")
-    F_sT: Scalar = param(1e-3, unit="N m/K", doc="static excess by temperature")
-    v_sl: Scalar = param(10.0, unit="rad/s", doc="Stribeck velocity of the load part", lower=1e-12)
-    v_s0: Scalar = param(5.0, unit="rad/s", doc="Stribeck velocity at 0 degC")
-    v_sT: Scalar = param(0.5, unit="rad/(s K)", doc="Stribeck velocity by temperature")
-    F_v0: Scalar = param(1e-3, unit="N m s/rad", doc="viscous coefficient, hot", lower=0.0)
-    F_vT: Scalar = param(
-        2e-3, unit="N m s/rad", doc="viscous coefficient, rise to 0 degC", lower=0.0
+    T: Scalar = param(
+        30.0, unit="degC", role="temperature", doc="temperature", lower=-60.0, upper=200.0
     )
-    T_v: Scalar = param(20.0, unit="K", doc="temperature scale of the viscous part", lower=1e-12)
-    delta: Scalar = param(1.3, unit="1", doc="Stribeck exponent", lower=0.1, upper=10.0)
-    v_eps: Scalar = param(0.1, unit="rad/s", doc="smoothing velocity", lower=1e-12)
-    F_eps: Scalar = param(1e-4, unit="N m", doc="smoothing of the maximum", lower=0.0)
+    F_c0: Scalar = param(
+        0.03, unit="N m", role="level", doc="dynamic level without load", lower=0.0
+    )
+    F_cl: Scalar = param(0.02, unit="1", role="level", doc="dynamic level by load", lower=0.0)
+    F_sl: Scalar = param(0.1, unit="1", role="level", doc="static excess by load", lower=0.0)
+    F_s0: Scalar = param(0.0, unit="N m", role="level", doc="static excess at 0 degC")
+    F_sT: Scalar = param(1e-3, unit="N m/K", role="level", doc="static excess by temperature")
+    v_sl: Scalar = param(
+        10.0,
+        unit="rad/s",
+        role="velocity scale",
+        doc="Stribeck velocity of the load part",
+        lower=1e-12,
+    )
+    v_s0: Scalar = param(
+        5.0, unit="rad/s", role="velocity scale", doc="Stribeck velocity at 0 degC"
+    )
+    v_sT: Scalar = param(
+        0.5, unit="rad/(s K)", role="velocity scale", doc="Stribeck velocity by temperature"
+    )
+    F_v0: Scalar = param(
+        1e-3, unit="N m s/rad", role="viscous", doc="viscous coefficient, hot", lower=0.0
+    )
+    F_vT: Scalar = param(
+        2e-3, unit="N m s/rad", role="viscous", doc="viscous coefficient, rise to 0 degC", lower=0.0
+    )
+    T_v: Scalar = param(
+        20.0, unit="K", role="temperature", doc="temperature scale of the viscous part", lower=1e-12
+    )
+    delta: Scalar = param(
+        1.3, unit="1", role="shape", doc="Stribeck exponent", lower=0.1, upper=10.0
+    )
+    v_eps: Scalar = param(0.1, unit="rad/s", role="width", doc="smoothing velocity", lower=1e-12)
+    F_eps: Scalar = param(1e-4, unit="N m", role="width", doc="smoothing of the maximum", lower=0.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -105,19 +125,35 @@ class BAM(StaticLaw):
         load="independent",
     )
 
-    K_b: Scalar = param(0.05, unit="N m", doc="dynamic level without load", lower=0.0)
-    K_s: Scalar = param(0.05, unit="N m", doc="static excess without load", lower=0.0)
-    K_e: Scalar = param(0.05, unit="1", doc="dynamic level by external torque", lower=0.0)
-    K_m: Scalar = param(0.05, unit="1", doc="dynamic level by motor torque", lower=0.0)
-    K_es: Scalar = param(0.05, unit="1", doc="static excess by external torque", lower=0.0)
-    K_ms: Scalar = param(0.05, unit="1", doc="static excess by motor torque", lower=0.0)
-    Q_e: Scalar = param(0.0, unit="1/(N m)", doc="excess by external torque squared", lower=0.0)
-    Q_m: Scalar = param(0.0, unit="1/(N m)", doc="excess by motor torque squared", lower=0.0)
-    v_s: Scalar = param(0.2, unit="rad/s", doc="Stribeck velocity", lower=1e-12)
-    alpha: Scalar = param(1.35, unit="1", doc="Stribeck exponent", lower=0.1, upper=10.0)
-    K_v: Scalar = param(0.1, unit="N m s/rad", doc="viscous coefficient", lower=0.0)
-    v_eps: Scalar = param(0.01, unit="rad/s", doc="smoothing velocity", lower=1e-12)
-    tau_eps: Scalar = param(1e-3, unit="N m", doc="smoothing torque", lower=1e-12)
+    K_b: Scalar = param(0.05, unit="N m", role="level", doc="dynamic level without load", lower=0.0)
+    K_s: Scalar = param(0.05, unit="N m", role="level", doc="static excess without load", lower=0.0)
+    K_e: Scalar = param(
+        0.05, unit="1", role="level", doc="dynamic level by external torque", lower=0.0
+    )
+    K_m: Scalar = param(
+        0.05, unit="1", role="level", doc="dynamic level by motor torque", lower=0.0
+    )
+    K_es: Scalar = param(
+        0.05, unit="1", role="level", doc="static excess by external torque", lower=0.0
+    )
+    K_ms: Scalar = param(
+        0.05, unit="1", role="level", doc="static excess by motor torque", lower=0.0
+    )
+    Q_e: Scalar = param(
+        0.0, unit="1/(N m)", role="level", doc="excess by external torque squared", lower=0.0
+    )
+    Q_m: Scalar = param(
+        0.0, unit="1/(N m)", role="level", doc="excess by motor torque squared", lower=0.0
+    )
+    v_s: Scalar = param(
+        0.2, unit="rad/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
+    )
+    alpha: Scalar = param(
+        1.35, unit="1", role="shape", doc="Stribeck exponent", lower=0.1, upper=10.0
+    )
+    K_v: Scalar = param(0.1, unit="N m s/rad", role="viscous", doc="viscous coefficient", lower=0.0)
+    v_eps: Scalar = param(0.01, unit="rad/s", role="width", doc="smoothing velocity", lower=1e-12)
+    tau_eps: Scalar = param(1e-3, unit="N m", role="width", doc="smoothing torque", lower=1e-12)
 
     @property
     def inputs(self) -> tuple[Input, ...]:
@@ -178,9 +214,11 @@ class Capstan(StaticLaw):
         odd=False,
     )
 
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    beta: Scalar = param(3.141592653589793, unit="rad", doc="wrap angle", lower=0.0)
-    v_eps: Scalar = param(1e-3, unit="m/s", doc="smoothing velocity", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    beta: Scalar = param(
+        3.141592653589793, unit="rad", role="geometry", doc="wrap angle", lower=0.0
+    )
+    v_eps: Scalar = param(1e-3, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
 
     @property
     def velocity_scale(self) -> Scalar:

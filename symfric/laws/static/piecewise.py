@@ -33,10 +33,14 @@ class BengisuAkay(StaticLaw):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_0: Scalar = param(1e-3, unit="m/s", doc="velocity of the peak", lower=1e-12)
-    xi: Scalar = param(1e3, unit="s/m", doc="steepness of the fall", lower=0.0)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_0: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="velocity of the peak", lower=1e-12
+    )
+    xi: Scalar = param(
+        1e3, unit="s/m", role="velocity scale", doc="steepness of the fall", lower=0.0
+    )
     form: str = option("smooth", choices=FORMS, doc="fall behind the peak")
 
     @property
@@ -76,10 +80,14 @@ class VelocityBased(StaticLaw):
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
     strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = (("v_s", "v_d"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_s: Scalar = param(1e-3, unit="m/s", doc="stiction transition velocity", lower=1e-12)
-    v_d: Scalar = param(1.5e-3, unit="m/s", doc="friction transition velocity", lower=1e-12)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_s: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="stiction transition velocity", lower=1e-12
+    )
+    v_d: Scalar = param(
+        1.5e-3, unit="m/s", role="velocity scale", doc="friction transition velocity", lower=1e-12
+    )
     form: str = option("smooth", choices=FORMS, doc="quintic or cubic steps")
 
     @property
@@ -120,9 +128,13 @@ class Ambrosio(StaticLaw):
     )
     strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = (("v_0", "v_1"),)
 
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_0: Scalar = param(2e-4, unit="m/s", doc="velocity below which nothing acts", lower=0.0)
-    v_1: Scalar = param(1e-3, unit="m/s", doc="velocity of full friction", lower=1e-12)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_0: Scalar = param(
+        2e-4, unit="m/s", role="velocity scale", doc="velocity below which nothing acts", lower=0.0
+    )
+    v_1: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="velocity of full friction", lower=1e-12
+    )
     form: str = option("smooth", choices=FORMS, doc="quintic step or ramp")
 
     @property
@@ -160,11 +172,17 @@ class Hollars(StaticLaw):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_t: Scalar = param(1e-2, unit="m/s", doc="transition velocity", lower=1e-12)
-    mu_v: Scalar = param(0.0, unit="s/m", doc="viscous coefficient, load-dependent", lower=0.0)
-    u_eps: Scalar = param(0.2, unit="1", doc="rounding of the peak", lower=0.0, upper=1.0)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_t: Scalar = param(
+        1e-2, unit="m/s", role="velocity scale", doc="transition velocity", lower=1e-12
+    )
+    mu_v: Scalar = param(
+        0.0, unit="s/m", role="viscous", doc="viscous coefficient, load-dependent", lower=0.0
+    )
+    u_eps: Scalar = param(
+        0.2, unit="1", role="width", doc="rounding of the peak", lower=0.0, upper=1.0
+    )
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -201,12 +219,20 @@ class Exudyn(StaticLaw):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_reg: Scalar = param(1e-3, unit="m/s", doc="velocity of the ramp's end", lower=1e-12)
-    v_exp: Scalar = param(1e-3, unit="m/s", doc="velocity of the fall", lower=1e-12)
-    mu_v: Scalar = param(0.0, unit="s/m", doc="viscous coefficient, load-dependent", lower=0.0)
-    u_eps: Scalar = param(0.2, unit="1", doc="rounding of the peak", lower=0.0, upper=1.0)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_reg: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="velocity of the ramp's end", lower=1e-12
+    )
+    v_exp: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="velocity of the fall", lower=1e-12
+    )
+    mu_v: Scalar = param(
+        0.0, unit="s/m", role="viscous", doc="viscous coefficient, load-dependent", lower=0.0
+    )
+    u_eps: Scalar = param(
+        0.2, unit="1", role="width", doc="rounding of the peak", lower=0.0, upper=1.0
+    )
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -244,10 +270,14 @@ class Step5(StaticLaw):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_t: Scalar = param(1e-3, unit="m/s", doc="transition velocity", lower=1e-12)
-    mu_v: Scalar = param(0.0, unit="s/m", doc="viscous coefficient, load-dependent", lower=0.0)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_t: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="transition velocity", lower=1e-12
+    )
+    mu_v: Scalar = param(
+        0.0, unit="s/m", role="viscous", doc="viscous coefficient, load-dependent", lower=0.0
+    )
 
     @property
     def velocity_scale(self) -> Scalar:

@@ -52,18 +52,28 @@ class QuarterCarGeneral(StaticLaw):
         load="independent",
     )
 
-    k_s: Scalar = param(28900.0, unit="N/m", doc="spring stiffness", lower=0.0)
-    b_d: Scalar = param(260.0, unit="N s/m", doc="damper coefficient", lower=0.0)
-    theta: Scalar = param(pi / 4, unit="rad", doc="angle of the strut", lower=0.01, upper=1.56)
-    L_d: Scalar = param(0.4, unit="m", doc="length of the strut", lower=1e-12)
-    F_brk: Scalar = param(193.8, unit="N", doc="break-away force", lower=0.0)
-    C_e: Scalar = param(180.0, unit="N", doc="static excess at rest", lower=0.0)
-    e_1: Scalar = param(0.01, unit="m/s", doc="velocity of the decay", lower=1e-12)
-    mu: Scalar = param(0.05, unit="1", doc="friction coefficient of the guide", lower=0.0)
-    sigma_v: Scalar = param(50.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
-    v_eps: Scalar = param(1e-3, unit="m/s", doc="half width of the stick window", lower=1e-12)
+    k_s: Scalar = param(28900.0, unit="N/m", role="stiffness", doc="spring stiffness", lower=0.0)
+    b_d: Scalar = param(260.0, unit="N s/m", role="damping", doc="damper coefficient", lower=0.0)
+    theta: Scalar = param(
+        pi / 4, unit="rad", role="geometry", doc="angle of the strut", lower=0.01, upper=1.56
+    )
+    L_d: Scalar = param(0.4, unit="m", role="geometry", doc="length of the strut", lower=1e-12)
+    F_brk: Scalar = param(193.8, unit="N", role="level", doc="break-away force", lower=0.0)
+    C_e: Scalar = param(180.0, unit="N", role="level", doc="static excess at rest", lower=0.0)
+    e_1: Scalar = param(
+        0.01, unit="m/s", role="velocity scale", doc="velocity of the decay", lower=1e-12
+    )
+    mu: Scalar = param(
+        0.05, unit="1", role="level", doc="friction coefficient of the guide", lower=0.0
+    )
+    sigma_v: Scalar = param(
+        50.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0
+    )
+    v_eps: Scalar = param(
+        1e-3, unit="m/s", role="width", doc="half width of the stick window", lower=1e-12
+    )
     F_eps: Scalar = param(
-        1.0, unit="N", doc="rounding of the break-away and of |f_sd|", lower=1e-12
+        1.0, unit="N", role="width", doc="rounding of the break-away and of |f_sd|", lower=1e-12
     )
     form: str = option("smooth", choices=("smooth", "as_printed"), doc="corrected or as printed")
 
@@ -121,10 +131,14 @@ class QuarterCarSimple(StaticLaw):
         load="independent",
     )
 
-    C_e: Scalar = param(180.0, unit="N", doc="static level", lower=0.0)
-    e_1: Scalar = param(0.01, unit="m/s", doc="velocity of the decay", lower=1e-12)
-    sigma_v: Scalar = param(50.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
-    v_eps: Scalar = param(1e-3, unit="m/s", doc="smoothing velocity", lower=0.0)
+    C_e: Scalar = param(180.0, unit="N", role="level", doc="static level", lower=0.0)
+    e_1: Scalar = param(
+        0.01, unit="m/s", role="velocity scale", doc="velocity of the decay", lower=1e-12
+    )
+    sigma_v: Scalar = param(
+        50.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0
+    )
+    v_eps: Scalar = param(1e-3, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
 
     @property
     def velocity_scale(self) -> Scalar:

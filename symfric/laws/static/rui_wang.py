@@ -32,10 +32,12 @@ class RuiWang(StaticLaw):
         load="independent",
     )
 
-    D: Scalar = param(1.5, unit="N", doc="peak", lower=0.0)
-    C: Scalar = param(1.5, unit="1", doc="shape factor", lower=0.0, upper=2.0)
-    B: Scalar = param(1000.0, unit="s/m", doc="stiffness factor", lower=1e-12)
-    E: Scalar = param(0.0, unit="1", doc="curvature factor", upper=0.999)
+    D: Scalar = param(1.5, unit="N", role="level", doc="peak", lower=0.0)
+    C: Scalar = param(1.5, unit="1", role="shape", doc="shape factor", lower=0.0, upper=2.0)
+    B: Scalar = param(
+        1000.0, unit="s/m", role="velocity scale", doc="stiffness factor", lower=1e-12
+    )
+    E: Scalar = param(0.0, unit="1", role="shape", doc="curvature factor", upper=0.999)
 
     @property
     def velocity_scale(self) -> Scalar:

@@ -38,10 +38,14 @@ class SelfTuning(StaticLaw):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=1e-12)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    B: Scalar = param(1000.0, unit="s/m", doc="stiffness factor", lower=1e-12)
-    E: Scalar = param(0.0, unit="1", doc="curvature factor", upper=0.999)
+    mu_s: Scalar = param(
+        0.15, unit="1", role="level", doc="static friction coefficient", lower=1e-12
+    )
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    B: Scalar = param(
+        1000.0, unit="s/m", role="velocity scale", doc="stiffness factor", lower=1e-12
+    )
+    E: Scalar = param(0.0, unit="1", role="shape", doc="curvature factor", upper=0.999)
 
     @property
     def C(self) -> Scalar:
@@ -108,13 +112,25 @@ class BrittleSelfTuning(StaticLaw):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"), ("B_0", "B_max"))
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=1e-12)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    B_0: Scalar = param(100.0, unit="s/m", doc="stiffness factor without load", lower=1e-12)
-    B_max: Scalar = param(1000.0, unit="s/m", doc="stiffness factor under heavy load", lower=1e-12)
-    difference_ref: Scalar = param(0.05, unit="1", doc="reference of mu_s - mu_d", lower=1e-12)
-    N_ref: Scalar = param(50.0, unit="N", doc="reference of the load", lower=1e-12)
-    E: Scalar = param(0.0, unit="1", doc="curvature factor", upper=0.999)
+    mu_s: Scalar = param(
+        0.15, unit="1", role="level", doc="static friction coefficient", lower=1e-12
+    )
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    B_0: Scalar = param(
+        100.0, unit="s/m", role="velocity scale", doc="stiffness factor without load", lower=1e-12
+    )
+    B_max: Scalar = param(
+        1000.0,
+        unit="s/m",
+        role="velocity scale",
+        doc="stiffness factor under heavy load",
+        lower=1e-12,
+    )
+    difference_ref: Scalar = param(
+        0.05, unit="1", role="shape", doc="reference of mu_s - mu_d", lower=1e-12
+    )
+    N_ref: Scalar = param(50.0, unit="N", role="load", doc="reference of the load", lower=1e-12)
+    E: Scalar = param(0.0, unit="1", role="shape", doc="curvature factor", upper=0.999)
 
     @property
     def velocity_scale(self) -> Scalar:

@@ -31,10 +31,12 @@ class SimscapeBreakaway(StaticLaw):
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_brk: Scalar = param(1e-3, unit="m/s", doc="breakaway velocity", lower=1e-12)
-    sigma_2: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_brk: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="breakaway velocity", lower=1e-12
+    )
+    sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -70,11 +72,15 @@ class Specker(StaticLaw):
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
     strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = (("v_t", "v_sp"),)
 
-    mu_s: Scalar = param(0.15, unit="1", doc="static friction coefficient", lower=0.0)
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_sp: Scalar = param(1e-3, unit="m/s", doc="velocity of the peak", lower=1e-12)
-    v_t: Scalar = param(1e-4, unit="m/s", doc="transition velocity", lower=1e-12)
-    sigma_2: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
+    mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_sp: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="velocity of the peak", lower=1e-12
+    )
+    v_t: Scalar = param(
+        1e-4, unit="m/s", role="velocity scale", doc="transition velocity", lower=1e-12
+    )
+    sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -112,12 +118,18 @@ class MakkarDixon(StaticLaw):
     )
     strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = (("gamma_3", "gamma_2"),)
 
-    gamma_1: Scalar = param(0.5, unit="N", doc="static excess", lower=0.0)
-    gamma_2: Scalar = param(1e4, unit="s/m", doc="steepness of the rise", lower=1e-12)
-    gamma_3: Scalar = param(1e3, unit="s/m", doc="steepness of the fall", lower=1e-12)
-    gamma_4: Scalar = param(1.0, unit="N", doc="dynamic level", lower=0.0)
-    gamma_5: Scalar = param(1e4, unit="s/m", doc="steepness of the dynamic part", lower=1e-12)
-    gamma_6: Scalar = param(0.0, unit="N s/m", doc="viscous coefficient", lower=0.0)
+    gamma_1: Scalar = param(0.5, unit="N", role="level", doc="static excess", lower=0.0)
+    gamma_2: Scalar = param(
+        1e4, unit="s/m", role="velocity scale", doc="steepness of the rise", lower=1e-12
+    )
+    gamma_3: Scalar = param(
+        1e3, unit="s/m", role="velocity scale", doc="steepness of the fall", lower=1e-12
+    )
+    gamma_4: Scalar = param(1.0, unit="N", role="level", doc="dynamic level", lower=0.0)
+    gamma_5: Scalar = param(
+        1e4, unit="s/m", role="velocity scale", doc="steepness of the dynamic part", lower=1e-12
+    )
+    gamma_6: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
 
     @property
     def velocity_scale(self) -> Scalar:

@@ -38,7 +38,7 @@ class Table(StaticLaw):
 
     speeds: tuple[float, ...]
     coefficients: tuple[float, ...]
-    v_eps: Scalar = param(1e-4, unit="m/s", doc="smoothing velocity", lower=1e-12)
+    v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=1e-12)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -40,8 +40,10 @@ class Threlfall(StaticLaw):
         source="Threlfall 1978, as in public multibody code",
     )
 
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_r: Scalar = param(1e-3, unit="m/s", doc="velocity of the transition", lower=1e-12)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_r: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="velocity of the transition", lower=1e-12
+    )
     form: str = option("smooth", choices=("smooth", "original"), doc="form of the rise")
 
     @property
@@ -80,8 +82,10 @@ class ModifiedThrelfall(StaticLaw):
         source="Marques et al. 2016",
     )
 
-    mu_d: Scalar = param(0.1, unit="1", doc="dynamic friction coefficient", lower=0.0)
-    v_r: Scalar = param(1e-3, unit="m/s", doc="velocity of the transition", lower=1e-12)
+    mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
+    v_r: Scalar = param(
+        1e-3, unit="m/s", role="velocity scale", doc="velocity of the transition", lower=1e-12
+    )
     form: str = option("smooth", choices=("smooth", "original"), doc="form of the rise")
 
     @property

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from symfric import Asymmetric, Coulomb
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import (
     Parametric,
@@ -72,6 +73,28 @@ def test_order_is_checked_of_numbers_and_left_open_for_symbols() -> None:
 @pytest.mark.parametrize("value", [ca.SX.sym("k"), ca.MX.sym("k"), ca.DM(3.0), np.ones(3)])
 def test_symbols_and_arrays_are_taken(value: object) -> None:
     assert Spring(hard=value).hard is value
+
+
+def test_arrays_and_constant_matrices_are_checked_like_numbers() -> None:
+    """Arrays skipped bounds and finiteness: `BrownMcPhee(mu_s=np.array(-5.0))` ran."""
+    for value in (np.array(-5.0), np.array([3.0, -5.0]), ca.DM(-5.0), ca.SX(-5.0)):
+        with pytest.raises(ValueError, match=r"soft: expected 0 <= soft <= inf \[N/m\], got -5"):
+            Spring(soft=value)
+    for value in (np.array([1.0, nan]), np.array(["a"]), np.zeros(0), [1.0], ca.DM(nan)):
+        with pytest.raises(ValueError, match=r"Spring: hard: expected a finite number"):
+            Spring(hard=value)
+    with pytest.raises(
+        ValueError, match=r"expected soft <= hard, got soft = \[1. 3.\] and hard = 2"
+    ):
+        Spring(soft=np.array([1.0, 3.0]))
+    assert Spring(soft=np.array([0.5, 1.0]), hard=np.array([0.5, 7.0]))
+
+
+def test_role_is_one_of_the_known_ones_and_handed_on() -> None:
+    with pytest.raises(ValueError, match=r"param: role: expected one of level, .*, got 'levle'"):
+        param(1.0, unit="1", doc="x", role="levle")
+    found = parameters(Asymmetric(Coulomb(), Coulomb(mu_d=0.2)))["mu_d_pos"]
+    assert (found.role, found.field, found.name) == ("level", "mu_d", "mu_d_pos")
 
 
 def test_parameters_are_frozen_and_compared_by_identity() -> None:

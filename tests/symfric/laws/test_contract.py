@@ -34,7 +34,20 @@ from symfric import (
     symbolise,
     with_values,
 )
-from symfric.laws import PHENOMENA
+from symfric.foundation.parameters import ROLES
+from symfric.laws import (
+    PHENOMENA,
+    POPULATIONS,
+    Asymmetric,
+    Element,
+    Lagged,
+    LoadDependent,
+    PlanarSlip,
+    Slider,
+    Table,
+    TemperatureDependent,
+)
+from symfric.scenes import ALL_SCENES, Robot
 
 magnitudes = st.floats(-12.0, 3.0).map(lambda e: 10.0**e)
 velocities = st.builds(lambda s, m: s * m, st.sampled_from([-1.0, 1.0]), magnitudes)
@@ -308,3 +321,13 @@ def test_symbols_take_the_bounds_of_their_parameters(kind: type[Law]) -> None:
         p = known[variable.name]
         assert (variable.lower, variable.upper) == (p.lower, p.upper)
         assert (variable.unit, variable.start) == (p.unit, p.value)
+
+
+def test_every_parameter_of_every_law_and_scene_says_what_it_is_for() -> None:
+    """Roles are data: identification, temperature and code generation read them, not texts."""
+    wrappers = (Asymmetric, LoadDependent, Lagged, TemperatureDependent, PlanarSlip, Table)
+    parts = (*ALL_LAWS.values(), *POPULATIONS.values(), *wrappers, Element, Slider)
+    for kind in (*parts, *ALL_SCENES.values(), Robot):
+        for item in fields(kind):
+            if "unit" in item.metadata:
+                assert item.metadata["role"] in ROLES, f"{kind.__name__}.{item.name}"

@@ -1,11 +1,24 @@
 """Scenes take any law, free parameters by name, and refuse what they cannot use."""
 
+from math import inf
+
 import casadi as ca
+import numpy as np
 import pytest
 from law_cases import CASES
 
-from symfric import Coulomb, LuGre, Stribeck, Sum, Viscous, drive, parameters, rabinowicz
-from symfric.scenes import ALL_SCENES, MECHANISMS, Scene, friction_states
+from symfric import (
+    BrownMcPhee,
+    Coulomb,
+    LuGre,
+    Stribeck,
+    Sum,
+    Viscous,
+    drive,
+    parameters,
+    rabinowicz,
+)
+from symfric.scenes import ALL_SCENES, MECHANISMS, Drive, Robot, Scene, friction_states
 
 SINGLE = {name: kind for name, kind in ALL_SCENES.items() if name not in MECHANISMS}
 """Scenes with one contact; those with several are tested in test_mechanism.py."""
@@ -106,3 +119,20 @@ def test_bristle_starts_loaded_for_the_given_start_velocity() -> None:
 
 def test_original_kink_starts_at_rest_too() -> None:
     assert drive(LuGre(v_eps=0.0)).initial_state() == pytest.approx([0.0, 0.0, 0.0])
+
+
+def test_every_scene_owns_the_time_and_the_input_that_show_it() -> None:
+    """A table in the figures knew them; a scene of one's own had neither."""
+    for kind in (*ALL_SCENES.values(), Robot):
+        assert 0 < kind.t_end < inf, kind
+    assert set(Drive.inputs) == {u.name for u in drive(Viscous()).u}
+    assert float(ca.DM(ca.SX(Drive.inputs["force"].function(ca.SX(0.5))))) == 2.0
+
+
+def test_arrays_are_no_parameters_of_one_machine() -> None:
+    """They ended in `ode: expected 2 rows, got 3` or in errors of CasADi."""
+    for value in (np.array([0.2]), np.array([0.2, 0.3]), ca.MX.sym("mu"), ca.SX.sym("mu", 2)):
+        with pytest.raises(ValueError, match=r"Rabinowicz: .* one number or SX symbol .* mu_s"):
+            rabinowicz(BrownMcPhee(mu_s=value))
+        with pytest.raises(ValueError, match=r"Rabinowicz: .* for m; simulate_many"):
+            rabinowicz(BrownMcPhee(), m=value)

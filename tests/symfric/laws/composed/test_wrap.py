@@ -7,8 +7,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rigs import prescribed_motion
 
-from symfric import Coulomb, LuGre, Stribeck, Sum, Viscous, parameters, rabinowicz, simulate
-from symfric.laws import Karnopp, Lagged, TemperatureDependent
+from symfric import (
+    Asymmetric,
+    Coulomb,
+    LoadDependent,
+    LuGre,
+    Stribeck,
+    Sum,
+    Viscous,
+    parameters,
+    rabinowicz,
+    simulate,
+)
+from symfric.foundation.parameters import with_values
+from symfric.laws import ALL_LAWS, GMS, Bittencourt, Karnopp, Lagged, Table, TemperatureDependent
+from symfric.laws.composed.wrapper import Wrapper
 
 N = 7.848
 
@@ -83,3 +96,49 @@ def test_temperature_may_be_a_symbol() -> None:
     law = TemperatureDependent(Viscous(sigma_2=2.0), T=T)
     F = ca.Function("F", [T], [law.force(0.1, N)])
     assert float(F(303.15)) == pytest.approx(0.2 * np.exp(-0.3))
+
+
+def test_every_law_feels_the_temperature_by_the_roles_of_its_parameters() -> None:
+    """Chosen by docstrings before: laws with F_S, C_e, K_v or mu_v in s/m felt nothing."""
+    for name, kind in ALL_LAWS.items():
+        law = kind()
+        warm = TemperatureDependent(law, T=303.15, k_dry=0.01, k_wet=0.03).inner
+        share = {"level": np.exp(-0.1), "viscous": np.exp(-0.3)}
+        for key, p in parameters(law).items():
+            expected = float(p.value) * share.get(p.role, 1.0)
+            assert float(parameters(warm)[key].value) == pytest.approx(expected), (name, key)
+        assert {"level", "viscous"} & {p.role for p in parameters(law).values()}, name
+    kept = parameters(TemperatureDependent(Bittencourt(), k_dry=0.1, T=300.0).inner)
+    assert kept["T"].value == Bittencourt().T  # a temperature of the law is no coefficient
+
+
+def test_law_without_levels_has_no_temperature() -> None:
+    with pytest.raises(ValueError, match=r"expected a law with a dry level .* got Table"):
+        TemperatureDependent(Table((0.0, 1.0), (0.1, 0.2)))
+
+
+def test_wrappers_hand_on_all_members_of_the_law_inside() -> None:
+    law = GMS(form="event", sigma_2=0.4)
+    z, v, load, h = law.steady_state(0.01, N) * 0.5, 0.01, N, 1e-3
+    around: tuple[Wrapper, ...] = (
+        Asymmetric(law, with_values(law, {})),
+        LoadDependent(law, N_eps=0.0),
+        TemperatureDependent(law),
+    )
+    for wrapper in around:
+        assert wrapper.states == law.states
+        assert wrapper.inputs == law.inputs
+        assert wrapper.velocity_scale == law.velocity_scale
+        assert wrapper.warnings() == law.warnings()
+        assert wrapper.force(v, load, z) == law.force(v, load, z)
+        assert (wrapper.rate(v, load, z) == law.rate(v, load, z)).all()
+        assert (wrapper.steady_state(v, load) == law.steady_state(v, load)).all()
+        steps = wrapper.held_step(v, load, z, h), law.held_step(v, load, z, h)
+        assert all((a == b).all() for a, b in zip(*steps, strict=True))  # type: ignore[arg-type]
+        for one, other in zip(wrapper.switches(v, load, z), law.switches(v, load, z), strict=True):
+            assert (one.name, one.direction) == (other.name, other.direction)
+            assert one.expression == other.expression
+    lagged = Lagged(Karnopp(), tau_L=0.01)
+    assert (lagged.inputs, lagged.velocity_scale) == (Karnopp().inputs, Karnopp().velocity_scale)
+    assert lagged.switches(v, load, np.array([v])) == ()
+    assert lagged.held_step(v, load, np.array([v]), h) is None

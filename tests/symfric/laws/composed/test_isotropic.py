@@ -28,7 +28,13 @@ from symfric.laws import (
     Slider,
     StaticLaw,
 )
-from symfric.laws.composed.planar import Isotropic, Planar, Spatial, anisotropy, is_isotropic
+from symfric.laws.composed.isotropic import (
+    Isotropic,
+    PlanarSlip,
+    SpatialSlip,
+    anisotropy,
+    is_isotropic,
+)
 
 N = 7.848
 SUMS: dict[str, Law] = {
@@ -76,7 +82,7 @@ def turned(law: Isotropic, R: np.ndarray, z: np.ndarray) -> np.ndarray:
 def test_turned_slip_turns_force_and_rate(
     name: str, v: np.ndarray, scale: float, a: np.ndarray, b: np.ndarray, angle: float
 ) -> None:
-    law, v, R = Planar(LAWS[name]), scale * v, turn(angle)
+    law, v, R = PlanarSlip(LAWS[name]), scale * v, turn(angle)
     z = bent(law, a, b)
     w, w_turned = given_inputs(law.law, b), given_inputs(law.law, R @ b)
     F, rate = law.force(v, N, z, **w), law.rate(v, N, z, **w)
@@ -96,7 +102,7 @@ STEP, COUNT = 1e-5, 2000
 def steps_of(name: str, axes: int) -> ca.Function:
     """COUNT Runge-Kutta steps (z, [v at 0, h/2, h]) -> (z, F), of the law itself for axes = 0."""
     one = LAWS[name]
-    law = {0: one, 2: Planar(one), 3: Spatial(one)}[axes]
+    law = {0: one, 2: PlanarSlip(one), 3: SpatialSlip(one)}[axes]
     z, v = ca.SX.sym("z", len(law.states)), ca.SX.sym("v", max(axes, 1), 3)
     at = [v[:, k] for k in range(3)]
     k_1 = law.rate(at[0], N, z)
@@ -130,7 +136,7 @@ def test_straight_slip_with_reversals_is_the_law_itself(
     name: str, direction: tuple[float, ...]
 ) -> None:
     one, e = LAWS[name], np.array(direction)
-    law = Planar(one) if len(e) == 2 else Spatial(one)
+    law = PlanarSlip(one) if len(e) == 2 else SpatialSlip(one)
     v = REVERSING
     z, F, _ = along_path(name, 0, at_rest(one), v[None, :])
     states, forces, _ = along_path(name, len(e), at_rest(law), e[:, None] * v)
@@ -150,7 +156,7 @@ def test_straight_slip_of_a_memoryless_law_is_the_law_itself(
 ) -> None:
     one, e = LAWS[name], turn(angle)[0]
     expected = e * one.force(v, N, **{n: x[0] for n, x in given_inputs(one, np.ones(1)).items()})
-    found = Planar(one, v_eps=1e-12).force(v * e, N, **given_inputs(one, e))
+    found = PlanarSlip(one, v_eps=1e-12).force(v * e, N, **given_inputs(one, e))
     if abs(v) > 1e-6 or v == 0.0:
         assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
@@ -163,7 +169,7 @@ ANGLES = 2 * pi * 100 * TIMES
 @pytest.mark.parametrize("radius", CIRCLES.values(), ids=CIRCLES.keys())
 def test_a_closed_circle_takes_energy(name: str, radius: float) -> None:
     """The second of two turns at 100 Hz, of a size below and far above the break-away path."""
-    law = Planar(LAWS[name])
+    law = PlanarSlip(LAWS[name])
     v = 2 * pi * 100 * radius * np.array([np.cos(ANGLES), np.sin(ANGLES)])
     _, F, work = along_path(name, 2, at_rest(law), v)
     assert np.isfinite(F).all()
@@ -182,7 +188,7 @@ def limits(law: Law) -> np.ndarray:
 @each_dynamic
 @given(seed=st.integers(0, 9))
 def test_states_never_leave_the_ball_of_their_limit_in_curved_slip(name: str, seed: int) -> None:
-    law, rng = Planar(LAWS[name]), np.random.default_rng(seed)
+    law, rng = PlanarSlip(LAWS[name]), np.random.default_rng(seed)
     speed = 8e-3 * np.abs(np.sin(2 * pi * rng.uniform(20, 120) * TIMES))
     waves = (rng.uniform(0, 3) * np.sin(2 * pi * f * TIMES + f) for f in (30.0, 110.0, 270.0))
     angle = sum(waves, start=0.0)
@@ -199,7 +205,7 @@ def test_value_gradient_and_hessian_are_finite(
     name: str, share: float, v: tuple[float, float]
 ) -> None:
     derivatives = second_derivatives(name)
-    law = Planar(LAWS[name])
+    law = PlanarSlip(LAWS[name])
     z = bent(law, share * np.array([0.6, 0.8]))
     results = derivatives(v, z, 0.1)
     assert all(np.isfinite(result.full()).all() for result in results)
@@ -207,7 +213,7 @@ def test_value_gradient_and_hessian_are_finite(
 
 @cache
 def second_derivatives(name: str) -> ca.Function:
-    law, v = Planar(LAWS[name]), ca.SX.sym("v", 2)
+    law, v = PlanarSlip(LAWS[name]), ca.SX.sym("v", 2)
     z, w = ca.SX.sym("z", len(law.states)), ca.SX.sym("w", 2)
     inputs = {i.name: EXAMPLE_INPUTS[i.name] * w for i in law.inputs}
     F, rate = law.force(v, N, z, **inputs), law.rate(v, N, z, **inputs)
@@ -218,14 +224,14 @@ def second_derivatives(name: str) -> ca.Function:
 
 @each
 def test_no_slip_and_no_load_is_no_force(name: str) -> None:
-    law = Planar(LAWS[name])
+    law = PlanarSlip(LAWS[name])
     z = at_rest(law)
     assert np.abs(law.force((0.0, 0.0), N, z)).max() == 0.0
 
 
 @each
 def test_all_number_types_give_the_same(name: str) -> None:
-    law, v, e = Planar(LAWS[name]), np.array([3e-4, -2e-3]), np.array([0.6, 0.8])
+    law, v, e = PlanarSlip(LAWS[name]), np.array([3e-4, -2e-3]), np.array([0.6, 0.8])
     z, w = bent(law, 0.7 * e, turn(1.0)[0]), given_inputs(LAWS[name], e)
     n = z.size
     F, rate = law.force(v, N, z, **w), law.rate(v, N, z, **w)
@@ -249,7 +255,7 @@ def test_all_number_types_give_the_same(name: str) -> None:
 @each
 @pytest.mark.parametrize("plane", [(0, 1), (1, 2), (2, 0)])
 def test_slip_in_a_plane_of_space_is_slip_in_the_plane(name: str, plane: tuple[int, int]) -> None:
-    flat, law = Planar(LAWS[name]), Spatial(LAWS[name])
+    flat, law = PlanarSlip(LAWS[name]), SpatialSlip(LAWS[name])
     P = np.eye(3)[:, list(plane)]
     v, a, b = np.array([0.03, -0.04]), np.array([0.5, 0.2]), np.array([0.1, -0.6])
     n = sum(directed(flat.law))
@@ -265,7 +271,7 @@ def test_slip_in_a_plane_of_space_is_slip_in_the_plane(name: str, plane: tuple[i
 
 def test_sideways_slip_lowers_the_resistance_along() -> None:
     """Coulomb's cone: while sliding fast across, a slow push along meets viscous friction only."""
-    law = Planar(Coulomb(mu_d=0.1, v_eps=1e-3))
+    law = PlanarSlip(Coulomb(mu_d=0.1, v_eps=1e-3))
     F = law.force((0.01, 1.0), N)
     assert F[1] == pytest.approx(0.1 * N, rel=1e-4)
     assert F[0] == pytest.approx(0.1 * N * 0.01, rel=1e-3)
@@ -274,23 +280,23 @@ def test_sideways_slip_lowers_the_resistance_along() -> None:
 @each_dynamic
 def test_sliding_points_against_the_motion_with_the_force_of_the_law(name: str) -> None:
     one, e = LAWS[name], np.array([0.6, -0.8])
-    law = Planar(one)
+    law = PlanarSlip(one)
     expected = one.force(0.1, N, one.steady_state(0.1, N)) * e
     assert law.force(0.1 * e, N, law.steady_state(0.1 * e, N)) == pytest.approx(expected, rel=1e-9)
 
 
 def test_states_are_vectors_by_axis_then_numbers() -> None:
-    names = [s.name for s in Planar(Sum((LuGre(), Dahl()))).states]
+    names = [s.name for s in PlanarSlip(Sum((LuGre(), Dahl()))).states]
     assert names == ["z_1_x", "z_2_x", "z_1_y", "z_2_y"]
-    assert Planar(BrownMcPhee()).states == ()
-    latched = [s.name for s in Spatial(GMS(elements=GMS().elements[:1])).states]
+    assert PlanarSlip(BrownMcPhee()).states == ()
+    latched = [s.name for s in SpatialSlip(GMS(elements=GMS().elements[:1])).states]
     assert latched == ["F_1_x", "F_1_y", "F_1_z", "p_1"]
 
 
 def test_lugre_on_a_circle_lags_by_the_angle_of_its_linear_equation() -> None:
     """dz/dt = v - lambda z with turning v: z = v/(lambda + i omega)."""
     speed, omega = 4e-3, 2 * pi * 100
-    law = Planar(LuGre(mu_s=0.1, sigma_1=0.0))
+    law = PlanarSlip(LuGre(mu_s=0.1, sigma_1=0.0))
     pull = 1e5 * speed / (0.1 * N)
     z = (speed / (pull + 1j * omega)) * np.exp(0.3j)
     v = speed * np.array([cos(0.3), sin(0.3)])
@@ -302,7 +308,7 @@ def test_lugre_on_a_circle_lags_by_the_angle_of_its_linear_equation() -> None:
 @given(v=pair, z=pair)
 def test_bouc_wen_is_the_biaxial_element(v: np.ndarray, z: np.ndarray) -> None:
     """Of Park, Wen, Ang with n = 2 and one product for both axes; loads along z only."""
-    law = Planar(BoucWen(n=2.0, A=1.2), turn=1e-9)
+    law = PlanarSlip(BoucWen(n=2.0, A=1.2), turn=1e-9)
     rate = law.rate(v, N, z) * 0.1 * N / 1e5
     power = v @ z
     if abs(power) < 1e-6:
@@ -313,7 +319,7 @@ def test_bouc_wen_is_the_biaxial_element(v: np.ndarray, z: np.ndarray) -> None:
 def test_sharp_maxwell_slip_is_radial_return() -> None:
     """Against steps of perfect plasticity: a spring returned to the disc after each."""
     slider = Slider(k=1e5, mu=0.1)
-    law, limit = Planar(MaxwellSlip(elements=(slider,), n=300.0), turn=1e-4), 0.1 * N
+    law, limit = PlanarSlip(MaxwellSlip(elements=(slider,), n=300.0), turn=1e-4), 0.1 * N
     t = np.linspace(0.0, 1.0, 40_001)
     x = 3e-5 * np.array([np.sin(2 * pi * t), np.sin(6 * pi * t + 1.0) * np.cos(3 * t)])
     v = np.diff(x) / np.diff(t)
@@ -331,7 +337,7 @@ def test_sharp_maxwell_slip_is_radial_return() -> None:
 
 
 def test_elasto_plastic_returns_from_any_side_below_break_away() -> None:
-    law = Planar(ElastoPlastic(z_ba=5e-6))
+    law = PlanarSlip(ElastoPlastic(z_ba=5e-6))
     v, z = np.array([2e-4, -1e-4]), np.array([2e-6, 3e-6])
     assert law.rate(v, N, z) == pytest.approx(v, rel=1e-12)
 
@@ -349,8 +355,10 @@ def test_elasto_plastic_returns_from_any_side_below_break_away() -> None:
     ids=lambda x: type(x).__name__ if isinstance(x, Law) else "",
 )
 def test_law_without_a_form_for_vectors_is_refused_by_reason(law: Law, reason: str) -> None:
-    with pytest.raises(ValueError, match=rf"Planar: .* got {type(law).__name__}; its?.*{reason}"):
-        Planar(law)
+    with pytest.raises(
+        ValueError, match=rf"PlanarSlip: .* got {type(law).__name__}; its?.*{reason}"
+    ):
+        PlanarSlip(law)
 
 
 class Crooked(StaticLaw):
@@ -366,8 +374,8 @@ class Crooked(StaticLaw):
 
 def test_expressions_without_vectors_are_refused_by_what_they_do() -> None:
     assert anisotropy(Crooked()) == "it adds a number to what has a direction"
-    with pytest.raises(ValueError, match="Planar: expected a law such as"):
-        Planar(Viscous)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="PlanarSlip: expected a law such as"):
+        PlanarSlip(Viscous)  # type: ignore[arg-type]
 
 
 def test_every_law_without_sides_and_modes_has_a_vector_form() -> None:
@@ -386,7 +394,7 @@ def test_force_stays_within_the_static_level(
 ) -> None:
     """Without damping of the bristles and for all loads of the elements below their limits."""
     damped = "sigma_1" in parameters(LAWS[name]) and name not in ("gonthier", "bristle_2d")
-    law = Planar(with_values(LAWS[name], {"sigma_1": 0.0}) if damped else LAWS[name])
+    law = PlanarSlip(with_values(LAWS[name], {"sigma_1": 0.0}) if damped else LAWS[name])
     below = [a / max(np.hypot(*a), 1.0) for a in (z, w)]
     rounding = 1e-3 if name == "gonthier" else 1e-9
     F = law.force(scale * v, N, bent(law, *below))

@@ -44,8 +44,10 @@ class Isotropic(Parametric):
     """Names of the dimensions."""
 
     law: Law
-    v_eps: Scalar = param(1e-9, unit="m/s", doc="smoothing of the speed", lower=1e-15)
-    turn: Scalar = param(1e-2, unit="1", doc="rounding from unloading to loading", lower=1e-9)
+    v_eps: Scalar = param(1e-9, unit="m/s", role="width", doc="smoothing of the speed", lower=1e-15)
+    turn: Scalar = param(
+        1e-2, unit="1", role="width", doc="rounding from unloading to loading", lower=1e-9
+    )
 
     def __post_init__(self) -> None:
         name = type(self).__name__
@@ -121,7 +123,7 @@ class Isotropic(Parametric):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Planar(Isotropic):
+class PlanarSlip(Isotropic):
     """An isotropic friction law for slip in a plane, d = 2: see `Isotropic`.
 
     Source: isotropy; LuGre in two dimensions: Velenis, Tsiotras, Canudas de Wit, Vehicle Syst. Dyn.
@@ -134,7 +136,7 @@ class Planar(Isotropic):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Spatial(Isotropic):
+class SpatialSlip(Isotropic):
     """An isotropic friction law for slip in space, d = 3, as of a ball in its socket: `Isotropic`.
 
     Limits: bristles have the direction they have in the axes in which v is given.
