@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symfric import Model, Output, Variable
+from symfric import Model, Output, Variable, simulate
 from symfric.model import Event, Monitor, finite
 
 x, y = Variable("x", "m", start=1.0, nominal=0.1), Variable("y", "m/s")
@@ -200,3 +200,14 @@ def test_details_with_known_names_are_refused() -> None:
     model = Model("m", x=(x,), ode=-x.symbol, details=lambda: {"x": Output(x.symbol, "m")})
     with pytest.raises(ValueError, match="model 'm': details: expected new names, got x"):
         model.expression("y")
+
+
+def test_model_without_states_is_solved_or_refused_in_a_sentence() -> None:
+    """Both crashed in CasADi or with a division by zero."""
+    z, t = Variable("z", "1", start=1.0), ca.SX.sym("t")
+    for given in ({"alg": z.symbol**3 - t - 1}, {"residual": z.symbol**3 - t - 1}):
+        run = simulate(Model("root", z=(z,), t=t, **given), 1.0)
+        assert run.final["z"] == pytest.approx(2 ** (1 / 3), abs=1e-6)
+    for model in (Model("empty"), Model("still", ode=ca.SX(0, 1))):
+        with pytest.raises(ValueError, match=r"model '\w+': expected states x or unknowns z"):
+            simulate(model, 1.0)
