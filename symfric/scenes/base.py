@@ -7,6 +7,7 @@ from math import isfinite
 from typing import ClassVar, final
 
 import casadi as ca
+import numpy as np
 
 from symfric.foundation.numeric import Scalar, is_number
 from symfric.foundation.parameters import Parametric, Variable, parameters, symbolise
@@ -66,8 +67,9 @@ class Scene(Parametric, ABC):
 
 
 def _is_scalar(value: Scalar) -> bool:
-    one = isinstance(value, ca.SX | ca.DM) and value.numel() == 1
-    return one or is_number(value)
+    if isinstance(value, ca.SX | ca.DM):
+        return value.numel() == 1
+    return is_number(value) or (isinstance(value, np.ndarray) and value.ndim == 0)
 
 
 @final
