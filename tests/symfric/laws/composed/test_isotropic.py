@@ -25,16 +25,12 @@ from symfric.laws import (
     Lagged,
     Leuven,
     MaxwellSlip,
+    PlanarSlip,
     Slider,
+    SpatialSlip,
     StaticLaw,
 )
-from symfric.laws.composed.isotropic import (
-    Isotropic,
-    PlanarSlip,
-    SpatialSlip,
-    anisotropy,
-    is_isotropic,
-)
+from symfric.laws.composed.isotropic import Isotropic, anisotropy, is_isotropic
 
 N = 7.848
 SUMS: dict[str, Law] = {
