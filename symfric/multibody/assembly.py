@@ -131,8 +131,11 @@ def slips(eq: Equations, normal_at_start: Sequence[float]) -> tuple[Slip, ...]:
             for i, s in enumerate(law.states)
         )
         z = symbols_of(states)
-        rate, force = law.rate(contact.slip, pressing, z), law.force(contact.slip, pressing, z)
-        found.append(Slip(contact, unknown, pressing, normal, states, ca.SX(rate), ca.SX(force)))
+        # a ball may turn about some axes only; what is put for the symbols of F must be dense
+        rate, force = (
+            ca.densify(ca.SX(of(contact.slip, pressing, z))) for of in (law.rate, law.force)
+        )
+        found.append(Slip(contact, unknown, pressing, normal, states, rate, force))
     return tuple(found)
 
 

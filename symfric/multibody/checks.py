@@ -174,11 +174,12 @@ class Rank:
     singular: bool
 
 
-def rank(at: Position, q: Array) -> Rank:
+def rank(at: Position, q: Array, first: Sequence[int] = ()) -> Rank:
     """Independent constraints near q, by elimination with full pivoting.
 
     Args:
         at: q -> (phi, phi_q, phi_t).
+        first: constraints that are kept whatever the others are, independent of each other.
     """
     here = at(q)[1].full()
     near = here
@@ -190,7 +191,7 @@ def rank(at: Position, q: Array) -> Rank:
             near = other if _rank(other) > _rank(near) else near
     u, s, _ = np.linalg.svd(near)
     r = int((s > RANK * max(1.0, s[0])).sum()) if s.size else 0
-    kept = tuple(sorted(_independent(near, r)))
+    kept = tuple(sorted(_independent(near, r, first)))
     redundant = tuple(i for i in range(near.shape[0]) if i not in kept)
     return Rank(kept, redundant, u[:, r:], _rank(here) < r)
 
@@ -199,15 +200,15 @@ def _rank(A: Array) -> int:
     return int(np.linalg.matrix_rank(A, tol=RANK * max(1.0, float(np.abs(A).max(initial=0.0)))))
 
 
-def _independent(A: Array, r: int) -> list[int]:
-    """Indices of r independent rows: Gram-Schmidt, each time the row with most left.
+def _independent(A: Array, r: int, first: Sequence[int]) -> list[int]:
+    """Indices of r independent rows: those of `first`, then Gram-Schmidt, the row with most left.
 
     Of equal rows the first is taken, so that the joints named first are kept whole.
     """
     left, chosen = A.copy(), list[int]()
-    for _ in range(r):
+    for k in range(r):
         size = np.linalg.norm(left, axis=1)
-        i = int(np.argmax(size > 0.5 * size.max()))
+        i = first[k] if k < len(first) else int(np.argmax(size > 0.5 * size.max()))
         chosen.append(i)
         direction = left[i] / size[i]
         left -= np.outer(left @ direction, direction)

@@ -36,6 +36,7 @@ class Equations:
         lam: multipliers of loops, then further constraints, then Euler parameters, shape (m, 1).
         F: friction forces of the contacts [N].
         held: constraints that are no joints.
+        norms: how many Euler parameters there are, whose norms are the last constraints.
         phi, phi_dot, phi_ddot: constraints on three levels, shape (m, 1).
         balance: M a + Phi_q' lam - Q, shape (n, 1), affine in a, lam and F.
         contacts: where friction acts.
@@ -48,6 +49,7 @@ class Equations:
     kin: Kinematics
     loops: tuple[Loop, ...]
     held: tuple[Held, ...]
+    norms: int
     q: ca.SX
     qd: ca.SX
     a: ca.SX
@@ -145,6 +147,7 @@ def equations(
         kin,
         closed,
         held,
+        norms.numel(),
         q,
         qd,
         a,

@@ -197,7 +197,8 @@ def written(
         return made
     at = numeric(eq, p, values)
     made = replace(made, misfits=tuple(_misfits(made, at)))
-    found = checks.rank(at, q0)
+    # a norm may be implied by closed loops, but its multiplier takes what theirs have along p
+    found = checks.rank(at, q0, range(eq.m - eq.norms, eq.m))
     if not found.redundant:
         return replace(made, singular=found.singular)
     return replace(
@@ -273,10 +274,10 @@ def _undetermined(
     pairs = [(name, ca.vec(row)[i]) for name, row in rows for i in range(row.numel())]
     column = ca.substitute(stacked(row for _, row in pairs), eq.kin.t, ca.SX(0))
     slope = ca.Function(
-        "slope", [eq.q, eq.qd, eq.a, eq.lam, p], [ca.densify(ca.jacobian(column, eq.lam))],
+        "slope", [eq.q, eq.qd, eq.a, eq.lam, eq.F, p], [ca.densify(ca.jacobian(column, eq.lam))],
         {"allow_free": True},
     )  # fmt: skip
-    some = rng.standard_normal(eq.n), rng.standard_normal(eq.m)
+    some = (rng.standard_normal(x.numel()) for x in (eq.a, eq.lam, eq.F))
     change = np.abs(slope.call([made.q0, made.qd0, *some, values])[0].full() @ free).max(axis=1)
     found = (name for (name, _), x in zip(pairs, change, strict=True) if x > 1e-7)
     return tuple(dict.fromkeys(found))

@@ -19,6 +19,11 @@ ASSEMBLED = 1e-12
 NEAR, CONVERGED = 1e-4, 1e-10
 """Relative Newton steps below which no damping is needed, and below which it is done."""
 
+LAST_DIGITS = 1e-15
+"""Relative change by which numbers are the same to rounding."""
+SHOWN = 6
+"""Names listed in a message."""
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -72,12 +77,12 @@ def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array
             y[columns] -= step
             if size < CONVERGED or size > last / 2:  # no longer quadratic: rounding
                 return y
+        elif np.isfinite(last) and residual <= _rounding(system, y, d):
+            return y  # what is left of an unknown that is zero is rounding
         elif not _descend(system, y, d, step, residual):
-            if np.abs(step).max() < CONVERGED * np.abs(y[columns]).max():
-                return y  # what is left of an unknown that is zero is rounding
             break
         last = size
-    names = ", ".join(system.names[i] for i in columns)
+    names = _few([system.names[i] for i in columns])
     raise ValueError(
         f"{where}: expected consistent start values, found no solution of the algebraic "
         f"equations for {names} near their start values; give better ones"
@@ -188,6 +193,23 @@ def _descend(system: System | Equations, y: Array, d: Array, step: Array, before
 
 def _residual(system: System | Equations, y: Array, d: Array) -> float:
     return float(np.linalg.norm(evaluate(system.constraints, y, d)))
+
+
+def _rounding(system: System | Equations, y: Array, d: Array) -> float:
+    """How far the residual moves when the last digits of states, unknowns and constants do."""
+    here, rng = evaluate(system.constraints, y, d), np.random.default_rng(0)
+
+    def touched(a: Array) -> Array:
+        return a * (1.0 + LAST_DIGITS * rng.choice([-1.0, 1.0], a.shape))
+
+    moved = (evaluate(system.constraints, touched(y), touched(d)) - here for _ in range(4))
+    return max(float(np.linalg.norm(change)) for change in moved)
+
+
+def _few(names: list[str]) -> str:
+    """The first of many names, and how many there are."""
+    rest = len(names) - SHOWN
+    return ", ".join(names[:SHOWN]) + (f" and {rest} others" if rest > 0 else "")
 
 
 def first_step(span: float) -> float:
