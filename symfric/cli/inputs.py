@@ -4,9 +4,9 @@ import csv
 from pathlib import Path
 
 from symfric import Linear
+from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
 from symfric.integrator import Input
-from symfric.model import finite
 
 
 def input_from_text(name: str, text: str) -> Input:
@@ -24,7 +24,7 @@ def input_from_text(name: str, text: str) -> Input:
                 f"--input {name}: expected a number or FILE.csv:COLUMN, got '{text}'"
             ) from None
         return read_column(Path(file), column)
-    return finite(f"--input {name}", value)
+    return checks.number(f"--input {name}", value)
 
 
 def read_column(path: Path, column: str) -> Linear:
@@ -54,4 +54,4 @@ def read_column(path: Path, column: str) -> Linear:
 
 def _cell(path: Path, line: int, row: list[str], place: int, name: str) -> float:
     text = row[place] if place < len(row) else ""
-    return finite(f"input file '{path}', line {line}, column {name}", text)
+    return checks.parsed(f"input file '{path}', line {line}, column {name}", text)

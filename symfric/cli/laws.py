@@ -14,11 +14,11 @@ from symfric.cli.options import JsonOption, PlotOption, SetOption, any_with, che
 from symfric.figures import FIGURES, FigureData, compare
 from symfric.figures.requirements import parts, phenomena
 from symfric.figures.scales import NORMAL_FORCE
+from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
 from symfric.laws import PHENOMENA, POPULATIONS, AnyLaw, Population, any_from_text
 from symfric.laws.cost import cost
 from symfric.laws.names import ALIASES
-from symfric.model import finite
 from symfric.scenes import ALL_SCENES
 
 
@@ -62,7 +62,11 @@ def laws(
         from symfric.figures.pictures import plot_catalogue, plot_laws  # noqa: PLC0415  (matplotlib is slow)
 
         draw = plot_laws if name else plot_catalogue
-        load = 1.0 if normal_force is None else finite("--normal-force", normal_force)
+        load = (
+            1.0
+            if normal_force is None
+            else checks.number("--normal-force", normal_force, unit="N", above=0.0)
+        )
         draw(chosen, load, plot)
     described = [{"name": text, **to_dict(law)} for text, law in chosen.items()]
     output.emit_json(described[0] if name else {"laws": described}, json)
@@ -85,7 +89,11 @@ def behaviour(
         raise ValueError("--figure, --compare: expected the name of a law before it, got none")
     scenario = figure or "profile"
     check_names("--figure", [scenario], [*FIGURES, *ALL_SCENES])
-    load = NORMAL_FORCE if normal_force is None else finite("--normal-force", normal_force)
+    load = (
+        NORMAL_FORCE
+        if normal_force is None
+        else checks.number("--normal-force", normal_force, unit="N", above=0.0)
+    )
     chosen = [any_with(name, settings), *map(any_from_text, others)]
     with output.progress(f"{scenario} of {', '.join([name, *others])}"):
         data = compare(chosen, scenario, load)

@@ -9,9 +9,9 @@ from typing import Annotated, TypeVar
 import typer
 
 from symfric import Law, law_from_text, parameters, with_values
+from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
 from symfric.laws import AnyLaw, any_from_text
-from symfric.model import finite
 
 JsonOption = Annotated[
     str | None,
@@ -53,7 +53,7 @@ def assignments(option: str, texts: Iterable[str] | None) -> dict[str, str]:
 def numbers(option: str, texts: Iterable[str] | None) -> dict[str, float]:
     """`NAME=NUMBER` texts by name."""
     given = assignments(option, texts)
-    return {name: finite(f"{option} {name}", value) for name, value in given.items()}
+    return {name: checks.parsed(f"{option} {name}", value) for name, value in given.items()}
 
 
 def law_with(text: str, settings: Iterable[str] | None) -> Law:
@@ -70,7 +70,7 @@ def _set(law: L, text: str, settings: Iterable[str] | None) -> L:
     given = assignments("--set", settings)
     check_names(f"--set of law {text}", given, [*parameters(law), *options(law)])
     forms = {name: given.pop(name) for name in options(law) if name in given}
-    values = {name: finite(f"--set {name}", value) for name, value in given.items()}
+    values = {name: checks.parsed(f"--set {name}", value) for name, value in given.items()}
     return with_values(replace(law, **forms) if forms else law, values)
 
 

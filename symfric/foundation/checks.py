@@ -116,6 +116,17 @@ def _bound(lower: float, upper: float) -> str:
     return f">= {lower:g}" if lower > -inf else f"<= {upper:g}"
 
 
+def parsed(where: str, text: str) -> float:
+    """The finite number that a text from a command line or a file means."""
+    try:
+        found = float(text)
+    except ValueError:
+        found = None
+    if found is None or not isfinite(found):
+        raise refused(where, "a finite number", text)
+    return found
+
+
 def count(
     where: str, value: object, *, least: int = 1, most: int | None = None, hint: str = ""
 ) -> int:
@@ -208,15 +219,16 @@ def names(
     return given
 
 
-def array(where: str, value: object, *, ndim: int | None = 1, unit: str = "") -> Array:
+def array(where: str, value: object, *, ndim: int | None = 1, what: str = "") -> Array:
     """`value` as an array of finite floats; `ndim` None takes any number of dimensions.
+
+    `what` says in a word what the numbers are.
 
     Raises:
         ValueError: no numbers, NaN, infinite, another number of dimensions.
     """
-    what = {0: "a number", 1: "a sequence of numbers", 2: "a matrix of numbers"}.get(
-        -1 if ndim is None else ndim, "numbers"
-    ) + f" [{unit}]" * bool(unit)
+    kinds = {0: "a number", 1: "a sequence of numbers", 2: "a matrix of numbers"}
+    what = what or kinds.get(-1 if ndim is None else ndim, "numbers")
     if isinstance(value, ca.DM):
         value = value.full().squeeze()
     try:
@@ -226,7 +238,7 @@ def array(where: str, value: object, *, ndim: int | None = 1, unit: str = "") ->
     if found.dtype.kind not in "iuf" and found.size:
         raise refused(where, what, value)
     if ndim is not None and found.ndim != ndim:
-        raise refused(where, what, found if found.ndim else value)
+        raise refused(where, what, value)
     numbers = found.astype(float)
     if not np.isfinite(numbers).all():
         k = tuple(int(i) for i in np.argwhere(~np.isfinite(numbers))[0])
@@ -237,20 +249,17 @@ def array(where: str, value: object, *, ndim: int | None = 1, unit: str = "") ->
 
 def times(where: str, value: object, first: float = -inf, last: float = inf) -> Array:
     """`value` as an array of increasing times [s] in [first, last], at least one."""
-    found = array(where, value, unit="s")
+    bounded = isfinite(first) or isfinite(last)
+    what = f"increasing times in [{first:g}, {last:g}] s" if bounded else "increasing times [s]"
+    found = array(where, value, what=what)
     if not found.size:
-        raise ValueError(f"{where}: expected at least one time [s], got none")
-    steps = np.diff(found)
-    if (steps <= 0).any():
-        k = int(np.argmax(steps <= 0))
-        raise ValueError(
-            f"{where}: expected increasing times, got {found[k + 1]:g} after {found[k]:g} s"
-        )
+        raise ValueError(f"{where}: expected {what}, got none")
+    falls = np.flatnonzero(np.diff(found) <= 0)
+    if falls.size:
+        before, after = found[falls[0] : falls[0] + 2]
+        raise ValueError(f"{where}: expected {what}, got {after:g} after {before:g} s")
     if found[0] < first or found[-1] > last:
-        raise ValueError(
-            f"{where}: expected times in [{first:g}, {last:g}] s, "
-            f"got {found[0]:g} ... {found[-1]:g} s"
-        )
+        raise ValueError(f"{where}: expected {what}, got {found[0]:g} ... {found[-1]:g} s")
     return found
 
 
@@ -270,15 +279,18 @@ def function(where: str, value: object, what: str) -> Any:
 
 
 def check_names(where: str, given: Iterable[str], known: Collection[str], hint: str = "") -> None:
-    """Refuse names that are not in `known`, all in one error that offers the closest ones."""
+    """Refuse names that are not in `known`, all in one error that offers the closest ones.
+
+    `hint` is what to do where none is close.
+    """
     unknown = [str(name) for name in given if name not in known]
     if not unknown:
         return
     close = [get_close_matches(name, list(known), n=1, cutoff=0.4) for name in unknown]
     offers = ", ".join(c[0] for c in close if c)
     advice = f"did you mean {offers}?" if offers else ("check the spelling" if known else "")
-    if hint:
-        advice = f"{advice} {hint}" if offers else hint
+    if hint and not offers:
+        advice = hint
     got = ", ".join(_cut(name) for name in unknown)
     raise ValueError(
         f"{where}: expected {_one_of(known)}, got {got}" + f"; {advice}" * bool(advice)

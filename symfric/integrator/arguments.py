@@ -1,27 +1,46 @@
-"""Checks that `simulate` and `simulate_many` have in common."""
+"""Checks that the doors of the integrator have in common."""
 
 import warnings
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symfric.foundation.parameters import check_names
+from symfric.foundation import checks
 from symfric.integrator.methods.method import Method
 from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS
-from symfric.model import finite
+from symfric.model import Model
 
 Array = NDArray[np.float64]
 LOOSE = 1e-5
 """Above this relative tolerance whole stick phases may be lost without a sign of it."""
 
 
-def check_span(where: str, t_start: float, t_end: float, rtol: float) -> None:
-    """Refuse an empty span and tolerances out of range; warn of a loose one."""
-    t_start, t_end = finite(f"{where}: t_start", t_start), finite(f"{where}: t_end", t_end)
+def check_model(where: str, model: object) -> None:
+    """Refuse what is no model: a law, a scene, a mechanism that nobody built."""
+    if isinstance(model, Model):
+        return
+    hint = ""
+    if not isinstance(model, type):
+        ways = {
+            "model": "call its model()",
+            "build": "call its build()",
+            "force": "put the law in a scene",
+        }
+        hint = next((advice for way, advice in ways.items() if hasattr(model, way)), "")
+    raise checks.refused(where, "a model, such as rabinowicz(LuGre())", model, hint)
+
+
+def check_span(where: str, t_start: float, t_end: float, rtol: float) -> tuple[float, float, float]:
+    """Start and end [s] and relative tolerance; warns of a loose one.
+
+    Raises:
+        ValueError: no numbers, an empty span, a tolerance out of range.
+    """
+    t_start = checks.number(f"{where}: t_start", t_start, unit="s")
+    t_end = checks.number(f"{where}: t_end", t_end, unit="s")
     if t_end <= t_start:
         raise ValueError(f"{where}: expected t_end > t_start = {t_start:g} s, got {t_end:g} s")
-    if not 1e-13 <= rtol <= 0.1:
-        raise ValueError(f"{where}: expected 1e-13 <= rtol <= 0.1, got {rtol:g}")
+    rtol = checks.number(f"{where}: rtol", rtol, lower=1e-13, upper=0.1)
     if rtol > LOOSE:
         warnings.warn(
             f"{where}: rtol = {rtol:g} is above {LOOSE:g}; whole stick phases may be lost "
@@ -29,21 +48,12 @@ def check_span(where: str, t_start: float, t_end: float, rtol: float) -> None:
             UserWarning,
             stacklevel=3,
         )
+    return t_start, t_end, rtol
 
 
 def check_times(where: str, t_start: float, t_end: float, t_eval: ArrayLike) -> Array:
     """`t_eval` as an array of increasing times inside the span."""
-    times = np.asarray(t_eval, dtype=float)
-    if (
-        times.ndim != 1
-        or not times.size
-        or not (t_start <= times[0] and times[-1] <= t_end and (np.diff(times) > 0).all())
-    ):
-        raise ValueError(
-            f"{where}: t_eval: expected increasing times in [{t_start:g}, {t_end:g}] s, "
-            f"got an array of shape {times.shape}"
-        )
-    return times
+    return checks.times(f"{where}: t_eval", t_eval, t_start, t_end)
 
 
 def chosen(where: str, name: str, rtol: float) -> Method:
@@ -52,11 +62,11 @@ def chosen(where: str, name: str, rtol: float) -> Method:
     Raises:
         ValueError: unknown name, or a method of fixed steps.
     """
+    name = checks.choice(f"{where}: method", name, ["auto", *METHODS])
     if name in METHODS and name not in ADAPTIVE:
         raise ValueError(
             f"{where}: method: expected one with error control, one of {', '.join(ADAPTIVE)}, got "
             f"{name}, which has fixed steps; it is for flow and for the C of plants"
         )
-    check_names(f"{where}: method", [name], ["auto", *ADAPTIVE])
     automatic = "radau5" if rtol > LOOSE else "rodas5p"
     return ADAPTIVE[automatic if name == "auto" else name]

@@ -19,9 +19,10 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symfric.foundation.parameters import check_names
+from symfric.foundation import checks
+from symfric.foundation.checks import check_names
 from symfric.foundation.status import Status
-from symfric.integrator.arguments import check_span, check_times, chosen
+from symfric.integrator.arguments import check_model, check_span, check_times, chosen
 from symfric.integrator.equations.initial import first_step
 from symfric.integrator.equations.inputs import Drivers, Input, drivers
 from symfric.integrator.many.chunk import Chunk, Job, Solved, digest, solve_chunk
@@ -124,19 +125,19 @@ def simulate_many(
     Warns:
         UserWarning: rtol above 1e-5, where stick phases may get lost.
     """
-    check_span("simulate_many", t_start, t_end, rtol)
+    check_model("simulate_many", model)
+    t_start, t_end, rtol = check_span("simulate_many", t_start, t_end, rtol)
     formula = chosen("simulate_many", method, rtol)
-    _check(model, backend, executor, workers, chunk)
-    times = check_times(
-        "simulate_many", t_start, t_end, [float(t_end)] if t_eval is None else t_eval
-    )
-    x0_of, p_of, members = _members(model, x0 or {}, p or {})
-    inputs = drivers(model, u, float(t_start), float(t_end))
+    workers, chunk = _check(model, backend, executor, workers, chunk, progress)
+    max_steps = checks.count("simulate_many: max_steps", max_steps)
+    times = check_times("simulate_many", t_start, t_end, [t_end] if t_eval is None else t_eval)
+    x0_of, p_of, members = _members(model, x0, p)
+    inputs = drivers(model, u, t_start, t_end)
     integrator = Integrator(model, inputs, formula)
     tolerances = Tolerances(
         rtol, 0.1 * rtol * integrator.system.nominal, event_tolerance, max_steps
     )
-    starts = partial(_starts, integrator, float(t_start), x0_of, p_of)
+    starts = partial(_starts, integrator, t_start, x0_of, p_of)
     job = Job.of(integrator, inputs, times, backend, max_steps)
     if model.events:
         solve = partial(solve_one_by_one, integrator, inputs, tolerances, backend, times)
@@ -150,7 +151,8 @@ def simulate_many(
     picks = {first: slice(first, min(first + chunk, members)) for first in firsts}
     folder = None
     if out is not None:
-        folder = Path(out) / _identity(job, integrator, tolerances, starts, picks)
+        place = checks.path("simulate_many: out", out)
+        folder = place / _identity(job, integrator, tolerances, starts, picks)
     store = Store(folder, model.signals, members, times.size)
     todo = {first: pick for first, pick in picks.items() if not store.has(first)}
     done, status = members - sum(_size(pick) for pick in todo.values()), Status.SUCCESS
@@ -188,8 +190,10 @@ def _check(
     executor: str | Executor,
     workers: int | None,
     chunk: int,
-) -> None:
-    check_names("simulate_many: backend", [backend], BACKENDS)
+    progress: object,
+) -> tuple[int | None, int]:
+    """Workers and members per task, as whole numbers."""
+    checks.choice("simulate_many: backend", backend, BACKENDS)
     if isinstance(executor, str):
         check_names("simulate_many: executor", [executor], EXECUTORS)
     if model.events and executor not in ("serial", "threads"):
@@ -197,23 +201,25 @@ def _check(
             f"simulate_many: executor: expected serial or threads for a model with events "
             f"('{model.name}' has {len(model.events)}), got {executor}"
         )
-    for name, value in (("chunk", chunk), ("workers", 1 if workers is None else workers)):
-        if value < 1:
-            raise ValueError(f"simulate_many: expected {name} >= 1, got {value}")
+    if progress is not None:
+        checks.function("simulate_many: progress", progress, "a function of the fraction done")
+    workers = None if workers is None else checks.count("simulate_many: workers", workers)
+    return workers, checks.count("simulate_many: chunk", chunk)
 
 
 Values = dict[str, Array]
 
 
 def _members(
-    model: Model, x0: Mapping[str, ArrayLike], p: Mapping[str, ArrayLike]
+    model: Model,
+    x0_given: Mapping[str, ArrayLike] | None,
+    p_given: Mapping[str, ArrayLike] | None,
 ) -> tuple[Values, Values, int]:
     """Start values and parameters by name, an entry per member, and the number of members."""
     where = "simulate_many"
-    check_names(f"{where}: x0 of '{model.name}'", x0, [v.name for v in model.x])
-    check_names(f"{where}: p of '{model.name}'", p, [v.name for v in model.p])
-    arrays = {f"x0.{name}": np.asarray(value, dtype=float) for name, value in x0.items()}
-    arrays |= {f"p.{name}": np.asarray(value, dtype=float) for name, value in p.items()}
+    x0, p = model.named("x0", x0_given), model.named("p", p_given)
+    given = {f"x0.{name}": x for name, x in x0.items()} | {f"p.{n}": x for n, x in p.items()}
+    arrays = {name: checks.array(f"{where}: {name}", x, ndim=None) for name, x in given.items()}
     lengths = {name: value.size for name, value in arrays.items() if value.ndim}
     if len(set(lengths.values())) > 1 or any(v.ndim > 1 for v in arrays.values()):
         shapes = ", ".join(f"{name} of shape {arrays[name].shape}" for name in lengths)
@@ -221,9 +227,6 @@ def _members(
     members = next(iter(lengths.values()), 1)
     if members < 1:
         raise ValueError(f"{where}: expected at least one member, got empty arrays")
-    odd = {name: np.flatnonzero(~np.isfinite(v)) for name, v in arrays.items()}
-    if bad := [f"{name} of member {rows[0]}" for name, rows in odd.items() if rows.size]:
-        raise ValueError(f"{where}: expected finite numbers, got NaN or infinity: {', '.join(bad)}")
     every = {name: np.broadcast_to(value, (members,)) for name, value in arrays.items()}
     return (
         {name: every[f"x0.{name}"] for name in x0},

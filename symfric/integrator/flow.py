@@ -3,7 +3,8 @@
 import casadi as ca
 import numpy as np
 
-from symfric.foundation.parameters import check_names
+from symfric.foundation import checks
+from symfric.integrator.arguments import check_model
 from symfric.integrator.equations.inputs import Drivers
 from symfric.integrator.equations.manifold import Manifold
 from symfric.integrator.equations.system import System, system
@@ -31,9 +32,9 @@ def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Functi
     Raises:
         ValueError: unknown method, events, fewer than one step.
     """
-    check_names("flow: method", [method], METHODS)
-    if steps < 1:
-        raise ValueError(f"flow: expected steps >= 1, got {steps}")
+    check_model("flow", model)
+    checks.choice("flow: method", method, METHODS)
+    steps = checks.count("flow: steps", steps)
     if model.events:
         raise ValueError(
             f"flow: expected a model without events, got {len(model.events)} in '{model.name}'; "

@@ -10,9 +10,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symfric.foundation.parameters import check_names
+from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
-from symfric.integrator.arguments import check_span, check_times, chosen
+from symfric.integrator.arguments import check_model, check_span, check_times, chosen
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.derivatives.adjoint import gradient
 from symfric.integrator.derivatives.sensitivity import Path, Seeds, forward, of_signals, seeds
@@ -28,6 +28,8 @@ from symfric.results.trajectory import Statistics, Trajectory
 Array = NDArray[np.float64]
 PEERS = ("rosenbrock", "sundials", "ggl")
 BACKENDS = ("auto", "vm", "compiled", *PEERS)
+MOST_SAMPLES = 10**8
+"""Beyond these the times alone need gigabytes."""
 REMEMBERED = 16
 """Integrators kept per model; the oldest goes first."""
 _BUILT: WeakKeyDictionary[Model, dict[object, Integrator]] = WeakKeyDictionary()
@@ -104,16 +106,20 @@ def simulate(
     Warns:
         UserWarning: rtol above 1e-5, where stick phases may get lost.
     """
-    check_span("simulate", t_start, t_end, rtol)
+    check_model("simulate", model)
+    t_start, t_end, rtol = check_span("simulate", t_start, t_end, rtol)
     formula = chosen("simulate", method, rtol)
-    check_names("simulate: backend", [backend], BACKENDS)
+    checks.choice("simulate: backend", backend, BACKENDS)
+    max_steps = checks.count("simulate: max_steps", max_steps)
+    sensitivities = checks.names("simulate: sensitivities", sensitivities)
+    _check_flags(progress, measure_error=measure_error, throw=throw)
     if sensitivities and backend in PEERS:
         raise ValueError(
             f"simulate: sensitivities: expected backend auto, vm or compiled, got {backend}"
         )
     times = _times(t_start, t_end, t_eval, samples)
     begin = perf_counter()
-    inputs = drivers(model, u, float(t_start), float(t_end))
+    inputs = drivers(model, u, t_start, t_end)
     integrator, fresh = _integrator(model, inputs, formula)
     build_time = perf_counter() - begin if fresh else 0.0
     which = seeds(model, sensitivities, x0, p) if sensitivities else None
@@ -188,10 +194,16 @@ def _solve(
     return run, dense, statistics
 
 
+def _check_flags(progress: object, **flags: object) -> None:
+    for name, value in flags.items():
+        checks.flag(f"simulate: {name}", value)
+    if progress is not None:
+        checks.function("simulate: progress", progress, "a function of the fraction done")
+
+
 def _times(t_start: float, t_end: float, t_eval: ArrayLike | None, samples: int) -> Array:
+    samples = checks.count("simulate: samples", samples, least=2, most=MOST_SAMPLES)
     if t_eval is None:
-        if samples < 2:
-            raise ValueError(f"simulate: expected samples >= 2, got {samples}")
         return np.linspace(t_start, t_end, samples)
     return check_times("simulate", t_start, t_end, t_eval)
 

@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, evaluate
 from symfric.foundation.parameters import Variable, check_names
 from symfric.foundation.symbols import stacked, strays, symbols_of
@@ -266,10 +267,21 @@ class Model:
     def values(self, letter: str, given: Mapping[str, float] | None = None) -> NDArray[np.float64]:
         """Numbers of the group "u" or "p": start values, replaced by those `given` by name."""
         group: Variables = getattr(self, letter)
-        given = dict(given or {})
-        check_names(f"model '{self.name}' {letter}", given, [v.name for v in group])
-        numbers = {v.name: v.start for v in group} | given
+        numbers = {v.name: v.start for v in group} | self.named(letter, given)
         return np.array([finite(f"{self.name}.{name}", x) for name, x in numbers.items()], float)
+
+    def named(self, what: str, given: Mapping[str, Any] | None) -> dict[str, Any]:
+        """What a user `given` by name for "x0", "u" or "p"; nothing for None.
+
+        Raises:
+            ValueError: no mapping, or a name that is not in the group.
+        """
+        known = [v.name for v in getattr(self, what[0])]
+        values = checks.named(f"model '{self.name}' {what}", given)
+        fixed = ", ".join(f'"{name}"' for name in values if name not in known)
+        free = f"free it when the model is made, as in rabinowicz(law, free=[{fixed}])"
+        checks.check_names(f"model '{self.name}' {what}", values, known, free * (what == "p"))
+        return values
 
     def initial_state(
         self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None
@@ -294,8 +306,7 @@ class Model:
         count: int,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Start values (count, nx) and parameters (count, n_p) of many members at once."""
-        check_names(f"model '{self.name}' x0", given, [v.name for v in self.x])
-        check_names(f"model '{self.name}' p", p, [v.name for v in self.p])
+        given, p = self.named("x0", given), self.named("p", p)
         parameters = np.tile(self.values("p")[:, None], (1, count))
         for i, v in enumerate(self.p):
             parameters[i] = p.get(v.name, parameters[i])
@@ -328,8 +339,8 @@ class Model:
     def _start_arguments(
         self, given: Mapping[str, float] | None, p: Mapping[str, float] | None
     ) -> tuple[NDArray[np.float64], ...]:
-        given = {name: finite(f"{self.name}.{name}", x) for name, x in (given or {}).items()}
-        check_names(f"model '{self.name}' x0", given, [v.name for v in self.x])
+        numbers = self.named("x0", given)
+        given = {name: finite(f"{self.name}.{name}", x) for name, x in numbers.items()}
         known = np.array([given.get(v.name, 0.0) for v in self.x])
         chosen = np.array([float(v.name in given) for v in self.x])
         return known, chosen, self.values("u"), self.values("p", p)
@@ -358,10 +369,4 @@ class Model:
 
 def finite(where: str, value: Any) -> float:
     """`value` as a float, or an error that says where it stands."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError, RuntimeError):
-        number = np.nan
-    if not np.isfinite(number):
-        raise ValueError(f"{where}: expected a finite number, got {value!r}")
-    return number
+    return checks.number(where, value)

@@ -8,9 +8,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symfric.foundation.parameters import check_names
-from symfric.foundation.symbols import stacked
-from symfric.model import Model, finite
+from symfric.foundation import checks
+from symfric.foundation.symbols import stacked, strays
+from symfric.model import Model
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,19 +28,13 @@ class Sampled:
     values: ArrayLike
 
     def __post_init__(self) -> None:
-        t, values = np.asarray(self.t, dtype=float), np.asarray(self.values, dtype=float)
         where = type(self).__name__
-        if t.ndim != 1 or t.shape != values.shape or t.size < 1:
+        t = checks.times(f"{where}: t", self.t)
+        values = checks.array(f"{where}: values", self.values)
+        if t.size != values.size:
             raise ValueError(
-                f"{where}: expected t and values of one length, got {t.shape} and {values.shape}"
-            )
-        if not (np.isfinite(t).all() and np.isfinite(values).all()):
-            raise ValueError(f"{where}: expected finite samples, got NaN or infinity")
-        if (np.diff(t) <= 0).any():
-            k = int(np.argmax(np.diff(t) <= 0))
-            raise ValueError(
-                f"{where}: expected increasing times, got t[{k + 1}] = {t[k + 1]:g} "
-                f"after t[{k}] = {t[k]:g}"
+                f"{where}: expected a value for every time, got {t.size} times "
+                f"and {values.size} values"
             )
         object.__setattr__(self, "t", t)
         object.__setattr__(self, "values", values)
@@ -73,6 +67,8 @@ class Linear(Sampled):
         ends = np.interp(breaks, np.asarray(self.t), np.asarray(self.values))
         return np.vstack([ends[:-1], np.diff(ends) / np.diff(breaks)])
 
+
+KINDS = "an input is a number, Hold or Linear samples, or a function of the symbolic time"
 
 Input = float | Sampled | Callable[[ca.SX], Any]
 """A constant, samples, or a function of the symbolic time that returns an expression."""
@@ -113,8 +109,7 @@ def drivers(
     """
     if not model.u and not given:
         return _undriven(t_start, t_end)
-    given = dict(given or {})
-    check_names(f"model '{model.name}' u", given, [v.name for v in model.u])
+    given = model.named("u", given)
     sampled = {name: s for name, s in given.items() if isinstance(s, Sampled)}
     inner = np.concatenate([np.asarray(s.t) for s in sampled.values()] or [np.zeros(0)])
     inner = inner[(inner > t_start) & (inner < t_end)]
@@ -128,7 +123,8 @@ def drivers(
         signal = given.get(variable.name, variable.start)
         if not callable(signal) and not isinstance(signal, Sampled):
             # a number is data too: another value must not mean another integrator
-            signal = Hold([t_start], [finite(f"input '{variable.name}'", signal)])
+            number = checks.number(f"input '{variable.name}'", signal, hint=KINDS)
+            signal = Hold([t_start], [number])
         if isinstance(signal, Sampled):
             c, slope = ca.SX.sym(f"{variable.name}_k"), ca.SX.sym(f"{variable.name}_dot")
             value, rise = signal.coefficients(breaks)
@@ -140,7 +136,7 @@ def drivers(
             else:
                 rows.append(c)
         else:
-            rows.append(ca.SX(signal(model.t)))
+            rows.append(_expression(variable.name, signal, model.t))
             key.append(signal)
     expression = stacked(rows)
     if ca.depends_on(expression, start):
@@ -152,6 +148,32 @@ def drivers(
         np.vstack(values) if values else np.zeros((0, breaks.size - 1)),
         tuple(key),
     )
+
+
+def _expression(name: str, signal: Callable[[ca.SX], Any], t: ca.SX) -> ca.SX:
+    """What the function `signal` makes of the symbolic time."""
+    where, what = f"input '{name}'", "a function of the symbolic time that returns one expression"
+    hint = (
+        "write casadi.sin(t) for math.sin(t), casadi.if_else(t > 1, a, b) for a Python if, "
+        "and samples as Linear(t, values)"
+    )
+    if isinstance(signal, type):
+        raise checks.refused(where, what, signal, KINDS)
+    try:
+        made = signal(t)
+    except (TypeError, ArithmeticError, RuntimeError, NotImplementedError) as error:
+        reason = (str(error).strip().splitlines() or [""])[0].rpartition(".cpp:")[2]
+        said = f"{type(error).__name__} ({reason.lstrip('0123456789: ')})"
+        raise ValueError(f"{where}: expected {what}, got {said}; {hint}") from error
+    number = checks.as_number(made)
+    if number is not None and not np.isfinite(number):
+        raise ValueError(f"{where}: expected {what}, got {number}; {hint}")
+    if number is None and not (isinstance(made, ca.SX) and made.is_scalar()):
+        raise checks.refused(where, what, made, hint)
+    expression = ca.SX(made)
+    if other := strays(expression, t):
+        raise ValueError(f"{where}: expected an expression in time alone, got {', '.join(other)}")
+    return expression
 
 
 def _undriven(t_start: float, t_end: float) -> Drivers:

@@ -155,7 +155,10 @@ def test_compared_laws_are_overlaid_with_the_settings_of_the_first(
         (["coulomb", "--figure", "lag"], "lag of coulomb: expected a law that shows"),
         (["--figure", "lag"], "expected the name of a law before it"),
         (["lugre", "--compare", "lugrr"], "did you mean lugre?"),
-        (["lugre", "--figure", "lag", "--normal-force", "0"], "N: expected a normal force above"),
+        (
+            ["lugre", "--figure", "lag", "--normal-force", "0"],
+            "--normal-force: expected a number > 0 [N], got 0.0",
+        ),
     ],
 )
 def test_a_figure_that_cannot_be_is_refused_in_one_sentence(

@@ -291,8 +291,11 @@ def test_loose_tolerance_warns() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"x0": {"w": [1.0]}}, "x0 of 'oscillator': expected one of x, v, got w"),
-        ({"p": {"kk": [1.0]}}, "p of 'oscillator': expected one of k, c, got kk; did you mean k"),
+        ({"x0": {"w": [1.0]}}, "model 'oscillator' x0: expected one of x, v, got w"),
+        (
+            {"p": {"kk": [1.0]}},
+            "model 'oscillator' p: expected one of k, c, got kk; did you mean k",
+        ),
         (
             {"x0": {"x": np.ones(2)}, "p": {"k": np.ones(3)}},
             r"arrays of one length, got x0\.x of shape \(2,\), p\.k of shape \(3,\)",
@@ -301,17 +304,17 @@ def test_loose_tolerance_warns() -> None:
         ({"x0": {"x": []}}, "expected at least one member, got empty arrays"),
         (
             {"x0": {"x": [1.0, np.nan]}, "p": {"k": np.inf}},
-            r"expected finite numbers, got NaN or infinity: x0\.x of member 1, p\.k of member 0",
+            r"simulate_many: x0\.x: expected finite numbers, got nan at 1",
         ),
         ({"t_end": -1.0}, "simulate_many: expected t_end > t_start = 0 s, got -1 s"),
-        ({"rtol": 1.0}, "simulate_many: expected 1e-13 <= rtol <= 0.1, got 1"),
+        ({"rtol": 1.0}, "simulate_many: rtol: expected 1e-13 <= number <= 0.1, got 1"),
         ({"t_eval": [0.5, 0.2]}, r"t_eval: expected increasing times in \[0, 1\] s"),
         ({"t_eval": [2.0]}, r"t_eval: expected increasing times in \[0, 1\] s"),
         ({"method": "euler"}, "simulate_many: method: expected one of .*, got euler"),
         ({"backend": "gpu"}, "backend: expected one of auto, vm, compiled, got gpu"),
         ({"executor": "mpi"}, "executor: expected one of serial, threads, processes, got mpi"),
-        ({"chunk": 0}, "simulate_many: expected chunk >= 1, got 0"),
-        ({"workers": 0}, "simulate_many: expected workers >= 1, got 0"),
+        ({"chunk": 0}, "simulate_many: chunk: expected a whole number >= 1, got 0"),
+        ({"workers": 0}, "simulate_many: workers: expected a whole number >= 1, got 0"),
         (
             {"model": bouncing(terminal=True), "executor": "processes"},
             r"expected serial or threads for a model with events \('ball' has 1\), got processes",

@@ -145,7 +145,7 @@ def falling() -> Model:
 @pytest.mark.parametrize(
     ("make", "arguments", "message"),
     [
-        (oscillator, {"steps": 0}, "flow: expected steps >= 1, got 0"),
+        (oscillator, {"steps": 0}, "flow: steps: expected a whole number >= 1, got 0"),
         (oscillator, {"method": "euler"}, "flow: method: expected one of .*rodas5p.*, got euler"),
         (falling, {}, "flow: expected a model without events, got 1 in 'falling'"),
     ],
