@@ -1,6 +1,8 @@
 """What a mechanical model knows beyond its equations."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import final
 
 import casadi as ca
@@ -37,11 +39,16 @@ class Holonomic:
 
         M a + phi_q' lam = Q,   d^2 phi / dt^2 = phi_q a + ... = 0,   further algebraic equations
 
+    These are the equations of the model: its `ode` and `alg` are made of them, by elimination of a.
+
     Attributes:
         n: number of coordinates.
         phi: SX (m, 1); no rows for a tree.
         a: SX symbols (n, 1).
-        implicit: SX (n + nz, 1), the equations above in q, q', the other states, a, z, u, p, t.
+        implicit: SX (n + nz, 1), the equations above in q, q', the other states, a, z, u, p, t;
+            the first n are affine in a.
+        rates: SX (nx - 2 n, 1), rates of the other states.
+        solve: applies M^-1 to a column, where there is a shorter way than to factorise M.
         index: 0 has it integrated in the tangent space of its constraints, in as many unknowns as
             there are degrees of freedom; 1 in all coordinates, which are put back onto the
             constraints at the end of every step. The solution is the same, to the tolerance.
@@ -56,8 +63,22 @@ class Holonomic:
     phi: ca.SX
     a: ca.SX
     implicit: ca.SX
+    rates: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    solve: Callable[[ca.SX], ca.SX] | None = None
     index: int = 1
     inner: Inner | None = None
     pressing: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
     pressed: tuple[str, ...] = ()
     advice: str = ""
+
+    @cached_property
+    def explicit(self) -> tuple[ca.SX, ca.SX]:
+        """Accelerations (n, 1) and algebraic equations (nz, 1) without the symbols a."""
+        balance, others = self.implicit[: self.n, 0], self.implicit[self.n :, 0]
+        right = -ca.substitute(balance, self.a, ca.SX.zeros(self.n))
+        if self.solve is None:
+            D, L, order = ca.ldl(ca.jacobian(balance, self.a))
+            acceleration = ca.ldl_solve(ca.densify(right), D, L, order)
+        else:
+            acceleration = self.solve(right)
+        return acceleration, ca.substitute(others, self.a, acceleration)

@@ -77,7 +77,8 @@ class Model:
 
         x' = ode(t, x, z, u, p),   0 = alg(t, x, z, u, p)
 
-    Give `ode` and `alg`, or give `residual` with `xdot` for a fully implicit model.
+    Give `ode` and `alg`, or `residual` with `xdot` for a fully implicit model, or `holonomic` for
+    a mechanism, whose equations then are the only ones: `ode` and `alg` are made of them.
 
     Attributes:
         name: what the scene is called.
@@ -90,13 +91,15 @@ class Model:
         monitors: expressions that error control watches besides x.
         events: what happens at zero crossings.
         t: SX symbol of time [s].
-        holonomic: constraints on coordinates, kept by the integrator on all levels.
+        holonomic: equations of a mechanism, with constraints on its coordinates that the
+            integrator keeps on all levels.
         details: writes further results, such as reactions, when somebody asks for one of them; to
             carry one along in derivatives and in C, put it into `outputs`.
         sketch: writes what is drawn of the machine, when somebody asks for a picture of it.
 
     Raises:
-        ValueError: all problems at once: repeated names, wrong row counts, undeclared symbols.
+        ValueError: all problems at once: repeated names, wrong row counts, undeclared symbols; an
+            `ode` or `alg` beside `holonomic` that is not made of it.
     """
 
     name: str
@@ -119,6 +122,8 @@ class Model:
     def __post_init__(self) -> None:
         if not self.x and self.residual.is_empty():  # algebraic equations alone are explicit
             object.__setattr__(self, "ode", ca.SX(0, 1))
+        if self.holonomic is not None:
+            self._take(self.holonomic)
         if self.ode is not None:
             object.__setattr__(self, "ode", ca.SX(self.ode))
             rates = [ca.SX.sym(f"{v.name}_dot") for v in self.x]
@@ -130,6 +135,19 @@ class Model:
         problems = self._problems()
         if problems:
             raise ValueError(f"model '{self.name}': " + "; ".join(problems))
+
+    def _take(self, mechanics: Holonomic) -> None:
+        """Make `ode` and `alg` of the equations of a mechanism."""
+        acceleration, alg = mechanics.explicit
+        rate = self.vector("x")[mechanics.n : 2 * mechanics.n, 0]
+        for name, made in (("ode", ca.vertcat(rate, acceleration, mechanics.rates)), ("alg", alg)):
+            given = getattr(self, name)
+            if given is not None and not given.is_empty() and not _same(given, made):
+                raise ValueError(
+                    f"model '{self.name}': {name}: expected none beside `holonomic`, of whose "
+                    "equations it is made, got others; change `holonomic.implicit`"
+                )
+            object.__setattr__(self, name, made)
 
     def _problems(self) -> list[str]:
         problems = self._naming_problems()
@@ -365,6 +383,11 @@ class Model:
     def _start_slopes(self) -> ca.Function:
         """Derivatives of `_start` by p and by the values given."""
         return self._start.factory("slopes", self._start.name_in(), ["jac:x:p", "jac:x:known"])
+
+
+def _same(a: ca.SX, b: ca.SX) -> bool:
+    """Whether two columns hold the same expressions."""
+    return a.shape == b.shape and ca.is_equal(ca.densify(a), ca.densify(b))
 
 
 def finite(where: str, value: Any) -> float:

@@ -11,6 +11,7 @@ loops and those normal forces that depend on reactions are algebraic variables.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import final
 
 import casadi as ca
@@ -184,40 +185,37 @@ def assemble(
         [before],
         [after],
     )
-    acceleration = solve_mass(eq, -ca.substitute(balance, eq.a, ca.SX.zeros(eq.n)))
-    algebraic = ca.vertcat(phi_ddot, normals)
+    mechanics = Holonomic(
+        eq.n,
+        eq.phi,
+        eq.a,
+        ca.vertcat(balance, phi_ddot, normals),
+        stacked(s.rate for s in contacts),
+        partial(solve_mass, eq),
+        index,
+        None if cut is None else _inner(cut, eq, contacts, forces),
+        *_pressing(contacts, ca.vertcat(eq.a, before)),
+    )
 
     def put(expressions: Sequence[ca.SX]) -> list[ca.SX]:
         known = ca.substitute(list(expressions), [before], [after])
-        return ca.substitute(known, [eq.a], [acceleration])
+        return ca.substitute(known, [eq.a], [mechanics.explicit[0]])
 
     scales = [(s, x) for s in contacts if np.isfinite(x := _scale(s, p))]
     names = {s.contact.name: x for s, x in scales}
-    rates = stacked(s.rate for s in contacts)
-    qd_column = symbols_of(qd)
     return Model(
         name=name,
         x=(*q, *qd, *(v for s in contacts for v in s.states)),
         z=(*multipliers, *(v for s in contacts for v in s.unknown)),
         u=u,
         p=p,
-        ode=ca.vertcat(qd_column, acceleration, rates),
-        alg=ca.substitute(algebraic, eq.a, acceleration),
         outputs=_outputs(eq, contacts, put),
         monitors=tuple(Monitor(v, x) for s, x in scales for v in ca.vertsplit(s.contact.slip)),
         events=tuple(e for s in contacts for e in _switches(s, qd)),
         t=eq.kin.t,
         details=lambda: more[0](p_column, put),
         sketch=lambda: more[1](names),
-        holonomic=Holonomic(
-            eq.n,
-            eq.phi,
-            eq.a,
-            ca.vertcat(balance, algebraic),
-            index,
-            None if cut is None else _inner(cut, eq, contacts, forces),
-            *_pressing(contacts, ca.vertcat(eq.a, before)),
-        ),
+        holonomic=mechanics,
     )
 
 

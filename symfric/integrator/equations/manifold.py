@@ -89,10 +89,10 @@ def holonomic_columns(model: Model) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
     before; it has no rates. Without constraints it has no rows.
     """
     mechanics, x = model.holonomic, model.vector("x")
-    if mechanics is None or model.ode is None:
-        raise ValueError(f"model '{model.name}': expected a holonomic model with an ode")
+    if mechanics is None:
+        raise ValueError(f"model '{model.name}': expected a holonomic model")
     n = mechanics.n
-    f = ca.vertcat(x[n : 2 * n], mechanics.a, model.ode[2 * n :], mechanics.implicit)
+    f = ca.vertcat(x[n : 2 * n], mechanics.a, mechanics.rates, mechanics.implicit)
     names = [v.name for v in model.x]
     names += [f"{v.name}_dot" for v in model.x[n : 2 * n]] + [v.name for v in model.z]
     V = ca.SX.sym("V", _of_basis(mechanics))

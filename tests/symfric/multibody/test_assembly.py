@@ -12,7 +12,7 @@ from symfric.integrator.equations.system import system
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.step.attempt import build_step
 from symfric.multibody import JointFriction, Mechanism
-from symfric.scenes import FourMass
+from symfric.scenes import FourBar, FourMass
 
 LAW = BrownMcPhee(v_t=0.01)
 
@@ -100,3 +100,20 @@ def test_guesses_are_those_without_friction() -> None:
 def test_every_contact_is_watched_on_the_scale_of_its_law() -> None:
     assert [m.nominal for m in VARIANTS["all"].build().monitors] == [0.01] * 4
     assert VARIANTS["none"].build().monitors == ()
+
+
+def test_a_mechanism_has_one_source_of_its_equations() -> None:
+    # `simulate` read `holonomic` and `ocp` read `ode`: zeros put there moved one and not the other
+    model = FourBar(BrownMcPhee()).model()
+    for part in ("ode", "alg"):
+        with pytest.raises(ValueError, match=rf"{part}: expected none beside `holonomic`"):
+            replace(model, **{part: ca.SX.zeros(getattr(model, part).shape)})
+    more = replace(model, outputs={})
+    assert ca.is_equal(more.ode, model.ode)
+    assert ca.is_equal(more.alg, model.alg)
+    heavier = replace(model.holonomic, implicit=2.0 * model.holonomic.implicit)
+    with pytest.raises(ValueError, match="ode: expected none"):
+        replace(model, holonomic=heavier)
+    n, nz = model.holonomic.n, len(model.z)
+    again = replace(model, holonomic=heavier, ode=None, alg=ca.SX(0, 1))
+    assert (again.ode.numel(), again.alg.numel()) == (2 * n, nz)
