@@ -25,6 +25,7 @@ newest:
 
 stress: $(VENV)/.test
 	$(BIN)/python -m pytest -m slow
+	$(BIN)/python -m pytest --hypothesis-profile stress tests/symfric/laws
 
 check: $(VENV)/.dev
 	$(BIN)/ruff check .

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import settings
 
 mpl.use("Agg")
-settings.register_profile("symfric", derandomize=True, deadline=None, max_examples=50)
-settings.load_profile("symfric")
+settings.register_profile("symfric", derandomize=True, deadline=None, max_examples=12)
+settings.register_profile("stress", derandomize=True, deadline=None, max_examples=300)
+settings.load_profile("symfric")  # `--hypothesis-profile stress`: see `make stress`
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

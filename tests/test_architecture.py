@@ -1,10 +1,9 @@
 """Structure of the source: import directions, sizes, and what may stand where."""
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
-
-import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("symfric", "ocp", "identification")
@@ -137,6 +136,7 @@ def is_module(name: str) -> bool:
     return path.with_suffix(".py").exists() or (path / "__init__.py").exists()
 
 
+@cache
 def parsed(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"), str(path))
 
@@ -145,7 +145,24 @@ def folder_of(module: str) -> str:
     return max((f for f in FRONTS if within(module, f)), key=len)
 
 
-each_source = pytest.mark.parametrize("path", SOURCES, ids=[dotted(p) for p in SOURCES])
+def each(paths: list[Path]) -> Callable[[Callable[[Path], None]], Callable[[], None]]:
+    """Runs a test over all `paths` as one; a failure names the file."""
+
+    def looped(test: Callable[[Path], None]) -> Callable[[], None]:
+        def over_all() -> None:
+            for path in paths:
+                try:
+                    test(path)
+                except AssertionError as error:
+                    error.add_note(f"in {path}")
+                    raise
+
+        return over_all
+
+    return looped
+
+
+each_source = each(SOURCES)
 
 
 def on_top(module: str) -> bool:
@@ -201,7 +218,7 @@ def test_imports_are_absolute(path: Path) -> None:
     assert not relative
 
 
-@pytest.mark.parametrize("path", SOURCES + TESTS, ids=[dotted(p) for p in SOURCES + TESTS])
+@each(SOURCES + TESTS)
 def test_file_is_short(path: Path) -> None:
     assert len(path.read_text(encoding="utf-8").splitlines()) <= 400
 
@@ -247,7 +264,7 @@ FORMULAS = [
 ]
 
 
-@pytest.mark.parametrize("path", FORMULAS, ids=[dotted(p) for p in FORMULAS])
+@each(FORMULAS)
 def test_only_the_smooth_blocks_use_nonsmooth_functions(path: Path) -> None:
     if dotted(path) != "symfric.laws.base.smooth":
         assert not NONSMOOTH & set(calls(parsed(path), beside="smooth"))

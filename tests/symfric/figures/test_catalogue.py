@@ -33,24 +33,20 @@ def shows(law: str, name: str) -> bool:
     return bool(SHOWN_WITH[name] & set(phenomena(law_from_text(law))))
 
 
-EVERY = [(law, name) for law in ALL_LAWS for name in FIGURES]
-
-
-@pytest.mark.parametrize(("law", "name"), [pair for pair in EVERY if shows(*pair)])
-def test_a_law_that_shows_it_has_finite_columns_of_one_length(law: str, name: str) -> None:
-    data = figure(law_from_text(law), name)
-    assert data.name == name
-    for curve in data.curves:
-        assert len({values.shape for values in curve.columns.values()}) == 1
-        assert {column for panel in data.panels for column in panel} <= set(curve.columns)
-        assert set(curve.columns) <= set(data.units)
-        assert all(np.isfinite(values).all() for values in curve.columns.values())
-
-
-@pytest.mark.parametrize(("law", "name"), [pair for pair in EVERY if not shows(*pair)])
-def test_a_law_that_cannot_show_it_is_refused(law: str, name: str) -> None:
-    with pytest.raises(ValueError, match=r"expected a law (that|with)"):
-        figure(law_from_text(law), name)
+@pytest.mark.parametrize("law", ALL_LAWS)
+def test_every_figure_has_finite_columns_of_one_length_or_is_refused(law: str) -> None:
+    for name in FIGURES:
+        if not shows(law, name):
+            with pytest.raises(ValueError, match=r"expected a law (that|with)"):
+                figure(law_from_text(law), name)
+            continue
+        data = figure(law_from_text(law), name)
+        assert data.name == name
+        for curve in data.curves:
+            assert len({values.shape for values in curve.columns.values()}) == 1
+            assert {column for panel in data.panels for column in panel} <= set(curve.columns)
+            assert set(curve.columns) <= set(data.units)
+            assert all(np.isfinite(values).all() for values in curve.columns.values())
 
 
 REFERENCES = {"generic_asperity": GenericAsperity(count=60), "random_bristles": RandomBristles()}

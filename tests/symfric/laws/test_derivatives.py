@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from law_cases import CASES, symbolic
 
-POINTS = [(name, variable) for name in CASES for variable in symbolic(name)[0]]
+POINTS = [(name, i) for name in CASES for i in range(len(symbolic(name)[0]))]
 V, SHARE = 7e-4, 0.6
 
 
@@ -30,12 +30,14 @@ def expansion_point(name: str) -> np.ndarray:
     return np.array([V, *z, *((off_zero | smoothing)[n] for n in names[1 + z.size :])])
 
 
-@pytest.mark.parametrize(("name", "variable"), POINTS, ids=[f"{c}-{v}" for c, v in POINTS])
-def test_difference_quotient_approaches_the_gradient_with_order_two(
-    name: str, variable: str
-) -> None:
+@pytest.mark.parametrize("name", CASES)
+def test_difference_quotient_approaches_the_gradient_with_order_two(name: str) -> None:
+    for i in range(len(symbolic(name)[0])):
+        quotients_approach_the_gradient_by(name, i)
+
+
+def quotients_approach_the_gradient_by(name: str, i: int) -> None:
     f, x = force_rate_and_gradient(name), expansion_point(name)
-    i = symbolic(name)[0].index(variable)
     exact = f(x)[1].full()[:, i]
     errors: list[np.ndarray] = []
     for h in 0.04 * abs(x[i]) * np.array([1.0, 0.5, 0.25]):
@@ -51,9 +53,8 @@ def test_difference_quotient_approaches_the_gradient_with_order_two(
 def test_many_derivatives_have_an_error_whose_ratio_is_seen() -> None:
     """Parameters that enter linearly leave nothing to compare beyond equality."""
     bent = 0
-    for name, variable in POINTS:
+    for name, i in POINTS:
         f, x = force_rate_and_gradient(name), expansion_point(name)
-        i = symbolic(name)[0].index(variable)
         step = np.zeros(x.size)
         step[i] = 0.04 * abs(x[i])
         quotient = (f(x + step)[0] - f(x - step)[0]).full().ravel() / (2 * step[i])

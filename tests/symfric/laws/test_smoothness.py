@@ -127,14 +127,15 @@ EXTREMES = [s * m for m in (0.0, 1e-300, 1e-12, 1e-6, 1e-3, 1.0, 1e3) for s in (
 
 
 @pytest.mark.parametrize("name", FORMS)
-@pytest.mark.parametrize("v", EXTREMES)
-def test_value_and_derivatives_of_every_form_are_finite_and_odd(name: str, v: float) -> None:
+def test_value_and_derivatives_of_every_form_are_finite_and_odd(name: str) -> None:
     law, x = FORMS[name][0], ca.SX.sym("x")
     given = {n: ca.SX.sym(n) for n in given_inputs(law)}
     every = ca.vertcat(x, *given.values())
     hessian, gradient = ca.hessian(ca.SX(law.force(x, 5.0, **given)), every)
     f = ca.Function("f", [every], [law.force(x, 5.0, **given), gradient, hessian])
-    forward, backward = (f([s * v, *(s * w for w in given_inputs(law).values())]) for s in (1, -1))
-    assert all(result.is_regular() for result in forward)
-    if law.facts.odd:
-        assert float(forward[0]) == -float(backward[0])
+    for v in EXTREMES:
+        point = ca.DM([v, *given_inputs(law).values()])
+        forward, backward = f(point), f(-point)
+        assert all(result.is_regular() for result in forward), v
+        if law.facts.odd:
+            assert float(forward[0]) == -float(backward[0]), v

@@ -28,23 +28,22 @@ each_scene = pytest.mark.parametrize("kind", SINGLE.values(), ids=SINGLE.keys())
 
 COORDINATES = {"rabinowicz": 1, "drive": 1, "quarter_car": 2}
 OFFERED = {"rabinowicz": {"F_e"}, "drive": {"F_e"}, "quarter_car": {"F_e", "x_rel", "v_rel"}}
-PAIRS = [(scene, name) for scene in SINGLE for name in CASES]
-FITTING = [(s, n) for s, n in PAIRS if {i.name for i in CASES[n].inputs} <= OFFERED[s]]
 
 
-@pytest.mark.parametrize(("scene", "name"), FITTING)
-def test_every_law_gives_a_model_of_its_size_that_starts(scene: str, name: str) -> None:
-    law = CASES[name]
-    model = SINGLE[scene](law).model()
-    assert len(model.x) == 2 * COORDINATES[scene] + len(law.states)
-    assert model.initial_state().shape == (len(model.x),)
-    assert model.p == ()
-
-
-@pytest.mark.parametrize(("scene", "name"), sorted(set(PAIRS) - set(FITTING)))
-def test_law_that_needs_what_the_scene_lacks_is_refused(scene: str, name: str) -> None:
-    with pytest.raises(ValueError, match=r"expected a law that needs no more than v, N, .*F_e"):
-        SINGLE[scene](CASES[name]).model()
+@pytest.mark.parametrize("scene", SINGLE)
+def test_every_law_gives_a_model_of_its_size_that_starts_or_is_refused(scene: str) -> None:
+    refused = 0
+    for law in CASES.values():
+        if not {i.name for i in law.inputs} <= OFFERED[scene]:
+            refused += 1
+            with pytest.raises(ValueError, match=r"law that needs no more than v, N, .*F_e"):
+                SINGLE[scene](law).model()
+            continue
+        model = SINGLE[scene](law).model()
+        assert len(model.x) == 2 * COORDINATES[scene] + len(law.states)
+        assert model.initial_state().shape == (len(model.x),)
+        assert model.p == ()
+    assert 0 < refused < len(CASES) / 4
 
 
 @each_scene

@@ -195,16 +195,12 @@ def test_states_never_leave_the_ball_of_their_limit_in_curved_slip(name: str, se
 
 
 @each
-@pytest.mark.parametrize("share", [0.0, 1.0])
-@pytest.mark.parametrize("v", [(0.0, 0.0), (1e-300, 0.0), (-1e-12, 1e-12), (1e-9, 0.0), (0.0, 1e3)])
-def test_value_gradient_and_hessian_are_finite(
-    name: str, share: float, v: tuple[float, float]
-) -> None:
-    derivatives = second_derivatives(name)
-    law = PlanarSlip(LAWS[name])
-    z = bent(law, share * np.array([0.6, 0.8]))
-    results = derivatives(v, z, 0.1)
-    assert all(np.isfinite(result.full()).all() for result in results)
+def test_value_gradient_and_hessian_are_finite(name: str) -> None:
+    law, derivatives = PlanarSlip(LAWS[name]), second_derivatives(name)
+    for share in (0.0, 1.0):
+        z = bent(law, share * np.array([0.6, 0.8]))
+        for v in ((0.0, 0.0), (1e-300, 0.0), (-1e-12, 1e-12), (1e-9, 0.0), (0.0, 1e3)):
+            assert all(result.is_regular() for result in derivatives(v, z, 0.1)), (share, v)
 
 
 @cache
@@ -249,8 +245,12 @@ def test_all_number_types_give_the_same(name: str) -> None:
 
 
 @each
-@pytest.mark.parametrize("plane", [(0, 1), (1, 2), (2, 0)])
-def test_slip_in_a_plane_of_space_is_slip_in_the_plane(name: str, plane: tuple[int, int]) -> None:
+def test_slip_in_a_plane_of_space_is_slip_in_the_plane(name: str) -> None:
+    for plane in ((0, 1), (1, 2), (2, 0)):
+        slip_in_a_plane_of_space_is_slip_in_the_plane(name, plane)
+
+
+def slip_in_a_plane_of_space_is_slip_in_the_plane(name: str, plane: tuple[int, int]) -> None:
     flat, law = PlanarSlip(LAWS[name]), SpatialSlip(LAWS[name])
     P = np.eye(3)[:, list(plane)]
     v, a, b = np.array([0.03, -0.04]), np.array([0.5, 0.2]), np.array([0.1, -0.6])
