@@ -100,7 +100,7 @@ FLOORS: dict[str, set[str]] = {
 """Folder -> folders it may import (CONVENTIONS, section 8). A folder stands for its rooms,
 too, except for the rooms themselves: these name each other. A house sees its own rooms."""
 
-ON_TOP = ("symfric.cli", "symfric.bench")
+ON_TOP = ("symfric.cli", "symfric.bench", "symfric.stress")
 """They see all, and they may print."""
 
 FRONTS = tuple(".".join(p.parent.relative_to(ROOT).parts) for p in SOURCES if p.stem == "__init__")

@@ -17,6 +17,7 @@ from symfric.cli.demo import demo
 from symfric.cli.identify import identify
 from symfric.cli.laws import laws
 from symfric.cli.run import run
+from symfric.cli.stress import stress
 
 BAD_INPUT, FAILED_SOLVE, INTERRUPTED = 2, 1, 130
 
@@ -30,7 +31,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # units in brackets are not markup
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for function in (laws, run, identify, codegen, demo, bench):
+for function in (laws, run, identify, codegen, demo, bench, stress):
     app.command()(function)
 
 

@@ -1,0 +1,245 @@
+"""What a campaign draws: laws x scenes x parameters x tolerances x methods x inputs x starts.
+
+A case is plain data, so that a file of a few lines reproduces it on another machine.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from functools import cache
+from pathlib import Path
+from typing import Any, final
+
+from symfric.figures.scene import DEFAULT_T_END
+from symfric.foundation.files import write_text
+from symfric.foundation.parameters import Parameter, options, parameters, with_values
+from symfric.laws import ALL_LAWS, Law, Viscous, law_from_text
+from symfric.scenes import ALL_SCENES, MECHANISMS, Scene
+from symfric.stress.dice import Dice, rounded
+
+SCENES = ("rabinowicz",) * 6 + ("drive",) * 6 + ("quarter_car",) * 2 + tuple(MECHANISMS)
+"""Scenes as often as they are drawn: those of one contact find most for their cost."""
+
+OFFERED = {"rabinowicz": {"F_e"}, "drive": {"F_e"}, "quarter_car": {"F_e", "x_rel", "v_rel"}}
+"""What scenes offer to laws besides v and N."""
+
+WRAPPED = ("{}+viscous", "asymmetric({})", "lagged({})", "load_dependent({})",
+           "temperature_dependent({})")  # fmt: skip
+METHODS = ("auto",) * 3 + ("rodas5p", "radau5") * 2 + ("rodas4p", "rodas3", "dopri5")
+SPREADS = (0.3, 1.0, 2.5)
+"""Decades by which the parameters of a case are off their defaults."""
+
+
+@final
+@dataclass(frozen=True)
+class Signal:
+    """An input in a file: its kind and the numbers that the kind needs (`machines.signal`).
+
+    Attributes:
+        kind: constant (c), hold and linear (values at t), sine (amplitude, rate [rad/s], offset)
+            or pulse (height, start [s], width [s]).
+        values: what stands in parentheses above.
+        t: sample times [s] of hold and linear.
+    """
+
+    kind: str
+    values: tuple[float, ...]
+    t: tuple[float, ...] = ()
+
+
+@final
+@dataclass(frozen=True)
+class Case:
+    """One simulation, as data.
+
+    Attributes:
+        seed, number: what it was drawn from.
+        law, scene: names, as on the command line.
+        values: parameters of scene and law that are off their defaults.
+        forms: options of the law.
+        free: those of `values` that are given at run time, `simulate(p=...)`.
+        x0: start values of states.
+        inputs: input -> signal.
+        t_start, t_end: span [s].
+        rtol, method, backend: as in `simulate`.
+    """
+
+    seed: int
+    number: int
+    scene: str
+    law: str
+    values: Mapping[str, float] = field(default_factory=dict[str, float])
+    forms: Mapping[str, str] = field(default_factory=dict[str, str])
+    free: tuple[str, ...] = ()
+    x0: Mapping[str, float] = field(default_factory=dict[str, float])
+    inputs: Mapping[str, Signal] = field(default_factory=dict[str, Signal])
+    t_start: float = 0.0
+    t_end: float = 1.0
+    rtol: float = 1e-6
+    method: str = "auto"
+    backend: str = "vm"
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> "Case":
+        """The case that `to_dict` wrote.
+
+        Raises:
+            ValueError: a field too many, too few or of another kind.
+        """
+        known, needed = {item.name for item in fields(cls)}, {"seed", "number", "scene", "law"}
+        if not needed <= data.keys() <= known:
+            raise ValueError(
+                f"case: expected fields among {', '.join(sorted(known))}, got {', '.join(data)}"
+            )
+        content: dict[str, Any] = dict(data) | {"free": tuple(data.get("free", ()))}
+        try:
+            content["inputs"] = {
+                name: Signal(s["kind"], tuple(map(float, s["values"])), tuple(map(float, s["t"])))
+                for name, s in data.get("inputs", {}).items()
+            }
+        except (TypeError, KeyError, AttributeError, ValueError) as error:
+            raise ValueError(
+                f"case: inputs: expected what `symfric stress` wrote, {error!r}"
+            ) from None
+        return cls(**content)
+
+    def write(self, path: str | Path) -> None:
+        """Write the file that `symfric stress --case` reads."""
+        write_text(path, json.dumps(self.to_dict(), indent=1) + "\n")
+
+    @classmethod
+    def read(cls, path: str | Path) -> "Case":
+        """The case in a file; a file of a campaign may hold its verdict beside it."""
+        try:
+            data = json.loads(Path(path).read_text(encoding="utf-8"))
+        except ValueError as error:
+            raise ValueError(f"'{path}': expected JSON of a case, got {error}") from None
+        if not isinstance(data, dict):
+            raise ValueError(f"'{path}': expected an object, got {type(data).__name__}")
+        return cls.from_dict(data.get("case", data))
+
+
+def draw(seed: int, number: int) -> Case:
+    """Case `number` of the campaign `seed`; each case has a sequence of its own."""
+    dice = Dice(seed, number)
+    scene = dice.pick(SCENES)
+    text, law = _law(dice, scene)
+    machine = ALL_SCENES[scene](law)
+    forms = {
+        name: dice.pick(form.choices) for name, form in options(law).items() if dice.chance(0.3)
+    }
+    values = _values(dice, machine)
+    span = rounded(DEFAULT_T_END[scene] * dice.decade(-1.3, 0.2))
+    t_start = dice.decade(0, 5) if dice.chance(0.03) else 0.0
+    rtol = dice.pick((1e-3, 1e-4, 1e-5, 1e-7, 1e-8, 1e-9)) if dice.chance(0.6) else 1e-6
+    inputs = {
+        name: _signal(dice, span, t_start)
+        for name in _inputs(scene)
+        if scene == "drive" or dice.chance(0.3)
+    }
+    return Case(
+        seed,
+        number,
+        scene,
+        text,
+        values,
+        forms,
+        tuple(name for name in values if dice.chance(0.5)) if dice.chance(0.15) else (),
+        _starts(dice, scene, law, values),
+        inputs,
+        t_start,
+        t_start + span,
+        rtol,
+        dice.pick(METHODS),
+        "compiled" if scene in ("rabinowicz", "drive") and dice.chance(0.01) else "vm",
+    )
+
+
+def _law(dice: Dice, scene: str) -> tuple[str, Law]:
+    """A law, one in six of them in a wrapper or a sum; few that the scene has no inputs for."""
+    name = dice.pick(list(ALL_LAWS))
+    while not {i.name for i in ALL_LAWS[name]().inputs} <= OFFERED.get(scene, set()):
+        if dice.chance(0.1):
+            break
+        name = dice.pick(list(ALL_LAWS))
+    text = dice.pick(WRAPPED).format(name) if dice.chance(1 / 6) else name
+    try:
+        return text, law_from_text(text)
+    except ValueError:  # some wrap laws without states only
+        return name, law_from_text(name)
+
+
+def _values(dice: Dice, machine: Scene) -> dict[str, float]:
+    """Numbers of law and scene; few that they refuse, such as mu_d > mu_s."""
+    while True:
+        found = _numbers(dice, parameters(machine))
+        try:
+            with_values(machine, found)
+        except ValueError:
+            if not dice.chance(0.1):
+                continue
+        return found
+
+
+def _numbers(dice: Dice, known: Mapping[str, Parameter]) -> dict[str, float]:
+    """One in three parameters off its default by decades; now and then zero or of other sign."""
+    spread = dice.pick(SPREADS)
+    found: dict[str, float] = {}
+    for name, parameter in known.items():
+        if not dice.chance(1 / 3):
+            continue
+        value = float(parameter.default) * dice.decade(-spread, spread)
+        if parameter.lower < 0:
+            value *= dice.pick((1.0, 1.0, 1.0, -1.0))
+        if dice.chance(0.04) or value == 0.0:
+            value = 0.0
+        found[name] = rounded(min(max(value, parameter.lower), parameter.upper))
+    return found
+
+
+def _starts(dice: Dice, scene: str, law: Law, values: Mapping[str, float]) -> dict[str, float]:
+    """Start values of some states: rest, almost rest, fast; a block may sit right on its belt."""
+    found: dict[str, float] = {}
+    for name, unit in _states(scene):
+        if not dice.chance(0.4):
+            continue
+        if unit.endswith("/s"):
+            value = dice.pick((0.0, dice.signed(-9, 1), dice.signed(-2, 0.5)))
+            on_belt = scene == "rabinowicz" and dice.chance(0.5)
+            found[name] = value + (values.get("v_belt", 0.1) if on_belt else 0.0)
+        else:
+            found[name] = dice.signed(-6, 0)
+    if scene not in MECHANISMS and dice.chance(0.1):
+        found |= {state.name: state.nominal * dice.signed(-2, 0.5) for state in law.states}
+    return found
+
+
+def _signal(dice: Dice, span: float, t_start: float) -> Signal:
+    """An input of decades in size: constant, samples, a sine or a short pulse."""
+    kind = dice.pick(("constant", "hold", "linear", "sine", "sine", "pulse"))
+    size = dice.signed(-1.5, 1.5)
+    if kind == "constant":
+        return Signal(kind, (size,))
+    if kind == "sine":
+        return Signal(kind, (size, dice.decade(-1, 2), dice.pick((0.0, 0.5 * size))))
+    if kind == "pulse":
+        width = span * dice.decade(-3, -0.5)
+        return Signal(kind, (size, t_start + rounded(span * dice.unit()), width))
+    count = int(dice.between(2, 20))
+    times = tuple(t_start + span * k / count for k in range(count))
+    return Signal(kind, tuple(size * dice.between(-1, 1) for _ in times), times)
+
+
+@cache
+def _states(scene: str) -> tuple[tuple[str, str], ...]:
+    """Names and units of the states of a scene without those of its law."""
+    return tuple((v.name, v.unit) for v in ALL_SCENES[scene](Viscous()).model().x)
+
+
+@cache
+def _inputs(scene: str) -> tuple[str, ...]:
+    return tuple(v.name for v in ALL_SCENES[scene](Viscous()).model().u)

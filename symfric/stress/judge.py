@@ -1,0 +1,264 @@
+"""How a case is judged: against another method at a hundredth of its tolerance.
+
+    tolerance of a state = rtol max|x| + atol,   error = max over states and times of
+                                                         |run - reference| / tolerance
+
+is at most RIGHT tolerances where a run is right. A larger error is not yet the run's fault: a
+third run at a thousandth of rtol must agree with the reference, and the problem must not be one
+that turns a tolerance at some time into much more at a later one (a block at the edge of
+sticking, a chaotic pendulum). What no method can tell is "undecided", never "right". A method
+that allows a tolerance in each step may be off by all of them together where nothing damps.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.status import SolveError, Status
+from symfric.integrator.arguments import chosen
+from symfric.results.trajectory import Trajectory
+from symfric.stress.cases import Case
+from symfric.stress.peer import by_scipy
+from symfric.stress.problem import TIMES, Problem, problem
+
+Array = NDArray[np.float64]
+
+CLASSES = {
+    "right": "as the reference, within ten tolerances",
+    "refused": "an error in a sentence: bad input, or a solve that failed",
+    "loose": "off by up to a hundred tolerances, or what those of all steps add up to",
+    "undecided": "references disagree, fail, or the problem amplifies without bound",
+    "silent": "success, and wrong",
+    "nan": "success, and a signal is not finite",
+    "crash": "a foreign exception, or the process died",
+    "hang": "no end within the limit",
+}
+"""Name -> what it means, in the order of the table."""
+
+FAILING = ("silent", "nan", "crash", "hang")
+"""Classes that must be empty."""
+
+RIGHT, LOOSE = 10.0, 100.0
+SENSITIVE = 1e-2
+"""Relative size of what becomes of one tolerance, above which a run says nothing."""
+WORK = 120_000
+"""Attempts of a run times its unknowns; a reference has ten times what the run took, and this."""
+PEER = 25
+"""One in so many cases is compared with SciPy, too, where its equations are an ODE."""
+RAW = ("Traceback", ".cpp:", "casadi::", "Assertion")
+"""What no sentence for users contains."""
+
+
+@final
+@dataclass(frozen=True)
+class Verdict:
+    """What became of a case.
+
+    Attributes:
+        kind: one of `CLASSES`.
+        reason: a sentence; empty where the run is right.
+        group: what the reason is called in a table.
+        error: error [tolerances], or None.
+        steps: steps taken.
+    """
+
+    kind: str
+    reason: str = ""
+    group: str = ""
+    error: float | None = None
+    steps: int = 0
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> "Verdict":
+        """What `to_dict` wrote."""
+        return cls(**data)
+
+
+def judge(case: Case) -> Verdict:
+    """Run a case and its references; a defect in symfric comes out as the exception it is."""
+    try:
+        ready = problem(case)
+    except ValueError as error:
+        return _refused("input", str(error))
+    try:
+        run = ready.run(case.rtol, case.method, max_steps=budget(ready), backend=case.backend)
+    except ValueError as error:
+        return _refused("start or input", str(error))
+    except SolveError as error:
+        return _failed(ready, error)
+    broken = [name for name in run.units if not np.isfinite(run[name]).all()]
+    if broken:
+        return Verdict("nan", f"{', '.join(broken)}: not finite", "not finite")
+    return _compared(ready, run)
+
+
+def _refused(group: str, sentence: str, steps: int = 0) -> Verdict:
+    raw = [text for text in RAW if text in sentence]
+    if raw or not sentence.strip():
+        return Verdict("crash", f"raw text instead of a sentence: {sentence}", "raw text")
+    return Verdict("refused", sentence, group, steps=steps)
+
+
+def _failed(ready: Problem, error: SolveError) -> Verdict:
+    """A solve that says it failed; whether another method goes through is told beside it."""
+    steps = error.partial.statistics.steps if isinstance(error.partial, Trajectory) else 0
+    if error.status is Status.MAX_STEPS:
+        return Verdict("undecided", str(error), "too many steps", steps=steps)
+    case = ready.case
+    other = _run(ready, case.rtol, _other(case), budget(ready))
+    through = isinstance(other, Trajectory)
+    group = f"{error.status.name}{', another method goes through' if through else ''}"
+    return _refused(group, str(error), steps)
+
+
+def _compared(ready: Problem, run: Trajectory) -> Verdict:
+    case, steps = ready.case, run.statistics.steps
+    limit = 10 * (steps + run.statistics.rejections) + budget(ready)
+    fine, finest = max(case.rtol / 100, 1e-13), max(case.rtol / 1000, 1e-13)
+    reference = _run(ready, fine, _other(case), limit)
+    if isinstance(reference, SolveError):
+        return _without_reference(ready, run, reference, finest, limit)
+    error = distance(ready, run, reference)
+    if error <= RIGHT:
+        return _peered(ready, run, reference, error)
+    third = _run(ready, finest, _third(case), limit)
+    if isinstance(third, SolveError):
+        text = f"{error:.3g} tolerances off; a third run at rtol/1000 failed: {third}"
+        return Verdict("undecided", text, "third run failed", error, steps)
+    doubt = distance(ready, reference, third)
+    error = distance(ready, run, third)
+    if error <= RIGHT:
+        return Verdict("right", "", "", error, steps)
+    if doubt > error / 3:
+        text = f"{error:.3g} tolerances off, and the references disagree by {doubt:.3g}"
+        return Verdict("undecided", text, "references disagree", error, steps)
+    return _graded(ready, third, error, steps, limit)
+
+
+def _graded(ready: Problem, reference: Trajectory, error: float, steps: int, limit: int) -> Verdict:
+    """Loose or silently wrong, by what the problem itself makes of a tolerance."""
+    grown = amplification(ready, reference, limit)
+    text = f"{error:.3g} tolerances off; the problem makes {grown:.3g} of one"
+    if grown * ready.case.rtol > SENSITIVE:
+        return Verdict("undecided", text, "sensitive", error, steps)
+    if error <= LOOSE:
+        return Verdict("loose", text, "", error, steps)
+    if error <= max(LOOSE, steps) * grown and error * ready.case.rtol < SENSITIVE:
+        return Verdict("loose", text, "adds up over steps", error, steps)
+    return Verdict("silent", text, "", error, steps)
+
+
+def _peered(ready: Problem, run: Trajectory, reference: Trajectory, error: float) -> Verdict:
+    """Right, unless SciPy, which shares no code with symfric, says otherwise."""
+    steps = run.statistics.steps
+    if ready.case.number % PEER == 0:
+        other = by_scipy(ready)
+        if other is not None:
+            apart = _largest(ready, _table(reference, ready.times), other, reference)
+            if apart > LOOSE:
+                text = f"SciPy is {apart:.3g} tolerances away from two of our methods"
+                return Verdict("undecided", text, "SciPy differs", error, steps)
+    return Verdict("right", "", "", error, steps)
+
+
+def _without_reference(
+    ready: Problem, run: Trajectory, first: SolveError, finest: float, limit: int
+) -> Verdict:
+    """The reference failed: another one judges, and two that fail at one place are believed."""
+    steps = run.statistics.steps
+    second = _run(ready, finest, _third(ready.case), limit)
+    if isinstance(second, Trajectory):
+        error = distance(ready, run, second)
+        if error <= RIGHT:
+            return Verdict("right", "", "", error, steps)
+        if error <= LOOSE:
+            return Verdict("loose", f"{error:.3g} tolerances off", "", error, steps)
+    group = f"reference: {first.status.name}"
+    return Verdict("undecided", f"the reference failed: {first}", group, None, steps)
+
+
+def _run(
+    ready: Problem,
+    rtol: float,
+    method: str,
+    limit: int,
+    x0: Mapping[str, float] | None = None,
+    times: Array | None = None,
+) -> Trajectory | SolveError:
+    try:
+        return ready.run(rtol, method, max_steps=limit, x0=x0, t_eval=times)
+    except SolveError as error:
+        return error
+
+
+def budget(ready: Problem) -> int:
+    """Attempts that a run may take: big mechanisms have fewer, of which each costs more."""
+    return WORK // (len(ready.model.x) + len(ready.model.z))
+
+
+def _other(case: Case) -> str:
+    """A method of another family than that of the case."""
+    return "rodas5p" if chosen("case", case.method, case.rtol).name == "radau5" else "radau5"
+
+
+def _third(case: Case) -> str:
+    """The method that is not the reference's."""
+    return "radau5" if _other(case) == "rodas5p" else "rodas5p"
+
+
+def distance(ready: Problem, run: Trajectory, reference: Trajectory) -> float:
+    """Largest difference of a state [tolerances].
+
+    Where the model has events the run may be early or late by rtol of the span: regimes jump.
+    """
+    return _largest(ready, _table(run, ready.times), _table(reference, ready.times), reference)
+
+
+def _largest(ready: Problem, y: Array, z: Array, reference: Trajectory) -> float:
+    low = high = z
+    if ready.model.events:
+        late = ready.case.rtol * (ready.times[-1] - ready.times[0])
+        shifted = [np.clip(ready.times + s * late, *ready.times[[0, -1]]) for s in (-1, 1)]
+        near = np.stack([z, *(_table(reference, times) for times in shifted)])
+        low, high = near.min(0), near.max(0)
+    apart = np.maximum(0.0, np.maximum(y - high, low - y))
+    return float((apart / tolerances(ready, z)).max())
+
+
+def tolerances(ready: Problem, z: Array) -> Array:
+    """Tolerances rtol max|x| + atol of each state, shape (nx, 1); z (nx, times) are the states."""
+    rtol, nominal = ready.case.rtol, ready.model.nominal("x")[:, None]
+    return rtol * np.abs(z).max(1, keepdims=True) + 0.1 * rtol * nominal
+
+
+def _table(run: Trajectory, times: Array) -> Array:
+    """States over time, shape (nx, times)."""
+    values = run.states(times)
+    return np.stack([values[v.name] for v in run.model.x])
+
+
+def amplification(ready: Problem, reference: Trajectory, limit: int) -> float:
+    """What becomes of one tolerance [tolerances], put in at the start or on the way."""
+    names, y = [v.name for v in ready.model.x], _table(reference, ready.times)
+    size, worst = tolerances(ready, y), 1.0
+    for k in STATIONS:
+        times, ends = ready.times[k:], list[Array]()
+        for added in (0.0, 1.0):
+            start = dict(zip(names, (y[:, k] + added * size[:, 0]).tolist(), strict=True))
+            run = _run(ready, ready.case.rtol / 100, _third(ready.case), limit, start, times)
+            if isinstance(run, SolveError):
+                return float("inf")
+            ends.append(_table(run, times))
+        worst = max(worst, float((np.abs(ends[1] - ends[0]) / size).max()))
+    return worst
+
+
+STATIONS = (0, TIMES // 3, 2 * TIMES // 3)
+"""Times, by number, at which a tolerance is put in."""

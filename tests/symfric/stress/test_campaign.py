@@ -1,0 +1,69 @@
+"""A campaign counts, keeps what fails, and survives an interrupt."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from symfric.stress.campaign import Report, campaign, rerun
+from symfric.stress.cases import Case, draw
+from symfric.stress.judge import CLASSES, FAILING, Verdict, judge
+
+
+@pytest.mark.slow
+def test_five_hundred_random_cases_are_never_silently_wrong() -> None:
+    """The suite's share of `symfric stress`; `make stress` runs ten thousand."""
+    report = campaign(500)
+    assert not [(n, v) for n, v in report.verdicts.items() if v.kind in FAILING]
+    assert len(report.verdicts) == 500
+
+
+def test_workers_do_not_change_what_is_found() -> None:
+    report = campaign(6, seed=3, workers=2)
+    assert [report.verdicts[n] for n in range(6)] == [judge(draw(3, n)) for n in range(6)]
+
+
+def test_an_interrupt_keeps_what_there_is() -> None:
+    def interrupt(_: float) -> None:
+        raise KeyboardInterrupt
+
+    report = campaign(50, workers=1, progress=interrupt)
+    assert (len(report.verdicts), report.asked) == (1, 50)
+
+
+def test_numbers_of_a_campaign_are_positive() -> None:
+    for cases, workers, limit in ((0, 1, 1.0), (5, 0, 1.0), (5, 1, -1.0)):
+        with pytest.raises(ValueError, match=r"stress: expected [a-z]+ > 0"):
+            campaign(cases, workers=workers, limit=limit)
+
+
+def test_a_case_runs_again_in_a_process_of_its_own() -> None:
+    assert rerun(draw(3, 1)) == judge(draw(3, 1))
+    assert rerun(Case(1, 1, "drive", "dahl", {"mu": 1.0})).kind == "refused"
+
+
+REPORT = Report(
+    7,
+    5,
+    {
+        0: Verdict("right", "", "", 0.5),
+        1: Verdict("silent", "1e6 tolerances off", "", 1e6),
+        2: Verdict("refused", "no", "input"),
+        3: Verdict("loose", "20 tolerances off", "", 20.0),
+    },
+    12.0,
+)
+
+
+def test_a_report_counts_classes_and_keeps_failing_cases(tmp_path: Path) -> None:
+    data = json.loads(json.dumps(REPORT.to_dict(), allow_nan=False))
+    assert data["classes"] == {name: 0 for name in CLASSES} | {
+        "right": 1, "silent": 1, "refused": 1, "loose": 1,
+    }  # fmt: skip
+    assert data["groups"]["refused"] == {"input": 1}
+    assert (data["cases"], data["asked"], data["seed"]) == (4, 5, 7)
+    assert data["errors_in_tolerances"]["greatest"] == 20.0
+    assert not REPORT.passed
+    (path,) = REPORT.save(tmp_path / "new")
+    assert path.name == "silent_7_1.json"
+    assert Case.read(path) == draw(7, 1)

@@ -1,0 +1,103 @@
+"""A judge is worth what he finds: wrong runs, built here, must not pass."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from symfric.foundation.status import SolveError, Status
+from symfric.stress.cases import Case, Signal
+from symfric.stress.judge import amplification, budget, distance, judge, tolerances
+from symfric.stress.peer import by_scipy
+from symfric.stress.problem import Problem, problem
+
+EASY = Case(1, 1, "rabinowicz", "brown_mcphee", t_end=2.0)
+"""A block that the belt takes along and loses."""
+
+
+def test_a_run_as_good_as_its_reference_is_right() -> None:
+    verdict = judge(EASY)
+    assert verdict.kind == "right"
+    assert verdict.error is not None
+    assert verdict.error < 1.0
+
+
+def test_what_is_refused_is_told_with_its_reason() -> None:
+    bad = replace(EASY, values={"mu_d": 0.5, "mu_s": 0.2})
+    assert (judge(bad).kind, judge(bad).group) == ("refused", "input")
+    assert "expected mu_d <= mu_s" in judge(bad).reason
+    stuck = Case(1, 1, "four_mass", "lugre", t_end=1.0)
+    assert judge(stuck).kind == "refused"
+    assert judge(stuck).group.startswith("STEP_TOO_SMALL")
+
+
+class Wrong:
+    """`simulate` as it would be with a defect: `harm` is done to the case's own run."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, harm: str) -> None:
+        self.right, self.harm = Problem.run, harm
+        monkeypatch.setattr(Problem, "run", lambda *args, **known: self.run(*args, **known))
+
+    def run(self, ready: Problem, rtol: float, method: str, **known: object) -> object:
+        if rtol != EASY.rtol:
+            return self.right(ready, rtol, method, **known)
+        if self.harm == "fails":
+            raise SolveError("casadi::Assertion failed", Status.SINGULAR)
+        coarse = self.right(ready, 1e-2, "rodas3", **known)
+        if self.harm == "nan":
+            evaluate = coarse.evaluate
+            coarse = replace(
+                coarse,
+                evaluate=lambda t: evaluate(t) | {"friction": np.full(np.shape(t), np.nan)},
+            )
+        return coarse
+
+
+@pytest.mark.parametrize(
+    ("harm", "kind"), [("coarse", "silent"), ("nan", "nan"), ("fails", "crash")]
+)
+def test_a_defect_is_found(monkeypatch: pytest.MonkeyPatch, harm: str, kind: str) -> None:
+    Wrong(monkeypatch, harm)
+    assert judge(EASY).kind == kind
+
+
+def test_a_foreign_exception_comes_through(monkeypatch: pytest.MonkeyPatch) -> None:
+    def foreign(_: Case) -> Problem:
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr("symfric.stress.judge.problem", foreign)
+    with pytest.raises(ZeroDivisionError):
+        judge(EASY)
+
+
+def test_distance_counts_tolerances() -> None:
+    ready = problem(EASY)
+    run = ready.run(1e-6, "rodas5p", max_steps=10_000)
+    assert distance(ready, run, run) == 0.0
+    shifted = replace(run, states=lambda t: {n: y + 2e-6 for n, y in run.states(t).items()})
+    table = np.stack([run["x"], run["v"]])
+    assert distance(ready, shifted, run) == pytest.approx(2e-6 / tolerances(ready, table).min())
+
+
+def test_what_a_problem_makes_of_a_tolerance_is_measured() -> None:
+    """Near its top a pendulum falls as d phi'' = w^2 d phi, w^2 = m g L / (J + m L^2)."""
+    fall = Case(1, 1, "pendulum", "viscous", {"sigma_2": 0.0}, x0={"phi": np.pi - 1e-3}, t_end=1.0)
+    ready, w = problem(fall), np.sqrt(9.81 * 0.5 / (1 / 12 + 0.25))
+    run = ready.run(1e-9, "radau5", max_steps=budget(ready))
+    angle, rate = tolerances(ready, np.stack([run["phi"], run["phi_rate"]]))[:, 0]
+    grown = angle * w * np.sinh(w) + rate * np.cosh(w)
+    assert amplification(ready, run, budget(ready)) == pytest.approx(grown / rate, rel=0.01)
+
+
+def test_scipy_agrees_with_symfric_and_gives_up_where_it_must() -> None:
+    for case in (
+        EASY,
+        Case(1, 1, "drive", "lugre", inputs={"force": Signal("hold", (2.0, -2.0), (0.0, 0.5))}),
+    ):
+        ready = problem(case)
+        run = ready.run(1e-8, "radau5", max_steps=10_000)
+        states = by_scipy(ready)
+        assert states is not None
+        mine = np.stack([run[v.name] for v in ready.model.x])
+        assert (np.abs(states - mine) / tolerances(ready, mine)).max() < 10
+    assert by_scipy(problem(Case(1, 1, "drive", "exact_coulomb"))) is None
