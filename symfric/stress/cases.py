@@ -10,7 +10,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any, final
 
-from symfric.figures.scene import DEFAULT_T_END
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Parameter, options, parameters, with_values
 from symfric.laws import ALL_LAWS, Law, Viscous, law_from_text
@@ -133,7 +132,7 @@ def draw(seed: int, number: int) -> Case:
         name: dice.pick(form.choices) for name, form in options(law).items() if dice.chance(0.3)
     }
     values = _values(dice, machine)
-    span = rounded(DEFAULT_T_END[scene] * dice.decade(-1.3, 0.2))
+    span = rounded(machine.t_end * dice.decade(-1.3, 0.2))
     t_start = dice.decade(0, 5) if dice.chance(0.03) else 0.0
     rtol = dice.pick((1e-3, 1e-4, 1e-5, 1e-7, 1e-8, 1e-9)) if dice.chance(0.6) else 1e-6
     inputs = {
