@@ -65,8 +65,6 @@ def pendulum() -> Model:
         x=(x, y, vx, vy),
         z=(lam,),
         p=(radius,),
-        ode=ca.vertcat(v, free),
-        alg=closed(free),
         holonomic=Holonomic(
             2, (ca.sumsqr(q) - radius.symbol**2) / 2, a, ca.vertcat(a - free, closed(a))
         ),
