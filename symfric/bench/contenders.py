@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from symfric.integrator.arguments import chosen
 from symfric.integrator.compiled.compiler import FLAGS, find_compiler
-from symfric.integrator.equations.initial import consistent, first_step
+from symfric.integrator.equations.initial import consistent, first_step, smallest_step
 from symfric.integrator.equations.inputs import Drivers, drivers
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.peers.casadi_integrators import peer
@@ -75,7 +75,7 @@ def loop(model: Model, times: Array, watched: tuple[str, ...], rtol: float) -> C
         S, pieces = State.at(0.0, first_step(end), y0), list[Array]()
         reason = Stop.FULL
         while reason in (Stop.FULL, Stop.ATTEMPTS):
-            records, _, reason = engine.run(S, R, ROWS, ATTEMPTS["compiled"], 1e-15 * end)
+            records, _, reason = engine.run(S, R, ROWS, ATTEMPTS["compiled"], smallest_step(end))
             pieces.append(records)
         if reason is not Stop.END:
             raise RuntimeError(f"the step became too small at t = {S[State.T]:g} s")

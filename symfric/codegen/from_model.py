@@ -12,6 +12,7 @@ from symfric.foundation.parameters import Variable, check_names
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import Drivers
 from symfric.integrator.equations.system import System, system
+from symfric.integrator.methods.suited import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.step.attempt import build_fixed
 from symfric.model import Model, Output, Variables, finite
@@ -72,7 +73,7 @@ def plant_block(
     size = Variable("h", "s", start=STEP_SIZE if h is None else h, lower=0.0, doc="step size")
     if not finite(f"{where}: h", size.start) > 0.0:
         raise ValueError(f"{where}: h: expected a step size > 0 [s], got {h}")
-    whole = _held(model)
+    whole = suited_to_start(_held(model), METHODS[method], model)
     duration = size.symbol if h is None else ca.SX(float(h))
     following = build_fixed(whole, METHODS[method])(whole.y, duration, whole.d)
     return Block(

@@ -57,6 +57,14 @@ def shown(value: object) -> str:
     return _cut(text)
 
 
+def listed(names: Iterable[str], most: int = 6) -> str:
+    """`names` with commas; of many only the first ones, and how many more there are."""
+    every = list(names)
+    if len(every) <= most:
+        return ", ".join(every)
+    return f"{', '.join(every[:most])} and {len(every) - most} more"
+
+
 def _cut(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
 

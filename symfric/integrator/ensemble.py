@@ -9,7 +9,7 @@ from concurrent.futures import (
     ThreadPoolExecutor,
     wait,
 )
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from os import cpu_count
@@ -138,6 +138,7 @@ def simulate_many(
         rtol, 0.1 * rtol * integrator.system.nominal, event_tolerance, max_steps
     )
     starts = partial(_starts, integrator, t_start, x0_of, p_of)
+    integrator = _suited(integrator, inputs, starts, members)
     job = Job.of(integrator, inputs, times, backend, max_steps)
     if model.events:
         solve = partial(solve_one_by_one, integrator, inputs, tolerances, backend, times)
@@ -255,6 +256,25 @@ def _starts(
     return y, values
 
 
+def _suited(
+    integrator: Integrator,
+    inputs: Drivers,
+    starts: Callable[[slice], tuple[Array, Array]],
+    members: int,
+) -> Integrator:
+    """The integrator with pivots that are sound for the first, the middle and the last member."""
+    if integrator.system.manifold is not None or integrator.system.is_ode:
+        return integrator
+    span, points = float(inputs.breaks[-1] - inputs.breaks[0]), list[tuple[Array, Array]]()
+    for m in sorted({0, members // 2, members - 1}):
+        y, p = (rows[0] for rows in starts(slice(m, m + 1)))
+        d = np.concatenate([p, inputs.values[:, 0]])
+        with suppress(ValueError):  # no consistent start: that member is reported by its number
+            points.append((integrator.start(y, d), d))
+            integrator = integrator.suited(points, span)
+    return integrator
+
+
 def _chunk(
     inputs: Drivers,
     tolerances: Tolerances,
@@ -264,7 +284,7 @@ def _chunk(
     """Start columns and run data of members."""
     y, p = starts(pick)
     t_start, t_end = float(inputs.breaks[0]), float(inputs.breaks[-1])
-    h = first_step(t_end - t_start)
+    h = first_step(t_end - t_start, t_start)
     data = np.tile(inputs.values[:, 0], (y.shape[0], 1))
     return Chunk(State.at(t_start, h, y), tolerances.given(t_end, np.hstack([p, data])))
 

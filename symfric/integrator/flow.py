@@ -8,6 +8,7 @@ from symfric.integrator.arguments import check_model
 from symfric.integrator.equations.inputs import Drivers
 from symfric.integrator.equations.manifold import Manifold
 from symfric.integrator.equations.system import System, system
+from symfric.integrator.methods.suited import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.step.attempt import build_fixed
 from symfric.model import Model
@@ -42,6 +43,7 @@ def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Functi
         )
     u = model.vector("u")
     whole = system(model, Drivers(u, u, np.zeros(2), np.zeros((len(model.u), 1)), ("flow",)))
+    whole = suited_to_start(whole, METHODS[method], model)
     fixed = build_fixed(whole, METHODS[method])
     x0, inputs = ca.MX.sym("x0", len(model.x)), ca.MX.sym("u", len(model.u))
     p, T = ca.MX.sym("p", len(model.p)), ca.MX.sym("T")

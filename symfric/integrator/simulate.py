@@ -126,6 +126,9 @@ def simulate(
     relative = 0.1 * rtol if atol is None else atol
     tolerances = Tolerances(rtol, relative * integrator.system.nominal, event_tolerance, max_steps)
     y0, values = _start(integrator, model, x0, p, t_start), model.values("p", p)
+    at_start = (y0, np.concatenate([values, inputs.values[:, 0]]))
+    if backend not in PEERS:
+        integrator = integrator.suited([at_start], float(t_end) - float(t_start))
     run, dense, statistics = _solve(
         integrator, inputs, y0, values, times, tolerances, backend, progress
     )
@@ -135,7 +138,7 @@ def simulate(
     if throw and not trajectory.status.ok and trajectory.status is not Status.INTERRUPTED:
         raise SolveError(trajectory.message, trajectory.status, trajectory)
     if which is not None and run.steps:
-        path = Path(integrator, dense, inputs, values, backend)
+        path = Path(run.integrator or integrator, dense, inputs, values, backend)
         trajectory = _differentiated(trajectory, path, which)
     if measure_error and trajectory.status.ok:
         finer = simulate(

@@ -8,6 +8,7 @@ from typing import Any, final
 import casadi as ca
 
 from symfric.integrator.equations.lu import SymbolicLU, factorise
+from symfric.integrator.equations.pivots import Factors
 from symfric.integrator.equations.system import System
 from symfric.model.holonomic import Inner
 
@@ -34,11 +35,11 @@ class Slopes:
     values: ca.Function
     pivots: tuple[tuple[int, ...], ...]
 
-    def factorised(self, mass: ca.SX, without: Sequence[int] = ()) -> SymbolicLU:
-        """Factors of `mass` - J, in terms of `entries`; J without the rows `without`."""
+    def matrix(self, mass: ca.SX, without: Sequence[int] = ()) -> ca.SX:
+        """`mass` - J, in terms of `entries`; J without the rows `without`."""
         kept, inner = ca.SX(self.J), self.J.shape[0] - mass.shape[0]
         kept[list(without), :] = 0
-        return factorise(ca.sparsify(ca.diagcat(mass, ca.SX(inner, inner)) - kept), self.pivots)
+        return ca.sparsify(ca.diagcat(mass, ca.SX(inner, inner)) - kept)
 
 
 @lru_cache(maxsize=2)
@@ -90,6 +91,7 @@ class Blocks:
         pack: (entries of J, h) -> factors of W.
         solve: (factors, right, memory) -> k with W k = right + M memory.
         lu: the factors as expressions.
+        factors: W, and the order in which it is factorised.
     """
 
     f: ca.Function
@@ -97,6 +99,7 @@ class Blocks:
     pack: ca.Function
     solve: ca.Function
     lu: SymbolicLU
+    factors: Factors
 
     def factor(self, y: Any, h: Any, d: Any) -> Any:
         """Factors of W."""
@@ -113,7 +116,8 @@ def blocks(system: System, gamma: float) -> Blocks:
     """The blocks of a method with the diagonal coefficient `gamma`."""
     h, own = ca.SX.sym("h"), slopes(system)
     right, memory = ca.SX.sym("right", system.n), ca.SX.sym("memory", system.n)
-    lu = own.factorised(system.mass / (gamma * h))
+    W = own.matrix(system.mass / (gamma * h))
+    lu = factorise(W, own.pivots, system.orders.get("step", ()))
     return Blocks(
         ca.Function("f", [system.y, system.d], [system.f], {"cse": True}),
         own.values,
@@ -123,7 +127,20 @@ def blocks(system: System, gamma: float) -> Blocks:
             [_solved(lu, right + system.mass @ memory)],
         ),
         lu,
+        Factors("step", own.values, (own.entries, h), W, lu.order),
     )  # fmt: skip
+
+
+@lru_cache(maxsize=2)
+def at_rest(system: System) -> tuple[SymbolicLU, Factors]:
+    """Factors of what W is for a tiny step: M, and the derivatives of the rows without rates.
+
+    It is singular where the algebraic equations do not determine their unknowns.
+    """
+    own, (rows, _) = slopes(system), system.algebraic
+    matrix = own.matrix(system.mass, [i for i in range(system.n) if i not in rows])
+    lu = factorise(matrix, own.pivots, system.orders.get("tiny", ()))
+    return lu, Factors("tiny", own.values, (own.entries, ca.SX.sym("h")), matrix, lu.order)
 
 
 def _solved(lu: SymbolicLU, right: ca.SX) -> ca.SX:
@@ -139,7 +156,7 @@ def refinement(system: System) -> ca.Function:
     Two steps of Newton's method for accelerations, multipliers and normal forces.
     """
     own, (rows, _), right = slopes(system), system.algebraic, ca.SX.sym("right", system.n)
-    lu = own.factorised(system.mass, [i for i in range(system.n) if i not in rows])
+    lu, _ = at_rest(system)
     pack = ca.Function("pack", [own.entries], [lu.packed])
     solve = ca.Function("solve", [lu.packed_symbol, right], [_solved(lu, right)])
     residual = ca.SX(system.n, 1)
@@ -165,11 +182,11 @@ def signs(system: System, gamma: float, watched: Sequence[int] = ()) -> Signs:
     latter is from zero.
     """
     own, block, (rows, _) = slopes(system), blocks(system, gamma), system.algebraic
-    lu, first = block.lu, {row for row, _ in block.lu.order[: len(rows)]}
-    if system.is_semi_explicit and first == set(rows):
+    lu, first = block.lu, block.lu.order[: len(rows)]
+    if system.is_semi_explicit and all({*places} == {*rows} for places in zip(*first, strict=True)):
         tiny = [lu.sign(len(rows)), lu.pivots(watched)]
     else:
-        own_lu = own.factorised(system.mass, [i for i in range(system.n) if i not in rows])
+        own_lu, _ = at_rest(system)
         in_symbols = [own_lu.sign(), own_lu.pivots(watched)]
         tiny = ca.substitute(in_symbols, [own_lu.packed_symbol], [own_lu.packed])
     symbols = [lu.packed_symbol, own.entries]

@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.checks import listed
 from symfric.foundation.numeric import evaluate, evaluate_all
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.manifold import Manifold, jammed
@@ -21,8 +22,8 @@ NEAR, CONVERGED = 1e-4, 1e-10
 
 LAST_DIGITS = 1e-15
 """Relative change by which numbers are the same to rounding."""
-SHOWN = 6
-"""Names listed in a message."""
+FLOOR = 10 * float(np.finfo(float).eps)
+"""Smallest step relative to t: a few of the last digits of t itself."""
 
 
 @final
@@ -82,7 +83,7 @@ def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array
         elif not _descend(system, y, d, step, residual):
             break
         last = size
-    names = _few([system.names[i] for i in columns])
+    names = listed(system.names[i] for i in columns)
     raise ValueError(
         f"{where}: expected consistent start values, found no solution of the algebraic "
         f"equations for {names} near their start values; give better ones"
@@ -206,12 +207,11 @@ def _rounding(system: System | Equations, y: Array, d: Array) -> float:
     return max(float(np.linalg.norm(change)) for change in moved)
 
 
-def _few(names: list[str]) -> str:
-    """The first of many names, and how many there are."""
-    rest = len(names) - SHOWN
-    return ", ".join(names[:SHOWN]) + (f" and {rest} others" if rest > 0 else "")
-
-
-def first_step(span: float) -> float:
+def first_step(span: float, t_start: float = 0.0) -> float:
     """A first step [s] so small that the controller decides: it grows eightfold per step."""
-    return 1e-8 * span
+    return max(1e-8 * span, 10 * FLOOR * abs(t_start))
+
+
+def smallest_step(span: float) -> float:
+    """The step [s] below which a run gives up where t is near 0; elsewhere rounding of t counts."""
+    return 1e-15 * first_step(span)

@@ -6,6 +6,9 @@ from typing import final
 
 import casadi as ca
 
+Order = tuple[tuple[int, int], ...]
+"""(row, column) of each pivot."""
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -21,7 +24,7 @@ class SymbolicLU:
     """
 
     packed: ca.SX
-    order: tuple[tuple[int, int], ...]
+    order: Order
     rows: tuple[tuple[int, ...], ...]
     columns: tuple[tuple[int, ...], ...]
     packed_symbol: ca.SX
@@ -71,13 +74,15 @@ class SymbolicLU:
         return ca.vertcat(ca.SX(0, 1), *x)
 
 
-def factorise(matrix: ca.SX, groups: Sequence[Sequence[int]] = ()) -> SymbolicLU:
+def factorise(matrix: ca.SX, groups: Sequence[Sequence[int]] = (), order: Order = ()) -> SymbolicLU:
     """Factorise a structurally nonsingular sparse matrix.
 
-    Pivots are chosen once, at build time. The rows of each group pivot on the diagonal, group by
-    group, those of a group by least fill (Markowitz): differential equations, whose pivot
-    1/(gamma h) dominates for small steps; a mass matrix; constraints, whose pivot is the definite
-    Schur complement of the mass matrix before. Rows in no group come last and pivot anywhere.
+    Pivots are chosen once, at build time: those of `order`, where it is given. Else the rows of
+    each group pivot on the diagonal, group by group, those of a group by least fill (Markowitz):
+    differential equations, whose pivot 1/(gamma h) dominates for small steps; a mass matrix;
+    constraints, whose pivot is the definite Schur complement of the mass matrix before. Rows in no
+    group come last and pivot anywhere; whether that is sound, numbers say
+    (`symfric.integrator.methods.suited`).
 
     Raises:
         ValueError: structurally singular.
@@ -94,8 +99,8 @@ def factorise(matrix: ca.SX, groups: Sequence[Sequence[int]] = ()) -> SymbolicLU
     grouped.append(set(range(n)).difference(*grouped))
     steps: list[tuple[int, int, tuple[int, ...], tuple[int, ...]]] = []
     packed: list[ca.SX] = []
-    for _ in range(n):
-        row, column = _pivot(rows, holders, grouped)
+    for k in range(n):
+        row, column = order[k] if order else _pivot(rows, holders, grouped)
         holders[column].discard(row)
         inverse = 1 / rows[row].pop(column)
         others, below = tuple(rows[row]), tuple(sorted(holders[column]))

@@ -1,6 +1,7 @@
 """A model as the step sees it: one column of unknowns, one right-hand side, a mass pattern."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import final
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.symbols import stacked
 from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.lu import Order
 from symfric.integrator.equations.manifold import Manifold, holonomic_columns, manifold
 from symfric.model import Model
 from symfric.model.holonomic import Inner
@@ -41,6 +43,8 @@ class System:
         rubs: whether something slides in it that its model names (`Model.monitors`).
         inner: f with inner unknowns, whose derivatives are sparse; None where f itself serves. Its
             groups take the place of `pivots`.
+        orders: pivots of the factors of each matrix by its name, where those that fill least are
+            not sound (`symfric.integrator.equations.pivots`).
         slope: Jacobian of f where it is not to be derived from f.
     """
 
@@ -57,9 +61,9 @@ class System:
     manifold: Manifold | None = None
     pivots: tuple[tuple[int, ...], ...] = ()
     slope: ca.SX | None = None
-
     rubs: bool = False
     inner: Inner | None = None
+    orders: Mapping[str, Order] = field(default_factory=dict[str, Order])
 
     @property
     def n(self) -> int:

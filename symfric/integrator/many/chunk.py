@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from symfric.foundation.status import Status
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.compiled.compiler import find_compiler
-from symfric.integrator.equations.initial import Equations, consistent_many
+from symfric.integrator.equations.initial import Equations, consistent_many, smallest_step
 from symfric.integrator.equations.inputs import Drivers
 from symfric.integrator.equations.manifold import Manifold
 from symfric.integrator.many.members import (
@@ -140,12 +140,13 @@ class Job:
 
     def stretch(self, first: int, last: int) -> tuple[Stretch, Indices]:
         """The input intervals first ... last - 1, and which of the times belong to them."""
-        breaks, h_min = self.breaks[first : last + 1], 1e-15 * np.abs(self.breaks).max()
+        breaks = self.breaks[first : last + 1]
+        h_min = smallest_step(float(self.breaks[-1] - self.breaks[0]))
         ends = np.inf if last == self.breaks.size - 1 else breaks[-1]
         inside = np.flatnonzero((self.times >= breaks[0]) & (self.times < ends))
         data = np.ascontiguousarray(self.data[:, first:last])
         return (
-            Stretch(breaks, data, self.times[inside], self.max_steps, max(float(h_min), 1e-18)),
+            Stretch(breaks, data, self.times[inside], self.max_steps, h_min),
             inside,
         )
 

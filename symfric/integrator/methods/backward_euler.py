@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any, final
 
 from symfric.integrator.equations.blocks import blocks
+from symfric.integrator.equations.pivots import Factors
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import Method, Trial, Trials
 
@@ -26,6 +27,10 @@ class BackwardEuler(Method):
     def work(self, system: System) -> tuple[int, int, int]:
         """Right-hand sides, Jacobians and factorisations of a step."""
         return self.iterations, self.iterations, self.iterations
+
+    def factors(self, system: System) -> tuple[Factors, ...]:
+        """Of the iteration matrix."""
+        return (blocks(system, 1.0).factors,)
 
     def trials(self, system: System) -> Trials:
         """Its steps on a system."""

@@ -8,6 +8,8 @@ from typing import Any, ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.checks import listed
+from symfric.integrator.equations.pivots import Factors
 from symfric.integrator.equations.system import System
 
 Array = NDArray[np.float64]
@@ -78,6 +80,10 @@ class Method(ABC):
     def work(self, system: System) -> tuple[int, int, int]:
         """Right-hand sides, Jacobians and factorisations of a step."""
 
+    def factors(self, system: System) -> tuple[Factors, ...]:
+        """Of all matrices that its steps on a system solve with; none of an explicit method."""
+        return ()
+
     @abstractmethod
     def trials(self, system: System) -> Trials:
         """Its steps on a system.
@@ -101,7 +107,7 @@ def need_ode(system: System, method: str) -> None:
     """
     if system.is_ode:
         return
-    unknown = ", ".join(system.names[i] for i in system.algebraic[1])
+    unknown = listed(system.names[i] for i in system.algebraic[1])
     found = f"the algebraic unknowns {unknown}" if unknown else "a mass matrix"
     raise ValueError(
         f"method {method}: expected an ODE x' = f(x), got {found}; use an implicit method such as "

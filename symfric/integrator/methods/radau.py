@@ -1,13 +1,15 @@
 """Radau IIA collocation, solved by simplified Newton iterations in the eigenbasis of its matrix."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, final
 
 import casadi as ca
 import numpy as np
 
-from symfric.integrator.equations.blocks import blocks
+from symfric.integrator.equations.blocks import at_rest, blocks
 from symfric.integrator.equations.lu import factorise
+from symfric.integrator.equations.pivots import Factors
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import Array, Method, Trial, Trials, combination
 
@@ -51,7 +53,13 @@ class Radau(Method):
         return 3 * self._iterations(system) - 2, 1, 2
 
     def _iterations(self, system: System) -> int:
-        return self.iterations + bool(system.algebraic[1])
+        return self.iterations + bool(system.algebraic[0])
+
+    def factors(self, system: System) -> tuple[Factors, ...]:
+        """Of the real and the complex iteration matrix, and for a tiny step."""
+        basis = eigenbasis(self.A)
+        own = blocks(system, self.diagonal).factors, pair(system, basis.alpha, basis.beta).factors
+        return *own, at_rest(system)[1]
 
     def trials(self, system: System) -> Trials:
         """Its steps on a system.
@@ -60,14 +68,14 @@ class Radau(Method):
         first iteration is the solution.
         """
         basis = eigenbasis(self.A)
-        block, (factor, solve) = blocks(system, self.diagonal), _pair(system, basis)
+        block, other = blocks(system, self.diagonal), pair(system, basis.alpha, basis.beta)
         n, T, inverse = system.n, basis.T, np.linalg.inv(basis.T)
         # what algebraic equations leave over where a step begins is no error of the step
         rates = ca.DM([float(i not in system.algebraic[0]) for i in range(n)])
 
         def trial(y: Any, h: Any, d: Any) -> Trial:
             kind, per_h = type(y), 1 / h
-            lu, lu_pair = block.factor(y, h, d), factor(y, h, d)
+            lu, lu_pair = block.factor(y, h, d), other.factor(y, h, d)
             first = block.f(y, d)
             slopes, corrections = [first] * 3, list[Any]()
             w = z = [kind.zeros(n)] * 3
@@ -79,8 +87,8 @@ class Radau(Method):
                 turned = ca.vertcat(
                     basis.alpha * w[1] + basis.beta * w[2], basis.alpha * w[2] - basis.beta * w[1]
                 )
-                pair = solve(lu_pair, ca.vertcat(*right[1:]), -per_h * turned)
-                change = [real, pair[:n], pair[n:]]
+                both = other.solve(lu_pair, ca.vertcat(*right[1:]), -per_h * turned)
+                change = [real, both[:n], both[n:]]
                 w = [old + new for old, new in zip(w, change, strict=True)]
                 z = [combination(row, w, kind) for row in T]
                 corrections.append(combination(T[-1], change, kind))
@@ -116,23 +124,44 @@ def eigenbasis(A: Array) -> Eigenbasis:
     )
 
 
-def _pair(system: System, basis: Eigenbasis) -> tuple[ca.Function, ca.Function]:
+@final
+@dataclass(frozen=True, eq=False)
+class Pair:
     """The complex iteration matrix (alpha - i beta) M/h - J as a real one of twice the size.
 
-    Returns:
-        (y, h, d) -> its factors; (factors, right, memory) -> k with W k = right + M memory.
+    Attributes:
+        factor: (y, h, d) -> its factors.
+        solve: (factors, right, memory) -> k with W k = right + M memory.
+        factors: W, and the order in which it is factorised.
     """
-    h, n = ca.SX.sym("h"), system.n
-    J, M = system.J, system.mass / h
-    diagonal, across = basis.alpha * M - J, basis.beta * M
-    both = ca.blockcat([[diagonal, across], [-across, diagonal]])
-    lu = factorise(ca.sparsify(both), [(*rows, *(n + i for i in rows)) for rows in system.pivots])
+
+    factor: ca.Function
+    solve: ca.Function
+    factors: Factors
+
+
+@lru_cache(maxsize=2)
+def pair(system: System, alpha: float, beta: float) -> Pair:
+    """The complex iteration matrix of `system`."""
+    h, n, J, M = ca.SX.sym("h"), system.n, system.J, system.mass
+    entries = ca.SX.sym("J", J.sparsity())
+
+    def matrix(J: ca.SX) -> ca.SX:
+        diagonal, across = alpha * (M / h) - J, beta * (M / h)
+        return ca.sparsify(ca.blockcat([[diagonal, across], [-across, diagonal]]))
+
+    groups = [(*rows, *(n + i for i in rows)) for rows in system.pivots]
+    lu = factorise(matrix(J), groups, system.orders.get("pair", ()))
     right, memory = ca.SX.sym("right", 2 * n), ca.SX.sym("memory", 2 * n)
-    solution = lu.solve(right + ca.diagcat(system.mass, system.mass) @ memory)
-    return (
+    solution = lu.solve(right + ca.diagcat(M, M) @ memory)
+    return Pair(
         ca.Function("factor_pair", [system.y, h, system.d], [lu.packed], {"cse": True}),
         ca.Function("solve_pair", [lu.packed_symbol, right, memory], [solution]),
-    )
+        Factors(
+            "pair", ca.Function("J", [system.y, system.d], [J]), (entries, h), matrix(entries),
+            lu.order,
+        ),
+    )  # fmt: skip
 
 
 def through(c: Array) -> Array:

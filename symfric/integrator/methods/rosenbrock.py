@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from typing import Any, final
 
-from symfric.integrator.equations.blocks import blocks
+from symfric.integrator.equations.blocks import at_rest, blocks
+from symfric.integrator.equations.pivots import Factors
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import Array, Method, Trial, Trials, combination
 
@@ -41,6 +42,10 @@ class Rosenbrock(Method):
     def work(self, system: System) -> tuple[int, int, int]:
         """Right-hand sides, Jacobians and factorisations of a step."""
         return self.stages, 1, 1
+
+    def factors(self, system: System) -> tuple[Factors, ...]:
+        """Of the iteration matrix, and for a tiny step."""
+        return blocks(system, self.gamma).factors, at_rest(system)[1]
 
     def trials(self, system: System) -> Trials:
         """Its steps on a system."""

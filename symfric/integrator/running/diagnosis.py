@@ -4,10 +4,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.checks import listed
 from symfric.foundation.status import Status
 from symfric.integrator.equations.blocks import blocks
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.manifold import grows, pulls, singular
+from symfric.integrator.equations.pivots import regular
 from symfric.integrator.equations.system import System
 from symfric.integrator.running.integrator import Integrator
 
@@ -76,7 +78,7 @@ def _unbounded(system: System, y: Array, f: Array, h: float) -> str:
     runaway = (
         (np.abs(x) > 1e3 * system.nominal) & (x * rate > 0) & (np.abs(x) < 1e3 * h * abs(rate))
     )
-    grown = ", ".join(f"{system.names[i]} = {x[i]:.3g}" for i in np.flatnonzero(huge | runaway))
+    grown = listed(f"{system.names[i]} = {x[i]:.3g}" for i in np.flatnonzero(huge | runaway))
     return f"{grown} grows without bound; check signs and parameters" if grown else ""
 
 
@@ -114,8 +116,8 @@ def _singular(integrator: Integrator, y: Array, d: Array, h: float) -> str:
     """Algebraic equations that cannot be solved, or do not determine their unknowns."""
     system = integrator.system
     names = _named(system, np.array(system.algebraic[1], dtype=int))
-    factors = ca.DM(blocks(system, 1.0).factor(y, max(h, 1e-12), d)).full()
-    if not np.isfinite(factors).all():
+    matrix = blocks(system, 1.0).factors.at(y, max(h, 1e-12), d)
+    if np.isfinite(matrix).all() and not regular(matrix):
         return (
             f"the iteration matrix is singular in {names or 'the states'}; the constraints may be "
             "redundant or the configuration singular"
@@ -131,4 +133,4 @@ def _singular(integrator: Integrator, y: Array, d: Array, h: float) -> str:
 
 
 def _named(system: System, rows: NDArray[np.intp]) -> str:
-    return ", ".join(system.names[i] for i in rows)
+    return listed(system.names[i] for i in rows)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import flat_view
 from symfric.integrator.compiled.compiler import load
+from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
@@ -42,7 +43,10 @@ class Engine(Protocol):
     def run(
         self, S: Array, R: Array, rows: int, attempts: int, h_min: float
     ) -> tuple[Array, int, Stop]:
-        """Advance S; return the records, the attempts made and why it stopped."""
+        """Advance S; return the records, the attempts made and why it stopped.
+
+        A step that fell below `h_min`, or below what rounding leaves of t (`FLOOR`), stops it.
+        """
         ...
 
 
@@ -81,17 +85,17 @@ class VmEngine:
             buffer.set_res(1, flat_view(D))
         found: list[Array] = []
         count = made = 0
-        T, H, t_end = State.T, State.H, R[Given.T_END]
-        while S[T] < t_end and count < rows and made < attempts and S[H] >= h_min:
+        t_end = R[Given.T_END]
+        while S[State.T] < t_end and count < rows and made < attempts and _large(S, h_min):
             evaluate()
             before = np.vstack([S, S_out[:-1]])
-            used = before[:, T] < t_end
-            took = S_out[:, T] > before[:, T]
+            used = before[:, State.T] < t_end
+            took = S_out[:, State.T] > before[:, State.T]
             found.append(
                 np.hstack(
                     [
-                        before[took, T, None],
-                        S_out[took, T, None],
+                        before[took, State.T, None],
+                        S_out[took, State.T, None],
                         before[took, State.Y],
                         S_out[took, State.Y],
                         D[took],
@@ -105,10 +109,15 @@ class VmEngine:
         return records, made, _reason(S, R, count >= rows, h_min)
 
 
+def _large(S: Array, h_min: float) -> bool:
+    """Whether the step is large enough to go on; NaN is not."""
+    return bool(S[State.H] >= max(h_min, FLOOR * abs(S[State.T])))
+
+
 def _reason(S: Array, R: Array, full: bool, h_min: float) -> Stop:
     if S[State.T] >= R[Given.T_END]:
         return Stop.END
-    if not S[State.H] >= h_min:
+    if not _large(S, h_min):
         return Stop.STEP_TOO_SMALL
     return Stop.FULL if full else Stop.ATTEMPTS
 
@@ -181,6 +190,7 @@ def c_source(step: ca.Function, dense_rows: int, *others: ca.Function) -> str:
         width=width(n, dense_rows),
         dense=2 + 2 * n,
         dense_rows=dense_rows,
+        floor=repr(FLOOR),
         arg=step.sz_arg(),
         res=step.sz_res(),
         iw=max(1, step.sz_iw()),
@@ -199,7 +209,8 @@ int symfric_run(double *S, const double *R, double *rows, long long max_rows,
   const double *arg[$arg];
   double *res[$res];
   long long i, count = 0, made = 0;
-  while (S[T] < R[T_END] && count < max_rows && made < max_attempts && S[H] >= h_min) {
+  while (S[T] < R[T_END] && count < max_rows && made < max_attempts
+         && S[H] >= h_min && S[H] >= $floor * fabs(S[T])) {
     double *row = rows + count * WIDTH;
     arg[0] = S;
     arg[1] = R;
@@ -221,7 +232,7 @@ int symfric_run(double *S, const double *R, double *rows, long long max_rows,
   counts[0] = count;
   counts[1] = made;
   if (S[T] >= R[T_END]) return 0;
-  if (!(S[H] >= h_min)) return 3;
+  if (!(S[H] >= h_min && S[H] >= $floor * fabs(S[T]))) return 3;
   return count >= max_rows ? 1 : 2;
 }
 """

@@ -1,5 +1,6 @@
 """The adaptive integrator of one model: built once, run for any numbers."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
@@ -15,13 +16,17 @@ from symfric.integrator.compiled.compiler import find_compiler, library_path
 from symfric.integrator.equations.blocks import refinement
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.lu import Order
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.method import Method
+from symfric.integrator.methods.suited import suited
 from symfric.integrator.running.engine import CompiledEngine, Engine, VmEngine, c_source
 from symfric.integrator.step.attempt import build_step
 from symfric.model import Model
 
 Array = NDArray[np.float64]
+Point = tuple[bytes | float, ...]
+Orders = tuple[tuple[str, Order], ...]
 INLINE = 6000
 """Steps with more instructions are compiled as calls of blocks, which compile much faster."""
 
@@ -32,12 +37,14 @@ class Integrator:
     """System, step and Functions of a model with one structure of inputs.
 
     Mutable only in what it remembers: its engines, the time spent in the virtual machine, from
-    which it decides when compiling pays, whether compiling failed, and the last start.
+    which it decides when compiling pays, whether compiling failed, the last start, and others of
+    its kind with other pivots.
     """
 
     model: Model
     inputs: Drivers
     tableau: Method
+    whole: System | None = None
     build_time: float = 0.0
     compile_time: float = 0.0
     vm_time: float = 0.0
@@ -46,10 +53,12 @@ class Integrator:
     _starts: dict[tuple[bytes, bytes], Array] = field(
         default_factory=dict[tuple[bytes, bytes], Array]
     )
+    _judged: dict[Point, "Integrator"] = field(default_factory=dict[Point, "Integrator"])
+    _others: dict[Orders, "Integrator"] = field(default_factory=dict[Orders, "Integrator"])
 
     def __post_init__(self) -> None:
         begin = perf_counter()
-        self.system: System = system(self.model, self.inputs)
+        self.system: System = self.whole or system(self.model, self.inputs)
         self.step = build_step(self.system, self.tableau)
         self.f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
         self.events = self._event_function()
@@ -128,6 +137,32 @@ class Integrator:
             found = consistent(self.system, f"model '{self.model.name}'", y, d)
             self._starts = {key: found}
         return self._starts[key]
+
+    def suited(self, points: Sequence[tuple[Array, Array]], span: float) -> "Integrator":
+        """The integrator itself, or one of the same model whose pivots are sound.
+
+        Which one depends on the arguments alone, not on what was run before.
+
+        Args:
+            points: (y, d) where a run has to get through, the newest last; algebraic unknowns of
+                the first follow.
+            span: its length [s].
+        """
+        if self.system.manifold is not None or self.system.is_ode:
+            return self
+        key = (*(part.tobytes() for point in points for part in point), span)
+        if key not in self._judged:
+            consistent_at = [(self.start(*points[0]), points[0][1]), *points[1:]]
+            whole = suited(self.system, self.tableau, consistent_at, span)
+            self._judged = {key: self if whole is self.system else self._other(whole)}
+        return self._judged[key]
+
+    def _other(self, whole: System) -> "Integrator":
+        """The integrator of the same equations with other pivots, built once."""
+        orders = tuple(sorted(whole.orders.items()))
+        if orders not in self._others:
+            self._others[orders] = Integrator(self.model, self.inputs, self.tableau, whole)
+        return self._others[orders]
 
     def vm(self) -> Engine:
         """The engine that needs no compiler."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.status import Status
-from symfric.integrator.equations.initial import consistent, first_step
+from symfric.integrator.equations.initial import consistent, first_step, smallest_step
 from symfric.integrator.equations.inputs import Drivers
 from symfric.integrator.running.dense import Dense, from_records, join
 from symfric.integrator.running.diagnosis import explain
@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 ROWS, EVENT_ROWS = 2048, 64
 ATTEMPTS = {"vm": 2_000, "compiled": 50_000}
 """Attempts between two looks at progress and interrupts: tens of milliseconds."""
+MANY_REJECTED, MOST_ORDERS = 30, 8
+"""Rejections among a batch of attempts, if more than steps, that make pivots suspect; and how often
+others are tried."""
 
 
 @final
@@ -57,7 +60,10 @@ class Tolerances:
 @final
 @dataclass(eq=False)
 class Run:
-    """What a run has produced so far; a mutable record that survives interrupts and failures."""
+    """What a run has produced so far; a mutable record that survives interrupts and failures.
+
+    `integrator` is the one it ended with: pivots that fail on the way are replaced.
+    """
 
     dense: list[Dense] = field(default_factory=list[Dense])
     happened: list[tuple[float, str]] = field(default_factory=list[tuple[float, str]])
@@ -65,6 +71,7 @@ class Run:
     attempts: int = 0
     smallest: float = np.inf
     engine: str = ""
+    integrator: Integrator | None = None
     status: Status = Status.SUCCESS
     message: str = Status.SUCCESS.value
 
@@ -99,6 +106,7 @@ def integrate(
         reached = f"{Status.INTERRUPTED.value} It reaches t = {drive.t:g} s."
         drive.run.stop(Status.INTERRUPTED, reached)
     run = drive.run
+    run.integrator = drive.integrator
     if not run.dense:
         empty = np.zeros((1, integrator.tableau.H.shape[0], y.size))
         start = inputs.breaks[:1]
@@ -122,12 +130,13 @@ class _Drive:
         self.integrator, self.inputs, self.tolerances = integrator, inputs, tolerances
         self.backend, self.progress = backend, progress
         self.t_start, self.t_end = float(inputs.breaks[0]), float(inputs.breaks[-1])
-        self.h_min = 1e-15 * max(abs(self.t_start), abs(self.t_end), 1e-3)
-        h = first_step(self.t_end - self.t_start)
-        self.S = State.at(self.t_start, h, y)
+        span = self.t_end - self.t_start
+        self.h_min = smallest_step(span)
+        self.S = State.at(self.t_start, first_step(span, self.t_start), y)
         self.eventful = bool(integrator.model.events)
         self.storm = EventStorm(self.t_end - self.t_start, tolerances.event)
         self.run, self.d = Run(), np.zeros(0)
+        self.span, self.places = span, [y.copy()]
 
     @property
     def t(self) -> float:
@@ -167,7 +176,7 @@ class _Drive:
             else:
                 self.run.keep(piece)
                 old = None if piece.t0.size else old
-                if reason is Stop.STEP_TOO_SMALL:
+                if reason is Stop.STEP_TOO_SMALL and not self.found_pivots():
                     self.run.stop(*explain(self.integrator, self.t, self.y, self.d, S[State.H]))
             if self.run.status is not Status.SUCCESS:
                 return
@@ -188,11 +197,28 @@ class _Drive:
         rows = EVENT_ROWS if self.eventful else ROWS
         records, made, reason = engine.run(self.S, R, rows, allowed, self.h_min)
         self.run.attempts += made
+        if made - records.shape[0] > max(records.shape[0], MANY_REJECTED):
+            self.found_pivots()
         if engine.name == "vm":
             spent, advance = perf_counter() - began, self.t - from_t
             self.integrator.vm_time += spent
             left = spent * (self.t_end - self.t) / advance if advance > 0 else left
         return records, reason, left
+
+    def found_pivots(self) -> bool:
+        """Whether steps failed for pivots that are not sound here; others are used from now on."""
+        if len(self.places) > MOST_ORDERS:
+            return False
+        here = self.y.copy()
+        points = [(y, self.d) for y in (*self.places, here)]
+        other = self.integrator.suited(points, self.span)
+        if other is self.integrator:
+            return False
+        self.integrator = other
+        self.places.append(here)
+        h = max(float(self.S[State.H]), first_step(self.span, self.t))
+        self.S[:] = State.at(self.t, h, here)
+        return True
 
     def crossing(self, piece: Dense, old: Array | None) -> Crossing | None:
         """The first event in `piece`."""

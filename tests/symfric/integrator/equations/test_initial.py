@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 from closed_forms import assemble, smooth_dae
 
-from symfric import LuGre, Model, Variable, rabinowicz, simulate
+from symfric import LuGre, Model, Variable, rabinowicz, simulate, simulate_many
 from symfric.integrator.compiled.columns import Columns
+from symfric.integrator.compiled.compiler import find_compiler
 from symfric.integrator.equations.initial import consistent, consistent_many
 
 x = Variable("x", "m", start=1.0)
@@ -123,3 +124,32 @@ def test_start_at_rest_in_all_derivatives_is_left() -> None:
     model = Model("late", x=(start,), ode=5 * t**4 + 0 * start.symbol, t=t)
     run = simulate(model, 2.0, rtol=1e-8)
     assert run["x"] == pytest.approx(run.t**5, abs=1e-6)
+
+
+@pytest.mark.parametrize("backend", ["vm", "compiled"])
+def test_smallest_step_follows_time_instead_of_its_end(backend: str) -> None:
+    """Robertson's reactions over 1e11 s: the floor stood at 1e-15 t_end = 1e-4 s.
+
+    Published at the end: a = 2.083340149701255e-8 (Test Set for IVP Solvers).
+    """
+    if backend == "compiled" and find_compiler() is None:
+        pytest.skip("no C compiler")
+    a, b = Variable("a", "1", start=1.0, nominal=1e-8), Variable("b", "1", nominal=1e-13)
+    c = Variable("c", "1")
+    slow = -0.04 * a.symbol + 1e4 * b.symbol * c.symbol
+    fast = 3e7 * b.symbol**2
+    model = Model("long", x=(a, b, c), ode=ca.vertcat(slow, -slow - fast, fast))
+    run = simulate(model, 1e11, rtol=1e-8, backend=backend, samples=2)
+    many = simulate_many(
+        model, 1e11, x0={"a": [1.0, 1.0]}, rtol=1e-8, backend=backend, executor="serial"
+    )
+    assert run.statistics.smallest_step < 1e-4
+    assert run.final["a"] == pytest.approx(2.083340149701255e-8, rel=1e-6)
+    assert many["a"][:, 0] == pytest.approx(2 * [run.final["a"]], rel=1e-12)
+
+
+def test_late_start_begins_with_a_step_that_time_can_resolve() -> None:
+    """A second after 1e9 s, where the last digit of t is a tenth of a microsecond."""
+    model = Model("late", x=(x,), ode=-x.symbol)
+    run = simulate(model, 1e9 + 1, t_start=1e9, rtol=1e-8)
+    assert run.final["x"] == pytest.approx(np.exp(-1), rel=1e-7)
