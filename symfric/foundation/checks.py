@@ -154,6 +154,20 @@ def count(
     return found
 
 
+def expression(where: str, value: object) -> Any:
+    """`value` as it is: an SX matrix, a DM matrix, a finite number or an array of them."""
+    if isinstance(value, ca.SX | ca.DM):
+        return value
+    if isinstance(value, ca.MX):
+        raise refused(where, "an SX expression", value, "models are written with casadi.SX")
+    if isinstance(value, np.ndarray) and value.dtype.kind in "iuf" and np.isfinite(value).all():
+        return value
+    found = as_number(value)
+    if found is None or not isfinite(found):
+        raise refused(where, "an SX expression or a finite number", value)
+    return value
+
+
 def flag(where: str, value: object) -> bool:
     """`value` as a bool: True or False, nothing that merely counts as one."""
     if isinstance(value, bool | np.bool_):
@@ -206,7 +220,7 @@ def named(where: str, value: object, known: Collection[str] | None = None) -> di
 
 def many(where: str, value: object, what: str) -> tuple[Any, ...]:
     """`value`, a sequence of `what`, as a tuple; a single text is not taken for its letters."""
-    if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
+    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
         raise refused(where, f"a sequence of {what}", value)
     return tuple(value)  # pyright: ignore[reportUnknownArgumentType, reportUnknownVariableType]
 
@@ -291,7 +305,11 @@ def check_names(where: str, given: Iterable[str], known: Collection[str], hint: 
 
     `hint` is what to do where none is close.
     """
-    unknown = [str(name) for name in given if name not in known]
+    listed = list(given)
+    odd = [name for name in listed if not isinstance(name, str)]  # pyright: ignore[reportUnnecessaryIsInstance]
+    if odd:
+        raise refused(where, _one_of(known), odd[0])
+    unknown = [name for name in listed if name not in known]
     if not unknown:
         return
     close = [get_close_matches(name, list(known), n=1, cutoff=0.4) for name in unknown]

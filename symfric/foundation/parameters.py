@@ -15,7 +15,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.checks import check_names
+from symfric.foundation import checks
+from symfric.foundation.checks import check_names as check_names
 from symfric.foundation.numeric import Scalar, is_casadi, is_number, is_symbolic
 
 ROLES = {
@@ -113,8 +114,21 @@ class Variable:
     symbol: ca.SX = field(default_factory=lambda: ca.SX(0, 0))
 
     def __post_init__(self) -> None:
-        if self.symbol.is_empty():
+        where = f"variable '{checks.text('variable: name', self.name)}'"
+        if not isinstance(self.unit, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise checks.refused(f"{where}: unit", "a text such as 'N', or ''", self.unit)
+        symbol = checks.kind(f"{where}: symbol", self.symbol, ca.SX, "an SX symbol")
+        if symbol.is_empty():
             object.__setattr__(self, "symbol", ca.SX.sym(self.name))
+        elif not (symbol.is_scalar() and symbol.is_symbolic()):
+            raise checks.refused(f"{where}: symbol", "one SX symbol", symbol)
+        if ca.SX(checks.expression(f"{where}: start", self.start)).numel() != 1:
+            raise checks.refused(f"{where}: start", "a number or one expression", self.start)
+        checks.number(f"{where}: nominal", self.nominal, above=0.0)
+        low, high = (checks.as_number(bound) for bound in (self.lower, self.upper))
+        if low is None or high is None or not low <= high:
+            shown = f"{checks.shown(self.lower)} and {checks.shown(self.upper)}"
+            raise ValueError(f"{where}: expected numbers lower <= upper, got {shown}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +248,11 @@ def parameters(obj: Parametric) -> dict[str, Parameter]:
 
     Names are the field names. Terms of a sum that share a name get `_1`, `_2`, ...; the two sides
     of an asymmetric law get `_pos` and `_neg`.
+
+    Raises:
+        ValueError: neither a law nor a scene.
     """
+    _check_parametric("parameters", obj)
     found: dict[str, Parameter] = {}
     children = [parameters(child) for _, _, child in _children(obj)]
     own = {item.name: item for item in fields(obj)}
@@ -290,8 +308,9 @@ def with_values(obj: P, values: Mapping[str, Scalar]) -> P:
         ValueError: a name that `obj` does not have (the closest ones are offered), or a value
             outside its bounds.
     """
+    _check_parametric("with_values", obj)
     names = _names(obj)
-    check_names(type(obj).__name__, values, names)
+    values = checks.named(type(obj).__name__, values, names)
     changes: dict[str, Any] = {}
     per_child: dict[int, dict[str, Scalar]] = {}
     for flat, value in values.items():
@@ -326,9 +345,7 @@ def symbolise(obj: P, *names: str) -> tuple[P, tuple[Variable, ...]]:
         ValueError: unknown or repeated name.
     """
     known = parameters(obj)
-    check_names(type(obj).__name__, names, known)
-    if len(set(names)) != len(names):
-        raise ValueError(f"symbolise: expected every name once, got {', '.join(names)}")
+    names = checks.names(type(obj).__name__, names, known)
     variables = tuple(
         Variable(
             name,
@@ -342,6 +359,10 @@ def symbolise(obj: P, *names: str) -> tuple[P, tuple[Variable, ...]]:
         for name in names
     )
     return with_values(obj, {v.name: v.symbol for v in variables}), variables
+
+
+def _check_parametric(where: str, obj: object) -> None:
+    checks.kind(where, obj, Parametric, "a law or a scene, such as LuGre()")
 
 
 def _magnitude(value: Scalar) -> float:

@@ -1,9 +1,9 @@
 """The one interface between those who write equations and those who solve them."""
 
 from symfric.model.holonomic import Holonomic as Holonomic
-from symfric.model.model import Event as Event
 from symfric.model.model import Model as Model
-from symfric.model.model import Monitor as Monitor
-from symfric.model.model import Output as Output
 from symfric.model.model import Variables as Variables
 from symfric.model.model import finite as finite
+from symfric.model.parts import Event as Event
+from symfric.model.parts import Monitor as Monitor
+from symfric.model.parts import Output as Output

@@ -15,58 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import Scalar, evaluate
+from symfric.foundation.numeric import evaluate
 from symfric.foundation.parameters import Variable, check_names
-from symfric.foundation.symbols import stacked, strays, symbols_of
+from symfric.foundation.symbols import stacked, symbols_of
 from symfric.model.holonomic import Holonomic
+from symfric.model.parts import Event, Monitor, Output
+from symfric.model.problems import GROUPS, equation_problems, kind_problems, naming_problems
 from symfric.model.sketch import Sketch
 
 Variables = tuple[Variable, ...]
-RESERVED = {"t", "ode", "alg", "residual", "signals"}
-"""Names that `Model.function` uses itself."""
-
-
-@dataclass(frozen=True, eq=False)
-class Output:
-    """A named result of a model: an expression in t, x, z, u, p, with its unit."""
-
-    expression: Scalar
-    unit: str
-    doc: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class Monitor:
-    """An expression in t, x, z, u, p whose relative error is controlled along with the states.
-
-    A sliding velocity is the difference of two velocities that may be a thousand times larger;
-    `nominal` is the scale on which the friction force changes with it.
-    """
-
-    expression: Scalar
-    nominal: float
-
-
-@dataclass(frozen=True, eq=False)
-class Event:
-    """Something that happens when an expression passes through zero.
-
-    A jump counts, of an input or by the reset of another event, if it leads beyond zero. Error
-    control does not look at the expression, and each step is looked at in quarters: one that
-    returns within a quarter of a step is not seen, unless the equations depend on it.
-
-    Attributes:
-        expression: in t, x, z, u, p.
-        direction: +1 only rising, -1 only falling, 0 both.
-        terminal: the simulation ends there.
-        reset: state -> its value after the event, in terms of the values before it.
-    """
-
-    name: str
-    expression: Scalar
-    direction: int = 0
-    terminal: bool = False
-    reset: Mapping[str, Scalar] = field(default_factory=dict[str, Scalar])
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +77,11 @@ class Model:
     sketch: Callable[[], Sketch] | None = None
 
     def __post_init__(self) -> None:
+        self._refuse(kind_problems(self))
+        for name in GROUPS:
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        for name in ("alg", "xdot", "residual"):
+            object.__setattr__(self, name, ca.SX(getattr(self, name)))
         if not self.x and self.residual.is_empty():  # algebraic equations alone are explicit
             object.__setattr__(self, "ode", ca.SX(0, 1))
         if self.holonomic is not None:
@@ -132,9 +94,11 @@ class Model:
                 object.__setattr__(
                     self, "residual", ca.vertcat(self.xdot - ca.vec(self.ode), self.alg)
                 )
-        problems = self._problems()
+        self._refuse([*naming_problems(self), *equation_problems(self, self._symbols())])
+
+    def _refuse(self, problems: list[str]) -> None:
         if problems:
-            raise ValueError(f"model '{self.name}': " + "; ".join(problems))
+            raise ValueError(f"model {self.name!r}: " + "; ".join(problems))
 
     def _take(self, mechanics: Holonomic) -> None:
         """Make `ode` and `alg` of the equations of a mechanism."""
@@ -148,58 +112,6 @@ class Model:
                     "equations it is made, got others; change `holonomic.implicit`"
                 )
             object.__setattr__(self, name, made)
-
-    def _problems(self) -> list[str]:
-        problems = self._naming_problems()
-        nx, nz = len(self.x), len(self.z)
-        if self.ode is not None and self.ode.numel() != nx:
-            problems.append(f"ode: expected {nx} rows (one a state), got {self.ode.numel()}")
-        elif self.ode is not None and self.alg.numel() != nz:
-            problems.append(f"alg: expected {nz} rows, got {self.alg.numel()}")
-        elif self.residual.numel() != nx + nz:
-            problems.append(f"residual: expected {nx + nz} rows, got {self.residual.numel()}")
-        equations = self.residual if self.ode is None else ca.veccat(self.ode, self.alg)
-        expressions = [equations, *(ca.SX(o.expression) for o in self.outputs.values())]
-        expressions += [ca.SX(m.expression) for m in self.monitors]
-        for event in self.events:
-            expressions += map(ca.SX, (event.expression, *event.reset.values()))
-        stray = strays(ca.veccat(*expressions), self._symbols())
-        if stray:
-            problems.append(
-                f"expected only declared symbols, got {', '.join(stray)}; "
-                "declare them as x, z, u or p"
-            )
-        return problems
-
-    def _naming_problems(self) -> list[str]:
-        problems: list[str] = []
-        names = [v.name for group in (self.x, self.z, self.u, self.p) for v in group]
-        names += list(self.outputs)
-        repeated = sorted({n for n in names if names.count(n) > 1} | (RESERVED & set(names)))
-        if repeated:
-            problems.append(
-                f"expected every name once and none of {', '.join(sorted(RESERVED))}, "
-                f"got {', '.join(repeated)}"
-            )
-        odd = [n for n in names if not (n.isascii() and n.isidentifier())]
-        if odd:
-            problems.append(f"expected names that are C identifiers, got {', '.join(odd)}")
-        states = [v.name for v in self.x]
-        for event in self.events:
-            missing = [n for n in event.reset if n not in states]
-            if missing:
-                problems.append(
-                    f"event '{event.name}': expected resets of {', '.join(states)}, "
-                    f"got {', '.join(missing)}"
-                )
-            if event.direction not in (-1, 0, 1):
-                problems.append(
-                    f"event '{event.name}': expected direction -1, 0 or 1, got {event.direction}"
-                )
-        long = [n for n, output in self.outputs.items() if ca.SX(output.expression).numel() != 1]
-        if long:
-            problems.append(f"outputs: expected scalar expressions, got {', '.join(long)}")
-        return problems
 
     def _symbols(self) -> ca.SX:
         return ca.vertcat(self.t, self.xdot, *(self.vector(letter) for letter in "xzup"))

@@ -9,6 +9,7 @@ from typing import ClassVar, final
 import casadi as ca
 import numpy as np
 
+from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, is_number
 from symfric.foundation.parameters import Parametric, Variable, parameters, symbolise
 from symfric.foundation.symbols import at_start, symbols_of
@@ -62,7 +63,7 @@ class Scene(Parametric, ABC):
 
         All others are constants of the equations, so terms they switch off vanish.
         """
-        scene, p = symbolise(self, *free)
+        scene, p = symbolise(self, *checks.names(f"{type(self).__name__}: free", free))
         return scene.equations(p)
 
 

@@ -59,7 +59,7 @@ def test_only_a_stateless_block_with_one_output_is_a_function():
         ({"resets": {"init_b": (ca.SX(2, 1), "")}}, "init_b: expected 1 rows"),
         ({"outputs": {"y": Output(ca.SX.sym("q"), "1")}}, "only declared symbols.*q"),
         ({"states": (), "next": ca.SX(0, 1), "outputs": {}}, "expected states or outputs"),
-        ({"parameters": (Variable("h", "s", start=float("nan"), symbol=p.symbol),)}, "finite"),
+        ({"parameters": (Variable("h", "s", start=2 * u.symbol, symbol=p.symbol),)}, "finite"),
     ],
 )
 def test_bad_blocks_are_refused(changes, message):

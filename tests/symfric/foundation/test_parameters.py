@@ -152,7 +152,7 @@ def test_symbolise_nothing_changes_nothing() -> None:
     ("names", "message"),
     [
         (["softt"], "Spring: expected one of soft, hard, got softt; did you mean soft"),
-        (["soft", "soft"], "symbolise: expected every name once, got soft, soft"),
+        (["soft", "soft"], "Spring: expected every name once, got soft, soft"),
     ],
 )
 def test_symbolise_refuses_unknown_and_repeated_names(names: list[str], message: str) -> None:

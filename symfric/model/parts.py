@@ -1,0 +1,67 @@
+"""What a model holds beside its equations: results, what error control watches, events."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from symfric.foundation import checks
+from symfric.foundation.numeric import Scalar
+
+
+@dataclass(frozen=True, eq=False)
+class Output:
+    """A named result of a model: an expression in t, x, z, u, p, with its unit."""
+
+    expression: Scalar
+    unit: str
+    doc: str = ""
+
+    def __post_init__(self) -> None:
+        checks.expression("Output", self.expression)
+        if not isinstance(self.unit, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise checks.refused("Output: unit", "a text such as 'N'", self.unit)
+
+
+@dataclass(frozen=True, eq=False)
+class Monitor:
+    """An expression in t, x, z, u, p whose relative error is controlled along with the states.
+
+    A sliding velocity is the difference of two velocities that may be a thousand times larger;
+    `nominal` is the scale on which the friction force changes with it.
+    """
+
+    expression: Scalar
+    nominal: float
+
+    def __post_init__(self) -> None:
+        checks.expression("Monitor", self.expression)
+        checks.number("Monitor: nominal", self.nominal, above=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """Something that happens when an expression passes through zero.
+
+    A jump counts, of an input or by the reset of another event, if it leads beyond zero. Error
+    control does not look at the expression, and each step is looked at in quarters: one that
+    returns within a quarter of a step is not seen, unless the equations depend on it.
+
+    Attributes:
+        expression: in t, x, z, u, p.
+        direction: +1 only rising, -1 only falling, 0 both.
+        terminal: the simulation ends there.
+        reset: state -> its value after the event, in terms of the values before it.
+    """
+
+    name: str
+    expression: Scalar
+    direction: int = 0
+    terminal: bool = False
+    reset: Mapping[str, Scalar] = field(default_factory=dict[str, Scalar])
+
+    def __post_init__(self) -> None:
+        where = f"event '{checks.text('Event: name', self.name)}'"
+        checks.expression(where, self.expression)
+        checks.count(f"{where}: direction", self.direction, least=-1, most=1)
+        checks.flag(f"{where}: terminal", self.terminal)
+        for name, value in checks.named(f"{where}: reset", self.reset).items():
+            checks.expression(f"{where}: reset of {name}", value)
