@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar, final
 
-from symfric.foundation.numeric import Scalar, atan, cos, sin, sqrt
+from symfric.foundation.numeric import Scalar, atan, cos, equals, sin
 from symfric.foundation.parameters import param
 from symfric.multibody import JointFriction, Mechanism, PointOnLine, Revolute
-from symfric.scenes.mechanism import MechanismScene
+from symfric.scenes.mechanism import MechanismScene, reach
 from symfric.scenes.pendulum import HINGE
 
 
@@ -47,9 +47,14 @@ class FourBar(MechanismScene):
         theta = self.angle
         x, z = self.base - self.crank * cos(theta), -self.crank * sin(theta)
         square = x * x + z * z
+        if equals(square, 0.0):
+            raise ValueError("FourBar: expected a crank whose end is not on the far hinge")
         # the pin lies above the line from the crank's end to the far hinge
         along = (square + self.coupler * self.coupler - self.rocker * self.rocker) / (2 * square)
-        across = sqrt(self.coupler * self.coupler / square - along * along)
+        across = reach(
+            "FourBar", self.coupler * self.coupler / square - along * along,
+            "coupler and rocker that meet, not in line,",
+        )  # fmt: skip
         px, pz = along * x - across * z, along * z + across * x
         beta = 2 * atan(pz / (px + self.coupler))
         qx, qz = px - x, pz - z

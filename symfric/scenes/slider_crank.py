@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from symfric.foundation.numeric import Scalar, sqrt
+from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import param
 from symfric.multibody import Distance, JointFriction, Mechanism, Prismatic, Revolute
-from symfric.scenes.mechanism import MechanismScene
+from symfric.scenes.mechanism import MechanismScene, reach
 
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
@@ -60,10 +60,11 @@ class SliderCrank(MechanismScene):
         m.frame("block.guide", z=X, x=Z)
         m.frame("block.pin", at=(0.0, 0.0, self.e))
         rise = self.c + self.r - self.e
-        reach = sqrt(self.l * self.l - self.b * self.b - rise * rise)
-        speed = self.b * self.r * self.omega / reach
+        square = self.l * self.l - self.b * self.b - rise * rise
+        start = reach("SliderCrank", square, "l^2 > b^2 + (c + r - e)^2")
+        speed = self.b * self.r * self.omega / start
         bearing = JointFriction(self.law, radius=self.R, length=self.a)
         m.joint(Revolute("crank", "ground.bearing", "wheel.bearing", 0.0, self.omega, bearing))
-        m.joint(Prismatic("slider", "ground.guide", "block.guide", reach, speed))
+        m.joint(Prismatic("slider", "ground.guide", "block.guide", start, speed))
         m.joint(Distance("rod", "wheel.pin", "block.pin", length=self.l))
         return m

@@ -203,6 +203,17 @@ def test_four_bar_closes_as_freudenstein_says() -> None:
     assert (np.diff(run["energy"]) < 1e-9).all()
 
 
+def test_links_that_do_not_reach_are_refused_in_a_sentence() -> None:
+    """They gave NaN starts, and NumPy's warning before."""
+    for scene, message in (
+        (FourBar(SMOOTH, crank=2.0), "FourBar: expected coupler and rocker that meet"),
+        (FourBar(SMOOTH, crank=0.4, base=0.4, angle=0.0), "FourBar: expected a crank whose end"),
+        (SliderCrank(SMOOTH, l=0.1), r"SliderCrank: expected l\^2 > b\^2"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            scene.model()
+
+
 def test_four_bar_without_friction_keeps_its_energy() -> None:
     run = simulate(FourBar(SMOOTH).model(), 3.0, rtol=1e-10)
     assert np.ptp(run["energy"]) < 1e-6 * run["kinetic"].max()
