@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from symfric.bench.counts import integrator
 from symfric.bench.timing import best_time
 from symfric.foundation.numeric import flat_view
-from symfric.integrator.equations.initial import consistent
+from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.layout import Given, State
 from symfric.laws import Law
@@ -96,11 +96,7 @@ def exponent(rows: Sequence[ChainRow], column: str, smallest: int = 8) -> float:
 def step_time(made: Integrator) -> float:
     """Time [s] of an attempt from the start, in the virtual machine."""
     whole, model = made.system, made.model
-    y = np.zeros(whole.n)
-    y[: whole.nx] = model.initial_state()
-    guesses = {v.name: float(v.start) for v in model.z}
-    for i, name in enumerate(whole.names):
-        y[i] = guesses.get(name, y[i])
+    y = first_guess(whole, model, model.initial_state())
     d = np.zeros(whole.d.numel())
     y = consistent(whole, "bench", y, d)
     S = State.at(0.0, 1e-4, y)

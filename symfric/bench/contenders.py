@@ -22,7 +22,12 @@ from numpy.typing import NDArray
 
 from symfric.integrator.arguments import chosen
 from symfric.integrator.compiled.compiler import FLAGS, find_compiler
-from symfric.integrator.equations.initial import consistent, first_step, smallest_step
+from symfric.integrator.equations.initial import (
+    consistent,
+    first_guess,
+    first_step,
+    smallest_step,
+)
 from symfric.integrator.equations.inputs import Drivers, drivers
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.peers.casadi_integrators import peer
@@ -116,16 +121,14 @@ def rosenbrock(
     return Contender(solve, seconds)
 
 
-def idas(
-    model: Model, times: Array, watched: tuple[str, ...], rtol: float, backend: str
-) -> Contender:
+def idas(model: Model, times: Array, watched: tuple[str, ...], rtol: float, name: str) -> Contender:
     """SUNDIALS' idas, which cannot be compiled: "sundials" for index 1, "ggl" for index 2.
 
     Raises:
         RuntimeError: it fails.
     """
     whole, inputs, y0 = _start(model, times)
-    problem = peer(whole, inputs, np.zeros(0), _tolerances(whole, rtol), backend)
+    problem = peer(whole, inputs, np.zeros(0), _tolerances(whole, rtol), name)
     y0 = np.concatenate([y0, np.zeros(problem.system.n - whole.n)])
     solver, data = problem.over(np.concatenate([[0.0], times]), y0)
     columns = problem.system.algebraic[1]
@@ -148,11 +151,7 @@ def _start(model: Model, times: Array) -> tuple[System, Drivers, Array]:
     """System, inputs and consistent start of a model without parameters and inputs."""
     inputs = drivers(model, None, 0.0, float(times[-1]))
     whole = system(model, inputs)
-    y = np.zeros(whole.n)
-    y[: whole.nx] = model.initial_state()
-    guesses = {v.name: float(v.start) for v in model.z}
-    for i, name in enumerate(whole.names):
-        y[i] = guesses.get(name, y[i])
+    y = first_guess(whole, model, model.initial_state())
     return whole, inputs, consistent(whole, "bench", y, np.zeros(whole.d.numel()))
 
 
@@ -164,10 +163,10 @@ MAKERS: dict[str, tuple[str, Callable[..., Contender]]] = {
     "rosenbrock absolute ode": ("absolute", partial(rosenbrock, explicit=True)),
     "rosenbrock joint": ("joint", partial(rosenbrock, explicit=False)),
     "rosenbrock joint ode": ("joint", partial(rosenbrock, explicit=True)),
-    "idas GGL absolute": ("absolute", partial(idas, backend="ggl")),
-    "idas GGL joint": ("joint", partial(idas, backend="ggl")),
-    "idas absolute": ("absolute", partial(idas, backend="sundials")),
-    "idas joint": ("joint", partial(idas, backend="sundials")),
+    "idas GGL absolute": ("absolute", partial(idas, name="ggl")),
+    "idas GGL joint": ("joint", partial(idas, name="ggl")),
+    "idas absolute": ("absolute", partial(idas, name="sundials")),
+    "idas joint": ("joint", partial(idas, name="sundials")),
 }
 """Name -> formulation, and how a solver is made of its model; "ode": accelerations eliminated."""
 

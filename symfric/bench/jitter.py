@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from symfric.figures import FigureData
 from symfric.figures.data import Curve
 from symfric.integrator.equations.blocks import refinement
-from symfric.integrator.equations.initial import consistent
+from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import drivers
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.tableaux import METHODS
@@ -131,11 +131,7 @@ class _Runs:
         self.model, self.t_end = replace(model, outputs=outputs), t_end
         self.times = np.linspace(0.0, t_end, round(t_end * 1e3) + 1)
         self.whole = system(model, drivers(model, None, 0.0, t_end))
-        y = np.zeros(self.whole.n)
-        y[: self.whole.nx] = model.initial_state()
-        guesses = {v.name: float(v.start) for v in model.z}
-        for i, name in enumerate(self.whole.names):
-            y[i] = guesses.get(name, y[i])
+        y = first_guess(self.whole, model, model.initial_state())
         self.y0 = consistent(self.whole, "jitter", y, np.zeros(0))
 
     def adaptive(self, rtol: float) -> tuple[float, ...]:

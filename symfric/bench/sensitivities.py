@@ -128,8 +128,8 @@ def _of_peer(model: Model, plugin: str) -> tuple[Call, Call, Call]:
     inputs = drivers(model, None, 0.0, T_END)
     whole = system(model, inputs)
     tolerances = Tolerances(RTOL, 0.1 * RTOL * whole.nominal, 0.0, 10_000_000)
-    backend = "rosenbrock" if plugin == "rosenbrock" else "sundials"
-    problem = peer(whole, inputs, model.values("p"), tolerances, backend)
+    name = "rosenbrock" if plugin == "rosenbrock" else "sundials"
+    problem = peer(whole, inputs, model.values("p"), tolerances, name)
     solver = ca.integrator("solver", plugin, problem.dae, 0.0, T_END, problem.options)
     p, seed = ca.MX.sym("p", len(model.p)), ca.DM.eye(len(model.p))
     x0 = model.initial_state({"v": V}) / whole.nominal

@@ -20,7 +20,7 @@ from symfric.cli.options import (
     numbers,
 )
 from symfric.foundation.parameters import check_names
-from symfric.integrator import Input
+from symfric.integrator import Input, simulate_by_peer
 from symfric.integrator.equations.inputs import Sampled
 from symfric.multibody.urdf.read import relative
 from symfric.results.kinds import is_mechanism, kinds, norms
@@ -64,10 +64,14 @@ def run(
     ] = "auto",
     backend: Annotated[
         str,
-        typer.Option(
-            "--backend", help="auto, vm, compiled, or CasADi's rosenbrock, sundials, ggl."
-        ),
+        typer.Option("--backend", help="Engine: auto, vm, compiled."),
     ] = "auto",
+    peer: Annotated[
+        str | None,
+        typer.Option(
+            "--peer", help="One of CasADi's integrators for comparison: sundials, rosenbrock, ggl."
+        ),
+    ] = None,
     samples: Annotated[
         int, typer.Option("--samples", help="Number of equally spaced times of the result.")
     ] = 2001,
@@ -92,6 +96,8 @@ def run(
     Example: symfric run arm.urdf --law lugre --x0 elbow=0.3 --input tau_elbow=2 --out arm.csv
     """
     kind_of(scene)
+    if peer is not None and (method, backend) != ("auto", "auto"):
+        raise ValueError("--peer: expected no --method and no --backend, which are of symfric")
     if len(law) > 1 and (out or json or movie):
         raise ValueError(
             f"--out, --json and --animate: expected one --law, got {len(law)}; compare several "
@@ -105,20 +111,14 @@ def run(
     until = _default_t_end(machine, signals) if t_end is None else t_end
     start = numbers("--x0", x0)
     found: dict[str, Trajectory] = {}
+    common: Any = {"x0": start, "u": signals, "rtol": rtol, "samples": samples, "throw": False}
     for name, machine in machines.items():
         with output.progress(f"{scene} with {name}") as tell:
-            found[name] = simulate(
-                machine.model(),
-                until,
-                x0=start,
-                u=signals,
-                rtol=rtol,
-                method=method,
-                backend=backend,
-                samples=samples,
-                progress=tell,
-                throw=False,
-            )
+            if peer is None:
+                how: Any = {"method": method, "backend": backend, "progress": tell}
+                found[name] = simulate(machine.model(), until, **common, **how)
+            else:
+                found[name] = simulate_by_peer(machine.model(), until, peer, **common)
     if out:
         next(iter(found.values())).to_csv(out)
     if plot:

@@ -130,6 +130,10 @@ class Variable:
             shown = f"{checks.shown(self.lower)} and {checks.shown(self.upper)}"
             raise ValueError(f"{where}: expected numbers lower <= upper, got {shown}")
 
+    def within(self, where: str, value: object) -> float:
+        """`value` as a finite number inside the bounds."""
+        return checks.number(where, value, unit=self.unit, lower=self.lower, upper=self.upper)
+
 
 @dataclass(frozen=True, eq=False)
 class Parametric:

@@ -1,5 +1,6 @@
 """Integration of a `Model` over time. Knows nothing of laws or mechanisms."""
 
+from symfric.integrator.by_peer import simulate_by_peer as simulate_by_peer
 from symfric.integrator.ensemble import Ensemble as Ensemble
 from symfric.integrator.ensemble import simulate_many as simulate_many
 from symfric.integrator.equations.inputs import Hold as Hold

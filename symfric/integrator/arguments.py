@@ -8,11 +8,16 @@ from numpy.typing import ArrayLike, NDArray
 from symfric.foundation import checks
 from symfric.integrator.methods.method import Method
 from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS
+from symfric.integrator.running.run import Tolerances
 from symfric.model import Model
 
 Array = NDArray[np.float64]
 LOOSE = 1e-5
 """Above this relative tolerance whole stick phases may be lost without a sign of it."""
+BACKENDS = ("auto", "vm", "compiled")
+"""Engines: CasADi's virtual machine, the step as machine code, and whichever is faster."""
+MOST_SAMPLES = 10**8
+"""Beyond these the times alone need gigabytes."""
 
 
 def check_model(where: str, model: object) -> None:
@@ -54,6 +59,48 @@ def check_span(where: str, t_start: float, t_end: float, rtol: float) -> tuple[f
 def check_times(where: str, t_start: float, t_end: float, t_eval: ArrayLike) -> Array:
     """`t_eval` as an array of increasing times inside the span."""
     return checks.times(f"{where}: t_eval", t_eval, t_start, t_end)
+
+
+def result_times(
+    where: str, t_start: float, t_end: float, t_eval: ArrayLike | None, samples: int
+) -> Array:
+    """Times of the result [s]: `t_eval`, or `samples` equally spaced ones."""
+    samples = checks.count(f"{where}: samples", samples, least=2, most=MOST_SAMPLES)
+    if t_eval is None:
+        return np.linspace(t_start, t_end, samples)
+    return check_times(where, t_start, t_end, t_eval)
+
+
+def check_flags(where: str, progress: object = None, **flags: object) -> None:
+    """Refuse what is no truth value, and a `progress` that cannot be called."""
+    for name, value in flags.items():
+        checks.flag(f"{where}: {name}", value)
+    if progress is not None:
+        checks.function(f"{where}: progress", progress, "a function of the fraction done")
+
+
+def tolerances(
+    where: str,
+    rtol: float,
+    atol: float | None,
+    nominal: Array,
+    event_tolerance: float,
+    max_steps: int,
+) -> Tolerances:
+    """What a run has to meet.
+
+    Args:
+        where: for messages.
+        rtol: relative tolerance.
+        atol: in multiples of `nominal`; 0.1 rtol by default.
+        nominal: typical magnitude of each state.
+        event_tolerance: tolerance of event times [s].
+        max_steps: attempts allowed.
+    """
+    relative = 0.1 * rtol if atol is None else checks.number(f"{where}: atol", atol, above=0.0)
+    event = checks.number(f"{where}: event_tolerance", event_tolerance, unit="s", above=0.0)
+    max_steps = checks.count(f"{where}: max_steps", max_steps)
+    return Tolerances(rtol, relative * nominal, event, max_steps)
 
 
 def chosen(where: str, name: str, rtol: float) -> Method:

@@ -20,10 +20,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.checks import check_names
 from symfric.foundation.status import Status
-from symfric.integrator.arguments import check_model, check_span, check_times, chosen
-from symfric.integrator.equations.initial import first_step
+from symfric.integrator.arguments import (
+    BACKENDS,
+    check_flags,
+    check_model,
+    check_span,
+    check_times,
+    chosen,
+    tolerances,
+)
+from symfric.integrator.equations.initial import first_guess, first_step
 from symfric.integrator.equations.inputs import Drivers, Input, drivers
 from symfric.integrator.many.chunk import Chunk, Job, Solved, digest, solve_chunk
 from symfric.integrator.many.one_by_one import solve_one_by_one
@@ -35,7 +42,6 @@ from symfric.model import Model
 
 Array = NDArray[np.float64]
 EXECUTORS = ("serial", "threads", "processes")
-BACKENDS = ("auto", "vm", "compiled")
 
 
 @final
@@ -67,7 +73,7 @@ class Ensemble:
     status: Status
 
     def __getitem__(self, name: str) -> Array:
-        check_names(f"ensemble of '{self.scene}'", [name], self.signals)
+        checks.check_names(f"ensemble of '{self.scene}'", [name], self.signals)
         return self.signals[name]
 
 
@@ -126,26 +132,27 @@ def simulate_many(
         UserWarning: rtol above 1e-5, where stick phases may get lost.
     """
     check_model("simulate_many", model)
+    check_flags("simulate_many", progress)
     t_start, t_end, rtol = check_span("simulate_many", t_start, t_end, rtol)
     formula = chosen("simulate_many", method, rtol)
-    workers, chunk = _check(model, backend, executor, workers, chunk, progress)
-    max_steps = checks.count("simulate_many: max_steps", max_steps)
+    _check(model, backend, executor)
+    workers = None if workers is None else checks.count("simulate_many: workers", workers)
+    chunk = checks.count("simulate_many: chunk", chunk)
     times = check_times("simulate_many", t_start, t_end, [t_end] if t_eval is None else t_eval)
     x0_of, p_of, members = _members(model, x0, p)
     inputs = drivers(model, u, t_start, t_end)
     integrator = Integrator(model, inputs, formula)
-    tolerances = Tolerances(
-        rtol, 0.1 * rtol * integrator.system.nominal, event_tolerance, max_steps
-    )
+    nominal = integrator.system.nominal
+    allowed = tolerances("simulate_many", rtol, None, nominal, event_tolerance, max_steps)
     starts = partial(_starts, integrator, t_start, x0_of, p_of)
     integrator = _suited(integrator, inputs, starts, members)
     job = Job.of(integrator, inputs, times, backend, max_steps)
     if model.events:
-        solve = partial(solve_one_by_one, integrator, inputs, tolerances, backend, times)
+        solve = partial(solve_one_by_one, integrator, inputs, allowed, backend, times)
         prepare = starts
     else:
         solve = partial(solve_chunk, job)
-        prepare = partial(_chunk, inputs, tolerances, starts)
+        prepare = partial(_chunk, inputs, allowed, starts)
         if isinstance(executor, str):
             job.load()  # or every worker would compile it
     firsts = range(0, members, chunk)
@@ -153,7 +160,7 @@ def simulate_many(
     folder = None
     if out is not None:
         place = checks.path("simulate_many: out", out)
-        folder = place / _identity(job, integrator, tolerances, starts, picks)
+        folder = place / _identity(job, integrator, allowed, starts, picks)
     store = Store(folder, model.signals, members, times.size)
     todo = {first: pick for first, pick in picks.items() if not store.has(first)}
     done, status = members - sum(_size(pick) for pick in todo.values()), Status.SUCCESS
@@ -185,27 +192,18 @@ def _size(pick: slice) -> int:
     return pick.stop - pick.start
 
 
-def _check(
-    model: Model,
-    backend: str,
-    executor: str | Executor,
-    workers: int | None,
-    chunk: int,
-    progress: object,
-) -> tuple[int | None, int]:
-    """Workers and members per task, as whole numbers."""
+def _check(model: Model, backend: str, executor: object) -> None:
     checks.choice("simulate_many: backend", backend, BACKENDS)
+    if not isinstance(executor, str | Executor):
+        what = f"one of {', '.join(EXECUTORS)} or a concurrent.futures.Executor"
+        raise checks.refused("simulate_many: executor", what, executor)
     if isinstance(executor, str):
-        check_names("simulate_many: executor", [executor], EXECUTORS)
+        checks.choice("simulate_many: executor", executor, EXECUTORS)
     if model.events and executor not in ("serial", "threads"):
         raise ValueError(
             f"simulate_many: executor: expected serial or threads for a model with events "
             f"('{model.name}' has {len(model.events)}), got {executor}"
         )
-    if progress is not None:
-        checks.function("simulate_many: progress", progress, "a function of the fraction done")
-    workers = None if workers is None else checks.count("simulate_many: workers", workers)
-    return workers, checks.count("simulate_many: chunk", chunk)
 
 
 Values = dict[str, Array]
@@ -228,6 +226,9 @@ def _members(
     members = next(iter(lengths.values()), 1)
     if members < 1:
         raise ValueError(f"{where}: expected at least one member, got empty arrays")
+    for v in model.p:
+        for end in (np.min, np.max) if v.name in p else ():
+            v.within(f"{where}: p.{v.name}", float(end(arrays[f"p.{v.name}"])))
     every = {name: np.broadcast_to(value, (members,)) for name, value in arrays.items()}
     return (
         {name: every[f"x0.{name}"] for name in x0},
@@ -246,14 +247,7 @@ def _starts(
         {name: v[pick] for name, v in p.items()},
         _size(pick),
     )
-    guesses = {v.name: float(v.start) for v in model.z}
-    y = np.zeros((_size(pick), system.n))
-    y[:, : system.nx] = x
-    for i, name in enumerate(system.names[system.nx :], start=system.nx):
-        y[:, i] = guesses.get(name, 0.0)
-    if system.timed:
-        y[:, -1] = t_start
-    return y, values
+    return first_guess(system, model, x, t_start), values
 
 
 def _suited(

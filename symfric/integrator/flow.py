@@ -5,6 +5,7 @@ import numpy as np
 
 from symfric.foundation import checks
 from symfric.integrator.arguments import check_model
+from symfric.integrator.equations.initial import first_guess
 from symfric.integrator.equations.inputs import Drivers
 from symfric.integrator.equations.manifold import Manifold
 from symfric.integrator.equations.system import System, system
@@ -63,7 +64,6 @@ def _start(model: Model, whole: System, x0: ca.MX, data: ca.MX) -> ca.MX:
         on = _on_constraints(whole, whole.manifold)(ca.vertcat(*unknowns), data)
         unknowns = [on[i] for i in range(whole.n)]
     if columns:
-        guesses = {v.name: float(v.start) for v in model.z}
         known = [i for i in range(whole.n) if i not in columns]
         problem = {
             "x": whole.y[columns],
@@ -71,7 +71,7 @@ def _start(model: Model, whole: System, x0: ca.MX, data: ca.MX) -> ca.MX:
             "g": whole.f[rows],
         }
         newton = ca.rootfinder("consistent", "newton", problem, {"error_on_fail": True})
-        guess = ca.DM([guesses.get(whole.names[i], 0.0) for i in columns])
+        guess = first_guess(whole, model, np.zeros(whole.nx))[columns]
         found = newton(guess, ca.vertcat(*(unknowns[i] for i in known), data))
         for row, i in enumerate(columns):
             unknowns[i] = found[row]

@@ -6,7 +6,7 @@ variables z, inputs u, parameters p.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
@@ -116,6 +116,15 @@ class Model:
     def _symbols(self) -> ca.SX:
         return ca.vertcat(self.t, self.xdot, *(self.vector(letter) for letter in "xzup"))
 
+    @cached_property
+    def memory(self) -> dict[str, Any]:
+        """What solvers keep of this model for the next call; it dies with the model."""
+        return {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields; a copy remembers nothing."""
+        return {item.name: getattr(self, item.name) for item in fields(self)}
+
     def vector(self, letter: str) -> ca.SX:
         """The symbols of the group "x", "z", "u" or "p" as a column (n, 1)."""
         return self._vectors[letter]
@@ -197,7 +206,11 @@ class Model:
     def values(self, letter: str, given: Mapping[str, float] | None = None) -> NDArray[np.float64]:
         """Numbers of the group "u" or "p": start values, replaced by those `given` by name."""
         group: Variables = getattr(self, letter)
-        numbers = {v.name: v.start for v in group} | self.named(letter, given)
+        values = self.named(letter, given)
+        for v in self.p if letter == "p" else ():
+            if v.name in values:
+                v.within(f"{self.name}.{v.name}", values[v.name])
+        numbers = {v.name: v.start for v in group} | values
         return np.array([finite(f"{self.name}.{name}", x) for name, x in numbers.items()], float)
 
     def named(self, what: str, given: Mapping[str, Any] | None) -> dict[str, Any]:

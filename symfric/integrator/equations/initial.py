@@ -7,11 +7,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.checks import listed
+from symfric.foundation.checks import listed, number
 from symfric.foundation.numeric import evaluate, evaluate_all
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.manifold import Manifold, jammed
 from symfric.integrator.equations.system import System
+from symfric.model import Model
 
 Array = NDArray[np.float64]
 ITERATIONS = 50
@@ -44,6 +45,25 @@ class Equations:
     algebraic: tuple[list[int], list[int]]
     constraints: ca.Function
     manifold: Manifold | None = None
+
+
+def first_guess(system: System, model: Model, x: Array, t: float = 0.0) -> Array:
+    """Unknowns from which consistent ones are sought, shape (..., n).
+
+    Args:
+        system: the equations of `model`.
+        model: whose algebraic variables say where they start; all others start at zero.
+        x: states, shape (..., nx).
+        t: time [s].
+    """
+    y = np.zeros((*x.shape[:-1], system.n))
+    y[..., : system.nx] = x
+    starts = {v.name: number(f"model '{model.name}' {v.name}", v.start) for v in model.z}
+    for i, name in enumerate(system.names[system.nx :], start=system.nx):
+        y[..., i] = starts.get(name, 0.0)
+    if system.timed:
+        y[..., -1] = t
+    return y
 
 
 def consistent(system: System | Equations, where: str, y: Array, d: Array) -> Array:

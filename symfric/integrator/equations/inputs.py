@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from hashlib import sha256
 from typing import Any, final
 
 import casadi as ca
@@ -9,8 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
+from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import stacked, strays
 from symfric.model import Model
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +25,8 @@ class Sampled:
         t: increasing sample times [s], shape (n,).
         values: samples, shape (n,).
 
-    Before the first and after the last sample the end value holds.
+    Both are copied, and the copies cannot be written: what was checked stays as it is. Before the
+    first and after the last sample the end value holds.
     """
 
     t: ArrayLike
@@ -36,10 +41,11 @@ class Sampled:
                 f"{where}: expected a value for every time, got {t.size} times "
                 f"and {values.size} values"
             )
-        object.__setattr__(self, "t", t)
-        object.__setattr__(self, "values", values)
+        for name, samples in (("t", t.copy()), ("values", values.copy())):
+            samples.flags.writeable = False
+            object.__setattr__(self, name, samples)
 
-    def coefficients(self, breaks: NDArray[np.float64]) -> NDArray[np.float64]:
+    def coefficients(self, breaks: Array) -> Array:
         """Value and slope at the start of each interval between `breaks`, shape (2, n - 1)."""
         raise NotImplementedError
 
@@ -49,7 +55,7 @@ class Sampled:
 class Hold(Sampled):
     """Zero-order hold: `values[k]` from t[k] until t[k+1], as a digital controller puts it out."""
 
-    def coefficients(self, breaks: NDArray[np.float64]) -> NDArray[np.float64]:
+    def coefficients(self, breaks: Array) -> Array:
         """Value at the start of each interval; slope 0."""
         t, values = np.asarray(self.t), np.asarray(self.values)
         middle = (breaks[:-1] + breaks[1:]) / 2
@@ -62,7 +68,7 @@ class Hold(Sampled):
 class Linear(Sampled):
     """Linear interpolation between the samples, as for a measured signal."""
 
-    def coefficients(self, breaks: NDArray[np.float64]) -> NDArray[np.float64]:
+    def coefficients(self, breaks: Array) -> Array:
         """Value and slope at the start of each interval."""
         ends = np.interp(breaks, np.asarray(self.t), np.asarray(self.values))
         return np.vstack([ends[:-1], np.diff(ends) / np.diff(breaks)])
@@ -88,11 +94,11 @@ class Drivers:
 
     expression: ca.SX
     data: ca.SX
-    breaks: NDArray[np.float64]
-    values: NDArray[np.float64]
-    key: tuple[object, ...]
+    breaks: Array
+    values: Array
+    key: tuple[str, ...]
 
-    def interval(self, times: NDArray[np.float64]) -> NDArray[np.intp]:
+    def interval(self, times: Array) -> NDArray[np.intp]:
         """Number of the interval that holds each time; at a break the later one."""
         return np.searchsorted(self.breaks[1:-1], times, side="right")
 
@@ -109,50 +115,62 @@ def drivers(
     """
     if not model.u and not given:
         return _undriven(t_start, t_end)
-    given = model.named("u", given)
-    sampled = {name: s for name, s in given.items() if isinstance(s, Sampled)}
-    inner = np.concatenate([np.asarray(s.t) for s in sampled.values()] or [np.zeros(0)])
+    signals = model.named("u", given)
+    times = [np.asarray(s.t) for s in signals.values() if isinstance(s, Sampled)]
+    inner = np.concatenate([np.zeros(0), *times])
     inner = inner[(inner > t_start) & (inner < t_end)]
     breaks = np.unique(np.concatenate([[t_start], inner, [t_end]]))
-    rows: list[ca.SX] = []
-    symbols: list[ca.SX] = []
-    values: list[NDArray[np.float64]] = []
-    start = ca.SX.sym("t_k")
-    key: list[object] = []
-    for variable in model.u:
-        signal = given.get(variable.name, variable.start)
-        if not callable(signal) and not isinstance(signal, Sampled):
-            # a number is data too: another value must not mean another integrator
-            number = checks.number(f"input '{variable.name}'", signal, hint=KINDS)
-            signal = Hold([t_start], [number])
-        if isinstance(signal, Sampled):
-            c, slope = ca.SX.sym(f"{variable.name}_k"), ca.SX.sym(f"{variable.name}_dot")
-            value, rise = signal.coefficients(breaks)
-            symbols, values = [*symbols, c], [*values, value]
-            key.append("linear" if rise.any() else "hold")
-            if rise.any():
-                rows.append(c + slope * (model.t - start))
-                symbols, values = [*symbols, slope], [*values, rise]
-            else:
-                rows.append(c)
-        else:
-            rows.append(_expression(variable.name, signal, model.t))
-            key.append(signal)
-    expression = stacked(rows)
-    if ca.depends_on(expression, start):
-        symbols, values = [*symbols, start], [*values, breaks[:-1]]
+    begin = ca.SX.sym("t_k")
+    parts = [_part(model, v, signals.get(v.name, v.start), breaks, begin) for v in model.u]
+    expression = stacked(part.row for part in parts)
+    data = [symbol for part in parts for symbol in part.data]
+    values = [row for part in parts for row in part.values]
+    if ca.depends_on(expression, begin):
+        data, values = [*data, begin], [*values, breaks[:-1]]
     return Drivers(
         expression,
-        stacked(symbols),
+        stacked(data),
         breaks,
         np.vstack(values) if values else np.zeros((0, breaks.size - 1)),
-        tuple(key),
+        tuple(part.key for part in parts),
     )
 
 
-def _expression(name: str, signal: Callable[[ca.SX], Any], t: ca.SX) -> ca.SX:
-    """What the function `signal` makes of the symbolic time."""
-    where, what = f"input '{name}'", "a function of the symbolic time that returns one expression"
+def _undriven(t_start: float, t_end: float) -> Drivers:
+    """The drivers of a model without inputs."""
+    return Drivers(stacked(()), stacked(()), np.array([t_start, t_end]), np.zeros((0, 1)), ())
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """One input: its expression, the data in it and their values on the intervals, structure."""
+
+    row: ca.SX
+    key: str
+    data: tuple[ca.SX, ...] = ()
+    values: tuple[Array, ...] = ()
+
+
+def _part(model: Model, variable: Variable, signal: Any, breaks: Array, begin: ca.SX) -> _Part:
+    """The input `variable`; intervals of linear samples count their time from `begin`."""
+    where = f"input '{variable.name}'"
+    if not isinstance(signal, Sampled):
+        if callable(signal):
+            expression = _evaluated(where, signal, model)
+            # the expression and not the function that wrote it: its data may have changed since
+            return _Part(expression, sha256(ca.SX.serialize(expression).encode()).hexdigest())
+        # a number is data too: another value must not mean another integrator
+        signal = Hold(breaks[:1], [checks.number(where, signal, hint=KINDS)])
+    c, slope = ca.SX.sym(f"{variable.name}_k"), ca.SX.sym(f"{variable.name}_dot")
+    value, rise = signal.coefficients(breaks)
+    if not rise.any():
+        return _Part(c, "hold", (c,), (value,))
+    return _Part(c + slope * (model.t - begin), "linear", (c, slope), (value, rise))
+
+
+def _evaluated(where: str, signal: Callable[[ca.SX], Any], model: Model) -> ca.SX:
+    """What the function `signal` makes of the symbolic time, in the symbols of the model."""
+    what = "a function of the symbolic time that returns one expression"
     hint = (
         "write casadi.sin(t) for math.sin(t), casadi.if_else(t > 1, a, b) for a Python if, "
         "and samples as Linear(t, values)"
@@ -160,8 +178,8 @@ def _expression(name: str, signal: Callable[[ca.SX], Any], t: ca.SX) -> ca.SX:
     if isinstance(signal, type):
         raise checks.refused(where, what, signal, KINDS)
     try:
-        made = signal(t)
-    except (TypeError, ArithmeticError, RuntimeError, NotImplementedError) as error:
+        made = signal(model.t)
+    except (TypeError, ArithmeticError, LookupError, AttributeError, RuntimeError) as error:
         reason = (str(error).strip().splitlines() or [""])[0].rpartition(".cpp:")[2]
         said = f"{type(error).__name__} ({reason.lstrip('0123456789: ')})"
         raise ValueError(f"{where}: expected {what}, got {said}; {hint}") from error
@@ -171,11 +189,7 @@ def _expression(name: str, signal: Callable[[ca.SX], Any], t: ca.SX) -> ca.SX:
     if number is None and not (isinstance(made, ca.SX) and made.is_scalar()):
         raise checks.refused(where, what, made, hint)
     expression = ca.SX(made)
-    if other := strays(expression, t):
+    own = stacked([model.t, *(model.vector(letter) for letter in "xzp")])
+    if other := strays(expression, own):
         raise ValueError(f"{where}: expected an expression in time alone, got {', '.join(other)}")
     return expression
-
-
-def _undriven(t_start: float, t_end: float) -> Drivers:
-    """The drivers of a model without inputs."""
-    return Drivers(stacked(()), stacked(()), np.array([t_start, t_end]), np.zeros((0, 1)), ())

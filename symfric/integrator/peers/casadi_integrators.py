@@ -22,6 +22,7 @@ from symfric.integrator.running.dense import Dense, hermite
 from symfric.integrator.running.run import Run, Tolerances
 
 Array = NDArray[np.float64]
+PEERS = ("sundials", "rosenbrock", "ggl")
 CHUNKS = 32
 COUNTS: tuple[str, ...] = ("steps", "rejections", "evaluations", "jacobians", "factorisations")
 STEPS_PER_INTERVAL = 100_000
@@ -92,31 +93,32 @@ def rates_of(system: System) -> tuple[list[int], Array]:
     return rates, nominal[rates]
 
 
-def peer(system: System, inputs: Drivers, p: Array, tolerances: Tolerances, backend: str) -> Peer:
+def peer(system: System, inputs: Drivers, p: Array, tolerances: Tolerances, name: str) -> Peer:
     """Semi-explicit DAE of `system` for CasADi, with time as its own variable.
 
     Args:
-        backend: "rosenbrock", "sundials" or "ggl".
+        system, inputs, p, tolerances: what is integrated, and how well.
+        name: "sundials" (cvodes, or idas where there are algebraic unknowns), "rosenbrock" or
+            "ggl", which is idas on the stabilised form of index 2.
 
     Raises:
         ValueError: a mass matrix that is not diagonal, which CasADi does not take, or "ggl" for
             what is no mechanism.
     """
-    if backend == "ggl":
+    if name == "ggl":
         system = stabilised(system)
     rows, columns = system.algebraic
     rates, nominal = rates_of(system)
     mass = ca.DM(system.mass)[rates, rates]
     if rows != columns or mass.nnz() != len(rates):
         raise ValueError(
-            "simulate: expected a diagonal mass matrix for this backend, got coupled rates; "
-            "use backend='auto'"
+            "simulate_by_peer: expected a diagonal mass matrix, got coupled rates; use simulate"
         )
     scale = ca.DM(nominal)
     scaled = ca.SX.sym("x", len(rates))
     f = ca.substitute(system.f, system.y[rates], scale * scaled)
     n_p = p.size
-    plugin = "rosenbrock" if backend == "rosenbrock" else ("idas" if columns else "cvodes")
+    plugin = "rosenbrock" if name == "rosenbrock" else ("idas" if columns else "cvodes")
     options: dict[str, Any] = {
         "reltol": tolerances.rtol,
         "abstol": float(np.min(tolerances.atol / system.nominal)),
@@ -125,7 +127,7 @@ def peer(system: System, inputs: Drivers, p: Array, tolerances: Tolerances, back
     if plugin != "rosenbrock":
         # without it SUNDIALS adjoints of several parameters are silently wrong (casadi#4383)
         options["quad_err_con"] = True
-    if backend == "ggl":
+    if name == "ggl":
         # multipliers of index 2 carry an error / h, which no step size brings below a tolerance
         options |= {"suppress_algebraic": True, "calc_ic": False}
     ode = f[rates] / (scale * ca.diag(mass))
@@ -137,7 +139,7 @@ def peer(system: System, inputs: Drivers, p: Array, tolerances: Tolerances, back
         "ode": ca.densify(ode),
         "alg": f[rows],
     }
-    return Peer(system, inputs, p, plugin, dae, options, 2 if backend == "ggl" else 1)
+    return Peer(system, inputs, p, plugin, dae, options, 2 if name == "ggl" else 1)
 
 
 def integrate_by_peer(
@@ -147,12 +149,12 @@ def integrate_by_peer(
     p: Array,
     times: Array,
     tolerances: Tolerances,
-    backend: str,
+    name: str,
 ) -> tuple[Run, Dense, dict[str, int]]:
     """Integrate with CasADi over `times`; a failure keeps what came before it."""
-    problem = peer(system, inputs, p, tolerances, backend)
+    problem = peer(system, inputs, p, tolerances, name)
     (rates, nominal), columns = rates_of(problem.system), problem.system.algebraic[1]
-    y = consistent(system, "simulate", y0, np.concatenate([p, inputs.values[:, 0]]))
+    y = consistent(system, "simulate_by_peer", y0, np.concatenate([p, inputs.values[:, 0]]))
     y = np.concatenate([y, np.zeros(problem.system.n - system.n)])
     grid = np.unique(np.concatenate([inputs.breaks, times]))
     run = Run(engine=f"casadi {problem.plugin}")
@@ -172,8 +174,8 @@ def integrate_by_peer(
             last = sub(r"^.*\.cpp:\d+: |\. Consult .*$", "", last.strip())
             run.stop(
                 Status.SOLVER_FAILED,
-                f"simulate: {problem.plugin} stopped after t = {grid[piece[0] - 1]:g} s ({last}); "
-                f"{HINTS[problem.index]}",
+                f"simulate_by_peer: {problem.plugin} stopped after "
+                f"t = {grid[piece[0] - 1]:g} s ({last}); {HINTS[problem.index]}",
             )
             break
         part = np.zeros((problem.system.n, piece.size))

@@ -26,7 +26,7 @@ def stabilised(system: System) -> System:
     manifold = system.manifold
     if manifold is None:
         raise ValueError(
-            "simulate: backend: expected rosenbrock or sundials for a model that is no mechanism, "
+            "simulate_by_peer: expected rosenbrock or sundials for a model that is no mechanism, "
             "got ggl"
         )
     n, m = manifold.n, manifold.m

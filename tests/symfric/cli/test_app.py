@@ -31,6 +31,8 @@ BAD = {
     "negative duration": ("run rabinowicz --law lugre --t-end -1", "t_end > t_start"),
     "tolerance": ("run rabinowicz --law lugre --rtol 1", "rtol"),
     "backend": ("run rabinowicz --law lugre --backend vn", "did you mean vm"),
+    "peer": ("run rabinowicz --law lugre --peer sundails", "did you mean sundials"),
+    "peer's method": ("run rabinowicz --law lugre --peer ggl --method radau5", "no --method"),
     "method": ("run rabinowicz --law lugre --method rodas5", "did you mean rodas5p"),
     "unknown state": ("run rabinowicz --law lugre --x0 q=1", "x0"),
     "infinite state": ("run rabinowicz --law lugre --x0 x=inf", "--x0 x: expected a finite"),

@@ -36,6 +36,13 @@ def test_json_has_the_numbers_of_python(capsys: pytest.CaptureFixture[str]) -> N
     assert result["t_end"] == 20.0
 
 
+def test_a_peer_runs_in_the_place_of_our_integrator(capsys: pytest.CaptureFixture[str]) -> None:
+    assert (
+        main(["run", "rabinowicz", "--law", "viscous", "--t-end", "0.1", "--peer", "sundials"]) == 0
+    )
+    assert "casadi cvodes" in capsys.readouterr().out
+
+
 def test_parameters_of_law_and_scene_and_start_values_are_set(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

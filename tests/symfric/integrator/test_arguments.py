@@ -5,6 +5,17 @@ import warnings
 import numpy as np
 import pytest
 
+from symfric import (
+    ExactCoulomb,
+    Model,
+    Variable,
+    Viscous,
+    drive,
+    rabinowicz,
+    simulate,
+    simulate_many,
+)
+from symfric.integrator import simulate_by_peer
 from symfric.integrator.arguments import LOOSE, check_span, check_times, chosen
 from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS, RADAU5, RODAS5P
 
@@ -71,3 +82,42 @@ def test_automatic_choice_takes_the_careful_method_at_loose_tolerances(
 def test_what_cannot_control_its_error_is_refused(name: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         chosen("here", name, 1e-6)
+
+
+def test_numbers_that_would_change_results_silently_are_refused_by_every_door() -> None:
+    """4f644ad took them all: no events, no error control, a mass below zero."""
+    model = rabinowicz(Viscous(), free=["m"])
+    doors = (simulate, simulate_many, simulate_by_peer)
+    cases: list[tuple[tuple[object, ...], dict[str, object], str]] = [
+        (doors[:2], {"event_tolerance": -1.0}, r"event_tolerance: expected a number > 0 \[s\]"),
+        (doors[:2], {"event_tolerance": np.nan}, r"event_tolerance: expected a finite number"),
+        (doors[::2], {"atol": np.inf}, "atol: expected a finite number, got inf"),
+        (doors[::2], {"atol": -1e-9}, "atol: expected a number > 0, got -1e-09"),
+        (doors[::2], {"atol": 0.0}, "atol: expected a number > 0, got 0.0"),
+        (doors, {"max_steps": 0}, "max_steps: expected a whole number >= 1, got 0"),
+        (doors, {"p": {"m": -1.0}}, r"[.]m: expected a number >= .* \[kg\], got -1"),
+        (doors[1:2], {"p": {"m": [1.0, -1.0]}}, r"p[.]m: expected a number >= .*, got -1"),
+        (doors[1:2], {"executor": None}, "executor: expected one of serial, .*Executor, got None"),
+        (doors[2:], {"peer": "vm"}, "peer: expected one of sundials, rosenbrock, ggl, got vm"),
+        (doors[:2], {"backend": "ggl"}, "backend: expected one of auto, vm, compiled, got ggl"),
+    ]
+    for some, arguments, message in cases:
+        for door in some:
+            with pytest.raises(ValueError, match=message):
+                door(model, 1.0, **arguments)  # type: ignore[operator]
+    for nominal in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="variable 'x': nominal: expected a"):
+            Variable("x", "m", nominal=nominal)
+
+
+def test_bounds_of_a_parameter_are_allowed_themselves() -> None:
+    k = Variable("k", "1/s", start=0.5, lower=0.0, upper=1.0)
+    x = Variable("x", "m", start=1.0)
+    model = Model("bounded", x=(x,), p=(k,), ode=-k.symbol * x.symbol)
+    assert simulate(model, 1.0, p={"k": 0.0}).final["x"] == 1.0
+    assert simulate_many(model, 1.0, p={"k": [0.0, 1.0]})["x"][0, -1] == 1.0
+
+
+def test_a_peer_knows_no_events() -> None:
+    with pytest.raises(ValueError, match="simulate_by_peer: expected a model without events"):
+        simulate_by_peer(drive(ExactCoulomb()), 1.0)

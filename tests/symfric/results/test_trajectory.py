@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from symfric import BrownMcPhee, LuGre, Trajectory, rabinowicz, simulate
+from symfric.integrator import simulate_by_peer
 from symfric.scenes import MECHANISMS, Pendulum
 
 
@@ -81,7 +82,7 @@ def test_a_model_without_details_has_none() -> None:
 def test_details_of_a_peer_show_its_drift() -> None:
     """Nothing is refined behind CasADi's integrators, neither signals nor expressions."""
     model = MECHANISMS["four_mass"](BrownMcPhee(v_t=0.1)).model()
-    run = simulate(model, 0.5, backend="rosenbrock", samples=5)
+    run = simulate_by_peer(model, 0.5, "rosenbrock", samples=5)
     assert run["constraint_position"].max() > 1e-10
     assert run.of(model.expression("constraint_position")) == pytest.approx(
         run["constraint_position"], abs=1e-15

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from symfric import BrownMcPhee, Model, SolveError, Status, Viscous, simulate
 from symfric.integrator.equations.blocks import signs
+from symfric.integrator.equations.initial import first_guess
 from symfric.integrator.equations.inputs import drivers
 from symfric.integrator.equations.manifold import SHOCK, Manifold
 from symfric.integrator.methods.tableaux import RODAS5P
@@ -68,10 +69,7 @@ def reserves(model: Model, t_end: float) -> tuple[Array, Array]:
     inputs = drivers(model, None, 0.0, t_end)
     integrator = Integrator(model, inputs, RODAS5P)
     s = integrator.system
-    y = np.zeros(s.n)
-    y[: s.nx] = model.initial_state()
-    guesses = {v.name: float(v.start) for v in model.z}
-    y[s.nx :] = [guesses.get(name, 0.0) for name in s.names[s.nx :]]
+    y = first_guess(s, model, model.initial_state())
     tolerances = Tolerances(1e-6, 1e-7 * s.nominal, 1e-10, 100_000)
     run, dense = integrate(integrator, inputs, y, np.zeros(0), tolerances, "vm", None)
     assert run.status is Status.SUCCESS

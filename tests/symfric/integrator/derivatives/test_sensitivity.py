@@ -300,11 +300,6 @@ def eventful() -> Model:
             r"'rabinowicz' \(parameters must be free\): expected one of k, .* got mu_s",
         ),
         (eventful, {"sensitivities": ["x0.x"]}, "expected a model without events, got 1"),
-        (
-            oscillator,
-            {"sensitivities": ["k"], "backend": "sundials"},
-            "sensitivities: expected backend auto, vm or compiled, got sundials",
-        ),
     ],
 )
 def test_bad_requests_are_refused_saying_what_is_possible(

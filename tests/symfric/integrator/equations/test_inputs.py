@@ -1,0 +1,161 @@
+"""Inputs: samples, expressions, numbers; a structure that is what the equations are."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric import Hold, Linear, Model, Variable, Viscous, drive, simulate
+from symfric.integrator.equations.inputs import Drivers, Input, drivers
+
+x = Variable("x", "m", start=0.0)
+force, torque = Variable("force", "N", start=2.0), Variable("torque", "N m", start=-1.0)
+TWO = Model("two", x=(x,), u=(force, torque), ode=force.symbol + torque.symbol)
+
+
+def values(of: Drivers, model: Model, t: float) -> list[float]:
+    """The inputs at one time."""
+    data = of.values[:, of.interval(np.array([t]))[0]]
+    return ca.Function("u", [model.t, of.data], [of.expression])(t, data).full().ravel().tolist()
+
+
+def made(**given: Input) -> Drivers:
+    return drivers(TWO, given, 0.0, 4.0)
+
+
+def test_what_is_not_given_keeps_its_start_value_and_numbers_are_data() -> None:
+    plain, other = made(), made(force=5.0)
+    assert values(plain, TWO, 1.0) == [2.0, -1.0]
+    assert values(other, TWO, 1.0) == [5.0, -1.0]
+    assert plain.key == other.key
+    assert plain.breaks.tolist() == [0.0, 4.0]
+    assert drivers(Model("none", x=(x,), ode=x.symbol), None, 0.0, 1.0).expression.numel() == 0
+
+
+def test_hold_jumps_at_its_samples_and_holds_beyond() -> None:
+    held = made(force=Hold([1.0, 2.5], [10.0, 20.0]))
+    assert held.breaks.tolist() == [0.0, 1.0, 2.5, 4.0]
+    found = [values(held, TWO, t)[0] for t in (0.0, 0.9, 1.0, 2.4, 2.5, 4.0)]
+    assert found == [10.0, 10.0, 10.0, 10.0, 20.0, 20.0]
+
+
+def test_linear_goes_through_its_samples_and_holds_beyond() -> None:
+    bent = made(torque=Linear([1.0, 2.0, 3.0], [0.0, 4.0, 3.0]))
+    found = [values(bent, TWO, t)[1] for t in (0.0, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0)]
+    assert found == pytest.approx([0.0, 0.0, 2.0, 4.0, 3.5, 3.0, 3.0], abs=1e-14)
+
+
+def test_breaks_of_several_inputs_are_those_of_all_inside_the_span() -> None:
+    both = made(force=Hold([-1.0, 1.0, 9.0], [1.0, 2.0, 3.0]), torque=Linear([0.5, 1.0], [0, 1]))
+    assert both.breaks.tolist() == [0.0, 0.5, 1.0, 4.0]
+    assert values(both, TWO, 0.75) == pytest.approx([1.0, 0.5])
+    assert values(both, TWO, 1.0) == pytest.approx([2.0, 1.0])
+
+
+def test_a_flat_line_costs_no_slope() -> None:
+    flat = made(force=Linear([0.0, 1.0], [3.0, 3.0]))
+    assert flat.key == made().key
+    assert not ca.depends_on(flat.expression, TWO.t)
+
+
+def test_expressions_may_be_constant_numpy_and_feedback() -> None:
+    assert values(made(force=lambda t: 7), TWO, 1.0)[0] == 7.0
+    assert values(made(force=lambda t: ca.if_else(t < 1, t, 5)), TWO, 0.25)[0] == 0.25
+    fed_back = simulate(TWO, 30.0, u={"force": lambda t: 1 - x.symbol}, rtol=1e-8)
+    assert fed_back.final["x"] == pytest.approx(0.0, abs=1e-7)
+
+
+def test_samples_are_copied_and_cannot_be_written() -> None:
+    t, y = np.array([0.0, 1.0]), np.array([1.0, 2.0])
+    kept = Linear(t, y)
+    t[1], y[1] = np.nan, np.nan
+    assert np.asarray(kept.t).tolist() == [0.0, 1.0]
+    assert np.asarray(kept.values).tolist() == [1.0, 2.0]
+    with pytest.raises(ValueError, match="read-only"):
+        kept.values[0] = 5.0  # type: ignore[index]
+
+
+def test_structure_is_the_expression_and_not_who_wrote_it() -> None:
+    """4f644ad took the function object for the structure."""
+    one, same, other = (made(force=f).key for f in (
+        lambda t: ca.sin(2 * t), lambda t: ca.sin(2 * t), lambda t: ca.sin(3 * t)
+    ))  # fmt: skip
+    assert one == same != other
+    assert len({one, made().key, made(torque=lambda t: ca.sin(2 * t)).key}) == 3
+
+
+@dataclass
+class Wave:
+    """Cannot be hashed."""
+
+    a: float
+
+    def __call__(self, t: ca.SX) -> ca.SX:
+        return self.a * ca.sin(t)
+
+
+class Source:
+    K = 1.0
+
+    def force(self, t: ca.SX) -> ca.SX:
+        return self.K * ca.sin(t)
+
+
+def test_changed_data_of_a_function_change_the_motion() -> None:
+    """4f644ad returned the motion of the old data, and refused what cannot be hashed."""
+    model = drive(Viscous())
+    scale, wave, source = [1.0], Wave(1.0), Source()
+
+    def closure(t: ca.SX) -> ca.SX:
+        return scale[0] * ca.sin(t)
+
+    def end(signal: Callable[[ca.SX], Any]) -> float:
+        return simulate(model, 1.0, u={"force": signal}, samples=2, backend="vm").final["x"]
+
+    small = [end(f) for f in (closure, wave, source.force)]
+    assert small == [small[0]] * 3
+    scale[0], wave.a, source.K = 100.0, 100.0, 100.0
+    large = [end(f) for f in (closure, wave, source.force)]
+    assert large == pytest.approx([100.0 * small[0]] * 3, rel=1e-4)
+    assert len(model.memory["integrators"]) == 2
+
+
+def test_bad_samples_are_refused() -> None:
+    cases: list[tuple[Any, Any, str]] = [
+        ([0.0, 1.0], [1.0], "expected a value for every time, got 2 times and 1 values"),
+        ([], [], r"t: expected increasing times \[s\], got none"),
+        ([0.0, 1.0, 1.0], [1.0, 2.0, 3.0], r"t: expected increasing times \[s\], got 1 after 1 s"),
+        ([0.0, np.nan], [1.0, 2.0], "t: expected finite numbers, got nan at 1"),
+        ([0.0, 1.0], [1.0, np.inf], "values: expected finite numbers, got inf at 1"),
+        ([0.0, 1.0], ["a", "b"], "values: expected a sequence of numbers"),
+    ]
+    for kind in (Hold, Linear):
+        for t, y, message in cases:
+            with pytest.raises(ValueError, match=f"{kind.__name__}: {message}"):
+                kind(t, y)
+
+
+def test_bad_inputs_are_refused_saying_what_an_input_is() -> None:
+    cases: list[tuple[Any, str]] = [
+        ("strong", "expected a finite number, got 'strong'; an input is a number, Hold or Linear"),
+        (np.nan, "expected a finite number, got nan"),
+        ([1.0, 2.0], "expected a finite number"),
+        (lambda t: math.sin(t), "returns one expression, got nan; write casadi.sin"),
+        (lambda t: 1.0 if t > 1 else 0.0, r"truth value .* write .*casadi.if_else"),
+        (lambda t: None, "returns one expression, got None"),
+        (lambda t: [t, t], "returns one expression, got"),
+        (lambda t: ca.vertcat(t, t), r"returns one expression, got the expression .* of shape"),
+        (lambda t: ca.SX.sym("k") * t, "expected an expression in time alone, got k"),
+        (lambda: 1.0, "TypeError"),
+        (lambda t: {}["missing"], "KeyError"),
+        (Wave, "got the class Wave"),
+    ]
+    for signal, message in cases:
+        with pytest.raises(ValueError, match=f"input 'force': .*{message}"):
+            made(force=signal)
+    with pytest.raises(ValueError, match="model 'two' u: expected one of force, torque, got froce"):
+        made(froce=1.0)
