@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import Scalar
+from symfric.foundation.numeric import Scalar, is_casadi
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,15 +26,23 @@ class Monitor:
     """An expression in t, x, z, u, p whose relative error is controlled along with the states.
 
     A sliding velocity is the difference of two velocities that may be a thousand times larger;
-    `nominal` is the scale on which the friction force changes with it.
+    `nominal` is the scale on which the friction force changes with it. Near zero, steps change it
+    by no more than a few `nominal`, so that what happens there only is not leapt over.
+
+    Attributes:
+        expression: in t, x, z, u, p.
+        nominal: above zero; a number, or an expression in p.
     """
 
     expression: Scalar
-    nominal: float
+    nominal: Scalar
 
     def __post_init__(self) -> None:
         checks.expression("Monitor", self.expression)
-        checks.number("Monitor: nominal", self.nominal, above=0.0)
+        if is_casadi(self.nominal):
+            checks.expression("Monitor: nominal", self.nominal)
+        else:
+            checks.number("Monitor: nominal", self.nominal, above=0.0)
 
 
 @dataclass(frozen=True, eq=False)

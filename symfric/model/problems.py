@@ -100,6 +100,7 @@ def equation_problems(model: "Model", known: ca.SX) -> list[str]:
         problems.append(f"residual: expected {nx + nz} rows, got {model.residual.numel()}")
     single = {f"output '{n}'": o.expression for n, o in model.outputs.items()}
     single |= {f"monitor {i + 1}": m.expression for i, m in enumerate(model.monitors)}
+    single |= {f"monitor {i + 1}: nominal": m.nominal for i, m in enumerate(model.monitors)}
     for event in model.events:
         single[f"event '{event.name}'"] = event.expression
         single |= {f"event '{event.name}', {n}": value for n, value in event.reset.items()}

@@ -210,7 +210,7 @@ def assemble(
         u=u,
         p=p,
         outputs=_outputs(eq, contacts, put),
-        monitors=tuple(Monitor(v, x) for s, x in scales for v in ca.vertsplit(s.contact.slip)),
+        monitors=tuple(m for s, _ in scales for m in _watched(s)),
         events=tuple(e for s in contacts for e in _switches(s, qd)),
         t=eq.kin.t,
         details=lambda: more[0](p_column, put),
@@ -247,6 +247,12 @@ def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip], forces: ca.S
 def _scale(slip: Slip, p: Variables) -> float:
     """Sliding velocity on which the law changes, at the start values of `p` [m/s]."""
     return float(at_start(slip.contact.friction.law.velocity_scale, p))
+
+
+def _watched(slip: Slip) -> tuple[Monitor, ...]:
+    """Its sliding velocities, on the scale of its law."""
+    scale = slip.contact.friction.law.velocity_scale
+    return tuple(Monitor(v, scale) for v in ca.vertsplit(slip.contact.slip))
 
 
 def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[str, ...], str]:

@@ -134,10 +134,10 @@ def contact(
 def slip_monitor(law: Law, v: Scalar, p: Variables) -> tuple[Monitor, ...]:
     """What error control must watch of a contact: its sliding velocity `v`, on the law's scale.
 
-    The scale is taken at the start values of `p`; a law without one adds nothing.
+    The scale follows `p`; a law without one, at the start values of `p`, adds nothing.
     """
-    scale = float(at_start(law.velocity_scale, p))
-    return (Monitor(v, scale),) if isfinite(scale) else ()
+    scale = law.velocity_scale
+    return (Monitor(v, scale),) if isfinite(float(at_start(scale, p))) else ()
 
 
 def friction_states(law: Law, v: Scalar, N: Scalar) -> tuple[Variables, ca.SX]:

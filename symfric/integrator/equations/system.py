@@ -36,11 +36,11 @@ class System:
         nominal: typical magnitude of each differential state, shape (nx,).
         monitors: SX (m, 1), expressions whose relative error is controlled too: those of the model
             and its algebraic variables.
-        monitor_nominal: their typical magnitudes, shape (m,).
+        monitor_nominal: SX (m, 1), their typical magnitudes, in terms of d.
         manifold: where the solution of a holonomic model lies.
         pivots: groups of rows with a safe pivot on the diagonal, each once those before it are
             eliminated: rates of their own unknown and mass matrices, constraints, normal forces.
-        rubs: whether something slides in it that its model names (`Model.monitors`).
+        slips: how many of the monitors, the first ones, are those of the model.
         inner: f with inner unknowns, whose derivatives are sparse; None where f itself serves. Its
             groups take the place of `pivots`.
         orders: pivots of the factors of each matrix by its name, where those that fill least are
@@ -57,11 +57,11 @@ class System:
     names: tuple[str, ...]
     nominal: NDArray[np.float64]
     monitors: ca.SX
-    monitor_nominal: NDArray[np.float64]
+    monitor_nominal: ca.SX
     manifold: Manifold | None = None
     pivots: tuple[tuple[int, ...], ...] = ()
     slope: ca.SX | None = None
-    rubs: bool = False
+    slips: int = 0
     inner: Inner | None = None
     orders: Mapping[str, Order] = field(default_factory=dict[str, Order])
 
@@ -69,6 +69,11 @@ class System:
     def n(self) -> int:
         """Number of unknowns."""
         return self.y.numel()
+
+    @property
+    def rubs(self) -> bool:
+        """Whether something slides in it that its model names."""
+        return self.slips > 0
 
     @cached_property
     def J(self) -> ca.SX:
@@ -145,10 +150,10 @@ def system(model: Model, inputs: Drivers) -> System:
         tuple(names),
         model.nominal("x"),
         ca.substitute(monitors, model.vector("u"), inputs.expression),
-        np.array([nominal for _, nominal in watched], dtype=float),
+        stacked(ca.SX(nominal) for _, nominal in watched),
         manifold(model, unknowns, d, f, inputs.expression) if mechanics else None,
         ((*own, *range(nx, nx + n)), tuple(range(nx + n, nx + n + m)), loop),
-        rubs=bool(model.monitors),
+        slips=len(model.monitors),
         inner=_with_inputs(model, inputs, f) if mechanics and mechanics.inner else None,
     )
 

@@ -18,6 +18,7 @@ from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import Method, Trial, Trials
 from symfric.integrator.step.layout import GROWTH_MEMORY, Given, State
 from symfric.integrator.step.tangent import tangent
+from symfric.integrator.step.watch import FINEST, Watch, watching
 
 SAFETY, GROW, SHRINK = 0.85, 8.0, 0.2
 E_FLOOR = 1e-6
@@ -103,33 +104,23 @@ def build_dense_step(system: System, method: Method) -> ca.Function:
 Norm = Callable[[Any], Any]
 
 
-def error_norm(system: System, y: Any, y_new: Any, atol: Any, rtol: Any, d: Any) -> Norm:
-    """Mean square of an error of y_new in the states and the monitored expressions, scaled.
+def error_norm(
+    system: System, y: Any, y_new: Any, atol: Any, rtol: Any, d: Any, watch: Watch | None
+) -> Norm:
+    """Mean square of an error of y_new in the states and in what is watched, scaled.
 
-    A state is scaled by atol + rtol max|x|, a monitored output m by rtol (nominal + min|m|): where
-    a contact sticks, its sliding velocity is resolved relative to the velocity scale of the law
-    instead of the velocity of the body, or breaking away comes too late or not at all.
+    A state is scaled by atol + rtol max|x|, what is watched as `Watch.error` says.
     """
-    nx, watched = system.nx, system.monitor_nominal.size
+    nx = system.nx
     scale = atol + rtol * ca.fmax(ca.fabs(y[:nx]), ca.fabs(y_new[:nx]))
 
     def of_states(error: Any) -> Any:
         return ca.sumsqr(error[:nx] / scale)
 
-    if not watched:
+    if watch is None:
         return lambda error: of_states(error) / nx
-    direction = ca.SX.sym("direction", system.n)
-    change = ca.jtimes(system.monitors, system.y, direction)
-    value = ca.Function("monitor", [system.y, system.d], [system.monitors])
-    to_first_order = ca.Function("monitor_error", [system.y, direction, system.d], [change])
-    smallest = ca.fmin(ca.fabs(value(y, d)), ca.fabs(value(y_new, d)))
-    slip_scale = rtol * (ca.DM(system.monitor_nominal) + smallest)
-
-    def norm(error: Any) -> Any:
-        slip = to_first_order(y_new, error, d) / slip_scale
-        return (of_states(error) + ca.sumsqr(slip)) / (nx + watched)
-
-    return norm
+    count = nx + system.monitors.numel()
+    return lambda error: (of_states(error) + watch.error(y_new, error, d, rtol)) / count
 
 
 def converged(before: Any, last: Any) -> Any:
@@ -162,7 +153,9 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
     order = method.embedded + 1
     trial = steps(system, method)(y, h, d)
     y_new = trial.end
-    norm = error_norm(system, y, y_new, atol, rtol, d)
+    look = watching(system)
+    watch = None if look is None else look(y, trial, d)
+    norm = error_norm(system, y, y_new, atol, rtol, d, watch)
     e2 = norm(trial.error)
     sound = e2 <= 1e20
     if system.manifold is not None and system.manifold.m:
@@ -182,6 +175,10 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
     # Gustafsson's predictive controller (Hairer and Wanner, IV.8), with growth = e^(-1/order) as
     # its memory, so that one power an attempt is enough
     growth = ca.fmax(e2, E_FLOOR**2) ** (-0.5 / order)
+    if watch is not None and watch.slips:
+        far = watch.leap()
+        accept = ca.logic_and(accept, ca.logic_or(far <= 1, h <= FINEST * ca.fabs(t_end)))
+        growth = ca.fmin(growth, 1 / ca.fmax(far, SAFETY / GROW))
     predicted = (h / h_old) * (growth * growth / growth_old)
     factor = ca.fmin(GROW, ca.fmax(SHRINK, SAFETY * ca.fmin(growth, predicted)))
     factor = ca.if_else(rejected > 0, ca.fmin(factor, 1), factor)

@@ -260,7 +260,7 @@ def _reduced(system: System, rows: _Rows, constraints: _Constraints, chart: _Cha
         (*(f"chart_{i}" for i in range(2 * nv)), *own_names, *(["t"] if system.timed else [])),
         np.ones(differential),
         ca.SX(0, 1),
-        np.zeros(0),
+        ca.SX(0, 1),
         pivots=(
             tuple(range(first, first + n)),
             tuple(range(first + n, first + n + rows.m)),

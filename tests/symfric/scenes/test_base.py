@@ -104,9 +104,12 @@ def test_error_control_watches_the_sliding_velocity_on_the_scale_of_the_law(
     assert [m.nominal for m in kind(law).model().monitors] == scale
 
 
-def test_scale_of_a_free_parameter_is_its_start_value() -> None:
-    (monitor,) = rabinowicz(Coulomb(v_eps=2e-3), free=["v_eps", "mu_d"]).monitors
-    assert monitor.nominal == 2e-3
+def test_scale_of_a_free_parameter_follows_it() -> None:
+    """It used to stay at the start value, so that another one was not resolved."""
+    model = rabinowicz(Coulomb(v_eps=2e-3), free=["v_eps", "mu_d"])
+    (monitor,) = model.monitors
+    nominal = ca.Function("nominal", [model.vector("p")], [monitor.nominal])
+    assert float(nominal(model.values("p", {"v_eps": 1e-5}))) == 1e-5
 
 
 def test_bristle_starts_loaded_for_the_given_start_velocity() -> None:

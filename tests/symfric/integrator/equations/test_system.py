@@ -127,7 +127,7 @@ def test_monitors_and_nominal_values_are_carried_along() -> None:
     )  # fmt: skip
     s = assembled(model)
     assert s.nominal.tolist() == [1.0, 0.1]
-    assert s.monitor_nominal.tolist() == [1e-3, 2.0]
+    assert ca.DM(s.monitor_nominal).full().ravel().tolist() == [1e-3, 2.0]
     assert ca.Function("m", [s.y, s.d], [s.monitors])(
         [5.0, 6.0], [3.0]
     ).full().ravel().tolist() == [

@@ -1,0 +1,173 @@
+"""What error control watches: no friction near rest is leapt over, whatever the estimate says."""
+
+import json
+from math import e, exp, sqrt, tanh
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from closed_forms import assemble
+from numpy.typing import NDArray
+from scipy.integrate import odeint
+
+from symfric import (
+    Andersson,
+    BengisuAkay,
+    Benson,
+    BrownMcPhee,
+    Coulomb,
+    Law,
+    SimscapeBreakaway,
+    Stribeck,
+    Sum,
+    Tustin,
+    Viscous,
+    rabinowicz,
+    simulate,
+    simulate_many,
+)
+from symfric.integrator.step.watch import REACH, Watch
+
+Array = NDArray[np.float64]
+CAPTURED = json.loads((Path(__file__).parents[3] / "golden" / "captured.json").read_text())
+STARTS = np.array(CAPTURED["v"])
+LAWS: dict[str, Law] = {
+    "stribeck": Stribeck(mu_s=0.3, mu_d=0.0),
+    "tustin": Tustin(mu_s=0.3, mu_d=0.0),
+    "benson": Benson(mu_s=0.3, mu_d=0.0),
+    "andersson": Andersson(mu_s=0.3, mu_d=0.0),
+    "simscape_breakaway": SimscapeBreakaway(mu_s=0.3, mu_d=0.0),
+    "bengisu_akay": BengisuAkay(mu_s=0.3, mu_d=0.0),
+    "brown_mcphee": BrownMcPhee(mu_s=0.3, mu_d=0.0, v_t=1e-4),
+}
+
+
+def law(case: str) -> Law:
+    name, *more = case.split()
+    return Sum((LAWS[name], Viscous(sigma_2=0.02))) if more else LAWS[name]
+
+
+def watch(before: float, half: float, after: float, scale: float = 1.0) -> Watch:
+    change = ca.Function("change", [ca.SX.sym("y")], [ca.SX(0)])
+    return Watch(*(ca.DM([x]) for x in (before, half, after, scale)), change, 1)
+
+
+@pytest.mark.parametrize(
+    ("before", "half", "after", "travel", "nearest"),
+    [
+        (10.0, 6.0, 2.0, 8.0, 2.0),  # straight, towards rest
+        (-2.0, -6.0, -10.0, 8.0, 2.0),
+        (3.0, 0.0, -3.0, 6.0, 0.0),  # through rest
+        (5.0, 1.0, 5.0, 4.0, 1.0),  # a dip and back: ends alone would show nothing
+        (5.0, -1.0, 5.0, 6.0, 0.0),  # a dip through rest
+    ],
+)
+def test_travel_is_counted_in_what_is_allowed_at_its_nearest_point(
+    before: float, half: float, after: float, travel: float, nearest: float
+) -> None:
+    assert float(watch(before, half, after).leap()) == travel / (REACH * (1 + nearest))
+
+
+def test_friction_peaks_without_a_coulomb_level_catch_the_block() -> None:
+    """18 of 20 starts were off by more than 1 %, x = -1.04 for -0.78 m, with SUCCESS.
+
+    Swinging without dissipation the block comes back to just where Simscape's smooth peak lets go:
+    an error of 1e-7 m decides there, so that this case alone needs a tighter tolerance.
+    """
+    for case, x in CAPTURED["x"].items():
+        rtol = 1e-7 if case == "simscape_breakaway" else 1e-6
+        many = simulate_many(
+            rabinowicz(law(case)),
+            20.0,
+            x0={"v": STARTS},
+            rtol=rtol,
+            backend="vm",
+            executor="serial",
+        )
+        assert np.abs(many["x"][:, -1] - x).max() < 1e-4, case
+
+
+def test_both_engines_catch_it() -> None:
+    """x = -1.0404 m was found, at rtol 1e-9 -0.797; SciPy's LSODA with max_step 2e-4: -0.7783."""
+    model = rabinowicz(LAWS["stribeck"])
+    runs = [simulate(model, 20.0, x0={"v": -0.5}, backend=b) for b in ("vm", "compiled")]
+    assert runs[0].statistics.steps == pytest.approx(runs[1].statistics.steps, rel=0.02)
+    assert [r.final["x"] for r in runs] == pytest.approx([-0.77828] * 2, abs=1e-4)
+
+
+def test_a_block_that_just_touches_the_velocity_of_the_belt_is_caught() -> None:
+    """Its velocity turns 3 micrometres a second short of it, on a scale of one, within a step.
+
+    Both ends of that step look harmless; x(6) was off by 0.39 m.
+    """
+    model = rabinowicz(Stribeck(mu_s=0.3, mu_d=0.0, v_s=1e-6, v_eps=1e-7))
+    run = simulate(model, 6.0, x0={"v": 3e-6 - 0.1}, backend="vm")
+    fine = simulate(model, 6.0, x0={"v": 3e-6 - 0.1}, rtol=1e-8, method="radau5", backend="vm")
+    assert run.final["x"] == pytest.approx(fine.final["x"], abs=1e-7)
+
+
+def test_a_scale_set_as_a_parameter_is_resolved_as_one_set_in_the_law() -> None:
+    """The scale stayed where the model was built: an error of 8.9e-3 instead of 1.7e-7."""
+    free = rabinowicz(Stribeck(v_s=1e-1, v_eps=1e-2), free=["v_s", "v_eps"])
+    run = simulate(free, 20.0, p={"v_s": 1e-3, "v_eps": 1e-4}, backend="vm")
+    held = simulate(rabinowicz(Stribeck(v_s=1e-3, v_eps=1e-4)), 20.0, backend="vm")
+    assert run.statistics.steps == pytest.approx(held.statistics.steps, rel=0.02)
+    assert run.final["x"] == pytest.approx(held.final["x"], abs=1e-6)
+
+
+def test_a_scale_too_fine_for_the_clock_ends_no_run() -> None:
+    """Rest is crossed in steps that the clock still tells apart."""
+    run = simulate(rabinowicz(Coulomb(mu_d=0.0, v_eps=1e-300)), 20.0, x0={"v": 0.5}, backend="vm")
+    assert run.status.ok
+
+
+def test_a_model_without_contacts_is_not_watched() -> None:
+    assert not assemble(rabinowicz(Viscous())).monitors.numel()
+
+
+# The references
+
+
+def peak(v: float, fall: float, eps: float = 1e-4) -> float:
+    return 0.3 * exp(-fall) * tanh(v / eps)
+
+
+def rounded(v: float) -> float:
+    """|v| with a rounded tip, in units of 1 mm/s."""
+    return sqrt((v / 1e-3) ** 2 + 1e-2) - 0.1
+
+
+def bengisu_akay(v: float) -> float:
+    u = min(abs(v) / 1e-3, 1.0)
+    beyond = max(abs(v) / 1e-3 - 1.0, 0.0)
+    return 0.3 * exp(-(beyond**2)) * u * (2 - u) * (1 if v > 0 else -1)
+
+
+PLAIN = {
+    "stribeck": lambda v: peak(v, (v / 1e-3) ** 2),
+    "tustin": lambda v: peak(v, rounded(v)),
+    "benson": lambda v: peak(v, rounded(v)),
+    "andersson": lambda v: peak(v, (v / 1e-3) ** 2),
+    "simscape_breakaway": lambda v: 0.3 * sqrt(e) * (v / 1e-3) * exp(-((v / 1e-3) ** 2) / 2),
+    "bengisu_akay": bengisu_akay,
+    "brown_mcphee": lambda v: 0.3 * (v / 1e-4) / (0.25 * (v / 1e-4) ** 2 + 0.75) ** 2,
+}
+
+
+@pytest.mark.slow
+def test_references_are_those_of_scipy() -> None:
+    """LSODA finds the peak because it is not allowed to take longer steps."""
+    for case, expected in CAPTURED["x"].items():
+        name, *viscous = case.split()
+        mu, sigma = PLAIN[name], 0.02 if viscous else 0.0
+
+        def rates(y: Array, t: float, mu=mu, sigma=sigma) -> tuple[float, float]:
+            slip = y[1] - 0.1
+            return y[1], (-2.1 * y[0] - 0.8 * 9.81 * mu(slip) - sigma * slip) / 0.8
+
+        for v, x in list(zip(STARTS, expected, strict=True))[::4]:
+            found = odeint(
+                rates, [0.0, v], [0.0, 20.0], rtol=1e-9, atol=1e-11, hmax=2e-4, mxstep=10**7
+            )
+            assert found[-1, 0] == pytest.approx(x, abs=1e-5), (case, v)
