@@ -58,24 +58,17 @@ def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Functi
 
 def _start(model: Model, whole: System, x0: ca.MX, data: ca.MX) -> ca.MX:
     """All unknowns at time 0, the algebraic ones consistent."""
-    rows, columns = whole.algebraic
-    unknowns = [x0[i] if i < whole.nx else ca.MX(0) for i in range(whole.n)]
+    guess = first_guess(whole, model, np.zeros(whole.nx))[whole.nx :]
+    y, free = ca.vertcat(x0, ca.DM(guess)), ca.DM(whole.free)
     if whole.manifold is not None:
-        on = _on_constraints(whole, whole.manifold)(ca.vertcat(*unknowns), data)
-        unknowns = [on[i] for i in range(whole.n)]
-    if columns:
-        known = [i for i in range(whole.n) if i not in columns]
-        problem = {
-            "x": whole.y[columns],
-            "p": ca.vertcat(whole.y[known], whole.d),
-            "g": whole.f[rows],
-        }
+        y = _on_constraints(whole, whole.manifold)(y, data)
+    if free.numel():
+        change = ca.SX.sym("change", free.shape[1])
+        g = ca.substitute(whole.f[whole.algebraic[0]], whole.y, whole.y + free @ change)
+        problem = {"x": change, "p": ca.vertcat(whole.y, whole.d), "g": g}
         newton = ca.rootfinder("consistent", "newton", problem, {"error_on_fail": True})
-        guess = first_guess(whole, model, np.zeros(whole.nx))[columns]
-        found = newton(guess, ca.vertcat(*(unknowns[i] for i in known), data))
-        for row, i in enumerate(columns):
-            unknowns[i] = found[row]
-    return ca.vertcat(*unknowns)
+        y = y + free @ newton(0, ca.vertcat(y, data))
+    return y
 
 
 def _on_constraints(whole: System, manifold: Manifold) -> ca.Function:

@@ -116,7 +116,7 @@ class Path:
     def pieces(self) -> list[slice]:
         """Steps between two jumps of the inputs, which algebraic unknowns follow."""
         cuts = [0, self.dense.t0.size]
-        if self.integrator.system.algebraic[1]:
+        if self.integrator.system.algebraic[0]:
             cuts[1:1] = [int(k) + 1 for k in np.flatnonzero(np.diff(self.interval))]
         return [slice(a, b) for a, b in pairwise(cuts)]
 
@@ -210,17 +210,15 @@ def made_consistent(path: Path, piece: slice) -> tuple[Array, Array]:
     constraints before.
     """
     made = derivatives(path.integrator)
-    n, columns = made.system.n, made.system.algebraic[1]
+    n, free = made.system.n, made.system.free
     y, d = path.steps[0][piece.start], path.steps[2][piece.start]
     by_before, by_d = np.eye(n), np.zeros((n, d.size))
     if piece.start == 0 and made.assembly is not None:
         by_before, by_d = (m.full() for m in made.assembly.call([y, d]))
-    if columns:
-        others = [i for i in range(n) if i not in columns]
+    if free.size:
         slope, more = (m.full() for m in made.algebraic.call([y, d]))
-        own, rest = slope[:, columns], slope[:, others]
-        by_before[columns] = -np.linalg.solve(own, rest @ by_before[others])
-        by_d[columns] = -np.linalg.solve(own, rest @ by_d[others] + more)
+        by_before -= free @ np.linalg.solve(slope @ free, slope @ by_before)
+        by_d -= free @ np.linalg.solve(slope @ free, slope @ by_d + more)
     return by_before, by_d
 
 

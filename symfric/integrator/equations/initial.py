@@ -35,14 +35,14 @@ class Equations:
     Attributes:
         names: of all unknowns.
         nx: number of differential states.
-        algebraic: rows of the equations, columns of their unknowns.
+        free: as `System.free`.
         constraints: as `System.constraints`.
         manifold: as `System.manifold`.
     """
 
     names: tuple[str, ...]
     nx: int
-    algebraic: tuple[list[int], list[int]]
+    free: Array
     constraints: ca.Function
     manifold: Manifold | None = None
 
@@ -85,29 +85,36 @@ def consistent(system: System | Equations, where: str, y: Array, d: Array) -> Ar
 
 def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array:
     """`y` with its algebraic unknowns solved for, by damped Newton."""
-    columns = system.algebraic[1]
-    if not columns:
+    rows, along = _moved(system)
+    if not rows.size:
         return y
     y, last = y.copy(), np.inf
     for _ in range(ITERATIONS):
         step, residual = _newton_step(system, y, d)
-        size = float(np.max(np.abs(step) / (np.abs(y[columns]) + 1e-14)))
+        step = along @ step
+        size = float(np.max(np.abs(step) / (np.abs(y[rows]) + 1e-14)))
         if not np.isfinite(size):
             break
         if size < NEAR:
-            y[columns] -= step
+            y[rows] -= step
             if size < CONVERGED or size > last / 2:  # no longer quadratic: rounding
                 return y
         elif np.isfinite(last) and residual <= _rounding(system, y, d):
             return y  # what is left of an unknown that is zero is rounding
-        elif not _descend(system, y, d, step, residual):
+        elif not _descend(system, y, d, rows, step, residual):
             break
         last = size
-    names = listed(system.names[i] for i in columns)
+    names = listed(system.names[i] for i in rows)
     raise ValueError(
         f"{where}: expected consistent start values, found no solution of the algebraic "
         f"equations for {names} near their start values; give better ones"
     )
+
+
+def _moved(system: System | Equations) -> tuple[NDArray[np.intp], Array]:
+    """Unknowns that algebraic equations may change, and `free` of these."""
+    rows = np.flatnonzero(system.free.any(axis=1))
+    return rows, system.free[rows]
 
 
 def consistent_many(
@@ -123,8 +130,8 @@ def consistent_many(
         where: for messages.
         y, d: guesses and run data, a row for each member.
     """
-    columns, failed = np.array(system.algebraic[1], dtype=np.intp), dict[int, str]()
-    if not columns.size:
+    (rows, along), failed = _moved(system), dict[int, str]()
+    if not rows.size:
         return y, failed
     guess, y, alone = y, y.copy(), list[int]()
     if system.manifold is not None:
@@ -135,12 +142,12 @@ def consistent_many(
     while todo.size:
         g, J = together([y[todo], d[todo]])
         norm = np.linalg.norm(g, axis=1)
-        step = _newton_steps(g, J)
-        size = np.max(np.abs(step) / (np.abs(y[np.ix_(todo, columns)]) + 1e-14), axis=1)
+        step = _newton_steps(g, J) @ along.T
+        size = np.max(np.abs(step) / (np.abs(y[np.ix_(todo, rows)]) + 1e-14), axis=1)
         near = size < NEAR
         good = np.isfinite(size) & (near | (norm < before[todo]))
         alone += todo[~good].tolist()
-        y[np.ix_(todo[good], columns)] -= step[good]
+        y[np.ix_(todo[good], rows)] -= step[good]
         done = near & ((size < CONVERGED) | (size > last[todo] / 2))
         before[todo], last[todo] = norm, size
         todo = todo[good & ~done]
@@ -201,12 +208,18 @@ def _newton_step(system: System | Equations, y: Array, d: Array) -> tuple[Array,
         return np.full(g.shape[0], np.nan), residual
 
 
-def _descend(system: System | Equations, y: Array, d: Array, step: Array, before: float) -> bool:
-    """Go along `step`, in place, as far as the residual shrinks; whether it does at all."""
-    columns = system.algebraic[1]
-    start = y[columns].copy()
+def _descend(
+    system: System | Equations,
+    y: Array,
+    d: Array,
+    rows: NDArray[np.intp],
+    step: Array,
+    before: float,
+) -> bool:
+    """Move `rows` along `step`, in place, while the residual shrinks; whether it does at all."""
+    start = y[rows].copy()
     for part in 0.5 ** np.arange(12):
-        y[columns] = start - part * step
+        y[rows] = start - part * step
         if _residual(system, y, d) < before:
             return True
     return False

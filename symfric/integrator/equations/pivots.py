@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.equations.lu import Order
+from symfric.integrator.equations.rank import equilibrated
 
 Array = NDArray[np.float64]
 SOUND = 1e-9
@@ -75,7 +76,7 @@ def backward_error(A: Array, order: Order) -> float:
     """Omega of two solutions by elimination in this order, infinite where a pivot is zero."""
     rows, columns = (list(places) for places in zip(*order, strict=True)) if order else ([], [])
     n, permuted = len(rows), A[np.ix_(rows, columns)]
-    _, unit = _equilibrated(permuted)
+    _, unit = equilibrated(permuted)
     signs = np.where(np.arange(n) % 2, -1.0, 1.0)
     right = permuted @ np.column_stack([unit, unit * signs])
     with np.errstate(all="ignore"):
@@ -90,7 +91,7 @@ def regular(A: Array) -> bool:
     """Whether A, with rows and columns of one size, can be told from a singular matrix."""
     if not A.size:
         return True
-    scaled, _ = _equilibrated(A)
+    scaled, _ = equilibrated(A)
     values = np.linalg.svd(scaled, compute_uv=False)
     return bool(values[-1] > REGULAR * values[0])
 
@@ -105,7 +106,7 @@ def best_order(pattern: NDArray[np.bool_], samples: Sequence[Array]) -> Order:
         ValueError: structurally singular.
     """
     n, left = pattern.shape[0], pattern.copy()
-    A = np.stack([_equilibrated(sample)[0] for sample in samples])
+    A = np.stack([equilibrated(sample)[0] for sample in samples])
     rows, columns = np.ones(n, dtype=bool), np.ones(n, dtype=bool)
     order: list[tuple[int, int]] = []
     for _ in range(n):
@@ -144,16 +145,3 @@ def _eliminated(A: Array, right: Array) -> Array:
     for k in range(A.shape[0] - 1, -1, -1):
         x[k] = (x[k] - left[k, k + 1 :] @ x[k + 1 :]) / left[k, k]
     return x
-
-
-def _equilibrated(A: Array) -> tuple[Array, Array]:
-    """A with rows and columns scaled to largest entries near 1, and the scales of its columns."""
-    scaled, unit = A.copy(), np.ones(A.shape[1])
-    for _ in range(8):
-        for axis in (1, 0):
-            size = np.abs(scaled).max(axis=axis, keepdims=True, initial=0.0)
-            factor = 1 / np.where(size > 0.0, size, 1.0)
-            scaled *= factor
-            if axis == 0:
-                unit *= factor[0]
-    return scaled, unit

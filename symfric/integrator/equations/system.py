@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.symbols import stacked
+from symfric.integrator.equations.implicit import implicit_columns
 from symfric.integrator.equations.inputs import Drivers
 from symfric.integrator.equations.lu import Order
 from symfric.integrator.equations.manifold import Manifold, holonomic_columns, manifold
+from symfric.integrator.equations.rank import null_space
 from symfric.model import Model
 from symfric.model.holonomic import Inner
 
@@ -100,19 +102,30 @@ class System:
         return rows, columns
 
     @cached_property
+    def free(self) -> NDArray[np.float64]:
+        """What the algebraic equations may change of y, a column each: M times it is zero.
+
+        Unit vectors of unknowns without rates, where the mass matrix is no wider than its rank.
+        """
+        return null_space(ca.DM(self.mass).full())
+
+    @cached_property
     def constraints(self) -> ca.Function:
-        """(y, d) -> algebraic equations, and their derivatives by the algebraic unknowns; dense."""
-        rows, columns = self.algebraic
-        g = self.f[rows]
-        both = [ca.densify(g), ca.densify(ca.jacobian(g, self.y[columns]))]
+        """(y, d) -> algebraic equations, and their derivatives along `free`; dense."""
+        g = self.f[self.algebraic[0]]
+        slope = ca.jacobian(g, self.y)
+        columns = self.algebraic[1]
+        along = slope[:, columns] if len(columns) == g.numel() else slope @ ca.DM(self.free)
+        both = [ca.densify(g), ca.densify(along)]
         return ca.Function("constraints", [self.y, self.d], both, {"cse": True})
 
 
 def system(model: Model, inputs: Drivers) -> System:
     """Put the inputs into the model and bring it into the form M y' = f(y, d).
 
-    An implicit model that is linear in x' with a constant matrix keeps that matrix as mass; any
-    other one gets its rates as additional algebraic unknowns, a holonomic one its accelerations.
+    An implicit model that is linear in x' with a constant matrix keeps that matrix as mass, be it
+    singular; any other one gets its rates as additional algebraic unknowns
+    (`symfric.integrator.equations.implicit`), a holonomic one its accelerations.
 
     Raises:
         ValueError: a model without unknowns.
@@ -178,12 +191,4 @@ def _columns(model: Model) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
     if model.ode is not None:
         f = ca.vertcat(model.ode, model.alg)
         return ca.vertcat(x, z), f, ca.diagcat(ca.SX.eye(nx), ca.SX(z.numel(), z.numel())), names
-    matrix = ca.jacobian(model.residual, model.xdot)
-    if matrix.is_constant():
-        f = -ca.substitute(model.residual, model.xdot, ca.SX.zeros(nx))
-        mass = ca.horzcat(matrix, ca.SX(matrix.size1(), z.numel()))
-        return ca.vertcat(x, z), f, mass, names
-    f = ca.vertcat(model.xdot, model.residual)
-    mass = ca.diagcat(ca.SX.eye(nx), ca.SX(f.numel() - nx, f.numel() - nx))
-    names = [*names[:nx], *(f"{v.name}_dot" for v in model.x), *names[nx:]]
-    return ca.vertcat(x, model.xdot, z), f, mass, names
+    return implicit_columns(model)

@@ -28,7 +28,7 @@ from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
-Places = tuple[int, ...]
+Rows = tuple[tuple[float, ...], ...]
 Packed = tuple[tuple[str, str | int], ...]
 WHY = {Stop.ATTEMPTS: Status.MAX_STEPS, Stop.STEP_TOO_SMALL: Status.STEP_TOO_SMALL}
 
@@ -72,7 +72,7 @@ class Job:
         signals: the serialised Function of the signals.
         n_signals: how many there are.
         constraints: the serialised algebraic equations, "" where there are none.
-        algebraic: their rows and columns.
+        free: as `System.free`, row by row.
         manifold: the constraints of a mechanism, Functions serialised; () where it is none.
         names: of the unknowns.
         nx: number of differential states.
@@ -87,7 +87,7 @@ class Job:
     signals: str
     n_signals: int
     constraints: str
-    algebraic: tuple[Places, Places]
+    free: Rows
     manifold: Packed
     names: tuple[str, ...]
     nx: int
@@ -112,7 +112,7 @@ class Job:
             signals=str(integrator.signals.serialize()),
             n_signals=integrator.signals.numel_out(0),
             constraints=str(s.constraints.serialize()) if s.algebraic[0] else "",
-            algebraic=(tuple(s.algebraic[0]), tuple(s.algebraic[1])),
+            free=tuple(map(tuple, s.free.tolist())),
             manifold=_packed(s.manifold),
             names=s.names,
             nx=s.nx,
@@ -180,8 +180,7 @@ def _packed(manifold: Manifold | None) -> Packed:
 def _equations(
     names: tuple[str, ...],
     nx: int,
-    rows: Places,
-    columns: Places,
+    free: Rows,
     constraints: str,
     manifold: Packed,
 ) -> tuple[Equations, Columns]:
@@ -192,8 +191,7 @@ def _equations(
             for name, value in manifold
         }
         mechanism = Manifold(**values)
-    places = (list(rows), list(columns))
-    return Equations(names, nx, places, function, mechanism), Columns(function)
+    return Equations(names, nx, np.array(free), function, mechanism), Columns(function)
 
 
 @lru_cache(16)
@@ -239,9 +237,7 @@ def _follow(
     job: Job, chunk: Chunk, S: Array, alive: Indices, interval: int, failed: dict[int, str]
 ) -> Indices:
     """Let algebraic unknowns follow the input data of an interval; the members that can."""
-    equations, together = _equations(
-        job.names, job.nx, *job.algebraic, job.constraints, job.manifold
-    )
+    equations, together = _equations(job.names, job.nx, job.free, job.constraints, job.manifold)
     d = chunk.R[alive, Given.d(job.nx)]
     d[:, d.shape[1] - job.data.shape[0] :] = job.data[:, interval]
     S[alive, State.Y], refused = consistent_many(

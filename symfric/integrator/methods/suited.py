@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.integrator.equations.initial import consistent
+from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.lu import Order
 from symfric.integrator.equations.pivots import Factors, backward_error, best_order, sound
 from symfric.integrator.equations.system import System
@@ -61,9 +61,7 @@ def suited_to_start(system: System, method: Method, model: Model) -> System:
     """
     if system.manifold is not None or system.is_ode:
         return system
-    guesses = {v.name: float(v.start) for v in model.z}
-    y = np.array([guesses.get(name, 0.0) for name in system.names])
-    y[: system.nx] = model.initial_state()
+    y = first_guess(system, model, model.initial_state())
     d = np.concatenate([model.values("p"), model.values("u")])
     with suppress(ValueError):
         return suited(system, method, [(consistent(system, "start", y, d), d)], 1.0)
