@@ -1,6 +1,5 @@
 """Options that several commands share, and what their texts mean."""
 
-import os
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +9,8 @@ import typer
 
 from symfric import Law, law_from_text, parameters, with_values
 from symfric.foundation import checks
+from symfric.foundation.files import check_file
+from symfric.foundation.files import check_folder as check_folder
 from symfric.foundation.parameters import check_names, options
 from symfric.laws import AnyLaw, any_from_text
 
@@ -92,20 +93,4 @@ def check_outputs(*paths: str | Path | None, picture: Path | None = None) -> Non
     for path in (*paths, picture):
         if path is None or str(path) == "-":
             continue
-        target = Path(path)
-        if target.is_dir():
-            raise ValueError(f"output '{path}': expected a file name, got a folder")
-        check_folder(target.parent)
-
-
-def check_folder(folder: Path) -> None:
-    """Refuse an output folder that can neither be written nor made.
-
-    Raises:
-        ValueError: it, or the nearest folder above it, is a file or without permission.
-    """
-    existing = next(place for place in (folder, *folder.absolute().parents) if place.exists())
-    if not existing.is_dir():
-        raise ValueError(f"output '{folder}': expected a folder, got the file '{existing}'")
-    if not os.access(existing, os.W_OK):
-        raise ValueError(f"output '{folder}': expected a writable place, got no permission")
+        check_file(path)

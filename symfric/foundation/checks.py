@@ -108,20 +108,21 @@ def number(
         ValueError: no number, NaN, infinite, or out of bounds.
     """
     found, unit = as_number(value), f" [{unit}]" * bool(unit)
-    if found is None or not isfinite(found):
-        raise refused(where, f"a finite number{unit}", value, hint)
-    if above is not None and not found > above:
-        raise refused(where, f"a number > {above:g}{unit}", value, hint)
-    if not lower <= found <= upper:
-        least = f"{lower:g} <= " if lower > -inf else ""
-        most = f" <= {upper:g}" if upper < inf else ""
-        what = f"{least}number{most}" if least and most else f"a number {_bound(lower, upper)}"
-        raise refused(where, what + unit, value, hint)
+    good = found is not None and isfinite(found) and lower <= found <= upper
+    if found is None or not good or (above is not None and not found > above):
+        raise refused(where, _bounded(lower, upper, above) + unit, value, hint)
     return found
 
 
-def _bound(lower: float, upper: float) -> str:
-    return f">= {lower:g}" if lower > -inf else f"<= {upper:g}"
+def _bounded(lower: float, upper: float, above: float | None) -> str:
+    """A number within bounds, in words."""
+    if above is not None:
+        return f"a number > {above:g}" + (f" and <= {upper:g}" if upper < inf else "")
+    if lower > -inf and upper < inf:
+        return f"{lower:g} <= number <= {upper:g}"
+    if lower > -inf:
+        return f"a number >= {lower:g}"
+    return f"a number <= {upper:g}" if upper < inf else "a finite number"
 
 
 def parsed(where: str, text: str) -> float:

@@ -6,22 +6,21 @@ from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from symfric.foundation import checks
+
 
 @contextmanager
 def written(path: str | Path) -> Generator[Path, None, None]:
     """A temporary path beside `path` that takes its name when the block ends without error.
 
-    The folder is made where it is missing. After an error or an interrupt the old file, if any, is
-    as it was and nothing is left behind.
+    The folder is made where it is missing (see `check_folder`). After an error or an interrupt the
+    old file, if any, is as it was and nothing is left behind.
 
     Raises:
         ValueError: the path is a folder or a device, or its folder cannot be made or written.
     """
-    target = Path(path).resolve()  # a link stays a link to the new file
+    target = check_file(path)
     try:
-        if target.exists() and not target.is_file():
-            kind = "a folder" if target.is_dir() else "a device"
-            raise ValueError(f"output '{path}': expected a file name, got {kind}")
         target.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(
             prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent
@@ -41,6 +40,59 @@ def written(path: str | Path) -> Generator[Path, None, None]:
     finally:
         with suppress(FileNotFoundError):
             temporary.unlink()
+
+
+def check_file(path: str | Path) -> Path:
+    """The file that `path` means, links followed; refuses what cannot be written.
+
+    Raises:
+        ValueError: no path, a folder, a device, a circle of links, or see `check_folder`.
+    """
+    place = checks.path("output", path)
+    try:
+        target = place.resolve()  # a link stays a link to the new file
+        target.is_symlink()
+        if target.exists() and not target.is_file():
+            kind = "a folder" if target.is_dir() else "a device"
+            raise ValueError(f"output '{path}': expected a file name, got {kind}")
+    except (OSError, RuntimeError) as error:
+        raise ValueError(f"output '{path}': expected a file name, got {_reason(error)}") from None
+    check_folder(target.parent)
+    return target
+
+
+def check_folder(folder: str | Path) -> Path:
+    """An output folder, which may be missing.
+
+    Missing folders are made below one that exists, but not directly below the root of the file
+    system, where a wrong first name would grow a tree of its own.
+
+    Raises:
+        ValueError: it, or the nearest folder above it, is a file, the root or without permission.
+    """
+    place = checks.path("output", folder)
+    try:
+        absolute = place.resolve()
+        existing = next(p for p in (absolute, *absolute.parents) if p.exists())
+    except (OSError, RuntimeError) as error:
+        raise ValueError(f"output '{folder}': expected a folder, got {_reason(error)}") from None
+    if not existing.is_dir():
+        raise ValueError(f"output '{folder}': expected a folder, got the file '{existing}'")
+    if existing != absolute and existing == Path(absolute.anchor):
+        first = absolute.parts[1]
+        raise ValueError(
+            f"output '{folder}': expected a folder that exists, got none named '{existing / first}'"
+            "; check the path or make the folder first"
+        )
+    if not os.access(existing, os.W_OK):
+        raise ValueError(f"output '{folder}': expected a writable place, got no permission")
+    return absolute
+
+
+def _reason(error: OSError | RuntimeError) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror.lower()
+    return "a circle of links"
 
 
 def write_text(path: str | Path, text: str) -> None:

@@ -6,13 +6,18 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from symfric.foundation import checks
 from symfric.foundation.files import written
 
 
 def save(figure: Figure, path: str | Path | None) -> Figure:
     """Write `figure` to `path`, if given, and close it; return it either way."""
     if path is not None:
-        with written(path) as temporary:
+        known = sorted(figure.canvas.get_supported_filetypes())
+        place = checks.path("picture", path)
+        ending = place.suffix.removeprefix(".").lower()
+        checks.check_names(f"picture '{path}': ending", [ending], known)
+        with written(place) as temporary:
             figure.savefig(temporary, dpi=150)
         plt.close(figure)
     return figure

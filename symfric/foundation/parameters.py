@@ -126,7 +126,7 @@ class Variable:
             raise checks.refused(f"{where}: start", "a number or one expression", self.start)
         checks.number(f"{where}: nominal", self.nominal, above=0.0)
         low, high = (checks.as_number(bound) for bound in (self.lower, self.upper))
-        if low is None or high is None or not low <= high:
+        if low is None or high is None or not low <= high or low == inf or high == -inf:
             shown = f"{checks.shown(self.lower)} and {checks.shown(self.upper)}"
             raise ValueError(f"{where}: expected numbers lower <= upper, got {shown}")
 

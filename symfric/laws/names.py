@@ -2,10 +2,11 @@
 
 from re import fullmatch
 
+from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
-from symfric.laws.base.law import Law
+from symfric.laws.base.law import Law, check_law
 from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum
-from symfric.laws.composed.populations import AnyLaw, GenericAsperity, RandomBristles
+from symfric.laws.composed.populations import AnyLaw, GenericAsperity, Population, RandomBristles
 from symfric.laws.composed.wrap import Lagged, TemperatureDependent
 from symfric.laws.dynamic import DYNAMIC_LAWS
 from symfric.laws.static import STATIC_LAWS
@@ -45,8 +46,14 @@ WRAPPERS: dict[str, type[LoadDependent | Lagged | TemperatureDependent]] = {
 """Laws around one law, by the name that stands before its parentheses."""
 
 
+DEEPEST = 20
+"""Laws in each other; deeper texts are no laws, and exhaust the stack."""
+
+
 def law_name(law: AnyLaw) -> str:
     """The text that `any_from_text` turns into a law of this kind; the class name of your own."""
+    if not isinstance(law, Law | Population):  # pyright: ignore[reportUnnecessaryIsInstance]
+        check_law("law_name", law)
     if isinstance(law, Sum):
         return "+".join(law_name(term) for term in law.laws)
     if isinstance(law, Asymmetric):
@@ -60,6 +67,7 @@ def law_name(law: AnyLaw) -> str:
 
 def any_from_text(text: str) -> AnyLaw:
     """The law or population with default parameters that `text` names; raises `law_from_text`'s."""
+    checks.text("law", text, "the name of a law, such as lugre")
     name = ALIASES.get(text.strip(), text.strip())
     return POPULATIONS[name]() if name in POPULATIONS else law_from_text(text)
 
@@ -74,6 +82,7 @@ def law_from_text(text: str) -> Law:
     Raises:
         ValueError: unknown name (the closest one is offered), empty term, unbalanced parentheses.
     """
+    checks.text("law", text, "the name of a law, such as lugre")
     terms = _split_terms(text)
     laws = tuple(_single(term, text) for term in terms)
     return laws[0] if len(laws) == 1 else Sum(laws)
@@ -94,26 +103,29 @@ def _single(term: str, text: str) -> Law:
         )
     if name in ("asymmetric", *WRAPPERS):
         raise ValueError(f"law '{text}': expected a law to wrap, as in {name}(stribeck), got none")
-    check_names(f"law '{text}'", [name], ALL_LAWS)
+    check_names(f"law {checks.shown(text)}", [name], ALL_LAWS, "`symfric laws` lists them")
     return ALL_LAWS[name]()
 
 
 def _split_terms(text: str) -> list[str]:
     """Split at the plus signs outside parentheses."""
+    where = f"law {checks.shown(text)}"
     terms, depth = [""], 0
     for letter in text.replace(" ", ""):
         depth += (letter == "(") - (letter == ")")
         if depth < 0:
             break
+        if depth > DEEPEST:
+            raise ValueError(f"{where}: expected at most {DEEPEST} laws in each other, got more")
         if letter == "+" and depth == 0:
             terms.append("")
         else:
             terms[-1] += letter
     if depth != 0:
-        raise ValueError(f"law '{text}': expected balanced parentheses")
+        raise ValueError(f"{where}: expected balanced parentheses, got {abs(depth)} too many")
     if not all(terms):
         raise ValueError(
-            f"law '{text}': expected the name of a law, got an empty term; "
+            f"{where}: expected the name of a law, got an empty term; "
             "write one as in coulomb+viscous"
         )
     return terms

@@ -164,6 +164,7 @@ class Model:
         Raises:
             ValueError: unknown name.
         """
+        checks.text(f"model '{self.name}'", name, "the name of a signal")
         variables = {v.name: v.symbol for group in (self.x, self.z, self.u) for v in group}
         if name in variables:
             return variables[name]
@@ -183,6 +184,7 @@ class Model:
             ValueError: unknown name, or "ode" of an implicit model.
         """
         t, x, z, u, p = self.t, *(self.vector(letter) for letter in "xzup")
+        checks.text(f"model '{self.name}'", what, "the name of a function")
         if what == "residual":
             return ca.Function(
                 "residual",

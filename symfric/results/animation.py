@@ -16,6 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from symfric.foundation import checks
 from symfric.foundation.files import write_text, written
 from symfric.model.sketch import Sketch
 from symfric.results.strokes import AZIMUTH, ELEVATION, Poses, Stroke, View, look, strokes
@@ -50,8 +51,8 @@ def animate(
     """
     check_format(path)
     for name, value in (("fps", fps), ("speed", speed)):
-        if value is not None and not 0 < value < np.inf:
-            raise ValueError(f"animation: {name}: expected a number > 0, got {value:g}")
+        if value is not None:
+            checks.number(f"animation: {name}", value, above=0.0)
     times, speed = frame_times(float(trajectory.t[0]), float(trajectory.t[-1]), fps, speed)
     figure, pose = picture(trajectory, times, speed)
 
@@ -75,7 +76,7 @@ def check_format(path: str | Path) -> None:
     Raises:
         ValueError: another ending than .gif, .html and .mp4, or .mp4 without ffmpeg.
     """
-    ending = Path(path).suffix.lower()
+    ending = checks.path("animation", path).suffix.lower()
     if ending not in ENDINGS:
         raise ValueError(
             f"animation '{path}': expected a file ending in {', '.join(ENDINGS)}, got '{ending}'"

@@ -35,6 +35,8 @@ def _pieces(trajectory: "Trajectory", expression: ca.SX, a: Array, b: Array) -> 
     """Integrals over the intervals from a to b, each within a step, shape (rows, intervals)."""
     half = (b - a)[:, None] / 2
     at = (a + b)[:, None] / 2 + half * NODES
+    if not at.size:
+        return np.zeros((expression.numel(), 0))
     values = np.atleast_2d(trajectory.of(expression, at.ravel()))
     return np.einsum("rkg,g,k->rk", values.reshape(-1, *at.shape), WEIGHTS, half[:, 0])
 

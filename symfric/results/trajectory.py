@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from symfric.foundation import checks
 from symfric.foundation.files import write_text, written
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import check_names
@@ -140,8 +141,11 @@ class Trajectory:
         if self.pull_back is None:
             raise self._without_derivatives
         where = f"trajectory of '{self.scene}'"
-        check_names(f"{where}: gradient", weights, self.units)
-        given = {name: np.asarray(w, dtype=float) for name, w in weights.items()}
+        named = checks.named(f"{where}: gradient", weights, self.units)
+        given = {
+            name: checks.array(f"{where}: gradient: {name}", w, ndim=None)
+            for name, w in named.items()
+        }
         odd = {name: w.shape for name, w in given.items() if w.shape not in ((), self.t.shape)}
         if odd:
             raise ValueError(
@@ -160,7 +164,7 @@ class Trajectory:
     def __getitem__(self, name: str) -> Array:
         if name == "t":
             return self.t
-        if name not in self.units:
+        if not isinstance(name, str) or name not in self.units:  # pyright: ignore[reportUnnecessaryIsInstance]
             self.check([name])
             return self._further[name]
         states = self._own_states
@@ -187,7 +191,8 @@ class Trajectory:
         Raises:
             ValueError: unknown names, with the nearest known one.
         """
-        names = list(names)
+        where = f"trajectory of '{self.scene}'"
+        names = [checks.text(where, name, "the name of a signal") for name in names]
         known = self.units if all(n in self.units for n in names) else self.units | self.details
         check_names(f"trajectory of '{self.scene}'", names, known)
 
@@ -204,7 +209,8 @@ class Trajectory:
         Raises:
             ValueError: a symbol that is none of the model's, a time outside the span.
         """
-        column, model = ca.SX(expression), self.model
+        where = f"trajectory of '{self.scene}': of"
+        column, model = ca.SX(checks.expression(where, expression)), self.model
         known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
         stray = strays(column, known)
         if stray:
@@ -249,7 +255,10 @@ class Trajectory:
         return self.evaluate(self._inside(times))
 
     def _inside(self, times: ArrayLike) -> Array:
-        at = np.atleast_1d(np.asarray(times, dtype=float))
+        where = f"trajectory of '{self.scene}': times"
+        at = np.atleast_1d(checks.array(where, times, ndim=None, what="times [s]"))
+        if at.ndim > 1:
+            raise checks.refused(where, "a time or a sequence of times [s]", times)
         first, last = self.steps[0], self.steps[-1]
         if at.size and not (first <= at.min() and at.max() <= last):
             raise ValueError(

@@ -4,6 +4,7 @@ from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from typing import ClassVar, final
 
+from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, column, empty, is_casadi, smallest
 from symfric.foundation.parameters import Parametric, distinct, param, parameters, with_values
 from symfric.laws.base import smooth
@@ -29,11 +30,12 @@ class Sum(Law):
     laws: tuple[Law, ...]
 
     def __post_init__(self) -> None:
-        for law in self.laws:
+        laws = checks.many("Sum", self.laws, "laws")
+        for law in laws:
             check_law("Sum", law)
-        if len(self.laws) < 2:
-            raise ValueError(f"Sum: expected at least two laws, got {len(self.laws)}")
-        terms = (law.laws if isinstance(law, Sum) else (law,) for law in self.laws)
+        if len(laws) < 2:
+            raise ValueError(f"Sum: expected at least two laws, got {len(laws)}")
+        terms = (law.laws if isinstance(law, Sum) else (law,) for law in laws)
         object.__setattr__(self, "laws", tuple(law for group in terms for law in group))
         super().__post_init__()
 

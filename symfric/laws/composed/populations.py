@@ -13,6 +13,7 @@ from typing import ClassVar, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, column, expm1, sin
 from symfric.foundation.parameters import Parametric, param
 from symfric.laws.base import smooth
@@ -56,12 +57,9 @@ class Population(Parametric, ABC):
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("count", "seed"):
-            value = getattr(self, name)
-            if value != int(value):
-                raise ValueError(
-                    f"{type(self).__name__}: {name}: expected a whole number, got {value}"
-                )
-            object.__setattr__(self, name, int(value))
+            least = 1 if name == "count" else 0
+            whole = checks.count(f"{type(self).__name__}: {name}", getattr(self, name), least=least)
+            object.__setattr__(self, name, whole)
 
     @property
     @abstractmethod

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
+from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, column, exp
 from symfric.foundation.parameters import Parametric, option, param
 from symfric.laws.base import smooth
@@ -86,6 +87,15 @@ class GMS(Law):
         0.03, unit="1", role="shape", doc="share over which slip sets in", lower=1e-6, upper=0.5
     )
     form: str = option("smooth", choices=("smooth", "event"), doc="latched, or exact with modes")
+
+    def __post_init__(self) -> None:
+        elements = checks.many("GMS: elements", self.elements, "Element(...)")
+        for element in elements:
+            checks.kind("GMS: elements", element, Element, "Element(...)")
+        if not elements:
+            raise ValueError("GMS: elements: expected at least one, got none")
+        object.__setattr__(self, "elements", elements)
+        super().__post_init__()
 
     @property
     def states(self) -> tuple[State, ...]:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
+from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, column
 from symfric.foundation.parameters import Parametric, option, param
 from symfric.laws.base import smooth
@@ -65,6 +66,15 @@ class MaxwellSlip(Law):
         1e-8, unit="1", role="width", doc="smoothing of the load share", lower=1e-12
     )
     form: str = option("smooth", choices=("smooth", "event"), doc="rounded, or exact with modes")
+
+    def __post_init__(self) -> None:
+        elements = checks.many("MaxwellSlip: elements", self.elements, "Slider(...)")
+        for element in elements:
+            checks.kind("MaxwellSlip: elements", element, Slider, "Slider(...)")
+        if not elements:
+            raise ValueError("MaxwellSlip: elements: expected at least one, got none")
+        object.__setattr__(self, "elements", elements)
+        super().__post_init__()
 
     @property
     def states(self) -> tuple[State, ...]:

@@ -7,6 +7,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import param
 from symfric.laws.base import smooth
@@ -42,15 +43,16 @@ class Table(StaticLaw):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        v, mu = np.asarray(self.speeds, float), np.asarray(self.coefficients, float)
-        if v.ndim != 1 or v.shape != mu.shape or v.size < 2:
+        v = checks.array("Table: speeds", self.speeds)
+        mu = checks.array("Table: coefficients", self.coefficients)
+        if v.shape != mu.shape or v.size < 2:
             raise ValueError(
                 "Table: expected as many coefficients as speeds, two or more, got "
                 f"{v.size} speeds and {mu.size} coefficients"
             )
-        if not (np.isfinite(v).all() and (np.diff(v) > 0).all() and v[0] >= 0):
+        if not ((np.diff(v) > 0).all() and v[0] >= 0):
             raise ValueError(f"Table: speeds: expected 0 <= rising numbers, got {self.speeds}")
-        if not (np.isfinite(mu).all() and (mu >= 0).all()):
+        if not (mu >= 0).all():
             raise ValueError(f"Table: coefficients: expected numbers >= 0, got {self.coefficients}")
 
     @property

@@ -82,10 +82,27 @@ def test_device_is_refused_and_stays_one(tmp_path: Path) -> None:
 
 def test_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(ValueError, match=r"expected a writable place, got (Not a dir|File exists)"):
+    with pytest.raises(ValueError, match=r"expected a folder, got (the file|not a dir)"):
         write_text(tmp_path / "file" / "below.txt", "")
 
 
 def test_name_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"expected a writable place, got File name too long"):
+    with pytest.raises(ValueError, match=r"expected a file name, got file name too long"):
         write_text(tmp_path / ("a" * 300), "")
+
+
+def test_no_folder_grows_directly_below_the_root() -> None:
+    """`--plot /nonexist/x.png` made /nonexist."""
+    path = Path("/a-folder-nobody-has/below/x.png")
+    with pytest.raises(ValueError, match=r"expected a folder that exists, got none named '/a-fol"):
+        write_text(path, "")
+    assert not path.parents[1].exists()
+
+
+def test_a_circle_of_links_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a").symlink_to(tmp_path / "b")
+    (tmp_path / "b").symlink_to(tmp_path / "a")
+    with pytest.raises(ValueError, match=r"output '.*': expected a .*, got (a circle|too many)"):
+        write_text(tmp_path / "a", "")
+    with pytest.raises(ValueError, match=r"output '.*': expected a .*, got (a circle|too many)"):
+        write_text(tmp_path / "a" / "c.txt", "")

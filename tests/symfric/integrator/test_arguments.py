@@ -34,7 +34,7 @@ def test_good_arguments_pass_without_a_word() -> None:
         (np.nan, 1.0, 1e-6, "here: t_start: expected a finite number \\[s\\], got nan"),
         (0.0, np.inf, 1e-6, "here: t_end: expected a finite number \\[s\\], got inf"),
         (0.0, 1.0, 1e-14, "here: rtol: expected 1e-13 <= number <= 0.1, got 1e-14"),
-        (0.0, 1.0, np.nan, "here: rtol: expected a finite number, got nan"),
+        (0.0, 1.0, np.nan, "here: rtol: expected 1e-13 <= number <= 0.1, got nan"),
     ],
 )
 def test_empty_span_and_odd_tolerance_are_refused(

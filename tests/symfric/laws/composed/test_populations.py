@@ -118,7 +118,7 @@ def test_bad_motion_is_refused(t: list[float], x: list[float], message: str) -> 
 
 @pytest.mark.parametrize("kind", [GenericAsperity, RandomBristles])
 def test_a_broken_count_is_refused(kind: type[Population]) -> None:
-    with pytest.raises(ValueError, match=r"count: expected a whole number, got 2.5"):
+    with pytest.raises(ValueError, match=r"count: expected a whole number >= 1, got 2.5"):
         kind(count=2.5)  # pyright: ignore[reportArgumentType]
     with pytest.raises(ValueError, match=r"count: expected 1 <= count"):
         kind(count=0)
