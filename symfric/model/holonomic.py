@@ -49,6 +49,8 @@ class Holonomic:
             the first n are affine in a.
         rates: SX (nx - 2 n, 1), rates of the other states.
         solve: applies M^-1 to a column, where there is a shorter way than to factorise M.
+        norms: how many of the multipliers, the last ones, belong to norms of Euler parameters: they
+            load nothing, and error control leaves them alone.
         index: 0 has it integrated in the tangent space of its constraints, in as many unknowns as
             there are degrees of freedom; 1 in all coordinates, which are put back onto the
             constraints at the end of every step. The solution is the same, to the tolerance.
@@ -65,6 +67,7 @@ class Holonomic:
     implicit: ca.SX
     rates: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
     solve: Callable[[ca.SX], ca.SX] | None = None
+    norms: int = 0
     index: int = 1
     inner: Inner | None = None
     pressing: ca.SX = field(default_factory=lambda: ca.SX(0, 1))

@@ -68,8 +68,8 @@ def coordinates(topology: Topology) -> tuple[Variables, Variables]:
         joint = link.joint
         quaternion = range(0) if joint.quaternion is None else range(joint.quaternion, link.n)
         given = zip(joint.coordinates, joint.starts, joint.rates, strict=True)
-        for i, ((suffix, unit), start, rate) in enumerate(given):
-            name = f"{joint.name}_{suffix}" if suffix else joint.name
+        for i, ((_, unit), start, rate) in enumerate(given):
+            name = joint.coordinate(i)
             per_second = "1/s" if i in quaternion else f"{unit}/s"
             q.append(Variable(name, unit, start=start, doc="joint coordinate"))
             qd.append(Variable(f"{name}_rate", per_second, start=rate, doc="joint rate"))
@@ -190,8 +190,9 @@ def assemble(
         eq.phi,
         eq.a,
         ca.vertcat(balance, phi_ddot, normals),
-        stacked(s.rate for s in contacts),
+        stacked((*(t.rate for t in eq.turns), *(s.rate for s in contacts))),
         partial(solve_mass, eq),
+        eq.norms,
         index,
         None if cut is None else _inner(cut, eq, contacts, forces),
         *_pressing(contacts, ca.vertcat(eq.a, before)),
@@ -205,7 +206,7 @@ def assemble(
     names = {s.contact.name: x for s, x in scales}
     return Model(
         name=name,
-        x=(*q, *qd, *(v for s in contacts for v in s.states)),
+        x=(*q, *qd, *(t.angle for t in eq.turns), *(v for s in contacts for v in s.states)),
         z=(*multipliers, *(v for s in contacts for v in s.unknown)),
         u=u,
         p=p,

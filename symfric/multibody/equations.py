@@ -1,7 +1,7 @@
 """All expressions of a mechanism in one choice of coordinates."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import final
 
 import casadi as ca
@@ -24,6 +24,7 @@ from symfric.multibody.joints import Joint
 from symfric.multibody.kinematics import Kinematics, kinematics
 from symfric.multibody.spatial import vector
 from symfric.multibody.topology import Topology, body_of, frame_at
+from symfric.multibody.turns import Turn, Turns
 
 
 @final
@@ -36,6 +37,7 @@ class Equations:
         lam: multipliers of loops, then further constraints, then Euler parameters, shape (m, 1).
         F: friction forces of the contacts [N].
         held: constraints that are no joints.
+        turns: angles of loops that forces ask for.
         norms: how many Euler parameters there are, whose norms are the last constraints.
         phi, phi_dot, phi_ddot: constraints on three levels, shape (m, 1).
         balance: M a + Phi_q' lam - Q, shape (n, 1), affine in a, lam and F.
@@ -49,6 +51,7 @@ class Equations:
     kin: Kinematics
     loops: tuple[Loop, ...]
     held: tuple[Held, ...]
+    turns: tuple[Turn, ...]
     norms: int
     q: ca.SX
     qd: ca.SX
@@ -123,6 +126,8 @@ def equations(
     closed = loops(kin)
     norms, along, inertia = normalisations(kin)
     held = tuple(c.held(kin, by_name) for c in constraints)
+    turns = Turns()
+    kin = replace(kin, turns=turns)
     phi = ca.vertcat(ca.SX(0, 1), *(part.phi for part in (*closed, *held)), norms)
     kept = range(phi.numel()) if kept is None else kept
     lam = ca.SX.sym("lam", len(kept))
@@ -147,6 +152,7 @@ def equations(
         kin,
         closed,
         held,
+        turns.found,
         norms.numel(),
         q,
         qd,
@@ -203,7 +209,7 @@ def _contacts(kin: Kinematics, joints: Sequence[Joint]) -> list[Contact]:
         friction = joint.friction
         for direction in joint.rubs:
             name = joint.name if len(joint.rubs) == 1 else f"{joint.name}_{direction}"
-            rate = kin.spin(joint) if direction == "ball" else kin.along(joint, direction)[1]
+            rate = kin.spin(joint) if direction == "ball" else kin.rate(joint, direction)
             slip = rate if direction == "slide" else friction.arm * rate
             law = SpatialSlip(friction.law) if direction == "ball" else friction.law
             pressed = name if direction in ("x", "y") else joint.name
@@ -241,5 +247,5 @@ def _power(kin: Kinematics, loads: Sequence[Load | Axial]) -> ca.SX:
         if isinstance(load, Load):
             total += load.power(kin)
         else:
-            total += load.value * kin.along(load.joint, load.direction)[1]
+            total += load.value * kin.rate(load.joint, load.direction)
     return total

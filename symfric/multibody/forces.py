@@ -179,7 +179,8 @@ class JointSpringDamper(Force):
         f = -stiffness (s - rest) - damping s' + actuator
 
     with s the displacement [m] or angle [rad]; f acts on the child, its opposite on the parent.
-    The angle of a joint that closes a loop lies between -pi and pi.
+    The angle counts full turns. Where the joint closes a loop, it is a state of the model with the
+    joint's name, which starts with the turns of the joint's `start`.
     """
 
     joint: str
@@ -202,9 +203,10 @@ class JointSpringDamper(Force):
         """One axial load."""
         joint = joints[self.joint]
         f = ca.SX(self.actuator)
-        if not (equals(self.stiffness, 0.0) and equals(self.damping, 0.0)):
-            s, rate = kin.along(joint, self.direction)
-            f = f - self.stiffness * (s - self.rest) - self.damping * rate
+        if not equals(self.stiffness, 0.0):
+            f -= self.stiffness * (kin.along(joint, self.direction)[0] - self.rest)
+        if not equals(self.damping, 0.0):
+            f -= self.damping * kin.rate(joint, self.direction)
         yield Axial(joint, self.direction, f)
 
     def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
@@ -221,8 +223,8 @@ class UserForce(Force):
     """A force [N] and a moment [N m] on a place, expressions of any body's motion.
 
     `expression` takes the kinematics, which answers `point("body.frame")` with position and
-    velocity and `motion["body"]` with R, p, w, v, and returns force and moment in world
-    components.
+    velocity, `motion["body"]` with R, p, w, v, `along(joint, direction)` with a displacement or an
+    angle over full turns and its rate, and returns force and moment in world components.
     """
 
     place: str

@@ -2,11 +2,12 @@
 
 import casadi as ca
 
-from symfric.foundation.symbols import stacked, symbols_of
+from symfric.foundation.symbols import stacked, starts_of, symbols_of
 from symfric.model import Variables
 from symfric.multibody.assembly import slips
 from symfric.multibody.body import GROUND
 from symfric.multibody.mechanism import Mechanism
+from symfric.multibody.turns import angles
 
 
 def functions(
@@ -34,6 +35,9 @@ def functions(
 
     Raises:
         ValueError: as `Mechanism.build`.
+
+    Limits: q alone does not count the full turns of a joint that closes a loop; springs about its
+    axis are taken at the angle nearest to the start.
     """
     eq = mechanism.prepare(p, formulation).eq
     q, qd, a, lam = eq.q, eq.qd, eq.a, eq.lam
@@ -53,8 +57,11 @@ def functions(
         "q": q, "qd": qd, "a": a, "lam": lam, "z": z, "u": u, "p": parameters, "t": eq.kin.t,
     }  # fmt: skip
 
+    turned = ca.densify(starts_of(turn.angle for turn in eq.turns))
+
     def function(name: str, arguments: str, **results: ca.SX) -> ca.Function:
         expressions = [ca.densify(result) for result in results.values()]
+        expressions = ca.substitute(expressions, [angles(eq.turns)], [turned])
         named = arguments.split()
         if ca.depends_on(ca.veccat(*expressions), eq.kin.t):
             named.append("t")

@@ -95,6 +95,11 @@ class Joint(ABC):
         """Whether motion in this direction is a translation [m], not a rotation [rad]."""
         return self.coordinates[self.directions[direction]][1] == "m"
 
+    def coordinate(self, k: int) -> str:
+        """Name of a joint coordinate."""
+        suffix = self.coordinates[k][0]
+        return f"{self.name}_{suffix}" if suffix else self.name
+
     def axis(self, direction: str, R: ca.SX) -> ca.SX:
         """Axis of a direction in P, shape (3, 1)."""
         return _unit("xyz".index(direction) if direction in "xyz" else 2)

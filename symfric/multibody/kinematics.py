@@ -9,6 +9,7 @@ from symfric.multibody.body import GROUND
 from symfric.multibody.cuts import Cuts
 from symfric.multibody.joints import Joint
 from symfric.multibody.topology import Link, Topology, body_of, frame_at
+from symfric.multibody.turns import Turns
 
 ZERO = ca.SX(3, 1)
 
@@ -82,7 +83,7 @@ class Relative:
 class Kinematics:
     """Motions of all bodies in terms of coordinates q, rates qd and accelerations qdd.
 
-    What a force or a constraint may ask: `motion`, `point`, `along` and the time `t`.
+    What a force or a constraint may ask: `motion`, `point`, `along`, `rate` and the time `t`.
     """
 
     topology: Topology
@@ -92,6 +93,7 @@ class Kinematics:
     motion: dict[str, Motion]
     t: ca.SX
     cuts: Cuts | None = None
+    turns: Turns | None = None
 
     def point(self, place: str) -> tuple[ca.SX, ca.SX]:
         """Position and velocity in the world of the origin of the frame "body.frame"."""
@@ -135,16 +137,25 @@ class Kinematics:
     def along(self, joint: Joint, direction: str) -> tuple[ca.SX, ca.SX]:
         """Displacement or angle of a joint in one of its `directions`, and its rate.
 
-        The angle of a joint that closes a loop lies between -pi and pi.
+        For a constraint the angle of a joint that closes a loop lies between -pi and pi.
         """
+        link, rate = self.topology.link_of.get(joint.name), self.rate(joint, direction)
+        if link is not None:
+            return self.q[link.first + joint.directions[direction]], rate
+        relative = self.relative(joint)
+        s = joint.displacement(direction, relative.R, relative.p)
+        if self.turns is None or joint.linear(direction):
+            return s, rate
+        return self.turns(joint, direction, s, rate), rate
+
+    def rate(self, joint: Joint, direction: str) -> ca.SX:
+        """Rate of the displacement or angle of a joint in one of its `directions`."""
         link = self.topology.link_of.get(joint.name)
         if link is not None:
-            k = link.first + joint.directions[direction]
-            return self.q[k], self.qd[k]
+            return self.qd[link.first + joint.directions[direction]]
         relative = self.relative(joint)
         axis = joint.axis(direction, relative.R)
-        rate = ca.dot(axis, relative.v if joint.linear(direction) else relative.w)
-        return joint.displacement(direction, relative.R, relative.p), rate
+        return ca.dot(axis, relative.v if joint.linear(direction) else relative.w)
 
 
 def kinematics(

@@ -19,6 +19,7 @@ from symfric.multibody.forces import Axial, Force
 from symfric.multibody.joints import Joint
 from symfric.multibody.spatial import euler_parameters
 from symfric.multibody.topology import Topology
+from symfric.multibody.turns import angles
 
 Array = NDArray[np.float64]
 LONG, LONG_WITH_FRICTION = 16, 12
@@ -128,7 +129,7 @@ def undeclared(
 ) -> Iterator[str]:
     """Symbols in forces that nobody declared."""
     by_name = {joint.name: joint for joint in joints}
-    known = ca.vertcat(eq.q, eq.qd, p, u, eq.kin.t)
+    known = ca.vertcat(eq.q, eq.qd, angles(eq.turns), p, u, eq.kin.t)
     for force in forces:
         parts: list[ca.SX] = []
         for load in force.loads(eq.kin, by_name):
@@ -142,8 +143,9 @@ def without_friction(made: Prepared, p: Variables, u: Variables) -> dict[str, Ar
     eq = made.eq
     unknowns = ca.vertcat(eq.a, eq.lam)
     rows = ca.vertcat(eq.balance, eq.phi_ddot)
-    zero = [ca.SX.zeros(eq.F.numel()), ca.SX(starts_of(u)), ca.SX(0)]
-    symbols = [eq.F, symbols_of(u), eq.kin.t]
+    turned = ca.densify(starts_of(t.angle for t in eq.turns))
+    zero = [turned, ca.SX.zeros(eq.F.numel()), ca.SX(starts_of(u)), ca.SX(0)]
+    symbols = [angles(eq.turns), eq.F, symbols_of(u), eq.kin.t]
     rows, normals = ca.substitute([rows, stacked(eq.normals)], symbols, zero)
     solve = ca.Function(
         "start",
@@ -273,12 +275,12 @@ def _undetermined(
     eq, rng = made.eq, np.random.default_rng(1)
     pairs = [(name, ca.vec(row)[i]) for name, row in rows for i in range(row.numel())]
     column = ca.substitute(stacked(row for _, row in pairs), eq.kin.t, ca.SX(0))
-    slope = ca.Function(
-        "slope", [eq.q, eq.qd, eq.a, eq.lam, eq.F, p], [ca.densify(ca.jacobian(column, eq.lam))],
-        {"allow_free": True},
-    )  # fmt: skip
-    some = (rng.standard_normal(x.numel()) for x in (eq.a, eq.lam, eq.F))
-    change = np.abs(slope.call([made.q0, made.qd0, *some, values])[0].full() @ free).max(axis=1)
+    given = ca.vertcat(eq.q, eq.qd, p)
+    others = ca.veccat(*(s for s in ca.symvar(column) if strays(s, given)))
+    jacobian = ca.densify(ca.jacobian(column, eq.lam))
+    slope = ca.Function("slope", [eq.q, eq.qd, p, others], [jacobian])
+    some = rng.standard_normal(others.numel())
+    change = np.abs(slope(made.q0, made.qd0, values, some).full() @ free).max(axis=1)
     found = (name for (name, _), x in zip(pairs, change, strict=True) if x > 1e-7)
     return tuple(dict.fromkeys(found))
 

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import casadi as ca
 
-from symfric.foundation.symbols import strays
+from symfric.foundation.symbols import stacked, strays
 from symfric.model import Output
 from symfric.multibody.body import GROUND
 from symfric.multibody.equations import Equations
@@ -33,6 +33,7 @@ from symfric.multibody.joints import (
     Spherical,
     Universal,
 )
+from symfric.multibody.turns import angles
 
 FORCE = ("Fx", "Fy", "Fz")
 COMPONENTS = (*FORCE, "Mx", "My", "Mz")
@@ -74,7 +75,7 @@ def results(
     found = [
         *_reactions(eq, [j for j in by_name.values() if j.name not in undetermined]),
         *_centres(eq),
-        *_work(eq, by_name, forces, ca.vertcat(eq.q, p)),
+        *_work(eq, by_name, forces, ca.vertcat(eq.q, angles(eq.turns), p)),
     ]
     values = put([output.expression for _, output in found])
     own = {str(eq.q[i]) for i in range(eq.n)}
@@ -125,6 +126,8 @@ def _work(
     none: the whole power of its force counts.
     """
     kin, conserved = eq.kin, eq.kinetic
+    positions = ca.vertcat(eq.q, angles(eq.turns))
+    rates = ca.vertcat(eq.qd, stacked(turn.rate for turn in eq.turns))
     for force in forces:
         energy = ca.SX(force.energy(kin, joints))
         own = not strays(energy, still)
@@ -135,11 +138,11 @@ def _work(
         power = ca.SX(0)
         for load in force.loads(kin, joints):
             if isinstance(load, Axial):
-                power += load.value * kin.along(load.joint, load.direction)[1]
+                power += load.value * kin.rate(load.joint, load.direction)
             else:
                 power += load.power(kin)
         if own:
-            power += ca.jtimes(energy, kin.q, kin.qd)
+            power += ca.jtimes(energy, positions, rates)
         yield f"{force.name}_work_rate", Output(power, "W", f"power put in by '{force.name}'")
     if eq.contacts:
         taken = sum((-ca.dot(c.F, c.slip) for c in eq.contacts), ca.SX(0))

@@ -147,10 +147,11 @@ def system(model: Model, inputs: Drivers) -> System:
         names.append("t")
     # an algebraic unknown without influence on the states would be free to be anything
     watched = [*((m.expression, m.nominal) for m in model.monitors)]
-    watched += [(v.symbol, v.nominal) for v in model.z]
+    n, m = (mechanics.n, phi.numel()) if mechanics else (0, 0)
+    idle = range(m - mechanics.norms, m) if mechanics else ()
+    watched += [(v.symbol, v.nominal) for i, v in enumerate(model.z) if i not in idle]
     monitors = stacked(ca.SX(expression) for expression, _ in watched)
     d = ca.vertcat(model.vector("p"), inputs.data)
-    n, m = (mechanics.n, phi.numel()) if mechanics else (0, 0)
     own = (i for i in range(nx) if mass.sparsity().has_nz(i, i))
     loop = tuple(range(nx + n + m, nx + n + len(model.z))) if mechanics else ()
     return System(

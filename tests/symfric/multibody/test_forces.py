@@ -32,9 +32,15 @@ def power_of(
             total += load.power(kin)
         else:
             assert isinstance(load, Axial)
-            total += load.value * kin.along(load.joint, load.direction)[1]
-    rate = ca.jtimes(force.energy(kin, joints), kin.q, kin.qd)
-    values = ca.Function("power", [kin.q, kin.qd], [total, rate])
+            total += load.value * kin.rate(load.joint, load.direction)
+    energy = force.energy(kin, joints)
+    turns = kin.turns.found if kin.turns else ()
+    rate = ca.jtimes(energy, kin.q, kin.qd)
+    rate += sum(ca.jtimes(energy, turn.angle.symbol, turn.rate) for turn in turns)
+    both = ca.substitute(
+        [total, rate], [t.angle.symbol for t in turns], [t.angle.start for t in turns]
+    )
+    values = ca.Function("power", [kin.q, kin.qd], both)
     return tuple(float(x) for x in values.call([q, qd]))  # type: ignore[return-value]
 
 
@@ -61,7 +67,7 @@ def power_at_start(force: Force) -> float:
         if isinstance(load, Load):
             total += load.power(made.eq.kin)
         else:
-            total += load.value * made.eq.kin.along(load.joint, load.direction)[1]
+            total += load.value * made.eq.kin.rate(load.joint, load.direction)
     return float(ca.Function("p", [made.eq.q, made.eq.qd], [total])(made.q0, made.qd0))
 
 

@@ -1,0 +1,84 @@
+"""Springs about the axes of joints that close loops: full turns count."""
+
+import numpy as np
+import pytest
+
+from symfric import simulate
+from symfric.multibody import (
+    JointSpringDamper,
+    Mechanism,
+    Revolute,
+    UserForce,
+    functions,
+)
+
+
+def drill(loop: bool, start: float, stiffness: float = 473.0) -> Mechanism:
+    """A rotary table drives a bit through a string of pipes; a bearing at the bit closes a loop."""
+    m = Mechanism("drill", gravity=(0.0, 0.0, 0.0))
+    m.body("table", 1.0, (2122.0, 2122.0, 2122.0))
+    m.body("bit", 1.0, (374.0, 374.0, 374.0))
+    m.joint(Revolute("top", "ground", "table", rate=5.0))
+    m.joint(Revolute("pipe", "table", "bit", start=start))
+    if loop:
+        m.joint(Revolute("rock", "ground", "bit", start=start, rate=5.0))
+    m.force(JointSpringDamper("string", "pipe", stiffness=stiffness, damping=23.0))
+    m.force(JointSpringDamper("drive", "top", actuator=6000.0))
+    m.force(UserForce("brake", "bit", lambda kin: ((0.0, 0.0, 0.0), (0.0, 0.0, -4000.0))))
+    return m
+
+
+@pytest.mark.parametrize("start", [0.0, -10.0])
+def test_a_string_winds_up_over_full_turns_where_its_joint_is_cut(start: float) -> None:
+    # the spring of a cut joint wrapped at pi: 183 rad of the table instead of 85, and SUCCESS
+    tree, cut = (
+        simulate(drill(loop, start).build(), 3.0, rtol=1e-8, backend="vm") for loop in (False, True)
+    )
+    assert np.abs(tree["pipe"]).max() > 1.5 * np.pi
+    for name in ("pipe", "energy"):
+        np.testing.assert_allclose(cut[name][-1], tree[name][-1], rtol=1e-5)
+    assert cut.energy_balance().relative < 1e-6
+    assert set(cut.energy_balance().work) == {"string", "drive", "brake"}
+
+
+def test_absolute_coordinates_count_turns_in_few_steps() -> None:
+    # ten times as many steps while error control watched the multiplier of the norm, which loads
+    # nothing
+    m = Mechanism("wheel", gravity=(0.0, 0.0, 0.0))
+    m.body("rim", 1.0, (1e3, 1e3, 1e3))
+    m.joint(Revolute("axle", "ground", "rim", start=-10.0, rate=5.0))
+    m.force(JointSpringDamper("spring", "axle", stiffness=500.0))
+    run = simulate(m.build(formulation="absolute"), 1.0, backend="vm")
+    w = np.sqrt(0.5)
+    expected = -10.0 * np.cos(w * run.t) + 5.0 / w * np.sin(w * run.t)
+    np.testing.assert_allclose(run["axle"], expected, atol=1e-4)
+    assert run.statistics.steps < 60
+
+
+def test_angles_that_no_force_asks_for_are_no_states() -> None:
+    without = drill(True, 0.0, stiffness=0.0).build()
+    assert [v.name for v in without.x] == ["top", "rock", "top_rate", "rock_rate"]
+    assert [v.name for v in drill(True, 0.0).build().x][4:] == ["pipe"]
+
+
+def test_forces_of_users_see_full_turns_too() -> None:
+    m = drill(True, -10.0, stiffness=0.0)
+    pipe = m.joints[1]
+
+    def spring(kin):
+        angle, _ = kin.along(pipe, "turn")
+        return (0.0, 0.0, 0.0), (0.0, 0.0, -473.0 * angle)
+
+    m.force(UserForce("own", "bit", spring))
+    model = m.build()
+    assert model.initial_state({"top": 1.0})[-1] == pytest.approx(-11.0)
+    run = simulate(model, 0.5, backend="vm")
+    assert run["pipe"][0] == pytest.approx(-10.0)
+    np.testing.assert_allclose(run["pipe"], run["rock"] - run["top"], atol=1e-6)
+
+
+def test_functions_of_positions_take_the_angle_nearest_to_the_start() -> None:
+    bias = functions(drill(True, -10.0))["bias"]
+    q = [0.0, -10.0 + 4.0 * np.pi]  # top, rock
+    moment = bias(q, [0.0, 0.0], [], []).full().ravel()
+    assert moment == pytest.approx([-6000.0 + 4730.0, 4000.0 - 4730.0])
