@@ -5,7 +5,7 @@ Nothing here imports symfric, so that a mistake cannot stand on both sides of a 
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import acos, atan, cos, exp, hypot, inf, pi, sin, sqrt, tanh
+from math import acos, atan, atan2, cos, exp, hypot, inf, pi, sin, sqrt, tanh
 
 
 @dataclass(frozen=True)
@@ -133,3 +133,35 @@ def stribeck_curve(
     speed = abs(v)
     weight = 0.0 if speed == inf else exp(-((speed / v_s) ** delta))
     return direction * N * (mu_s * weight + mu_d * (1 - weight)) + sigma_2 * v
+
+
+def rabinowicz_motion(v_0: float, t_end: float, block: tuple[float, ...]) -> tuple[float, int]:
+    """Elongation of the block at t_end and number of break-aways before, phase by phase.
+
+    It starts at x = 0 with v_0; sliding is an arc about +-mu_d N/k, sticking a straight line.
+    """
+    mu_s, mu_d, m, k, belt, g = block
+    N, w = m * g, sqrt(k / m)
+    t, x, v, breaks = 0.0, 0.0, v_0, 0
+    mode = (v > belt) - (v < belt)
+    while True:
+        if mode == 0:
+            free = (mu_s * N / k - x) / belt
+            if t + free >= t_end:
+                return x + belt * (t_end - t), breaks
+            t, x, v, mode, breaks = t + free, mu_s * N / k, belt, -1, breaks + 1
+        c = -mode * mu_d * N / k
+        A, B = x - c, v / w  # x = c + A cos(w s) + B sin(w s); v is that of the belt again at w s
+        angle = 2 * atan(-A * w / belt) if v == belt else _back_at(A * w, B * w, belt, mode)
+        s = angle % (2 * pi) / w
+        if t + s >= t_end:
+            return c + A * cos(w * (t_end - t)) + B * sin(w * (t_end - t)), breaks
+        t, x, v = t + s, c + A * cos(w * s) + B * sin(w * s), belt
+        mode = 0 if k * abs(x) <= mu_s * N else (-1 if x > 0 else 1)
+
+
+def _back_at(a: float, b: float, level: float, mode: int) -> float:
+    """The first angle at which b cos - a sin, beyond `level` on the side `mode`, comes back."""
+    size, phase = hypot(a, b), atan2(a, b)  # b cos(q) - a sin(q) = size cos(q + phase)
+    turns = (sign * acos(level / size) - phase for sign in (1.0, -1.0))
+    return min(turn % (2 * pi) for turn in turns)

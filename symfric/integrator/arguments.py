@@ -35,8 +35,12 @@ def check_model(where: str, model: object) -> None:
     raise checks.refused(where, "a model, such as rabinowicz(LuGre())", model, hint)
 
 
-def check_span(where: str, t_start: float, t_end: float, rtol: float) -> tuple[float, float, float]:
-    """Start and end [s] and relative tolerance; warns of a loose one.
+def check_span(
+    where: str, model: Model, t_start: float, t_end: float, rtol: float
+) -> tuple[float, float, float]:
+    """Start and end [s] and relative tolerance, that of the model's events at most.
+
+    Warns of a loose one.
 
     Raises:
         ValueError: no numbers, an empty span, a tolerance out of range.
@@ -46,6 +50,7 @@ def check_span(where: str, t_start: float, t_end: float, rtol: float) -> tuple[f
     if t_end <= t_start:
         raise ValueError(f"{where}: expected t_end > t_start = {t_start:g} s, got {t_end:g} s")
     rtol = checks.number(f"{where}: rtol", rtol, lower=1e-13, upper=0.1)
+    rtol = min((event.rtol for event in model.events if event.rtol < rtol), default=rtol)
     if rtol > LOOSE:
         warnings.warn(
             f"{where}: rtol = {rtol:g} is above {LOOSE:g}; whole stick phases may be lost "

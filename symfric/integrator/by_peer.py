@@ -64,7 +64,7 @@ def simulate_by_peer(
     where = "simulate_by_peer"
     check_model(where, model)
     check_flags(where, throw=throw)
-    t_start, t_end, rtol = check_span(where, t_start, t_end, rtol)
+    t_start, t_end, rtol = check_span(where, model, t_start, t_end, rtol)
     checks.choice(f"{where}: peer", peer, PEERS)
     if model.events:
         raise ValueError(

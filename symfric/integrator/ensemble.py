@@ -133,7 +133,7 @@ def simulate_many(
     """
     check_model("simulate_many", model)
     check_flags("simulate_many", progress)
-    t_start, t_end, rtol = check_span("simulate_many", t_start, t_end, rtol)
+    t_start, t_end, rtol = check_span("simulate_many", model, t_start, t_end, rtol)
     formula = chosen("simulate_many", method, rtol)
     _check(model, backend, executor)
     workers = None if workers is None else checks.count("simulate_many: workers", workers)

@@ -105,7 +105,7 @@ def simulate(
     """
     check_model("simulate", model)
     check_flags("simulate", progress, measure_error=measure_error, throw=throw)
-    t_start, t_end, rtol = check_span("simulate", t_start, t_end, rtol)
+    t_start, t_end, rtol = check_span("simulate", model, t_start, t_end, rtol)
     formula = chosen("simulate", method, rtol)
     checks.choice("simulate: backend", backend, BACKENDS)
     sensitivities = checks.names("simulate: sensitivities", sensitivities)

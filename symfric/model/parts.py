@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, is_casadi
@@ -58,6 +59,9 @@ class Event:
         direction: +1 only rising, -1 only falling, 0 both.
         terminal: the simulation ends there.
         reset: state -> its value after the event, in terms of the values before it.
+        at_start: it happens at the start, too, where the expression is beyond zero in the given
+            direction, 1 or -1, already, or leaves zero that way.
+        rtol: largest relative tolerance of a run with this event; it replaces a larger one.
     """
 
     name: str
@@ -65,11 +69,17 @@ class Event:
     direction: int = 0
     terminal: bool = False
     reset: Mapping[str, Scalar] = field(default_factory=dict[str, Scalar])
+    at_start: bool = False
+    rtol: float = inf
 
     def __post_init__(self) -> None:
         where = f"event '{checks.text('Event: name', self.name)}'"
         checks.expression(where, self.expression)
         checks.count(f"{where}: direction", self.direction, least=-1, most=1)
         checks.flag(f"{where}: terminal", self.terminal)
+        if checks.flag(f"{where}: at_start", self.at_start) and self.direction == 0:
+            raise checks.refused(f"{where}: at_start", "a direction 1 or -1", 0)
+        if self.rtol != inf:
+            checks.number(f"{where}: rtol", self.rtol, above=0.0)
         for name, value in checks.named(f"{where}: reset", self.reset).items():
             checks.expression(f"{where}: reset of {name}", value)

@@ -291,6 +291,8 @@ def _switches(slip: Slip, qd: Variables) -> tuple[Event, ...]:
             s.direction,
             reset={f"{contact.name}_{state}": value for state, value in s.reset.items()}
             | (rest if s.halts else {}),
+            at_start=s.at_start,
+            rtol=s.rtol,
         )
         for s in contact.law.switches(contact.slip, slip.N, z)
     )

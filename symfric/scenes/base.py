@@ -119,6 +119,8 @@ def contact(
             s.expression,
             s.direction,
             reset=dict(s.reset) | (dict(rest) if s.halts else {}),
+            at_start=s.at_start,
+            rtol=s.rtol,
         )
         for s in law.switches(v, N, z, **given)
     )

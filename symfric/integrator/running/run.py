@@ -152,7 +152,7 @@ class _Drive:
         """Integrate over all input intervals, each with its own run data d = (p, data)."""
         for k in range(self.inputs.breaks.size - 1):
             before, self.d = self.d, np.concatenate([p, self.inputs.values[:, k]])
-            old = self.jump(before) if k else None
+            old = self.jump(before) if k else self.before_start()
             if self.run.status is Status.SUCCESS:
                 self.interval(float(self.inputs.breaks[k + 1]), old)
             if self.run.status is not Status.SUCCESS:
@@ -251,6 +251,16 @@ class _Drive:
         else:
             self.make_consistent()
         return old
+
+    def before_start(self) -> Array | None:
+        """Event values as if just before the start, where some have happened by it; else None."""
+        events = self.integrator.model.events
+        if not any(event.at_start for event in events):
+            return None
+        now = values(self.integrator, self.t, self.y, self.d)
+        return np.array(
+            [-e.direction if e.at_start else x for e, x in zip(events, now, strict=True)]
+        )
 
     def jump(self, before: Array) -> Array | None:
         """Take over new input data, which algebraic unknowns follow; event values before them."""

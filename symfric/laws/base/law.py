@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 from typing import ClassVar
 
 from symfric.foundation.numeric import Scalar, empty
@@ -86,6 +87,8 @@ class Switch:
         direction: +1 only rising, -1 only falling, 0 both.
         reset: state -> its value afterwards, in terms of the values before.
         halts: the sliding velocity, zero at this instant, becomes zero without rounding.
+        at_start: it happens at the start, too, where the expression is beyond zero already.
+        rtol: largest relative tolerance that a run may have, where a law promises exact instants.
     """
 
     name: str
@@ -93,6 +96,8 @@ class Switch:
     direction: int = 0
     reset: Mapping[str, Scalar] = field(default_factory=dict[str, Scalar])
     halts: bool = False
+    at_start: bool = False
+    rtol: float = inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +112,7 @@ class Law(Parametric, ABC):
     be a float, a NumPy array, SX, MX or DM. A law that needs another input, such as the applied
     tangential force, names it in `inputs` and takes it as a keyword-only argument with default 0.
 
-    A law with modes (stick, slip) keeps them in states of rate zero, which jump at its `switches`.
+    A law with modes (stick, slip) keeps them in states that only jump, at its `switches`.
     """
 
     facts: ClassVar[Facts]

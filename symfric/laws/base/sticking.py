@@ -7,13 +7,16 @@ from symfric.foundation.numeric import Scalar, column, empty
 from symfric.laws.base import smooth
 from symfric.laws.base.law import APPLIED_FORCE, Input, Law, State, Switch
 
+FINEST = 1e-7
+"""Relative tolerance of runs with such a law at most: they are what other laws are measured by."""
+
 
 @dataclass(frozen=True, eq=False)
 class Sticking(Law):
     """A law whose mode is the direction of sliding, or 0 for a contact at rest.
 
         F = slip force in the direction `mode`   while sliding
-        F = F_e within +-static level            at rest, mode = 0
+        F = F_e                                  at rest, mode = 0, which ends at the static level
 
     A form without modes (`has_mode` false) has no states.
     """
@@ -34,36 +37,61 @@ class Sticking(Law):
         return (APPLIED_FORCE,)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
-        """Zero: the mode changes at switches only."""
-        return column(0.0 * v) if self.has_mode else empty(v)
+        """Zero; beyond the static level at rest the overload (F_e -+ level)/(|F_e| + 1 N) [1/s].
+
+        Nothing depends on it, and rest ends at the instant where it would begin. It is there for
+        error control, which would else step over a short overload: at rest nothing else moves.
+        """
+        if not self.has_mode:
+            return empty(v)
+        static = self.static_level(N)
+        beyond = F_e - smooth.clip(F_e, -static, static)
+        share = beyond / (smooth.magnitude(F_e, 0.0) + APPLIED_FORCE.nominal)
+        return column(smooth.choose(rests(z[0]), share, 0.0 * v))
+
+    @abstractmethod
+    def static_level(self, N: Scalar) -> Scalar:
+        """The largest force [N] that rest holds."""
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """The direction of sliding."""
         return column(smooth.sign(v, 0.0)) if self.has_mode else empty(v)
 
 
-def held(mode: Scalar, F_e: Scalar, static: Scalar) -> Scalar:
-    """What the contact carries at rest [N]; zero while it slides."""
-    return smooth.clip(F_e, -static, static) * (1 - mode * mode)
+def rests(mode: Scalar) -> Scalar:
+    """Whether `mode`, -1, 0 or 1 but for the overload that error control sees, says rest."""
+    return smooth.magnitude(mode, 0.0) < 0.5
 
 
-def stick_and_slip(
-    v: Scalar, mode: Scalar, F_e: Scalar, static: Scalar, v_0: Scalar
-) -> tuple[Switch, ...]:
-    """End of sliding at v = 0, break-away under a growing load, and motion under an overload.
+def carried(mode: Scalar, F_e: Scalar, slip: Scalar) -> Scalar:
+    """The force [N] of the contact: `slip` while it slides, at rest whatever is applied.
 
-    Sliding goes on in the other direction where the contact cannot hold `F_e`. A load beyond
-    `static` from the very start has no instant of break-away; its rest ends at |v| = v_0. While
-    the load beyond `static` pulls forward v = 0 is a beginning, and no end.
+    Not clipped to the static level: the equations of rest stay smooth beyond its end, and so does
+    the dense output on which that end is found.
     """
-    onward = smooth.sign(F_e, 0.0)
+    return smooth.choose(rests(mode), F_e, slip)
+
+
+def stick_and_slip(v: Scalar, mode: Scalar, F_e: Scalar, static: Scalar) -> tuple[Switch, ...]:
+    """End of sliding at v = 0, and its beginning where the load passes `static`.
+
+    Sliding goes on in the other direction where the contact cannot hold `F_e`; rest ends at once
+    where the load is beyond `static` from the very start. While the load beyond `static` pulls
+    forward v = 0 is a beginning, and no end.
+    """
+    onward, still = smooth.choose(F_e < 0, -1.0, 1.0), rests(mode)
     excess = smooth.magnitude(F_e, 0.0) - static
-    gone = smooth.magnitude(v, 0.0) - v_0
     after = smooth.choose(excess <= 0, 0.0, onward)
-    rests, pull = mode == 0, mode * F_e - static
+    pull = mode * F_e - static
     ahead = smooth.choose(mode * v > pull, mode * v, pull)
     return (
-        Switch("stick", smooth.choose(rests, 1.0, ahead), -1, {"mode": after}, halts=True),
-        Switch("slip", smooth.choose(rests, excess, -1.0), 1, {"mode": onward}),
-        Switch("overload", smooth.choose(rests, gone, -1.0), 1, {"mode": onward}),
+        Switch("stick", smooth.choose(still, 1.0, ahead), -1, {"mode": after}, halts=True),
+        Switch(
+            "slip",
+            smooth.choose(still, excess, -1.0),
+            1,
+            {"mode": onward},
+            at_start=True,
+            rtol=FINEST,
+        ),
     )

@@ -8,7 +8,7 @@ from symfric.foundation.numeric import Scalar, atan, exp, is_number
 from symfric.foundation.parameters import option, param
 from symfric.laws.base import smooth
 from symfric.laws.base.law import APPLIED_FORCE, Facts, Input, StaticLaw, Switch
-from symfric.laws.base.sticking import Sticking, held, stick_and_slip
+from symfric.laws.base.sticking import Sticking, carried, rests, stick_and_slip
 
 FORMS = ("smooth", "original")
 WITH_MODES = (*FORMS, "event")
@@ -66,12 +66,16 @@ class Karnopp(Sticking):
         """The half width of the band [m/s]; none in the event form, where it is an event."""
         return inf if self.has_mode else self.D_v
 
+    def static_level(self, N: Scalar) -> Scalar:
+        """The force [N] of break-away."""
+        return self.mu_s * N
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
         """Friction force [N]."""
         if self.has_mode:
             level = self.mu_d * N + self.sigma_2 * z[0] * v
             leaving = smooth.choose(z[0] * v < self.D_v, self.mu_s * N, level)
-            return z[0] * leaving + held(z[0], F_e, self.mu_s * N)
+            return carried(z[0], F_e, z[0] * leaving)
         slip = self.mu_d * N * smooth.sign(v, 0.0) + self.sigma_2 * v
         speed, static = smooth.magnitude(v, 0.0), self.mu_s * N
         if self.form == "original":
@@ -85,8 +89,8 @@ class Karnopp(Sticking):
         """Those of a contact that sticks; the band ends a slide, and its edge jumps the force."""
         if not self.has_mode:
             return ()
-        edge = smooth.choose(z[0] == 0, -1.0, z[0] * v - self.D_v)
-        stuck = stick_and_slip(v, z[0], F_e, self.mu_s * N, self.D_v)
+        edge = smooth.choose(rests(z[0]), -1.0, z[0] * v - self.D_v)
+        stuck = stick_and_slip(v, z[0], F_e, self.mu_s * N)
         return (
             *stuck,
             Switch("stop", edge, -1, stuck[0].reset, halts=True),
@@ -166,8 +170,7 @@ class LeineSwitch(Sticking):
     c v draws a sticking body to the middle of the band: with m alpha for c, dv/dt = -alpha v.
     |v| of the smooth form is smooth over v_eps.
     form = "event" (one state, the mode) has no band: sliding ends where v passes through zero,
-    rest where |F_e| reaches mu_s N, or at |v| = eta under a greater load from the very start. It
-    needs a scene with events.
+    rest where |F_e| reaches mu_s N. It needs a scene with events.
     Limits: the level falls from mu_s N to zero, with no dynamic level. The smooth form creeps under
     load and is 6 % short of the original at 10 v_eps, since atan is slow.
     Source: Leine et al., Nonlinear Dynam. 16, 1998 (not read); smooth form and slip law as in the
@@ -209,6 +212,10 @@ class LeineSwitch(Sticking):
         """The smoothing velocity, or the half width of the band [m/s]; none in the event form."""
         return {"smooth": self.v_eps, "original": self.eta, "event": inf}[self.form]
 
+    def static_level(self, N: Scalar) -> Scalar:
+        """The force [N] of break-away."""
+        return self.mu_s * N
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
         """Friction force [N]."""
         static = self.mu_s * N
@@ -217,7 +224,7 @@ class LeineSwitch(Sticking):
             return falling * (2 / pi * atan(v / self.v_eps))
         speed = smooth.magnitude(v, 0.0)
         if self.has_mode:
-            return static * z[0] / (1 + self.delta * speed) + held(z[0], F_e, static)
+            return carried(z[0], F_e, static * z[0] / (1 + self.delta * speed))
         slip = static * smooth.sign(v, 0.0) / (1 + self.delta * speed)
         stick = smooth.hold(F_e + self.c * v, static, 0.0)
         return smooth.choose(speed <= self.eta, stick, slip)
@@ -225,10 +232,10 @@ class LeineSwitch(Sticking):
     def switches(
         self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0
     ) -> tuple[Switch, ...]:
-        """The end of sliding, break-away under a growing load, and motion under an overload."""
+        """The end of sliding, and break-away."""
         if not self.has_mode:
             return ()
-        return stick_and_slip(v, z[0], F_e, self.mu_s * N, self.eta)
+        return stick_and_slip(v, z[0], F_e, self.mu_s * N)
 
 
 @final

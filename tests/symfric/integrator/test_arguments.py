@@ -19,11 +19,21 @@ from symfric.integrator import simulate_by_peer
 from symfric.integrator.arguments import LOOSE, check_span, check_times, chosen
 from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS, RADAU5, RODAS5P
 
+MODEL = drive(Viscous())
+
+
+def test_tolerance_is_that_of_the_events_at_most_and_then_no_loose_one() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert check_span("here", rabinowicz(ExactCoulomb()), 0.0, 1.0, 1e-3)[2] == 1e-7
+    assert check_span("here", rabinowicz(ExactCoulomb()), 0.0, 1.0, 1e-9)[2] == 1e-9
+    assert check_span("here", MODEL, 0.0, 1.0, 1e-6)[2] == 1e-6
+
 
 def test_good_arguments_pass_without_a_word() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        check_span("here", 0.0, 1.0, 1e-5)
+        check_span("here", MODEL, 0.0, 1.0, 1e-5)
     np.testing.assert_array_equal(check_times("here", 0.0, 1.0, [0, 1]), [0.0, 1.0])
 
 
@@ -41,7 +51,7 @@ def test_empty_span_and_odd_tolerance_are_refused(
     t_start: float, t_end: float, rtol: float, message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):
-        check_span("here", t_start, t_end, rtol)
+        check_span("here", MODEL, t_start, t_end, rtol)
 
 
 @pytest.mark.parametrize("t_eval", [[], [[0.0]], [0.5, 0.5], [-0.1], [1.1], [np.nan], 0.5])
@@ -54,7 +64,7 @@ def test_times_that_are_no_increasing_row_in_the_span_are_refused(t_eval: object
 
 def test_loose_tolerance_warns_with_its_place() -> None:
     with pytest.warns(UserWarning, match="here: rtol = 0.001 is above 1e-05; whole stick phases"):
-        check_span("here", 0.0, 1.0, 1e-3)
+        check_span("here", MODEL, 0.0, 1.0, 1e-3)
 
 
 @pytest.mark.parametrize("name", ADAPTIVE)

@@ -305,3 +305,15 @@ def test_contact_that_is_overloaded_when_it_sticks_slips_on_at_once() -> None:
     names = [name for _, name in run.happened]
     assert names[:2] == ["meet", "slip"]
     assert run.happened[1][0] == pytest.approx(run.happened[0][0], abs=1e-8)
+
+
+def test_event_at_the_start_happens_where_it_is_due_already() -> None:
+    """Beyond zero, or leaving it; not at rest on it, nor below; others keep to crossings."""
+    for start, slope, expected in ((0.5, 0.0, 1), (0.0, 1.0, 1), (0.0, 0.0, 0), (-0.5, 0.0, 0)):
+        due = Event("due", X, 1, reset={"x": -9.0, "y": 7.0}, at_start=True)
+        model = Model("due", x=(x, y), ode=ca.vertcat(slope, 0), events=(due, Event("plain", X, 1)))
+        run = simulate(model, 1.0, x0={"x": start, "y": 0.0})
+        assert run.happened == ((0.0, "due"),) * expected
+        assert run.final["y"] == 7.0 * expected
+    with pytest.raises(ValueError, match="at_start: expected a direction 1 or -1, got 0"):
+        Model("due", x=(x,), ode=ca.SX(1), events=(Event("due", X, at_start=True),))
