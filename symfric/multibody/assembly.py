@@ -90,12 +90,23 @@ def keeps_deflection(law: Law) -> bool:
     return ca.depends_on(slope, z) and ca.depends_on(ca.SX(law.steady_state(v, N)), N)
 
 
+def mirrored(M: ca.SX) -> ca.SX:
+    """A symmetric matrix from one that is symmetric in value, but not in its zeros.
+
+    What cancels on one side of the diagonal by itself may stand as 0 x there on the other.
+    """
+    if M.sparsity().is_symmetric():
+        return M
+    upper = ca.project(M, M.sparsity() * M.T.sparsity())
+    return ca.triu2symm(ca.triu(upper))
+
+
 def solve_mass(eq: Equations, right: ca.SX) -> ca.SX:
     """M^-1 right."""
     topology = eq.kin.topology
     free = [isinstance(link.joint, Free) and link.base == GROUND for link in topology.links]
     if not all(free) or not free:
-        D, L, order = ca.ldl(eq.mass)
+        D, L, order = ca.ldl(mirrored(eq.mass))
         return ca.ldl_solve(ca.densify(right), D, L, order) if eq.n else right
     rows: list[ca.SX] = []
     for link in topology.links:

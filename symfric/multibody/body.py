@@ -6,12 +6,16 @@ from typing import Any, final
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Scalar
 from symfric.multibody.spatial import Frame, Vector, is_scalar, is_vector, vector
 
+Array = NDArray[np.float64]
 GROUND = "ground"
 """The name of the body that does not move."""
+TRIANGLE = 1e-9
+"""Relative rounding of principal moments that is no mistake."""
 
 
 @final
@@ -26,6 +30,9 @@ class Body:
             six numbers Jxx, Jyy, Jzz, Jxy, Jxz, Jyz.
         com: centre of mass from the origin of the body [m].
         frames: places where joints and forces act; "" is the origin.
+        ideal: whether mass and inertia are taken as they are: a massless link between two joints,
+            a point mass, numbers that no rigid body has. The mass matrix of the mechanism must
+            be positive definite at the start all the same.
     """
 
     name: str
@@ -33,6 +40,7 @@ class Body:
     inertia: Sequence[Any]
     com: Vector = (0.0, 0.0, 0.0)
     frames: dict[str, Frame] = field(default_factory=lambda: {"": Frame()})
+    ideal: bool = False
 
     @property
     def J(self) -> ca.SX:
@@ -56,18 +64,14 @@ class Body:
             return
         both = ca.substitute(ca.vertcat(self.mass, ca.vec(ca.densify(self.J))), p, ca.SX(values))
         numbers = ca.DM(both).full().ravel()
+        if self.ideal:
+            if not np.isfinite(numbers).all():
+                yield f"mass, inertia: expected finite numbers, got {', '.join(_short(numbers))}"
+            return
+        hint = "; `ideal=True` takes a massless link or a point mass as it is"
         if not numbers[0] > 0:
-            yield f"mass: expected > 0 kg, got {numbers[0]:g}"
-        principal = np.linalg.eigvalsh(numbers[1:].reshape(3, 3))
-        if not principal[0] > 0:
-            yield (
-                f"inertia: expected positive principal moments, got {', '.join(_short(principal))}"
-            )
-        elif principal[2] > (principal[0] + principal[1]) * (1 + 1e-9):
-            yield (
-                "inertia: expected the largest principal moment to be at most the sum of the "
-                f"others, got {', '.join(_short(principal))} kg m^2"
-            )
+            yield f"mass: expected > 0 kg, got {numbers[0]:g}{hint}"
+        yield from (f"{text}{hint}" for text in unphysical(numbers[1:].reshape(3, 3)))
 
     def _no_numbers(self) -> Iterator[str]:
         """What is no number or not as many as it should."""
@@ -81,6 +85,25 @@ class Body:
             yield f"inertia: expected 3 or 6 numbers [kg m^2], got {given!r}"
         if not is_vector(self.com):
             yield f"com: expected three numbers [m], got {self.com!r}"
+
+
+def unphysical(J: Array, point: bool = False) -> Iterator[str]:
+    """Why no rigid body has the inertia J [kg m^2] about its centre of mass.
+
+    Args:
+        J: shape (3, 3).
+        point: whether principal moments of zero are fine: a point, a thin rod.
+    """
+    principal = np.linalg.eigvalsh(J)
+    spread = TRIANGLE * abs(principal[2])
+    if not (principal[0] > 0 or (point and principal[0] >= -spread)):
+        expected = "no negative principal moment" if point else "positive principal moments"
+        yield f"inertia: expected {expected}, got {', '.join(_short(principal))} kg m^2"
+    elif principal[2] > principal[0] + principal[1] + spread:
+        yield (
+            "inertia: expected the largest principal moment to be at most the sum of the "
+            f"others, got {', '.join(_short(principal))} kg m^2"
+        )
 
 
 def _short(numbers: Any) -> list[str]:

@@ -26,6 +26,8 @@ FITS = 1e-8
 """Largest violation of a constraint at the start [m, m/s]."""
 RANK = 1e-9
 """Singular values below this times the largest count as zero."""
+SINGULAR = 1e-12
+"""Eigenvalues of a mass matrix of unit diagonal below this count as zero."""
 
 
 def naming(
@@ -213,6 +215,18 @@ def _independent(A: Array, r: int, first: Sequence[int]) -> list[int]:
         direction = left[i] / size[i]
         left -= np.outer(left @ direction, direction)
     return chosen
+
+
+def weightless(M: Array) -> NDArray[np.bool_]:
+    """Which coordinates keep the mass matrix M, shape (n, n), from being positive definite.
+
+    Each is measured by its own inertia, so that units and sizes do not matter.
+    """
+    own = np.diag(M)
+    if not (own > 0).all():
+        return own <= 0
+    least, along = np.linalg.eigh((M + M.T) / 2 / np.sqrt(np.outer(own, own)))
+    return (least[0] < SINGULAR) & (np.abs(along[:, 0]) > 0.1)
 
 
 def project(at: Position, q: Array, iterations: int = 30) -> Array | None:

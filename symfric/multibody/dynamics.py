@@ -89,7 +89,8 @@ def normalisations(kin: Kinematics) -> tuple[ca.SX, ca.SX, ca.SX]:
         column[first : first + 4] = p
         phi = ca.vertcat(phi, (ca.dot(p, p) - 1) / 2)
         along = ca.horzcat(along, column)
-        weights = ca.vertcat(weights, ca.trace(kin.topology.bodies[link.body].J))
+        body = kin.topology.bodies[link.body]
+        weights = ca.vertcat(weights, 1.0 if body.ideal else ca.trace(body.J))
     return phi, along, weights
 
 

@@ -26,6 +26,7 @@ from symfric.multibody.prepare import (
     undeclared,
     with_cuts,
     without_friction,
+    without_inertia,
     written,
 )
 from symfric.multibody.results import results
@@ -64,10 +65,15 @@ class Mechanism:
             self.forces.append(Gravity("gravity", gravity))
 
     def body(
-        self, name: str, mass: Scalar, inertia: Sequence[Any], com: Vector = (0.0, 0.0, 0.0)
+        self,
+        name: str,
+        mass: Scalar,
+        inertia: Sequence[Any],
+        com: Vector = (0.0, 0.0, 0.0),
+        ideal: bool = False,
     ) -> None:
         """Add a rigid body; see `Body`."""
-        self.bodies.append(Body(name, mass, inertia, com))
+        self.bodies.append(Body(name, mass, inertia, com, ideal=ideal))
 
     def frame(
         self,
@@ -155,7 +161,9 @@ class Mechanism:
         u = symbols_of(self.inputs)
         loose = undeclared(made.eq, self.joints, self.forces, symbols, u)
         self._refuse([*made.problems, *made.misfits, *_left_open(made), *loose])
+        self._refuse(without_inertia(made, symbols, values))
         if formulation == "absolute":
+            self._refuse(_inseparable(bodies, symbols, values))
             by_name = {body.name: body for body in bodies}
             names = [body.name for body in bodies if body.name != GROUND]
             made = in_absolute_coordinates(
@@ -262,6 +270,17 @@ class Mechanism:
         copy.constraints = self.constraints
         copy.frames, copy.joints = self.frames, [start.get(j.name, j) for j in self.joints]
         return copy
+
+
+def _inseparable(bodies: Iterable[Body], p: ca.SX, values: ca.DM) -> Iterator[str]:
+    """Bodies that cannot be balanced without those they hang on."""
+    for body in bodies:
+        strict = replace(body, ideal=False)
+        if body.ideal and body.name != GROUND and any(strict.problems(p, values)):
+            yield (
+                f"body '{body.name}': expected a rigid body in absolute coordinates, got a "
+                "massless link, a point or what no body is; joint coordinates take it"
+            )
 
 
 def _left_open(made: Prepared) -> Iterator[str]:

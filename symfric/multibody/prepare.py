@@ -138,6 +138,24 @@ def undeclared(
         yield from checks.undeclared(f"force '{force.name}'", parts, known, expected)
 
 
+def without_inertia(made: Prepared, p: ca.SX, values: ca.DM) -> Iterator[str]:
+    """Coordinates that no mass resists, at the start or anywhere near it, as ideal bodies make."""
+    eq = made.eq
+    if not any(eq.kin.topology.bodies[link.body].ideal for link in eq.kin.topology.links):
+        return
+    mass = ca.Function("mass", [eq.q, p], [ca.densify(eq.mass)])
+    rng = np.random.default_rng(0)
+    near = made.q0 + 0.1 * rng.standard_normal(eq.n)
+    found = checks.weightless(mass(near, values).full())
+    if found.any():
+        names = ", ".join(v.name for v, is_one in zip(made.q, found, strict=True) if is_one)
+        yield (
+            f"expected a mass matrix that is positive definite, got one that is not in {names}: "
+            "what these move has no mass (links without any, points on an axis, parallel axes) or "
+            "an inertia that no body has"
+        )
+
+
 def without_friction(made: Prepared, p: Variables, u: Variables) -> dict[str, Array]:
     """Multipliers and normal forces at the start if there were no friction."""
     eq = made.eq

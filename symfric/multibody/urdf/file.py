@@ -2,25 +2,23 @@
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import cos, isfinite, sin
 from pathlib import Path
 from typing import final
 from xml.parsers import expat
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from symfric.multibody.body import unphysical
+from symfric.multibody.urdf.notes import Array, Notes
+
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 SINGLE = KINDS[:3]
 """Joints of one coordinate."""
 LIMITS = ("lower", "upper", "effort", "velocity")
-APPEARANCE = {"visual", "collision", "material"}
-"""Tags that no mechanism has a place for and nobody misses there."""
-SNAP = 1e-15
-"""Entries of rotation matrices nearer to 0 are 0: a quarter turn must not leave 6e-17 behind."""
+POINT = 1e-15
+"""Inertia over mass [m^2] that is rounding: a radius of gyration of 30 nm."""
 
 
 @final
@@ -81,12 +79,14 @@ class Urdf:
         links: what each link weighs; None for a massless one.
         joints: every link but the root is the child of one.
         left_out: tags that say something which is not in here, each with where it stands.
+        doubts: what cannot be meant as it stands and is taken as it is, each with its path.
     """
 
     name: str
     links: Mapping[str, Inertial | None]
     joints: tuple[UrdfJoint, ...]
     left_out: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
 
     @property
     def root(self) -> str:
@@ -113,11 +113,14 @@ class Urdf:
                 yield joint
 
 
-def parse(source: str | Path) -> Urdf:
+def parse(source: str | Path, strict: bool = False) -> Urdf:
     """Read a URDF file.
 
     Args:
         source: path of a file, or its text (which begins with "<").
+        strict: refuse what no rigid body has (a negative principal moment, one larger than the sum
+            of the others, an inertia without a mass) and joints that mimic one the file does not
+            have; otherwise the former is taken as it is, the latter move on their own.
 
     Raises:
         ValueError: no XML, no tree of links, or numbers that cannot be, all problems at once, each
@@ -134,12 +137,13 @@ def parse(source: str | Path) -> Urdf:
     if robot.tag != "robot":
         raise ValueError(f"{where}: expected <robot> as its outermost tag, got <{robot.tag}>")
     name = robot.get("name") or ("robot" if is_text else Path(source).stem)
-    notes = _Notes()
+    notes = Notes(strict)
     links = {tag.get("name", ""): _inertial(tag, notes) for tag in robot.findall("link")}
     joints = tuple(_joint(tag, notes) for tag in robot.findall("joint"))
     notes.others("", robot, {"link", "joint"})
     _check_names(robot, notes)
     if not notes.problems:
+        joints = tuple(_known_leader(joint, joints, notes) for joint in joints)
         notes.problems.extend([*_tree_problems(links, joints), *_mimic_problems(joints)])
     if notes.problems:
         raise ValueError("\n".join(f"urdf '{name}' > {text}" for text in notes.problems))
@@ -147,7 +151,7 @@ def parse(source: str | Path) -> Urdf:
         f"<{tag}>" + (f" of {', '.join(at)}" if any(at) else "")
         for tag, at in notes.left_out.items()
     )
-    return Urdf(name, links, joints, left)
+    return Urdf(name, links, joints, left, tuple(notes.doubts))
 
 
 def _tags(content: bytes, encoding: str | None) -> ET.Element:
@@ -159,65 +163,7 @@ def _tags(content: bytes, encoding: str | None) -> ET.Element:
     return builder.close()
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class _Notes:
-    """What is wrong, and what is left out: tag -> where it stands."""
-
-    problems: list[str] = field(default_factory=list[str])
-    left_out: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
-
-    def others(self, where: str, tag: ET.Element, known: Iterable[str]) -> None:
-        """Note the tags inside `tag` that are not known."""
-        for other in tag:
-            if other.tag.startswith("xacro:"):
-                self.problems.append("<xacro>: expected plain URDF; expand the file with xacro")
-            elif other.tag not in {*known, *APPEARANCE}:
-                self.left(other.tag, where)
-
-    def left(self, tag: str, where: str) -> None:
-        """Note a tag that is left out, once for every place."""
-        places = self.left_out.setdefault(tag, [])
-        if where not in places:
-            places.append(where)
-
-    def numbers(self, where: str, tag: ET.Element | None, key: str, default: str) -> Array:
-        """The numbers in an attribute, as many as in `default`, which stands for a missing one."""
-        text = default if tag is None else tag.get(key, default)
-        n = len(default.split())
-        try:
-            found = [float(word) for word in text.split()]
-        except ValueError:
-            found = []
-        if len(found) != n or not all(isfinite(x) for x in found):
-            several = "a number" if n == 1 else f"{n} numbers"
-            self.problems.append(f"{where}: expected {several} in {key}, got '{text}'")
-            found = [float(word) for word in default.split()]
-        return np.array(found)
-
-    def number(self, where: str, tag: ET.Element | None, key: str, default: str = "0") -> float:
-        """The number in an attribute."""
-        return float(self.numbers(where, tag, key, default)[0])
-
-    def pose(self, where: str, tag: ET.Element) -> tuple[Array, Array]:
-        """Rotation and position in the tag <origin> of `tag`."""
-        origin, at = tag.find("origin"), f"{where} > origin"
-        turn = rotation(*self.numbers(at, origin, "rpy", "0 0 0"))
-        return turn, self.numbers(at, origin, "xyz", "0 0 0")
-
-
-def rotation(roll: float, pitch: float, yaw: float) -> Array:
-    """R_z(yaw) R_y(pitch) R_x(roll): turns about the fixed axes x, y, z, one after the other."""
-    (cr, sr), (cp, sp), (cy, sy) = ((cos(a), sin(a)) for a in (roll, pitch, yaw))
-    R = np.array([
-        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-        [-sp, cp * sr, cp * cr],
-    ])  # fmt: skip
-    return np.where(np.abs(R) < SNAP, 0.0, R)
-
-
-def _inertial(tag: ET.Element, notes: _Notes) -> Inertial | None:
+def _inertial(tag: ET.Element, notes: Notes) -> Inertial | None:
     link = f"link '{tag.get('name', '')}'"
     notes.others(link, tag, {"inertial"})
     inertial = tag.find("inertial")
@@ -235,16 +181,23 @@ def _inertial(tag: ET.Element, notes: _Notes) -> Inertial | None:
         notes.number(at, inertia, key) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     )
     J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    principal = np.linalg.eigvalsh(J)
     if mass < 0:
         notes.problems.append(f"{where} > mass: expected >= 0 kg, got {mass:g}")
-    if principal[0] < -1e-9 * abs(principal[2]):
-        text = ", ".join(f"{x:g}" for x in principal)
-        notes.problems.append(f"{at}: expected no negative principal moment, got {text}")
+        return None
+    if np.abs(J).max() <= POINT * mass:
+        J = np.zeros((3, 3))
+    for text in unphysical(J, point=True) if mass else _weightless(J):
+        notes.doubt(f"{where} > {text}")
     return Inertial(mass, com, R @ J @ R.T) if mass or J.any() else None
 
 
-def _joint(tag: ET.Element, notes: _Notes) -> UrdfJoint:
+def _weightless(J: Array) -> Iterator[str]:
+    """An inertia without a mass."""
+    if J.any():
+        yield "mass: expected > 0 kg, because there is an inertia, got 0"
+
+
+def _joint(tag: ET.Element, notes: Notes) -> UrdfJoint:
     name, kind = tag.get("name", ""), tag.get("type", "")
     where = f"joint '{name}'"
     known = {"origin", "parent", "child", "axis", "dynamics", "limit", "mimic"}
@@ -255,9 +208,15 @@ def _joint(tag: ET.Element, notes: _Notes) -> UrdfJoint:
     for key in () if dynamics is None else dynamics.keys():
         if key not in ("damping", "friction"):
             notes.left(f"dynamics {key}", where)
-    if limit is not None:
+    if limit is not None and kind != "fixed":
         notes.left("limit", where)
-    axis = notes.numbers(f"{where} > axis", tag.find("axis"), "xyz", "1 0 0")
+    # what a joint does not have says nothing, and exporters write zeros there
+    along = None if kind in ("fixed", "floating") else tag.find("axis")
+    mimic = tag.find("mimic")
+    if kind == "fixed" and mimic is not None:
+        notes.left("mimic", where)
+        mimic = None
+    axis = notes.numbers(f"{where} > axis", along, "xyz", "1 0 0")
     length = float(np.linalg.norm(axis))
     if not length > 1e-12:
         notes.problems.append(f"{where} > axis: expected a direction, got '0 0 0'")
@@ -273,18 +232,18 @@ def _joint(tag: ET.Element, notes: _Notes) -> UrdfJoint:
         name, kind, ends["parent"], ends["child"], R, p, axis / (length or 1.0), damping, friction,
         {key: notes.number(f"{where} > limit", limit, key) for key in LIMITS
          if limit is not None and key in limit.attrib},
-        _mimic(where, tag.find("mimic"), notes),
+        _mimic(where, mimic, notes),
     )  # fmt: skip
 
 
-def _end(where: str, tag: ET.Element | None, key: str, notes: _Notes) -> str:
+def _end(where: str, tag: ET.Element | None, key: str, notes: Notes) -> str:
     link = "" if tag is None else tag.get("link", "")
     if not link:
         notes.problems.append(f"{where} > {key}: expected the name of a link, found none")
     return link
 
 
-def _mimic(where: str, tag: ET.Element | None, notes: _Notes) -> Mimic | None:
+def _mimic(where: str, tag: ET.Element | None, notes: Notes) -> Mimic | None:
     if tag is None:
         return None
     at = f"{where} > mimic"
@@ -294,7 +253,7 @@ def _mimic(where: str, tag: ET.Element | None, notes: _Notes) -> Mimic | None:
     )  # fmt: skip
 
 
-def _check_names(robot: ET.Element, notes: _Notes) -> None:
+def _check_names(robot: ET.Element, notes: Notes) -> None:
     """Every link and every joint has a name of its own."""
     for kind in ("link", "joint"):
         names = [tag.get("name", "") for tag in robot.findall(kind)]
@@ -328,6 +287,15 @@ def _tree_problems(links: Iterable[str], joints: Sequence[UrdfJoint]) -> Iterato
     for link in carriers:
         if link not in reached:
             yield f"link '{link}': expected joints that lead to '{roots[0]}', got a closed loop"
+
+
+def _known_leader(joint: UrdfJoint, joints: Sequence[UrdfJoint], notes: Notes) -> UrdfJoint:
+    """The joint; one that moves on its own where the file lacks the joint that it mimics."""
+    if joint.mimic is None or any(joint.mimic.joint == other.name for other in joints):
+        return joint
+    leader = joint.mimic.joint or "one without a name"
+    notes.doubt(f"joint '{joint.name}' > mimic: expected a joint of the file, got {leader}")
+    return replace(joint, mimic=None)
 
 
 def _mimic_problems(joints: Sequence[UrdfJoint]) -> Iterator[str]:

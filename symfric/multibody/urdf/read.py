@@ -2,7 +2,7 @@
 
 import re
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import final
@@ -12,14 +12,16 @@ import numpy as np
 from symfric.foundation.numeric import Scalar, equals, is_number
 from symfric.foundation.parameters import check_names, parameters, with_values
 from symfric.laws import Coulomb, Law, Sum, Viscous
-from symfric.multibody.body import GROUND
+from symfric.multibody.body import GROUND, unphysical
 from symfric.multibody.couplings import Gear
 from symfric.multibody.forces import JointSpringDamper
 from symfric.multibody.friction import JointFriction
 from symfric.multibody.joints import Free, Joint, Planar, Prismatic, Revolute
 from symfric.multibody.mechanism import Mechanism
 from symfric.multibody.spatial import Vector
-from symfric.multibody.urdf.file import Array, Inertial, Urdf, UrdfJoint, parse
+from symfric.multibody.urdf.bodies import Carried, carried, holding, merged
+from symfric.multibody.urdf.file import Inertial, Urdf, UrdfJoint, parse
+from symfric.multibody.urdf.notes import Array
 
 KINDS: dict[str, type[Joint]] = {
     "revolute": Revolute,
@@ -40,13 +42,15 @@ def read_urdf(
     bearings: Mapping[str, JointFriction] | None = None,
     floating: bool = False,
     gravity: Vector = (0.0, 0.0, -9.81),
+    strict: bool = False,
 ) -> Mechanism:
     """The mechanism that a URDF file describes: a chain or tree of links.
 
     Joints keep their names, q = 0 is the file's zero. Links that fixed joints hold together are
     one body with the name of the innermost link; every link is a frame of its body, "body.link".
-    Every joint that turns about or slides along its axis gets an input `tau_<joint>` [N m, N],
-    unless it mimics another one: then a `Gear` makes it follow.
+    Massless links between joints make these the axes of one joint; joints that move no mass at
+    all are held at zero. Every joint that turns about or slides along its axis gets an input
+    `tau_<joint>` [N m, N], unless it mimics another one: then a `Gear` makes it follow.
 
     `<dynamics damping="d" friction="f">` becomes the friction d w + f tanh(w / v_eps) for a joint
     rate w: `Viscous` with sigma_2 = d, and `Coulomb` with mu_d = 1 under the normal force f. That
@@ -62,42 +66,51 @@ def read_urdf(
         floating: whether the root link moves freely (joint `floating_base`); otherwise it is the
             ground, whatever it weighs. A massless root always is.
         gravity: [m/s^2] in the axes of the root link.
+        strict: refuse instead of warn: inertias that no rigid body has, joints that move no mass,
+            joints that mimic one the file does not have.
 
     Raises:
-        ValueError: all mistakes of the file at once, each with its path; a joint that moves a
-            massless link; an unknown name in `bearings`.
+        ValueError: all mistakes of the file at once, each with its path; nothing that moves has a
+            mass; an unknown name in `bearings`.
         OSError: the file cannot be read.
 
     Warns:
-        UserWarning: once, of all that is left out (tags such as `<limit>`: nothing stops a joint
-            there, `parse` has the numbers; not of visual, collision and material) and of names
-            that are no C identifiers and are changed.
+        UserWarning: once, of what is taken as it is though it cannot be meant (see `strict`), of
+            all that is left out (tags such as `<limit>`: nothing stops a joint there, `parse` has
+            the numbers; not of visual, collision and material) and of names that are no C
+            identifiers and are changed.
+
+    Limits: an inertia of which no body is made can make the motion gain energy; `build` refuses it
+    where the mass matrix at the start is not positive definite.
     """
-    urdf = parse(source)
-    check_names(f"urdf '{urdf.name}' bearings", bearings or {}, [j.name for j in urdf.joints])
-    carried = _carried(urdf)
-    weights = {
-        link: _merged(urdf, carried, link) for link in urdf.links if link == carried[link].body
-    }
+    urdf, held = holding(parse(source, strict))
+    places = carried(urdf)
+    weights = {link: merged(urdf, places, link) for link in urdf.links if link == places[link].body}
     grounded = not floating or weights[urdf.root].mass == 0
     names = _names(urdf, grounded)
-    moved = [joint for joint in urdf.outwards() if carried[joint.child].body == joint.child]
-    problems = [*names.problems, *_massless(moved, weights)]
+    moved = [joint for joint in urdf.outwards() if places[joint.child].body == joint.child]
+    problems = [*names.problems, *_massless(moved, held, strict or (grounded and not moved))]
     if problems:
         raise ValueError("\n".join(f"urdf '{urdf.name}' > {text}" for text in problems))
+    check_names(f"urdf '{urdf.name}' bearings", bearings or {}, [j.name for j in moved])
     m = Mechanism(_identifier(urdf.name), gravity)
-    _add_bodies(m, urdf, carried, weights, names)
+    _add_bodies(m, urdf, places, weights, names)
     if not grounded:
         m.joint(Free(FLOATING, GROUND, names.links[urdf.root]))
     left = list(urdf.left_out)
     for joint in moved:
         friction = (bearings or {}).get(joint.name) or tag_friction(joint, law, level)
-        left += _hang(m, joint, names, carried, friction, urdf.zero(joint))
+        left += _hang(m, joint, names, places, friction, urdf.zero(joint))
     _couple(m, moved, names)
     if law is not None and equals(level, 0.0) and not any(joint.friction for joint in moved):
         left.append(f"{type(law).__name__}, because no joint has <dynamics friction>")
     changes = [f"{old} to {new}" for old, new in names.changed.items()]
-    texts = [("left out", left), ("names changed", changes)]
+    texts = [
+        ("taken as it is", urdf.doubts),
+        ("held at zero, because they move no mass", [f"joint '{name}'" for name in held]),
+        ("left out", left),
+        ("names changed", changes),
+    ]
     message = "; ".join(f"{what}: {', '.join(several)}" for what, several in texts if several)
     if message:
         warnings.warn(f"urdf '{urdf.name}': {message}", stacklevel=2)
@@ -133,56 +146,6 @@ def relative(law: Law) -> Law:
 
 @final
 @dataclass(frozen=True, eq=False)
-class _Carried:
-    """Where a link is: the link whose body it is part of, and its pose there."""
-
-    body: str
-    R: Array
-    p: Array
-
-
-def _carried(urdf: Urdf) -> dict[str, _Carried]:
-    """Every link: a body of its own, or fixed to another one."""
-    found = {urdf.root: _Carried(urdf.root, np.eye(3), np.zeros(3))}
-    for joint in urdf.outwards():
-        on = found[joint.parent]
-        found[joint.child] = (
-            _Carried(on.body, on.R @ joint.R, on.p + on.R @ joint.p)
-            if joint.kind == "fixed"
-            else _Carried(joint.child, np.eye(3), np.zeros(3))
-        )
-    return found
-
-
-def _merged(urdf: Urdf, carried: Mapping[str, _Carried], body: str) -> Inertial:
-    """Mass, centre of mass and inertia about it of all links of a body."""
-    parts = [
-        (at, part)
-        for link, at in carried.items()
-        if at.body == body and (part := urdf.links[link]) is not None
-    ]
-    mass = sum(part.mass for _, part in parts)
-    moment = sum((part.mass * (at.p + at.R @ part.com) for at, part in parts), np.zeros(3))
-    com = moment / mass if mass else moment
-    inertia = np.zeros((3, 3))
-    for at, part in parts:
-        d = at.p + at.R @ part.com - com
-        inertia += at.R @ part.J @ at.R.T + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
-    return Inertial(mass, com, inertia)
-
-
-def _massless(moved: Iterable[UrdfJoint], weights: Mapping[str, Inertial]) -> Iterator[str]:
-    """Massless links that a joint moves."""
-    for joint in moved:
-        if weights[joint.child].mass == 0:
-            yield (
-                f"link '{joint.child}' > inertial: expected a mass > 0 kg, because joint "
-                f"'{joint.name}' moves it; give it one, or hold it with a fixed joint"
-            )
-
-
-@final
-@dataclass(frozen=True, eq=False)
 class _Names:
     """Names in the mechanism: of bodies by link, of joints; those that differ; what is wrong."""
 
@@ -190,6 +153,21 @@ class _Names:
     joints: dict[str, str] = field(default_factory=dict[str, str])
     changed: dict[str, str] = field(default_factory=dict[str, str])
     problems: list[str] = field(default_factory=list[str])
+
+
+def _massless(moved: Iterable[UrdfJoint], held: Collection[str], refused: bool) -> Iterator[str]:
+    """Joints that move no mass, where that is refused, and those that mimic them."""
+    for name in held if refused else ():
+        yield (
+            f"joint '{name}': expected links with a mass > 0 kg that it moves, got none; give one "
+            "an <inertial>, or make it a fixed joint"
+        )
+    for joint in moved:
+        if joint.mimic is not None and joint.mimic.joint in held:
+            yield (
+                f"joint '{joint.name}' > mimic: expected a joint that moves a mass, got "
+                f"'{joint.mimic.joint}'"
+            )
 
 
 def _identifier(text: str) -> str:
@@ -227,7 +205,7 @@ def _names(urdf: Urdf, grounded: bool) -> _Names:
 def _add_bodies(
     m: Mechanism,
     urdf: Urdf,
-    carried: Mapping[str, _Carried],
+    places: Mapping[str, Carried],
     weights: Mapping[str, Inertial],
     names: _Names,
 ) -> None:
@@ -235,8 +213,9 @@ def _add_bodies(
     for link, weight in weights.items():
         if names.links[link] != GROUND:
             six = weight.J[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-            m.body(names.links[link], weight.mass, six.tolist(), _plain(weight.com))
-    for link, at in carried.items():
+            ideal = weight.mass == 0 or any(unphysical(weight.J))
+            m.body(names.links[link], weight.mass, six.tolist(), _plain(weight.com), ideal)
+    for link, at in places.items():
         name = names.links[link] if names.links[link] != GROUND else _identifier(link)
         m.frame(
             f"{names.links[at.body]}.{name}", _plain(at.p), _plain(at.R[:, 2]), _plain(at.R[:, 0])
@@ -247,12 +226,12 @@ def _hang(
     m: Mechanism,
     joint: UrdfJoint,
     names: _Names,
-    carried: Mapping[str, _Carried],
+    places: Mapping[str, Carried],
     friction: JointFriction | None,
     start: float,
 ) -> Iterator[str]:
     """Add a joint with its frames and its input; yield what is left out."""
-    name, on = names.joints[joint.name], carried[joint.parent]
+    name, on = names.joints[joint.name], places[joint.parent]
     parent, child = names.links[on.body], names.links[joint.child]
     across = np.eye(3)[int(np.argmin(np.abs(joint.axis)))]
     R, p = on.R @ joint.R, on.p + on.R @ joint.p

@@ -10,7 +10,7 @@ from robots import SMALL, rod
 
 from symfric import Coulomb, Law, LuGre, Sum, Viscous, parameters, simulate
 from symfric.laws import Stribeck
-from symfric.multibody import JointFriction, functions
+from symfric.multibody import JointFriction, Mechanism, Universal, functions
 from symfric.multibody.urdf.file import parse
 from symfric.multibody.urdf.read import read_urdf, relative, tag_friction
 
@@ -175,7 +175,7 @@ def test_names_are_kept_apart() -> None:
     ("changes", "message"),
     [
         ({'mass value="2"': 'mass value="0"', "0.1": "0", "0.01": "0"},
-         "urdf 'small' > link 'arm' > inertial: expected a mass > 0 kg, because joint 'hinge'"),
+         "urdf 'small' > joint 'hinge': expected links with a mass > 0 kg that it moves, got none"),
         ({"hinge": "a-b", "</robot>": '<joint name="a_b" type="continuous"><parent link="arm"/>'
           '<child link="x"/></joint><link name="x"><inertial><mass value="1"/><inertia ixx="1" '
           'iyy="1" izz="1"/></inertial></link><joint name="a_b_joint" type="continuous"><parent '
@@ -201,8 +201,122 @@ def test_file_is_read_by_its_path(tmp_path: Path) -> None:
     assert read_urdf(path).name == read_urdf(str(path)).name == "small"
 
 
-def test_inertia_that_cannot_be_is_refused_with_the_name_of_the_link() -> None:
+def test_inertia_that_no_body_has_is_used_with_a_warning_or_refused() -> None:
+    text = rod(**{'izz="0.01"': 'izz="0.5"'})
+    with pytest.warns(UserWarning, match="taken as it is: link 'arm' > inertial > inertia: expect"):
+        m = read_urdf(text)
+    assert [float(x) for x in m.bodies[1].inertia] == [0.1, 0.1, 0.5, 0, 0, 0]
+    assert float(functions(m)["mass"](0, [])) == pytest.approx(0.1 + 2 * 0.25**2)
     with pytest.raises(
-        ValueError, match="mechanism 'small' > body 'arm' > inertia: expected the l"
+        ValueError, match="urdf 'small' > link 'arm' > inertial > inertia: expected"
     ):
-        read_urdf(rod(**{'izz="0.01"': 'izz="0.5"'})).build()
+        read_urdf(text, strict=True)
+    with (
+        pytest.warns(UserWarning, match="link 'arm'"),
+        pytest.raises(ValueError, match="positive definite, got one that is not in hinge: what"),
+    ):
+        read_urdf(text.replace('iyy="0.1"', 'iyy="-0.5"')).build()
+
+
+def bar(name: str, weight: str = "") -> str:
+    return f'<link name="{name}">{weight}</link>'
+
+
+def hinge(name: str, parent: str, child: str, axis: str, more: str = "") -> str:
+    return (
+        f'<joint name="{name}" type="continuous"><parent link="{parent}"/><child link="{child}"/>'
+        f'<axis xyz="{axis}"/>{more}</joint>'
+    )
+
+
+def text_of(*parts: str) -> str:
+    return f'<robot name="r">{bar("world")}{"".join(parts)}</robot>'
+
+
+HEAVY = """<inertial><origin xyz="0.1 0.2 -0.5"/><mass value="2"/>
+  <inertia ixx="0.1" iyy="0.2" izz="0.15" ixy="0.01" ixz="0.02" iyz="-0.03"/></inertial>"""
+
+
+def test_massless_links_between_joints_make_one_joint_of_several_axes() -> None:
+    """Two hinges at a point, about x and y: a universal joint, by its own equations."""
+    robot = read_urdf(
+        text_of(bar("cross"), bar("arm", HEAVY), hinge("a", "world", "cross", "1 0 0"),
+                hinge("b", "cross", "arm", "0 1 0")), strict=True,
+    )  # fmt: skip
+    _, cross, arm = robot.bodies
+    assert (cross.mass, cross.ideal, arm.ideal) == (0.0, True, False)
+    m = Mechanism("r")
+    m.body("arm", arm.mass, arm.inertia, arm.com)
+    m.joint(Universal("u", "ground", "arm"))
+    q, qd, a = np.random.default_rng(0).normal(size=(3, 2))
+    found, expected = (
+        functions(x)["inverse_dynamics"](q, qd, a, [], [], [0] * len(x.inputs), [])
+        for x in (robot, m)
+    )
+    assert found.full() == pytest.approx(expected.full(), rel=1e-13)
+    runs = [simulate(x.build(), 0.5, rtol=1e-9, backend="vm", samples=5) for x in (robot, m)]
+    for mine, theirs in (("a", "u_x"), ("b", "u_y")):
+        assert runs[0][mine] == pytest.approx(runs[1][theirs], abs=1e-8)
+    with pytest.raises(ValueError, match="body 'cross': expected a rigid body in absolute coord"):
+        robot.build(formulation="absolute")
+
+
+def test_joints_that_move_no_mass_are_held_with_a_warning_or_refused() -> None:
+    """A finger of two massless links on a heavy arm."""
+    text = text_of(
+        bar("arm", HEAVY), bar("f1"), bar("f2"), hinge("a", "world", "arm", "1 0 0"),
+        hinge("b", "arm", "f1", "1 0 0"), hinge("c", "f1", "f2", "0 1 0", '<mimic joint="b"/>'),
+    )  # fmt: skip
+    with pytest.warns(UserWarning, match="held at zero, because they move no mass: joint 'b', joi"):
+        m = read_urdf(text)
+    assert ([j.name for j in m.joints], [v.name for v in m.inputs]) == (["a"], ["tau_a"])
+    assert "arm.f2" in {place for place, _ in m.frames}
+    with pytest.raises(ValueError, match="joint 'b': expected links with a mass") as caught:
+        read_urdf(text, strict=True)
+    assert len(str(caught.value).splitlines()) == 2
+    heavy = text.replace('name="f2">', f'name="f2">{HEAVY}').replace(
+        '<parent link="f1"/>', '<parent link="arm"/>'
+    )
+    with pytest.raises(ValueError, match="joint 'c' > mimic: expected a joint that moves a mass"):
+        read_urdf(heavy)
+
+
+def test_parallel_axes_of_massless_links_are_refused_by_build() -> None:
+    """Both turn the same body the same way: the difference of the two angles moves nothing."""
+    text = text_of(bar("cross"), bar("arm", HEAVY), hinge("a", "world", "cross", "0 1 0"),
+                   hinge("b", "cross", "arm", "0 2 0"))  # fmt: skip
+    with pytest.raises(ValueError, match=r"mechanism 'r' > expected a mass matrix .* in a, b: "):
+        read_urdf(text).build()
+
+
+def test_point_mass_on_a_rod_swings() -> None:
+    """Guards against refusing an inertia of zeros: g sin(q) / l."""
+    point = '<inertial><origin xyz="0 0 -0.4"/><mass value="3"/><inertia ixx="0"/></inertial>'
+    text = text_of(bar("bob", point), hinge("a", "world", "bob", "0 1 0"))
+    f = read_urdf(text, strict=True).build().function("ode")
+    assert float(f(0, [0.3, 0], [], [0], [])[1]) == pytest.approx(-9.81 * np.sin(0.3) / 0.4)
+    onto = text.replace("0 0 -0.4", "0 0.4 0")
+    with pytest.raises(ValueError, match=r"expected a mass matrix .* not in a: what these move"):
+        read_urdf(onto).build()
+
+
+def test_mass_matrix_may_have_zeros_on_one_side_only() -> None:
+    """Guards against CasADi's "LDL factorization requires a symmetric matrix" in build()."""
+    ball = '<inertial><origin xyz="{}"/><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></iner'
+    a, b = (f"{ball.format(at)}tial>" for at in ("0 0.1 0", "0 0 0.1"))
+    m = read_urdf(
+        text_of(bar("a", a), bar("b", b), hinge("p", "world", "a", "1 0 0"),
+                hinge("q", "a", "b", "0 1 0"))
+    )  # fmt: skip
+    eq = m.prepare().eq
+    assert not eq.mass.sparsity().is_symmetric()
+    q, qd = np.random.default_rng(0).normal(size=(2, 2))
+    f = functions(m)
+    M, bias = f["mass"](q, []).full(), f["bias"](q, qd, [1, 2], []).full().ravel()
+    found = m.build().function("ode")(0, [*q, *qd], [], [1, 2], []).full().ravel()
+    assert found[2:] == pytest.approx(np.linalg.solve(M, -bias), rel=1e-12)
+
+
+def test_bearing_of_a_fixed_joint_is_refused() -> None:
+    with pytest.raises(ValueError, match="'dumb bell' bearings: expected one of spin, got weld"):
+        read_urdf(WELDED, bearings={"weld": JointFriction(Coulomb(), radius=0.01)})

@@ -1,0 +1,83 @@
+"""What is noted while a URDF file is read: mistakes, doubts, what is left out; and its numbers."""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from math import cos, isfinite, sin
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+APPEARANCE = {"visual", "collision", "material"}
+"""Tags that no mechanism has a place for and nobody misses there."""
+SNAP = 1e-15
+"""Entries of rotation matrices nearer to 0 are 0: a quarter turn must not leave 6e-17 behind."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Notes:
+    """What is wrong, what cannot be meant as it stands, what is left out: tag -> where it stands.
+
+    A strict reader takes doubts for problems.
+    """
+
+    strict: bool = False
+    problems: list[str] = field(default_factory=list[str])
+    doubts: list[str] = field(default_factory=list[str])
+    left_out: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
+
+    def others(self, where: str, tag: ET.Element, known: Iterable[str]) -> None:
+        """Note the tags inside `tag` that are not known."""
+        for other in tag:
+            if other.tag.startswith("xacro:"):
+                self.problems.append("<xacro>: expected plain URDF; expand the file with xacro")
+            elif other.tag not in {*known, *APPEARANCE}:
+                self.left(other.tag, where)
+
+    def doubt(self, text: str) -> None:
+        """Note what others' tools take as it is."""
+        (self.problems if self.strict else self.doubts).append(text)
+
+    def left(self, tag: str, where: str) -> None:
+        """Note a tag that is left out, once for every place."""
+        places = self.left_out.setdefault(tag, [])
+        if where not in places:
+            places.append(where)
+
+    def numbers(self, where: str, tag: ET.Element | None, key: str, default: str) -> Array:
+        """The numbers in an attribute, as many as in `default`, which stands for a missing one."""
+        text = default if tag is None else tag.get(key, default)
+        n = len(default.split())
+        try:
+            found = [float(word) for word in text.split()]
+        except ValueError:
+            found = []
+        if len(found) != n or not all(isfinite(x) for x in found):
+            several = "a number" if n == 1 else f"{n} numbers"
+            self.problems.append(f"{where}: expected {several} in {key}, got '{text}'")
+            found = [float(word) for word in default.split()]
+        return np.array(found)
+
+    def number(self, where: str, tag: ET.Element | None, key: str, default: str = "0") -> float:
+        """The number in an attribute."""
+        return float(self.numbers(where, tag, key, default)[0])
+
+    def pose(self, where: str, tag: ET.Element) -> tuple[Array, Array]:
+        """Rotation and position in the tag <origin> of `tag`."""
+        origin, at = tag.find("origin"), f"{where} > origin"
+        turn = rotation(*self.numbers(at, origin, "rpy", "0 0 0"))
+        return turn, self.numbers(at, origin, "xyz", "0 0 0")
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> Array:
+    """R_z(yaw) R_y(pitch) R_x(roll): turns about the fixed axes x, y, z, one after the other."""
+    (cr, sr), (cp, sp), (cy, sy) = ((cos(a), sin(a)) for a in (roll, pitch, yaw))
+    R = np.array([
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ])  # fmt: skip
+    return np.where(np.abs(R) < SNAP, 0.0, R)
