@@ -180,12 +180,11 @@ def _inertial(tag: ET.Element, notes: Notes) -> Inertial | None:
     xx, yy, zz, xy, xz, yz = (
         notes.number(at, inertia, key) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     )
-    J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    given = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if mass < 0:
         notes.problems.append(f"{where} > mass: expected >= 0 kg, got {mass:g}")
         return None
-    if np.abs(J).max() <= POINT * mass:
-        J = np.zeros((3, 3))
+    J = given if np.abs(given).max() > POINT * mass else np.zeros((3, 3))
     for text in unphysical(J, point=True) if mass else _weightless(J):
         notes.doubt(f"{where} > {text}")
     return Inertial(mass, com, R @ J @ R.T) if mass or J.any() else None
