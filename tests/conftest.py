@@ -2,6 +2,7 @@
 
 import matplotlib as mpl
 import pytest
+import stored
 from hypothesis import settings
 
 mpl.use("Agg")
@@ -14,3 +15,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--update-golden", action="store_true", help="write tables under tests/golden anew"
     )
+    parser.addoption(
+        "--recompute", action="store_true", help="compute stored references again and compare"
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    stored.chosen["update"] = config.getoption("--update-golden")
+    stored.chosen["recompute"] = config.getoption("--recompute")

@@ -13,6 +13,7 @@ from mechanics import (
     slider_crank,
 )
 from scipy.integrate import solve_ivp
+from stored import stored
 
 from symfric import (
     BrownMcPhee,
@@ -43,12 +44,17 @@ SMOOTH = Viscous(sigma_2=0.0)
 each_scene = pytest.mark.parametrize("kind", MECHANISMS.values(), ids=MECHANISMS.keys())
 
 
-def reference(rates: Rates, y0: list[float], times: np.ndarray) -> np.ndarray:
-    run = solve_ivp(
-        rates, (0.0, times[-1]), y0, method="Radau", rtol=1e-9, atol=1e-11, t_eval=times
-    )
-    assert run.success
-    return run.y
+def reference(name: str, rates: Rates, y0: list[float], times: np.ndarray) -> np.ndarray:
+    """Minimal coordinates and their rates at `times`, by SciPy's Radau."""
+
+    def compute() -> np.ndarray:
+        run = solve_ivp(
+            rates, (0.0, times[-1]), y0, method="Radau", rtol=1e-9, atol=1e-11, t_eval=times
+        )
+        assert run.success
+        return run.y
+
+    return stored(name, compute)
 
 
 def constraints(run: Trajectory) -> tuple[float, float, float]:
@@ -71,7 +77,9 @@ def test_pendulum_swings_with_the_elliptic_period(amplitude: float) -> None:
 
 def test_double_pendulum_agrees_with_the_textbook() -> None:
     times = np.linspace(0.1, 4.0, 40)
-    a, b, *_ = reference(double_pendulum(1.0, 1.0, 9.81), [2.0, 2.0, 0.0, 0.0], times)
+    a, b, *_ = reference(
+        "double_pendulum", double_pendulum(1.0, 1.0, 9.81), [2.0, 2.0, 0.0, 0.0], times
+    )
     run = simulate(DoublePendulum(SMOOTH).model(), 4.0, rtol=1e-10, t_eval=times)
     assert run["phi_1"] == pytest.approx(a, abs=2e-6)
     assert run["phi_1"] + run["phi_2"] == pytest.approx(b, abs=2e-6)
@@ -85,7 +93,8 @@ def test_pendulum_on_a_box_agrees_with_newtons_laws(law: BrownMcPhee) -> None:
     def mu(v: float) -> float:
         return brown_mcphee(v, 0.03, 0.02, 0.02)
 
-    expected = reference(pendulum_box(6.0, 20.0, 0.3, 0.05, 9.81, mu), [0, np.pi / 6, 0, 0], times)
+    start, rates = [0, np.pi / 6, 0, 0], pendulum_box(6.0, 20.0, 0.3, 0.05, 9.81, mu)
+    expected = reference("pendulum_box", rates, start, times)
     run = simulate(PendulumBox(law, R=0.05).model(), 5.0, rtol=1e-9, t_eval=times)
     for name, values in zip(("x", "phi", "x_rate", "phi_rate"), expected, strict=True):
         assert run[name] == pytest.approx(values, abs=1e-6), name
@@ -145,7 +154,7 @@ def test_four_mass_agrees_with_minimal_coordinates() -> None:
     def mu(v: float) -> float:
         return brown_mcphee(v, 0.12, 0.1, 0.01)
 
-    th, x4, *_ = reference(four_mass(mu), [np.arctan2(3, 4), 5.0, 0.0, -1.0], times)
+    th, x4, *_ = reference("four_mass", four_mass(mu), [np.arctan2(3, 4), 5.0, 0.0, -1.0], times)
     run = simulate(four_mass_model(PEAK), 4.0, rtol=1e-9, t_eval=times)
     assert run["x1"] == pytest.approx(5 * np.cos(th), abs=1e-6)
     assert run["y2"] == pytest.approx(5 * np.sin(th), abs=1e-6)
@@ -188,7 +197,7 @@ def test_slider_crank_agrees_with_the_crank_angle_alone() -> None:
     def mu(v: float) -> float:
         return brown_mcphee(v, 0.1, 0.08, 0.01)
 
-    th, w = reference(slider_crank(mu), [0.0, 120.0], times)
+    th, w = reference("slider_crank", slider_crank(mu), [0.0, 120.0], times)
     run = simulate(SliderCrank(CRANK).model(), 0.25, rtol=1e-10, t_eval=times)
     assert run["crank"] == pytest.approx(th, abs=1e-6)
     assert run["crank_rate"] == pytest.approx(w, abs=1e-4)

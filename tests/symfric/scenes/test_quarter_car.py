@@ -10,6 +10,7 @@ import pytest
 from mechanics import brown_mcphee
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
+from stored import stored
 
 from symfric import BrownMcPhee, Law, LuGre, Sum, Trajectory, Viscous, parameters, simulate
 from symfric.foundation.parameters import with_values
@@ -90,7 +91,8 @@ LAWS: list[tuple[Law, Friction]] = [
 @pytest.mark.parametrize(("law", "friction"), LAWS, ids=["general", "simple", "brown_mcphee"])
 def test_rig_agrees_with_newtons_laws(law: Law, friction: Friction, amplitude: float) -> None:
     times = np.linspace(0.1, 10.0, 100)
-    expected = rig(friction, amplitude, times)
+    case = f"quarter_car_{friction.__name__}_{1e3 * amplitude:.0f}_mm"
+    expected = stored(case, lambda: rig(friction, amplitude, times))
     run = simulate(QuarterCar(law, amplitude=amplitude).model(), 10.0, rtol=1e-8, t_eval=times)
     for name, values in zip(("X_b", "X_w", "v_b", "v_w"), expected, strict=True):
         assert run[name] == pytest.approx(values, abs=2e-6), name

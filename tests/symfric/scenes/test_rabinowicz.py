@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from oracles import StickSlip, rabinowicz_coulomb, rabinowicz_lugre
 from scipy.integrate import solve_ivp
+from stored import stored
 
 from symfric import (
     ALL_LAWS,
@@ -126,17 +127,21 @@ def test_seed_widths_of_brown_mcphee_come_as_close_as_stated() -> None:
 def reference() -> tuple[np.ndarray, np.ndarray]:
     """Times and (x, v, z) of LuGre stick-slip by SciPy's Radau at 1e-12."""
     t = np.linspace(0.0, 8.0, 161)
-    run = solve_ivp(
-        rabinowicz_lugre(),
-        (0.0, 8.0),
-        [0.0, 0.0, -0.1 * M * G / 1e5],
-        method="Radau",
-        rtol=1e-12,
-        atol=[1e-15, 1e-15, 1e-19],
-        t_eval=t,
-    )
-    assert run.success
-    return t, run.y
+
+    def compute() -> np.ndarray:
+        run = solve_ivp(
+            rabinowicz_lugre(),
+            (0.0, 8.0),
+            [0.0, 0.0, -0.1 * M * G / 1e5],
+            method="Radau",
+            rtol=1e-12,
+            atol=[1e-15, 1e-15, 1e-19],
+            t_eval=t,
+        )
+        assert run.success
+        return run.y
+
+    return t, stored("rabinowicz_lugre", compute)
 
 
 @pytest.mark.parametrize(("rtol", "error"), [(1e-6, 2e-4), (1e-8, 2e-6), (1e-10, 2e-8)])
