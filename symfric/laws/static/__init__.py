@@ -1,34 +1,43 @@
 """Memoryless laws F(v, N): one family a file."""
 
 from symfric.laws.base.law import Law
-from symfric.laws.static.applied_force import Awrejcewicz, Karnopp, LeineSwitch, Wojewoda
-from symfric.laws.static.brown_mcphee import BrownMcPhee
-from symfric.laws.static.coulomb import Coulomb, PowerLawViscous, Viscous
-from symfric.laws.static.exponential import (
-    Andersson,
-    Benson,
-    Berger,
-    DuanSingh,
-    SteadyStateLuGre,
-    Tustin,
-)
-from symfric.laws.static.falling import Lorentzian, PoppStelter
-from symfric.laws.static.joints import BAM, Bittencourt, Capstan
-from symfric.laws.static.piecewise import (
-    Ambrosio,
-    BengisuAkay,
-    Exudyn,
-    Hollars,
-    Step5,
-    VelocityBased,
-)
-from symfric.laws.static.quarter_car import QuarterCarGeneral, QuarterCarSimple
-from symfric.laws.static.rui_wang import RuiWang
-from symfric.laws.static.self_tuning import BrittleSelfTuning, SelfTuning
-from symfric.laws.static.smooth_peak import MakkarDixon, SimscapeBreakaway, Specker
-from symfric.laws.static.stribeck import Stribeck
+from symfric.laws.static.applied_force import Awrejcewicz as Awrejcewicz
+from symfric.laws.static.applied_force import Karnopp as Karnopp
+from symfric.laws.static.applied_force import LeineSwitch as LeineSwitch
+from symfric.laws.static.applied_force import Wojewoda as Wojewoda
+from symfric.laws.static.brown_mcphee import BrownMcPhee as BrownMcPhee
+from symfric.laws.static.coulomb import Coulomb as Coulomb
+from symfric.laws.static.coulomb import PowerLawViscous as PowerLawViscous
+from symfric.laws.static.coulomb import Viscous as Viscous
+from symfric.laws.static.exponential import Andersson as Andersson
+from symfric.laws.static.exponential import Benson as Benson
+from symfric.laws.static.exponential import Berger as Berger
+from symfric.laws.static.exponential import DuanSingh as DuanSingh
+from symfric.laws.static.exponential import SteadyStateLuGre as SteadyStateLuGre
+from symfric.laws.static.exponential import Tustin as Tustin
+from symfric.laws.static.falling import Lorentzian as Lorentzian
+from symfric.laws.static.falling import PoppStelter as PoppStelter
+from symfric.laws.static.joints import BAM as BAM
+from symfric.laws.static.joints import Bittencourt as Bittencourt
+from symfric.laws.static.joints import Capstan as Capstan
+from symfric.laws.static.piecewise import Ambrosio as Ambrosio
+from symfric.laws.static.piecewise import BengisuAkay as BengisuAkay
+from symfric.laws.static.piecewise import Exudyn as Exudyn
+from symfric.laws.static.piecewise import Hollars as Hollars
+from symfric.laws.static.piecewise import Step5 as Step5
+from symfric.laws.static.piecewise import VelocityBased as VelocityBased
+from symfric.laws.static.quarter_car import QuarterCarGeneral as QuarterCarGeneral
+from symfric.laws.static.quarter_car import QuarterCarSimple as QuarterCarSimple
+from symfric.laws.static.rui_wang import RuiWang as RuiWang
+from symfric.laws.static.self_tuning import BrittleSelfTuning as BrittleSelfTuning
+from symfric.laws.static.self_tuning import SelfTuning as SelfTuning
+from symfric.laws.static.smooth_peak import MakkarDixon as MakkarDixon
+from symfric.laws.static.smooth_peak import SimscapeBreakaway as SimscapeBreakaway
+from symfric.laws.static.smooth_peak import Specker as Specker
+from symfric.laws.static.stribeck import Stribeck as Stribeck
 from symfric.laws.static.table import Table as Table
-from symfric.laws.static.threlfall import ModifiedThrelfall, Threlfall
+from symfric.laws.static.threlfall import ModifiedThrelfall as ModifiedThrelfall
+from symfric.laws.static.threlfall import Threlfall as Threlfall
 
 STATIC_LAWS: dict[str, type[Law]] = {
     "coulomb": Coulomb,
