@@ -10,11 +10,12 @@ import casadi as ca
 from symfric.codegen.block import Block
 from symfric.codegen.folding import runtime_parameters
 from symfric.codegen.held_step import force_of_rate, held_step
+from symfric.foundation.checks import number
 from symfric.foundation.numeric import is_casadi
 from symfric.foundation.parameters import Variable, check_names, parameters, symbolise
 from symfric.laws import Law, Sum, law_name
 from symfric.laws.base.law import chosen
-from symfric.model import Output, Variables, finite
+from symfric.model import Output, Variables
 
 STEP_SIZE = 1e-3
 """Default of the parameter h [s]."""
@@ -120,10 +121,9 @@ def _function(law: Law, runtime: Variables) -> Block:
 def _step(law: Law, runtime: Variables, h: float | None, where: str) -> Block:
     v, N, *_ = inputs = _inputs(law)
     states = tuple(Variable(s.name, s.unit, nominal=s.nominal) for s in law.states)
-    size = Variable("h", "s", start=STEP_SIZE if h is None else h, lower=0.0, doc="step size")
-    if not finite(f"{where}: h", size.start) > 0.0:
-        raise ValueError(f"{where}: h: expected a step size > 0 [s], got {h}")
-    duration = size.symbol if h is None else float(h)
+    held = STEP_SIZE if h is None else number(f"{where}: h", h, unit="s", above=0.0)
+    size = Variable("h", "s", start=held, lower=0.0, doc="step size")
+    duration = size.symbol if h is None else held
 
     z = ca.vertcat(*(state.symbol for state in states))
     given = _given(inputs)
@@ -139,7 +139,7 @@ def _step(law: Law, runtime: Variables, h: float | None, where: str) -> Block:
         next=end,
         outputs={"F": Output(mean_force, "N", FORCE + ", mean over the step")},
         resets={"init_sliding": (ca.SX(law.steady_state(v.symbol, N.symbol)), SLIDING)},
-        constants={} if h is None else {"h": float(h)},
+        constants={} if h is None else {"h": held},
     )
 
 

@@ -72,6 +72,7 @@ def test_joint_coordinates_cost_a_fraction_of_absolute_ones(
     assert many.step > 15 * few.step
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 def test_compilation_is_measured() -> None:
     rows = compile_rows(("joint",))

@@ -10,6 +10,8 @@ import pytest
 from symfric.bench import Benchmark, Row
 from symfric.cli import main
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def result(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:

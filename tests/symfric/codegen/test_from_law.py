@@ -314,8 +314,8 @@ def test_parameters_without_effect_do_not_appear():
         (LuGre(), {"free": ("mu_s", "mu_s")}, "every name once"),
         (LuGre(v_eps=0.0), {"free": ("v_eps",)}, "finite force at rest"),
         (LuGre(mu_s=ca.SX.sym("mu_s")), {}, "numbers as parameters, got symbols .'mu_s'"),
-        (LuGre(), {"h": 0.0}, "h: expected a step size > 0"),
-        (LuGre(), {"h": float("nan")}, "h: expected a finite number"),
+        (LuGre(), {"h": 0.0}, r"h: expected a number > 0 \[s\]"),
+        (LuGre(), {"h": float("nan")}, r"h: expected a number > 0 \[s\]"),
         (LuGre(), {"name": "my law"}, "C identifier, got 'my law'"),
     ],
 )

@@ -23,7 +23,7 @@ from symfric.codegen.block import Block
 from symfric.codegen.compiler import Compiler
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.model import Event
-from symfric.scenes import Arm
+from symfric.scenes import Arm, DoublePendulum
 
 x, z, u = Variable("x", "m", start=1.0), Variable("z", "1", start=0.5), Variable("u", "m/s")
 PENDULUM = Model(
@@ -66,6 +66,17 @@ def test_double_is_equal_to_the_bit(
     assert found.ok, found.table()
 
 
+def test_a_joint_that_rubs_by_its_reactions_is_verified(compiler: Compiler, tmp_path: Path) -> None:
+    model = DoublePendulum(BrownMcPhee(v_t=0.05)).model()
+    block = plant_block(model, h=1e-3)
+    assert sum(v.name.endswith("_N") for v in block.states) == 2
+    assert verify(generate(block, tmp_path, real="double")).ok
+    after, exact = advanced(block, 200), simulate(model, 0.2, rtol=1e-9).final
+    for name in ("phi_1", "phi_2"):
+        assert after[name] == pytest.approx(exact[name], abs=0.01)  # order 1
+
+
+@pytest.mark.slow
 def test_arm_with_friction_from_reactions_in_every_joint_is_verified(
     compiler: Compiler, tmp_path: Path
 ) -> None:

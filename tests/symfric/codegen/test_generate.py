@@ -79,7 +79,7 @@ def test_bad_input_writes_nothing(tmp_path, law, options, message):
 
 def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path):
     (tmp_path / "c").write_text("")
-    with pytest.raises(ValueError, match="expected a writable place"):
+    with pytest.raises(ValueError, match="expected a folder, got the file"):
         generate(LuGre(), tmp_path / "c")
 
 

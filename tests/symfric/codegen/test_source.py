@@ -15,6 +15,8 @@ from symfric.codegen.source import header, routines, source
 
 STRICT = [*WARNINGS, "-Werror"]
 GENERATED = {name: law for name, law in SYMMETRIC.items() if name not in NO_STEP}
+FEW = ("brown_mcphee", "self_tuning", "lugre", "maxwell_slip", "lugre+dahl")
+"""A function, one with branches, a state, elements that yield, a sum: what every suite compiles."""
 
 
 def compiled(command, arguments):
@@ -23,12 +25,15 @@ def compiled(command, arguments):
     assert done.stderr == ""
 
 
-@pytest.fixture(scope="module")
-def everything(tmp_path_factory):
-    """Every law in both types in one folder, and a program that includes and calls all of it."""
-    folder = tmp_path_factory.mktemp("all")
+@pytest.fixture(
+    scope="module", params=[FEW, pytest.param(tuple(GENERATED), marks=pytest.mark.slow)],
+    ids=["few", "all"],
+)  # fmt: skip
+def everything(request, tmp_path_factory):
+    """Laws in both types in one folder, and a program that includes and calls all of it."""
+    folder = tmp_path_factory.mktemp("laws")
     headers, sources, uses = [], [], []
-    for i, law in enumerate(GENERATED.values()):
+    for i, law in enumerate(GENERATED[name] for name in request.param):
         made = generate(law, folder, name=f"law_{i}")
         for real in made.reals:
             headers.append(made.header(real).name)

@@ -14,9 +14,17 @@ STEEP = {"lagged(stribeck)"}
 """A filtered velocity of 2 m/s in float is known to 1e-7 m/s, a thousandth of the law's width."""
 
 LAWS = {name: law for name, law in CASES.items() if name not in NO_STEP}
+QUICK = {
+    *("stribeck", "brown_mcphee", "self_tuning", "threlfall", "karnopp", "lugre", "dahl, n 0.5"),
+    *("maxwell_slip", "bouc_wen", "gonthier", "lagged(stribeck)", "asymmetric(lugre)"),
+}
+"""One of each kind of expression and of step; `make stress` verifies all."""
 
 
-@pytest.mark.parametrize("name", list(LAWS))
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in LAWS],
+)
 def test_every_law_is_verified(name, compiler, tmp_path):
     found = verify(generate(LAWS[name], tmp_path))
     double, single = found.checks

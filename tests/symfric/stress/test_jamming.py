@@ -18,9 +18,13 @@ from symfric.scenes import MECHANISMS, PendulumBox
 
 Array = NDArray[np.float64]
 MU, MASS = 0.12, 20.0
-each_tolerance = pytest.mark.parametrize("rtol", [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10])
+often = pytest.mark.slow
+each_tolerance = pytest.mark.parametrize(
+    "rtol", [1e-4, 1e-7, 1e-10, *(pytest.param(10.0**-k, marks=often) for k in (5, 6, 8, 9))]
+)
 each_form = pytest.mark.parametrize(
-    ("formulation", "index"), [("joint", 1), ("absolute", 0), ("absolute", 1)]
+    ("formulation", "index"),
+    [("joint", 1), *(pytest.param("absolute", k, marks=often) for k in (0, 1))],
 )
 
 
