@@ -57,6 +57,12 @@ def numbers(option: str, texts: Iterable[str] | None) -> dict[str, float]:
     return {name: checks.parsed(f"{option} {name}", value) for name, value in given.items()}
 
 
+def seconds(option: str, text: str | None) -> list[float]:
+    """Times [s] separated by commas."""
+    parts = [] if text is None else text.split(",")
+    return [checks.parsed(option, part.strip()) for part in parts]
+
+
 def law_with(text: str, settings: Iterable[str] | None) -> Law:
     """The law that `text` names, with the parameters and options of `--set`."""
     return _set(law_from_text(text), text, settings)

@@ -18,6 +18,7 @@ from symfric.cli.options import (
     assignments,
     check_outputs,
     numbers,
+    seconds,
 )
 from symfric.foundation.parameters import check_names
 from symfric.integrator import Input, simulate_by_peer
@@ -72,6 +73,13 @@ def run(
             "--peer", help="One of CasADi's integrators for comparison: sundials, rosenbrock, ggl."
         ),
     ] = None,
+    max_step: Annotated[
+        float | None, typer.Option("--max-step", help="Longest step [s]; any by default.")
+    ] = None,
+    times: Annotated[
+        str | None,
+        typer.Option("--times", metavar="T1,T2,...", help="Times [s] at which a step has to end."),
+    ] = None,
     samples: Annotated[
         int, typer.Option("--samples", help="Number of equally spaced times of the result.")
     ] = 2001,
@@ -96,8 +104,11 @@ def run(
     Example: symfric run arm.urdf --law lugre --x0 elbow=0.3 --input tau_elbow=2 --out arm.csv
     """
     kind_of(scene)
-    if peer is not None and (method, backend) != ("auto", "auto"):
-        raise ValueError("--peer: expected no --method and no --backend, which are of symfric")
+    how: Any = {"max_step": max_step, "times": seconds("--times", times)}
+    if peer is not None and (method, backend, max_step, times) != ("auto", "auto", None, None):
+        raise ValueError(
+            "--peer: expected no --method, --backend, --max-step and --times, which are of symfric"
+        )
     if len(law) > 1 and (out or json or movie):
         raise ValueError(
             f"--out, --json and --animate: expected one --law, got {len(law)}; compare several "
@@ -115,7 +126,7 @@ def run(
     for name, machine in machines.items():
         with output.progress(f"{scene} with {name}") as tell:
             if peer is None:
-                how: Any = {"method": method, "backend": backend, "progress": tell}
+                how |= {"method": method, "backend": backend, "progress": tell}
                 found[name] = simulate(machine.model(), until, **common, **how)
             else:
                 found[name] = simulate_by_peer(machine.model(), until, peer, **common)

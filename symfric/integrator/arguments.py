@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
+from symfric.integrator.equations.inputs import Drivers
 from symfric.integrator.methods.method import Method
+from symfric.integrator.methods.radau import Radau
 from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS
 from symfric.integrator.running.run import Tolerances
 from symfric.model import Model
@@ -91,6 +93,7 @@ def tolerances(
     nominal: Array,
     event_tolerance: float,
     max_steps: int,
+    max_step: float | None = None,
 ) -> Tolerances:
     """What a run has to meet.
 
@@ -101,11 +104,29 @@ def tolerances(
         nominal: typical magnitude of each state.
         event_tolerance: tolerance of event times [s].
         max_steps: attempts allowed.
+        max_step: longest step [s]; any by default.
     """
     relative = 0.1 * rtol if atol is None else checks.number(f"{where}: atol", atol, above=0.0)
     event = checks.number(f"{where}: event_tolerance", event_tolerance, unit="s", above=0.0)
     max_steps = checks.count(f"{where}: max_steps", max_steps)
-    return Tolerances(rtol, relative * nominal, event, max_steps)
+    longest = np.inf
+    if max_step is not None:
+        longest = checks.number(f"{where}: max_step", max_step, unit="s", above=0.0)
+    return Tolerances(rtol, relative * nominal, event, max_steps, longest)
+
+
+def stopping(
+    where: str, inputs: Drivers, times: ArrayLike, t_start: float, t_end: float
+) -> Drivers:
+    """`inputs` with an end of a step at each of `times` [s]."""
+    if np.size(times) == 0:
+        return inputs
+    return inputs.stopping_at(checks.times(f"{where}: times", times, t_start, t_end))
+
+
+def another(method: Method) -> str:
+    """A formula that does not share the mistakes of `method`: one that iterates, or does not."""
+    return "rodas5p" if isinstance(method, Radau) else "radau5"
 
 
 def chosen(where: str, name: str, rtol: float) -> Method:

@@ -28,6 +28,7 @@ from symfric.integrator.arguments import (
     check_span,
     check_times,
     chosen,
+    stopping,
     tolerances,
 )
 from symfric.integrator.equations.initial import first_guess, first_step
@@ -91,6 +92,8 @@ def simulate_many(
     backend: str = "auto",
     event_tolerance: float = 1e-10,
     max_steps: int = 10_000_000,
+    max_step: float | None = None,
+    times: ArrayLike = (),
     executor: str | Executor = "threads",
     workers: int | None = None,
     chunk: int = 500,
@@ -106,8 +109,8 @@ def simulate_many(
         u: inputs by name, common to all members.
         p: parameters by name: numbers, or arrays with an entry per member.
         t_eval: times of the results [s]; default only `t_end`.
-        rtol, method, event_tolerance, max_steps: as in `simulate`; the absolute tolerance is
-            0.1 rtol nominal.
+        rtol, method, event_tolerance, max_steps, max_step, times: as in `simulate`; the absolute
+            tolerance is 0.1 rtol nominal.
         backend: "compiled", "vm", or "auto": compiled where there is a compiler.
         executor: "serial", "threads" (the compiled loop holds no lock), "processes", or any
             `concurrent.futures.Executor`, such as a dask client's or mpi4py's: a task is plain
@@ -138,17 +141,18 @@ def simulate_many(
     _check(model, backend, executor)
     workers = None if workers is None else checks.count("simulate_many: workers", workers)
     chunk = checks.count("simulate_many: chunk", chunk)
-    times = check_times("simulate_many", t_start, t_end, [t_end] if t_eval is None else t_eval)
+    looks = check_times("simulate_many", t_start, t_end, [t_end] if t_eval is None else t_eval)
     x0_of, p_of, members = _members(model, x0, p)
     inputs = drivers(model, u, t_start, t_end)
+    inputs = stopping("simulate_many", inputs, times, t_start, t_end)
     integrator = Integrator(model, inputs, formula)
     nominal = integrator.system.nominal
-    allowed = tolerances("simulate_many", rtol, None, nominal, event_tolerance, max_steps)
+    allowed = tolerances("simulate_many", rtol, None, nominal, event_tolerance, max_steps, max_step)
     starts = partial(_starts, integrator, t_start, x0_of, p_of)
     integrator = _suited(integrator, inputs, starts, members)
-    job = Job.of(integrator, inputs, times, backend, max_steps)
+    job = Job.of(integrator, inputs, looks, backend, max_steps)
     if model.events:
-        solve = partial(solve_one_by_one, integrator, inputs, allowed, backend, times)
+        solve = partial(solve_one_by_one, integrator, inputs, allowed, backend, looks)
         prepare = starts
     else:
         solve = partial(solve_chunk, job)
@@ -161,7 +165,7 @@ def simulate_many(
     if out is not None:
         place = checks.path("simulate_many: out", out)
         folder = place / _identity(job, integrator, allowed, starts, picks)
-    store = Store(folder, model.signals, members, times.size)
+    store = Store(folder, model.signals, members, looks.size)
     todo = {first: pick for first, pick in picks.items() if not store.has(first)}
     done, status = members - sum(_size(pick) for pick in todo.values()), Status.SUCCESS
     try:
@@ -178,7 +182,7 @@ def simulate_many(
         status = Status.INTERRUPTED
     return Ensemble(
         model.name,
-        times,
+        looks,
         store.signals,
         dict(model.signals),
         store.attempts,
@@ -278,7 +282,7 @@ def _chunk(
     """Start columns and run data of members."""
     y, p = starts(pick)
     t_start, t_end = float(inputs.breaks[0]), float(inputs.breaks[-1])
-    h = first_step(t_end - t_start, t_start)
+    h = min(first_step(t_end - t_start, t_start), tolerances.max_step)
     data = np.tile(inputs.values[:, 0], (y.shape[0], 1))
     return Chunk(State.at(t_start, h, y), tolerances.given(t_end, np.hstack([p, data])))
 
@@ -292,6 +296,7 @@ def _identity(
 ) -> str:
     """Hash of everything that the results depend on, and of how they are cut in chunks."""
     parts: list[Any] = [job.digest(), tolerances.rtol, tolerances.atol, list(picks)]
+    parts.append(tolerances.max_step)
     for event, reset in zip(integrator.model.events, integrator.resets, strict=True):
         parts += [event.name, event.direction, event.terminal, tolerances.event]
         parts += [(name, str(function.serialize())) for name, function in reset.items()]

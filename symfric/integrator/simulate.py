@@ -12,11 +12,13 @@ from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.arguments import (
     BACKENDS,
+    another,
     check_flags,
     check_model,
     check_span,
     chosen,
     result_times,
+    stopping,
     tolerances,
 )
 from symfric.integrator.derivatives.adjoint import gradient
@@ -50,6 +52,8 @@ def simulate(
     backend: str = "auto",
     event_tolerance: float = 1e-10,
     max_steps: int = 10_000_000,
+    max_step: float | None = None,
+    times: ArrayLike = (),
     sensitivities: Sequence[str] = (),
     measure_error: bool = False,
     progress: Callable[[float], None] | None = None,
@@ -63,7 +67,9 @@ def simulate(
         t_start: first time [s].
         x0: start values of states by name; the others start where the model says (bristles in
             steady sliding).
-        u: inputs by name: a number, `Hold` or `Linear` samples, or a function of symbolic time.
+        u: inputs by name: a number, `Hold` or `Linear` samples, or a function of symbolic time,
+            which is looked at on a grid of 8193 times for pulses that a step could leap over: name
+            those that are shorter in `times`.
         p: values of the model's parameters by name.
         rtol: relative tolerance of each step.
         atol: absolute tolerance in multiples of each state's nominal value; default 0.1 rtol.
@@ -82,14 +88,18 @@ def simulate(
             criterion proves an equation not to be stiff, so it is never chosen by itself.
         backend: the engine: "vm" needs no compiler; "compiled" compiles the step once and keeps
             it in the user's cache; "auto" starts in the former and goes over to the latter when
-            that is predicted to pay. Both give the same bits. Integrators of others have a door of
+            that is predicted to pay. They differ by rounding. Integrators of others have a door of
             their own, `simulate_by_peer`.
         event_tolerance: how sharply events are located [s].
         max_steps: attempts allowed.
+        max_step: longest step [s]; none by default. For what error control cannot see coming: a
+            model with short events of its own, such as a function of time in its equations.
+        times: increasing times [s] at which a step has to end.
         sensitivities: free parameters by name and start values as "x0.v"; the trajectory then
             gives the derivatives of all signals (`Trajectory.sensitivities`) and gradients of
             sums of them (`Trajectory.gradient`), exact for the steps that were taken.
-        measure_error: run again at rtol/100 and report the difference in the statistics.
+        measure_error: run again at rtol/100, by another formula in steps half as long, and report
+            the difference in the statistics.
         progress: called with the fraction done every few tens of milliseconds.
         throw: raise `SolveError` on failure; with False the partial trajectory is returned.
 
@@ -109,21 +119,22 @@ def simulate(
     formula = chosen("simulate", method, rtol)
     checks.choice("simulate: backend", backend, BACKENDS)
     sensitivities = checks.names("simulate: sensitivities", sensitivities)
-    times = result_times("simulate", t_start, t_end, t_eval, samples)
+    looks = result_times("simulate", t_start, t_end, t_eval, samples)
     begin = perf_counter()
     inputs = drivers(model, u, t_start, t_end)
+    inputs = stopping("simulate", inputs, times, t_start, t_end)
     integrator, fresh = built(model, inputs, formula)
     build_time = perf_counter() - begin if fresh else 0.0
     which = seeds(model, sensitivities, x0, p) if sensitivities else None
     nominal = integrator.system.nominal
-    allowed = tolerances("simulate", rtol, atol, nominal, event_tolerance, max_steps)
+    allowed = tolerances("simulate", rtol, atol, nominal, event_tolerance, max_steps, max_step)
     y0 = first_guess(integrator.system, model, model.initial_state(x0, p), t_start)
     values = model.values("p", p)
     at_start = (y0, np.concatenate([values, inputs.values[:, 0]]))
     integrator = integrator.suited([at_start], t_end - t_start)
     run, dense, statistics = _solve(integrator, inputs, y0, values, allowed, backend, progress)
     trajectory = trajectory_of(
-        integrator, inputs, run, dense, values, times, replace(statistics, build_time=build_time)
+        integrator, inputs, run, dense, values, looks, replace(statistics, build_time=build_time)
     )
     if throw and not trajectory.status.ok and trajectory.status is not Status.INTERRUPTED:
         raise SolveError(trajectory.message, trajectory.status, trajectory)
@@ -134,7 +145,8 @@ def simulate(
         finer = simulate(
             model, t_end, t_start=t_start, x0=x0, u=u, p=p, rtol=max(rtol / 100, 1e-13),
             atol=None if atol is None else atol / 100, event_tolerance=event_tolerance,
-            t_eval=trajectory.t, method=method, backend=backend,
+            t_eval=trajectory.t, method=another(formula), backend=backend,
+            max_step=float(np.diff(trajectory.steps).max()) / 2, times=times,
         )  # fmt: skip
         error = _difference(model, trajectory, finer)
         trajectory = replace(trajectory, statistics=replace(trajectory.statistics, error=error))

@@ -1,7 +1,7 @@
 """Inputs of a model over time: constants, expressions, sampled signals."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from typing import Any, final
 
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import stacked, strays
+from symfric.integrator.equations.onsets import onsets
 from symfric.model import Model
 
 Array = NDArray[np.float64]
@@ -102,13 +103,23 @@ class Drivers:
         """Number of the interval that holds each time; at a break the later one."""
         return np.searchsorted(self.breaks[1:-1], times, side="right")
 
+    def stopping_at(self, times: ArrayLike) -> "Drivers":
+        """The same inputs, with breaks at `times` [s], too; those outside the span are left out."""
+        at = np.asarray(times, dtype=float)
+        at = at[(at > self.breaks[0]) & (at < self.breaks[-1])]
+        if not at.size:
+            return self
+        breaks = np.union1d(self.breaks, at)
+        return replace(self, breaks=breaks, values=self.values[:, self.interval(breaks[:-1])])
+
 
 def drivers(
     model: Model, given: Mapping[str, Input] | None, t_start: float, t_end: float
 ) -> Drivers:
     """Collect the inputs `given` by name; the others keep their start value.
 
-    Numbers and samples become data, expressions go into the equations.
+    Numbers and samples become data, expressions go into the equations. There are breaks at all
+    samples, and where a function of time changes its pace.
 
     Raises:
         ValueError: unknown name or a value of another kind.
@@ -127,13 +138,14 @@ def drivers(
     values = [row for part in parts for row in part.values]
     if ca.depends_on(expression, begin):
         data, values = [*data, begin], [*values, breaks[:-1]]
-    return Drivers(
+    found = Drivers(
         expression,
         stacked(data),
         breaks,
         np.vstack(values) if values else np.zeros((0, breaks.size - 1)),
         tuple(part.key for part in parts),
     )
+    return found.stopping_at([t for part in parts for t in part.onsets])
 
 
 def _undriven(t_start: float, t_end: float) -> Drivers:
@@ -143,12 +155,16 @@ def _undriven(t_start: float, t_end: float) -> Drivers:
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """One input: its expression, the data in it and their values on the intervals, structure."""
+    """One input: its expression, the data in it and their values on the intervals, structure.
+
+    `onsets` are times at which a step has to end, or it could leap over a pulse.
+    """
 
     row: ca.SX
     key: str
     data: tuple[ca.SX, ...] = ()
     values: tuple[Array, ...] = ()
+    onsets: tuple[float, ...] = ()
 
 
 def _part(model: Model, variable: Variable, signal: Any, breaks: Array, begin: ca.SX) -> _Part:
@@ -158,7 +174,9 @@ def _part(model: Model, variable: Variable, signal: Any, breaks: Array, begin: c
         if callable(signal):
             expression = _evaluated(where, signal, model)
             # the expression and not the function that wrote it: its data may have changed since
-            return _Part(expression, sha256(ca.SX.serialize(expression).encode()).hexdigest())
+            key = sha256(ca.SX.serialize(expression).encode()).hexdigest()
+            times = onsets(_of_time(expression, model), float(breaks[0]), float(breaks[-1]))
+            return _Part(expression, key, onsets=times)
         # a number is data too: another value must not mean another integrator
         signal = Hold(breaks[:1], [checks.number(where, signal, hint=KINDS)])
     c, slope = ca.SX.sym(f"{variable.name}_k"), ca.SX.sym(f"{variable.name}_dot")
@@ -166,6 +184,12 @@ def _part(model: Model, variable: Variable, signal: Any, breaks: Array, begin: c
     if not rise.any():
         return _Part(c, "hold", (c,), (value,))
     return _Part(c + slope * (model.t - begin), "linear", (c, slope), (value, rise))
+
+
+def _of_time(expression: ca.SX, model: Model) -> str:
+    """`expression` with states and parameters at zero, serialised: what time alone does to it."""
+    others = stacked(model.vector(letter) for letter in "xzp")
+    return ca.SX.serialize(ca.substitute(expression, others, ca.SX.zeros(others.numel())))
 
 
 def _evaluated(where: str, signal: Callable[[ca.SX], Any], model: Model) -> ca.SX:

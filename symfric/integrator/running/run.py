@@ -132,7 +132,8 @@ class _Drive:
         self.t_start, self.t_end = float(inputs.breaks[0]), float(inputs.breaks[-1])
         span = self.t_end - self.t_start
         self.h_min = smallest_step(span)
-        self.S = State.at(self.t_start, first_step(span, self.t_start), y)
+        h = min(first_step(span, self.t_start), tolerances.max_step)
+        self.S = State.at(self.t_start, h, y)
         self.eventful = bool(integrator.model.events)
         self.storm = EventStorm(self.t_end - self.t_start, tolerances.event)
         self.run, self.d = Run(), np.zeros(0)

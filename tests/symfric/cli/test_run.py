@@ -36,6 +36,15 @@ def test_json_has_the_numbers_of_python(capsys: pytest.CaptureFixture[str]) -> N
     assert result["t_end"] == 20.0
 
 
+def test_longest_step_and_times_are_those_of_python(capsys: pytest.CaptureFixture[str]) -> None:
+    told = ["--max-step", "0.01", "--times", "0.5, 1.25", "--t-end", "2"]
+    result = found(capsys, "rabinowicz", "--law", "lugre", *told)
+    expected = simulate(rabinowicz(LuGre()), 2.0, max_step=0.01, times=[0.5, 1.25])
+    assert result["statistics"]["steps"] == expected.statistics.steps
+    assert main(["run", "rabinowicz", "--law", "lugre", "--times", "1,x"]) == 2
+    assert "--times: expected a finite number, got 'x'" in capsys.readouterr().err
+
+
 def test_a_peer_runs_in_the_place_of_our_integrator(capsys: pytest.CaptureFixture[str]) -> None:
     assert (
         main(["run", "rabinowicz", "--law", "viscous", "--t-end", "0.1", "--peer", "sundials"]) == 0

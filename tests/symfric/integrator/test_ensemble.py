@@ -118,6 +118,15 @@ def test_time_may_start_anywhere() -> None:
     assert many["x"] == pytest.approx(np.array([[0.0, rise], [1.0, 1.0 + rise]]), abs=1e-5)
 
 
+@each_engine
+def test_longest_step_and_times_hold_for_every_member(backend: str) -> None:
+    model, how = rabinowicz(LuGre()), {"max_step": 0.01, "times": [0.1234, 0.5]}
+    many = simulate_many(model, 1.0, x0={"v": VELOCITIES}, backend=backend, **how)
+    assert many.attempts.min() > 100
+    for m in (0, 6):
+        assert_member(many, m, model, 1.0, x0={"v": VELOCITIES[m]}, backend=backend, **how)
+
+
 def test_numbers_alone_are_one_member() -> None:
     many = simulate_many(oscillator(), 1.0, x0={"x": 2.0})
     assert many["x"].shape == (1, 1)

@@ -97,6 +97,23 @@ def test_times_asked_for_do_not_change_the_steps() -> None:
     assert few.final["x"] == pytest.approx(many.final["x"], rel=1e-9)
 
 
+@pytest.mark.parametrize("backend", ["vm", "compiled"])
+def test_no_step_is_longer_than_allowed_and_one_ends_at_each_time(backend: str) -> None:
+    model, times = rabinowicz(LuGre()), [0.1234, 0.5, 1.7]
+    run = simulate(model, 2.0, max_step=0.01, times=times, backend=backend)
+    assert np.diff(run.steps).max() <= 0.01 * (1 + 1e-12)
+    assert set(times) <= set(run.steps)
+    free = simulate(model, 2.0, backend=backend)
+    assert np.diff(free.steps).max() > 0.02
+    assert free.statistics.steps < run.statistics.steps
+    assert run.final["x"] == pytest.approx(free.final["x"], rel=1e-6)
+
+
+def test_a_longest_step_shorter_than_the_first_one_holds_from_the_start() -> None:
+    run = simulate(cart(), 1e-9, max_step=1e-18, times=[1e-17], max_steps=100, throw=False)
+    assert np.diff(run.steps).max() <= 1.01e-18
+
+
 def test_times_of_the_result_may_be_given() -> None:
     times = [0.5, 0.7, 1.9]
     run = simulate(cart(), 2.0, u={"force": 3.0}, t_eval=times, rtol=1e-8)
@@ -262,6 +279,10 @@ def test_failed_solve_is_returned_where_nothing_is_to_be_thrown() -> None:
         ({"p": {"m": 1.0}}, r"model 'drive' p: expected no names, got m"),
         ({"t_eval": [0.0, 0.5, 0.5]}, r"t_eval: expected increasing times in \[0, 1\] s"),
         ({"t_eval": [0.0, 2.0]}, r"t_eval: expected increasing times in \[0, 1\] s"),
+        ({"max_step": 0.0}, r"max_step: expected a number > 0 \[s\], got 0"),
+        ({"max_step": "fine"}, r"max_step: expected a finite number \[s\], got 'fine'"),
+        ({"times": [0.5, 0.5]}, r"simulate: times: expected increasing times in \[0, 1\] s"),
+        ({"times": [0.5, 1.5]}, r"simulate: times: expected increasing times in \[0, 1\] s"),
         ({"t_eval": []}, r"t_eval: expected increasing times"),
         ({"t_eval": [[0.0, 1.0]]}, r"t_eval: expected increasing times .* got \[\[0.0, 1.0\]\]"),
     ],

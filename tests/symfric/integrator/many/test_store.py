@@ -158,6 +158,8 @@ def changed(row: int) -> Any:
         {"t_eval": [1.0 - 1e-12]},
         {"t_end": 1.0 + 1e-12, "t_eval": [1.0]},
         {"t_start": 1e-12},
+        {"max_step": 0.01},
+        {"times": [0.5]},
         {"backend": "vm"},
         {"chunk": 1250},
         {"model": constant(1.0 + 1e-15)},

@@ -1,0 +1,91 @@
+"""Pulses of inputs that are functions of time: found on a grid, hit by steps."""
+
+from collections.abc import Callable
+from math import pi, sqrt
+
+import casadi as ca
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from symfric import BrownMcPhee, Model, Variable, drive, simulate, simulate_many
+from symfric.integrator.equations.onsets import DEPTH, changes, levels, onsets
+
+Function = Callable[[ca.SX], ca.SX]
+x, force = Variable("x", "m"), Variable("force", "N")
+AT = 5.1234
+
+
+def pulse(width: float) -> Function:
+    """A pulse of impulse one at `AT`."""
+    return lambda t: ca.exp(-(((t - AT) / width) ** 2)) / (width * sqrt(pi))
+
+
+def times(function: Function, t_end: float = 10.0) -> NDArray[np.float64]:
+    t = ca.SX.sym("t")
+    return np.array(onsets(ca.SX.serialize(ca.SX(function(t))), 0.0, t_end))
+
+
+@pytest.mark.parametrize(
+    "steady",
+    [
+        lambda t: ca.SX(3.0),
+        lambda t: 2 - 3 * t,
+        lambda t: 2 * ca.sin(pi * t),
+        lambda t: ca.sin(300 * t),
+        lambda t: ca.sin(2 * t) + 0.02 * ca.sin(200 * t),
+        lambda t: t**3,
+        lambda t: t / 0.0,
+    ],
+)
+def test_a_function_of_one_pace_needs_no_step_to_end(steady: Function) -> None:
+    assert times(steady).size == 0
+
+
+@pytest.mark.parametrize("width", [1.0, 0.1, 0.01, 0.001])
+def test_a_pulse_lies_between_times_that_are_about_as_near_as_it_is_short(width: float) -> None:
+    found = times(pulse(width))
+    before, after = found[found < AT], found[found > AT]
+    nearest = AT - before[-1], after[0] - AT
+    assert max(nearest) < 50 * width + 20 * 10.0 / 2**DEPTH
+    assert found.size < 12
+
+
+def test_both_sides_of_a_jump_are_hit() -> None:
+    found = times(lambda t: ca.if_else(t > 3.3, 1.0, 0.0))
+    assert np.diff(found)[np.searchsorted(found, 3.3) - 1] <= 16 * 10.0 / 2**DEPTH
+
+
+def test_pieces_are_halved_until_they_are_straight() -> None:
+    assert levels(np.array([0.0, 1.0, 2.0, 3.0, 4.0])).tolist() == [0] * 4
+    assert levels(np.array([0.0, 0.0, 0.0, 1.0, 0.0])).tolist() == [1, 1, 2, 2]
+
+
+def test_a_change_of_pace_is_counted_from_the_last_one() -> None:
+    assert changes(np.array([1, 2, 3, 4, 5, 7, 7, 4, 1])).tolist() == [3, 5, 7, 8]
+
+
+@pytest.mark.parametrize("width", [1.0, 0.1, 0.01, 0.001])
+def test_no_pulse_is_leapt_over(width: float) -> None:
+    """A block on a table got none of the impulse and stayed where it was, with SUCCESS."""
+    model = drive(BrownMcPhee(mu_s=0.0, mu_d=0.0), m=1.0)
+    run = simulate(model, 10.0, u={"force": pulse(width)}, backend="vm")
+    assert run.final["v"] == pytest.approx(1.0, rel=1e-5)
+    many = simulate_many(model, 10.0, u={"force": pulse(width)}, backend="vm", executor="serial")
+    assert many["v"][0, -1] == run.final["v"]
+
+
+def test_a_pulse_beside_feedback_is_seen() -> None:
+    model = Model("integrator", x=(x,), u=(force,), ode=force.symbol)
+    feedback = {"force": lambda t: pulse(0.01)(t) - 1e-3 * x.symbol}
+    run = simulate(model, 10.0, u=feedback, backend="vm")
+    assert run.final["x"] == pytest.approx(np.exp(-1e-3 * (10 - AT)), rel=1e-5)
+
+
+def test_a_pulse_too_short_for_the_grid_is_hit_where_it_is_named() -> None:
+    model = Model("integrator", x=(x,), u=(force,), ode=force.symbol)
+    how = {"u": {"force": pulse(1e-6)}, "backend": "vm"}
+    missed, hit = simulate(model, 10.0, **how), simulate(model, 10.0, times=[AT], **how)
+    assert missed.final["x"] == 0.0
+    assert hit.final["x"] == pytest.approx(1.0, rel=1e-5)
+    assert AT in hit.steps
