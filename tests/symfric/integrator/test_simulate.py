@@ -280,7 +280,7 @@ def test_failed_solve_is_returned_where_nothing_is_to_be_thrown() -> None:
         ({"t_eval": [0.0, 0.5, 0.5]}, r"t_eval: expected increasing times in \[0, 1\] s"),
         ({"t_eval": [0.0, 2.0]}, r"t_eval: expected increasing times in \[0, 1\] s"),
         ({"max_step": 0.0}, r"max_step: expected a number > 0 \[s\], got 0"),
-        ({"max_step": "fine"}, r"max_step: expected a finite number \[s\], got 'fine'"),
+        ({"max_step": "fine"}, r"max_step: expected a number > 0 \[s\], got 'fine'"),
         ({"times": [0.5, 0.5]}, r"simulate: times: expected increasing times in \[0, 1\] s"),
         ({"times": [0.5, 1.5]}, r"simulate: times: expected increasing times in \[0, 1\] s"),
         ({"t_eval": []}, r"t_eval: expected increasing times"),
