@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from symfric.multibody import (
     Cylindrical,
     Fixed,
-    Free,
+    Floating,
     Joint,
     JointFriction,
     Mechanism,
@@ -24,7 +24,7 @@ from symfric.multibody.prepare import Prepared
 
 Array = NDArray[np.float64]
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-TREE = (Revolute, Prismatic, Cylindrical, Universal, Planar, Spherical, Fixed, Free)
+TREE = (Revolute, Prismatic, Cylindrical, Universal, Planar, Spherical, Fixed, Floating)
 
 
 def body(m: Mechanism, name: str, seed: int) -> None:

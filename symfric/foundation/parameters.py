@@ -102,6 +102,7 @@ class Variable:
         start: initial or default value; an expression in other symbols where it depends on them.
         nominal: typical magnitude; absolute tolerances and scalings are relative to it.
         lower, upper: bounds for optimisation and identification.
+        kind: what it is among the signals of a model, see `symfric.model.kinds`.
     """
 
     name: str
@@ -112,6 +113,7 @@ class Variable:
     upper: float = inf
     doc: str = ""
     symbol: ca.SX = field(default_factory=lambda: ca.SX(0, 0))
+    kind: str = ""
 
     def __post_init__(self) -> None:
         where = f"variable '{checks.text('variable: name', self.name)}'"

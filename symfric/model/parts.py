@@ -10,11 +10,15 @@ from symfric.foundation.numeric import Scalar, is_casadi
 
 @dataclass(frozen=True, eq=False)
 class Output:
-    """A named result of a model: an expression in t, x, z, u, p, with its unit."""
+    """A named result of a model: an expression in t, x, z, u, p, with its unit.
+
+    `kind` says what it is, see `symfric.model.kinds`; it may be empty.
+    """
 
     expression: Scalar
     unit: str
     doc: str = ""
+    kind: str = ""
 
     def __post_init__(self) -> None:
         checks.expression("Output", self.expression)

@@ -26,12 +26,41 @@ class Part:
 
 
 @final
+@dataclass(frozen=True)
+class Symbol:
+    """How a joint, a rod or a spring is drawn between two places a and b.
+
+    Attributes:
+        marker: shape of the marker at b; none where empty.
+        line: from a to b: "rod", "spring", "damper"; none where empty.
+        axes: lines through b along axes of a or b, each ("a" or "b", number of the axis).
+        hinge: whether it turns about z of b and does nothing else.
+        guide: whether it slides along z of a.
+        plate: whether it moves in the plane x, y of a.
+        anchored: whether it shows where it hangs on the ground.
+    """
+
+    marker: str = ""
+    line: str = ""
+    axes: tuple[tuple[str, int], ...] = ()
+    hinge: bool = False
+    guide: bool = False
+    plate: bool = False
+    anchored: bool = False
+
+    @property
+    def turnable(self) -> bool:
+        """Whether a and b may be swapped: not where each has an axis of its own."""
+        return len({end for end, _ in self.axes}) < 2
+
+
+@final
 @dataclass(frozen=True, eq=False)
 class Mark:
     """Something between two places: a joint, a rod, a spring.
 
     Attributes:
-        kind: "revolute", "prismatic", ..., "distance", "spring", "damper".
+        symbol: how it is drawn.
         a, b: indices of its two places; the first is on the ground if one is.
         slips: name of the sliding velocity of each contact and the velocity [m/s] below which it
             counts as sticking.
@@ -39,7 +68,7 @@ class Mark:
     """
 
     name: str
-    kind: str
+    symbol: Symbol
     a: int
     b: int
     slips: tuple[tuple[str, float], ...] = ()

@@ -15,12 +15,12 @@ from symfric.multibody.forces import SpringDamper as SpringDamper
 from symfric.multibody.forces import UserForce as UserForce
 from symfric.multibody.friction import JointFriction as JointFriction
 from symfric.multibody.functions import functions as functions
+from symfric.multibody.joint import Joint as Joint
 from symfric.multibody.joints import ALL_JOINTS as ALL_JOINTS
 from symfric.multibody.joints import Cylindrical as Cylindrical
 from symfric.multibody.joints import Distance as Distance
 from symfric.multibody.joints import Fixed as Fixed
-from symfric.multibody.joints import Free as Free
-from symfric.multibody.joints import Joint as Joint
+from symfric.multibody.joints import Floating as Floating
 from symfric.multibody.joints import Planar as Planar
 from symfric.multibody.joints import PointOnLine as PointOnLine
 from symfric.multibody.joints import Prismatic as Prismatic

@@ -22,13 +22,13 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import at_start, stacked, symbols_of
 from symfric.laws import Law
 from symfric.laws.composed.isotropic import SpatialSlip
-from symfric.model import Event, Model, Monitor, Output, Variables
+from symfric.model import Event, Model, Monitor, Output, Variables, kinds
 from symfric.model.holonomic import Holonomic, Inner
 from symfric.model.sketch import Sketch
 from symfric.multibody.body import GROUND
 from symfric.multibody.equations import Equations
 from symfric.multibody.friction import Contact
-from symfric.multibody.joints import Free
+from symfric.multibody.joints import Floating
 from symfric.multibody.results import Put
 from symfric.multibody.spatial import euler_e
 from symfric.multibody.topology import Topology
@@ -71,8 +71,10 @@ def coordinates(topology: Topology) -> tuple[Variables, Variables]:
         for i, ((_, unit), start, rate) in enumerate(given):
             name = joint.coordinate(i)
             per_second = "1/s" if i in quaternion else f"{unit}/s"
-            q.append(Variable(name, unit, start=start, doc="joint coordinate"))
-            qd.append(Variable(f"{name}_rate", per_second, start=rate, doc="joint rate"))
+            q.append(Variable(name, unit, start=start, doc="joint coordinate", kind=kinds.POSITION))
+            qd.append(
+                Variable(f"{name}_rate", per_second, start=rate, doc="joint rate", kind=kinds.RATE)
+            )
     return tuple(q), tuple(qd)
 
 
@@ -104,7 +106,7 @@ def mirrored(M: ca.SX) -> ca.SX:
 def solve_mass(eq: Equations, right: ca.SX) -> ca.SX:
     """M^-1 right."""
     topology = eq.kin.topology
-    free = [isinstance(link.joint, Free) and link.base == GROUND for link in topology.links]
+    free = [isinstance(link.joint, Floating) and link.base == GROUND for link in topology.links]
     if not all(free) or not free:
         D, L, order = ca.ldl(mirrored(eq.mass))
         return ca.ldl_solve(ca.densify(right), D, L, order) if eq.n else right
@@ -134,12 +136,21 @@ def slips(eq: Equations, normal_at_start: Sequence[float]) -> tuple[Slip, ...]:
                 scale = max(1.0, abs(start))
                 kind = type(contact.friction.law).__name__
                 doc = f"normal force of joint '{contact.joint}' with {kind}"
-                made = Variable(f"{pressed}_N", "N", start=start, nominal=scale, doc=doc)
+                made = Variable(
+                    f"{pressed}_N", "N", start=start, nominal=scale, doc=doc,
+                    kind=kinds.NORMAL_FORCE,
+                )  # fmt: skip
                 unknowns[pressed], unknown = made, (made,)
             pressing = unknowns[pressed].symbol
         begin = ca.SX(law.steady_state(contact.slip, start))
         states = tuple(
-            Variable(f"{contact.name}_{s.name}", s.unit, start=begin[i], nominal=s.nominal)
+            Variable(
+                f"{contact.name}_{s.name}",
+                s.unit,
+                start=begin[i],
+                nominal=s.nominal,
+                kind=kinds.FRICTION_STATE,
+            )
             for i, s in enumerate(law.states)
         )
         z = symbols_of(states)
@@ -330,17 +341,24 @@ def _outputs(eq: Equations, contacts: Sequence[Slip], put: Put) -> dict[str, Out
     for slip, normal in zip(contacts, expressions, strict=False):
         contact, name = slip.contact, slip.contact.name
         if slip.N is slip.normal:
-            found[f"{contact.pressed}_N"] = Output(normal, "N", "normal force")
+            found[f"{contact.pressed}_N"] = Output(normal, "N", "normal force", kinds.NORMAL_FORCE)
         speed, size = _sizes(slip)
         found[f"{name}_slip"] = Output(speed, "m/s", "sliding velocity, of a ball its size")
-        found[f"{name}_friction"] = Output(size, "N", "friction force opposing the slip")
+        found[f"{name}_friction"] = Output(
+            size, "N", "friction force opposing the slip", kinds.FRICTION
+        )
         power = ca.dot(slip.force, contact.slip)
-        found[f"{name}_power"] = Output(power, "W", "power taken by friction")
-    found["kinetic"] = Output(eq.kinetic, "J", "kinetic energy")
-    found["potential"] = Output(eq.potential, "J", "potential energy")
-    found["energy"] = Output(eq.kinetic + eq.potential, "J", "kinetic and potential energy")
+        found[f"{name}_power"] = Output(power, "W", "power taken by friction", kinds.FRICTION)
+    for name, value, doc in (
+        ("kinetic", eq.kinetic, "kinetic energy"),
+        ("potential", eq.potential, "potential energy"),
+        ("energy", eq.kinetic + eq.potential, "kinetic and potential energy"),
+    ):
+        found[name] = Output(value, "J", doc, kinds.ENERGY)
     if eq.m:
         for (label, _, unit), value in zip(norms, expressions[len(contacts) :], strict=True):
             norm = ca.sqrt(ca.sumsqr(value))
-            found[label] = Output(norm, unit, "norm of the constraints on this level")
+            found[label] = Output(
+                norm, unit, "norm of the constraints on this level", kinds.CONSTRAINTS
+            )
     return found

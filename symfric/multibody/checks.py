@@ -16,7 +16,7 @@ from symfric.multibody.body import GROUND, Body
 from symfric.multibody.constraints import Constraint
 from symfric.multibody.forces import Force
 from symfric.multibody.friction import JointFriction
-from symfric.multibody.joints import Joint
+from symfric.multibody.joint import Joint
 from symfric.multibody.topology import Topology, body_of
 
 Array = NDArray[np.float64]
@@ -152,7 +152,7 @@ def connected(bodies: Sequence[Body], topology: Topology) -> Iterator[str]:
     for name in loose:
         yield (
             f"body '{name}': expected joints with coordinates that lead to the ground, found "
-            "none; a Free joint lets it move freely"
+            "none; a Floating joint lets it move freely"
         )
     if not loose and not topology.n:
         yield "expected bodies that can move, got none"

@@ -19,7 +19,7 @@ import casadi as ca
 from symfric.foundation.numeric import Scalar
 from symfric.multibody.body import GROUND
 from symfric.multibody.forces import Axial, Load
-from symfric.multibody.joints import Joint
+from symfric.multibody.joint import Joint
 from symfric.multibody.kinematics import Kinematics, Motion
 from symfric.multibody.spatial import skew
 

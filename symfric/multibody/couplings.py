@@ -25,7 +25,7 @@ import casadi as ca
 
 from symfric.foundation.numeric import Scalar, is_number, is_symbolic
 from symfric.multibody.constraints import Constraint, Held, impossible, linear, wraps
-from symfric.multibody.joints import Joint
+from symfric.multibody.joint import Joint
 from symfric.multibody.kinematics import Kinematics
 
 TEETH = 1000

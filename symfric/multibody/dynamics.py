@@ -19,7 +19,8 @@ import casadi as ca
 from symfric.foundation.symbols import stacked
 from symfric.multibody.body import GROUND, Body
 from symfric.multibody.forces import Axial, Load
-from symfric.multibody.joints import Free, Joint
+from symfric.multibody.joint import Joint
+from symfric.multibody.joints import Floating
 from symfric.multibody.kinematics import Kinematics, Motion, Relative
 from symfric.multibody.spatial import skew
 from symfric.multibody.topology import Link, body_of, frame_at
@@ -156,7 +157,7 @@ def balance(
 def _floats(kin: Kinematics, link: Link) -> bool:
     """Whether the coordinates of a link are those of its centre of mass in the world."""
     centred = (link.at_body.p - kin.topology.bodies[link.body].c).is_zero()
-    return isinstance(link.joint, Free) and link.base == GROUND and not link.reverse and centred
+    return isinstance(link.joint, Floating) and link.base == GROUND and not link.reverse and centred
 
 
 def _floating(kin: Kinematics, link: Link, loads: list[Load]) -> ca.SX:

@@ -20,7 +20,7 @@ from symfric.multibody.dynamics import (
 )
 from symfric.multibody.forces import Axial, Force, Gravity, Load
 from symfric.multibody.friction import Contact
-from symfric.multibody.joints import Joint
+from symfric.multibody.joint import Joint
 from symfric.multibody.kinematics import Kinematics, kinematics
 from symfric.multibody.spatial import vector
 from symfric.multibody.topology import Topology, body_of, frame_at

@@ -14,7 +14,7 @@ import casadi as ca
 
 from symfric.foundation.numeric import Scalar, equals, is_number, is_symbolic
 from symfric.multibody.body import GROUND
-from symfric.multibody.joints import Joint
+from symfric.multibody.joint import Joint
 from symfric.multibody.kinematics import Kinematics
 from symfric.multibody.spatial import Vector, vector
 from symfric.multibody.topology import body_of

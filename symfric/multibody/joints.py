@@ -1,14 +1,8 @@
-"""Joints: for each its pose and motion subspace (joint coordinates) and its constraints (loops).
+"""The joints: each with its pose, its motion subspace and its constraints.
 
-A joint connects a frame P on its parent body with a frame C on its child body. Its pose (R_PC,
-p_PC) is a function of the joint coordinates q; its motion subspace (H_w, H_v) gives the relative
-angular velocity w_PC_C = H_w q' in components of C, where Euler parameters have it simplest, and
-the velocity p_PC' = H_v q' in those of P. The constraints are
-expressions of the pose that vanish for every q; they close a loop, where the joint has no
-coordinates. The axis of a joint is z of both frames.
+See `symfric.multibody.joint` for what these are.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, final
@@ -16,7 +10,8 @@ from typing import ClassVar, final
 import casadi as ca
 
 from symfric.foundation.numeric import Scalar, is_number, is_symbolic
-from symfric.multibody.friction import JointFriction
+from symfric.model.sketch import Symbol
+from symfric.multibody.joint import FORCE, Joint, Pair, unit
 from symfric.multibody.spatial import (
     euler_g,
     rotation,
@@ -25,112 +20,13 @@ from symfric.multibody.spatial import (
     rotation_z,
 )
 
-Pair = tuple[ca.SX, ca.SX]
 NONE = ca.SX(3, 0)
 ANGLE, LENGTH = ("", "rad"), ("", "m")
 EULER = tuple((f"e{i}", "1") for i in range(4))
 
 
-def _unit(k: int) -> ca.SX:
-    """Motion along or about the axis k, shape (3, 1)."""
-    column = ca.SX(3, 1)
-    column[k] = 1
-    return column
-
-
 def _z() -> ca.SX:
-    return _unit(2)
-
-
-@dataclass(frozen=True, eq=False)
-class Joint(ABC):
-    """A joint between two bodies.
-
-    Attributes:
-        name: C identifier; coordinates and results carry it.
-        parent, child: "body" or "body.frame"; "ground" is the body that does not move.
-        start: joint coordinates at the start [m, rad]; a number where there is one coordinate.
-            What closes a loop needs none.
-        rate: their rates [m/s, rad/s].
-        friction: law and geometry of the bearing, or None.
-    """
-
-    coordinates: ClassVar[tuple[tuple[str, str], ...]] = ()
-    """Suffix and unit of each joint coordinate."""
-    constrains: ClassVar[int] = 0
-    """Number of constraints; the spanning tree keeps the joints with most."""
-    closes: ClassVar[bool] = False
-    """Whether it can only close loops, having no coordinates of its own."""
-    rubs: ClassVar[tuple[str, ...]] = ()
-    """Directions in which friction acts; "ball" is that of a ball in its socket."""
-    directions: ClassVar[Mapping[str, int]] = {}
-    """Where forces and motions may be prescribed: "slide", "turn", ... -> joint coordinate."""
-    quaternion: ClassVar[int | None] = None
-    """Index of the first of four Euler parameters among the coordinates."""
-
-    name: str
-    parent: str
-    child: str
-    start: Scalar | tuple[Scalar, ...] | None = None
-    rate: Scalar | tuple[Scalar, ...] | None = None
-    friction: JointFriction | None = None
-
-    @abstractmethod
-    def pose(self, q: ca.SX) -> Pair:
-        """(R_PC, p_PC) at the joint coordinates q."""
-
-    @abstractmethod
-    def subspace(self, q: ca.SX) -> Pair:
-        """(H_w, H_v), shape (3, n) each."""
-
-    @abstractmethod
-    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """Expressions of R_PC and p_PC that must vanish, shape (m, 1)."""
-
-    def problems(self) -> Iterator[str]:
-        """What is wrong with its own numbers."""
-        return iter(())
-
-    def linear(self, direction: str) -> bool:
-        """Whether motion in this direction is a translation [m], not a rotation [rad]."""
-        return self.coordinates[self.directions[direction]][1] == "m"
-
-    def coordinate(self, k: int) -> str:
-        """Name of a joint coordinate."""
-        suffix = self.coordinates[k][0]
-        return f"{self.name}_{suffix}" if suffix else self.name
-
-    def axis(self, direction: str, R: ca.SX) -> ca.SX:
-        """Axis of a direction in P, shape (3, 1)."""
-        return _unit("xyz".index(direction) if direction in "xyz" else 2)
-
-    def bearing(self, direction: str, R: ca.SX) -> ca.SX:
-        """Turns components in C into those of the bearing, whose own axis is the last."""
-        return ca.SX.eye(3)
-
-    def displacement(self, direction: str, R: ca.SX, p: ca.SX) -> ca.SX:
-        """The coordinate of a direction at a pose; an angle between -pi and pi."""
-        if self.linear(direction):
-            return p["xyz".index(direction) if direction in "xyz" else 2]
-        return ca.atan2(R[1, 0], R[0, 0])
-
-    @property
-    def starts(self) -> tuple[Scalar, ...]:
-        """Joint coordinates at the start; zero, or no rotation, where none are given."""
-        return _several(self.start, len(self.coordinates), self.quaternion)
-
-    @property
-    def rates(self) -> tuple[Scalar, ...]:
-        """Their rates at the start; zero where none are given."""
-        return _several(self.rate, len(self.coordinates), None)
-
-
-def _several(given: object, n: int, quaternion: int | None) -> tuple[Scalar, ...]:
-    if given is None:
-        return tuple(1.0 if i == quaternion else 0.0 for i in range(n))
-    if isinstance(given, tuple):
-        return given
-    return (given,) if is_number(given) or n == 1 else tuple(given)  # type: ignore[arg-type]
+    return unit(2)
 
 
 def _parallel(R: ca.SX) -> ca.SX:
@@ -147,6 +43,8 @@ class Revolute(Joint):
     constrains: ClassVar[int] = 5
     rubs: ClassVar[tuple[str, ...]] = ("turn",)
     directions: ClassVar[Mapping[str, int]] = {"turn": 0}
+    transmits: ClassVar[tuple[str, ...]] = (*FORCE, "Mx", "My")
+    symbol: ClassVar[Symbol] = Symbol("o", axes=(("b", 2),), hinge=True, anchored=True)
 
     def pose(self, q: ca.SX) -> Pair:
         """Turned by q about z."""
@@ -170,6 +68,8 @@ class Prismatic(Joint):
     constrains: ClassVar[int] = 5
     rubs: ClassVar[tuple[str, ...]] = ("slide",)
     directions: ClassVar[Mapping[str, int]] = {"slide": 0}
+    transmits: ClassVar[tuple[str, ...]] = ("Fx", "Fy", "Mx", "My", "Mz")
+    symbol: ClassVar[Symbol] = Symbol("s", guide=True)
 
     def pose(self, q: ca.SX) -> Pair:
         """Shifted by q along z."""
@@ -193,6 +93,8 @@ class Cylindrical(Joint):
     constrains: ClassVar[int] = 4
     rubs: ClassVar[tuple[str, ...]] = ("slide", "turn")
     directions: ClassVar[Mapping[str, int]] = {"slide": 0, "turn": 1}
+    transmits: ClassVar[tuple[str, ...]] = ("Fx", "Fy", "Mx", "My")
+    symbol: ClassVar[Symbol] = Symbol("s", axes=(("a", 2),), guide=True)
 
     def pose(self, q: ca.SX) -> Pair:
         """Shifted by q[0] along z and turned by q[1] about it."""
@@ -216,6 +118,8 @@ class Spherical(Joint):
     constrains: ClassVar[int] = 3
     rubs: ClassVar[tuple[str, ...]] = ("ball",)
     quaternion: ClassVar[int | None] = 0
+    transmits: ClassVar[tuple[str, ...]] = FORCE
+    symbol: ClassVar[Symbol] = Symbol("o", anchored=True)
 
     def pose(self, q: ca.SX) -> Pair:
         """R of the Euler parameters q."""
@@ -239,6 +143,8 @@ class Universal(Joint):
     constrains: ClassVar[int] = 4
     rubs: ClassVar[tuple[str, ...]] = ("x", "y")
     directions: ClassVar[Mapping[str, int]] = {"x": 0, "y": 1}
+    transmits: ClassVar[tuple[str, ...]] = (*FORCE, "Mx", "Mz")
+    symbol: ClassVar[Symbol] = Symbol("o", axes=(("a", 0), ("b", 1)), anchored=True)
 
     def pose(self, q: ca.SX) -> Pair:
         """Turned by q[0] about x, then by q[1] about the new y."""
@@ -255,7 +161,7 @@ class Universal(Joint):
 
     def axis(self, direction: str, R: ca.SX) -> ca.SX:
         """The parent's x, the child's y."""
-        return _unit(0) if direction == "x" else R[:, 1]
+        return unit(0) if direction == "x" else R[:, 1]
 
     def bearing(self, direction: str, R: ca.SX) -> ca.SX:
         """One on the parent's x, one on the child's y; a massless cross between them."""
@@ -276,6 +182,8 @@ class Planar(Joint):
     coordinates: ClassVar[tuple[tuple[str, str], ...]] = (("x", "m"), ("y", "m"), ("angle", "rad"))
     constrains: ClassVar[int] = 3
     directions: ClassVar[Mapping[str, int]] = {"x": 0, "y": 1, "turn": 2}
+    transmits: ClassVar[tuple[str, ...]] = ("Fz", "Mx", "My")
+    symbol: ClassVar[Symbol] = Symbol("D", plate=True)
 
     def pose(self, q: ca.SX) -> Pair:
         """Shifted by q[0], q[1] in the plane and turned by q[2] about its normal."""
@@ -296,6 +204,7 @@ class Fixed(Joint):
     """Holds two bodies together; 6 constraints."""
 
     constrains: ClassVar[int] = 6
+    symbol: ClassVar[Symbol] = Symbol("s", anchored=True)
 
     def pose(self, q: ca.SX) -> Pair:
         """The frames coincide."""
@@ -312,7 +221,7 @@ class Fixed(Joint):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Free(Joint):
+class Floating(Joint):
     """Lets a body move freely; Euler parameters for its rotation; no constraint."""
 
     coordinates: ClassVar[tuple[tuple[str, str], ...]] = (
@@ -322,6 +231,7 @@ class Free(Joint):
         *EULER,
     )
     quaternion: ClassVar[int | None] = 3
+    transmits: ClassVar[tuple[str, ...]] = ()
 
     def pose(self, q: ca.SX) -> Pair:
         """Shifted by q[:3], R of the Euler parameters q[3:]."""
@@ -363,6 +273,8 @@ class Distance(Closing):
     """
 
     constrains: ClassVar[int] = 1
+    transmits: ClassVar[tuple[str, ...]] = FORCE
+    symbol: ClassVar[Symbol] = Symbol(line="rod", anchored=True)
 
     length: Scalar = 1.0
 
@@ -386,6 +298,8 @@ class PointOnLine(Closing):
     """
 
     constrains: ClassVar[int] = 2
+    transmits: ClassVar[tuple[str, ...]] = FORCE
+    symbol: ClassVar[Symbol] = Symbol("o", axes=(("a", 2),), anchored=True)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
         """On the axis."""
@@ -393,6 +307,6 @@ class PointOnLine(Closing):
 
 
 ALL_JOINTS: tuple[type[Joint], ...] = (
-    Revolute, Prismatic, Cylindrical, Spherical, Universal, Planar, Fixed, Free, Distance,
+    Revolute, Prismatic, Cylindrical, Spherical, Universal, Planar, Fixed, Floating, Distance,
     PointOnLine,
 )  # fmt: skip

@@ -7,7 +7,7 @@ import casadi as ca
 
 from symfric.multibody.body import GROUND
 from symfric.multibody.cuts import Cuts
-from symfric.multibody.joints import Joint
+from symfric.multibody.joint import Joint
 from symfric.multibody.topology import Link, Topology, body_of, frame_at
 from symfric.multibody.turns import Turns
 

@@ -18,7 +18,7 @@ from symfric.multibody.assembly import assemble, coordinates
 from symfric.multibody.body import GROUND, Body
 from symfric.multibody.constraints import Constraint
 from symfric.multibody.forces import Force, Gravity
-from symfric.multibody.joints import Joint
+from symfric.multibody.joint import Joint
 from symfric.multibody.prepare import (
     Prepared,
     in_absolute_coordinates,

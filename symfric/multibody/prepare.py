@@ -16,7 +16,7 @@ from symfric.multibody.constraints import Constraint
 from symfric.multibody.cuts import Cuts
 from symfric.multibody.equations import Equations, equations
 from symfric.multibody.forces import Axial, Force
-from symfric.multibody.joints import Joint
+from symfric.multibody.joint import Joint
 from symfric.multibody.spatial import euler_parameters
 from symfric.multibody.topology import Topology
 from symfric.multibody.turns import angles

@@ -13,42 +13,19 @@ Carried along always, the reactions alone would take the outputs of a six-joint 
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import casadi as ca
 
 from symfric.foundation.symbols import stacked, strays
 from symfric.model import Output
+from symfric.model.kinds import WORK
 from symfric.multibody.body import GROUND
 from symfric.multibody.equations import Equations
 from symfric.multibody.forces import Axial, Force
-from symfric.multibody.joints import (
-    Cylindrical,
-    Distance,
-    Free,
-    Joint,
-    Planar,
-    PointOnLine,
-    Prismatic,
-    Revolute,
-    Spherical,
-    Universal,
-)
+from symfric.multibody.joint import COMPONENTS, FORCE, Joint
+from symfric.multibody.joints import Distance
 from symfric.multibody.turns import angles
-
-FORCE = ("Fx", "Fy", "Fz")
-COMPONENTS = (*FORCE, "Mx", "My", "Mz")
-TRANSMITTED: dict[type[Joint], tuple[str, ...]] = {
-    Revolute: (*FORCE, "Mx", "My"),
-    Prismatic: ("Fx", "Fy", "Mx", "My", "Mz"),
-    Cylindrical: ("Fx", "Fy", "Mx", "My"),
-    Spherical: FORCE,
-    Universal: (*FORCE, "Mx", "Mz"),
-    Planar: ("Fz", "Mx", "My"),
-    Free: (),
-    Distance: FORCE,
-    PointOnLine: FORCE,
-}
-"""Components that a joint can transmit, in the axes of the child's frame; all where not listed."""
 
 Put = Callable[[Sequence[ca.SX]], list[ca.SX]]
 """Expressions in accelerations and friction forces -> the same in the symbols of the model."""
@@ -80,7 +57,7 @@ def results(
     values = put([output.expression for _, output in found])
     own = {str(eq.q[i]) for i in range(eq.n)}
     return {
-        name: Output(value, output.unit, output.doc)
+        name: replace(output, expression=value)
         for (name, output), value in zip(found, values, strict=True)
         if name not in own  # absolute coordinates are the centres of mass
     }
@@ -94,7 +71,7 @@ def _reactions(eq: Equations, joints: Sequence[Joint]) -> Iterator[tuple[str, Ou
     """
     for joint in joints:
         column = ca.vertcat(*eq.reactions[joint.name])
-        for component in TRANSMITTED.get(type(joint), COMPONENTS):
+        for component in joint.transmits:
             unit, what = ("N", "force") if component in FORCE else ("N m", "moment")
             value = column[COMPONENTS.index(component)]
             doc = f"{what} of joint '{joint.name}' on its child along {component[1]} of its frame"
@@ -143,11 +120,14 @@ def _work(
                 power += load.power(kin)
         if own:
             power += ca.jtimes(energy, positions, rates)
-        yield f"{force.name}_work_rate", Output(power, "W", f"power put in by '{force.name}'")
+        yield f"{force.name}_work_rate", Output(power, "W", f"power put in by '{force.name}'", WORK)
     if eq.contacts:
         taken = sum((-ca.dot(c.F, c.slip) for c in eq.contacts), ca.SX(0))
-        yield "friction_work_rate", Output(taken, "W", "power put in by friction, at most zero")
+        yield (
+            "friction_work_rate",
+            Output(taken, "W", "power put in by friction, at most zero", WORK),
+        )
     if eq.m and not eq.phi_t.is_zero():
         drive = ca.dot(eq.lam, eq.phi_t)
-        yield "drive_work_rate", Output(drive, "W", "power put in by prescribed motions")
+        yield "drive_work_rate", Output(drive, "W", "power put in by prescribed motions", WORK)
     yield "conserved", Output(conserved, "J", "energy without potentials of time or inputs")

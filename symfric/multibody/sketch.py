@@ -5,13 +5,15 @@ from collections.abc import Iterable, Mapping
 import casadi as ca
 
 from symfric.foundation.numeric import equals
-from symfric.model.sketch import Mark, Part, Sketch
+from symfric.model.sketch import Mark, Part, Sketch, Symbol
 from symfric.multibody.body import GROUND
 from symfric.multibody.equations import Equations
 from symfric.multibody.forces import Force, SpringDamper
-from symfric.multibody.joints import Joint
+from symfric.multibody.joint import Joint
 from symfric.multibody.kinematics import Kinematics
 from symfric.multibody.topology import body_of, frame_at
+
+SPRING, DAMPER = (Symbol(line=line, anchored=True) for line in ("spring", "damper"))
 
 
 def sketch(
@@ -41,8 +43,8 @@ def sketch(
         columns.append(_centre(eq.kin, name))
     marks = [_joint(eq, joint, used, scales) for joint in joints]
     for force in drawn:
-        kind = "damper" if equals(force.stiffness, 0.0) else "spring"
-        marks.append(_mark(force.name, kind, (force.a, force.b), used))
+        symbol = DAMPER if equals(force.stiffness, 0.0) else SPRING
+        marks.append(_mark(force.name, symbol, (force.a, force.b), used))
     return Sketch(ca.horzcat(*columns), tuple(parts), tuple(marks))
 
 
@@ -52,22 +54,21 @@ def _joint(eq: Equations, joint: Joint, used: dict[str, int], scales: Mapping[st
         for c in eq.contacts
         if c.joint == joint.name and c.name in scales
     )
-    return _mark(joint.name, type(joint).__name__.lower(), (joint.parent, joint.child), used, slips)
+    return _mark(joint.name, joint.symbol, (joint.parent, joint.child), used, slips)
 
 
 def _mark(
     name: str,
-    kind: str,
+    symbol: Symbol,
     ends: tuple[str, str],
     used: dict[str, int],
     slips: tuple[tuple[str, float], ...] = (),
 ) -> Mark:
     """A mark whose first end is on the ground, if one is."""
     grounded = GROUND in (body_of(end) for end in ends)
-    # the axes of a universal joint belong one to each end, which are at one point anyway
-    if grounded and body_of(ends[0]) != GROUND and kind != "universal":
+    if grounded and body_of(ends[0]) != GROUND and symbol.turnable:
         ends = ends[1], ends[0]
-    return Mark(name, kind, used[ends[0]], used[ends[1]], slips, grounded)
+    return Mark(name, symbol, used[ends[0]], used[ends[1]], slips, grounded)
 
 
 def _frame(kin: Kinematics, place: str) -> ca.SX:

@@ -8,7 +8,8 @@ from typing import final
 import casadi as ca
 
 from symfric.multibody.body import GROUND, Body
-from symfric.multibody.joints import Free, Joint, Pair
+from symfric.multibody.joint import Joint, Pair
+from symfric.multibody.joints import Floating
 from symfric.multibody.spatial import Frame, skew
 
 
@@ -128,7 +129,7 @@ def absolute(bodies: Mapping[str, Body], joints: Sequence[Joint], names: Sequenc
         Link(
             GROUND,
             name,
-            Free(name, GROUND, name),
+            Floating(name, GROUND, name),
             False,
             Frame(),
             Frame(at=bodies[name].c),

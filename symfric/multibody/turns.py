@@ -14,7 +14,8 @@ import casadi as ca
 
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import symbols_of
-from symfric.multibody.joints import Joint
+from symfric.model.kinds import POSITION
+from symfric.multibody.joint import Joint
 
 
 @final
@@ -40,7 +41,9 @@ class Turns:
         if name not in self._found:
             full = ca.floor((joint.starts[k] - angle) / (2 * pi) + 0.5)
             start = angle + 2 * pi * full
-            state = Variable(name, "rad", start=start, doc="angle of a joint that closes a loop")
+            state = Variable(
+                name, "rad", start=start, doc="angle of a joint that closes a loop", kind=POSITION
+            )
             self._found[name] = Turn(state, rate)
         return self._found[name].angle.symbol
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.symbols import stacked
+from symfric.model.kinds import WORK
 
 if TYPE_CHECKING:
     from symfric.results.trajectory import Trajectory
@@ -15,8 +16,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
 """Of Gauss quadrature on (-1, 1): exact to degree 9, beyond any dense output."""
-WORK = "_work_rate"
-"""Details with this ending are powers [W] that enter the balance."""
 
 
 def integrals(trajectory: "Trajectory", expression: ca.SX, times: Array) -> Array:
@@ -87,7 +86,7 @@ class EnergyBalance:
 
 
 def energy_balance(trajectory: "Trajectory") -> EnergyBalance:
-    """The balance of a model whose details are "conserved" and powers named "..._work_rate".
+    """The balance of a model that has the detail "conserved" and powers of the kind `WORK`.
 
     Raises:
         ValueError: the model has no such details.
@@ -100,7 +99,8 @@ def energy_balance(trajectory: "Trajectory") -> EnergyBalance:
         )
     start = trajectory.steps[:1]
     model, at = trajectory.model, np.concatenate([start, trajectory.t])
-    rates = {name.removesuffix(WORK): name for name in details if name.endswith(WORK)}
+    powers = [name for name, output in trajectory.model.further.items() if output.kind == WORK]
+    rates = {name.removesuffix("_work_rate"): name for name in powers}
     column = stacked(model.expression(name) for name in rates.values())
     energy, kinetic = trajectory.of(
         ca.vertcat(model.expression("conserved"), model.expression("kinetic")), at

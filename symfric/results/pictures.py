@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import Figure
 
 from symfric.foundation.panels import panels, save
-from symfric.results.kinds import CONSTRAINTS, is_mechanism, kinds
+from symfric.model.kinds import CONSTRAINTS
+from symfric.results.kinds import is_mechanism, kinds
 
 if TYPE_CHECKING:
     from symfric.results.trajectory import Trajectory

@@ -19,12 +19,6 @@ ELEVATION, AZIMUTH = 22.0, -58.0
 """From where a spatial motion is seen [degree]."""
 UPRIGHT = 0.99
 """Component of the view along z beyond which z is no direction on the picture."""
-SLIDING = ("prismatic", "cylindrical")
-ANCHORED = ("revolute", "spherical", "universal", "fixed", "pointonline", "distance", "spring",
-            "damper")  # fmt: skip
-"""What shows where it hangs on the ground."""
-MARKERS = {"revolute": "o", "prismatic": "s", "cylindrical": "s", "spherical": "o",
-           "universal": "o", "planar": "D", "fixed": "s", "pointonline": "o"}  # fmt: skip
 
 
 @final
@@ -114,7 +108,7 @@ def _normal(sketch: Sketch, poses: Poses) -> Array | None:
     """The normal of the plane in which all moves, towards the eye; None if there is none."""
     moved = (poses.at - poses.at[:, :, :1]).transpose(1, 0, 2).reshape(3, -1)
     directions, extent, _ = np.linalg.svd(moved, full_matrices=False)
-    hinges = [poses.axes[mark.b, 2] for mark in sketch.marks if mark.kind == "revolute"]
+    hinges = [poses.axes[mark.b, 2] for mark in sketch.marks if mark.symbol.hinge]
     if extent[1] > FLAT * extent[0]:
         normal = directions[:, 2]
     elif hinges:
@@ -148,9 +142,9 @@ def strokes(
         yield from _body(sketch, part, k, poses, view)
     for mark in sketch.marks:
         yield from _symbol(mark, poses, view)
-        if mark.kind in MARKERS:
+        if mark.symbol.marker:
             at = poses.at[mark.b][None]
-            yield Stroke("joint", at, -1, MARKERS[mark.kind], sticks.get(mark.name))
+            yield Stroke("joint", at, -1, mark.symbol.marker, sticks.get(mark.name))
 
 
 def _body(sketch: Sketch, part: Part, k: int, poses: Poses, view: View) -> Iterator[Stroke]:
@@ -162,7 +156,7 @@ def _body(sketch: Sketch, part: Part, k: int, poses: Poses, view: View) -> Itera
         if arms:
             gap = np.full_like(centre, np.nan)
             yield Stroke(role, np.stack([p for arm in arms for p in (centre, arm, gap)]), k)
-    if not arms and not any(m.kind in SLIDING and m.b in part.corners for m in sketch.marks):
+    if not arms and not any(m.symbol.guide and m.b in part.corners for m in sketch.marks):
         yield Stroke("block", _block(poses.axes[part.centre], centre, 1.2 * view.size), k)
     yield Stroke("centre", centre[None], k)
 
@@ -170,31 +164,27 @@ def _body(sketch: Sketch, part: Part, k: int, poses: Poses, view: View) -> Itera
 def _behind(mark: Mark, poses: Poses, view: View) -> Iterator[Stroke]:
     """Guides, rods, springs, and where something hangs on the ground."""
     a, b, z = poses.at[mark.a], poses.at[mark.b], poses.axes[mark.a, 2]
-    if mark.kind in SLIDING:
+    if mark.symbol.guide:
         along = np.sum(z * (b - a), axis=0)
         low, high = along.min() - 3 * view.size, along.max() + 3 * view.size
         role = "ground" if mark.grounded else "guide"
         yield Stroke(role, np.stack([a + low * z, a + high * z]))
-    elif mark.kind in ("distance", "damper"):
-        yield Stroke("rod" if mark.kind == "distance" else "damper", np.stack([a, b]))
-    elif mark.kind == "spring":
-        yield Stroke("spring", _zigzag(a, b, view))
-    if mark.grounded and mark.kind in ANCHORED:
+    if mark.symbol.line:
+        points = _zigzag(a, b, view) if mark.symbol.line == "spring" else np.stack([a, b])
+        yield Stroke(mark.symbol.line, points)
+    if mark.grounded and mark.symbol.anchored:
         yield Stroke("anchor", a[None])
 
 
 def _symbol(mark: Mark, poses: Poses, view: View) -> Iterator[Stroke]:
-    """Blocks and axes of joints."""
+    """Blocks, axes and plates of joints."""
     a, b, size = poses.axes[mark.a], poses.at[mark.b], view.size
-    if mark.kind in SLIDING:
+    if mark.symbol.guide:
         yield Stroke("block", _block(poses.axes[mark.b], b, size))
-    if mark.kind in ("revolute", "pointonline", "cylindrical"):
-        z = poses.axes[mark.b, 2] if mark.kind == "revolute" else a[2]
-        yield Stroke("axis", np.stack([b - 1.6 * size * z, b + 1.6 * size * z]))
-    if mark.kind == "universal":
-        for axis in (a[0], poses.axes[mark.b, 1]):
-            yield Stroke("axis", np.stack([b - 1.6 * size * axis, b + 1.6 * size * axis]))
-    if mark.kind == "planar":
+    for end, k in mark.symbol.axes:
+        axis = poses.axes[mark.a if end == "a" else mark.b, k]
+        yield Stroke("axis", np.stack([b - 1.6 * size * axis, b + 1.6 * size * axis]))
+    if mark.symbol.plate:
         corners = [(1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1)]
         yield Stroke("axis", np.stack([b + 2 * size * (i * a[0] + j * a[1]) for i, j in corners]))
 

@@ -155,9 +155,9 @@ def refinement(system: System) -> ca.Function:
 
     Two steps of Newton's method for accelerations, multipliers and normal forces.
     """
-    own, (rows, _), right = slopes(system), system.algebraic, ca.SX.sym("right", system.n)
-    lu, _ = at_rest(system)
-    pack = ca.Function("pack", [own.entries], [lu.packed])
+    (rows, _), right = system.algebraic, ca.SX.sym("right", system.n)
+    lu, factors = at_rest(system)  # whose symbols `slopes` may have forgotten
+    pack = ca.Function("pack", [factors.symbols[0]], [lu.packed])
     solve = ca.Function("solve", [lu.packed_symbol, right], [_solved(lu, right)])
     residual = ca.SX(system.n, 1)
     residual[rows] = system.f[rows]
@@ -166,7 +166,7 @@ def refinement(system: System) -> ca.Function:
     if system.manifold is not None:
         y = ca.SX(system.manifold.project(y, d))
     for _ in range(2):
-        y = y + solve(pack(own.values(y, d)), f(y, d))
+        y = y + solve(pack(factors.entries(y, d)), f(y, d))
     return ca.Function("refine", [system.y, d], [y], {"cse": True})
 
 
@@ -181,20 +181,22 @@ def signs(system: System, gamma: float, watched: Sequence[int] = ()) -> Signs:
     step only damps away. The pivots of the rows `watched`, which are there anyway, say how far the
     latter is from zero.
     """
-    own, block, (rows, _) = slopes(system), blocks(system, gamma), system.algebraic
+    block, (rows, _) = blocks(system, gamma), system.algebraic
+    entries = block.factors.symbols[0]
     lu, first = block.lu, block.lu.order[: len(rows)]
     if system.is_semi_explicit and all({*places} == {*rows} for places in zip(*first, strict=True)):
         tiny = [lu.sign(len(rows)), lu.pivots(watched)]
     else:
-        own_lu, _ = at_rest(system)
+        own_lu, factors = at_rest(system)
+        entries = factors.symbols[0]
         in_symbols = [own_lu.sign(), own_lu.pivots(watched)]
         tiny = ca.substitute(in_symbols, [own_lu.packed_symbol], [own_lu.packed])
-    symbols = [lu.packed_symbol, own.entries]
+    symbols = [lu.packed_symbol, entries]
     every = ca.Function("signs", symbols, [lu.sign(), *tiny], {"cse": True})
 
     def at(y: Any, h: Any, d: Any) -> tuple[Any, Any, Any]:
-        entries = block.slopes(y, d)
-        of_step, of_tiny_step, pivots = every(block.pack(entries, h), entries)
+        values = block.slopes(y, d)
+        of_step, of_tiny_step, pivots = every(block.pack(values, h), values)
         return of_step, of_tiny_step, pivots
 
     return at

@@ -16,7 +16,8 @@ from symfric.multibody.body import GROUND, unphysical
 from symfric.multibody.couplings import Gear
 from symfric.multibody.forces import JointSpringDamper
 from symfric.multibody.friction import JointFriction
-from symfric.multibody.joints import Free, Joint, Planar, Prismatic, Revolute
+from symfric.multibody.joint import Joint
+from symfric.multibody.joints import Floating, Planar, Prismatic, Revolute
 from symfric.multibody.mechanism import Mechanism
 from symfric.multibody.spatial import Vector
 from symfric.multibody.urdf.bodies import Carried, carried, holding, merged
@@ -28,7 +29,7 @@ KINDS: dict[str, type[Joint]] = {
     "continuous": Revolute,
     "prismatic": Prismatic,
     "planar": Planar,
-    "floating": Free,
+    "floating": Floating,
 }
 FLOATING = "floating_base"
 """The joint of a root link that moves freely."""
@@ -96,7 +97,7 @@ def read_urdf(
     m = Mechanism(_identifier(urdf.name), gravity)
     _add_bodies(m, urdf, places, weights, names)
     if not grounded:
-        m.joint(Free(FLOATING, GROUND, names.links[urdf.root]))
+        m.joint(Floating(FLOATING, GROUND, names.links[urdf.root]))
     left = list(urdf.left_out)
     for joint in moved:
         friction = (bearings or {}).get(joint.name) or tag_friction(joint, law, level)

@@ -11,7 +11,7 @@ from symfric import BrownMcPhee
 from symfric.multibody import (
     Distance,
     Fixed,
-    Free,
+    Floating,
     JointFriction,
     JointSpringDamper,
     Mechanism,
@@ -95,12 +95,12 @@ MISTAKES: dict[str, tuple[Callable[[Mechanism], object], str]] = {
     "loose body": (
         lambda m: m.body("bob", 1.0, (1.0, 1.0, 1.0)),
         "> body 'bob': expected joints with coordinates that lead to the ground, found none; "
-        "a Free joint lets it move freely",
+        "a Floating joint lets it move freely",
     ),
     "friction of nothing": (
         lambda m: (
             m.body("bob", 1.0, (1.0, 1.0, 1.0)),
-            m.joint(Free("pose", "rod", "bob", friction=JointFriction(LAW))),
+            m.joint(Floating("pose", "rod", "bob", friction=JointFriction(LAW))),
         ),
         "> joint 'pose' > friction: expected a revolute, prismatic, cylindrical, universal or",
     ),

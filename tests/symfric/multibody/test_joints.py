@@ -1,11 +1,16 @@
 """Every joint: pose, motion subspace and constraints fit each other."""
 
+from typing import ClassVar
+
 import casadi as ca
 import numpy as np
 import pytest
 
-from symfric.multibody import ALL_JOINTS, Joint
-from symfric.multibody.spatial import skew
+from symfric.model.sketch import Symbol
+from symfric.multibody import ALL_JOINTS, Joint, Mechanism
+from symfric.multibody.joint import COMPONENTS, Pair, unit
+from symfric.multibody.spatial import rotation_z, skew
+from symfric.results.kinds import kinds
 
 MOVING = [kind for kind in ALL_JOINTS if not kind.closes]
 each_joint = pytest.mark.parametrize("kind", ALL_JOINTS, ids=lambda kind: kind.__name__)
@@ -84,6 +89,52 @@ def test_motion_subspace_does_no_work_against_the_constraints(kind: type[Joint])
     assert work == pytest.approx(np.zeros(work.shape), abs=1e-14)
 
 
+@each_joint
+def test_what_a_joint_transmits_is_what_its_constraints_hold(kind: type[Joint]) -> None:
+    q = ca.SX.sym("q", len(kind.coordinates))
+    if kind.closes:
+        R, p = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0], np.ones(3)
+    else:
+        pose = ca.Function("pose", [q], [ca.densify(x) for x in joint(kind).pose(q)])
+        R, p = (m.full() for m in pose.call([coordinates(kind)]))
+    C = twist_derivatives(kind, R, p)
+    held = np.abs(np.hstack([C[:, :3] @ R, C[:, 3:] @ R])).max(axis=0, initial=0.0)
+    assert tuple(np.array(COMPONENTS)[held > 1e-12]) == kind.transmits
+
+
+def test_a_new_joint_is_a_class_and_nothing_else() -> None:
+    """Results, pictures and tables ask the class, not a list of names."""
+
+    class PinInSlot(Joint):
+        """Slides along x and turns about z."""
+
+        coordinates = (("slide", "m"), ("angle", "rad"))
+        constrains = 4
+        directions: ClassVar = {"x": 0, "turn": 1}
+        transmits = ("Fy", "Fz", "Mx", "My")
+        symbol = Symbol("o", axes=(("a", 2),))
+
+        def pose(self, q: ca.SX) -> Pair:
+            return rotation_z(q[1]), ca.vertcat(q[0], 0, 0)
+
+        def subspace(self, q: ca.SX) -> Pair:
+            return ca.horzcat(ca.SX(3, 1), unit(2)), ca.horzcat(unit(0), ca.SX(3, 1))
+
+        def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
+            return ca.vertcat(p[1], p[2], R[0, 2], R[1, 2])
+
+    m = Mechanism("slotted", gravity=(0.0, -9.81, 0.0))
+    m.body("bob", 1.0, (0.1, 0.1, 0.1))
+    m.joint(PinInSlot("pin", "ground", "bob", rate=(1.0, 2.0)))
+    for formulation in ("joint", "absolute"):
+        model = m.build(formulation=formulation)
+        reactions = {name for name in model.further if name.startswith("pin_")}
+        assert reactions == {"pin_Fy", "pin_Fz", "pin_Mx", "pin_My"}
+        assert model.sketch is not None
+        assert model.sketch().marks[0].symbol.marker == "o"
+    assert kinds(m.build())["pin_slide"] == "position"
+
+
 def test_distance_measures_from_point_to_point() -> None:
     (rod,) = (k for k in ALL_JOINTS if k.__name__ == "Distance")
     made = rod("rod", "a", "b", length=5.0)  # type: ignore[call-arg]
@@ -98,7 +149,7 @@ def test_distance_measures_from_point_to_point() -> None:
         ("Revolute", None, (0.0,)),
         ("Cylindrical", (1.0, 2.0), (1.0, 2.0)),
         ("Spherical", None, (1.0, 0.0, 0.0, 0.0)),
-        ("Free", None, (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)),
+        ("Floating", None, (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)),
     ],
 )
 def test_a_joint_starts_where_it_is_told_or_without_displacement(

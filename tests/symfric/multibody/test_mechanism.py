@@ -11,7 +11,7 @@ from symfric.foundation.parameters import Variable
 from symfric.multibody import (
     Distance,
     Fixed,
-    Free,
+    Floating,
     JointFriction,
     JointSpringDamper,
     Mechanism,
@@ -227,7 +227,7 @@ def test_a_free_body_spins_as_it_must(formulation: str) -> None:
     m = Mechanism("m", gravity=(0.0, 0.0, 0.0))
     m.body("stone", 2.0, (1.0, 2.0, 2.5))
     rate = tuple(0.5 * w for w in (0.3, 2.0, 0.1))
-    m.joint(Free("pose", "ground", "stone", rate=(1.0, 0.0, 0.0, 0.0, *rate)))
+    m.joint(Floating("pose", "ground", "stone", rate=(1.0, 0.0, 0.0, 0.0, *rate)))
     run = simulate(m.build(formulation=formulation), 5.0, rtol=1e-9)
     assert np.ptp(run["kinetic"]) < 1e-7
     assert run["constraint_position"].max() < 1e-12

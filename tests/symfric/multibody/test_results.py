@@ -25,7 +25,7 @@ from symfric.multibody import (
     SpringDamper,
     UserForce,
 )
-from symfric.multibody.joints import Joint
+from symfric.multibody.joint import Joint
 from symfric.multibody.results import COMPONENTS, TRANSMITTED
 from symfric.scenes import MECHANISMS, FourMass
 

@@ -18,7 +18,7 @@ from symfric.multibody import (
     Revolute,
     Spherical,
 )
-from symfric.results.energy import WORK, EnergyBalance
+from symfric.results.energy import EnergyBalance
 from symfric.scenes import MECHANISMS, FourBar, FourMass, Pendulum, SliderCrank
 
 X = (1.0, 0.0, 0.0)
@@ -135,7 +135,7 @@ def test_friction_explains_the_loss_of_energy(name: str) -> None:
 def test_a_wrong_friction_power_shows() -> None:
     """One part in ten thousand of it is a thousand times what the integrator leaves open."""
     model = FourMass(LAW).model()
-    name = f"friction{WORK}"
+    name = "friction_work_rate"
     off = dict(model.further)
     off[name] = replace(off[name], expression=(1 + 1e-4) * off[name].expression)
     right, wrong = (

@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from symfric.model.sketch import Mark, Part, Sketch
+from symfric.model.sketch import Mark, Part, Sketch, Symbol
+from symfric.multibody import Distance, Prismatic, Revolute, Spherical
+from symfric.multibody.sketch import SPRING
 from symfric.results.strokes import Poses, Stroke, View, look, strokes
 
 Array = NDArray[np.float64]
@@ -31,7 +33,7 @@ def arm(normal: int, length: float = 2.0, lift: float = 0.0) -> tuple[Sketch, Po
     hinge = np.roll(ground, 2 - normal, axis=0), np.roll(axes, 2 - normal, axis=0)
     at = np.stack([np.zeros((3, FRAMES)), np.zeros((3, FRAMES)), np.zeros((3, FRAMES)), far])
     parts = (Part("ground", 2, (0,), fixed=True), Part("rod", 3, (1,)))
-    marks = (Mark("hinge", "revolute", 0, 1, grounded=True),)
+    marks = (Mark("hinge", Revolute.symbol, 0, 1, grounded=True),)
     poses = Poses(np.stack([*hinge, ground, axes]), at, np.stack([0 * far, far]))
     return Sketch(ca.SX(12, 4), parts, marks), poses
 
@@ -68,11 +70,11 @@ def test_the_picture_holds_all_places_and_paths_with_a_margin() -> None:
     assert view.size == pytest.approx(0.02 * np.ptp(poses.at, axis=(0, 2)).max())
 
 
-def drawn(kind: str, a: Array, b: Array, **more: object) -> dict[str, Stroke]:
+def drawn(symbol: Symbol, a: Array, b: Array, **more: object) -> dict[str, Stroke]:
     """Strokes by role of one mark between two places that stand still."""
     axes = np.tile(np.eye(3)[None, :, :, None], (3, 1, 1, 1))
     poses = Poses(axes, np.stack([a, b, b])[:, :, None], b[None, :, None])
-    sketch = Sketch(ca.SX(12, 3), (Part("body", 2, (1,)),), (Mark("it", kind, 0, 1, **more),))  # type: ignore[arg-type]
+    sketch = Sketch(ca.SX(12, 3), (Part("body", 2, (1,)),), (Mark("it", symbol, 0, 1, **more),))  # type: ignore[arg-type]
     view = View(a, b, np.array([0.0, -1.0, 0.0]), True, 0.1)
     sticks = {"it": np.array([True])} if more.get("slips") else {}
     return {s.role: s for s in strokes(sketch, poses, view, sticks)}
@@ -82,7 +84,7 @@ A, B = np.zeros(3), np.array([3.0, 0.0, 4.0])
 
 
 def test_a_spring_runs_from_end_to_end_and_swings_in_the_picture() -> None:
-    points = drawn("spring", A, B)["spring"].points[:, :, 0]
+    points = drawn(SPRING, A, B)["spring"].points[:, :, 0]
     assert points[0] == pytest.approx(A)
     assert points[-1] == pytest.approx(B)
     along = points @ B / 5
@@ -93,12 +95,12 @@ def test_a_spring_runs_from_end_to_end_and_swings_in_the_picture() -> None:
 
 
 def test_a_spring_towards_the_eye_is_drawn_too() -> None:
-    points = drawn("spring", A, np.array([0.0, 2.0, 0.0]))["spring"].points
+    points = drawn(SPRING, A, np.array([0.0, 2.0, 0.0]))["spring"].points
     assert np.isfinite(points).all()
 
 
 def test_a_block_has_the_twelve_edges_of_a_cube() -> None:
-    points = drawn("spherical", A, B)["block"].points[:, :, 0].reshape(12, 3, 3)
+    points = drawn(Spherical.symbol, A, B)["block"].points[:, :, 0].reshape(12, 3, 3)
     assert np.isnan(points[:, 2]).all()
     lengths = np.linalg.norm(points[:, 0] - points[:, 1], axis=1)
     assert lengths == pytest.approx(np.full(12, 0.24))
@@ -106,24 +108,24 @@ def test_a_block_has_the_twelve_edges_of_a_cube() -> None:
 
 
 def test_a_guide_reaches_beyond_the_slide_on_the_axis_of_its_parent() -> None:
-    found = drawn("prismatic", A, np.array([0.0, 0.0, 2.0]), grounded=True)
+    found = drawn(Prismatic.symbol, A, np.array([0.0, 0.0, 2.0]), grounded=True)
     assert found["ground"].points[:, :, 0] == pytest.approx(np.array([[0, 0, 1.7], [0, 0, 2.3]]))
     assert "anchor" not in found
-    assert "guide" in drawn("prismatic", A, B)
+    assert "guide" in drawn(Prismatic.symbol, A, B)
 
 
 def test_what_hangs_on_the_ground_shows_it() -> None:
-    assert drawn("revolute", A, A, grounded=True)["anchor"].points[0, :, 0] == pytest.approx(A)
-    assert "anchor" not in drawn("revolute", A, A)
+    assert drawn(Revolute.symbol, A, A, grounded=True)["anchor"].points[0, :, 0] == pytest.approx(A)
+    assert "anchor" not in drawn(Revolute.symbol, A, A)
 
 
 def test_joints_carry_what_their_contacts_do() -> None:
-    joint = drawn("revolute", A, A, slips=(("it_slip", 0.1),))["joint"]
+    joint = drawn(Revolute.symbol, A, A, slips=(("it_slip", 0.1),))["joint"]
     assert joint.sticks is not None and joint.sticks.all()
-    assert drawn("revolute", A, A)["joint"].sticks is None
+    assert drawn(Revolute.symbol, A, A)["joint"].sticks is None
 
 
 def test_a_rod_is_a_line() -> None:
-    found = drawn("distance", A, B)
+    found = drawn(Distance.symbol, A, B)
     assert found["rod"].points[:, :, 0] == pytest.approx(np.stack([A, B]))
     assert "joint" not in found
