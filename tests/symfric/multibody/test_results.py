@@ -25,8 +25,7 @@ from symfric.multibody import (
     SpringDamper,
     UserForce,
 )
-from symfric.multibody.joint import Joint
-from symfric.multibody.results import COMPONENTS, TRANSMITTED
+from symfric.multibody.joint import COMPONENTS, Joint
 from symfric.scenes import MECHANISMS, FourMass
 
 Y = (0.0, 1.0, 0.0)
@@ -123,7 +122,7 @@ def test_components_left_out_are_those_a_joint_cannot_transmit(kind: type[Joint]
     eq, name = made.eq, f"j{TREE.index(kind)}"
     q, qd = state(made)
     values = solve(eq, q, qd).reactions[name]
-    given = TRANSMITTED.get(kind, COMPONENTS)
+    given = kind.transmits
     for component, value in zip(COMPONENTS, values, strict=True):
         if component in given:
             assert abs(value) > 1e-6, component
@@ -200,7 +199,7 @@ def test_reactions_that_redundant_constraints_leave_open_are_not_given() -> None
 
 
 def test_a_pin_that_closes_a_loop_has_forces_alone() -> None:
-    assert TRANSMITTED[PointOnLine] == ("Fx", "Fy", "Fz")
+    assert PointOnLine.transmits == ("Fx", "Fy", "Fz")
 
 
 def powers(m: Mechanism) -> set[str]:
