@@ -98,7 +98,7 @@ def test_cost_is_shown_as_instructions_of_value_and_gradient(
     assert cost["value"] > cost["gradient"] > 0
 
 
-@pytest.mark.parametrize("arguments", [["lugre"], [], ["asymmetric(stribeck)"], ["viscous"]])
+@pytest.mark.parametrize("arguments", [["lugre"], [], ["asymmetric(stribeck)"]])
 def test_the_picture_is_a_png(arguments: list[str], tmp_path: Path) -> None:
     path = tmp_path / "laws.png"
     assert main(["laws", *arguments, "--plot", str(path)]) == 0

@@ -49,11 +49,21 @@ def test_every_figure_has_finite_columns_of_one_length_or_is_refused(law: str) -
             assert all(np.isfinite(values).all() for values in curve.columns.values())
 
 
-REFERENCES = {"generic_asperity": GenericAsperity(count=60), "random_bristles": RandomBristles()}
+REFERENCES = {"generic_asperity": GenericAsperity(count=12), "random_bristles": RandomBristles()}
 
 
-@pytest.mark.parametrize("name", [n for n in FIGURES if not n.startswith("sweep")])
-@pytest.mark.parametrize("law", REFERENCES)
+LONG = {("generic_asperity", "break_away"), ("generic_asperity", "drift")}
+
+
+@pytest.mark.parametrize(
+    ("law", "name"),
+    [
+        pytest.param(law, name, marks=pytest.mark.slow if (law, name) in LONG else ())
+        for law in REFERENCES
+        for name in FIGURES
+        if not name.startswith("sweep")
+    ],
+)
 def test_a_population_has_the_figures_of_its_phenomena(law: str, name: str) -> None:
     reference = REFERENCES[law]
     needed = SHOWN_WITH.get(name)

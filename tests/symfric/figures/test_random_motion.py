@@ -42,7 +42,7 @@ def test_the_run_ends_where_the_velocity_is_reached() -> None:
 
 
 def test_a_weak_push_is_held_and_a_strong_one_is_not() -> None:
-    law = GenericAsperity(count=300, tau_c=1e-6)
+    law = GenericAsperity(count=100, tau_c=1e-6)
     ends = [shoved(law, N, 0.8, lambda t, F=F: F + 0 * t, 0.3, None) for F in (0.5, 4.0)]
     assert abs(ends[0].columns["x"][-1]) < 2e-6
     assert ends[1].columns["x"][-1] == pytest.approx((4.0 - 2.0) / 0.8 * 0.045, rel=0.1)

@@ -145,7 +145,7 @@ DRIVES: dict[str, tuple[int, str, int]] = {
 }
 
 
-@pytest.mark.parametrize("reverse", [False, True])
+@pytest.mark.parametrize("reverse", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", DRIVES)
 def test_every_direction_is_driven_alike_in_both_formulations(name: str, reverse: bool) -> None:
     """Motion s + s' t + t^2: accelerations of all bodies, reactions of all joints, the force."""

@@ -216,7 +216,7 @@ def test_bearings_of_a_cross_feel_what_it_transmits() -> None:
     assert loads["y"] == pytest.approx(np.hypot(3, 1 + 4) + 4 + 2, rel=1e-6)
 
 
-@pytest.mark.parametrize("reverse", [False, True])
+@pytest.mark.parametrize("reverse", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_friction_in_all_joints_is_the_same_in_both_formulations(reverse: bool) -> None:
     m = chain(reverse)
     law = BrownMcPhee(mu_s=0.03, mu_d=0.02, v_t=0.5)
