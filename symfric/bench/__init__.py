@@ -4,6 +4,8 @@ from symfric.bench.ensemble import EnsembleRow as EnsembleRow
 from symfric.bench.integrator import Benchmark as Benchmark
 from symfric.bench.integrator import Row as Row
 from symfric.bench.integrator import bench_integrator as bench_integrator
+from symfric.bench.ivp import IvpBenchmark as IvpBenchmark
+from symfric.bench.ivp import bench_ivp as bench_ivp
 from symfric.bench.jitter import jitter as jitter
 from symfric.bench.multibody import MultibodyBenchmark as MultibodyBenchmark
 from symfric.bench.multibody import bench_multibody as bench_multibody

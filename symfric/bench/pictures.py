@@ -8,6 +8,9 @@ from matplotlib.figure import Figure
 
 from symfric.foundation.panels import save
 
+ABREAST = 5
+"""Panels in a row."""
+
 
 def _filled(number: int) -> str | None:
     """Hollow markers from the eleventh line on, which has the colour of the first."""
@@ -17,17 +20,25 @@ def _filled(number: int) -> str | None:
 def plot_work_precision(
     lines: Mapping[str, Mapping[str, Sequence[tuple[float, float]]]],
     path: str | Path | None = None,
+    error_label: str = "relative position error [1]",
 ) -> Figure:
-    """Run time against error, a panel per case.
+    """Run time against error, a panel per case, at most five beside each other.
 
     Args:
         lines: case -> integrator -> points (relative error, time in s).
         path: image file.
+        error_label: what the error is.
     """
-    figure, axes = plt.subplots(1, len(lines), squeeze=False, sharey=True, figsize=(11, 4.8))
+    columns = min(len(lines), ABREAST)
+    rows = -(-len(lines) // columns)
+    figure, axes = plt.subplots(
+        rows, columns, squeeze=False, sharey=True, figsize=(11, 1.6 + 3.2 * rows)
+    )
     figure.set_layout_engine("constrained")
     names = list(dict.fromkeys(name for integrators in lines.values() for name in integrators))
-    for axis, (case, integrators) in zip(axes[0], lines.items(), strict=True):
+    for axis in axes.flat[len(lines) :]:
+        axis.set_axis_off()
+    for axis, (case, integrators) in zip(axes.flat, lines.items(), strict=False):
         for name, points in integrators.items():
             error, time = zip(*sorted(points), strict=True)
             bold = name.startswith("symfric")
@@ -37,10 +48,11 @@ def plot_work_precision(
                 color=f"C{names.index(name) % 10}", markerfacecolor=_filled(names.index(name)),
             )  # fmt: skip
         axis.set_title(case)
-        axis.set_xlabel("relative position error [1]")
+        axis.set_xlabel(error_label)
         axis.invert_xaxis()
         axis.grid(alpha=0.3, which="both")
-    axes[0, 0].set_ylabel("time of a run [ms]")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("time of a run [ms]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5,
                   fontsize="small")  # fmt: skip
     return save(figure, path)

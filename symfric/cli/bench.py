@@ -9,7 +9,7 @@ from symfric.cli import bench_tables, output
 from symfric.cli.options import JsonOption, PlotOption, check_outputs
 from symfric.foundation.parameters import check_names
 
-SUBJECTS = ("integrator", "multibody", "jitter")
+SUBJECTS = ("integrator", "multibody", "ivp", "jitter")
 
 
 def bench(
@@ -31,7 +31,8 @@ def bench(
     """Measure symfric beside other integrators: time, error and ratios at equal error.
 
     integrator: stick-slip of one mass, ensembles and derivatives. multibody: mechanisms, the cost
-    of their steps, what they do not need, published numbers. jitter: total variation of
+    of their steps, what they do not need, published numbers. ivp: correct digits on problems with
+    published solutions (Test Set for IVP Solvers). jitter: total variation of
     accelerations against law, step and transition velocity.
 
     Example: symfric bench multibody --plot bench.png --csv runs.csv
@@ -45,6 +46,8 @@ def bench(
         _integrator(quick, plot, json)
     elif subject == "multibody":
         _multibody(quick, links, plot, csv, json)
+    elif subject == "ivp":
+        _ivp(quick, plot, json)
     else:
         _jitter(quick, plot, json)
     output.say_written(plot, csv, json)
@@ -80,6 +83,18 @@ def _multibody(
     output.emit_json(result.to_dict(), json)
     if json != "-":
         bench_tables.multibody(result)
+
+
+def _ivp(quick: bool, plot: Path | None, json: str | None) -> None:
+    from symfric.bench import bench_ivp  # noqa: PLC0415  (only this command needs it)
+
+    with output.progress("measuring") as tell:
+        result = bench_ivp(quick=quick, progress=lambda _, fraction: tell(fraction))
+    if plot:
+        result.plot(plot)
+    output.emit_json(result.to_dict(), json)
+    if json != "-":
+        bench_tables.ivp(result)
 
 
 def _jitter(quick: bool, plot: Path | None, json: str | None) -> None:

@@ -6,7 +6,7 @@ from symfric.cli import output
 from symfric.figures import FigureData
 
 if TYPE_CHECKING:
-    from symfric.bench import Benchmark, MultibodyBenchmark
+    from symfric.bench import Benchmark, IvpBenchmark, MultibodyBenchmark
 
 
 def integrator(result: "Benchmark") -> None:
@@ -127,6 +127,25 @@ def _accuracy(result: "MultibodyBenchmark") -> None:
         [[r.case, r.rtol, r.t_end, r.steps, _short(r.relative)] for r in result.drifts],
         "Energy of frictionless mechanisms",
     )
+
+
+def ivp(result: "IvpBenchmark") -> None:
+    """Digits, steps and times, and the drift of constraints."""
+    output.show_table(
+        ["problem", "method", "rtol", "digits", "wanted", "steps", "time [ms]"],
+        [
+            [r.problem, r.method, r.rtol, round(r.scd, 1), r.wanted or "", r.steps,
+             _short(1e3 * r.time_s)]
+            for r in result.rows
+        ],
+        "Correct digits of the worst signal at the end",
+    )  # fmt: skip
+    output.show_table(
+        ["problem", "method", "rtol", "drift"],
+        [[r.problem, r.method, r.rtol, _short(r.drift)] for r in result.rows if r.drift],
+        "Largest value of a constraint that is kept as an acceleration only",
+    )
+    _skipped({f"{r.problem}, {r.method}": r.message for r in result.rows if r.message})
 
 
 def jitter(data: FigureData) -> None:

@@ -151,11 +151,13 @@ class Integrator:
         if self.system.manifold is not None or self.system.is_ode:
             return self
         key = (*(part.tobytes() for point in points for part in point), span)
-        if key not in self._judged:
+        found = self._judged.get(key)
+        if found is None:
             consistent_at = [(self.start(*points[0]), points[0][1]), *points[1:]]
             whole = suited(self.system, self.tableau, consistent_at, span)
-            self._judged = {key: self if whole is self.system else self._other(whole)}
-        return self._judged[key]
+            found = self if whole is self.system else self._other(whole)
+            self._judged = {key: found}
+        return found
 
     def _other(self, whole: System) -> "Integrator":
         """The integrator of the same equations with other pivots, built once."""

@@ -1,0 +1,158 @@
+"""Correct digits and run time on problems of others with published solutions."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from symfric.bench.problems import PROBLEMS
+from symfric.bench.problems.problem import Problem
+from symfric.bench.timing import best_time
+from symfric.integrator.compiled.compiler import find_compiler
+from symfric.integrator.simulate import simulate
+from symfric.model import Model
+from symfric.results.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+METHODS = ("rodas5p", "radau5")
+TOLERANCES = (1e-6, 1e-8, 1e-10)
+
+
+@final
+@dataclass(frozen=True)
+class IvpRow:
+    """One method on one problem at one tolerance.
+
+    Attributes:
+        scd: significant correct digits of the worst signal at the end, -log10 of its relative
+            error; -inf where the end was not reached.
+        worst: that signal.
+        wanted: digits aimed at.
+        steps, rejections: accepted and rejected.
+        time_s: shortest time of a call [s], equations built and compiled before.
+        drift: largest value that a constraint has at an accepted step; 0 without constraints.
+        message: why the end was not reached, else empty.
+    """
+
+    problem: str
+    method: str
+    rtol: float
+    scd: float
+    worst: str
+    wanted: int
+    steps: int
+    rejections: int
+    time_s: float
+    drift: float
+    message: str
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class IvpBenchmark:
+    """All rows of one run of the benchmark."""
+
+    rows: tuple[IvpRow, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Rows; digits that are none are null."""
+        return {
+            "rows": [
+                {k: None if v in (inf, -inf) else v for k, v in asdict(row).items()}
+                for row in self.rows
+            ],
+            "sources": {problem.name: problem.source for problem in PROBLEMS},
+        }
+
+    def plot(self, path: str | Path | None = None) -> "Figure":
+        """Work-precision diagram: time against relative error, a panel per problem."""
+        from symfric.bench.pictures import plot_work_precision  # noqa: PLC0415
+
+        lines: dict[str, dict[str, list[tuple[float, float]]]] = {}
+        for row in self.rows:
+            if np.isfinite(row.scd):
+                case = lines.setdefault(row.problem, {})
+                case.setdefault(row.method, []).append((10**-row.scd, row.time_s))
+        return plot_work_precision(lines, path, "relative error [1]")
+
+
+def bench_ivp(
+    *,
+    quick: bool = False,
+    problems: Sequence[Problem] = PROBLEMS,
+    progress: Callable[[str, float], None] | None = None,
+) -> IvpBenchmark:
+    """Measure all problems.
+
+    Args:
+        quick: rtol 1e-6 only.
+        problems: which ones.
+        progress: called with what is measured and the fraction done.
+    """
+    rows: list[IvpRow] = []
+    for k, problem in enumerate(problems):
+        model = problem.model()
+        for method in METHODS:
+            if progress is not None:
+                progress(f"{problem.name}: {method}", k / len(problems))
+            tolerances = TOLERANCES[:1] if quick or method in problem.laborious else TOLERANCES
+            rows += [measure(problem, model, method, rtol) for rtol in tolerances]
+    return IvpBenchmark(tuple(rows))
+
+
+def measure(
+    problem: Problem, model: Model, method: str, rtol: float, backend: str | None = None
+) -> IvpRow:
+    """Integrate one problem and count its correct digits.
+
+    Args:
+        problem, model: what, and its equations.
+        method, rtol: as in `simulate`.
+        backend: likewise; by default compiled where there is a compiler.
+    """
+    engine = backend or ("compiled" if find_compiler() else "vm")
+    solve = partial(
+        simulate, model, problem.t_end, rtol=rtol, method=method, backend=engine, samples=2,
+        throw=False,
+    )  # fmt: skip
+    solve()
+    time_s, run = best_time(solve)
+    scd, worst = correct_digits(problem, run) if run.status.ok else (-inf, "")
+    return IvpRow(
+        problem.name,
+        method,
+        rtol,
+        scd,
+        worst,
+        problem.digits.get(rtol, 0),
+        run.statistics.steps,
+        run.statistics.rejections,
+        time_s,
+        _drift(problem, run),
+        "" if run.status.ok else run.message,
+    )
+
+
+def correct_digits(problem: Problem, run: Trajectory) -> tuple[float, str]:
+    """Digits of the worst signal at the end, and which one that is."""
+    end = run.final
+    errors = {
+        name: abs(end[name] - value) / abs(value) for name, value in problem.reference.items()
+    }
+    worst = max(errors, key=lambda name: errors[name])
+    # a double has no more digits than its rounding
+    return float(-np.log10(max(errors[worst], float(np.finfo(float).eps)))), worst
+
+
+def _drift(problem: Problem, run: Trajectory) -> float:
+    """Largest value of a constraint at accepted steps."""
+    if not problem.drift or run.steps.size < 2:
+        return 0.0
+    at = run.at(run.steps)
+    return max(float(np.abs(at[name]).max()) for name in problem.drift)
