@@ -129,7 +129,7 @@ def identify(
 
 
 def _silent(text: str, fraction: float) -> None:
-    """No progress shown."""
+    """Shows no progress: the default of callers that are no terminal."""
     del text, fraction
 
 

@@ -55,7 +55,7 @@ class Layout:
 
     @property
     def size(self) -> int:
-        """Number of unknowns."""
+        """Number of unknowns of the nonlinear program."""
         return self.nx + self.intervals * self.block + self.free_time
 
     def stack(self, points: Points) -> Array:

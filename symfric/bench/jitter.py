@@ -135,7 +135,7 @@ class _Runs:
         self.y0 = consistent(self.whole, "jitter", y, np.zeros(0))
 
     def adaptive(self, rtol: float) -> tuple[float, ...]:
-        """With error control."""
+        """Total variation of the accelerations of a run with error control."""
         run = simulate(self.model, self.t_end, rtol=rtol, t_eval=self.times)
         return tuple(variation(run[f"{s}_a"]) for s in SIGNALS)
 

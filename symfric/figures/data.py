@@ -35,7 +35,7 @@ class Curve:
 
     @property
     def label(self) -> str:
-        """Law and case."""
+        """How a legend names the curve: its law and, where there are several, its case."""
         return f"{self.law}, {self.case}" if self.case else self.law
 
     def __getitem__(self, column: str) -> Array:

@@ -104,7 +104,7 @@ def mirrored(M: ca.SX) -> ca.SX:
 
 
 def solve_mass(eq: Equations, right: ca.SX) -> ca.SX:
-    """M^-1 right."""
+    """M^-1 times the columns of `right`, by blocks where bodies float freely."""
     topology = eq.kin.topology
     free = [isinstance(link.joint, Floating) and link.base == GROUND for link in topology.links]
     if not all(free) or not free:

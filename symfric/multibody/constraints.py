@@ -127,7 +127,7 @@ class PrescribedMotion(Constraint):
     direction: str = "turn"
 
     def joints(self) -> Iterable[tuple[str, str]]:
-        """Its joint."""
+        """The joint that is driven, and along which direction."""
         return ((self.joint, self.direction),)
 
     def problems(self) -> Iterator[str]:

@@ -53,7 +53,7 @@ class Coupling(Constraint):
         return self._numbers[0][1]
 
     def joints(self) -> Iterable[tuple[str, str]]:
-        """Both."""
+        """Both joints that are coupled, and along which directions."""
         return self._ends
 
     def problems(self) -> Iterator[str]:

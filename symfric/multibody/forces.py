@@ -101,11 +101,11 @@ class Gravity(Force):
 
     @property
     def conservative(self) -> bool:
-        """Always."""
+        """Gravity always is: what it takes comes back."""
         return True
 
     def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
-        """Weights."""
+        """The weight of every body at its centre of mass."""
         for name, body in kin.topology.bodies.items():
             if name != GROUND:
                 com, _ = kin.motion[name].point(body.c)
@@ -136,7 +136,7 @@ class SpringDamper(Force):
     actuator: Scalar = 0.0
 
     def places(self) -> Iterable[str]:
-        """Both ends."""
+        """The two places between which it acts."""
         return (self.a, self.b)
 
     @property
@@ -191,7 +191,7 @@ class JointSpringDamper(Force):
     actuator: Scalar = 0.0
 
     def joints(self) -> Iterable[tuple[str, str]]:
-        """Its joint."""
+        """The joint along whose direction it acts."""
         return ((self.joint, self.direction),)
 
     @property
@@ -200,7 +200,7 @@ class JointSpringDamper(Force):
         return equals(self.damping, 0.0) and equals(self.actuator, 0.0)
 
     def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
-        """One axial load."""
+        """One load along the direction of its joint: actuator, spring and damper."""
         joint = joints[self.joint]
         f = ca.SX(self.actuator)
         if not equals(self.stiffness, 0.0):
@@ -236,11 +236,11 @@ class UserForce(Force):
             yield f"expression: expected a function of the kinematics, got {self.expression!r}"
 
     def places(self) -> Iterable[str]:
-        """Where it acts."""
+        """The place at which it acts."""
         return (self.place,)
 
     def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
-        """The expression."""
+        """Force and moment as the user's expression gives them."""
         force, moment = self.expression(kin)
         at, arm = kin.point(self.place)[0], kin.offset(self.place)
         yield Load(body_of(self.place), vector(force), at, vector(moment), arm)

@@ -51,7 +51,7 @@ class Revolute(Joint):
         return rotation_z(q), ca.SX(3, 1)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Rotation about z."""
+        """Angular velocity along z of the joint, no velocity of its point."""
         return _z(), ca.SX(3, 1)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
@@ -76,7 +76,7 @@ class Prismatic(Joint):
         return ca.SX.eye(3), ca.vertcat(0, 0, q)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Translation along z."""
+        """No angular velocity, velocity along z of the joint."""
         return ca.SX(3, 1), _z()
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
@@ -207,11 +207,11 @@ class Fixed(Joint):
     symbol: ClassVar[Symbol] = Symbol("s", anchored=True)
 
     def pose(self, q: ca.SX) -> Pair:
-        """The frames coincide."""
+        """The frames coincide: identity and zero."""
         return ca.SX.eye(3), ca.SX(3, 1)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """No motion."""
+        """No column: nothing moves."""
         return NONE, NONE
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
@@ -245,7 +245,7 @@ class Floating(Joint):
         )
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """None."""
+        """No row: all six directions are free."""
         return ca.SX(0, 1)
 
 
@@ -256,11 +256,11 @@ class Closing(Joint):
     closes: ClassVar[bool] = True
 
     def pose(self, q: ca.SX) -> Pair:
-        """Has no coordinates."""
+        """Not asked for: the joint always closes a loop and has no coordinates."""
         raise NotImplementedError
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Has no coordinates."""
+        """Not asked for: the joint always closes a loop and has no coordinates."""
         raise NotImplementedError
 
 
@@ -284,7 +284,7 @@ class Distance(Closing):
             yield f"length: expected > 0 m, got {self.length!r}"
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """The squared distance."""
+        """(p'p - length^2)/2 = 0: the squared distance has a gradient everywhere."""
         return (ca.dot(p, p) - self.length * self.length) / 2
 
 
@@ -302,7 +302,7 @@ class PointOnLine(Closing):
     symbol: ClassVar[Symbol] = Symbol("o", axes=(("a", 2),), anchored=True)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """On the axis."""
+        """p_x = p_y = 0: the point is on the z axis of the line."""
         return ca.vertcat(p[0], p[1])
 
 

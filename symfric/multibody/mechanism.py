@@ -92,11 +92,11 @@ class Mechanism:
             )
 
     def joint(self, joint: Joint) -> None:
-        """Add a joint."""
+        """Add a joint; `build` reports what is wrong with it, with its path."""
         self._take(self.joints, joint, Joint)
 
     def force(self, force: Force) -> None:
-        """Add a force."""
+        """Add a force; `build` reports what is wrong with it, with its path."""
         self._take(self.forces, force, Force)
 
     def constraint(self, constraint: Constraint) -> None:

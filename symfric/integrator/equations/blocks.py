@@ -102,7 +102,7 @@ class Blocks:
     factors: Factors
 
     def factor(self, y: Any, h: Any, d: Any) -> Any:
-        """Factors of W."""
+        """The factors of W = M / (gamma h) - J at a point, ready to solve with."""
         return self.pack(self.slopes(y, d), h)
 
     @property

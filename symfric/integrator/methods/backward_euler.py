@@ -22,7 +22,7 @@ class BackwardEuler(Method):
 
     @property
     def diagonal(self) -> None:
-        """None."""
+        """No gamma: W of the fixed step is M / h - J."""
 
     def work(self, system: System) -> tuple[int, int, int]:
         """Right-hand sides, Jacobians and factorisations of a step."""

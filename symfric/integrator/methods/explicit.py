@@ -35,7 +35,7 @@ class Explicit(Method):
 
     @property
     def diagonal(self) -> None:
-        """None."""
+        """No gamma: an explicit method has no iteration matrix."""
 
     def work(self, system: System) -> tuple[int, int, int]:
         """Right-hand sides, Jacobians and factorisations of a step."""

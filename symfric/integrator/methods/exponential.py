@@ -44,7 +44,7 @@ class Exponential(Method):
 
     @property
     def diagonal(self) -> None:
-        """None."""
+        """No gamma: the exponential of h J takes the place of W."""
 
     def work(self, system: System) -> tuple[int, int, int]:
         """Right-hand sides, Jacobians (their diagonals) and factorisations of a step."""

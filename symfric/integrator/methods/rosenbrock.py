@@ -31,7 +31,7 @@ class Rosenbrock(Method):
 
     @property
     def diagonal(self) -> float:
-        """Gamma."""
+        """gamma, the same for all stages, so that one factorisation serves them."""
         return self.gamma
 
     @property

@@ -76,14 +76,14 @@ class Run:
     message: str = Status.SUCCESS.value
 
     def keep(self, piece: Dense) -> None:
-        """Add accepted steps."""
+        """Append accepted steps with their continuous solution, and count them."""
         if piece.t0.size:
             self.dense.append(piece)
             self.steps += piece.t0.size
             self.smallest = min(self.smallest, float((piece.t1 - piece.t0).min()))
 
     def stop(self, status: Status, message: str | None = None) -> None:
-        """End with `status`."""
+        """End the run with `status`, said in `message` or in the sentence of the status."""
         self.status, self.message = status, message or status.value
 
 

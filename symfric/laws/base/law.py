@@ -181,7 +181,7 @@ class StaticLaw(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """No internal states."""
+        """No internal states: the force is a map of v and N."""
         return ()
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
@@ -191,7 +191,7 @@ class StaticLaw(Law):
     def switches(
         self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
     ) -> tuple[Switch, ...]:
-        """No modes."""
+        """No modes: nothing jumps."""
         return ()
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:

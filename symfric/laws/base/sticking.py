@@ -33,7 +33,7 @@ class Sticking(Law):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """The applied force."""
+        """The applied force F_e [N], which rest has to carry."""
         return (APPLIED_FORCE,)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:

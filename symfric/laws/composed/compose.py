@@ -200,7 +200,7 @@ class LoadDependent(Wrapper):
 
     @property
     def inner(self) -> Law:
-        """The law."""
+        """The law whose load is scaled."""
         return self.law
 
     def load(self, N: Scalar) -> Scalar:

@@ -68,7 +68,7 @@ class Population(Parametric, ABC):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """None."""
+        """Nothing besides v and N."""
         return ()
 
     @property
@@ -163,7 +163,7 @@ class Population(Parametric, ABC):
         return float(F[parts:].mean())
 
     def warnings(self) -> tuple[str, ...]:
-        """None."""
+        """Nothing to warn of: every parameter within its bounds will do."""
         return ()
 
 

@@ -41,7 +41,7 @@ class Lagged(Wrapper):
 
     @property
     def inner(self) -> Law:
-        """The law."""
+        """The law that is wrapped."""
         return self.law
 
     @property

@@ -68,7 +68,7 @@ class BoucWen(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The load share."""
+        """z: the share of the limit that the hysteretic part carries, within -1 ... 1."""
         return (State("z", "1", 1.0),)
 
     @property

@@ -40,7 +40,7 @@ class Bristle(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The bristle deflection."""
+        """z: mean deflection of the bristles [m], positive with v."""
         return (State("z", "m", 1e-5),)
 
     @property

@@ -55,7 +55,7 @@ class Bristle2D(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The bristle deflection."""
+        """z: deflection of the bristle [m], a vector in a plane."""
         return (State("z", "m", 1e-5),)
 
     @property

@@ -49,7 +49,7 @@ class Dahl(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The bristle deflection."""
+        """z: deflection of the contact [m], positive with v."""
         return (State("z", "m", 1e-5),)
 
     @property

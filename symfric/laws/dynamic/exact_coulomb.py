@@ -41,7 +41,7 @@ class ExactCoulomb(Sticking):
 
     @property
     def has_mode(self) -> bool:
-        """Always."""
+        """Always: stick and slip are modes."""
         return True
 
     @property

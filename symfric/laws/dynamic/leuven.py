@@ -97,7 +97,7 @@ class Leuven(Law):
         return sum((z[i] for i in range(1, len(self.elements))), start=z[0])
 
     def stretching(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
-        """dz/dt [m/s]."""
+        """dz/dt [m/s] of the hysteretic deflection."""
         share = self._hysteresis(z) / self.level(v, N)
         spent = smooth.signed_power(share, self.delta_l, self.r_eps)
         return v - smooth.magnitude(v, self.v_eps) * spent

@@ -67,7 +67,7 @@ class StickSlip(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """The stiction deformation."""
+        """D: deformation of the contact while it sticks [m]."""
         return (State("D", "m", 1e-6),)
 
     @property

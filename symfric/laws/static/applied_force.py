@@ -139,7 +139,7 @@ class Awrejcewicz(StaticLaw):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """The applied force."""
+        """The applied force F_e [N], which rest has to carry."""
         return (APPLIED_FORCE,)
 
     @property
@@ -283,7 +283,7 @@ class Wojewoda(StaticLaw):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """The sliding acceleration."""
+        """The sliding acceleration dv/dt [m/s^2]."""
         return (Input("dv", "m/s^2", "sliding acceleration"),)
 
     @property

@@ -41,6 +41,7 @@ def test_the_run_ends_where_the_velocity_is_reached() -> None:
     assert run.at([0.25])["v"] == pytest.approx(0.0625, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_a_weak_push_is_held_and_a_strong_one_is_not() -> None:
     law = GenericAsperity(count=100, tau_c=1e-6)
     ends = [shoved(law, N, 0.8, lambda t, F=F: F + 0 * t, 0.3, None) for F in (0.5, 4.0)]
