@@ -77,7 +77,7 @@ def scaling(
         begin = perf_counter()
         made = integrator(make(n))
         build_s = perf_counter() - begin
-        rows.append(ChainRow(n, build_s, made.step.n_instructions(), step_time(made)))
+        rows.append(ChainRow(n, build_s, made.instructions, step_time(made)))
         if build_s > budget:
             break
     return rows

@@ -114,7 +114,7 @@ def count(mechanism: str, variant: str, formulation: str, of: Mechanism) -> Coun
         len(model.x),
         len(model.z),
         model.function("ode").n_instructions(),
-        made.step.n_instructions(),
+        made.instructions,
         ca.jacobian(whole.f, whole.y).nnz(),
     )
 
@@ -131,7 +131,7 @@ def compile_rows(formulations: tuple[str, ...] = ("joint", "absolute")) -> list[
         for name, mechanism in COMPILED:
             begin = perf_counter()
             made = integrator(mechanism.build(formulation=formulation))
-            source = c_source(made.step_to_compile(), METHOD.H.shape[0])
+            source = c_source(made.step, METHOD.H.shape[0])
             build_s = perf_counter() - begin
             seconds = compile_time(source)
             rows.append(CompileRow(name, formulation, build_s, source.count("\n"), seconds))

@@ -44,6 +44,14 @@ def equals(value: Scalar, number: float) -> bool:
     return is_number(value) and float(value) == number
 
 
+def reciprocal(value: Scalar) -> Scalar:
+    """1 / value, to the bit, for a value that divides several others.
+
+    CasADi turns a product with 1 / x into a quotient by x, and so one division into many.
+    """
+    return 2 * (0.5 / value)
+
+
 def _dispatch(name: str, numpy_name: str | None = None) -> Callable[..., Any]:
     of_casadi: Callable[..., Any] = getattr(ca, name)
     of_numpy: Callable[..., Any] = getattr(np, numpy_name or name)

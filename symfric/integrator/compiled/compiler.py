@@ -15,12 +15,13 @@ from pathlib import Path
 from symfric.foundation.files import written
 
 FLAGS = (
-    "-O2", "-march=native", "-fno-math-errno", "-freciprocal-math",
+    "-O2", "-march=native", "-fno-math-errno", "-ffp-contract=off",
     "-fno-tree-pre", "-fno-code-hoisting", "-fno-gcse", "-fPIC", "-shared",
 )  # fmt: skip
-"""Reciprocals instead of repeated divisions save a fifth of a step; looking for common parts in
-code that has none left would take a third of the compiler's time. Nothing here lets the compiler
-assume finite numbers: rejecting a step that returned NaN relies on them."""
+"""Nothing here lets the compiler round otherwise than CasADi's virtual machine does, so that a
+result does not depend on which of them ran: no fused multiply-add, no reciprocals (repeated
+divisions are taken out of the graph instead), no reordering. Looking for common parts in code that
+has none left would take a third of the compiler's time."""
 
 
 @cache

@@ -7,6 +7,7 @@ from typing import Any, final
 
 import casadi as ca
 
+from symfric.foundation.numeric import reciprocal
 from symfric.integrator.equations.lu import SymbolicLU, factorise
 from symfric.integrator.equations.pivots import Factors
 from symfric.integrator.equations.system import System
@@ -116,7 +117,7 @@ def blocks(system: System, gamma: float) -> Blocks:
     """The blocks of a method with the diagonal coefficient `gamma`."""
     h, own = ca.SX.sym("h"), slopes(system)
     right, memory = ca.SX.sym("right", system.n), ca.SX.sym("memory", system.n)
-    W = own.matrix(system.mass / (gamma * h))
+    W = own.matrix(system.mass * reciprocal(gamma * h))
     lu = factorise(W, own.pivots, system.orders.get("step", ()))
     return Blocks(
         ca.Function("f", [system.y, system.d], [system.f], {"cse": True}),

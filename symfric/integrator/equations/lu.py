@@ -6,6 +6,8 @@ from typing import final
 
 import casadi as ca
 
+from symfric.foundation.numeric import reciprocal
+
 Order = tuple[tuple[int, int], ...]
 """(row, column) of each pivot."""
 
@@ -102,7 +104,7 @@ def factorise(matrix: ca.SX, groups: Sequence[Sequence[int]] = (), order: Order 
     for k in range(n):
         row, column = order[k] if order else _pivot(rows, holders, grouped)
         holders[column].discard(row)
-        inverse = 1 / rows[row].pop(column)
+        inverse = reciprocal(rows[row].pop(column))
         others, below = tuple(rows[row]), tuple(sorted(holders[column]))
         for c in others:
             holders[c].discard(row)

@@ -14,6 +14,7 @@ from symfric.integrator.equations.implicit import implicit_columns
 from symfric.integrator.equations.inputs import Drivers
 from symfric.integrator.equations.lu import Order
 from symfric.integrator.equations.manifold import Manifold, holonomic_columns, manifold
+from symfric.integrator.equations.quotients import divided_once
 from symfric.integrator.equations.rank import null_space
 from symfric.model import Model
 from symfric.model.holonomic import Inner
@@ -157,7 +158,7 @@ def system(model: Model, inputs: Drivers) -> System:
     return System(
         unknowns,
         d,
-        ca.cse(f),
+        divided_once(ca.cse(f)),
         ca.sparsify(mass),
         nx,
         timed,

@@ -105,7 +105,7 @@ class Job:
         s = integrator.system
         return cls(
             where=f"simulate_many of '{integrator.model.name}'",
-            code=many_source(integrator.step_to_compile(), integrator.signals)
+            code=many_source(integrator.step, integrator.signals)
             if compiled
             else str(integrator.step.serialize()),
             compiled=compiled,

@@ -7,6 +7,7 @@ from typing import Any, final
 import casadi as ca
 import numpy as np
 
+from symfric.foundation.numeric import reciprocal
 from symfric.integrator.equations.blocks import at_rest, blocks
 from symfric.integrator.equations.lu import factorise
 from symfric.integrator.equations.pivots import Factors
@@ -74,7 +75,7 @@ class Radau(Method):
         rates = ca.DM([float(i not in system.algebraic[0]) for i in range(n)])
 
         def trial(y: Any, h: Any, d: Any) -> Trial:
-            kind, per_h = type(y), 1 / h
+            kind, per_h = type(y), reciprocal(h)
             lu, lu_pair = block.factor(y, h, d), other.factor(y, h, d)
             first = block.f(y, d)
             slopes, corrections = [first] * 3, list[Any]()
@@ -144,10 +145,10 @@ class Pair:
 def pair(system: System, alpha: float, beta: float) -> Pair:
     """The complex iteration matrix of `system`."""
     h, n, J, M = ca.SX.sym("h"), system.n, system.J, system.mass
-    entries = ca.SX.sym("J", J.sparsity())
+    entries, per_h = ca.SX.sym("J", J.sparsity()), reciprocal(h)
 
     def matrix(J: ca.SX) -> ca.SX:
-        diagonal, across = alpha * (M / h) - J, beta * (M / h)
+        diagonal, across = alpha * (M * per_h) - J, beta * (M * per_h)
         return ca.sparsify(ca.blockcat([[diagonal, across], [-across, diagonal]]))
 
     groups = [(*rows, *(n + i for i in rows)) for rows in system.pivots]

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, final
 
+from symfric.foundation.numeric import reciprocal
 from symfric.integrator.equations.blocks import at_rest, blocks
 from symfric.integrator.equations.pivots import Factors
 from symfric.integrator.equations.system import System
@@ -52,7 +53,7 @@ class Rosenbrock(Method):
         block, A, C = blocks(system, self.gamma), self.A, self.C
 
         def trial(y: Any, h: Any, d: Any) -> Trial:
-            lu, per_h = block.factor(y, h, d), 1 / h
+            lu, per_h = block.factor(y, h, d), reciprocal(h)
             k: list[Any] = []
             argument = y
             for i in range(self.stages):

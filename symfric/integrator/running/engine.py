@@ -58,7 +58,11 @@ def width(n: int, dense_rows: int) -> int:
 @final
 @dataclass(frozen=True, eq=False)
 class VmEngine:
-    """Attempts in CasADi's virtual machine, in batches of one call; needs no compiler."""
+    """Attempts in CasADi's virtual machine, in batches of one call; needs no compiler.
+
+    The same attempts as in the compiled loop, to the bit: both evaluate one graph operation by
+    operation, each rounded once (`compiled.compiler.FLAGS`), with one library of functions.
+    """
 
     step: ca.Function
     batch: ca.Function
@@ -86,11 +90,15 @@ class VmEngine:
         found: list[Array] = []
         count = made = 0
         t_end = R[Given.T_END]
-        while S[State.T] < t_end and count < rows and made < attempts and _large(S, h_min):
+        while S[State.T] < t_end and count < rows and made < attempts and _large(S, h_min).all():
             evaluate()
             before = np.vstack([S, S_out[:-1]])
-            used = before[:, State.T] < t_end
             took = S_out[:, State.T] > before[:, State.T]
+            room = np.cumsum(took) - took < rows - count
+            goes = (before[:, State.T] < t_end) & _large(before, h_min) & room
+            # a batch goes beyond what the compiled loop would do: that is not taken
+            used = min(size if goes.all() else int(np.argmin(goes)), attempts - made)
+            took[used:] = False
             found.append(
                 np.hstack(
                     [
@@ -103,21 +111,21 @@ class VmEngine:
                 )
             )
             count += found[-1].shape[0]
-            made += int(used.sum())
-            S[:] = S_out[-1]
+            made += used
+            S[:] = S_out[used - 1]
         records = np.vstack(found) if found else np.zeros((0, width(n, D.shape[1] // n)))
         return records, made, _reason(S, R, count >= rows, h_min)
 
 
-def _large(S: Array, h_min: float) -> bool:
-    """Whether the step is large enough to go on; NaN is not."""
-    return bool(S[State.H] >= max(h_min, FLOOR * abs(S[State.T])))
+def _large(S: Array, h_min: float) -> NDArray[np.bool_]:
+    """Whether the steps of columns S (..., MEMORY + n) are large enough to go on; NaN is not."""
+    return S[..., State.H] >= np.maximum(h_min, FLOOR * np.abs(S[..., State.T]))
 
 
 def _reason(S: Array, R: Array, full: bool, h_min: float) -> Stop:
     if S[State.T] >= R[Given.T_END]:
         return Stop.END
-    if not _large(S, h_min):
+    if not _large(S, h_min).all():
         return Stop.STEP_TOO_SMALL
     return Stop.FULL if full else Stop.ATTEMPTS
 

@@ -27,14 +27,17 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 Point = tuple[bytes | float, ...]
 Orders = tuple[tuple[str, Order], ...]
-INLINE = 6000
-"""Steps with more instructions are compiled as calls of blocks, which compile much faster."""
+INLINE = 7000
+"""Steps with more instructions are calls of blocks, which compile much faster; both engines run the
+same form."""
 
 
 @final
 @dataclass(eq=False)
 class Integrator:
     """System, step and Functions of a model with one structure of inputs.
+
+    Which engine runs is a question of speed alone: both give the same bits.
 
     Mutable only in what it remembers: its engines, the time spent in the virtual machine, from
     which it decides when compiling pays, whether compiling failed, the last start, and others of
@@ -60,6 +63,9 @@ class Integrator:
         begin = perf_counter()
         self.system: System = self.whole or system(self.model, self.inputs)
         self.step = build_step(self.system, self.tableau)
+        self.instructions = self.step.n_instructions()
+        if self.instructions > INLINE:
+            self.step = build_step(self.system, self.tableau, ca.MX)
         self.f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
         self.events = self._event_function()
         self.resets = [
@@ -180,17 +186,9 @@ class Integrator:
         """
         if "compiled" not in self._engines:
             begin = perf_counter()
-            self._engines["compiled"] = CompiledEngine.of(
-                self.step_to_compile(), self.tableau.H.shape[0]
-            )
+            self._engines["compiled"] = CompiledEngine.of(self.step, self.tableau.H.shape[0])
             self.compile_time = perf_counter() - begin
         return self._engines["compiled"]
-
-    def step_to_compile(self) -> ca.Function:
-        """The step in the form that compiles fast."""
-        if self.step.n_instructions() <= INLINE:
-            return self.step
-        return build_step(self.system, self.tableau, ca.MX)
 
     def choose(self, backend: str, left: float) -> Engine:
         """The engine for `backend`; "auto" compiles when that is predicted to pay.
@@ -213,14 +211,14 @@ class Integrator:
 
     def _best(self, left: float) -> Engine:
         """The compiled engine where it pays or lies in the cache, else the virtual machine."""
-        n = self.step.n_instructions()
+        n = self.instructions
         look_up, compile_ = 2e-3 + 1e-5 * n, 0.1 + 1.5e-4 * n
         expected = max(left, self.vm_time)
         if expected > 2 * compile_:
             return self.compiled()
         if expected > 2 * look_up and "looked up" not in self._engines:
             self._engines["looked up"] = self.vm()
-            path = library_path(c_source(self.step_to_compile(), self.tableau.H.shape[0]))
+            path = library_path(c_source(self.step, self.tableau.H.shape[0]))
             if path is not None and path.exists():
                 return self.compiled()
         return self.vm()

@@ -12,6 +12,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from symfric.foundation.numeric import reciprocal
 from symfric.integrator.equations.blocks import signs
 from symfric.integrator.equations.manifold import PULLING, SHOCK
 from symfric.integrator.equations.system import System
@@ -114,8 +115,10 @@ def error_norm(
     nx = system.nx
     scale = atol + rtol * ca.fmax(ca.fabs(y[:nx]), ca.fabs(y_new[:nx]))
 
+    per_scale = reciprocal(scale)
+
     def of_states(error: Any) -> Any:
-        return ca.sumsqr(error[:nx] / scale)
+        return ca.sumsqr(error[:nx] * per_scale)
 
     if watch is None:
         return lambda error: of_states(error) / nx
@@ -176,8 +179,8 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
     # its memory, so that one power an attempt is enough
     growth = ca.fmax(e2, E_FLOOR**2) ** (-0.5 / order)
     if watch is not None and watch.slips:
-        far = watch.leap()
-        accept = ca.logic_and(accept, ca.logic_or(far <= 1, h <= FINEST * ca.fabs(t_end)))
+        far = ca.if_else(h > FINEST * ca.fabs(t_end), watch.leap(), 0)
+        accept = ca.logic_and(accept, far <= 1)
         growth = ca.fmin(growth, 1 / ca.fmax(far, SAFETY / GROW))
     predicted = (h / h_old) * (growth * growth / growth_old)
     factor = ca.fmin(GROW, ca.fmax(SHRINK, SAFETY * ca.fmin(growth, predicted)))

@@ -26,7 +26,8 @@ REACH = 4.0
 """Friction that rises over w and falls behind it is seen by the stages of a step this long."""
 
 FINEST = 1e-14
-"""A step this short, relative to the end time, is about to end the run: it is never asked for."""
+"""A step this short, relative to the end time, is about to end the run: neither it nor the one
+behind it is asked for."""
 
 
 @final

@@ -1,0 +1,152 @@
+"""The same call gives the same bits: by both engines, in every process, at whatever moment."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from hashlib import sha256
+from typing import Any
+
+import casadi as ca
+import pytest
+
+import symfric.integrator.running.integrator as module
+from symfric import (
+    BrownMcPhee,
+    ExactCoulomb,
+    Linear,
+    LuGre,
+    Model,
+    RateAndState,
+    Trajectory,
+    drive,
+    rabinowicz,
+    simulate,
+    simulate_many,
+)
+from symfric.integrator.compiled.compiler import find_compiler
+from symfric.integrator.running.integrator import Integrator
+from symfric.laws import ALL_LAWS
+from symfric.scenes import PendulumBox, SliderCrank
+
+needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
+LAW = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
+FORCE = {"force": lambda t: 12 * ca.sin(3 * t)}
+SAMPLED = {"force": Linear([0.0, 0.4, 0.9], [0.0, 15.0, -15.0])}
+
+Case = tuple[Callable[[], Model], float, dict[str, Any]]
+CASES: dict[str, Case] = {
+    "events": (lambda: drive(ExactCoulomb()), 2.0, {"u": FORCE}),
+    "samples": (lambda: drive(LuGre()), 1.0, {"u": SAMPLED}),
+    "exponentials": (lambda: rabinowicz(RateAndState(), free=["k"]), 0.5, {"p": {"k": 3.0}}),
+    "normal force": (lambda: PendulumBox(LAW).model(), 2.0, {}),
+    "loop": (lambda: SliderCrank(LAW).model(), 0.1, {}),
+    "few steps": (lambda: rabinowicz(LuGre()), 5.0, {"max_steps": 70}),
+    "loose": (lambda: rabinowicz(LuGre()), 5.0, {"method": "radau5"}),
+}
+
+
+def digest(run: Trajectory) -> str:
+    """Every bit of a run but how long it took and what ran it."""
+    total = sha256(run.message.encode() + repr(run.happened).encode())
+    total.update(repr((run.statistics.steps, run.statistics.rejections)).encode())
+    for values in (run.steps, *(run[name] for name in run.units)):
+        total.update(values.tobytes())
+    return total.hexdigest()
+
+
+def of_case(case: str, backend: str) -> str:
+    make, t_end, arguments = CASES[case]
+    return digest(simulate(make(), t_end, samples=51, backend=backend, throw=False, **arguments))
+
+
+@needs_compiler
+@pytest.mark.parametrize("case", CASES)
+def test_both_engines_give_the_same_bits(case: str) -> None:
+    assert of_case(case, "compiled") == of_case(case, "vm")
+
+
+@needs_compiler
+def test_large_steps_are_blocks_in_both_engines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """4f644ad compiled blocks and ran the step written out in the virtual machine."""
+    monkeypatch.setattr(module, "INLINE", 100)
+    assert of_case("normal force", "compiled") == of_case("normal force", "vm")
+
+
+@needs_compiler
+def test_engines_may_change_on_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As "auto" does, at a moment that depends on the load of the machine."""
+    asked = 0
+
+    def by_turns(self: Integrator, _: str, __: float) -> object:
+        nonlocal asked
+        asked += 1
+        return self.compiled() if asked % 2 else self.vm()
+
+    plain = {case: of_case(case, "vm") for case in ("events", "samples")}
+    monkeypatch.setattr(Integrator, "choose", by_turns)
+    assert {case: of_case(case, "auto") for case in plain} == plain
+    assert asked > 3
+
+
+@needs_compiler
+def test_members_have_the_same_bits_by_both_engines() -> None:
+    for u, t_eval in ((SAMPLED, [0.3, 0.4, 1.0]), (FORCE, [1.0])):
+        vm, compiled = (
+            simulate_many(
+                drive(LuGre()), 1.0, u=u, x0={"v": [-0.1, 0.2]}, t_eval=t_eval, backend=backend
+            )
+            for backend in ("vm", "compiled")
+        )
+        assert all((vm[name] == compiled[name]).all() for name in vm.signals)
+        assert vm.attempts.tolist() == compiled.attempts.tolist()
+
+
+@needs_compiler
+def test_derivatives_have_the_same_bits_by_both_engines() -> None:
+    vm, compiled = (
+        simulate(
+            rabinowicz(LuGre(), free=["mu_s", "k"]), 1.0, samples=5, backend=backend,
+            sensitivities=["mu_s", "k"],
+        )
+        for backend in ("vm", "compiled")
+    )  # fmt: skip
+    for seed, slopes in vm.sensitivities.items():
+        assert all((compiled.sensitivities[seed][n] == y).all() for n, y in slopes.items())
+    assert vm.gradient({"x": 1.0}) == compiled.gradient({"x": 1.0})
+
+
+def test_every_process_gives_the_same_bits() -> None:
+    """Names of expressions hash otherwise in each of them."""
+    names = ["events", "normal force", "loop"]
+    script = (
+        f"import sys; sys.path[:0] = {sys.path!r}; import warnings\n"
+        f"warnings.simplefilter('ignore')\n"
+        f"from importlib.util import spec_from_file_location as s, module_from_spec as m\n"
+        f"spec = s('bits', {__file__!r}); module = m(spec); spec.loader.exec_module(module)\n"
+        f"print(*(module.of_case(name, 'vm') for name in {names!r}))"
+    )
+    there = subprocess.run(
+        [sys.executable, "-c", script], env=os.environ | {"PYTHONHASHSEED": "4711"},
+        capture_output=True, text=True, check=True, timeout=120,
+    )  # fmt: skip
+    assert there.stdout.split() == [of_case(name, "vm") for name in names]
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_every_law_gives_the_same_bits_by_both_engines() -> None:
+    count = 0
+    for law in ALL_LAWS.values():
+        for scene, u in ((rabinowicz, {}), (drive, FORCE)):
+            try:
+                model = scene(law())
+            except ValueError:  # a law that needs more than these scenes have
+                continue
+            vm, compiled = (
+                digest(simulate(model, 2.0, u=u, samples=51, backend=backend, throw=False))
+                for backend in ("vm", "compiled")
+            )
+            assert vm == compiled, model.name
+            count += 1
+    assert count > 80
