@@ -12,7 +12,7 @@ demo: $(VENV)/.runtime
 	$(BIN)/symfric demo --out out
 
 test: $(VENV)/.test
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 newest:
 	@newest="$$(sh .ci/newest-python "$(PYTHON)")"; \
@@ -21,7 +21,8 @@ newest:
 		$(MAKE) VENV=.venv-newest PYTHON="$$newest" .venv-newest/.test && \
 		.venv-newest/bin/python -m pip install --quiet --upgrade numpy && \
 		.venv-newest/bin/python -c 'import numpy; print("newest: NumPy", numpy.__version__)' && \
-		.venv-newest/bin/python -m pytest -p no:cacheprovider -m "not slow and not heavy"; fi
+		.venv-newest/bin/python -m pytest -n auto --dist loadfile -p no:cacheprovider \
+			-m "not slow and not heavy"; fi
 
 stress: $(VENV)/.test
 	$(BIN)/python -m pytest -m slow

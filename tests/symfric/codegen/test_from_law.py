@@ -38,6 +38,8 @@ from symfric.laws import (
     StickSlip,
 )
 
+pytestmark = pytest.mark.heavy
+
 LOAD = 8.0
 BRISTLE = ["lugre", "dahl", "lugre, delta 0.78, viscous", "lugre+dahl", "asymmetric(lugre)"]
 

@@ -25,6 +25,8 @@ from symfric.integrator.methods.tableaux import METHODS
 from symfric.model import Event
 from symfric.scenes import Arm, DoublePendulum
 
+pytestmark = pytest.mark.heavy
+
 x, z, u = Variable("x", "m", start=1.0), Variable("z", "1", start=0.5), Variable("u", "m/s")
 PENDULUM = Model(
     "leak",

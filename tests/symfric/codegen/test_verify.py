@@ -10,6 +10,8 @@ from symfric import BrownMcPhee, LuGre, Stribeck, law_from_text
 from symfric.codegen import generate, law_block, verify
 from symfric.codegen.verify import excitation
 
+pytestmark = pytest.mark.heavy
+
 STEEP = {"lagged(stribeck)"}
 """A filtered velocity of 2 m/s in float is known to 1e-7 m/s, a thousandth of the law's width."""
 

@@ -7,6 +7,8 @@ from symfric import ALL_LAWS, Coulomb, LuGre, figure, law_from_text
 from symfric.figures import FIGURES, phenomena
 from symfric.laws import GenericAsperity, RandomBristles
 
+pytestmark = pytest.mark.heavy
+
 NEEDS = {
     "profile": set(ALL_LAWS),
     "steady_state": set(ALL_LAWS),

@@ -25,6 +25,8 @@ from symfric.multibody import (
 from symfric.multibody.kinematics import Kinematics
 from symfric.scenes import FourBar, SliderCrank
 
+pytestmark = pytest.mark.heavy
+
 SMOOTH = Viscous(sigma_2=0.0)
 FORMULATIONS = ["joint", "absolute"]
 in_both = pytest.mark.parametrize("formulation", FORMULATIONS)

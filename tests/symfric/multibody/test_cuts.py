@@ -14,6 +14,8 @@ from symfric.laws import Law
 from symfric.multibody import prepare
 from symfric.multibody.cuts import Cuts
 
+pytestmark = pytest.mark.heavy
+
 GAMMA = float(METHODS["rodas5p"].diagonal or 0.0)
 LAWS = {"none": None, "brown_mcphee": BrownMcPhee(v_t=0.01), "lugre": LuGre(sigma_0=1e3)}
 each_law = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)

@@ -33,6 +33,8 @@ from symfric.multibody import JointFriction, Mechanism, Revolute, Spherical, Uni
 from symfric.scenes import FourBar, SliderCrank
 from symfric.scenes.mechanism import MechanismScene
 
+pytestmark = pytest.mark.heavy
+
 in_both = pytest.mark.parametrize("formulation", ["joint", "absolute"])
 
 LAW = BrownMcPhee()

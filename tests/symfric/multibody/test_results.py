@@ -28,6 +28,8 @@ from symfric.multibody import (
 from symfric.multibody.joint import COMPONENTS, Joint
 from symfric.scenes import MECHANISMS, FourMass
 
+pytestmark = pytest.mark.heavy
+
 Y = (0.0, 1.0, 0.0)
 LAW = BrownMcPhee(v_t=0.5)
 

@@ -21,6 +21,8 @@ from symfric.multibody import (
 from symfric.results.energy import EnergyBalance
 from symfric.scenes import MECHANISMS, FourBar, FourMass, Pendulum, SliderCrank
 
+pytestmark = pytest.mark.heavy
+
 X = (1.0, 0.0, 0.0)
 LAW = BrownMcPhee(v_t=0.05)
 

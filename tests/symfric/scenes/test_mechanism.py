@@ -39,6 +39,8 @@ from symfric.scenes import (
     SliderCrank,
 )
 
+pytestmark = pytest.mark.heavy
+
 SMOOTH = Viscous(sigma_2=0.0)
 """No friction at all: a float zero leaves no term."""
 each_scene = pytest.mark.parametrize("kind", MECHANISMS.values(), ids=MECHANISMS.keys())

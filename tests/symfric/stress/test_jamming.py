@@ -16,6 +16,8 @@ from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import Tolerances, integrate
 from symfric.scenes import MECHANISMS, PendulumBox
 
+pytestmark = pytest.mark.heavy
+
 Array = NDArray[np.float64]
 MU, MASS = 0.12, 20.0
 often = pytest.mark.slow

@@ -16,6 +16,8 @@ from symfric.integrator.step.tangent import Tangent, tangent
 from symfric.multibody import Mechanism, PrescribedMotion
 from symfric.scenes import FourBar, FourMass, MechanismScene, PendulumBox, SliderCrank
 
+pytestmark = pytest.mark.heavy
+
 LAW = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
 SCENES: dict[str, MechanismScene] = {
     "four_mass": FourMass(LAW),

@@ -32,6 +32,8 @@ from symfric.laws import (
 )
 from symfric.laws.composed.isotropic import Isotropic, anisotropy, is_isotropic
 
+pytestmark = pytest.mark.heavy
+
 N = 7.848
 SUMS: dict[str, Law] = {
     "lugre+ambrosio": Sum((LuGre(), Ambrosio())),
