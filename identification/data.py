@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.filters import Filter
 from identification.loop import PositionLoop
+from symfric.foundation import checks
 from symfric.foundation.files import written
 
 Array = NDArray[np.float64]
@@ -56,7 +57,11 @@ class Dataset:
 
     def __post_init__(self) -> None:
         for key, values in self.signals().items():
-            object.__setattr__(self, key, np.asarray(values, dtype=float))
+            what = f"a column of numbers [{UNITS[key]}]"
+            column = checks.array(
+                f"data '{self.name}': {key}", values, ndim=None, what=what, nan=True
+            )
+            object.__setattr__(self, key, column)
         problems = self._shape_problems() or self._value_problems()
         if problems:
             raise ValueError(f"data '{self.name}': " + "; ".join(problems))

@@ -15,11 +15,12 @@ from identification.regress import linear_regression
 from identification.result import Estimate, Identification
 from identification.signals import Signals, differentiate
 from identification.start import start_values
+from symfric.foundation import checks
 from symfric.foundation.parameters import parameters, with_values
 from symfric.foundation.status import SolveError
 from symfric.laws import Law, law_from_text
+from symfric.laws.base.law import check_law
 from symfric.laws.names import law_name
-from symfric.model import finite
 from symfric.scenes import Drive
 
 Progress = Callable[[str, float], None]
@@ -76,13 +77,25 @@ def identify(
     near rest, since v is taken as known. A Stribeck part needs motion at speeds around its velocity
     scale, or its standard errors say so.
     """
-    if folds < 0 or folds == 1:
+    _check(data, validate, filter, progress)
+    throw, free = checks.flag("identify: throw", throw), checks.names("identify: free", free)
+    held = checks.named("identify: fixed", fixed).items()
+    fixed = {name: checks.number(f"identify: fixed {name}", value) for name, value in held}
+    folds = checks.count("identify: folds", folds, least=0)
+    if folds == 1:
         raise ValueError(f"identify: folds: expected 0 or at least 2, got {folds}")
     tell = progress or _silent
     law = law_from_text(law) if isinstance(law, str) else law
+    check_law("identify: law", law)
     signals = differentiate(data, filter)
     v_max = float(np.abs(signals.v).max())
-    choice = choose(law, v_max, finite("identify: normal_force", normal_force), free, fixed)
+    choice = choose(
+        law,
+        v_max,
+        checks.number("identify: normal_force", normal_force, unit="N", above=0.0),
+        free,
+        fixed,
+    )
     if not choice.free:
         raise ValueError("identify: expected at least one free parameter, got all fixed")
     if signals.kept.size < 3 * len(choice.free):
@@ -126,6 +139,18 @@ def identify(
     if throw and not fit.status.ok:
         raise SolveError(f"identify {result.law}: {result.message}", fit.status, result)
     return result
+
+
+def _check(data: object, validate: object, filter: object, progress: object) -> None:
+    """Refuse what is of the wrong kind."""
+    record = "a record, such as read_data('record.csv')"
+    checks.kind("identify: data", data, Dataset, record)
+    if validate is not None:
+        checks.kind("identify: validate", validate, Dataset, record)
+    if filter is not None:
+        checks.kind("identify: filter", filter, Filter, "a filter, such as Filter(...)")
+    if progress is not None:
+        checks.function("identify: progress", progress, "a function of a text and a fraction")
 
 
 def _silent(text: str, fraction: float) -> None:

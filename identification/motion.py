@@ -17,10 +17,11 @@ from numpy.typing import ArrayLike
 from identification.data import Array
 from identification.precision import precision
 from identification.result import Estimate
-from symfric.foundation.parameters import Variable, check_names
+from symfric.foundation import checks
+from symfric.foundation.parameters import Variable
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator import Input, Trajectory, simulate
-from symfric.model import Model
+from symfric.model import Model, check_model
 
 AT_BOUND = 1e-9
 """Distance to a bound, relative to the parameter's scale, below which it stands there."""
@@ -134,6 +135,11 @@ def identify_motion(
     to a local minimum; fit a shorter piece first. Bounds stop a step, they do not guide it.
     Standard errors take residuals as white; start values of the motion are taken as known.
     """
+    check_model("identify_motion", model)
+    throw = checks.flag("identify_motion: throw", throw)
+    iterations = checks.count("identify_motion: iterations", iterations)
+    p, x0 = model.named("p", p), model.named("x0", x0)
+    u = model.named("u", u)
     task = _task(model, t, measured, free, p, x0, u, rtol)
     w = np.array([model.values("p", p)[model.p.index(v)] for v in task.fitted]) / task.units
     run = task.run(w, throw=True)
@@ -188,12 +194,13 @@ def _task(
     rtol: float,
 ) -> _Task:
     """The task, its data checked."""
-    names = [v.name for v in model.p]
-    chosen = names if free is None else list(free)
-    check_names("identify_motion: free", chosen, names)
-    check_names("identify_motion: measured", measured, model.signals)
-    times = np.asarray(t, dtype=float)
-    records = {name: np.asarray(y, dtype=float) for name, y in measured.items()}
+    where, names = "identify_motion", [v.name for v in model.p]
+    chosen = names if free is None else list(checks.names(f"{where}: free", free, names))
+    times = checks.times(f"{where}: t", t)
+    records = {
+        name: checks.array(f"{where}: {name}", y)
+        for name, y in checks.named(f"{where}: measured", measured, model.signals).items()
+    }
     problems = list(_problems(times, records, chosen))
     if problems:
         raise ValueError(f"identify_motion: {'; '.join(problems)}")
@@ -209,13 +216,11 @@ def _problems(t: Array, records: Mapping[str, Array], chosen: list[str]) -> Iter
         yield "expected a model with free parameters, got none; scene.model(free=[...])"
     if not records:
         yield "expected measured signals, got none"
-    if t.ndim != 1 or t.size < 2 or not (np.diff(t) > 0).all():
-        yield f"expected increasing times t of shape (n,), got shape {t.shape}"
+    if t.size < 2:
+        yield f"expected at least two times, got {t.size}"
     for name, y in records.items():
         if y.shape != t.shape:
             yield f"{name}: expected shape {t.shape}, got {y.shape}"
-        elif not np.isfinite(y).all():
-            yield f"{name}: expected finite samples, got NaN or infinity"
         elif np.ptp(y) == 0:
             yield f"{name}: expected a signal that changes, got a constant"
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.data import UNITS, Array, Dataset
 from identification.matlab import read_mat
-from symfric.foundation.parameters import check_names
+from symfric.foundation import checks
 
 ALIASES = {
     "t": ("t", "time"),
@@ -49,9 +49,10 @@ def read_data(path: str | Path, columns: Mapping[str, str] | None = None) -> Dat
     Raises:
         ValueError: file, column or cell that cannot be used, with its place.
     """
-    file = Path(path)
-    columns = dict(columns or {})
-    check_names(f"read '{file.name}': columns", columns, UNITS)
+    file = checks.path("read", path)
+    columns = checks.named(f"read '{file.name}': columns", columns, UNITS)
+    for name in columns.values():
+        checks.text(f"read '{file.name}': columns", name, "the name of a column")
     if not file.is_file():
         raise ValueError(f"read '{path}': expected a file, got nothing there; check the path")
     if file.suffix.lower() == ".mat":

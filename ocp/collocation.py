@@ -8,6 +8,8 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
+from symfric.foundation import checks
+
 Array = NDArray[np.float64]
 MAX_DEGREE = 9
 
@@ -55,8 +57,7 @@ def radau(degree: int) -> Radau:
     Raises:
         ValueError: degree is not in 1 ... 9.
     """
-    if degree not in range(1, MAX_DEGREE + 1):
-        raise ValueError(f"radau: expected a degree in 1 ... {MAX_DEGREE}, got {degree!r}")
+    degree = checks.count("radau: degree", degree, most=MAX_DEGREE)
     points = np.array(ca.collocation_points(degree, "radau"))  # zeros of P_d - P_(d-1)
     nodes = np.concatenate([[0.0], points])
     moments = np.eye(degree)[0]  # of the shifted Legendre polynomials over [0, 1]

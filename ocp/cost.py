@@ -6,6 +6,7 @@ from typing import final
 
 import casadi as ca
 
+from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import check_names
 from symfric.model import Model
@@ -60,6 +61,7 @@ class Cost:
         return Cost(self.running + other.running, self.end + other.end)
 
     def __mul__(self, weight: float) -> "Cost":
+        weight = checks.number("cost: weight", weight)
         return Cost(
             tuple((weight * w, term) for w, term in self.running),
             tuple((weight * w, term) for w, term in self.end),
@@ -78,12 +80,7 @@ class Cost:
 
 
 def _checked(where: str, expression: Expression) -> Expression:
-    if not callable(expression):
-        raise ValueError(
-            f"{where}: expected a function of the signals such as lambda s: s.x**2, "
-            f"got {expression!r}"
-        )
-    return expression
+    return checks.function(where, expression, "a function of the signals such as lambda s: s.x**2")
 
 
 def integral(expression: Expression) -> Cost:
@@ -100,11 +97,23 @@ TIME = at_end(lambda s: s.t)
 """The duration T [s] as a cost."""
 
 
+def _value(term: Expression, signals: Signals) -> ca.SX:
+    """The expression that `term` makes of the signals."""
+    what = "a function of the signals that returns one expression, such as lambda s: s.x**2"
+    try:
+        value = checks.expression("cost", term(signals))
+    except (TypeError, ArithmeticError, RuntimeError, NotImplementedError) as error:
+        raise checks.refused(
+            "cost", what, error, "write casadi functions for those of math"
+        ) from error
+    if ca.SX(value).numel() != 1:
+        raise checks.refused("cost", what, value)
+    return ca.SX(value)
+
+
 def _total(terms: tuple[tuple[float, Expression], ...], signals: Signals) -> ca.SX:
     total = ca.SX(0)
     for weight, term in terms:
-        value = ca.SX(term(signals))
-        if value.numel() != 1:
-            raise ValueError(f"cost: expected scalar expressions, got one of shape {value.shape}")
+        value = _value(term, signals)
         total += weight * value
     return total

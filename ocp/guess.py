@@ -12,7 +12,7 @@ from ocp.layout import Points
 from ocp.problem import Box, Free, Problem
 from ocp.solution import Solution
 from ocp.transcribe import Transcription
-from symfric.foundation.parameters import check_names
+from symfric.foundation import checks
 from symfric.model import Model
 
 Array = NDArray[np.float64]
@@ -33,8 +33,8 @@ def initial_points(into: Transcription, given: Mapping[str, Guess] | None = None
         ValueError: unknown name, or values that are not finite or not one a time.
     """
     problem, model = into.problem, into.problem.model
-    given = dict(given or {})
-    check_names("guess", given, [v.name for group in (model.x, model.z, model.u) for v in group])
+    known = [v.name for group in (model.x, model.z, model.u) for v in group]
+    given = checks.named("guess", given, known)
     T = _duration(problem)
 
     def row(name: str, fractions: Array, default: Array) -> Array:
@@ -84,15 +84,18 @@ def _duration(problem: Problem) -> float:
 
 
 def _evaluate(name: str, guess: Guess, times: Array, T: float) -> Array:
-    values = np.asarray(guess(times) if callable(guess) else guess, dtype=float)
+    try:
+        made = guess(times) if callable(guess) else guess
+    except (TypeError, ArithmeticError, RuntimeError) as error:
+        what = f"for {name} a number, samples, or a function of the times"
+        raise checks.refused("guess", what, error) from error
+    values = checks.array(f"guess of {name}", made, ndim=None)
     sizes = (1, times.size) if callable(guess) else range(1, values.size + 1)
     if values.ndim > 1 or values.size not in sizes:
         raise ValueError(
             f"guess: expected for {name} a number, samples, or a function that returns one value "
             f"a time, got an array of shape {values.shape}"
         )
-    if not np.isfinite(values).all():
-        raise ValueError(f"guess: expected finite values of {name}, got NaN or infinity")
     if callable(guess) or values.ndim == 0:
         return np.broadcast_to(values, times.shape)
     return np.interp(times, np.linspace(0.0, T, values.size), values)

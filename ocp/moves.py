@@ -2,7 +2,8 @@
 
 from ocp.cost import TIME, integral
 from ocp.problem import Free, Problem
-from symfric.model import Model
+from symfric.foundation import checks
+from symfric.model import Model, check_model
 
 
 def rest_to_rest(
@@ -23,6 +24,11 @@ def rest_to_rest(
     Raises:
         ValueError: what `Problem` finds wrong, such as a model without these signals.
     """
+    check_model("rest_to_rest", model)
+    names = [v.name for group in (model.x, model.u) for v in group]
+    for name in (position, velocity, force):
+        checks.choice(f"rest_to_rest of '{model.name}'", name, names)
+    limit = checks.number("rest_to_rest: limit", limit, unit="N", above=0.0)
     return Problem(
         model,
         T,

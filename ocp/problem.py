@@ -9,10 +9,11 @@ from typing import Any, final
 import casadi as ca
 
 from ocp.cost import Cost
+from symfric.foundation import checks
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import check_names
 from symfric.foundation.symbols import strays
-from symfric.model import Model
+from symfric.model import Model, check_model
 
 Range = float | tuple[float | None, float | None]
 """A value to meet, or (lower, upper) to stay between; None is no bound."""
@@ -39,6 +40,11 @@ class Free:
     guess: float | None = None
 
     def __post_init__(self) -> None:
+        for name in ("lower", "upper", "guess"):
+            value = getattr(self, name)
+            if name != "guess" or value is not None:
+                number = checks.number(f"Free: {name}", value, unit="s", above=0.0)
+                object.__setattr__(self, name, number)
         guess = self.lower if self.guess is None else self.guess
         if not (0 < self.lower <= guess <= self.upper < inf and self.lower < self.upper):
             raise ValueError(
@@ -94,6 +100,10 @@ class Problem:
     p: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def __post_init__(self) -> None:
+        check_model("Problem", self.model)
+        problems = list(self._kinds())
+        if problems:
+            raise ValueError(f"problem '{self.model.name}': " + "; ".join(problems))
         problems = [p for p in (*self._names(), *self._ranges(), *self._rest()) if p]
         # Values are looked at only when all names and ranges are right.
         problems = problems or [*self._start(), *self._costs()]
@@ -137,6 +147,23 @@ class Problem:
         return {
             v.name: meet(self.box(v.name), as_box(given.get(v.name, FREE))) for v in self.model.x
         }
+
+    def _kinds(self) -> Iterator[str]:
+        """What is no mapping by name, or no fraction."""
+        groups: dict[str, Any] = {"initial": self.initial, "final": self.final}
+        groups |= {"bounds": self.bounds, "p": self.p}
+        if isinstance(self.via, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
+            groups |= {f"via {checks.shown(at)}": values for at, values in self.via.items()}
+            for at in self.via:
+                if not is_number(at):
+                    yield f"via: expected fractions of T, got {checks.shown(at)}"
+        else:
+            yield f"via: expected states by fractions of T, got {checks.shown(self.via)}"
+        for what, given in groups.items():
+            try:
+                checks.named(what, given)
+            except ValueError as error:
+                yield str(error)
 
     def _names(self) -> Iterator[str]:
         model = self.model

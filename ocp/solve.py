@@ -14,6 +14,7 @@ from ocp.problem import Problem
 from ocp.solution import Solution
 from ocp.transcribe import Transcription, make_mesh, transcribe
 from ocp.verify import verified
+from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 
 Array = NDArray[np.float64]
@@ -61,8 +62,15 @@ def solve(
     on an even mesh needs many intervals (1 m out and back in 2 s: 800 for a miss of 1 mm) and may
     settle for a motion that is a third too expensive.
     """
-    if not tolerance > 0:
-        raise ValueError(f"solve: expected tolerance > 0, got {tolerance!r}")
+    checks.kind("solve", problem, Problem, "a problem, such as rest_to_rest(...)")
+    tolerance = checks.number("solve: tolerance", tolerance, above=0.0)
+    for name, value in (("verify", verify), ("throw", throw)):
+        checks.flag(f"solve: {name}", value)
+    if progress is not None:
+        checks.function("solve: progress", progress, "a function of the progress")
+    options = checks.named("solve: options", options)
+    if odd := [name for name, value in options.items() if not isinstance(value, str | float | int)]:
+        raise checks.refused(f"solve: option {odd[0]}", "a number or a text", options[odd[0]])
     begin = perf_counter()
     program = transcribe(problem, make_mesh(problem, intervals), radau(degree))
     start, warm = _start(program, guess)
@@ -71,7 +79,7 @@ def solve(
         program,
         start,
         problem.model.values("p", problem.p),
-        (WARM if warm else {}) | dict(options or {}),
+        (WARM if warm else {}) | options,
         progress,
     )
     statistics = replace(outcome.statistics, build_time=written + outcome.statistics.build_time)

@@ -15,9 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 from ocp.collocation import Radau
 from ocp.layout import Layout, Points
 from ocp.problem import Free, Problem
+from symfric.foundation import checks
 
 Array = NDArray[np.float64]
 SAME_NODE = 1e-9
+MOST_INTERVALS = 10**6
+"""Beyond these a program has no room in any memory."""
 
 
 @final
@@ -121,14 +124,13 @@ def make_mesh(problem: Problem, intervals: int | ArrayLike) -> Array:
     Raises:
         ValueError: neither.
     """
-    if isinstance(intervals, int | np.integer) and not isinstance(intervals, bool):
-        if intervals < 1:
-            raise ValueError(f"intervals: expected at least 1, got {intervals}")
-        mesh = np.linspace(0.0, 1.0, int(intervals) + 1)
+    if checks.as_number(intervals) is not None:
+        count = checks.count("intervals", intervals, most=MOST_INTERVALS)
+        mesh = np.linspace(0.0, 1.0, count + 1)
     else:
-        mesh = np.asarray(intervals, dtype=float)
-        ends = mesh.ndim == 1 and mesh.size > 1 and mesh[0] == 0.0 and mesh[-1] == 1.0
-        if not ends or not (np.diff(mesh) > 0).all():
+        what = "their number or increasing fractions of T from 0 to 1"
+        mesh = checks.array("intervals", intervals, what=what)
+        if mesh.size < 2 or mesh[0] != 0.0 or mesh[-1] != 1.0 or not (np.diff(mesh) > 0).all():
             raise ValueError(
                 "intervals: expected their number or increasing fractions of T from 0 to 1, "
                 f"got {intervals!r}"

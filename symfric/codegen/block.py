@@ -12,8 +12,9 @@ import casadi as ca
 
 from symfric.codegen.c99 import FUNCTIONS
 from symfric.codegen.graph import graph
+from symfric.foundation import checks
 from symfric.foundation.symbols import strays, symbols_of
-from symfric.model import Output, Variables, finite
+from symfric.model import Output, Variables
 
 GROUPS = ("state", "param", "in", "out")
 """Names of the structs, and of the pointers to them."""
@@ -70,7 +71,7 @@ class Block:
         if problems:
             raise ValueError(f"block '{self.name}': " + "; ".join(problems))
         for variable in (*self.states, *self.parameters):
-            finite(f"block '{self.name}': {variable.name}", variable.start)
+            checks.number(f"block '{self.name}': {variable.name}", variable.start)
 
     def _name_problems(self) -> list[str]:
         variables = [v.name for v in (*self.states, *self.inputs, *self.parameters)]

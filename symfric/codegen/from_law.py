@@ -10,11 +10,11 @@ import casadi as ca
 from symfric.codegen.block import Block
 from symfric.codegen.folding import runtime_parameters
 from symfric.codegen.held_step import force_of_rate, held_step
-from symfric.foundation.checks import number
+from symfric.foundation import checks
 from symfric.foundation.numeric import is_casadi
 from symfric.foundation.parameters import Variable, check_names, parameters, symbolise
 from symfric.laws import Law, Sum, law_name
-from symfric.laws.base.law import chosen
+from symfric.laws.base.law import check_law, chosen
 from symfric.model import Output, Variables
 
 STEP_SIZE = 1e-3
@@ -72,7 +72,11 @@ def law_block(
             within the step (exact Coulomb, Karnopp and Leine by events); a force that is not finite
             at rest (a smoothing width of 0 left variable).
     """
+    check_law("codegen", law)
     where = f"codegen '{law_name(law)}'"
+    free = None if free is None else checks.names(f"{where}: free", free)
+    if name is not None:
+        checks.text(f"{where}: name", name, "a C identifier")
     known = parameters(law)
     symbols = [p.name for p in known.values() if is_casadi(p.value)]
     if symbols:
@@ -99,6 +103,12 @@ def law_block(
     return block
 
 
+def step_variable(where: str, h: float | None) -> Variable:
+    """The parameter h [s], which starts at the step size given, by default 1 ms."""
+    start = STEP_SIZE if h is None else checks.number(f"{where}: h", h, unit="s", above=0.0)
+    return Variable("h", "s", start=start, lower=0.0, doc="step size")
+
+
 def _inputs(law: Law) -> Variables:
     return (
         Variable("v", "m/s", doc="sliding velocity"),
@@ -121,9 +131,8 @@ def _function(law: Law, runtime: Variables) -> Block:
 def _step(law: Law, runtime: Variables, h: float | None, where: str) -> Block:
     v, N, *_ = inputs = _inputs(law)
     states = tuple(Variable(s.name, s.unit, nominal=s.nominal) for s in law.states)
-    held = STEP_SIZE if h is None else number(f"{where}: h", h, unit="s", above=0.0)
-    size = Variable("h", "s", start=held, lower=0.0, doc="step size")
-    duration = size.symbol if h is None else held
+    size = step_variable(where, h)
+    duration = size.symbol if h is None else float(h)
 
     z = ca.vertcat(*(state.symbol for state in states))
     given = _given(inputs)

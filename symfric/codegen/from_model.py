@@ -7,15 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.block import Block
-from symfric.codegen.from_law import STEP_SIZE
-from symfric.foundation.parameters import Variable, check_names
+from symfric.codegen.from_law import step_variable
+from symfric.foundation import checks
+from symfric.foundation.parameters import Variable
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import Drivers
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.suited import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.step.attempt import build_fixed
-from symfric.model import Model, Output, Variables, finite
+from symfric.model import Model, Output, Variables, check_model
 
 
 def plant_block(
@@ -61,8 +62,11 @@ def plant_block(
             values without consistent algebraic ones; outputs that depend on time where the
             equations do not.
     """
+    check_model("codegen", model)
     where = f"codegen '{model.name}'"
-    check_names(f"{where}: method", [method], ["auto", *METHODS])
+    if name is not None:
+        checks.text(f"{where}: name", name, "a C identifier")
+    checks.choice(f"{where}: method", method, ["auto", *METHODS])
     if method == "auto":
         method = "backward_euler" if model.holonomic and model.monitors else "rodas3"
     if model.events:
@@ -70,9 +74,7 @@ def plant_block(
             f"{where}: expected a model without events, got {len(model.events)}; "
             "use a smooth or bristle law"
         )
-    size = Variable("h", "s", start=STEP_SIZE if h is None else h, lower=0.0, doc="step size")
-    if not finite(f"{where}: h", size.start) > 0.0:
-        raise ValueError(f"{where}: h: expected a step size > 0 [s], got {h}")
+    size = step_variable(where, h)
     whole = suited_to_start(_held(model), METHODS[method], model)
     duration = size.symbol if h is None else ca.SX(float(h))
     following = build_fixed(whole, METHODS[method])(whole.y, duration, whole.d)
@@ -103,7 +105,7 @@ def _states(model: Model, whole: System, where: str) -> Variables:
     start: NDArray[np.float64] = np.zeros(whole.n)
     start[: whole.nx] = model.initial_state()
     for i in range(whole.nx, whole.n):
-        start[i] = finite(f"{where}: {unknowns[i].name}", unknowns[i].start)
+        start[i] = checks.number(f"{where}: {unknowns[i].name}", unknowns[i].start)
     start = consistent(whole, where, start, np.concatenate([model.values("p"), model.values("u")]))
     return tuple(
         replace(v, start=float(value), symbol=symbol)

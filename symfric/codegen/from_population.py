@@ -5,10 +5,11 @@ from inspect import getdoc
 import casadi as ca
 
 from symfric.codegen.block import Block
-from symfric.codegen.from_law import STEP_SIZE
+from symfric.codegen.from_law import STEP_SIZE, step_variable
+from symfric.foundation import checks
 from symfric.foundation.parameters import Variable, parameters
 from symfric.laws import Population, law_name
-from symfric.model import Output, finite
+from symfric.model import Output
 
 LOOP = """One contact. The friction force of the population is the sum of F over an array of states,
 all with the same v and N, each with the random number r of its own in [-1, 1]. `Population.begin`
@@ -30,13 +31,13 @@ def contact_block(law: Population, *, name: str | None = None, h: float | None =
         ValueError: a step size <= 0.
     """
     where = f"codegen '{law_name(law)}'"
+    if name is not None:
+        checks.text(f"{where}: name", name, "a C identifier")
     states = tuple(Variable(s.name, s.unit, nominal=s.nominal) for s in law.states)
     v = Variable("v", "m/s", nominal=law.step / STEP_SIZE, doc="sliding velocity")
     N = Variable("N", "N", nominal=10.0, lower=0.0, doc="normal force of all contacts")
     r = Variable("r", "1", nominal=0.5, doc="random number of the contact, -1 to 1")
-    size = Variable("h", "s", start=STEP_SIZE if h is None else h, lower=0.0, doc="step size")
-    if not finite(f"{where}: h", size.start) > 0.0:
-        raise ValueError(f"{where}: h: expected a step size > 0 [s], got {h}")
+    size = step_variable(where, h)
     duration = size.symbol if h is None else float(h)
     z = ca.vertcat(*(state.symbol for state in states))
     rows = ca.SX(law.contact(z, r.symbol, v.symbol * duration, duration, N.symbol))

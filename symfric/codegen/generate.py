@@ -12,6 +12,7 @@ from symfric.codegen.c99 import REALS, Real
 from symfric.codegen.from_law import law_block
 from symfric.codegen.from_population import contact_block
 from symfric.codegen.source import header, members, prefix, routines, source
+from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import check_names
 from symfric.laws import AnyLaw, Population
@@ -75,8 +76,10 @@ def generate(
         ValueError: bad input, a law that has no step, an operation that C99 lacks, a
             constant outside the range of float.
     """
-    names = (real,) if isinstance(real, str) else tuple(dict.fromkeys(real))
-    check_names("codegen real", names, REALS)
+    several = (real,) if isinstance(real, str) else checks.many("codegen: real", real, "types")
+    check_names("codegen: real", several, REALS)
+    names = tuple(dict.fromkeys(several))
+    folder = checks.path("codegen: out", out)
     if not names:
         raise ValueError("codegen: real: expected double, float or both, got none")
     if isinstance(law, Block):
@@ -95,7 +98,6 @@ def generate(
         texts[f"{prefix(block, kind)}.c"] = source(block, kind)
     manifest = _manifest(block, [REALS[n] for n in names])
     texts["manifest.json"] = json.dumps(manifest, indent=2) + "\n"
-    folder = Path(out)
     for file, text in texts.items():
         write_text(folder / file, text)
     return Generated(block, folder, names, tuple(folder / file for file in texts), manifest)

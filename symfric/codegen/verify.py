@@ -16,6 +16,7 @@ from symfric.codegen.generate import Generated
 from symfric.codegen.runaway import longest_step, runs_away, step_size
 from symfric.codegen.runner import program, run_c, run_vm
 from symfric.codegen.source import prefix, routines
+from symfric.foundation.checks import kind
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Variable
 
@@ -138,6 +139,7 @@ def verify(
     Raises:
         ValueError: `compiler` is given and does not exist.
     """
+    kind("verify", generated, Generated, "what generate(...) returned")
     block, found = generated.block, find_compiler(compiler)
     if found is None:
         return Verification(block.name, NO_COMPILER, None, ())

@@ -8,6 +8,7 @@ from symfric.figures.data import FigureData
 from symfric.figures.requirements import check_any
 from symfric.figures.scales import NORMAL_FORCE, scales
 from symfric.figures.scene import scene_figure
+from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, distinct
 from symfric.laws import AnyLaw, Law, Population, any_from_text, law_name, steady_inputs
 from symfric.scenes import ALL_SCENES
@@ -65,7 +66,8 @@ def _named(laws: Sequence[AnyLaw | str] | Mapping[str, AnyLaw]) -> dict[str, Any
     if isinstance(laws, Mapping):
         found = dict(laws)
     else:
-        each = [any_from_text(law) if isinstance(law, str) else law for law in laws]
+        given = checks.many("compare", laws, "laws or their names, such as ['lugre', 'gms']")
+        each = [any_from_text(law) if isinstance(law, str) else law for law in given]
         for law in each:
             check_any("compare", law)
         names = [name for (name,) in distinct([[law_name(law)] for law in each])]

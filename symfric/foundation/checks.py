@@ -242,10 +242,12 @@ def names(
     return given
 
 
-def array(where: str, value: object, *, ndim: int | None = 1, what: str = "") -> Array:
+def array(
+    where: str, value: object, *, ndim: int | None = 1, what: str = "", nan: bool = False
+) -> Array:
     """`value` as an array of finite floats; `ndim` None takes any number of dimensions.
 
-    `what` says in a word what the numbers are.
+    `what` says in words what the numbers are; with `nan` they need not be finite.
 
     Raises:
         ValueError: no numbers, NaN, infinite, another number of dimensions.
@@ -263,7 +265,7 @@ def array(where: str, value: object, *, ndim: int | None = 1, what: str = "") ->
     if ndim is not None and found.ndim != ndim:
         raise refused(where, what, value)
     numbers = found.astype(float)
-    if not np.isfinite(numbers).all():
+    if not nan and not np.isfinite(numbers).all():
         k = tuple(int(i) for i in np.argwhere(~np.isfinite(numbers))[0])
         place = f" at {', '.join(map(str, k))}" if k else ""
         raise ValueError(f"{where}: expected finite numbers, got {numbers[k]}{place}")

@@ -12,6 +12,7 @@ from symfric.integrator.methods.radau import Radau
 from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS
 from symfric.integrator.running.run import Tolerances
 from symfric.model import Model
+from symfric.model import check_model as check_model
 
 Array = NDArray[np.float64]
 LOOSE = 1e-5
@@ -20,21 +21,6 @@ BACKENDS = ("auto", "vm", "compiled")
 """Engines: CasADi's virtual machine, the step as machine code, and whichever is faster."""
 MOST_SAMPLES = 10**8
 """Beyond these the times alone need gigabytes."""
-
-
-def check_model(where: str, model: object) -> None:
-    """Refuse what is no model: a law, a scene, a mechanism that nobody built."""
-    if isinstance(model, Model):
-        return
-    hint = ""
-    if not isinstance(model, type):
-        ways = {
-            "model": "call its model()",
-            "build": "call its build()",
-            "force": "put the law in a scene",
-        }
-        hint = next((advice for way, advice in ways.items() if hasattr(model, way)), "")
-    raise checks.refused(where, "a model, such as rabinowicz(LuGre())", model, hint)
 
 
 def check_span(

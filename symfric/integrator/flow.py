@@ -4,7 +4,6 @@ import casadi as ca
 import numpy as np
 
 from symfric.foundation import checks
-from symfric.integrator.arguments import check_model
 from symfric.integrator.equations.initial import first_guess
 from symfric.integrator.equations.inputs import Drivers
 from symfric.integrator.equations.manifold import Manifold
@@ -12,7 +11,7 @@ from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.suited import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.step.attempt import build_fixed
-from symfric.model import Model
+from symfric.model import Model, check_model
 
 
 def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Function:

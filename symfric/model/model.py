@@ -320,3 +320,18 @@ def _same(a: ca.SX, b: ca.SX) -> bool:
 def finite(where: str, value: Any) -> float:
     """`value` as a float, or an error that says where it stands."""
     return checks.number(where, value)
+
+
+def check_model(where: str, model: object) -> None:
+    """Refuse what is no model: a law, a scene, a mechanism that nobody built."""
+    if isinstance(model, Model):
+        return
+    hint = ""
+    if not isinstance(model, type):
+        ways = {
+            "model": "call its model()",
+            "build": "call its build()",
+            "force": "put the law in a scene",
+        }
+        hint = next((advice for way, advice in ways.items() if hasattr(model, way)), "")
+    raise checks.refused(where, "a model, such as rabinowicz(LuGre())", model, hint)

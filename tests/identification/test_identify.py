@@ -162,7 +162,7 @@ ALL = {"m": 95.0, "offset": 0.0, "sigma_2": 1.0}
         ("lugre", {}, "expected a static law, got LuGre with internal states z"),
         ("coulom", {}, "did you mean coulomb"),
         ("coulomb", {"folds": 1}, "folds: expected 0 or at least 2, got 1"),
-        ("coulomb", {"normal_force": float("nan")}, "normal_force: expected a finite number"),
+        ("coulomb", {"normal_force": float("nan")}, "normal_force: expected a number > 0"),
         ("viscous", {"fixed": ALL}, "expected at least one free parameter, got all fixed"),
         ("stribeck", {"filter": Filter(100.0, 300)}, "expected at least 18 equations for 6"),
         ("coulomb", {"filter": Filter(800.0)}, "below the Nyquist frequency"),

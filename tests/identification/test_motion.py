@@ -83,10 +83,10 @@ def test_a_fit_that_does_not_end_hands_over_what_it_has() -> None:
         (T, {"y": T}, {}, "measured: expected one of x, got y"),
         (T, {}, {}, "expected measured signals, got none"),
         (T, {"x": T}, {"free": []}, "expected a model with free parameters, got none"),
-        (T[::-1], {"x": T}, {}, r"expected increasing times t of shape \(n,\)"),
+        (T[::-1], {"x": T}, {}, r"t: expected increasing times \[s\], got"),
         (T, {"x": T[1:]}, {}, r"x: expected shape \(21,\), got \(20,\)"),
         (T, {"x": 0 * T}, {}, "x: expected a signal that changes, got a constant"),
-        (T, {"x": T + np.nan}, {}, "x: expected finite samples"),
+        (T, {"x": T + np.nan}, {}, "x: expected finite numbers, got nan at 0"),
     ],
 )
 def test_bad_input_is_described(

@@ -66,7 +66,7 @@ def test_guess_may_be_a_number_samples_or_a_function_of_time(given: Guess) -> No
     ("given", "message"),
     [
         ({"w": 1.0}, "guess: expected one of x, v, a, got w"),
-        ({"x": np.nan}, "guess: expected finite values of x"),
+        ({"x": np.nan}, "guess of x: expected finite numbers, got nan"),
         ({"x": []}, r"guess: expected for x a number, samples, or a function .* shape \(0,\)"),
         ({"x": np.ones((2, 2))}, r"got an array of shape \(2, 2\)"),
         ({"a": lambda t: t[:3]}, r"guess: expected for a a number.* shape \(3,\)"),

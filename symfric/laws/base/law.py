@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import ClassVar
 
+from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, empty
 from symfric.foundation.parameters import Parametric
 
@@ -171,8 +172,7 @@ def chosen(law: Law, inputs: Mapping[str, Scalar]) -> dict[str, Scalar]:
 def check_law(where: str, law: object) -> None:
     """Refuse what is not a law: its class, or its name."""
     if not isinstance(law, Law):
-        got = f"the class {law.__name__}" if isinstance(law, type) else repr(law)
-        raise ValueError(f"{where}: expected a law such as LuGre(), got {got}")
+        raise checks.refused(where, "a law such as LuGre()", law)
 
 
 @dataclass(frozen=True, eq=False)
