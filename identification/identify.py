@@ -78,24 +78,14 @@ def identify(
     scale, or its standard errors say so.
     """
     _check(data, validate, filter, progress)
-    throw, free = checks.flag("identify: throw", throw), checks.names("identify: free", free)
-    held = checks.named("identify: fixed", fixed).items()
-    fixed = {name: checks.number(f"identify: fixed {name}", value) for name, value in held}
-    folds = checks.count("identify: folds", folds, least=0)
-    if folds == 1:
-        raise ValueError(f"identify: folds: expected 0 or at least 2, got {folds}")
+    throw, folds = checks.flag("identify: throw", throw), _folds(folds)
     tell = progress or _silent
     law = law_from_text(law) if isinstance(law, str) else law
     check_law("identify: law", law)
     signals = differentiate(data, filter)
     v_max = float(np.abs(signals.v).max())
-    choice = choose(
-        law,
-        v_max,
-        checks.number("identify: normal_force", normal_force, unit="N", above=0.0),
-        free,
-        fixed,
-    )
+    load = checks.number("identify: normal_force", normal_force, unit="N", above=0.0)
+    choice = choose(law, v_max, load, checks.names("identify: free", free), _numbers(fixed))
     if not choice.free:
         raise ValueError("identify: expected at least one free parameter, got all fixed")
     if signals.kept.size < 3 * len(choice.free):
@@ -151,6 +141,18 @@ def _check(data: object, validate: object, filter: object, progress: object) -> 
         checks.kind("identify: filter", filter, Filter, "a filter, such as Filter(...)")
     if progress is not None:
         checks.function("identify: progress", progress, "a function of a text and a fraction")
+
+
+def _folds(folds: object) -> int:
+    found = checks.count("identify: folds", folds, least=0)
+    if found == 1:
+        raise ValueError("identify: folds: expected 0 or at least 2, got 1")
+    return found
+
+
+def _numbers(fixed: object) -> dict[str, float]:
+    given = checks.named("identify: fixed", fixed)
+    return {name: checks.number(f"identify: fixed {name}", x) for name, x in given.items()}
 
 
 def _silent(text: str, fraction: float) -> None:

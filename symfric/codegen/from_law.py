@@ -132,7 +132,7 @@ def _step(law: Law, runtime: Variables, h: float | None, where: str) -> Block:
     v, N, *_ = inputs = _inputs(law)
     states = tuple(Variable(s.name, s.unit, nominal=s.nominal) for s in law.states)
     size = step_variable(where, h)
-    duration = size.symbol if h is None else float(h)
+    duration = size.symbol if h is None else float(size.start)
 
     z = ca.vertcat(*(state.symbol for state in states))
     given = _given(inputs)
@@ -148,7 +148,7 @@ def _step(law: Law, runtime: Variables, h: float | None, where: str) -> Block:
         next=end,
         outputs={"F": Output(mean_force, "N", FORCE + ", mean over the step")},
         resets={"init_sliding": (ca.SX(law.steady_state(v.symbol, N.symbol)), SLIDING)},
-        constants={} if h is None else {"h": held},
+        constants={} if h is None else {"h": float(size.start)},
     )
 
 
