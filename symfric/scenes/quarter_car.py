@@ -10,9 +10,11 @@ from symfric.foundation.numeric import Scalar, sqrt, tan
 from symfric.foundation.parameters import Variable, param, parameters, with_values
 from symfric.laws.base import smooth
 from symfric.laws.static.quarter_car import tilt
-from symfric.model import Model, Output, Variables
+from symfric.model import Model, Monitor, Output, Variables
 from symfric.scenes.base import Scene, contact
 
+ANY = 1e100
+"""Scale [N] of a load that error control does not resolve, but looks at for being a number."""
 LINKAGE = ("k_s", "b_d", "theta", "L_d")
 """Numbers of the rig that a law of its guide may contain, too."""
 
@@ -94,9 +96,13 @@ class QuarterCar(Scene):
         x_tyre, v_tyre = X_r - X_w.symbol, ca.jtimes(X_r, t, ca.SX(1)) - v_w.symbol
         f_sd = self.k_s * x_rel + self.b_d * v_rel
         N = self.normal_force(f_sd, x_rel)
-        slip = contact(
-            self.law, v_b.symbol, N, p, rest={"v_b": 0.0}, x_rel=x_rel, v_rel=v_rel, F_e=f_sd
-        )
+        given = {"x_rel": x_rel, "v_rel": v_rel, "F_e": f_sd}
+        slip = contact(self.law, v_b.symbol, N, p, rest={"v_b": 0.0}, **given)
+        # beyond the strut's reach N is not a number: a run must stop there under any law
+        load = ca.SX.sym("N")
+        told = contact(self.law, v_b.symbol, load, p, rest={"v_b": 0.0}, **given)
+        loaded = ca.depends_on(ca.vertcat(told.force, told.rate), load)
+        reach = () if loaded else (Monitor(N, ANY),)
         a_b = (f_sd - slip.force) / self.M_b
         a_w = (-f_sd + self.k_t * x_tyre + self.b_t * v_tyre) / self.M_w
         return Model(
@@ -104,7 +110,7 @@ class QuarterCar(Scene):
             x=(X_b, X_w, v_b, v_w, *slip.states),
             p=p,
             ode=ca.vertcat(v_b.symbol, v_w.symbol, a_b, a_w, slip.rate),
-            monitors=slip.monitors,
+            monitors=(*slip.monitors, *reach),
             events=slip.events,
             t=t,
             outputs={

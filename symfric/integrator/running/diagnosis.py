@@ -87,13 +87,17 @@ def _not_finite(integrator: Integrator, y: Array, d: Array, h: float) -> str:
     system = integrator.system
     f = integrator.f(y, d).full().ravel()
     rates = np.linalg.pinv(ca.DM(system.mass).full()) @ np.nan_to_num(f, posinf=0.0, neginf=0.0)
+    watched = ca.Function("watched", [system.y, system.d], [system.monitors])
     for ahead in (0.0, *(10.0**k * h for k in range(5))):
         f = integrator.f(y + ahead * rates, d).full().ravel()
         broken = _named(system, np.flatnonzero(~np.isfinite(f)))
-        if broken:
+        what = f"the equation of {broken}" if broken else ""
+        if not np.isfinite(watched(y + ahead * rates, d).full()).all():
+            what = what or "an expression that error control watches"
+        if what:
             when = "returned" if ahead == 0.0 else "is about to return"
             return (
-                f"the equation of {broken} {when} NaN or infinity; "
+                f"{what} {when} NaN or infinity; "
                 "look for a division by zero or a root of a negative number there"
             )
     return ""

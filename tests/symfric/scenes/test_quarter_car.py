@@ -12,9 +12,21 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from stored import stored
 
-from symfric import BrownMcPhee, Law, LuGre, Sum, Trajectory, Viscous, parameters, simulate
+from symfric import (
+    BrownMcPhee,
+    Coulomb,
+    Law,
+    LuGre,
+    SolveError,
+    Status,
+    Sum,
+    Trajectory,
+    Viscous,
+    parameters,
+    simulate,
+)
 from symfric.foundation.parameters import with_values
-from symfric.laws import QuarterCarGeneral, QuarterCarSimple
+from symfric.laws import MakkarDixon, QuarterCarGeneral, QuarterCarSimple
 from symfric.multibody import JointFriction, JointSpringDamper, Mechanism, Prismatic, UserForce
 from symfric.multibody.kinematics import Kinematics
 from symfric.scenes import QuarterCar
@@ -210,3 +222,15 @@ def test_free_stiffness_of_the_rig_is_that_of_its_law() -> None:
     f = QuarterCar(QuarterCarGeneral()).model(["k_s"]).function("signals")
     held = f(0.0, [0.0, 1e-3, 0.0, 0.0], [], [], [30000.0]).full().ravel()
     assert 30.0 in held.round(9)
+
+
+@pytest.mark.parametrize("law", [Coulomb(), MakkarDixon()], ids=["loaded", "not loaded"])
+def test_a_rig_stops_where_its_strut_cannot_reach_under_any_law(law: Law) -> None:
+    """A law that does without N went on with N = NaN in the result."""
+    rig = QuarterCar(law, k_s=636.0, k_t=159000.0, M_w=13.5, middle=1.62)
+    with pytest.raises(SolveError) as caught:
+        simulate(rig.model(), 2.0)
+    partial = caught.value.partial
+    assert caught.value.status is Status.NOT_FINITE
+    assert np.isfinite(partial["N"]).all()
+    assert abs(partial.final["x_rel"]) < 0.2844

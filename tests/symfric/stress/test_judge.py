@@ -101,3 +101,11 @@ def test_scipy_agrees_with_symfric_and_gives_up_where_it_must() -> None:
         mine = np.stack([run[v.name] for v in ready.model.x])
         assert (np.abs(states - mine) / tolerances(ready, mine)).max() < 10
     assert by_scipy(problem(Case(1, 1, "drive", "exact_coulomb"))) is None
+
+
+def test_a_polynomial_that_is_off_between_right_ends_of_steps_is_told_apart() -> None:
+    """A jump of the force moves a stuck block's creep at once; a long step leads there slowly."""
+    force = Signal("hold", (0.1, -0.1, 0.1, 0.2), (0.0, 0.2, 0.4, 0.6))
+    stuck = Case(1, 1, "drive", "andersson", {"N": 131.0, "mu_s": 19.8}, inputs={"force": force})
+    verdict = judge(replace(stuck, rtol=1e-9, method="rodas3", t_end=0.8))
+    assert (verdict.kind, verdict.group) == ("loose", "between steps only")
