@@ -1,12 +1,12 @@
-# make demo, test, check, stress: each makes its own virtual environment .venv when there is none.
-# PYTHON=... chooses the interpreter (3.11 or newer). make newest: the fast half of the tests on the
-# newest interpreter there is, with the newest NumPy, in .venv-newest.
+# make demo, test, check, stress, mutants: each makes its own virtual environment .venv when there is
+# none. PYTHON=... chooses the interpreter (3.11 or newer). make newest: the fast half of the tests on
+# the newest interpreter there is, with the newest NumPy, in .venv-newest.
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test newest check stress clean
+.PHONY: demo test newest check stress mutants clean
 
 demo: $(VENV)/.runtime
 	$(BIN)/symfric demo --out out
@@ -29,6 +29,9 @@ stress: $(VENV)/.test
 	$(BIN)/python -m pytest --hypothesis-profile stress tests/symfric/laws
 	$(BIN)/python -m pytest --recompute tests/symfric/scenes tests/symfric/integrator/test_accuracy.py
 	$(BIN)/symfric stress --cases 10000 --json out/stress.json --save out/stress_cases
+
+mutants: $(VENV)/.test
+	$(BIN)/python tests/mutants/run.py
 
 check: $(VENV)/.dev
 	$(BIN)/ruff check .

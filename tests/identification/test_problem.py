@@ -43,6 +43,8 @@ def test_gradient_and_hessian_are_exact(stage: Dataset, text: str) -> None:
     def cost(at: np.ndarray) -> float:
         return 0.5 * float(weights @ (task.residuals(at) / task.scale) ** 2) / task.rows
 
+    assert float(task.solver.get_function("nlp_f")(w, weights)) == pytest.approx(cost(w))
+
     def error(h: float) -> tuple[float, float]:
         ends = [w + h * direction, w - h * direction]
         slopes = [np.asarray(gradient(e, weights)[1].full()).ravel() for e in ends]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from motions import double_integrator, fastest, least_effort, out_and_back, stage
 
-from ocp import Problem, integral
+from ocp import Problem, at_end, integral
 from ocp.collocation import radau
 from ocp.guess import initial_points
 from ocp.transcribe import Transcription, make_mesh, transcribe
@@ -131,6 +131,18 @@ def test_a_known_motion_satisfies_all_equations() -> None:
     f, g = ca.Function("fg", [nlp.w, nlp.p], [nlp.f, nlp.g])(nlp.pack(points), [])
     np.testing.assert_allclose(g.full(), 0.0, atol=1e-12)
     assert float(f) == pytest.approx(2.0)  # a^2 over 2 s
+
+
+def test_equations_of_every_interval_are_taken_at_its_own_time() -> None:
+    """x' = t + u under u = 1: x = t^2/2 + t, whose end the cost knows."""
+    x, u, t = Variable("x", "m"), Variable("u", "1"), ca.SX.sym("t")
+    clock = Model("clock", x=(x,), u=(u,), ode=ca.SX(t + u.symbol), t=t)
+    nlp = program(Problem(clock, 2.0, at_end(lambda s: s.x**2)), 4)
+    s = 2.0 * nlp.fractions
+    points = replace(initial_points(nlp), x=(s**2 / 2 + s)[None], u=np.ones((1, 4)))
+    f, g = ca.Function("fg", [nlp.w, nlp.p], [nlp.f, nlp.g])(nlp.pack(points), [])
+    np.testing.assert_allclose(g.full(), 0.0, atol=1e-12)
+    assert float(f) == pytest.approx(16.0)
 
 
 def test_rows_of_the_constraints_are_named() -> None:

@@ -180,6 +180,10 @@ def test_shared_values_become_constant_locals():
     assert lines(s * y + s) == ["const double t1 = SF_SIN(a);", "r = t1 * b + t1;"]
 
 
+def test_a_value_that_its_user_writes_twice_becomes_a_constant_local():
+    assert lines(ca.sin(x) ** 2) == ["const double t1 = SF_SIN(a);", "r = t1 * t1;"]
+
+
 def test_shared_conditions_become_bools():
     condition = x < y
     first, second = ca.if_else(condition, x, y), ca.if_else(condition, 1, y)

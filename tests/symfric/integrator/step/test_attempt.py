@@ -119,6 +119,16 @@ def test_growth_and_shrinkage_of_a_step_are_bounded() -> None:
     assert shrunk[H] == pytest.approx(SHRINK * 1e3)
 
 
+def test_step_that_follows_a_better_one_is_the_more_careful() -> None:
+    """Gustafsson: h_next = 0.85 h min(g, (h / h_old) g^2 / g_old), g = err^(-1/5)."""
+    steady, rising = column((1.0, 1.0), h=0.03), column((1.0, 1.0), h=0.03)
+    growth = attempt(smooth_ode(), steady, rtol=1e-7)[State.GROWTH_OLD]
+    assert 1.0 < growth < 2.5
+    steady[State.GROWTH_OLD], rising[State.GROWTH_OLD] = growth, 1.5 * growth
+    ends = [attempt(smooth_ode(), before, rtol=1e-7)[H] for before in (steady, rising)]
+    assert ends == pytest.approx([0.03 * 0.85 * growth, 0.03 * 0.85 * growth / 1.5], rel=1e-12)
+
+
 @pytest.mark.parametrize("h", [1e-8, 1e-4, 1e-2])
 def test_step_never_grows_just_after_a_rejection(h: float) -> None:
     S = attempt(smooth_ode(), column((1.0, 1.0), h=h, rejected=1.0))

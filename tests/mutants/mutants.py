@@ -1,0 +1,211 @@
+"""One-line defects that the tests must see: name, file, old text, new text, tests that must fail.
+
+Where the line of a mutant is rewritten, rewrite the mutant: `tests/test_mutants.py` says so.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A defect: `old`, which stands in `file` exactly once, becomes `new`; `tests` must fail."""
+
+    name: str
+    file: str
+    old: str
+    new: str
+    tests: tuple[str, ...]
+
+
+STEP = "symfric/integrator/step/attempt.py"
+WATCH = "symfric/integrator/step/watch.py"
+EVENTS = "symfric/integrator/running/events.py"
+RUN = "symfric/integrator/running/run.py"
+INITIAL = "symfric/integrator/equations/initial.py"
+EMITTER = "symfric/codegen/emitter.py"
+TRANSCRIBE = "ocp/transcribe.py"
+
+T_STEP = ("tests/symfric/integrator/step/test_attempt.py",)
+T_WATCH = ("tests/symfric/integrator/step/test_watch.py",)
+T_EVENTS = ("tests/symfric/integrator/running/test_events.py",)
+T_EMITTER = ("tests/symfric/codegen/test_emitter.py",)
+T_TRANSCRIBE = ("tests/ocp/test_transcribe.py",)
+
+CONTROLLERS = (
+    Mutant(
+        "a step is accepted at ten times the tolerance", STEP,
+        "accept = ca.logic_and(e2 <= 1, left > 0)", "accept = ca.logic_and(e2 <= 100, left > 0)",
+        T_STEP,
+    ),
+    Mutant(
+        "the controller does not look at the step before", STEP,
+        "SAFETY * ca.fmin(growth, predicted)", "SAFETY * growth", T_STEP,
+    ),
+    Mutant(
+        "a step grows right after a rejection", STEP,
+        "ca.if_else(rejected > 0, ca.fmin(factor, 1), factor)",
+        "ca.if_else(rejected > 2, ca.fmin(factor, 1), factor)", T_STEP,
+    ),
+    Mutant(
+        "a step cut by the end forgets its size", STEP,
+        "ca.if_else(h < h_wish, ca.fmax(h_wish, h * factor), h * factor)", "h * factor", T_STEP,
+    ),
+    Mutant("Newton's method stops far too early", STEP, "KAPPA = 0.1", "KAPPA = 50.0",
+        ("tests/symfric/integrator/methods/test_radau.py",)),
+    Mutant(
+        "sliding is scaled by the faster end of a step", WATCH,
+        "smallest = ca.fmin(", "smallest = ca.fmax(", T_STEP,
+    ),
+    Mutant(
+        "a step may carry a sliding velocity far across its scale", WATCH,
+        "REACH = 4.0", "REACH = 400.0", T_WATCH,
+    ),
+    Mutant(
+        "a step that turns back within is not seen to travel", WATCH,
+        "bow = ca.fabs(half - (before + after) / 2)", "bow = 0 * half", T_WATCH,
+    ),
+    Mutant(
+        "a longest step is not kept", STEP, "h_next = ca.fmin(h_max, ", "h_next = ca.fmin(np.inf, ",
+        ("tests/symfric/integrator/test_simulate.py", "tests/symfric/integrator/running/test_run.py"),
+    ),
+    Mutant(
+        "an equation that returns NaN is accepted", STEP,
+        "e2 = ca.if_else(sound, e2, 1e20)", "e2 = ca.if_else(sound, e2, 0)", T_STEP,
+    ),
+)  # fmt: skip
+
+EVENT = (
+    Mutant(
+        "a falling event fires on the way up", EVENTS,
+        "(before < 0) & (after >= 0) & (directions >= 0)", "(before < 0) & (after >= 0)", T_EVENTS,
+    ),
+    Mutant(
+        "a step is looked at at its ends only", EVENTS,
+        "LOOKS = np.array([0.0, 0.25, 0.5, 0.75, 1.0])", "LOOKS = np.array([0.0, 1.0])", T_EVENTS,
+    ),
+    Mutant(
+        "an expression that a jump leaves at zero counts as passed", EVENTS,
+        "jumped = passed(integrator, old, new) & (new != 0)",
+        "jumped = passed(integrator, old, new)", T_EVENTS,
+    ),
+    Mutant(
+        "what happens together happens one by one", EVENTS,
+        "if (root - theta) * h <= tolerance", "if root < theta", T_EVENTS,
+    ),
+    Mutant(
+        "the dense output of a cut step is not rescaled", EVENTS,
+        "powers *= s ** np.arange(rows + 2)[:, None]", "powers *= s", T_EVENTS,
+    ),
+    Mutant(
+        "an event fires again at once", RUN,
+        "old[list(which)] = np.nan", "old[list(which)] *= 1.0", T_EVENTS,
+    ),
+)  # fmt: skip
+
+FITS: tuple[Mutant, ...] = (
+    Mutant(
+        "block errors are too small", "identification/precision.py",
+        "* BLOCKS / (BLOCKS - 1))", "/ BLOCKS)", ("tests/identification/test_precision.py",),
+    ),
+    Mutant(
+        "parameters that data cannot tell apart count as determined",
+        "identification/precision.py", "RANK = 1e-7", "RANK = 1e-30",
+        ("tests/identification/test_precision.py",),
+    ),
+    Mutant(
+        "a parameter at its bound is not held", "identification/precision.py",
+        "kept = ~held & ~lost", "kept = ~lost", ("tests/identification/test_precision.py",),
+    ),
+    Mutant(
+        "the weights of a fit do nothing", "identification/problem.py",
+        "cost = ca.dot(c, r**2) / (2 * rows)", "cost = ca.dot(r, r) / (2 * rows)",
+        ("tests/identification/test_problem.py",),
+    ),
+    Mutant(
+        "the Hessian of a fit forgets the curvature of the law", "identification/problem.py",
+        "curvature -= bends(", "curvature -= 0 * bends(",
+        ("tests/identification/test_problem.py",),
+    ),
+    Mutant(
+        "Coulomb friction and offset are one column", "identification/regress.py",
+        '"offset": np.ones_like(v)', '"offset": sign', ("tests/identification/test_regress.py",),
+    ),
+)  # fmt: skip
+
+CONSISTENT = (
+    Mutant(
+        "members go on without a look at the residual", INITIAL,
+        "good = np.isfinite(size) & (near | (norm < before[todo]))", "good = np.isfinite(size)",
+        ("tests/symfric/integrator/equations/test_initial.py",),
+    ),
+    Mutant(
+        "unknowns stop while Newton's steps are still large", INITIAL,
+        "NEAR, CONVERGED = 1e-4, 1e-10", "NEAR, CONVERGED = 1e-1, 1e-2",
+        ("tests/symfric/integrator/equations/test_initial.py",),
+    ),
+)  # fmt: skip
+
+TRANSCRIPTION = (
+    Mutant(
+        "equations are taken at the point before", TRANSCRIBE,
+        "time = t + scheme.nodes[j + 1] * h", "time = t + scheme.nodes[j] * h", T_TRANSCRIBE,
+    ),
+    Mutant(
+        "the integral cost has the weights of another point", TRANSCRIBE,
+        "cost += h * scheme.weights[j] * running", "cost += h * scheme.weights[-j] * running",
+        T_TRANSCRIBE,
+    ),
+    Mutant(
+        "points on the way are not bounds", TRANSCRIBE,
+        "for fraction in (0.0, *problem.via, 1.0):", "for fraction in (0.0, 1.0):", T_TRANSCRIBE,
+    ),
+    Mutant(
+        "the cost at the end is left out", TRANSCRIBE,
+        "f += end_cost(problem, scheme)(T, blocks[:, -1], p)",
+        "f += 0 * end_cost(problem, scheme)(T, blocks[:, -1], p)", T_TRANSCRIBE,
+    ),
+    Mutant(
+        "intervals start where the one before starts", TRANSCRIBE,
+        "T * ca.DM(mesh[:-1]).T", "T * ca.DM(mesh[1:]).T", T_TRANSCRIBE,
+    ),
+)  # fmt: skip
+
+EMIT = (
+    Mutant(
+        "operands lose their parentheses", EMITTER,
+        "return self.text if self.binds >= least else", "return self.text if True else", T_EMITTER,
+    ),
+    Mutant(
+        "the parts of a conditional change places", "symfric/codegen/graph.py",
+        "return Node(SELECT, (yes.args[0], yes.args[1], no.args[1]))",
+        "return Node(SELECT, (yes.args[0], no.args[1], yes.args[1]))",
+        ("tests/symfric/codegen/test_graph.py",),
+    ),
+    Mutant(
+        "a shared value is written out each time", EMITTER,
+        "(uses[i] > 1 or long)", "long", T_EMITTER,
+    ),
+    Mutant(
+        "locals take the names of arguments", EMITTER,
+        'stem += "_"', "break", T_EMITTER,
+    ),
+    Mutant(
+        "a pattern that repeats its operand counts once", EMITTER,
+        "found[i] += max(repeats, 1)", "found[i] += 1", T_EMITTER,
+    ),
+    Mutant(
+        "a bool stands where a number is meant", EMITTER,
+        "if not value.logical:\n        return value", "if True:\n        return value", T_EMITTER,
+    ),
+    Mutant(
+        "a parameter that spares a function stays variable", "symfric/codegen/folding.py",
+        ">= least", ">= 0", ("tests/symfric/codegen/test_folding.py",),
+    ),
+    Mutant(
+        "a held step goes beyond its place of rest", "symfric/codegen/held_step.py",
+        "ca.logic_and(ratio > 0, ratio < 1)", "ca.logic_and(ratio > 0, ratio < 0)",
+        ("tests/symfric/codegen/test_held_step.py",),
+    ),
+)  # fmt: skip
+
+MUTANTS = (*CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT)
