@@ -27,6 +27,7 @@ TRANSCRIBE = "ocp/transcribe.py"
 
 T_STEP = ("tests/symfric/integrator/step/test_attempt.py",)
 T_WATCH = ("tests/symfric/integrator/step/test_watch.py",)
+T_SIMULATE = ("tests/symfric/integrator/test_simulate.py",)
 T_EVENTS = ("tests/symfric/integrator/running/test_events.py",)
 T_EMITTER = ("tests/symfric/codegen/test_emitter.py",)
 T_TRANSCRIBE = ("tests/ocp/test_transcribe.py",)
@@ -54,7 +55,7 @@ CONTROLLERS = (
         ("tests/symfric/integrator/methods/test_radau.py",)),
     Mutant(
         "sliding is scaled by the faster end of a step", WATCH,
-        "smallest = ca.fmin(", "smallest = ca.fmax(", T_STEP,
+        "smallest = ca.fmin(", "smallest = ca.fmax(", T_WATCH,
     ),
     Mutant(
         "a step may carry a sliding velocity far across its scale", WATCH,
@@ -66,7 +67,7 @@ CONTROLLERS = (
     ),
     Mutant(
         "a longest step is not kept", STEP, "h_next = ca.fmin(h_max, ", "h_next = ca.fmin(np.inf, ",
-        ("tests/symfric/integrator/test_simulate.py", "tests/symfric/integrator/running/test_run.py"),
+        T_SIMULATE,
     ),
     Mutant(
         "an equation that returns NaN is accepted", STEP,

@@ -53,6 +53,15 @@ def watch(before: float, half: float, after: float, scale: float = 1.0) -> Watch
     return Watch(*(ca.DM([x]) for x in (before, half, after, scale)), change, 1)
 
 
+def test_an_error_of_slip_is_measured_by_the_slower_end_of_a_step() -> None:
+    """e / (rtol (w + min|s|)): here 1e-6 / (1e-3 (0.5 + 2))."""
+    y, e = ca.SX.sym("y"), ca.SX.sym("e")
+    same = ca.Function("change", [y, e, ca.SX.sym("d", 0)], [e])
+    for before, after in ((-2.0, 10.0), (10.0, 2.0)):
+        slip = Watch(*(ca.DM([x]) for x in (before, 0.0, after, 0.5)), same, 1)
+        assert float(slip.error(0.0, 1e-6, [], 1e-3)) == pytest.approx((1e-6 / 2.5e-3) ** 2)
+
+
 @pytest.mark.parametrize(
     ("before", "half", "after", "travel", "nearest"),
     [
