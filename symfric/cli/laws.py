@@ -10,13 +10,13 @@ import typer
 
 from symfric import ALL_LAWS, parameters
 from symfric.cli import output
-from symfric.cli.options import JsonOption, PlotOption, SetOption, any_with, check_outputs
+from symfric.cli.options import JsonOption, PlotOption, SetOption, all_with, any_with, check_outputs
 from symfric.figures import FIGURES, FigureData, compare
 from symfric.figures.requirements import parts, phenomena
 from symfric.figures.scales import NORMAL_FORCE
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
-from symfric.laws import PHENOMENA, POPULATIONS, AnyLaw, Population, any_from_text
+from symfric.laws import PHENOMENA, POPULATIONS, AnyLaw, Population
 from symfric.laws.cost import cost
 from symfric.laws.names import ALIASES
 from symfric.scenes import ALL_SCENES
@@ -46,7 +46,8 @@ def laws(
 
     In full: equation, limits, source, parameters with units and bounds, and a picture. With
     --figure or --compare its behaviour instead, computed as in the papers; --figure takes
-    scenes such as rabinowicz, too.
+    scenes such as rabinowicz, too. --set then holds for every law that is compared, and
+    --set gms.C=10 for one of them.
 
     Example: symfric laws gms --figure hysteresis --compare lugre --plot loops.png
     """
@@ -94,7 +95,7 @@ def behaviour(
         if normal_force is None
         else checks.number("--normal-force", normal_force, unit="N", above=0.0)
     )
-    chosen = [any_with(name, settings), *map(any_from_text, others)]
+    chosen = all_with([name, *others], settings)
     with output.progress(f"{scenario} of {', '.join([name, *others])}"):
         data = compare(chosen, scenario, load)
     if plot:

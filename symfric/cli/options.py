@@ -1,6 +1,6 @@
 """Options that several commands share, and what their texts mean."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, TypeVar
@@ -71,6 +71,37 @@ def law_with(text: str, settings: Iterable[str] | None) -> Law:
 def any_with(text: str, settings: Iterable[str] | None) -> AnyLaw:
     """The law or population that `text` names, with the parameters and options of `--set`."""
     return _set(any_from_text(text), text, settings)
+
+
+def all_with(texts: Sequence[str], settings: Iterable[str] | None) -> list[AnyLaw]:
+    """The laws that `texts` name, all with the parameters and options of `--set`.
+
+    `LAW.NAME=VALUE` sets the parameter of one of them only.
+
+    Raises:
+        ValueError: a name that one of them does not have; it says which.
+    """
+    laws = [(text, any_from_text(text)) for text in texts]
+    chosen: list[dict[str, str]] = [{} for _ in laws]
+    lacking: list[str] = []
+    given = assignments("--set", settings)
+    for name in sorted(given, key=lambda name: "." in name):  # what is for one law comes last
+        only, _, own = name.rpartition(".")
+        check_names(f"--set {name}", [only] if only else [], texts)
+        for (text, law), values in zip(laws, chosen, strict=True):
+            if only in ("", text):
+                values[own] = given[name]
+            if not only and own not in {*parameters(law), *options(law)}:
+                lacking.append(f"{own}, which {text} does not have")
+    if lacking and len(laws) > 1:
+        raise ValueError(
+            f"--set: expected what {' and '.join(texts)} all have, got {'; '.join(lacking)}; "
+            f"--set {texts[0]}.NAME=VALUE is for one law"
+        )
+    return [
+        _set(law, text, [f"{name}={value}" for name, value in values.items()])
+        for (text, law), values in zip(laws, chosen, strict=True)
+    ]
 
 
 def _set(law: L, text: str, settings: Iterable[str] | None) -> L:

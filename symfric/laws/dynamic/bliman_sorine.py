@@ -24,7 +24,8 @@ class BlimanSorine(Law):
     N [mu_1 (1 - exp(-s_p/(eta s_f))) - mu_2 (1 - exp(-s_p/s_f))].
     order = "1" keeps F_1 alone, with mu_2 = 0 and the path eta s_f: that is `Dahl`.
     Limits: steady state (mu_1 - mu_2) N sign(v), no Stribeck effect in steady sliding; initial
-    stiffness N (mu_1/eta - mu_2)/s_f. Weakly damped at velocity reversals; dissipative for the
+    stiffness N (mu_1/eta - mu_2)/s_f. Weakly damped at velocity reversals, so that a block on
+    a belt rings, and its break-away magnifies errors; dissipative for the
     default set, not for every one. |v| is smooth over v_eps, as in `LuGre`.
     Source: Bliman and Sorine, Proc. European Control Conf. 1995; Olsson et al., Eur. J. Control 4,
     1998.
@@ -50,7 +51,7 @@ class BlimanSorine(Law):
         1e-5, unit="m", role="length", doc="path constant of the slow part", lower=1e-15
     )
     v_eps: Scalar = param(
-        1e-9, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
+        1e-15, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
     )
     order: str = option("2", choices=("1", "2"), doc="number of states")
 
@@ -61,8 +62,12 @@ class BlimanSorine(Law):
 
     @property
     def velocity_scale(self) -> Scalar:
-        """None: the force depends on the path alone."""
-        return inf
+        """One path constant a second [m/s]; none without the peak of order 2.
+
+        The force depends on the path alone. But a contact that rings under its peak breaks away
+        by the phase in which it meets the peak, and error control must resolve the ringing.
+        """
+        return self.s_f if self.order == "2" else inf
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

@@ -35,7 +35,7 @@ class Bristle(Law):
     sigma_1: Scalar = param(190.0, unit="N s/m", role="damping", doc="bristle damping", lower=0.0)
     sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
     v_eps: Scalar = param(
-        1e-9, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
+        1e-15, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
     )
 
     @property

@@ -41,7 +41,7 @@ class Dahl(Law):
     )
     n: Scalar = param(1.0, unit="1", role="shape", doc="exponent", lower=0.0, upper=10.0)
     v_eps: Scalar = param(
-        1e-9, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
+        1e-15, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
     )
     rho_eps: Scalar = param(
         1e-6, unit="1", role="width", doc="smoothing of |rho|, for n != 1", lower=1e-12

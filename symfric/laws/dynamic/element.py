@@ -2,9 +2,23 @@
 
 from collections.abc import Callable
 
+from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, sqrt
+from symfric.foundation.parameters import Parametric
 from symfric.foundation.vector import ROUND, Vector, Vectors
 from symfric.laws.base import smooth
+from symfric.laws.base.law import Law
+
+
+def check_elements(law: Law, kind: type[Parametric]) -> None:
+    """Refuse a law without elements, or with elements of another kind, and make them a tuple."""
+    where, one = f"{type(law).__name__}: elements", f"{kind.__name__}()"
+    elements = checks.many(where, vars(law)["elements"], f"elements, such as {one}")
+    if not elements:
+        raise checks.refused(where, f"at least one element, such as {one}", elements)
+    for element in elements:
+        checks.kind(where, element, kind, f"an element, such as {one}")
+    object.__setattr__(law, "elements", elements)
 
 
 def along(t: Vector, s: Vector) -> Scalar:

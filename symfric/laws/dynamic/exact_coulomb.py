@@ -15,8 +15,8 @@ from symfric.laws.base.sticking import Sticking, carried, stick_and_slip
 class ExactCoulomb(Sticking):
     """Set-valued Coulomb friction with a static level, by modes (one state).
 
-        slip: F = mu_d N mode,  mode = sign(v)
-        stick: F = F_e,  mode = 0,  until |F_e| = mu_s N
+        F = mu_d N mode    slip, mode = sign(v), until v passes through zero
+        F = F_e            stick, mode = 0, until |F_e| = mu_s N
 
     F_e is the applied force: what the contact must carry for no acceleration. Sliding ends where
     v passes through zero; the contact sticks there if it can, or slides on to the other side. This

@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, column, exp
 from symfric.foundation.parameters import Parametric, option, param
 from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, Law, State, Switch
-from symfric.laws.dynamic.element import ahead, stretched
+from symfric.laws.dynamic.element import ahead, check_elements, stretched
 
 
 @final
@@ -81,7 +80,7 @@ class GMS(Law):
     )
     sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
     v_eps: Scalar = param(
-        1e-9, unit="m/s", role="width", doc="smoothing velocity of sign(v)", lower=1e-15
+        1e-15, unit="m/s", role="width", doc="smoothing velocity of sign(v)", lower=1e-15
     )
     rho: Scalar = param(
         0.03, unit="1", role="shape", doc="share over which slip sets in", lower=1e-6, upper=0.5
@@ -89,12 +88,7 @@ class GMS(Law):
     form: str = option("smooth", choices=("smooth", "event"), doc="latched, or exact with modes")
 
     def __post_init__(self) -> None:
-        elements = checks.many("GMS: elements", self.elements, "Element(...)")
-        for element in elements:
-            checks.kind("GMS: elements", element, Element, "Element(...)")
-        if not elements:
-            raise ValueError("GMS: elements: expected at least one, got none")
-        object.__setattr__(self, "elements", elements)
+        check_elements(self, Element)
         super().__post_init__()
 
     @property

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from symfric.foundation.numeric import Scalar, column, equals, exp
+from symfric.foundation.numeric import Scalar, column, equals, exp, expm1
 from symfric.foundation.parameters import param
+from symfric.foundation.vector import TINY
 from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, Law, State
 
@@ -101,10 +102,14 @@ class Gonthier(Law):
         return smooth.hold(bristle, self._level(N, z[1]) + rounding, rounding) + self.sigma_2 * v
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Dwell memory s(v), and the deflection F_C dir/sigma_0 at which the force is at its limit.
+        """Dwell memory s(v), and the deflection at which the force stays.
 
-        Above 6 v_s both rest, to rounding. In creep the deflection goes on growing, to
-        sigma_1 v s/(1 - s)/sigma_0 more, which adds less than kappa F_C to the saturated force.
+        dz/dt vanishes at sigma_0 z = F_C dir + sigma_1 v s/(1 - s). In creep that is far beyond
+        the level F_C, at which the saturated force is reached: the deflection stands there, and
+        goes on growing without effect on the force but for kappa F_C.
         """
-        s = self._sticking(v)
-        return column(self._level(N, s) / self.sigma_0 * self._direction(v), s)
+        s, x = self._sticking(v), v / self.v_s
+        F_C = self._level(N, s)
+        creep = self.sigma_1 * self.v_s * s * x / (TINY - expm1(-x * x))
+        z = smooth.clip(F_C * self._direction(v) + creep, -F_C, F_C) / self.sigma_0
+        return column(z, s)

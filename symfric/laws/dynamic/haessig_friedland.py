@@ -56,7 +56,7 @@ class HaessigFriedland(Law):
         0.05, unit="1", role="shape", doc="share over which excess is lost", lower=1e-6, upper=1
     )
     v_eps: Scalar = param(
-        1e-9, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
+        1e-15, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
     )
     r_eps: Scalar = param(
         1e-8, unit="1", role="width", doc="smoothing of the load share", lower=1e-12

@@ -7,7 +7,7 @@ from symfric.foundation.numeric import Scalar, column, is_number
 from symfric.foundation.parameters import param
 from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, Law, State
-from symfric.laws.dynamic.element import yielding
+from symfric.laws.dynamic.element import check_elements, yielding
 from symfric.laws.dynamic.maxwell_slip import Slider
 
 SLIDERS = (Slider(5e4, 0.05), Slider(2.5e4, 0.05), Slider(1.5e4, 0.05), Slider(1e4, 0.05))
@@ -63,13 +63,14 @@ class Leuven(Law):
         20.0, unit="1", role="shape", doc="sharpness of the yielding", lower=1.0, upper=1e3
     )
     v_eps: Scalar = param(
-        1e-9, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
+        1e-15, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
     )
     r_eps: Scalar = param(
         1e-8, unit="1", role="width", doc="smoothing of the load shares", lower=1e-12
     )
 
     def __post_init__(self) -> None:
+        check_elements(self, Slider)
         super().__post_init__()
         shares = [e.mu for e in self.elements]
         if all(map(is_number, (*shares, self.mu_s))) and sum(shares) < self.mu_s:

@@ -22,9 +22,10 @@ class LuGre(Bristle):
     `z` is the mean bristle deflection [m].
     Limits: steady state g sign(v) + sigma_2 v; drifts under vibration. |v| is smooth over v_eps
     and exactly zero at rest; v_eps = 0 is the original with a kink at v = 0, for which
-    |z| <= mu_s N / sigma_0 is invariant. Keep v_eps ten times below the creep while sticking, the
-    loading rate over sigma_0 (on a belt k v_belt / sigma_0): at more, the bristle stretches on
-    instead of breaking away and stick-slip comes out wrong without a sign of it. Passive from v
+    |z| <= mu_s N / sigma_0 is invariant. A bristle under a creep below v_eps does not relax: it
+    stretches on instead of breaking away. The creep of a contact that sticks is the loading rate
+    over sigma_0, on a belt k v_belt / sigma_0; the default is below it on belts of 1e-9 m/s and
+    more. Keep another one ten times below. Passive from v
     to F only if sigma_2 >= sigma_1 (mu_s - mu_d) / mu_d, which the default set does not meet:
     after a jump in v the force may point forward for an instant. Not valid for N = 0 or a
     fast-varying N, since the deflection does not shrink with the load.

@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, column
 from symfric.foundation.parameters import Parametric, option, param
 from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, Law, State, Switch
-from symfric.laws.dynamic.element import stretched, yielding
+from symfric.laws.dynamic.element import check_elements, stretched, yielding
 
 
 @final
@@ -60,7 +59,7 @@ class MaxwellSlip(Law):
         20.0, unit="1", role="shape", doc="sharpness of the yielding", lower=1.0, upper=1e3
     )
     v_eps: Scalar = param(
-        1e-9, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
+        1e-15, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
     )
     r_eps: Scalar = param(
         1e-8, unit="1", role="width", doc="smoothing of the load share", lower=1e-12
@@ -68,12 +67,7 @@ class MaxwellSlip(Law):
     form: str = option("smooth", choices=("smooth", "event"), doc="rounded, or exact with modes")
 
     def __post_init__(self) -> None:
-        elements = checks.many("MaxwellSlip: elements", self.elements, "Slider(...)")
-        for element in elements:
-            checks.kind("MaxwellSlip: elements", element, Slider, "Slider(...)")
-        if not elements:
-            raise ValueError("MaxwellSlip: elements: expected at least one, got none")
-        object.__setattr__(self, "elements", elements)
+        check_elements(self, Slider)
         super().__post_init__()
 
     @property

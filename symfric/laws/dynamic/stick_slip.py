@@ -58,7 +58,7 @@ class StickSlip(Law):
         20.0, unit="1", role="shape", doc="sharpness of the yielding", lower=1.0, upper=1e3
     )
     v_eps: Scalar = param(
-        1e-9, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
+        1e-15, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
     )
     r_eps: Scalar = param(
         1e-8, unit="1", role="width", doc="smoothing of the deformation", lower=1e-12

@@ -178,12 +178,21 @@ def corrected_shape_factor(
         convergence linear; the closed form has no such limit.
 
     Raises:
-        ValueError: ratio outside 0 ... 1, or no convergence within `max_iterations`.
+        ValueError: ratio outside 0 ... 1; theta outside 0 ... pi/2, or so small that C would be
+            beyond 2, where friction reverses in fast sliding; no convergence within
+            `max_iterations`.
     """
     if not 0.0 <= ratio <= 1.0:
         raise ValueError(
             f"corrected_shape_factor: expected 0 <= mu_d/mu_s <= 1, got {ratio:g}; "
             "the dynamic level cannot exceed the static one"
+        )
+    least = (pi - asin_of_float(ratio)) / 2
+    if not least * (1 - 1e-15) <= theta <= pi / 2:
+        raise ValueError(
+            f"corrected_shape_factor: expected {least:.6g} <= theta <= pi/2 for mu_d/mu_s = "
+            f"{ratio:g}, got {theta:g}; below, C is beyond 2 and friction reverses in fast "
+            "sliding; a larger v_d or B widens theta"
         )
     shape, error = pi / theta, inf
     for iteration in range(max_iterations):

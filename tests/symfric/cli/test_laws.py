@@ -139,13 +139,15 @@ def test_a_figure_is_drawn_summarised_and_given_as_data(
     assert data["units"]["x"] == "m"
 
 
-def test_compared_laws_are_overlaid_with_the_settings_of_the_first(
+def test_settings_hold_for_all_compared_laws_or_for_the_named_one(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    data = described(capsys, "lugre", "--set", "mu_s=0.3", "--compare", "lugre", "--compare", "gms")
-    assert [curve["law"] for curve in data["curves"]] == ["lugre_1", "lugre_2", "gms"]
+    """They changed the first one only, without a word."""
+    settings = ("--set", "mu_s=0.3", "--set", "gms.mu_s=0.2")
+    data = described(capsys, "lugre", *settings, "--compare", "elasto_plastic", "--compare", "gms")
+    assert [curve["law"] for curve in data["curves"]] == ["lugre", "elasto_plastic", "gms"]
     tops = [max(curve["columns"]["F"]) for curve in data["curves"]]
-    assert tops == pytest.approx([0.3 * 7.848, 0.15 * 7.848, 0.15 * 7.848], rel=1e-3)
+    assert tops == pytest.approx([0.3 * 7.848, 0.3 * 7.848, 0.2 * 7.848], rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -155,6 +157,11 @@ def test_compared_laws_are_overlaid_with_the_settings_of_the_first(
         (["coulomb", "--figure", "lag"], "lag of coulomb: expected a law that shows"),
         (["--figure", "lag"], "expected the name of a law before it"),
         (["lugre", "--compare", "lugrr"], "did you mean lugre?"),
+        (
+            ["lugre", "--compare", "coulomb", "--set", "v_s=1"],
+            "got v_s, which coulomb does not have; --set lugre.NAME=VALUE is for one law",
+        ),
+        (["lugre", "--compare", "coulomb", "--set", "gms.C=1"], "--set gms.C: expected one of"),
         (
             ["lugre", "--figure", "lag", "--normal-force", "0"],
             "--normal-force: expected a number > 0 [N], got 0.0",

@@ -15,6 +15,14 @@ def test_lugre_drifts_and_the_elasto_plastic_law_does_not() -> None:
     assert data["LuGre"]["x"][-1] > 1e-4
 
 
+def test_the_vibration_starts_from_rest() -> None:
+    """The elasto-plastic law "drifted" 9 cm at data where the push goes on for a second."""
+    given = {"mu_s": 1.05, "mu_d": 0.2, "v_s": 98e-6, "delta": 0.78, "sigma_0": 1.6e5}
+    data = drift(ElastoPlastic(z_ba=0.61e-6, sigma_1=0.08, **given), N=1.0)
+    assert np.ptp(data.curves[0]["x"]) < 2e-6
+    assert drift(LuGre(sigma_1=0.08, **given), N=1.0).curves[0]["x"][-1] > 1e-5
+
+
 def test_drift_of_lugre_is_that_of_an_independent_integration() -> None:
     assert drift(LuGre())["lugre"]["x"][-1] == pytest.approx(2.43e-4, rel=5e-3)  # SciPy's LSODA
 

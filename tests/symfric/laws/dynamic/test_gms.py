@@ -7,7 +7,7 @@ from oracles import stribeck_curve
 from rigs import prescribed_motion, through
 
 from symfric import Trajectory, simulate
-from symfric.laws import GMS, Element, MaxwellSlip, Slider
+from symfric.laws import GMS, Element, Leuven, MaxwellSlip, Slider, Viscous
 
 YIELDS = [0.2e-6, 0.5e-6, 1.0e-6, 1.6e-6]
 POINTS = [0.0, 1.5e-6, 0.5e-6, 1.0e-6, 0.5e-6, -0.2e-6]
@@ -149,3 +149,14 @@ def test_shares_are_divided_by_their_sum() -> None:
         GMS((Element(1e5, 0.25), Element(2e4, 0.75))),
     )
     assert one.steady_state(0.1, 8.0) == pytest.approx(other.steady_state(0.1, 8.0))
+
+
+def test_laws_of_elements_want_some_of_their_kind() -> None:
+    """`GMS(elements=())` failed only when it was run."""
+    for kind, one in ((GMS, "Element"), (MaxwellSlip, "Slider"), (Leuven, "Slider")):
+        for elements in ((), [], (1.0,), Viscous(), None, (Viscous(),)):
+            with pytest.raises(
+                ValueError, match=rf"{kind.__name__}: elements: .*such as {one}\(\)"
+            ):
+                kind(elements=elements)  # type: ignore[arg-type]
+    assert GMS(elements=[Element()]).elements[0].k == 1e5  # type: ignore[arg-type]

@@ -76,3 +76,19 @@ def test_long_dwell_constant_lowers_the_reach() -> None:
 def test_direction_velocity_above_the_stribeck_velocity_is_refused() -> None:
     with pytest.raises(ValueError, match=r"v_d < v_s, got v_d = 0.001 and v_s = 1e-05"):
         Gonthier(v_d=1e-3, v_s=1e-5)
+
+
+def test_steady_state_is_what_long_creep_ends_in() -> None:
+    """Below v_d it was 0.178 N at 1e-5 m/s where the law goes on to 1.178 N."""
+    law = Gonthier()
+    for v in (1e-5, -5e-5, 2e-4, 1e-2):
+        model = prescribed_motion(law, LOAD, lambda t, v=v: ca.SX(v) + 0 * t)
+        rest = {"z": 0.0, "s_dw": 1.0}
+        run = simulate(model, 2.0 + 3e-5 / abs(v), x0=rest, rtol=1e-8, samples=2)
+        force = law.force(v, LOAD, law.steady_state(v, LOAD))
+        assert force == pytest.approx(run.final["friction"], rel=2 * law.kappa)
+    stiff = Gonthier(sigma_1=1e-9)  # without damping the bristle rests on the printed branch
+    assert stiff.force(5e-5, LOAD, stiff.steady_state(5e-5, LOAD)) == pytest.approx(
+        0.15 * LOAD * 0.6875, rel=1e-2
+    )
+    assert (law.steady_state(0.0, LOAD)[0], law.force(0.0, LOAD, np.array([0.0, 1.0]))) == (0, 0)

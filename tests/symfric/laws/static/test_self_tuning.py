@@ -89,6 +89,15 @@ def test_impossible_ratio_is_refused(ratio: float) -> None:
         corrected_shape_factor(ratio)
 
 
+def test_angle_for_which_friction_would_reverse_is_refused() -> None:
+    """C = 2.18 was returned for theta = 1.2: friction that drives at high speed."""
+    for theta in (1.2, 0.0, -1.0, 2.0):
+        with pytest.raises(ValueError, match=r"expected 1\.309 <= theta <= pi/2 .* got"):
+            corrected_shape_factor(0.5, theta=theta)
+    assert corrected_shape_factor(0.5, theta=1.309)[0] <= 2.0
+    assert sin(corrected_shape_factor(0.5, theta=1.31)[0] * pi / 2) > 0
+
+
 def test_missing_convergence_is_reported_with_the_closed_form() -> None:
     with pytest.raises(ValueError, match=r"within 3 iterations, got residual .* C = 1\.40967"):
         corrected_shape_factor(0.8, max_iterations=3)
