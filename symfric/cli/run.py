@@ -225,6 +225,7 @@ def to_dict(law: str, scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
         "statistics": trajectory.statistics.to_dict(),
         "t_end": float(trajectory.t[-1]),
         "final": trajectory.final,
+        "extremes": trajectory.extremes,
     } | books
 
 
@@ -258,8 +259,8 @@ def show_trajectory(law: str, trajectory: Trajectory) -> None:
     output.show_table(
         ["signal", "final", "least", "greatest", "unit"],
         [
-            (name, float(y[-1]), float(y.min()), float(y.max()), trajectory.units[name])
-            for name, y in ((name, trajectory[name]) for name in names)
+            (name, trajectory.final[name], *trajectory.extremes[name], trajectory.units[name])
+            for name in names
         ],
         title=f"{trajectory.scene} with {law}, 0 ... {trajectory.t[-1]:g} s",
     )

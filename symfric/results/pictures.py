@@ -42,7 +42,7 @@ def plot_trajectories(
     figure, axes = panels(len(shown))
     for axis, name in zip(axes, shown, strict=True):
         for label, trajectory in trajectories.items():
-            axis.plot(trajectory.t, trajectory[name], label=label, linewidth=1.2)
+            axis.plot(trajectory.looks, trajectory.at_looks(name), label=label, linewidth=1.2)
         axis.set_ylabel(f"{name} [{first.unit(name)}]")
     axes[0].set_title(first.scene, loc="left")
     if list(trajectories) != [first.scene]:
@@ -80,9 +80,14 @@ def _grouped(trajectories: "Mapping[str, Trajectory]", shown: Sequence[str]) -> 
                 label = name if style == "-" else None
                 dots = title == CONSTRAINTS
                 axis.plot(
-                    trajectory.t, trajectory[name], "." if dots else style, color=f"C{k % 10}",
-                    label=label, linewidth=1.1, markersize=1.5,
-                )  # fmt: skip
+                    trajectory.t if dots else trajectory.looks,
+                    trajectory[name] if dots else trajectory.at_looks(name),
+                    "." if dots else style,
+                    color=f"C{k % 10}",
+                    label=label,
+                    linewidth=1.1,
+                    markersize=1.5,
+                )
         if title == CONSTRAINTS:
             axis.set_yscale("log", nonpositive="mask")
         axis.set_ylabel(title)

@@ -20,6 +20,7 @@ from symfric.foundation.status import Status
 from symfric.foundation.symbols import strays
 from symfric.model import Model
 from symfric.results.energy import EnergyBalance, energy_balance, integrals
+from symfric.results.extremes import extremes, looks
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -107,6 +108,29 @@ class Trajectory:
     def signals(self) -> dict[str, Array]:
         """Name -> values at `t`, shape (n,): states, algebraic variables, inputs, outputs."""
         return self.evaluate(self.t)
+
+    @cached_property
+    def looks(self) -> Array:
+        """Times [s] that show every accepted step, however short, and `t`, shape (k,)."""
+        jumps = np.array([time for time, _ in self.happened], dtype=float)
+        return looks(self.t, self.steps, jumps)
+
+    @cached_property
+    def _looked(self) -> dict[str, Array]:
+        return self.evaluate(self.looks)
+
+    def at_looks(self, name: str) -> Array:
+        """A signal or detail at `looks`: what pictures show."""
+        self.check([name])
+        if name in self._looked:
+            return self._looked[name]
+        return self.of(self.model.expression(name), self.looks)
+
+    @cached_property
+    def extremes(self) -> dict[str, tuple[float, float]]:
+        """Name -> least and greatest value of a signal over all accepted steps."""
+        found = extremes(self.looks, self._looked, self.evaluate)
+        return {name: (float(low), float(high)) for name, (low, high) in found.items()}
 
     @cached_property
     def _own_states(self) -> dict[str, Array]:

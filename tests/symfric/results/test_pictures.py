@@ -38,8 +38,8 @@ def test_trajectory_plots_a_labelled_panel_per_signal(runs: dict[str, Trajectory
     assert axes[-1].get_xlabel() == "t [s]"
     assert "rabinowicz" in (axes[0].get_title(), axes[0].get_title(loc="left"))
     line = axes[1].lines[0]
-    assert line.get_xdata() == pytest.approx(runs["lugre"].t)
-    assert line.get_ydata() == pytest.approx(runs["lugre"]["v"])
+    assert line.get_xdata() == pytest.approx(runs["lugre"].looks)
+    assert line.get_ydata() == pytest.approx(runs["lugre"].at_looks("v"))
 
 
 def test_chosen_signals_in_the_chosen_order(runs: dict[str, Trajectory]) -> None:
