@@ -2,9 +2,10 @@
 
     minimise 1/2 sum_s sum_i ((y_s(t_i; p) - measured_s(t_i)) / scale_s)^2
 
-by Levenberg's and Marquardt's method with the derivatives of the steps that the simulation took.
-It takes what `identify` does not: laws with states, several bodies, friction from reactions.
-Source: J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630, 1978.
+by Levenberg's and Marquardt's method (`identification.descent`) with the derivatives of the steps
+that the simulation took. It takes what `identify` does not: laws with states, several bodies,
+friction from reactions. Parameters that cannot be negative are fitted by their logarithm, because
+nobody knows their scale (a bristle's stiffness may be 1e3 or 1e8 N/m); the others by their value.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -12,9 +13,10 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from identification.data import Array
+from identification.descent import Descent, Point, descend
 from identification.precision import precision
 from identification.result import Estimate
 from symfric.foundation import checks
@@ -24,11 +26,11 @@ from symfric.integrator import Input, Trajectory, simulate
 from symfric.model import Model, check_model
 
 AT_BOUND = 1e-9
-"""Distance to a bound, relative to the parameter's scale, below which it stands there."""
-GAIN = 1e-10
-"""Expected relative fall of the cost below which nothing is left to gain."""
-STUCK = 1e12
-"""Damping beyond which no step lowers the cost."""
+"""Distance to a bound, relative to the parameter's start or nominal value, that is none."""
+ROUNDING = 10.0
+"""Error of a simulated signal over rtol times its size, for which the fit is prepared."""
+CORRELATED = 0.5
+"""Correlation of what is left from one sample to the next that is worth a sentence."""
 
 
 @final
@@ -42,7 +44,8 @@ class MotionFit:
         undetermined: groups of parameters that the data cannot tell apart.
         errors: signal -> root mean square of what is left, in the signal's unit.
         trajectory: the motion with the fitted parameters, at the measured times.
-        status, message: how the fit ended.
+        status, message: how the fit ended: at a minimum, and what the record does not tell there;
+            or why not. A minimum need not be the lowest one: look at `errors`.
         iterations: accepted steps.
     """
 
@@ -72,31 +75,88 @@ class _Task:
     rtol: float
 
     @property
-    def units(self) -> Array:
-        """What parameters are divided by: start value or nominal value."""
-        return np.array([abs(float(v.start)) or v.nominal for v in self.fitted])
+    def start(self) -> Array:
+        """Start values of the fitted parameters."""
+        values = self.model.values("p", self.p)
+        return np.array([values[self.model.p.index(v)] for v in self.fitted])
 
-    def run(self, w: Array, throw: bool = False) -> Trajectory:
-        """The motion at the parameters `w`."""
+    @property
+    def units(self) -> Array:
+        """What parameters are measured by: start value or nominal value."""
+        return np.where(self.start, np.abs(self.start), [v.nominal for v in self.fitted])
+
+    @property
+    def logarithmic(self) -> NDArray[np.bool_]:
+        """Which parameters are fitted by their logarithm: those that start and stay positive."""
+        return np.array([v.lower >= 0 for v in self.fitted]) & (self.start > 0)
+
+    def coordinates(self, p: Array) -> Array:
+        """Coordinates of parameters."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self.logarithmic, np.log(p / self.units), p / self.units)
+
+    def values(self, w: Array) -> Array:
+        """Parameters at coordinates."""
+        return self.units * np.where(self.logarithmic, np.exp(w * self.logarithmic), w)
+
+    @property
+    def box(self) -> tuple[Array, Array]:
+        """Bounds of the coordinates."""
+        low, high = (np.array([getattr(v, s) for v in self.fitted]) for s in ("lower", "upper"))
+        return self.coordinates(low), self.coordinates(high)
+
+    @property
+    def rounding(self) -> float:
+        """Norm of what the tolerance of the simulation leaves in the residuals."""
+        sizes = [float(np.abs(y).max()) / self.scales[s] for s, y in self.measured.items()]
+        return ROUNDING * self.rtol * float(np.linalg.norm(sizes)) * float(np.sqrt(self.t.size))
+
+    def run(self, p: Array, throw: bool = False) -> Trajectory:
+        """The motion with the parameters `p`."""
         names = [v.name for v in self.fitted]
-        values = dict(zip(names, (w * self.units).tolist(), strict=True))
         return simulate(
             self.model, float(self.t[-1]), t_start=float(self.t[0]), x0=self.x0, u=self.u,
-            p=dict(self.p) | values, rtol=self.rtol, t_eval=self.t, sensitivities=names,
-            throw=throw,
+            p=dict(self.p) | dict(zip(names, p.tolist(), strict=True)), rtol=self.rtol,
+            t_eval=self.t, sensitivities=names, throw=throw,
         )  # fmt: skip
 
-    def residuals(self, run: Trajectory) -> Array:
-        """(y - measured) / scale of all signals, one after the other."""
-        return np.concatenate([(run[s] - y) / self.scales[s] for s, y in self.measured.items()])
+    def point(self, w: Array, run: Trajectory) -> Point:
+        """The residuals (y - measured) / scale of all signals, one after the other."""
+        r = np.concatenate([(run[s] - y) / self.scales[s] for s, y in self.measured.items()])
+        slope = np.where(self.logarithmic, self.values(w), self.units)
+        return Point(w, r, self.slopes(run) * slope, run)
+
+    def correlated(self, point: Point) -> Iterator[str]:
+        """Signals whose residuals follow each other from sample to sample."""
+        if np.sqrt(point.cost) <= ROUNDING * self.rounding:
+            return
+        for name, e in zip(self.measured, np.split(point.r, len(self.measured)), strict=True):
+            e = e - e.mean()
+            if e[1:] @ e[:-1] > max(CORRELATED, 4 / np.sqrt(e.size)) * (e @ e):
+                yield name
 
     def slopes(self, run: Trajectory) -> Array:
-        """Derivatives of the residuals, a column for each parameter."""
+        """Derivatives of the residuals by the parameters, a column for each."""
         columns = [
             np.concatenate([run.sensitivities[v.name][s] / self.scales[s] for s in self.measured])
             for v in self.fitted
         ]
-        return np.column_stack(columns) * self.units
+        return np.column_stack(columns)
+
+    def trial(self, w: Array) -> Point | str:
+        """The point at `w`; why the motion cannot be simulated there."""
+        p = self.values(w)
+        there = ", ".join(f"{v.name} = {x:.5g}" for v, x in zip(self.fitted, p, strict=True))
+        try:
+            run = self.run(p)
+        except ValueError as error:  # no consistent start with these parameters
+            return f"with {there}: {error}"
+        if not run.status.ok:
+            return f"with {there}: {run.message}"
+        found = self.point(w, run)
+        if not (np.isfinite(found.r).all() and np.isfinite(found.J).all()):
+            return f"with {there}: the motion or its derivatives are not finite"
+        return found
 
 
 def identify_motion(
@@ -141,46 +201,12 @@ def identify_motion(
     p, x0 = model.named("p", p), model.named("x0", x0)
     u = model.named("u", u)
     task = _task(model, t, measured, free, p, x0, u, rtol)
-    w = np.array([model.values("p", p)[model.p.index(v)] for v in task.fitted]) / task.units
-    run = task.run(w, throw=True)
-    r, damping, status, count = task.residuals(run), 1e-3, Status.MAX_ITERATIONS, 0
-    for count in range(iterations):  # noqa: B007
-        found = _better(task, w, r, task.slopes(run), damping)
-        if found is None:
-            status = Status.SOLVED
-            break
-        w, run, r, damping = found
-    result = _result(task, w, run, r, status, count)
-    if throw and not status.ok:
-        raise SolveError(f"identify_motion: {result.message}", status, result)
+    w = task.coordinates(task.start)
+    start = task.point(w, task.run(task.start, throw=True))
+    result = _result(task, descend(task.trial, start, *task.box, task.rounding, iterations))
+    if throw and not result.status.ok:
+        raise SolveError(f"identify_motion: {result.message}", result.status, result)
     return result
-
-
-def _better(
-    task: _Task, w: Array, r: Array, J: Array, damping: float
-) -> tuple[Array, Trajectory, Array, float] | None:
-    """The next parameters with their motion, residuals and damping; None at the minimum."""
-    low, high = (_limits(task, side) for side in ("lower", "upper"))
-    g, normal = J.T @ r, J.T @ J
-    held = ((w - low < AT_BOUND) & (g > 0)) | ((high - w < AT_BOUND) & (g < 0))
-    size = np.where(np.diag(normal) > 0, np.diag(normal), 1.0)
-    normal, g = np.where(held | held[:, None], 0.0, normal), np.where(held, 0.0, g)
-    while damping < STUCK:
-        step = -np.linalg.solve(normal + np.diag(np.where(held, 1.0, damping * size)), g)
-        trial = np.clip(w + step, low, high)
-        if -g @ step < GAIN * (r @ r):
-            return None
-        run = task.run(trial)
-        if run.status.ok:
-            left = task.residuals(run)
-            if left @ left < r @ r:
-                return trial, run, left, damping / 10
-        damping *= 5
-    return None
-
-
-def _limits(task: _Task, side: str) -> Array:
-    return np.array([getattr(v, side) for v in task.fitted]) / task.units
 
 
 def _task(
@@ -225,12 +251,12 @@ def _problems(t: Array, records: Mapping[str, Array], chosen: list[str]) -> Iter
             yield f"{name}: expected a signal that changes, got a constant"
 
 
-def _result(
-    task: _Task, w: Array, run: Trajectory, r: Array, status: Status, count: int
-) -> MotionFit:
-    low, high = (_limits(task, side) for side in ("lower", "upper"))
-    held = (w - low < AT_BOUND) | (high - w < AT_BOUND)
-    found = precision(task.slopes(run) / task.units, r, held)
+def _result(task: _Task, end: Descent) -> MotionFit:
+    run, values = end.point.run, task.values(end.point.w)
+    low, high = (np.array([getattr(v, side) for v in task.fitted]) for side in ("lower", "upper"))
+    near = AT_BOUND * task.units
+    held = (values - low < near) | (high - values < near)
+    found = precision(task.slopes(run), end.point.r, held)
     names = [v.name for v in task.fitted]
     groups = tuple(tuple(names[i] for i in group) for group in found.undetermined)
     lost = {name: group for group in groups for name in group}
@@ -242,6 +268,25 @@ def _result(
         if v.name in lost:
             others = ", ".join(n for n in lost[v.name] if n != v.name)
             note = f"cannot be told from {others}" if others else "without influence"
-        estimates[v.name] = Estimate(float(w[i] * task.units[i]), v.unit, error, block, note=note)
+        estimates[v.name] = Estimate(float(values[i]), v.unit, error, block, note=note)
     left = {s: float(np.sqrt(np.mean((run[s] - y) ** 2))) for s, y in task.measured.items()}
-    return MotionFit(estimates, found.correlation, groups, left, run, status, status.value, count)
+    message = _message(end, estimates, task.correlated(end.point))
+    return MotionFit(
+        estimates, found.correlation, groups, left, run, end.status, message, end.steps
+    )
+
+
+def _message(end: Descent, estimates: Mapping[str, Estimate], correlated: Iterable[str]) -> str:
+    """How the fit ended, and what it does not tell."""
+    notes = [f"{name} is {e.note}" for name, e in estimates.items() if e.note == "at its bound"]
+    notes += [f"{n} {e.note}" for n, e in estimates.items() if e.note.startswith("cannot")]
+    notes += [
+        f"{n} is {e.note} there" for n, e in estimates.items() if e.note.startswith("without")
+    ]
+    notes += [
+        f"what is left of {name} is no white noise: the model does not follow it, this is not the "
+        "lowest minimum, or its noise is coloured and the errors given here are too small"
+        for name in correlated
+    ]
+    more = [f"{text}." for text in (end.why, "; ".join(notes)) if text]
+    return " ".join([end.status.value, *more])

@@ -33,6 +33,10 @@ class Status(Enum):
         "values, give a better guess or more time."
     )
     MAX_ITERATIONS = "The maximum number of iterations was reached; give a better guess."
+    NO_DESCENT = (
+        "No step fits better, although the derivatives say that one should: this is no minimum; "
+        "start elsewhere or narrow the bounds."
+    )
     TERMINAL_MISS = (
         "The optimiser met its conditions, but the re-simulated control misses the target; "
         "use more intervals."

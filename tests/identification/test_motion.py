@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -74,6 +75,53 @@ def test_a_fit_that_does_not_end_hands_over_what_it_has() -> None:
     with pytest.raises(SolveError, match="identify_motion: The maximum number of") as caught:
         identify_motion(DECAY, T, {"x": 2 * np.exp(-1.7 * T)}, free=["rate"], iterations=1)
     assert 1.0 < caught.value.partial.parameters["rate"].value < 2.0
+
+
+def test_minimum_is_met_and_not_a_hundredth_of_the_cost_above_it() -> None:
+    """Guards the mutant "the fit stops at 1e-2": noise, and a start far off."""
+    measured = 2 * np.exp(-1.7 * T) + 0.05 * np.random.default_rng(1).standard_normal(T.size)
+    fit = identify_motion(DECAY, T, {"x": measured}, free=["rate"], p={"rate": 9.0})
+    rates = fit.parameters["rate"].value * (1 + np.array([-1e-4, 0.0, 1e-4]))
+    costs = [np.sum((2 * np.exp(-rate * T) - measured) ** 2) for rate in rates]
+    assert costs[1] < min(costs[0], costs[2])
+    assert (fit.status, fit.message) == (Status.SOLVED, Status.SOLVED.value)
+
+
+WALL = Model(
+    "wall",
+    x=(x,),
+    p=(p := Variable("p", "1/s", start=1.0),),
+    ode=-p.symbol * x.symbol + 1e-12 * ca.log(1.05 - p.symbol),
+)
+
+
+def test_an_edge_beyond_which_nothing_can_be_simulated_is_not_called_solved() -> None:
+    """The data ask for p = 2; beyond 1.05 the motion is not finite."""
+    with pytest.raises(SolveError, match=r"this is no minimum; .* because with p = 1\.05: sim"):
+        identify_motion(WALL, T, {"x": 2 * np.exp(-2.0 * T)})
+    fit = identify_motion(WALL, T, {"x": 2 * np.exp(-2.0 * T)}, throw=False)
+    assert fit.status is Status.NO_DESCENT
+    assert fit.parameters["p"].value == pytest.approx(1.05, rel=1e-3)
+
+
+def test_scale_of_a_positive_parameter_need_not_be_known() -> None:
+    """From six orders of magnitude above and three below; the other one is negative."""
+    level = Variable("level", "m/s", start=-1.0)
+    speed = Variable("speed", "1/s", start=1.0, lower=0.0)
+    model = Model("fall", x=(x,), p=(speed, level), ode=level.symbol - speed.symbol * x.symbol)
+    measured = (2 + 3 / 1.7) * np.exp(-1.7 * T) - 3 / 1.7
+    for guess in (1.7e3, 1.7e-3):
+        fit = identify_motion(model, T, {"x": measured}, p={"speed": guess})
+        assert fit.parameters["speed"].value == pytest.approx(1.7, rel=1e-6)
+        assert fit.parameters["level"].value == pytest.approx(-3.0, rel=1e-6)
+
+
+def test_what_is_left_and_no_noise_is_said() -> None:
+    """An exponential for a straight line; white noise is passed over."""
+    t = np.linspace(0.0, 2.0, 201)
+    fit = identify_motion(DECAY, t, {"x": 2 - 0.9 * t}, free=["rate"])
+    assert "what is left of x is no white noise: the model does not follow it" in fit.message
+    assert fit.status is Status.SOLVED
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,7 @@ def test_results_that_met_their_tolerances_can_be_used() -> None:
         Status.SOLVER_FAILED,
         Status.INFEASIBLE,
         Status.MAX_ITERATIONS,
+        Status.NO_DESCENT,
         Status.TERMINAL_MISS,
     ],
 )

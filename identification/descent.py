@@ -1,0 +1,162 @@
+"""Nonlinear least squares inside a box, with an end that says what was reached.
+
+    minimise 1/2 r'r,   step s: (J'J + damping diag(J'J)) s = -J'r
+
+Levenberg's and Marquardt's step, in which no coordinate moves by more than `REACH` at once.
+Whether the end is a minimum is judged by what a whole Gauss-Newton step would still gain, never by
+the size of a damped one:
+
+    fall = max over s of  r'r - |r + J s|^2     in the coordinates that no bound holds
+
+Source: J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630, 1978.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.data import Array
+from symfric.foundation.status import Status
+
+REACH = 1.5
+"""Largest change of a coordinate in one step: of a logarithmic one a factor of 4.5."""
+GAIN = 1e-10
+"""Fall of the cost, relative to it, below which nothing is left to gain."""
+NEAR = 0.1
+"""Length of the last step, in standard errors, that is near enough where no trial does better."""
+FAR = 15.0
+"""Longest step that is believed in: of a logarithmic coordinate a factor of three million."""
+START, MORE, LESS, STUCK = 1e-3, 5.0, 10.0, 1e12
+"""Damping at the start, its growth after a trial that fails, its fall after a good one, its end."""
+AT_BOUND = 1e-9
+"""Distance to a bound below which a coordinate stands there."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Where the residuals are known.
+
+    Attributes:
+        w: coordinates, shape (n,).
+        r: residuals, shape (rows,).
+        J: their derivatives by w, shape (rows, n).
+        run: what the residuals were taken from.
+    """
+
+    w: Array
+    r: Array
+    J: Array
+    run: Any
+
+    @property
+    def cost(self) -> float:
+        """Sum of squares r'r."""
+        return float(self.r @ self.r)
+
+
+Evaluate = Callable[[Array], Point | str]
+"""w -> the residuals there, or why there are none."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """How a descent ended: where, with which status, after how many steps, and why no further."""
+
+    point: Point
+    status: Status
+    steps: int
+    why: str = ""
+
+
+def descend(
+    at: Evaluate, start: Point, low: Array, high: Array, rounding: float, steps: int
+) -> Descent:
+    """Go from `start` to a minimum.
+
+    Args:
+        at: residuals and derivatives.
+        start: first point, inside the box.
+        low, high: bounds of w, shape (n,).
+        rounding: norm of the error that residuals carry from their computation; falls of the cost
+            that it can hide are not asked for.
+        steps: allowed.
+    """
+    point, damping = start, START
+    for count in range(steps + 1):
+        free = ~_held(point, low, high)
+        fall = remaining(point, free)
+        if fall <= GAIN * point.cost or np.sqrt(point.cost) <= rounding:
+            return Descent(point, Status.SOLVED, count)
+        if count == steps:
+            break
+        found = _lower(at, point, free, (low, high), damping)
+        if isinstance(found, str):
+            return Descent(point, *_verdict(point, fall, rounding, count, found))
+        point, damping = found
+    return Descent(point, Status.MAX_ITERATIONS, steps)
+
+
+def remaining(point: Point, free: NDArray[np.bool_]) -> float:
+    """Fall of r'r that a Gauss-Newton step in the `free` coordinates promises.
+
+    The step goes no further than `FAR` in any principal direction: beyond, derivatives promise
+    nothing, and a coordinate that has lost its influence would have to go further than any.
+    """
+    u, s, _ = np.linalg.svd(point.J[:, free], full_matrices=False)
+    part = np.abs(u.T @ point.r)
+    reached = np.minimum(part, FAR * s)
+    return float(((2 * part - reached) * reached).sum())
+
+
+def _verdict(
+    point: Point, fall: float, rounding: float, count: int, why: str
+) -> tuple[Status, int, str]:
+    """What it means that no trial lowers the cost."""
+    hidden = 2 * np.sqrt(point.cost) * rounding + rounding**2
+    if fall <= hidden:
+        return Status.SOLVED, count, ""
+    freedom = max(1, point.r.size - point.w.size)
+    if fall <= NEAR**2 * point.cost / freedom:
+        return Status.ACCEPTABLE, count, ""
+    return Status.NO_DESCENT, count, why
+
+
+def _lower(
+    at: Evaluate,
+    point: Point,
+    free: NDArray[np.bool_],
+    box: tuple[Array, Array],
+    damping: float,
+) -> tuple[Point, float] | str:
+    """The next point with its damping; why there is none."""
+    g, normal = point.J.T @ point.r, point.J.T @ point.J
+    weight = np.where(np.diag(normal) > 0, np.diag(normal), 1.0)
+    failed, tried, why = 0, 0, ""
+    while damping < STUCK:
+        matrix = (normal + np.diag(damping * weight))[np.ix_(free, free)]
+        step = np.zeros(point.w.size)
+        step[free] = -np.linalg.solve(matrix, g[free])
+        step *= min(1.0, REACH / max(float(np.abs(step).max()), 1e-300))
+        w = np.clip(point.w + step, *box)
+        if (w == point.w).all():
+            break
+        trial, tried = at(w), tried + 1
+        if isinstance(trial, str):
+            failed, why = failed + 1, trial
+        elif trial.cost < point.cost:
+            return trial, damping / LESS
+        damping *= MORE
+    if not why:
+        return f"all {tried} trials fit worse, so the derivatives do not describe the motion there"
+    return f"{failed} of {tried} trials could not be simulated, the last because {why}"
+
+
+def _held(point: Point, low: Array, high: Array) -> NDArray[np.bool_]:
+    """Coordinates at a bound beyond which the cost would fall."""
+    g = point.J.T @ point.r
+    return ((point.w - low < AT_BOUND) & (g > 0)) | ((high - point.w < AT_BOUND) & (g < 0))
