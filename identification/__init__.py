@@ -17,7 +17,7 @@ from identification.regress import LinearFit as LinearFit
 from identification.regress import linear_regression as linear_regression
 from identification.result import Estimate as Estimate
 from identification.result import Identification as Identification
-from identification.signals import Signals as Signals
+from identification.signals import MotionSignals as MotionSignals
 from identification.signals import differentiate as differentiate
 from identification.stepper import Motion as Motion
 from identification.stepper import open_loop as open_loop

@@ -10,7 +10,7 @@ from identification.data import Array, Dataset
 from identification.filters import Filter, central_difference, lowpass
 from identification.loop import closed_loop
 from identification.problem import inverse_force
-from identification.signals import Signals, differentiate
+from identification.signals import MotionSignals, differentiate
 from identification.stepper import open_loop
 from symfric.scenes import Drive
 
@@ -62,7 +62,7 @@ def predicted_force(drive: Drive, v: Array, a: Array) -> Array:
     return np.asarray(force(v[None, :], a[None, :]).full()).ravel()
 
 
-def residual_force(drive: Drive, signals: Signals) -> Array:
+def residual_force(drive: Drive, signals: MotionSignals) -> Array:
     """Measured minus predicted force of the decimated equations [N]."""
     return signals.equations(signals.force - predicted_force(drive, signals.v, signals.a))
 

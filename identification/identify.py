@@ -13,7 +13,7 @@ from identification.precision import precision
 from identification.problem import Fit, Problem, problem
 from identification.regress import linear_regression
 from identification.result import Estimate, Identification
-from identification.signals import Signals, differentiate
+from identification.signals import MotionSignals, differentiate
 from identification.start import start_values
 from symfric.foundation import checks
 from symfric.foundation.parameters import parameters, with_values
@@ -198,7 +198,9 @@ def _estimates(
     return estimates, found.correlation, groups
 
 
-def _cross_validation(task: Problem, fit: Fit, signals: Signals, folds: int) -> dict[str, float]:
+def _cross_validation(
+    task: Problem, fit: Fit, signals: MotionSignals, folds: int
+) -> dict[str, float]:
     """Force errors on each of `folds` pieces with parameters fitted to the others."""
     force = signals.equations(signals.force)
     pieces = np.array_split(np.arange(task.rows), folds)

@@ -16,7 +16,7 @@ import numpy as np
 
 from identification.coordinates import Coordinates
 from identification.data import Array
-from identification.signals import Signals
+from identification.signals import MotionSignals
 from symfric.foundation.status import Status
 from symfric.model import Model
 
@@ -85,7 +85,7 @@ def inverse_force(model: Model) -> ca.SX:
     return (model.xdot[1] - ca.substitute(rate, force, 0)) / slope
 
 
-def problem(coordinates: Coordinates, signals: Signals, scale: float) -> Problem:
+def problem(coordinates: Coordinates, signals: MotionSignals, scale: float) -> Problem:
     """The problem of fitting `coordinates` to `signals`; `scale` [N] is the expected residual."""
     model, w = coordinates.model, coordinates.w
     motion = ca.vertcat(model.x[1].symbol, model.xdot[1])

@@ -12,7 +12,7 @@ import numpy as np
 
 from identification.data import Array
 from identification.precision import precision
-from identification.signals import Signals
+from identification.signals import MotionSignals
 
 
 @final
@@ -34,7 +34,7 @@ class LinearFit:
     force_rms: float
 
 
-def linear_regression(signals: Signals, directions: bool = False) -> LinearFit:
+def linear_regression(signals: MotionSignals, directions: bool = False) -> LinearFit:
     """Least squares on the decimated equations.
 
     Args:

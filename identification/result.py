@@ -10,7 +10,7 @@ from identification.data import Array
 from identification.errors import Errors
 from identification.filters import Filter
 from identification.regress import LinearFit
-from identification.signals import Signals
+from identification.signals import MotionSignals
 from symfric.foundation.files import write_text
 from symfric.foundation.status import Status
 from symfric.laws import Law
@@ -121,7 +121,7 @@ class Identification:
     filter: Filter
     iterations: int
     benchmark: str
-    signals: Signals
+    signals: MotionSignals
 
     @property
     def fitted_law(self) -> Law:

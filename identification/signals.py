@@ -14,7 +14,7 @@ from identification.filters import Decimation, Filter, central_difference, choos
 
 @final
 @dataclass(frozen=True, eq=False)
-class Signals:
+class MotionSignals:
     """A record differentiated without phase shift, its disturbed ends cut off.
 
     Attributes:
@@ -65,7 +65,7 @@ def filter_of(data: Dataset) -> Filter:
     return data.filter or choose_filter(data.force, data.uniform().step)
 
 
-def differentiate(data: Dataset, filter: Filter | None = None) -> Signals:
+def differentiate(data: Dataset, filter: Filter | None = None) -> MotionSignals:
     """Filtered position, velocity and acceleration of `data`.
 
     The position (and the velocity, where it is measured) passes the zero-phase Butterworth filter;
@@ -89,7 +89,7 @@ def differentiate(data: Dataset, filter: Filter | None = None) -> Signals:
     a = central_difference(v, step)
     cut = chosen.trim(step)
     inside = slice(cut, max(cut, data.t.size - cut))
-    signals = Signals(
+    signals = MotionSignals(
         data.name, data.t[inside], x[inside], v[inside], a[inside], data.force[inside], chosen
     )
     if signals.decimation.rows == 0 or signals.kept.size < 10:

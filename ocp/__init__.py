@@ -7,7 +7,7 @@ from ocp.cost import at_end as at_end
 from ocp.cost import integral as integral
 from ocp.guess import Guess as Guess
 from ocp.ipopt import Progress as Progress
-from ocp.ipopt import Statistics as Statistics
+from ocp.ipopt import SolverStatistics as SolverStatistics
 from ocp.moves import rest_to_rest as rest_to_rest
 from ocp.problem import FREE as FREE
 from ocp.problem import Free as Free

@@ -71,7 +71,7 @@ class Iterate:
 
 @final
 @dataclass(frozen=True)
-class Statistics:
+class SolverStatistics:
     """What an optimisation cost.
 
     Attributes:
@@ -110,7 +110,7 @@ class Outcome:
     violations: Array
     status: Status
     answer: str
-    statistics: Statistics
+    statistics: SolverStatistics
 
 
 def optimise(
@@ -185,7 +185,7 @@ def _outcome(
     stats = solver.stats()
     answer = str(stats["return_status"])
     w, g, lam_w, lam_g = (last[name].full().ravel() for name in ("x", "g", "lam_x", "lam_g"))
-    statistics = Statistics(
+    statistics = SolverStatistics(
         unknowns=w.size,
         constraints=g.size,
         jacobian_nonzeros=solver.get_function("nlp_jac_g").nnz_out("jac_g_x"),

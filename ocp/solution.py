@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.ipopt import Iterate, Statistics
+from ocp.ipopt import Iterate, SolverStatistics
 from ocp.layout import Points
 from ocp.problem import Problem
 from symfric.foundation.files import write_text, written
@@ -62,7 +62,7 @@ class Solution:
     controls: dict[str, Array]
     trajectory: Trajectory | None
     terminal_miss: dict[str, float]
-    statistics: Statistics
+    statistics: SolverStatistics
     mesh: Array
     points: Points
     iterate: Iterate

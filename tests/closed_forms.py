@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric import Model, Variable
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.method import Method
 from symfric.integrator.running.dense import Dense
@@ -30,7 +30,7 @@ class ClosedForm:
 
 def assemble(model: Model) -> System:
     """The model without driven inputs, as an integration step sees it."""
-    return system(model, drivers(model, None, 0.0, T))
+    return system(model, input_data(model, None, 0.0, T))
 
 
 def smooth_ode() -> ClosedForm:

@@ -28,7 +28,7 @@ from symfric.integrator.equations.initial import (
     first_step,
     smallest_step,
 )
-from symfric.integrator.equations.inputs import Drivers, drivers
+from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.peers.casadi_integrators import peer
 from symfric.integrator.running.dense import from_records
@@ -147,9 +147,9 @@ def _tolerances(whole: System, rtol: float) -> Tolerances:
     return Tolerances(rtol, 0.1 * rtol * whole.nominal, 0.0, 10_000_000)
 
 
-def _start(model: Model, times: Array) -> tuple[System, Drivers, Array]:
+def _start(model: Model, times: Array) -> tuple[System, InputData, Array]:
     """System, inputs and consistent start of a model without parameters and inputs."""
-    inputs = drivers(model, None, 0.0, float(times[-1]))
+    inputs = input_data(model, None, 0.0, float(times[-1]))
     whole = system(model, inputs)
     y = first_guess(whole, model, model.initial_state())
     return whole, inputs, consistent(whole, "bench", y, np.zeros(whole.d.numel()))

@@ -8,7 +8,7 @@ import casadi as ca
 
 from symfric.bench.contenders import compile_time
 from symfric.integrator.compiled.compiler import find_compiler
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.engine import c_source
 from symfric.integrator.running.integrator import Integrator
@@ -99,7 +99,7 @@ COMPILED: tuple[tuple[str, Mechanism], ...] = (
 
 def integrator(model: Model) -> Integrator:
     """The adaptive integrator of a model without inputs."""
-    return Integrator(model, drivers(model, None, 0.0, 1.0), METHOD)
+    return Integrator(model, input_data(model, None, 0.0, 1.0), METHOD)
 
 
 def count(mechanism: str, variant: str, formulation: str, of: Mechanism) -> CountRow:

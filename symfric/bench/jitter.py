@@ -20,7 +20,7 @@ from symfric.figures import FigureData
 from symfric.figures.data import Curve
 from symfric.integrator.equations.blocks import refinement
 from symfric.integrator.equations.initial import consistent, first_guess
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.simulate import simulate
@@ -130,7 +130,7 @@ class _Runs:
         }
         self.model, self.t_end = replace(model, outputs=outputs), t_end
         self.times = np.linspace(0.0, t_end, round(t_end * 1e3) + 1)
-        self.whole = system(model, drivers(model, None, 0.0, t_end))
+        self.whole = system(model, input_data(model, None, 0.0, t_end))
         y = first_guess(self.whole, model, model.initial_state())
         self.y0 = consistent(self.whole, "jitter", y, np.zeros(0))
 

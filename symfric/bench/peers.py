@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import flat_view
 from symfric.integrator.compiled.compiler import load
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.peers.casadi_integrators import peer
 from symfric.integrator.running.run import Tolerances
@@ -46,7 +46,7 @@ def ours(model: Model, times: Array, rtol: float, backend: str, method: str) -> 
 
 def casadi(model: Model, times: Array, rtol: float, plugin: str, compiled: bool) -> Solve:
     """CasADi's integrator `plugin`, its states scaled by nominal values as ours are."""
-    inputs = drivers(model, None, 0.0, float(times[-1]))
+    inputs = input_data(model, None, 0.0, float(times[-1]))
     whole = system(model, inputs)
     tolerances = Tolerances(rtol, 0.1 * rtol * whole.nominal, 0.0, 10_000_000)
     problem = peer(whole, inputs, np.zeros(0), tolerances, "rosenbrock")
@@ -84,7 +84,7 @@ def scipy(model: Model, times: Array, rtol: float, method: str) -> Solve:
     """
     from scipy.integrate import solve_ivp  # noqa: PLC0415  (an extra, only some users need it)
 
-    whole = system(model, drivers(model, None, 0.0, float(times[-1])))
+    whole = system(model, input_data(model, None, 0.0, float(times[-1])))
     n = whole.n
     f = ca.Function("f", [whole.y], [ca.densify(whole.f)])
     jacobian = ca.Function("j", [whole.y], [ca.densify(ca.jacobian(whole.f, whole.y))])

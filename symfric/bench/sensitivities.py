@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from symfric.bench.timing import best_time
 from symfric.integrator.compiled.compiler import find_compiler
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.peers.casadi_integrators import peer
 from symfric.integrator.running.run import Tolerances
@@ -125,7 +125,7 @@ def _of_ours(model: Model, backend: str, names: tuple[str, ...]) -> tuple[Call, 
 
 def _of_peer(model: Model, plugin: str) -> tuple[Call, Call, Call]:
     """CasADi's integrator; start values that follow parameters are differentiated along."""
-    inputs = drivers(model, None, 0.0, T_END)
+    inputs = input_data(model, None, 0.0, T_END)
     whole = system(model, inputs)
     tolerances = Tolerances(RTOL, 0.1 * RTOL * whole.nominal, 0.0, 10_000_000)
     name = "rosenbrock" if plugin == "rosenbrock" else "sundials"

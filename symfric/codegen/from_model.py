@@ -11,7 +11,7 @@ from symfric.codegen.from_law import step_variable
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
 from symfric.integrator.equations.initial import consistent
-from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.suited import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS
@@ -93,7 +93,7 @@ def plant_block(
 def _held(model: Model) -> System:
     """The equations with the inputs as run data."""
     u = model.vector("u")
-    return system(model, Drivers(u, u, np.zeros(2), np.zeros((len(model.u), 1)), ("plant",)))
+    return system(model, InputData(u, u, np.zeros(2), np.zeros((len(model.u), 1)), ("plant",)))
 
 
 def _states(model: Model, whole: System, where: str) -> Variables:

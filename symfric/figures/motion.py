@@ -51,7 +51,7 @@ class Run(Protocol):
     """A run of a pushed block."""
 
     @property
-    def steps(self) -> Array:
+    def step_times(self) -> Array:
         """Ends of its steps [s]."""
         ...
 
@@ -116,5 +116,5 @@ def pushed(
 def fine(run: Run, parts: int = 4) -> Array:
     """The ends of the steps of `run` with `parts` intervals in each [s]."""
     inner = np.linspace(0.0, 1.0, parts, endpoint=False)
-    starts, lengths = run.steps[:-1], np.diff(run.steps)
-    return np.append((starts[:, None] + lengths[:, None] * inner).ravel(), run.steps[-1])
+    starts, lengths = run.step_times[:-1], np.diff(run.step_times)
+    return np.append((starts[:, None] + lengths[:, None] * inner).ravel(), run.step_times[-1])

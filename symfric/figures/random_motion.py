@@ -42,13 +42,13 @@ def slid(
 class Steps:
     """The steps of a pushed block: their ends [s], and at each the signals."""
 
-    steps: Array
+    step_times: Array
     columns: dict[str, Array]
 
     def at(self, t: ArrayLike) -> dict[str, Array]:
         """The signals at the times `t` [s], linear between the steps."""
         times = np.atleast_1d(np.asarray(t, float))
-        return {n: np.interp(times, self.steps, column) for n, column in self.columns.items()}
+        return {n: np.interp(times, self.step_times, column) for n, column in self.columns.items()}
 
 
 def shoved(

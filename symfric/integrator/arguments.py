@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
-from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.methods.method import Method
 from symfric.integrator.methods.radau import Radau
 from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS
@@ -102,8 +102,8 @@ def tolerances(
 
 
 def stopping(
-    where: str, inputs: Drivers, times: ArrayLike, t_start: float, t_end: float
-) -> Drivers:
+    where: str, inputs: InputData, times: ArrayLike, t_start: float, t_end: float
+) -> InputData:
     """`inputs` with an end of a step at each of `times` [s]."""
     if np.size(times) == 0:
         return inputs

@@ -17,7 +17,7 @@ from symfric.integrator.arguments import (
     tolerances,
 )
 from symfric.integrator.equations.initial import first_guess
-from symfric.integrator.equations.inputs import Input, drivers
+from symfric.integrator.equations.inputs import Input, input_data
 from symfric.integrator.outcome import trajectory_of
 from symfric.integrator.peers.casadi_integrators import PEERS, integrate_by_peer
 from symfric.integrator.running.built import built
@@ -73,7 +73,7 @@ def simulate_by_peer(
         )
     times = result_times(where, t_start, t_end, t_eval, samples)
     begin = perf_counter()
-    inputs = drivers(model, u, t_start, t_end)
+    inputs = input_data(model, u, t_start, t_end)
     integrator, fresh = built(model, inputs, chosen(where, "auto", rtol))
     built_at, system = perf_counter(), integrator.system
     allowed = tolerances(where, rtol, atol, system.nominal, 1e-10, max_steps)

@@ -32,7 +32,7 @@ from symfric.integrator.arguments import (
     tolerances,
 )
 from symfric.integrator.equations.initial import first_guess, first_step
-from symfric.integrator.equations.inputs import Drivers, Input, drivers
+from symfric.integrator.equations.inputs import Input, InputData, input_data
 from symfric.integrator.many.chunk import Chunk, Job, Solved, digest, solve_chunk
 from symfric.integrator.many.one_by_one import solve_one_by_one
 from symfric.integrator.many.store import Store
@@ -143,7 +143,7 @@ def simulate_many(
     chunk = checks.count("simulate_many: chunk", chunk)
     looks = check_times("simulate_many", t_start, t_end, [t_end] if t_eval is None else t_eval)
     x0_of, p_of, members = _members(model, x0, p)
-    inputs = drivers(model, u, t_start, t_end)
+    inputs = input_data(model, u, t_start, t_end)
     inputs = stopping("simulate_many", inputs, times, t_start, t_end)
     integrator = Integrator(model, inputs, formula)
     nominal = integrator.system.nominal
@@ -256,7 +256,7 @@ def _starts(
 
 def _suited(
     integrator: Integrator,
-    inputs: Drivers,
+    inputs: InputData,
     starts: Callable[[slice], tuple[Array, Array]],
     members: int,
 ) -> Integrator:
@@ -274,7 +274,7 @@ def _suited(
 
 
 def _chunk(
-    inputs: Drivers,
+    inputs: InputData,
     tolerances: Tolerances,
     starts: Callable[[slice], tuple[Array, Array]],
     pick: slice,

@@ -5,7 +5,7 @@ import numpy as np
 
 from symfric.foundation import checks
 from symfric.integrator.equations.initial import first_guess
-from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.manifold import Manifold
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.suited import suited_to_start
@@ -42,7 +42,7 @@ def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Functi
             "use a smooth or bristle law"
         )
     u = model.vector("u")
-    whole = system(model, Drivers(u, u, np.zeros(2), np.zeros((len(model.u), 1)), ("flow",)))
+    whole = system(model, InputData(u, u, np.zeros(2), np.zeros((len(model.u), 1)), ("flow",)))
     whole = suited_to_start(whole, METHODS[method], model)
     fixed = build_fixed(whole, METHODS[method])
     x0, inputs = ca.MX.sym("x0", len(model.x)), ca.MX.sym("u", len(model.u))

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.compiled.columns import Columns
-from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.dense import Dense
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import Run
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 def trajectory_of(
     integrator: Integrator,
-    inputs: Drivers,
+    inputs: InputData,
     run: Run,
     dense: Dense,
     p: Array,

@@ -24,7 +24,7 @@ from symfric.integrator.arguments import (
 from symfric.integrator.derivatives.adjoint import gradient
 from symfric.integrator.derivatives.sensitivity import Path, Seeds, forward, of_signals, seeds
 from symfric.integrator.equations.initial import first_guess
-from symfric.integrator.equations.inputs import Drivers, Input, drivers
+from symfric.integrator.equations.inputs import Input, InputData, input_data
 from symfric.integrator.outcome import trajectory_of
 from symfric.integrator.running.built import built
 from symfric.integrator.running.dense import Dense
@@ -121,7 +121,7 @@ def simulate(
     sensitivities = checks.names("simulate: sensitivities", sensitivities)
     looks = result_times("simulate", t_start, t_end, t_eval, samples)
     begin = perf_counter()
-    inputs = drivers(model, u, t_start, t_end)
+    inputs = input_data(model, u, t_start, t_end)
     inputs = stopping("simulate", inputs, times, t_start, t_end)
     integrator, fresh = built(model, inputs, formula)
     build_time = perf_counter() - begin if fresh else 0.0
@@ -146,7 +146,7 @@ def simulate(
             model, t_end, t_start=t_start, x0=x0, u=u, p=p, rtol=max(rtol / 100, 1e-13),
             atol=None if atol is None else atol / 100, event_tolerance=event_tolerance,
             t_eval=trajectory.t, method=another(formula), backend=backend,
-            max_step=float(np.diff(trajectory.steps).max()) / 2, times=times,
+            max_step=float(np.diff(trajectory.step_times).max()) / 2, times=times,
         )  # fmt: skip
         error = _difference(model, trajectory, finer)
         trajectory = replace(trajectory, statistics=replace(trajectory.statistics, error=error))
@@ -155,7 +155,7 @@ def simulate(
 
 def _solve(
     integrator: Integrator,
-    inputs: Drivers,
+    inputs: InputData,
     y0: Array,
     p: Array,
     allowed: Tolerances,

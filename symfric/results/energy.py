@@ -23,7 +23,7 @@ def integrals(trajectory: "Trajectory", expression: ca.SX, times: Array) -> Arra
 
     Steps end at jumps of inputs and at events, so that the integrand is smooth inside each.
     """
-    ends = trajectory.steps
+    ends = trajectory.step_times
     k = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, ends.size - 2)
     whole = _pieces(trajectory, expression, ends[:-1], ends[1:])
     before = np.concatenate([np.zeros((whole.shape[0], 1)), np.cumsum(whole, axis=1)], axis=1)
@@ -97,7 +97,7 @@ def energy_balance(trajectory: "Trajectory") -> EnergyBalance:
             f"trajectory of '{trajectory.scene}': expected a mechanism, got a model that says "
             "nothing of its energy; integral(name) integrates any of its signals"
         )
-    start = trajectory.steps[:1]
+    start = trajectory.step_times[:1]
     model, at = trajectory.model, np.concatenate([start, trajectory.t])
     powers = [name for name, output in trajectory.model.further.items() if output.kind == WORK]
     rates = {name.removesuffix("_work_rate"): name for name in powers}

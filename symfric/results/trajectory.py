@@ -79,7 +79,7 @@ class Trajectory:
         units: name -> unit of every signal.
         status: how it ended; `message` says it in a sentence.
         statistics: steps, evaluations, times.
-        steps: ends of the accepted steps [s], shape (steps + 1,).
+        step_times: ends of the accepted steps [s], shape (steps + 1,).
         states: the states alone, at any times; cheaper than all signals.
         evaluate: all signals at any times.
         express: an expression of the model at any times, shape (rows, n).
@@ -95,7 +95,7 @@ class Trajectory:
     status: Status
     message: str
     statistics: Statistics
-    steps: Array
+    step_times: Array
     states: Callable[[Array], dict[str, Array]]
     evaluate: Callable[[Array], dict[str, Array]]
     express: Callable[[ca.SX, Array], Array]
@@ -283,7 +283,7 @@ class Trajectory:
         at = np.atleast_1d(checks.array(where, times, ndim=None, what="times [s]"))
         if at.ndim > 1:
             raise checks.refused(where, "a time or a sequence of times [s]", times)
-        first, last = self.steps[0], self.steps[-1]
+        first, last = self.step_times[0], self.step_times[-1]
         if at.size and not (first <= at.min() and at.max() <= last):
             raise ValueError(
                 f"trajectory of '{self.scene}': expected times in [{first:g}, {last:g}] s, "
@@ -294,7 +294,7 @@ class Trajectory:
     @cached_property
     def final(self) -> dict[str, float]:
         """All signals at the last time reached."""
-        return {k: float(v[0]) for k, v in self.evaluate(self.steps[-1:]).items()}
+        return {k: float(v[0]) for k, v in self.evaluate(self.step_times[-1:]).items()}
 
     def plot(self, *names: str, path: str | Path | None = None, label: str = "") -> "Figure":
         """One panel per signal over time, labelled with units; saved to `path` if given.

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.stress.problem import Problem
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ def by_scipy(ready: Problem) -> Array | None:
     from scipy.integrate import solve_ivp  # noqa: PLC0415  (not everybody has it)
 
     p = model.values("p", ready.p)
-    ode, given = model.function("ode"), drivers(model, ready.inputs, case.t_start, case.t_end)
+    ode, given = model.function("ode"), input_data(model, ready.inputs, case.t_start, case.t_end)
     force = ca.Function("u", [model.t, given.data], [given.expression])
     calls = 0
     x, times = model.initial_state(case.x0, ready.p), ready.times

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.parameters import check_names
 from symfric.integrator.compiled.columns import Columns
-from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.system import System
 from symfric.integrator.running.dense import Dense
 from symfric.integrator.running.integrator import Integrator
@@ -89,7 +89,7 @@ class Path:
 
     integrator: Integrator
     dense: Dense
-    inputs: Drivers
+    inputs: InputData
     p: Array
     backend: str
 

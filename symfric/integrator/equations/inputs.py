@@ -82,7 +82,7 @@ Input = float | Sampled | Callable[[ca.SX], Any]
 
 
 @dataclass(frozen=True, eq=False)
-class Drivers:
+class InputData:
     """How the inputs of one simulation enter its equations.
 
     Attributes:
@@ -90,7 +90,7 @@ class Drivers:
         data: SX symbols that are constant on each interval.
         breaks: interval ends in [t_start, t_end], shape (n + 1,).
         values: `data` on each interval, shape (n_data, n).
-        key: the structure; two drivers of a model with one key have the same equations.
+        key: the structure; two of a model with one key have the same equations.
     """
 
     expression: ca.SX
@@ -103,7 +103,7 @@ class Drivers:
         """Number of the interval that holds each time; at a break the later one."""
         return np.searchsorted(self.breaks[1:-1], times, side="right")
 
-    def stopping_at(self, times: ArrayLike) -> "Drivers":
+    def stopping_at(self, times: ArrayLike) -> "InputData":
         """The same inputs, with breaks at `times` [s], too; those outside the span are left out."""
         at = np.asarray(times, dtype=float)
         at = at[(at > self.breaks[0]) & (at < self.breaks[-1])]
@@ -113,9 +113,9 @@ class Drivers:
         return replace(self, breaks=breaks, values=self.values[:, self.interval(breaks[:-1])])
 
 
-def drivers(
+def input_data(
     model: Model, given: Mapping[str, Input] | None, t_start: float, t_end: float
-) -> Drivers:
+) -> InputData:
     """Collect the inputs `given` by name; the others keep their start value.
 
     Numbers and samples become data, expressions go into the equations. There are breaks at all
@@ -138,7 +138,7 @@ def drivers(
     values = [row for part in parts for row in part.values]
     if ca.depends_on(expression, begin):
         data, values = [*data, begin], [*values, breaks[:-1]]
-    found = Drivers(
+    found = InputData(
         expression,
         stacked(data),
         breaks,
@@ -148,9 +148,9 @@ def drivers(
     return found.stopping_at([t for part in parts for t in part.onsets])
 
 
-def _undriven(t_start: float, t_end: float) -> Drivers:
-    """The drivers of a model without inputs."""
-    return Drivers(stacked(()), stacked(()), np.array([t_start, t_end]), np.zeros((0, 1)), ())
+def _undriven(t_start: float, t_end: float) -> InputData:
+    """What a model without inputs takes."""
+    return InputData(stacked(()), stacked(()), np.array([t_start, t_end]), np.zeros((0, 1)), ())
 
 
 @dataclass(frozen=True, eq=False)

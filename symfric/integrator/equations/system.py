@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.symbols import stacked
 from symfric.integrator.equations.implicit import implicit_columns
-from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.lu import Order
 from symfric.integrator.equations.manifold import Manifold, holonomic_columns, manifold
 from symfric.integrator.equations.quotients import divided_once
@@ -121,7 +121,7 @@ class System:
         return ca.Function("constraints", [self.y, self.d], both, {"cse": True})
 
 
-def system(model: Model, inputs: Drivers) -> System:
+def system(model: Model, inputs: InputData) -> System:
     """Put the inputs into the model and bring it into the form M y' = f(y, d).
 
     An implicit model that is linear in x' with a constant matrix keeps that matrix as mass, be it
@@ -173,7 +173,7 @@ def system(model: Model, inputs: Drivers) -> System:
     )
 
 
-def _with_inputs(model: Model, inputs: Drivers, f: ca.SX) -> Inner | None:
+def _with_inputs(model: Model, inputs: InputData, f: ca.SX) -> Inner | None:
     """Right-hand sides of a holonomic model with inner unknowns, in the order of `f`."""
     mechanics = model.holonomic
     if mechanics is None or mechanics.inner is None:

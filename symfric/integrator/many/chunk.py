@@ -13,7 +13,7 @@ from symfric.foundation.status import Status
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.compiled.compiler import find_compiler
 from symfric.integrator.equations.initial import Equations, consistent_many, smallest_step
-from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.manifold import Manifold
 from symfric.integrator.many.members import (
     CompiledMembers,
@@ -98,7 +98,7 @@ class Job:
 
     @classmethod
     def of(
-        cls, integrator: Integrator, inputs: Drivers, times: Array, backend: str, max_steps: int
+        cls, integrator: Integrator, inputs: InputData, times: Array, backend: str, max_steps: int
     ) -> "Job":
         """The job of an integrator; "auto" is compiled where there is a compiler."""
         compiled = backend == "compiled" or (backend == "auto" and find_compiler() is not None)

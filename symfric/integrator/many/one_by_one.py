@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.status import Status
-from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.many.chunk import Solved
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import Tolerances, integrate
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 def solve_one_by_one(
     integrator: Integrator,
-    inputs: Drivers,
+    inputs: InputData,
     tolerances: Tolerances,
     backend: str,
     times: Array,

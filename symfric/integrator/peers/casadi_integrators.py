@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import consistent, first_step
-from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.system import System
 from symfric.integrator.peers.ggl import stabilised
 from symfric.integrator.running.dense import Dense, hermite
@@ -41,7 +41,7 @@ class Peer:
     """A system for `casadi.integrator`, its differential states scaled by nominal values."""
 
     system: System
-    inputs: Drivers
+    inputs: InputData
     p: Array
     plugin: str
     dae: dict[str, ca.SX]
@@ -93,7 +93,7 @@ def rates_of(system: System) -> tuple[list[int], Array]:
     return rates, nominal[rates]
 
 
-def peer(system: System, inputs: Drivers, p: Array, tolerances: Tolerances, name: str) -> Peer:
+def peer(system: System, inputs: InputData, p: Array, tolerances: Tolerances, name: str) -> Peer:
     """Semi-explicit DAE of `system` for CasADi, with time as its own variable.
 
     Args:
@@ -144,7 +144,7 @@ def peer(system: System, inputs: Drivers, p: Array, tolerances: Tolerances, name
 
 def integrate_by_peer(
     system: System,
-    inputs: Drivers,
+    inputs: InputData,
     y0: Array,
     p: Array,
     times: Array,
@@ -199,7 +199,7 @@ def _counts(solver: ca.Function) -> dict[str, int]:
     }
 
 
-def _dense(system: System, inputs: Drivers, p: Array, grid: Array, y: Array) -> Dense:
+def _dense(system: System, inputs: InputData, p: Array, grid: Array, y: Array) -> Dense:
     """Cubic interpolation of the rates' columns on the grid, linear of the algebraic ones."""
     if grid.size < 2:
         return Dense(grid, grid + 1e-300, y.T, y.T, np.zeros((1, 2, system.n)))

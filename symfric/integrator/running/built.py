@@ -2,7 +2,7 @@
 
 from threading import Lock
 
-from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.methods.method import Method
 from symfric.integrator.running.integrator import Integrator
 from symfric.model import Model
@@ -12,7 +12,7 @@ REMEMBERED = 16
 _LOCK = Lock()
 
 
-def built(model: Model, inputs: Drivers, method: Method) -> tuple[Integrator, bool]:
+def built(model: Model, inputs: InputData, method: Method) -> tuple[Integrator, bool]:
     """The integrator of this model, structure of inputs and method; whether it was built just now.
 
     The model holds it, not a table of models: an integrator refers to its model, and a table would

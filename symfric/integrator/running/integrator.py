@@ -15,7 +15,7 @@ from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.compiled.compiler import find_compiler, library_path
 from symfric.integrator.equations.blocks import refinement
 from symfric.integrator.equations.initial import consistent
-from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.lu import Order
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.method import Method
@@ -45,7 +45,7 @@ class Integrator:
     """
 
     model: Model
-    inputs: Drivers
+    inputs: InputData
     tableau: Method
     whole: System | None = None
     build_time: float = 0.0

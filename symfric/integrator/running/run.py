@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import consistent, first_step, smallest_step
-from symfric.integrator.equations.inputs import Drivers
+from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.dense import Dense, from_records, join
 from symfric.integrator.running.diagnosis import explain
 from symfric.integrator.running.engine import Stop
@@ -89,7 +89,7 @@ class Run:
 
 def integrate(
     integrator: Integrator,
-    inputs: Drivers,
+    inputs: InputData,
     y0: Array,
     p: Array,
     tolerances: Tolerances,
@@ -99,14 +99,14 @@ def integrate(
     """Integrate over all input intervals; the result holds whatever was reached."""
     d = np.concatenate([p, inputs.values[:, 0]])
     y = integrator.start(y0, d)
-    drive = _Drive(integrator, inputs, tolerances, backend, progress, y)
+    march = _March(integrator, inputs, tolerances, backend, progress, y)
     try:
-        drive.whole(p)
+        march.whole(p)
     except KeyboardInterrupt:
-        reached = f"{Status.INTERRUPTED.value} It reaches t = {drive.t:g} s."
-        drive.run.stop(Status.INTERRUPTED, reached)
-    run = drive.run
-    run.integrator = drive.integrator
+        reached = f"{Status.INTERRUPTED.value} It reaches t = {march.t:g} s."
+        march.run.stop(Status.INTERRUPTED, reached)
+    run = march.run
+    run.integrator = march.integrator
     if not run.dense:
         empty = np.zeros((1, integrator.tableau.H.shape[0], y.size))
         start = inputs.breaks[:1]
@@ -115,13 +115,13 @@ def integrate(
 
 
 @final
-class _Drive:
+class _March:
     """One run under way: the step's memory and unknowns S, and what it has produced."""
 
     def __init__(
         self,
         integrator: Integrator,
-        inputs: Drivers,
+        inputs: InputData,
         tolerances: Tolerances,
         backend: str,
         progress: Callable[[float], None] | None,

@@ -9,7 +9,7 @@ from symfric import Viscous, simulate
 from symfric.bench.jitter import jitter, plot_jitter, runge_kutta_4, variation
 from symfric.figures import FigureData
 from symfric.integrator.equations.blocks import refinement
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.scenes import SliderCrank
 
@@ -49,7 +49,7 @@ def test_picture_is_drawn(data: FigureData, tmp_path: Path) -> None:
 
 def test_classical_runge_kutta_has_order_4_on_the_constraints() -> None:
     model = SliderCrank(Viscous(sigma_2=0.0)).model()
-    whole = system(model, drivers(model, None, 0.0, 0.05))
+    whole = system(model, input_data(model, None, 0.0, 0.05))
     step, exact = runge_kutta_4(whole), simulate(model, 0.05, rtol=1e-12, t_eval=[0.05])
     assert whole.manifold is not None
     errors: list[float] = []

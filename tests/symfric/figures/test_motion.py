@@ -31,11 +31,11 @@ def test_a_law_that_needs_the_applied_force_is_refused() -> None:
 def test_a_pushed_block_stops_where_it_has_broken_away() -> None:
     run = pushed(LuGre(), 1.0, 1.0, 2.0, 10.0, until=0.5)
     assert run.final["v"] == pytest.approx(0.5, rel=1e-6)
-    assert run.steps[-1] < 0.4  # 2 N - 0.1 N on 1 kg need about 0.26 s
+    assert run.step_times[-1] < 0.4  # 2 N - 0.1 N on 1 kg need about 0.26 s
 
 
 def test_times_between_the_steps_hold_the_ends_of_the_steps() -> None:
     run = pushed(LuGre(), 1.0, 1.0, 0.05, 0.1)
     times = fine(run, 4)
-    assert times[::4] == pytest.approx(run.steps)
+    assert times[::4] == pytest.approx(run.step_times)
     assert (np.diff(times) > 0).all()

@@ -29,14 +29,14 @@ def test_a_pushed_block_on_a_spring_swings_with_its_frequency() -> None:
     start = float(SPRING.begin().z.mean()) * 1e5
     run = shoved(SPRING, N, 0.8, start + 1.0, 0.05, None)
     w = np.sqrt(1e5 / 0.8)
-    expected = 1e-5 * (1 - np.cos(w * run.steps))
+    expected = 1e-5 * (1 - np.cos(w * run.step_times))
     assert run.columns["x"] == pytest.approx(expected, abs=3e-6)
 
 
 def test_the_run_ends_where_the_velocity_is_reached() -> None:
     law = GenericAsperity(count=50, mu_0=0.0, mu_inf=0.0)
     run = shoved(law, N, 2.0, Linear([0.0, 1.0], [0.0, 4.0]), 1.0, 0.25)
-    assert run.steps[-1] == pytest.approx(0.5, abs=2e-3)  # v = t^2 without friction
+    assert run.step_times[-1] == pytest.approx(0.5, abs=2e-3)  # v = t^2 without friction
     assert run.at(0.25)["force"] == pytest.approx(1.0)
     assert run.at([0.25])["v"] == pytest.approx(0.0625, abs=2e-3)
 

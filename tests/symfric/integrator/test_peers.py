@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from symfric import Model, Variable
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.peers.casadi_integrators import Peer, peer
 from symfric.integrator.running.run import Tolerances
@@ -26,7 +26,7 @@ def hats(count: int, algebraic: bool) -> Model:
 
 def problem(count: int, backend: str, algebraic: bool, rtol: float) -> Peer:
     model = hats(count, algebraic)
-    inputs = drivers(model, None, 0.0, 1.0)
+    inputs = input_data(model, None, 0.0, 1.0)
     whole = system(model, inputs)
     tolerances = Tolerances(rtol, rtol * whole.nominal, 0.0, 100_000)
     return peer(whole, inputs, model.values("p"), tolerances, backend)

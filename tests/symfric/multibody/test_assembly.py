@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from symfric import BrownMcPhee, LuGre, Model
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.step.attempt import build_step
@@ -37,7 +37,7 @@ VARIANTS: dict[str, Mechanism] = {
 
 
 def step(model: Model) -> ca.Function:
-    return build_step(system(model, drivers(model, None, 0.0, 1.0)), METHODS["rodas5p"])
+    return build_step(system(model, input_data(model, None, 0.0, 1.0)), METHODS["rodas5p"])
 
 
 def counts(name: str) -> tuple[int, int, int]:

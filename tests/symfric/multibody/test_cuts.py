@@ -7,7 +7,7 @@ import pytest
 from symfric import BrownMcPhee, LuGre, Model, simulate
 from symfric.bench.chains import chain
 from symfric.integrator.equations.blocks import blocks, refinement, signs
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.laws import Law
@@ -22,7 +22,7 @@ each_law = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 
 
 def unknowns(model: Model) -> System:
-    return system(model, drivers(model, None, 0.0, 1.0))
+    return system(model, input_data(model, None, 0.0, 1.0))
 
 
 def both(links: int, law: Law | None, monkeypatch: pytest.MonkeyPatch) -> tuple[System, System]:

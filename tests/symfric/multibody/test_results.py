@@ -10,7 +10,7 @@ from chains import TREE, chain, solve, state
 
 from symfric import BrownMcPhee, simulate
 from symfric.integrator.equations.initial import consistent
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.model import Model
 from symfric.multibody import (
@@ -39,7 +39,7 @@ def at_start(model: Model) -> dict[str, float]:
     mechanics = model.holonomic
     assert mechanics is not None
     nx, n = len(model.x), mechanics.n
-    made = system(model, drivers(model, None, 0.0, 1.0))
+    made = system(model, input_data(model, None, 0.0, 1.0))
     y = np.zeros(made.n)
     y[:nx] = model.initial_state()
     y[nx + n : nx + n + len(model.z)] = [v.start for v in model.z]

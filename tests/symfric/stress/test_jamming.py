@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from symfric import BrownMcPhee, Model, SolveError, Status, Viscous, simulate
 from symfric.integrator.equations.blocks import signs
 from symfric.integrator.equations.initial import first_guess
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.manifold import SHOCK, Manifold
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
@@ -72,7 +72,7 @@ def test_a_box_just_heavy_enough_moves_on(rtol: float) -> None:
 
 def reserves(model: Model, t_end: float) -> tuple[Array, Array]:
     """Det(I - dN/dN) at the ends of all steps, by NumPy, and the product of our pivots."""
-    inputs = drivers(model, None, 0.0, t_end)
+    inputs = input_data(model, None, 0.0, t_end)
     integrator = Integrator(model, inputs, RODAS5P)
     s = integrator.system
     y = first_guess(s, model, model.initial_state())

@@ -128,7 +128,7 @@ def test_a_light_box_jams_where_the_closed_form_says(ratio: float) -> None:
     assert isinstance(run, Trajectory)
     assert caught.value.status is Status.JAMMED
     sound(run)
-    last = run.at([float(run.steps[-1])])["phi"][0]
+    last = run.at([float(run.step_times[-1])])["phi"][0]
     top = atan(0.12) / 2  # where the reserve is smallest
     assert last == pytest.approx(brentq(reserve, top, 0.5, args=(ratio,)), abs=2e-4)
     assert (reserve(run["phi"], ratio) > 0).all()
@@ -218,7 +218,7 @@ def test_an_exact_parallelogram_stops_where_its_links_lie_in_line() -> None:
     assert isinstance(run, Trajectory)
     assert finite(run)
     assert run["theta_crank"] == pytest.approx(run["theta_rocker"], abs=1e-9)
-    reached = run.at([float(run.steps[-1])])["theta_crank"][0]
+    reached = run.at([float(run.step_times[-1])])["theta_crank"][0]
     assert reached == pytest.approx(np.pi, abs=1e-5)
 
 
@@ -230,7 +230,7 @@ def test_a_step_over_a_change_point_is_not_taken(formulation: str, index: int, r
     with pytest.raises(SolveError, match="the configuration is singular") as caught:
         simulate(model, 3.0, rtol=rtol, backend="vm")
     assert caught.value.partial is not None
-    assert caught.value.partial.steps[-1] == pytest.approx(0.206637, abs=1e-5)
+    assert caught.value.partial.step_times[-1] == pytest.approx(0.206637, abs=1e-5)
 
 
 @pytest.mark.parametrize("excess", [1e-8, 1e-4, 1e-2])

@@ -11,7 +11,7 @@ import pytest
 from symfric import LuGre, Status, rabinowicz, simulate
 from symfric.integrator.compiled import compiler
 from symfric.integrator.compiled.compiler import cache_folder, find_compiler, library_path, load
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
 
@@ -50,7 +50,7 @@ def choose_compiler(monkeypatch: pytest.MonkeyPatch, command: str) -> None:
 
 def integrator() -> Integrator:
     model = rabinowicz(LuGre())
-    return Integrator(model, drivers(model, None, 0.0, 1.0), RODAS5P)
+    return Integrator(model, input_data(model, None, 0.0, 1.0), RODAS5P)
 
 
 @needs_compiler

@@ -25,7 +25,7 @@ from symfric import (
     rabinowicz,
     simulate,
 )
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.peers.casadi_integrators import peer
 from symfric.integrator.running.run import Tolerances
@@ -92,7 +92,7 @@ def test_difference_quotients_agree_over_a_scan_of_widths(law: str, name: str) -
 
 def peer_slopes(model: Model, x0: Array, times: Array, plugin: str) -> tuple[Array, Array]:
     """States and their derivatives by p at times, by an integrator of CasADi and its own AD."""
-    inputs = drivers(model, None, 0.0, float(times[-1]))
+    inputs = input_data(model, None, 0.0, float(times[-1]))
     whole = system(model, inputs)
     tolerances = Tolerances(1e-12, 1e-13 * whole.nominal, 0.0, 1_000_000)
     problem = peer(whole, inputs, model.values("p"), tolerances, plugin)

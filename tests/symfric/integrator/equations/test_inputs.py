@@ -10,21 +10,21 @@ import numpy as np
 import pytest
 
 from symfric import Hold, Linear, Model, Variable, Viscous, drive, simulate
-from symfric.integrator.equations.inputs import Drivers, Input, drivers
+from symfric.integrator.equations.inputs import Input, InputData, input_data
 
 x = Variable("x", "m", start=0.0)
 force, torque = Variable("force", "N", start=2.0), Variable("torque", "N m", start=-1.0)
 TWO = Model("two", x=(x,), u=(force, torque), ode=force.symbol + torque.symbol)
 
 
-def values(of: Drivers, model: Model, t: float) -> list[float]:
+def values(of: InputData, model: Model, t: float) -> list[float]:
     """The inputs at one time."""
     data = of.values[:, of.interval(np.array([t]))[0]]
     return ca.Function("u", [model.t, of.data], [of.expression])(t, data).full().ravel().tolist()
 
 
-def made(**given: Input) -> Drivers:
-    return drivers(TWO, given, 0.0, 4.0)
+def made(**given: Input) -> InputData:
+    return input_data(TWO, given, 0.0, 4.0)
 
 
 def test_what_is_not_given_keeps_its_start_value_and_numbers_are_data() -> None:
@@ -33,7 +33,7 @@ def test_what_is_not_given_keeps_its_start_value_and_numbers_are_data() -> None:
     assert values(other, TWO, 1.0) == [5.0, -1.0]
     assert plain.key == other.key
     assert plain.breaks.tolist() == [0.0, 4.0]
-    assert drivers(Model("none", x=(x,), ode=x.symbol), None, 0.0, 1.0).expression.numel() == 0
+    assert input_data(Model("none", x=(x,), ode=x.symbol), None, 0.0, 1.0).expression.numel() == 0
 
 
 def test_hold_jumps_at_its_samples_and_holds_beyond() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from symfric import BrownMcPhee, Model, SolveError, Status, Variable, Viscous, simulate
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import System, system
 from symfric.multibody import (
     Distance,
@@ -58,7 +58,7 @@ def test_steps_end_where_results_are(name: str) -> None:
 
 
 def unknowns(model: Model) -> System:
-    return system(model, drivers(model, None, 0.0, 1.0))
+    return system(model, input_data(model, None, 0.0, 1.0))
 
 
 def test_accelerations_are_unknowns_and_no_mass_matrix_is_inverted() -> None:

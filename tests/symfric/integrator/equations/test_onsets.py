@@ -88,4 +88,4 @@ def test_a_pulse_too_short_for_the_grid_is_hit_where_it_is_named() -> None:
     missed, hit = simulate(model, 10.0, **how), simulate(model, 10.0, times=[AT], **how)
     assert missed.final["x"] == 0.0
     assert hit.final["x"] == pytest.approx(1.0, rel=1e-5)
-    assert AT in hit.steps
+    assert AT in hit.step_times

@@ -6,7 +6,7 @@ import pytest
 
 from symfric import BrownMcPhee, Hold, Linear, LuGre, Model, Variable, drive, rabinowicz, simulate
 from symfric.integrator.equations.initial import consistent
-from symfric.integrator.equations.inputs import Input, drivers
+from symfric.integrator.equations.inputs import Input, input_data
 from symfric.integrator.equations.system import System, system
 from symfric.model import Monitor
 
@@ -17,7 +17,7 @@ rates = ca.SX.sym("rates", 2)
 
 
 def assembled(model: Model, **inputs: Input) -> System:
-    return system(model, drivers(model, inputs, 0.0, 2.0))
+    return system(model, input_data(model, inputs, 0.0, 2.0))
 
 
 def value(s: System, unknowns: list[float], data: list[float]) -> list[float]:

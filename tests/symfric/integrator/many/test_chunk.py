@@ -11,7 +11,7 @@ import pytest
 from differentiable import oscillator, switched
 
 from symfric import BrownMcPhee, Hold, Model, rabinowicz, simulate
-from symfric.integrator.equations.inputs import Input, drivers
+from symfric.integrator.equations.inputs import Input, input_data
 from symfric.integrator.many.chunk import Chunk, Job, digest, solve_chunk
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
@@ -22,7 +22,7 @@ def task(
     model: Model, start: list[float], backend: str = "vm", u: dict[str, Input] | None = None
 ) -> tuple[Job, Chunk]:
     """Two equal members over a second, results at three times."""
-    inputs = drivers(model, u, 0.0, 1.0)
+    inputs = input_data(model, u, 0.0, 1.0)
     integrator = Integrator(model, inputs, RODAS5P)
     times = np.array([0.0, 0.5, 1.0])
     p, atol = model.values("p"), 1e-7 * integrator.system.nominal

@@ -7,7 +7,7 @@ import pytest
 from differentiable import oscillator
 
 from symfric import Hold, Model, Output, Variable
-from symfric.integrator.equations.inputs import Drivers, drivers
+from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.many.members import (
     CompiledMembers,
     Members,
@@ -34,21 +34,21 @@ each_loop = pytest.mark.parametrize("make", [vm, compiled])
 Make = Callable[[Integrator], Members]
 
 
-def columns(inputs: Drivers, model: Model, starts: list[list[float]]) -> tuple:
+def columns(inputs: InputData, model: Model, starts: list[list[float]]) -> tuple:
     S = State.at(inputs.breaks[0], 1e-8, starts)
     atol = 1e-7 * model.nominal("x")
     R = Given.of(0.0, 1e-6, np.inf, atol, [*model.values("p"), *inputs.values[:, 0]])
     return S, np.tile(R, (len(starts), 1)), np.zeros(len(starts), dtype=np.int64)
 
 
-def stretch(inputs: Drivers, times: list[float], max_steps: int = 10_000) -> Stretch:
+def stretch(inputs: InputData, times: list[float], max_steps: int = 10_000) -> Stretch:
     return Stretch(inputs.breaks, inputs.values, np.array(times), max_steps, 1e-15)
 
 
 @each_loop
 def test_held_input_belongs_to_the_interval_that_it_begins(make: Make) -> None:
     model = oscillator()
-    inputs = drivers(model, {"u": Hold([0.0, 0.3, 0.6], [1.0, -2.0, 3.0])}, 0.0, 1.0)
+    inputs = input_data(model, {"u": Hold([0.0, 0.3, 0.6], [1.0, -2.0, 3.0])}, 0.0, 1.0)
     S, R, made = columns(inputs, model, [[1.0, 0.0], [0.0, 0.0]])
     before = R.copy()
     found, reason = make(Integrator(model, inputs, RODAS5P)).run(
@@ -66,7 +66,7 @@ def test_held_input_belongs_to_the_interval_that_it_begins(make: Make) -> None:
 @each_loop
 def test_attempts_made_before_count(make: Make) -> None:
     model = oscillator()
-    inputs = drivers(model, None, 0.0, 100.0)
+    inputs = input_data(model, None, 0.0, 100.0)
     members = make(Integrator(model, inputs, RODAS5P))
     S, R, made = columns(inputs, model, [[1.0, 0.0], [1.0, 0.0]])
     made[1] = 64
@@ -81,7 +81,7 @@ def test_attempts_made_before_count(make: Make) -> None:
 @each_loop
 def test_two_stretches_are_one(make: Make) -> None:
     model = oscillator()
-    inputs = drivers(model, None, 0.0, 2.0)
+    inputs = input_data(model, None, 0.0, 2.0)
     members, times = make(Integrator(model, inputs, RODAS5P)), [0.5, 1.5, 2.0]
     S, R, made = columns(inputs, model, [[1.0, 0.0]])
     whole, _ = members.run(S.copy(), R, made.copy(), stretch(inputs, times))
@@ -96,7 +96,7 @@ def test_two_stretches_are_one(make: Make) -> None:
 def test_member_that_cannot_start_has_its_start_alone(make: Make) -> None:
     x = Variable("x", "m", start=1.0)
     model = Model("broken", x=(x,), ode=np.nan * x.symbol)
-    inputs = drivers(model, None, 0.0, 1.0)
+    inputs = input_data(model, None, 0.0, 1.0)
     S, R, made = columns(inputs, model, [[1.0]])
     found, reason = make(Integrator(model, inputs, RODAS5P)).run(
         S, R, made, stretch(inputs, [0.0, 0.5])
@@ -112,7 +112,7 @@ def test_signals_with_structural_zeros_are_filled_in(make: Make) -> None:
     x = Variable("x", "m", start=1.0)
     outputs = {"none": Output(0.0, "1"), "twice": Output(2 * x.symbol, "m")}
     model = Model("sparse", x=(x,), ode=-x.symbol, outputs=outputs)
-    inputs = drivers(model, None, 0.0, 1.0)
+    inputs = input_data(model, None, 0.0, 1.0)
     S, R, made = columns(inputs, model, [[1.0]])
     found, _ = make(Integrator(model, inputs, RODAS5P)).run(S, R, made, stretch(inputs, [1.0]))
     assert found[0, 0] == pytest.approx([np.exp(-1.0), 0.0, 2 * np.exp(-1.0)], rel=1e-5)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from symfric import Model, Variable
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.many import one_by_one
 from symfric.integrator.many.one_by_one import solve_one_by_one
 from symfric.integrator.methods.tableaux import RODAS5P
@@ -25,7 +25,7 @@ def switch() -> Model:
 
 def solve(starts: list[list[float]]) -> Any:
     model = switch()
-    inputs = drivers(model, None, 0.0, 3.0)
+    inputs = input_data(model, None, 0.0, 3.0)
     tolerances = Tolerances(1e-8, np.array([1e-9]), 1e-10, 10_000)
     integrator, times = Integrator(model, inputs, RODAS5P), np.array([1.0, 3.0])
     rows = np.array(starts), np.zeros((len(starts), 0))

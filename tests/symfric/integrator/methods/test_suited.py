@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from symfric import Model, SolveError, Status, Variable, flow, simulate, simulate_many
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS, RODAS5P
 from symfric.integrator.running.integrator import Integrator
 
@@ -55,7 +55,7 @@ def test_same_call_takes_the_same_order_whatever_ran_before() -> None:
 
 def test_sound_order_stays_and_a_better_one_is_built_once() -> None:
     model = crossed(x.symbol - 1)
-    made = Integrator(model, drivers(model, None, 0.0, 1.0), RODAS5P)
+    made = Integrator(model, input_data(model, None, 0.0, 1.0), RODAS5P)
 
     def at(start: float) -> Integrator:
         return made.suited([(np.array([start, 0.0, 0.0]), np.zeros(0))], 1.0)

@@ -7,7 +7,7 @@ import pytest
 
 from symfric import BrownMcPhee, Model, SolveError, simulate
 from symfric.integrator import simulate_by_peer
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.peers.ggl import stabilised
 from symfric.results.trajectory import Trajectory
@@ -80,7 +80,7 @@ def test_drift_of_the_constraints_shows_in_the_results(formulation: str) -> None
 
 
 def test_unknowns_of_the_stabilised_form_are_named() -> None:
-    whole = system(m := model("slider_crank", "joint"), drivers(m, None, 0.0, 1.0))
+    whole = system(m := model("slider_crank", "joint"), input_data(m, None, 0.0, 1.0))
     assert stabilised(whole).names == (*whole.names, "rod_lambda_eta")
     assert stabilised(whole).n == whole.n + 1
 

@@ -10,7 +10,7 @@ import pytest
 
 import symfric.integrator.running.built as module
 from symfric import Model, Variable, Viscous, drive, simulate
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.built import REMEMBERED, built
 from symfric.integrator.running.integrator import Integrator
@@ -21,7 +21,7 @@ def cart() -> Model:
 
 
 def wave(model: Model, k: int) -> tuple[Integrator, bool]:
-    inputs = drivers(model, {"force": lambda t: ca.sin(k * t)}, 0.0, 1.0)
+    inputs = input_data(model, {"force": lambda t: ca.sin(k * t)}, 0.0, 1.0)
     return built(model, inputs, METHODS["rodas3"])
 
 
@@ -45,8 +45,8 @@ def test_equal_inputs_and_methods_share_an_integrator_others_do_not() -> None:
     assert fresh
     assert wave(model, 1) == (first, False)
     assert wave(model, 2)[0] is not first
-    assert built(model, drivers(model, None, 0.0, 1.0), METHODS["rodas3"])[0] is not first
-    assert built(model, drivers(model, None, 0.0, 1.0), METHODS["rodas4p"])[1]
+    assert built(model, input_data(model, None, 0.0, 1.0), METHODS["rodas3"])[0] is not first
+    assert built(model, input_data(model, None, 0.0, 1.0), METHODS["rodas4p"])[1]
     assert wave(cart(), 1)[1]
 
 

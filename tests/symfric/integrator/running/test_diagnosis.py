@@ -64,7 +64,7 @@ def test_equation_that_turns_nan_is_named_with_its_time(case: str, backend: str)
     assert message.startswith(f"simulate 'edge': stopped at t = {end:g} s: the ")
     assert "equation of y" in message
     assert "equation of x" not in message
-    assert partial.steps[-1] == pytest.approx(end, abs=1e-6)
+    assert partial.step_times[-1] == pytest.approx(end, abs=1e-6)
     assert all(np.isfinite(signal).all() for signal in partial.signals.values())
 
 
@@ -87,7 +87,7 @@ def test_infinite_derivative_is_named_with_both_names() -> None:
     status, message, partial = failure(model, 3.0)
     assert status is Status.NOT_FINITE
     assert "equation of y" in message
-    assert partial.steps[-1] == pytest.approx(2.0, abs=1e-4)
+    assert partial.step_times[-1] == pytest.approx(2.0, abs=1e-4)
 
 
 @each_backend
@@ -100,7 +100,7 @@ def test_unbounded_growth_is_said_with_the_state(power: int, backend: str) -> No
     assert "y = " in message
     assert "grows without bound; check signs and parameters" in message
     assert "x = " not in message
-    assert partial.steps[-1] == pytest.approx(1 / (power - 1), abs=1e-4)
+    assert partial.step_times[-1] == pytest.approx(1 / (power - 1), abs=1e-4)
 
 
 def test_algebraic_equation_that_loses_its_solution_is_named() -> None:
@@ -138,7 +138,7 @@ def test_discontinuity_that_stops_the_step_is_called_one() -> None:
     assert status is Status.STEP_TOO_SMALL
     assert "fastest equation x; a discontinuity is near" in message
     assert "smooth form or the model an event" in message
-    assert partial.steps[-1] == pytest.approx(0.5, abs=1e-6)
+    assert partial.step_times[-1] == pytest.approx(0.5, abs=1e-6)
 
 
 @each_backend
@@ -147,10 +147,10 @@ def test_number_of_attempts_is_limited(backend: str) -> None:
     status, message, partial = failure(model, 1000.0, max_steps=300, backend=backend)
     assert status is Status.MAX_STEPS
     assert "maximum number of steps was used up" in message
-    assert f"stands at t = {partial.steps[-1]:g} s" in message
+    assert f"stands at t = {partial.step_times[-1]:g} s" in message
     attempts = partial.statistics.steps + partial.statistics.rejections
     assert 300 <= attempts < 300 + 32
-    assert 0 < partial.steps[-1] < 1000
+    assert 0 < partial.step_times[-1] < 1000
 
 
 def test_partial_result_equals_the_start_of_a_whole_one() -> None:
@@ -166,4 +166,4 @@ def test_failure_is_returned_where_nothing_is_to_be_thrown() -> None:
     run = simulate(advancing(ca.sqrt(1 - X)), 2.0, throw=False)
     assert run.status is Status.NOT_FINITE
     assert not run.status.ok
-    assert run.t[-1] <= run.steps[-1] < 2.0
+    assert run.t[-1] <= run.step_times[-1] < 2.0

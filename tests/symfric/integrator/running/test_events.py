@@ -103,7 +103,7 @@ def test_zeno_storm_is_said_with_what_was_reached(backend: str) -> None:
         simulate(ball(0.8), 5.0, rtol=1e-10, backend=backend)
     partial = caught.value.partial
     assert caught.value.status is partial.status is Status.EVENT_STORM
-    assert partial.steps[-1] == pytest.approx(FALL * (1 + 2 * 0.8 / 0.2), abs=1e-5)
+    assert partial.step_times[-1] == pytest.approx(FALL * (1 + 2 * 0.8 / 0.2), abs=1e-5)
     assert 60 < len(partial.happened) < 100
 
 
@@ -121,7 +121,7 @@ def test_terminal_event_ends_the_run_at_its_time(backend: str) -> None:
     model = clock(Event("stop", X - 0.7, 1, terminal=True))
     run = simulate(model, 5.0, backend=backend, samples=51)
     assert run.status is Status.TERMINATED
-    assert run.steps[-1] == run.happened[0][0] == pytest.approx(0.7, abs=1e-9)
+    assert run.step_times[-1] == run.happened[0][0] == pytest.approx(0.7, abs=1e-9)
     assert run.t.tolist() == pytest.approx(np.arange(0, 0.65, 0.1).tolist())
     assert run.final["x"] == pytest.approx(0.7, abs=1e-9)
 

@@ -43,9 +43,9 @@ def test_interrupt_keeps_what_was_reached(backend: str) -> None:
     run = simulate(model, 2000.0, backend=backend, progress=interrupt, samples=20001)
     assert run.status is Status.INTERRUPTED
     assert not run.status.ok
-    assert 0.02 * 2000 < run.steps[-1] < 2000
-    assert f"reaches t = {run.steps[-1]:g} s" in run.message
-    assert run.t[-1] <= run.steps[-1]
+    assert 0.02 * 2000 < run.step_times[-1] < 2000
+    assert f"reaches t = {run.step_times[-1]:g} s" in run.message
+    assert run.t[-1] <= run.step_times[-1]
     early = run.t < 30
     assert run["x"][early] == pytest.approx(whole["x"][: run.t.size][early], abs=1e-4)
 
@@ -83,11 +83,11 @@ def test_statistics_add_up(law: BrownMcPhee | LuGre, backend: str) -> None:
     run = simulate(rabinowicz(law), 20.0, backend=backend)
     s = run.statistics
     attempts = s.steps + s.rejections
-    assert s.steps == run.steps.size - 1
+    assert s.steps == run.step_times.size - 1
     assert 0 < s.rejections < s.steps
     assert s.evaluations == 8 * attempts
     assert s.jacobians == s.factorisations == attempts
-    assert s.smallest_step == pytest.approx(np.diff(run.steps).min(), rel=1e-9)
+    assert s.smallest_step == pytest.approx(np.diff(run.step_times).min(), rel=1e-9)
     assert s.events == 0
     assert (s.backend, s.method) == (backend, "Rodas5P")
     assert s.error != s.error
@@ -114,9 +114,9 @@ def test_steps_end_at_the_ends_of_input_intervals() -> None:
     ends = [0.3, 0.31, 1.1, 1.7]
     force = Hold([0.0, *ends], [1.0, -3.0, 2.0, 0.5, 4.0])
     run = simulate(drive(BrownMcPhee()), 2.0, u={"force": force})
-    assert set(ends) <= set(run.steps.tolist())
-    assert (np.diff(run.steps) > 0).all()
-    assert (run.steps[0], run.steps[-1]) == (0.0, 2.0)
+    assert set(ends) <= set(run.step_times.tolist())
+    assert (np.diff(run.step_times) > 0).all()
+    assert (run.step_times[0], run.step_times[-1]) == (0.0, 2.0)
 
 
 def test_algebraic_variables_follow_a_jump_of_an_input() -> None:
@@ -135,7 +135,7 @@ def test_jump_of_an_input_to_where_no_solution_is_fails_with_what_was_reached() 
     run = simulate(model, 2.0, u={"u": Hold([0.0, 1.0], [1.0, -1.0])}, throw=False)
     assert run.status is Status.SINGULAR
     assert "at t = 1 s" in run.message
-    assert run.steps[-1] == 1.0
+    assert run.step_times[-1] == 1.0
 
 
 def test_measured_error_is_that_of_the_run() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from symfric import BrownMcPhee, Model, flow, simulate
 from symfric.foundation.parameters import symbolise
-from symfric.integrator.equations.inputs import drivers
+from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.step.attempt import build_fixed
@@ -35,7 +35,7 @@ def smooth(scene: MechanismScene) -> Mechanism:
 
 
 def unknowns(model: Model) -> tuple[System, Tangent]:
-    whole = system(model, drivers(model, None, 0.0, 1.0))
+    whole = system(model, input_data(model, None, 0.0, 1.0))
     chart = tangent(whole)
     assert chart is not None
     return whole, chart
@@ -73,7 +73,7 @@ def test_as_many_differential_unknowns_as_degrees_of_freedom(
 
 def test_trees_need_no_chart() -> None:
     model = PendulumBox(LAW).mechanism().build(index=0)
-    assert tangent(system(model, drivers(model, None, 0.0, 1.0))) is None
+    assert tangent(system(model, input_data(model, None, 0.0, 1.0))) is None
 
 
 def start_of(model: Model) -> np.ndarray:
