@@ -88,7 +88,7 @@ def simulate(
             criterion proves an equation not to be stiff, so it is never chosen by itself.
         backend: the engine: "vm" needs no compiler; "compiled" compiles the step once and keeps
             it in the user's cache; "auto" starts in the former and goes over to the latter when
-            that is predicted to pay. They differ by rounding. Integrators of others have a door of
+            that is predicted to pay. Both give the same bits. Integrators of others have a door of
             their own, `simulate_by_peer`.
         event_tolerance: how sharply events are located [s].
         max_steps: attempts allowed.

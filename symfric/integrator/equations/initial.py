@@ -240,9 +240,13 @@ def _rounding(system: System | Equations, y: Array, d: Array) -> float:
     return max(float(np.linalg.norm(change)) for change in moved)
 
 
+LONGEST_FIRST = 1e-5
+"""A first step [s] that no machine moves much in, however long it is to run; it costs a few."""
+
+
 def first_step(span: float, t_start: float = 0.0) -> float:
     """A first step [s] so small that the controller decides: it grows eightfold per step."""
-    return max(1e-8 * span, 10 * FLOOR * abs(t_start))
+    return max(min(1e-8 * span, LONGEST_FIRST), 10 * FLOOR * abs(t_start))
 
 
 def smallest_step(span: float) -> float:

@@ -193,22 +193,27 @@ def resets(integrator: Integrator, t: float, y: Array, d: Array, which: tuple[in
 class EventStorm:
     """Notices events that pile up at one time (Zeno) instead of letting the clock stand still.
 
-    A storm is four events of one kind in a row at shrinking distances, the last one below a
-    thousand event tolerances; or a hundred events within a 1e-9th of the span.
+    A storm is four events of one kind in a row at distances that shrink like a geometric series
+    with less than a thousand event tolerances still to come; or a hundred events less than a few
+    tolerances, or roundings of the clock, apart. Events that are merely many, of a fast machine or
+    within a long run, are none.
     """
 
-    def __init__(self, span: float, tolerance: float) -> None:
+    def __init__(self, tolerance: float) -> None:
         self._recent: deque[tuple[float, tuple[int, ...]]] = deque(maxlen=100)
-        self._span, self._tolerance = span, tolerance
+        self._tolerance = tolerance
 
     def raged_at(self, t: float, which: tuple[int, ...]) -> bool:
         """Whether the events `which` at time `t` complete a storm."""
         self._recent.append((t, which))
         full = len(self._recent) == self._recent.maxlen
-        if full and t - self._recent[0][0] < 1e-9 * self._span:
+        apart = max(self._tolerance, float(np.spacing(abs(t))))
+        if full and t - self._recent[0][0] < 10 * apart * len(self._recent):
             return True
         last = list(self._recent)[-4:]
         gaps = np.diff([time for time, _ in last])
         alike = len(last) == 4 and len({events for _, events in last}) == 1
-        shrinking = bool((gaps[1:] < gaps[:-1]).all())
-        return alike and shrinking and bool(gaps[-1] < 1000 * self._tolerance)
+        if not alike or not (gaps[1:] < gaps[:-1]).all():
+            return False
+        still_to_come = gaps[-1] * gaps[-1] / (gaps[-2] - gaps[-1])
+        return bool(still_to_come < 1000 * self._tolerance)

@@ -135,7 +135,7 @@ class _March:
         h = min(first_step(span, self.t_start), tolerances.max_step)
         self.S = State.at(self.t_start, h, y)
         self.eventful = bool(integrator.model.events)
-        self.storm = EventStorm(self.t_end - self.t_start, tolerances.event)
+        self.storm = EventStorm(tolerances.event)
         self.run, self.d = Run(), np.zeros(0)
         self.span, self.places = span, [y.copy()]
 

@@ -5,7 +5,17 @@ import numpy as np
 import pytest
 from closed_forms import assemble, smooth_dae
 
-from symfric import LuGre, Model, Variable, rabinowicz, simulate, simulate_many
+from symfric import (
+    BrownMcPhee,
+    Law,
+    LuGre,
+    Model,
+    Status,
+    Variable,
+    rabinowicz,
+    simulate,
+    simulate_many,
+)
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.compiled.compiler import find_compiler
 from symfric.integrator.equations.initial import consistent, consistent_many
@@ -116,6 +126,16 @@ def test_span_of_any_length_is_started_and_ended(span: float) -> None:
     run = simulate(model, span, rtol=1e-8)
     assert run.final["x"] == pytest.approx(np.exp(-1), rel=1e-7)
     assert run.statistics.steps < 60
+
+
+@pytest.mark.parametrize("law", [BrownMcPhee(), LuGre()])
+def test_a_run_of_ages_does_not_begin_with_a_leap(law: Law) -> None:
+    """Over 1e20 s the first step took 1e12 s, to steady sliding that is unstable, with SUCCESS."""
+    run = simulate(rabinowicz(law), 1e20, max_steps=1000, backend="vm", throw=False)
+    assert run.status is Status.MAX_STEPS
+    begun = simulate(rabinowicz(law), 20.0, max_steps=1000, backend="vm")
+    at = np.linspace(0.0, min(20.0, run.steps[-1]), 50)
+    assert run.at(at)["x"] == pytest.approx(begun.at(at)["x"], abs=1e-5)
 
 
 def test_start_at_rest_in_all_derivatives_is_left() -> None:

@@ -97,6 +97,33 @@ def test_elastic_ball_is_no_storm() -> None:
     assert run.happened[-1][0] == pytest.approx(impacts(44, 1.0)[-1], abs=1e-6)
 
 
+def test_fast_events_of_a_stiffening_machine_are_no_storm() -> None:
+    """Periods of 50 ns that get shorter: four of them below a microsecond were called a storm."""
+    x, v, w = Variable("x", "m", start=1.0), Variable("v", "m/s"), Variable("w", "rad/s")
+    rate = 2 * np.pi * 2e7
+    model = Model(
+        "resonator", x=(x, v, w),
+        ode=ca.vertcat(v.symbol, -((rate * (1 + w.symbol)) ** 2) * x.symbol, 1e4),
+        events=(Event("up", x.symbol, 1),),
+    )  # fmt: skip
+    run = simulate(model, 1e-6, event_tolerance=1e-14)
+    assert run.status is Status.SUCCESS
+    run = simulate(model, 1e-6)
+    assert run.status is Status.SUCCESS
+    assert len(run.happened) == 20
+
+
+def test_a_hundred_events_of_a_short_while_in_a_long_run_are_no_storm() -> None:
+    """A burst of 200 crossings within a millionth of a span that the last of them ends."""
+    count = Variable("count", "1")
+    tick = Event("tick", ca.sin(np.pi * 1e3 * X), 0, reset={"count": count.symbol + 1})
+    last = Event("last", count.symbol - 199.5, 1, terminal=True)
+    model = Model("burst", x=(x, count), ode=ca.SX([1.0, 0.0]), events=(tick, last))
+    run = simulate(model, 1e9, max_step=2e-4, throw=False)
+    assert run.status is Status.TERMINATED
+    assert run.steps[-1] == pytest.approx(0.2, rel=1e-6)
+
+
 @each_backend
 def test_zeno_storm_is_said_with_what_was_reached(backend: str) -> None:
     with pytest.raises(SolveError, match=r"Zeno.*mode.*t = 4\.063\d+ s, event 'bounce'") as caught:
