@@ -5,6 +5,7 @@ from typing import ClassVar, final
 
 from symfric.foundation.numeric import Scalar, asinh, column, exp, is_number, log, sqrt
 from symfric.foundation.parameters import option, param
+from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, Law, State
 
 
@@ -89,5 +90,11 @@ class RateAndState(Law):
         return column(self.v_0 / self.D_c * (exp(-z[0]) - w / self.v_0))
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """The psi of steady sliding, shape (1, 1)."""
-        return column(-log(self._speed(v) / self.v_0))
+        """The psi of steady sliding, shape (1, 1); 0, an age of D_c/v_0, below v_eps.
+
+        A contact at rest has no steady age. The oldest one, D_c/v_eps, is that of months: a body
+        that is let go under more than such a contact holds leaves it within no time that a step
+        could resolve.
+        """
+        moves = smooth.magnitude(v, 0.0) >= self.v_eps
+        return column(smooth.choose(moves, -log(self._speed(v) / self.v_0), 0.0))

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from oracles import stribeck_curve
 from rigs import prescribed_motion
 
-from symfric import Dahl, LuGre, Trajectory, drive, simulate
-from symfric.laws import LuGreNormalised, LuGrePassive
+from symfric import Dahl, LuGre, Trajectory, drive, rabinowicz, simulate
+from symfric.laws import ElastoPlastic, LuGreNormalised, LuGrePassive
 
 N = 7.848
 
@@ -157,3 +157,11 @@ def test_passivity_is_warned_about_with_the_bound() -> None:
     assert LuGrePassive().warnings() == ()
     assert len(LuGreNormalised().warnings()) == 1
     assert LuGre(sigma_1=ca.SX.sym("sigma_1")).warnings() == ()
+
+
+def test_slow_belts_take_the_block_to_the_static_level_and_no_further() -> None:
+    """The default width of |v| was above the creep: 1.35 mu_s N at 1e-5 m/s, 1.6 at 1e-6."""
+    for law in (LuGre(), LuGreNormalised(), LuGrePassive(), ElastoPlastic()):
+        for belt in (1e-5, 1e-6, 1e-8):
+            run = simulate(rabinowicz(law, v_belt=belt), 0.9 / belt, samples=20_001, backend="vm")
+            assert np.abs(run["friction"]).max() == pytest.approx(0.15 * N, rel=1e-4)

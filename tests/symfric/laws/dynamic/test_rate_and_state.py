@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 from symfric import drive, simulate
 from symfric.laws import RateAndState
+from symfric.scenes import DoublePendulum, FourMass, Pendulum, PendulumBox
 
 ROCK = {"mu_0": 0.6, "a": 0.005, "b": 0.01, "v_0": 1e-6, "D_c": 1e-5}
 
@@ -83,3 +84,12 @@ def test_creep_under_load_is_that_of_an_independent_integrator() -> None:
 def test_overflow_is_refused() -> None:
     with pytest.raises(ValueError, match=r"mu_0 <= 150 a, got mu_0 = 0.6 and a = 0.003"):
         RateAndState(mu_0=0.6, a=0.003)
+
+
+def test_machines_that_are_let_go_from_rest_run_with_defaults() -> None:
+    """They stopped at once: the start was an age of months, with a slope of 1e25 N s/m at rest."""
+    for scene in (Pendulum, DoublePendulum, PendulumBox, FourMass):
+        run = simulate(scene(RateAndState()).model(), 0.2, samples=2, backend="vm")
+        assert run.status.ok, scene
+    assert RateAndState().steady_state(0.0, 1.0)[0] == 0.0
+    assert RateAndState().steady_state(-1e-9, 1.0)[0] == pytest.approx(np.log(1e3))
