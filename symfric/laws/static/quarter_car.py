@@ -37,7 +37,8 @@ class QuarterCarGeneral(StaticLaw):
     |f_sd| / tan. `v` is the velocity of the body, x_rel the wheel's position minus the body's.
     As printed, the Coulomb term has the sign of the spring force and may drive the body, the branch
     at rest is not limited, and exp(|v|/e_1) needs e_1 < 0: here e_1 is its magnitude.
-    C_e, e_1, mu, sigma_v and L_d are not given in the paper; their defaults are invented.
+    C_e, e_1, mu, sigma_v and L_d are not given in the paper; their defaults are invented, sigma_v
+    so that friction lessens the overshoot of the body, as the paper says.
     Limits: holds |f_sd| <= F_brk - F_eps at rest; mu = 0 leaves the simple law beyond v_eps;
     x_rel < L_d / (2 sin(theta)).
     Source: Al-Zughaibi, quarter-car friction, equations 7-12 and 24 (seed 1), corrected as said.
@@ -67,7 +68,7 @@ class QuarterCarGeneral(StaticLaw):
         0.05, unit="1", role="level", doc="friction coefficient of the guide", lower=0.0
     )
     sigma_v: Scalar = param(
-        50.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0
+        1500.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0
     )
     v_eps: Scalar = param(
         1e-3, unit="m/s", role="width", doc="half width of the stick window", lower=1e-12
@@ -117,7 +118,7 @@ class QuarterCarSimple(StaticLaw):
 
     |v| and sign(v) are smooth over v_eps; the float v_eps = 0 is the original. As printed the
     exponent grows: here e_1 is the magnitude of the paper's. `N` has no effect. C_e, e_1 and
-    sigma_v are not given in the paper; their defaults are invented.
+    sigma_v are not given in the paper; their defaults are invented, as for `QuarterCarGeneral`.
     Limits: `Tustin` with a dynamic level of zero. Creeps under load; `QuarterCarGeneral` with
     mu = 0 holds at rest.
     Source: Al-Zughaibi, quarter-car friction, equation 21 (seed 1), with the sign of e_1 corrected.
@@ -136,7 +137,7 @@ class QuarterCarSimple(StaticLaw):
         0.01, unit="m/s", role="velocity scale", doc="velocity of the decay", lower=1e-12
     )
     sigma_v: Scalar = param(
-        50.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0
+        1500.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0
     )
     v_eps: Scalar = param(1e-3, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
 
