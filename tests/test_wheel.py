@@ -1,4 +1,4 @@
-"""The wheel holds the three packages and nothing else."""
+"""The wheel holds the three packages, the command and nothing else."""
 
 import subprocess
 import sys
@@ -32,9 +32,12 @@ def metadata(wheel: ZipFile, name: str) -> str:
     return wheel.read(path).decode()
 
 
-def test_it_holds_the_three_packages_alone(wheel: ZipFile) -> None:
+def test_it_holds_the_three_packages_and_the_command_alone(wheel: ZipFile) -> None:
     tops = {name.split("/")[0] for name in wheel.namelist()}
-    assert {top for top in tops if not top.endswith(".dist-info")} == set(PACKAGES)
+    assert {top for top in tops if not top.endswith(".dist-info")} == {
+        *PACKAGES,
+        "symfric_command.py",
+    }
 
 
 @pytest.mark.parametrize("package", PACKAGES)
@@ -62,4 +65,4 @@ def test_it_asks_for_these_libraries_only(wheel: ZipFile) -> None:
 
 def test_it_cannot_be_uploaded_by_accident_and_installs_the_command(wheel: ZipFile) -> None:
     assert "Classifier: Private :: Do Not Upload" in metadata(wheel, "METADATA")
-    assert "symfric = symfric.cli:main" in metadata(wheel, "entry_points.txt")
+    assert "symfric = symfric_command:main" in metadata(wheel, "entry_points.txt")

@@ -67,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refuse(error, INTERRUPTED if interrupted else FAILED_SOLVE)
     except (KeyboardInterrupt, typer.Abort):
         return _refuse(KeyboardInterrupt("interrupted"), INTERRUPTED)
-    except (ValueError, OSError, USAGE_ERROR) as error:
+    except (ValueError, OSError, MemoryError, USAGE_ERROR) as error:
         return _refuse(error, BAD_INPUT)
 
 
@@ -83,6 +83,8 @@ def sentence(error: BaseException) -> str:
     """The message of `error` on one line."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"'{error.filename}': {error.strerror}"
+    if isinstance(error, MemoryError):
+        return "expected a task that fits into memory, got a larger one; ask for fewer --samples"
     text = error.format_message() if isinstance(error, USAGE_ERROR) else str(error)
     text = " ".join(text.split()).removesuffix(".")
     return text.replace(". Did you mean", "; did you mean")

@@ -28,12 +28,12 @@ def bench(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Measure symfric beside other integrators: time, error and ratios at equal error.
+    """Measure symfric beside other integrators.
 
-    integrator: stick-slip of one mass, ensembles and derivatives. multibody: mechanisms, the cost
-    of their steps, what they do not need, published numbers. ivp: correct digits on problems with
-    published solutions (Test Set for IVP Solvers). jitter: total variation of
-    accelerations against law, step and transition velocity.
+    Time, error and ratios at equal error. integrator: stick-slip of one mass, ensembles and
+    derivatives. multibody: mechanisms, the cost of their steps, what they do not need, published
+    numbers. ivp: correct digits on problems with published solutions (Test Set for IVP Solvers).
+    jitter: total variation of accelerations against law, step and transition velocity.
 
     Example: symfric bench multibody --plot bench.png --csv runs.csv
     """

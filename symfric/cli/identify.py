@@ -30,7 +30,11 @@ def identify(
         Path | None, typer.Option("--validate", metavar="DATA2", help="Record for errors only.")
     ] = None,
     normal_force: Annotated[
-        float, typer.Option("--normal-force", help="N [N]; with 1 the coefficients read as N.")
+        float,
+        typer.Option(
+            "--normal-force",
+            help="Normal force [N]; with 1 the coefficients are forces in newtons.",
+        ),
     ] = 1.0,
     columns: Annotated[
         list[str] | None,

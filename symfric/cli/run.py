@@ -23,6 +23,7 @@ from symfric.cli.options import (
 from symfric.foundation.parameters import check_names
 from symfric.integrator import Input, simulate_by_peer
 from symfric.integrator.equations.inputs import Sampled
+from symfric.model import Model
 from symfric.multibody.urdf.read import relative
 from symfric.results.kinds import is_mechanism, kinds, norms
 from symfric.scenes import ALL_SCENES, MECHANISMS, Robot, Scene
@@ -45,7 +46,8 @@ def run(
         typer.Option(
             "--input",
             metavar="NAME=VALUE",
-            help="Input: a number, or FILE.csv:COLUMN over its column t. "
+            help="Input: a number, or FILE.csv:COLUMN over its column t, both in SI "
+            "or with their units in the header, as t [ms]. "
             "The drive's default is force = 2 sin(pi t) N.",
         ),
     ] = None,
@@ -117,19 +119,20 @@ def run(
     check_outputs(out, json, movie, picture=plot)
     check_movie(movie, scene)
     machines = scenes_with(scene, law, numbers("--set", settings))
+    models = {name: machine.model() for name, machine in machines.items()}
     machine = next(iter(machines.values()))
-    signals, described = _inputs(machine, inputs)
+    signals, described = _inputs(machine, models[law[0]], inputs)
     until = _default_t_end(machine, signals) if t_end is None else t_end
     start = numbers("--x0", x0)
     found: dict[str, Trajectory] = {}
     common: Any = {"x0": start, "u": signals, "rtol": rtol, "samples": samples, "throw": False}
-    for name, machine in machines.items():
+    for name, model in models.items():
         with output.progress(f"{scene} with {name}") as tell:
             if peer is None:
                 how |= {"method": method, "backend": backend, "progress": tell}
-                found[name] = simulate(machine.model(), until, **common, **how)
+                found[name] = simulate(model, until, **common, **how)
             else:
-                found[name] = simulate_by_peer(machine.model(), until, peer, **common)
+                found[name] = simulate_by_peer(model, until, peer, **common)
     if out:
         next(iter(found.values())).to_csv(out)
     if plot:
@@ -195,13 +198,16 @@ def check_movie(path: Path | None, scene: str) -> None:
     check_format(path)
 
 
-def _inputs(scene: Scene, texts: list[str] | None) -> tuple[dict[str, Input], dict[str, str]]:
+def _inputs(
+    scene: Scene, model: Model, texts: list[str] | None
+) -> tuple[dict[str, Input], dict[str, str]]:
     """Inputs by name, and the texts that describe them; without any those of the scene."""
-    given = assignments("--input", texts)
+    given, units = assignments("--input", texts), {v.name: v.unit for v in model.u}
+    check_names(f"--input of {model.name}", given, units)
     if not given:
         own = scene.inputs.items()
         return {name: of.function for name, of in own}, {name: of.text for name, of in own}
-    return {name: input_from_text(name, text) for name, text in given.items()}, given
+    return {n: input_from_text(n, text, units[n]) for n, text in given.items()}, given
 
 
 def _default_t_end(scene: Scene, signals: dict[str, Input]) -> float:

@@ -19,7 +19,7 @@ LOOSE = 1e-5
 """Above this relative tolerance whole stick phases may be lost without a sign of it."""
 BACKENDS = ("auto", "vm", "compiled")
 """Engines: CasADi's virtual machine, the step as machine code, and whichever is faster."""
-MOST_SAMPLES = 10**8
+MOST_SAMPLES = 10**7
 """Beyond these the times alone need gigabytes."""
 
 

@@ -60,7 +60,7 @@ ROWS = [f"{t!r},{t!r},{1 - t!r}" for t in T.tolist()]
         ("t [s],x [m],u [N]", None, r"a column 'force \[N\]', got t \[s\], x \[m\], u \[N\]"),
         ("t [s],x [inch],force [N]", None, r"column 'x \[inch\]': expected a unit of m, mm.*inch"),
         ("t,x [m],force [N]", None, "column 't': expected a unit of s, ms, us.*got none"),
-        ("t [s],x [m],q [m],F [N]", None, r"expected one column for x, got \['x \[m\]', 'q"),
+        ("t [s],x [m],q [m],F [N]", None, r"expected one column for x, got 'x \[m\]', 'q"),
         ("t [s],x [m],force [N]", [*ROWS[:5], "0.05,abc,1", *ROWS[6:]], "row 7: .*got 'abc'"),
         ("t [s],x [m],force [N]", [*ROWS[:5], "0.05,1", *ROWS[6:]], "row 7: .*number, got ''"),
         ("t [s],x [m],force [N]", [*ROWS[:5], "0.05,nan,1", *ROWS[6:]], "column x, row 7: .*nan"),

@@ -84,13 +84,35 @@ def test_bad_input_leaves_no_files_behind(tmp_path: Path) -> None:
 
 def test_an_operating_system_error_names_the_file(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "drive", "--law", "lugre", "--input", "force=none.csv:f"]) == 2
-    assert capsys.readouterr().err == "symfric: 'none.csv': No such file or directory\n"
+    assert "'none.csv': expected a file, got nothing there" in capsys.readouterr().err
 
 
 def test_debug_shows_where_an_error_comes_from(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SYMFRIC_DEBUG", "1")
     with pytest.raises(ValueError, match="did you mean lugre"):
         main(["laws", "lugr"])
+
+
+def test_an_interrupt_while_everything_is_imported_is_one_sentence() -> None:
+    """Ctrl-C in the first second printed a traceback."""
+    stopped = (
+        "import sys\n"
+        "class Interrupt:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'casadi': raise KeyboardInterrupt\n"
+        "sys.meta_path.insert(0, Interrupt())\n"
+        "from symfric_command import main\n"
+        "sys.exit(main())\n"
+    )
+    root = Path(symfric.__file__).parents[1]
+    done = subprocess.run(
+        [sys.executable, "-c", stopped],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {"PYTHONPATH": str(root)},
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "symfric: interrupted\n")
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,176 @@
+"""Signals in CSV files: a header that names columns and units, rows of numbers, SI out of it.
+
+One reader for records to identify from and for inputs of a simulation.
+"""
+
+import csv
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from math import pi
+from pathlib import Path
+from re import fullmatch
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Rows = list[tuple[int, list[str]]]
+"""Row number in the file, cells."""
+
+FACTORS: dict[str, dict[str, float]] = {
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6},
+    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6},
+    "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
+    "m/s": {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "µm/s": 1e-6},
+    "N m": {"N m": 1.0, "Nm": 1.0, "mN m": 1e-3, "mNm": 1e-3, "kN m": 1e3, "kNm": 1e3},
+    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180},
+    "rad/s": {"rad/s": 1.0, "deg/s": pi / 180},
+}
+"""Units a column may have and their factors, by SI unit; of other units only the unit itself."""
+
+
+@final
+@dataclass(frozen=True)
+class Column:
+    """A column that is looked for.
+
+    Attributes:
+        names: what it may be called in the header, without or with its unit.
+        unit: SI unit of the result.
+        needed: whether it must be there.
+        assumed: whether a header without a unit means the SI unit.
+    """
+
+    names: Collection[str]
+    unit: str
+    needed: bool = True
+    assumed: bool = False
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Table:
+    """What was found.
+
+    Attributes:
+        columns: name -> values in SI units, shape (n,).
+        first_row: row of the file that holds the first numbers; 0 where there are none.
+    """
+
+    columns: dict[str, Array]
+    first_row: int
+
+
+def read_table(file: Path, wanted: Mapping[str, Column]) -> Table:
+    """The columns `wanted` of a CSV file.
+
+    Comma, semicolon or tab separates the cells; numbers have a decimal point. Other columns are
+    left out.
+
+    Raises:
+        ValueError: all problems of the header, or of the cells, at once, each with its place.
+        OSError: the file cannot be read.
+    """
+    rows = _rows(file)
+    header = [cell.strip() for cell in rows[0][1]]
+    found = _places(file.name, header, wanted)
+    columns: dict[str, Array] = {}
+    problems: list[str] = []
+    long = [(n, row) for n, row in rows if any(map(str.strip, row[len(header) :]))]
+    if long:
+        problems.append(
+            f"row {long[0][0]}: expected {len(header)} cells as in the header, got "
+            f"{len(long[0][1])}; write numbers with a decimal point"
+        )
+    for key, (index, factor) in found.items():
+        cells, bad = _numbers(rows[1:], index)
+        columns[key] = factor * cells
+        if bad:
+            problems.append(f"column '{header[index]}', {bad}")
+    _refuse(file.name, problems)
+    return Table(columns, rows[1][0] if len(rows) > 1 else 0)
+
+
+def _refuse(name: str, problems: Sequence[str]) -> None:
+    if problems:
+        raise ValueError(f"read '{name}': " + "; ".join(problems))
+
+
+def _rows(file: Path) -> Rows:
+    """Non-empty rows with their number in the file, the header first."""
+    if not file.exists():
+        raise ValueError(f"read '{file}': expected a file, got nothing there; check the path")
+    if not file.is_file():
+        kind = "a folder" if file.is_dir() else "something else"
+        raise ValueError(f"read '{file}': expected a file, got {kind}")
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise ValueError(f"read '{file.name}': expected UTF-8 text, got other bytes") from None
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    delimiter = max(",;\t", key=first.count)
+    lines = csv.reader(text.splitlines(), delimiter=delimiter)
+    try:
+        rows = [(n, row) for n, row in enumerate(lines, start=1) if any(map(str.strip, row))]
+    except csv.Error as error:
+        raise ValueError(
+            f"read '{file.name}': expected rows of short cells, got {error} in row {lines.line_num}"
+        ) from None
+    if not rows:
+        raise ValueError(
+            f"read '{file.name}': expected a header such as 't [s], x [m], force [N]', "
+            "got an empty file"
+        )
+    return rows
+
+
+def _places(
+    where: str, header: list[str], wanted: Mapping[str, Column]
+) -> dict[str, tuple[int, float]]:
+    """Name -> index of its column and factor to SI."""
+    labels = [_label(cell) for cell in header]
+    found: dict[str, tuple[int, float]] = {}
+    problems: list[str] = []
+    for key, column in wanted.items():
+        names = column.names
+        hits = [i for i, (name, _) in enumerate(labels) if name in names or header[i] in names]
+        if len(hits) > 1:
+            twice = ", ".join(f"'{header[i]}'" for i in hits)
+            problems.append(f"expected one column for {key}, got {twice}")
+        elif hits:
+            factors = FACTORS.get(column.unit, {column.unit: 1.0})
+            given = labels[hits[0]][1] or (column.unit if column.assumed else "")
+            if given in factors:
+                found[key] = hits[0], factors[given]
+            else:
+                problems.append(
+                    f"column '{header[hits[0]]}': expected a unit of {', '.join(factors)} "
+                    f"in brackets, got {given or 'none'}"
+                )
+        elif column.needed:
+            example = next(iter(names))
+            problems.append(
+                f"expected a column '{_label(example)[0]} [{column.unit}]', "
+                f"got {', '.join(header)}; check the header"
+            )
+    _refuse(where, problems)
+    return found
+
+
+def _label(cell: str) -> tuple[str, str]:
+    """Name and unit of a header cell such as `x [mm]`."""
+    match = fullmatch(r"(.*?)\s*\[(.*)\]", cell)
+    return (match[1], match[2].strip().replace("μ", "µ")) if match else (cell, "")
+
+
+def _numbers(rows: Rows, index: int) -> tuple[Array, str]:
+    """One column as numbers, and a sentence about its first bad cell, if any."""
+    values = np.full(len(rows), np.nan)
+    for k, (number, row) in enumerate(rows):
+        cell = row[index].strip() if index < len(row) else ""
+        try:
+            values[k] = float(cell)
+        except ValueError:
+            return values, f"row {number}: expected a number, got '{cell[:40]}'"
+    return values, ""

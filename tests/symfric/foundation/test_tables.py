@@ -1,0 +1,58 @@
+"""Columns of CSV files: what becomes of units, delimiters and bad rows; one reader for all."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from symfric.foundation.tables import FACTORS, Column, read_table
+
+WANTED = {"t": Column(("t", "time"), "s"), "F": Column(("F", "force"), "N", assumed=True)}
+
+
+def table(folder: Path, text: str) -> dict[str, list[float]]:
+    (folder / "a.csv").write_text(text, encoding="utf-8")
+    found = read_table(folder / "a.csv", WANTED)
+    return {name: column.tolist() for name, column in found.columns.items()}
+
+
+def test_units_become_si_and_other_columns_are_left_out(tmp_path: Path) -> None:
+    text = "note;force [kN];time [ms]\nx;1;0\n\ny;2;500\n"
+    assert table(tmp_path, text) == {"t": [0.0, 0.5], "F": [1000.0, 2000.0]}
+    assert table(tmp_path, "F,t [s]\n3,1\n") == {"t": [1.0], "F": [3.0]}
+    assert table(tmp_path, "F,t [s]\n3,1,\n") == {"t": [1.0], "F": [3.0]}  # a comma at the end
+    for unit, factors in FACTORS.items():
+        assert factors[unit] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "read 'a.csv': expected a header such as 't [s], x [m], force [N]', got an empty"),
+        ("F,t\n1,2\n", "column 't': expected a unit of s, ms, us, µs in brackets, got none"),
+        ("F [m],t [s]\n", "column 'F [m]': expected a unit of N, mN, kN in brackets, got m"),
+        ("F,force,t [s]\n", "expected one column for F, got 'F', 'force'"),
+        ("x,t [s]\n", "expected a column 'F [N]', got x, t [s]; check the header"),
+        ("F,t [s]\n1,2\n1,2,5,3\n", "row 3: expected 2 cells as in the header, got 4; write numb"),
+        ("F,t [s]\n1\n", "column 't [s]', row 2: expected a number, got ''"),
+        ("F;t [s]\n1,5;2\n", "column 'F', row 2: expected a number, got '1,5'"),
+        (f"F,t [s]\n{'1' * 200_000},2\n", "expected rows of short cells, got field larger than"),
+    ],
+)
+def test_what_cannot_be_read_is_refused_with_its_place(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    with pytest.raises(ValueError) as caught:
+        table(tmp_path, text)
+    assert message in str(caught.value)
+    assert len(str(caught.value)) < 300
+
+
+def test_folders_missing_files_and_other_bytes_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="expected a file, got nothing there"):
+        read_table(tmp_path / "none.csv", WANTED)
+    with pytest.raises(ValueError, match="expected a file, got a folder"):
+        read_table(tmp_path, WANTED)
+    (tmp_path / "a.csv").write_bytes(np.arange(200, dtype=np.uint8).tobytes())
+    with pytest.raises(ValueError, match="expected UTF-8 text, got other bytes"):
+        read_table(tmp_path / "a.csv", WANTED)
