@@ -2,7 +2,7 @@
 
 import os
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
@@ -13,6 +13,7 @@ import numpy as np
 from symfric.stress.cases import Case, draw
 from symfric.stress.crew import Crew, Died, Hung
 from symfric.stress.judge import CLASSES, FAILING, Verdict, judge
+from symfric.stress.problem import WORK
 
 LIMIT = 120.0
 """Seconds that a case may take before it counts as hanging; the slowest need ten."""
@@ -95,16 +96,20 @@ class Report:
 
 
 def campaign(
-    cases: int,
+    cases: int | Sequence[int],
     seed: int = 1,
     *,
+    work: int = WORK,
     workers: int | None = None,
     limit: float = LIMIT,
     progress: Callable[[float], None] | None = None,
 ) -> Report:
-    """Run the cases 0 ... `cases` - 1 of `seed`; the same on any machine.
+    """Run the cases 0 ... `cases` - 1 of `seed`, or those of the numbers given.
+
+    The same seed and number are the same case on any machine.
 
     Args:
+        work: as in `judge`.
         workers: processes; default one a core.
         limit: seconds that a case may take.
         progress: called with the fraction done.
@@ -114,22 +119,28 @@ def campaign(
     Raises:
         ValueError: a number that is not positive.
     """
-    for name, value in (("cases", cases), ("workers", workers), ("limit", limit)):
+    numbers = range(cases) if isinstance(cases, int) else cases
+    for name, value in (
+        ("cases", len(numbers)),
+        ("work", work),
+        ("workers", workers),
+        ("limit", limit),
+    ):
         if value is not None and not value > 0:
             raise ValueError(f"stress: expected {name} > 0, got {value}")
     began, verdicts = monotonic(), dict[int, Verdict]()
-    tasks = ((number, (seed, number)) for number in range(cases))
-    crew = Crew(_judged, tasks, min(workers or os.cpu_count() or 1, cases), limit)
+    tasks = ((number, (seed, number, work)) for number in numbers)
+    crew = Crew(_judged, tasks, min(workers or os.cpu_count() or 1, len(numbers)), limit)
     try:
         for number, outcome in crew.outcomes():
             verdicts[number] = _verdict(outcome)
             if progress is not None:
-                progress(len(verdicts) / cases)
+                progress(len(verdicts) / len(numbers))
     except KeyboardInterrupt:
         pass
     finally:
         crew.dismiss()
-    return Report(seed, cases, verdicts, monotonic() - began)
+    return Report(seed, len(numbers), verdicts, monotonic() - began)
 
 
 def rerun(case: Case, limit: float = LIMIT) -> Verdict:
@@ -142,9 +153,11 @@ def rerun(case: Case, limit: float = LIMIT) -> Verdict:
 
 
 def _judged(task: Any) -> Any:
-    """What a worker does with (seed, number) or the data of a case."""
-    case = draw(*task) if isinstance(task, tuple) else Case.from_dict(task)
-    return judge(case).to_dict()
+    """What a worker does with (seed, number, work) or the data of a case."""
+    if isinstance(task, tuple):
+        seed, number, work = task
+        return judge(draw(seed, number), work).to_dict()
+    return judge(Case.from_dict(task)).to_dict()
 
 
 def _verdict(outcome: Any) -> Verdict:

@@ -1,5 +1,6 @@
 """SciPy's integrator as a judge that shares no code with ours, where it is installed."""
 
+import warnings
 from importlib.util import find_spec
 from itertools import pairwise
 
@@ -47,10 +48,12 @@ def by_scipy(ready: Problem) -> Array | None:
 
         here = (times >= begin) & (times <= end)
         try:
-            done = solve_ivp(
-                rate, (begin, end), x, method="LSODA", dense_output=True, rtol=RTOL,
-                atol=RTOL * 1e-3 * model.nominal("x"), max_step=(end - begin) / 200,
-            )  # fmt: skip
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # LSODA tells of each step that it repeats
+                done = solve_ivp(
+                    rate, (begin, end), x, method="LSODA", dense_output=True, rtol=RTOL,
+                    atol=RTOL * 1e-3 * model.nominal("x"), max_step=(end - begin) / 200,
+                )  # fmt: skip
         except TooManyError:
             return None
         if not done.success:

@@ -17,6 +17,7 @@ from symfric.results.trajectory import Trajectory
 from symfric.scenes import ALL_SCENES
 from symfric.stress.cases import Case, Signal
 
+WORK = 120_000
 TIMES = 101
 """Times at which runs are compared."""
 
@@ -30,13 +31,20 @@ class Problem:
         model: the equations.
         inputs: as `simulate` takes them.
         p: parameters given at run time.
-        modes: which states only jump, shape (nx,): theirs is a number of a regime.
+        work: attempts that a run may take, times its unknowns: large machines have fewer, of which
+            each costs more.
     """
 
     case: Case
     model: Model
     inputs: Mapping[str, Input]
     p: Mapping[str, float]
+    work: int = WORK
+
+    @property
+    def attempts(self) -> int:
+        """Attempts that a run may take."""
+        return self.work // (len(self.model.x) + len(self.model.z))
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -74,7 +82,7 @@ class Problem:
             )
 
 
-def problem(case: Case) -> Problem:
+def problem(case: Case, work: int = WORK) -> Problem:
     """Build the model of a case.
 
     Raises:
@@ -88,7 +96,7 @@ def problem(case: Case) -> Problem:
         known = parameters(ALL_SCENES[case.scene](law))
         scene = with_values(scene, {name: known[name].value for name in p})
     inputs = {name: signal(s) for name, s in case.inputs.items()}
-    return Problem(case, scene.model(free=case.free), inputs, p)
+    return Problem(case, scene.model(free=case.free), inputs, p, work)
 
 
 def signal(s: Signal) -> Input:

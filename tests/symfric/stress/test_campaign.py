@@ -9,12 +9,18 @@ from symfric.stress.campaign import Report, campaign, rerun
 from symfric.stress.cases import Case, draw
 from symfric.stress.judge import CLASSES, FAILING, Verdict, judge
 
+COSTLY = {"arm": 10, "four_bar": 10, "double_pendulum": 2}
+"""Scenes of which the suite takes one case in so many."""
 
-@pytest.mark.slow
-def test_five_hundred_random_cases_are_never_silently_wrong() -> None:
-    """The suite's share of `symfric stress`; `make stress` runs ten thousand."""
-    report = campaign(500)
-    assert not [(n, v) for n, v in report.verdicts.items() if v.kind in FAILING]
+
+def test_of_five_hundred_random_cases_none_is_silently_wrong_or_ends_badly() -> None:
+    """The suite's share of `symfric stress`, with a tenth of its work; 40 s of one core."""
+    numbers = [n for n in range(700) if n % COSTLY.get(draw(1, n).scene, 1) == 0][:500]
+    report = campaign(numbers, work=12_000)
+    failing = {n: v.reason for n, v in report.verdicts.items() if v.kind in FAILING}
+    assert not failing
+    assert report.classes["right"] > 320
+    assert report.classes["undecided"] < 90
     assert len(report.verdicts) == 500
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from symfric.foundation.status import SolveError, Status
 from symfric.stress.cases import Case, Signal
-from symfric.stress.judge import amplification, budget, distance, judge, tolerances
+from symfric.stress.judge import amplification, distance, judge, tolerances
 from symfric.stress.peer import by_scipy
 from symfric.stress.problem import Problem, problem
 
@@ -83,10 +83,10 @@ def test_what_a_problem_makes_of_a_tolerance_is_measured() -> None:
     """Near its top a pendulum falls as d phi'' = w^2 d phi, w^2 = m g L / (J + m L^2)."""
     fall = Case(1, 1, "pendulum", "viscous", {"sigma_2": 0.0}, x0={"phi": np.pi - 1e-3}, t_end=1.0)
     ready, w = problem(fall), np.sqrt(9.81 * 0.5 / (1 / 12 + 0.25))
-    run = ready.run(1e-9, "radau5", max_steps=budget(ready))
+    run = ready.run(1e-9, "radau5", max_steps=ready.attempts)
     angle, rate = tolerances(ready, np.stack([run["phi"], run["phi_rate"]]))[:, 0]
     grown = angle * w * np.sinh(w) + rate * np.cosh(w)
-    assert amplification(ready, run, budget(ready)) == pytest.approx(grown / rate, rel=0.01)
+    assert amplification(ready, run, ready.attempts) == pytest.approx(grown / rate, rel=0.01)
 
 
 def test_scipy_agrees_with_symfric_and_gives_up_where_it_must() -> None:
