@@ -7,7 +7,7 @@ from typing import final
 import casadi as ca
 import numpy as np
 
-from identification.choice import VELOCITY_SCALES, Choice, is_coefficient, is_smoothing, parts
+from identification.choice import VELOCITIES, Choice, is_coefficient, is_velocity, parts
 from identification.data import Array
 from symfric.foundation.parameters import parameters, symbolise
 from symfric.model import Model
@@ -88,15 +88,16 @@ def coordinates(choice: Choice, force: float, speed: float, mass: float) -> Coor
     }
     p: list[ca.SX] = []
     lower, upper, linear, scale = (np.zeros(len(variables)) for _ in range(4))
-    typical = {"kg": mass, "N": force, "N s/m": force / speed}
+    N = float(choice.drive.N)
+    typical = {"kg": mass, "N": force, "N s/m": force / speed, "s/m": force / N / speed}
     for i, v in enumerate(variables):
         parameter = known[v.name]
-        logarithmic = parameter.unit in VELOCITY_SCALES
+        logarithmic = is_velocity(parameter)
         linear[i] = not logarithmic
         size = typical.get(v.unit, max(abs(float(parameter.value)), 1.0))
-        scale[i] = force / float(choice.drive.N) if is_coefficient(parameter) else size
+        scale[i] = force / N if is_coefficient(parameter) else size
         if logarithmic:
-            bounds = _window(parameter.unit, is_smoothing(v.name), choice.v_max)
+            bounds = _window(parameter.unit, parameter.role == "width", choice.v_max)
             lower[i], upper[i] = np.log([max(v.lower, bounds[0]), min(v.upper, bounds[1])])
             p.append(ca.exp(w[i]))
         elif i in low_of:
@@ -116,4 +117,4 @@ def coordinates(choice: Choice, force: float, speed: float, mass: float) -> Coor
 def _window(unit: str, smoothing: bool, v_max: float) -> tuple[float, float]:
     """Range of a velocity scale that the data can tell, in its unit."""
     low, high = (1e-5 if smoothing else 2e-3) * v_max, v_max
-    return (low, high) if unit == "m/s" else (1 / high, 1 / low)
+    return (low, high) if unit in VELOCITIES else (1 / high, 1 / low)

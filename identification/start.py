@@ -1,8 +1,10 @@
 """Start values: linear regression, then a scan over the velocity scale of the law."""
 
+from collections.abc import Collection
+
 import numpy as np
 
-from identification.choice import Choice, is_coefficient, is_smoothing
+from identification.choice import VELOCITIES, Choice, is_coefficient, is_velocity, parts
 from identification.coordinates import Coordinates
 from identification.data import Array
 from identification.problem import Problem
@@ -23,11 +25,13 @@ def start_values(choice: Choice, linear: LinearFit, problem: Problem) -> Array:
     residual wins. A law without a velocity scale needs one point only.
     """
     known = parameters(choice.drive)
-    scanned = [n for n in choice.free if not _is_level(known[n]) and _is_velocity(known[n])]
+    scanned = [n for n in choice.free if _is_scanned(known[n])]
     scales = np.geomspace(4e-3, 0.5, SCALES if scanned else 1) * choice.v_max
+    upper = {high for part in parts(choice.drive) for _, high in type(part).ordered}
     best: tuple[float, Array] | None = None
     for scale in scales:
-        guess = {n: _guess(known[n], linear, float(choice.drive.N), scale) for n in choice.free}
+        N = float(choice.drive.N)
+        guess = {n: _guess(known[n], linear, N, scale, upper) for n in choice.free}
         cost, w = _levels(problem, problem.coordinates.of(guess))
         if best is None or cost < best[0]:
             best = cost, w
@@ -36,25 +40,24 @@ def start_values(choice: Choice, linear: LinearFit, problem: Problem) -> Array:
     return best[1]
 
 
-def _is_velocity(parameter: Parameter) -> bool:
-    return parameter.unit in ("m/s", "s/m") and not is_smoothing(parameter.name)
+def _is_scanned(parameter: Parameter) -> bool:
+    return is_velocity(parameter) and parameter.role != "width"
 
 
-def _is_level(parameter: Parameter) -> bool:
-    return parameter.unit in ("kg", "N", "N s/m") or is_coefficient(parameter)
-
-
-def _guess(parameter: Parameter, linear: LinearFit, N: float, scale: float) -> float:
-    """Start of one parameter: from the regression by its unit, or the velocity scale."""
+def _guess(
+    parameter: Parameter, linear: LinearFit, N: float, scale: float, upper: Collection[str]
+) -> float:
+    """Start of one parameter: from the regression by its role, or the velocity scale."""
     level = max(abs(linear.values["F_c"]), linear.force_rms)
-    if parameter.name in ("m", "offset"):
-        return linear.values[parameter.name]
-    if is_coefficient(parameter):
-        return level / N * (1.2 if parameter.name.startswith("mu_s") else 1.0)
-    if parameter.unit == "N s/m":
-        return max(linear.values["F_v"], 0.0)
-    if _is_velocity(parameter):
-        return scale if parameter.unit == "m/s" else 1 / scale
+    if parameter.role in ("mass", "offset"):
+        return linear.values["m" if parameter.role == "mass" else "offset"]
+    if is_coefficient(parameter) or (parameter.role, parameter.unit) == ("level", "N"):
+        per = N if is_coefficient(parameter) else 1.0
+        return level / per * (1.2 if parameter.field in upper else 1.0)
+    if parameter.role == "viscous" and parameter.unit in ("N s/m", "s/m"):
+        return max(linear.values["F_v"], 0.0) / (N if parameter.unit == "s/m" else 1.0)
+    if _is_scanned(parameter):
+        return scale if parameter.unit in VELOCITIES else 1 / scale
     return float(parameter.value)
 
 

@@ -13,12 +13,29 @@ from symfric import Coulomb, law_from_text, parameters, symbolise
         ("self_tuning", {"m", "offset", "mu_s", "mu_d", "B"}),
         ("asymmetric(coulomb)", {"m", "mu_d_pos", "mu_d_neg"}),
         ("load_dependent(coulomb)", {"m", "offset", "mu_d"}),
+        ("steady_state_lugre", {"m", "offset", "F_S", "F_C", "v_s", "sigma_2"}),
+        ("quarter_car_simple", {"m", "offset", "C_e", "e_1", "sigma_v"}),
+        ("rui_wang", {"m", "offset", "D", "B"}),
+        ("capstan", {"m", "offset", "mu_d"}),
     ],
 )
 def test_fitted_by_default(text: str, free: set[str]) -> None:
     choice = choose(law_from_text(text), 0.1)
     assert set(choice.free) == free
     assert set(choice.reasons) == set(parameters(choice.drive)) - free
+
+
+def test_what_only_a_change_of_load_or_temperature_could_tell_apart_is_held() -> None:
+    """A level without load and one by load; what nothing could tell apart is left to the fit."""
+    choice = choose(law_from_text("bittencourt"), 1.0)
+    alike = "load and temperature are constant: it cannot be told from "
+    assert choice.reasons["F_cl"] == f"{alike}F_c0"
+    assert choice.reasons["F_sT"].startswith(alike)
+    assert "F_c0" in choice.free
+    asked = choose(law_from_text("bittencourt"), 1.0, free=["F_cl"])
+    assert "F_cl" in asked.free
+    assert asked.reasons["F_c0"] == f"{alike}F_cl"
+    assert {"mu_d_1", "mu_d_2"} <= set(choose(law_from_text("coulomb+coulomb"), 1.0).free)
 
 
 def test_smoothing_widths_follow_the_speeds() -> None:

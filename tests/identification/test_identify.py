@@ -7,6 +7,7 @@ from identification import Dataset, Filter, Identification, identify, linear_reg
 from identification.problem import STATUS
 from identification.synthetic import synthetic_drive_data
 from symfric import Coulomb, SolveError, Status, Sum, Viscous
+from symfric.laws import SteadyStateLuGre
 
 FILTER = Filter(100.0, 10, v_min=1e-3)
 TRUTH = {"m": 95.0, "offset": -3.0, "mu_s": 28.0, "mu_d": 20.0, "v_s": 0.01, "sigma_2": 200.0}
@@ -197,3 +198,15 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
             hits[name] += low <= value <= high
     # binomial: fewer than 52 of 60 has a probability of 0.5 % at 95 % coverage
     assert min(hits.values()) >= 52, hits
+
+
+def test_levels_in_newtons_are_fitted() -> None:
+    """Guards F_S and F_C being held at their defaults because "the load is constant"."""
+    law = SteadyStateLuGre(F_S=28.0, F_C=20.0, v_s=0.01, sigma_2=200.0)
+    record = synthetic_drive_data(law, speeds=(0.004, 0.01, 0.03, 0.1), dwell=0.5)
+    found = identify(record, "steady_state_lugre", filter=FILTER)
+    assert found.errors.force_rms < 3.0
+    for name, truth in {"F_S": 28.0, "F_C": 20.0, "v_s": 0.01, "sigma_2": 200.0}.items():
+        estimate = found.parameters[name]
+        assert estimate.half_width is not None
+        assert abs(estimate.value - truth) < max(estimate.half_width, 0.02 * truth)
