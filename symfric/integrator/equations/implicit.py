@@ -13,6 +13,9 @@ Where dF/dx' is not constant, the rates v = B x' that the equations depend on ar
     B x' = v,   0 = F(v, x, z),
 
 with the same combination of equations that never depend on rates.
+
+Limits: the directions that a matrix maps to zero must not turn with the state. Write a nonlinear
+charge q(x) between several nodes as a state of its own, q' = i, 0 = q - q(x).
 """
 
 import casadi as ca

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.symbols import stacked
 from symfric.integrator.equations.implicit import implicit_columns
+from symfric.integrator.equations.index import check_index
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.lu import Order
 from symfric.integrator.equations.manifold import Manifold, holonomic_columns, manifold
@@ -129,7 +130,7 @@ def system(model: Model, inputs: InputData) -> System:
     (`symfric.integrator.equations.implicit`), a holonomic one its accelerations.
 
     Raises:
-        ValueError: a model without unknowns.
+        ValueError: a model without unknowns, or of an index above 1.
     """
     unknowns, f, mass, names = _columns(model)
     nx = len(model.x)
@@ -140,6 +141,8 @@ def system(model: Model, inputs: InputData) -> System:
         )
     f = ca.substitute(f, model.vector("u"), inputs.expression)
     mechanics = model.holonomic
+    if mechanics is None:
+        check_index(f"model '{model.name}'", unknowns, f, mass, names)
     phi = mechanics.phi if mechanics else ca.SX(0, 1)
     timed = bool(ca.depends_on(ca.vertcat(f, phi), model.t))
     if timed:
