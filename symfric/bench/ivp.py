@@ -152,7 +152,7 @@ def correct_digits(problem: Problem, run: Trajectory) -> tuple[float, str]:
 
 def _drift(problem: Problem, run: Trajectory) -> float:
     """Largest value of a constraint at accepted steps."""
-    if not problem.drift or run.steps.size < 2:
+    if not problem.drift or run.step_times.size < 2:
         return 0.0
-    at = run.at(run.steps)
+    at = run.at(run.step_times)
     return max(float(np.abs(at[name]).max()) for name in problem.drift)

@@ -113,7 +113,7 @@ class Trajectory:
     def looks(self) -> Array:
         """Times [s] that show every accepted step, however short, and `t`, shape (k,)."""
         jumps = np.array([time for time, _ in self.happened], dtype=float)
-        return looks(self.t, self.steps, jumps)
+        return looks(self.t, self.step_times, jumps)
 
     @cached_property
     def _looked(self) -> dict[str, Array]:

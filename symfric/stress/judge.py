@@ -237,7 +237,7 @@ def at_steps(ready: Problem, run: Trajectory, reference: Trajectory) -> float:
     An implicit step may go over a fast transient and end right, and its polynomial leads there by
     another way.
     """
-    times = run.steps[:: 1 + run.steps.size // TIMES]
+    times = run.step_times[:: 1 + run.step_times.size // TIMES]
     size = tolerances(ready, _table(reference, ready.times))
     return float((np.abs(_table(run, times) - _table(reference, times)) / size).max())
 

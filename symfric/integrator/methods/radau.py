@@ -149,7 +149,7 @@ def pair(system: System, alpha: float, beta: float) -> Pair:
 
     def matrix(J: ca.SX) -> ca.SX:
         diagonal, across = alpha * (M * per_h) - J, beta * (M * per_h)
-        return ca.sparsify(ca.blockcat([[diagonal, across], [-across, diagonal]]))
+        return ca.SX(ca.sparsify(ca.blockcat([[diagonal, across], [-across, diagonal]])))
 
     groups = [(*rows, *(n + i for i in rows)) for rows in system.pivots]
     lu = factorise(matrix(J), groups, system.orders.get("pair", ()))

@@ -134,7 +134,7 @@ def test_a_run_of_ages_does_not_begin_with_a_leap(law: Law) -> None:
     run = simulate(rabinowicz(law), 1e20, max_steps=1000, backend="vm", throw=False)
     assert run.status is Status.MAX_STEPS
     begun = simulate(rabinowicz(law), 20.0, max_steps=1000, backend="vm")
-    at = np.linspace(0.0, min(20.0, run.steps[-1]), 50)
+    at = np.linspace(0.0, min(20.0, run.step_times[-1]), 50)
     assert run.at(at)["x"] == pytest.approx(begun.at(at)["x"], abs=1e-5)
 
 

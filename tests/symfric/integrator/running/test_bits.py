@@ -50,7 +50,7 @@ def digest(run: Trajectory) -> str:
     """Every bit of a run but how long it took and what ran it."""
     total = sha256(run.message.encode() + repr(run.happened).encode())
     total.update(repr((run.statistics.steps, run.statistics.rejections)).encode())
-    for values in (run.steps, *(run[name] for name in run.units)):
+    for values in (run.step_times, *(run[name] for name in run.units)):
         total.update(values.tobytes())
     return total.hexdigest()
 

@@ -63,8 +63,8 @@ def test_the_step_that_an_event_cuts_keeps_its_polynomial() -> None:
         end = Event("end", X - np.sin(until), terminal=True)
         swing = Model("swing", x=(x, velocity), ode=ca.vertcat(Y, -X), events=(end,))
         run = simulate(swing, 2.0, rtol=1e-8)
-        assert run.steps[-1] == pytest.approx(until, abs=1e-8)
-        last = np.linspace(run.steps[-2], run.steps[-1], 50)
+        assert run.step_times[-1] == pytest.approx(until, abs=1e-8)
+        last = np.linspace(run.step_times[-2], run.step_times[-1], 50)
         assert run.at(last)["x"] == pytest.approx(np.sin(last), abs=1e-7)
         cut.append(last[-1] - last[0])
     assert max(cut) > 0.05
@@ -121,7 +121,7 @@ def test_a_hundred_events_of_a_short_while_in_a_long_run_are_no_storm() -> None:
     model = Model("burst", x=(x, count), ode=ca.SX([1.0, 0.0]), events=(tick, last))
     run = simulate(model, 1e9, max_step=2e-4, throw=False)
     assert run.status is Status.TERMINATED
-    assert run.steps[-1] == pytest.approx(0.2, rel=1e-6)
+    assert run.step_times[-1] == pytest.approx(0.2, rel=1e-6)
 
 
 @each_backend
