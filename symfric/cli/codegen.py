@@ -49,6 +49,9 @@ def codegen(
         list[str] | None,
         typer.Option("--free", metavar="NAME", help="Keep this one variable, fold the others."),
     ] = None,
+    turning: Annotated[
+        bool, typer.Option("--turning", help="A law in rad/s and N m: units in the header.")
+    ] = False,
     compiler: Annotated[
         str | None, typer.Option("--compiler", help="Default: $CC, gcc or clang.")
     ] = None,
@@ -65,6 +68,8 @@ def codegen(
     check_names("--real", [kind], REALS)
     check_folder(out)
     adjustable = None
+    if scene is not None and turning:
+        raise ValueError("--turning: expected with a law only: a scene knows what turns")
     if scene is not None:
         made = partial(plant, scene, law, numbers("--set", settings), method or "auto", name, free)
         generated, adjustable = generate(made(step_size), out, real=REALS[kind]), made
@@ -72,7 +77,13 @@ def codegen(
         raise ValueError("--method: expected with --scene only: the step of a law is exact")
     else:
         generated = generate(
-            any_with(law, settings), out, name=name, real=REALS[kind], h=step_size, free=free
+            any_with(law, settings),
+            out,
+            name=name,
+            real=REALS[kind],
+            h=step_size,
+            free=free,
+            turning=turning,
         )
     verification = verify(generated, compiler=compiler, adjustable=adjustable)
     output.emit_json(to_dict(law, generated, verification), json)

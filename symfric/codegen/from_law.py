@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
 from inspect import getdoc
 from re import sub
+from typing import Any
 
 import casadi as ca
 
@@ -13,6 +14,7 @@ from symfric.codegen.held_step import force_of_rate, held_step
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_casadi
 from symfric.foundation.parameters import Variable, check_names, parameters, symbolise
+from symfric.foundation.units import turned
 from symfric.laws import Law, Sum, law_name
 from symfric.laws.base.law import check_law, chosen
 from symfric.model import Output, Variables
@@ -30,6 +32,7 @@ def law_block(
     name: str | None = None,
     h: float | None = None,
     free: Sequence[str] | None = None,
+    turning: bool = False,
 ) -> Block:
     """The discrete-time block of `law` with inputs v, N, those of the law, and output F.
 
@@ -64,6 +67,7 @@ def law_block(
             states has no step size.
         free: parameters that stay variable at run time, the others become constants; default see
             `runtime_parameters`. Parameters without effect never appear.
+        turning: the contact turns: the same C, with units rad/s and N m in its texts.
 
     Raises:
         ValueError: symbols in the law; names in `free` that are unknown, repeated or without
@@ -74,6 +78,7 @@ def law_block(
     """
     check_law("codegen", law)
     where = f"codegen '{law_name(law)}'"
+    checks.flag(f"{where}: turning", turning)
     free = None if free is None else checks.names(f"{where}: free", free)
     if name is not None:
         checks.text(f"{where}: name", name, "a C identifier")
@@ -100,7 +105,18 @@ def law_block(
         | dict(block.constants),
     )
     _check_at_rest(block, where)
-    return block
+    return in_turning(block) if turning else block
+
+
+def in_turning(block: Block) -> Block:
+    """The block with the units of a contact that turns."""
+    groups: dict[str, Any] = {
+        group: tuple(replace(v, unit=turned(v.unit)) for v in getattr(block, group))
+        for group in ("states", "inputs", "parameters")
+    }
+    outputs = {n: replace(o, unit=turned(o.unit)) for n, o in block.outputs.items()}
+    doc = f"{block.doc}\n\nFor a contact that turns: read rad for m, N m for N."
+    return replace(block, **groups, outputs=outputs, doc=doc)
 
 
 def step_variable(where: str, h: float | None) -> Variable:

@@ -54,6 +54,7 @@ def generate(
     real: str | Sequence[str] = ("double", "float"),
     h: float | None = None,
     free: Sequence[str] | None = None,
+    turning: bool = False,
 ) -> Generated:
     """Write a friction law, or any block, as C99.
 
@@ -71,6 +72,7 @@ def generate(
         h: step size [s] as a constant instead of a parameter (laws with states).
         free: parameters that stay variable at run time; default see `runtime_parameters`. Those of
             a population are constants.
+        turning: the law is that of a contact that turns: rad/s and N m in its texts.
 
     Raises:
         ValueError: bad input, a law that has no step, an operation that C99 lacks, a
@@ -83,15 +85,19 @@ def generate(
     if not names:
         raise ValueError("codegen: real: expected double, float or both, got none")
     if isinstance(law, Block):
-        if name is not None or h is not None or free is not None:
-            raise ValueError("codegen: expected name, h and free with a law only, got a block")
+        if name is not None or h is not None or free is not None or turning:
+            raise ValueError(
+                "codegen: expected name, h, free and turning with a law only, got a block"
+            )
         block = law
     elif isinstance(law, Population):
         if free:
             raise ValueError(f"codegen: free: expected none with a population, got {free}")
+        if turning:
+            raise ValueError("codegen: turning: expected a law, got a population, which slides")
         block = contact_block(law, name=name, h=h)
     else:
-        block = law_block(law, name=name, h=h, free=free)
+        block = law_block(law, name=name, h=h, free=free, turning=turning)
     texts: dict[str, str] = {}
     for kind in (REALS[n] for n in names):
         texts[f"{prefix(block, kind)}.h"] = header(block, kind)

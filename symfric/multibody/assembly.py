@@ -146,7 +146,7 @@ def slips(eq: Equations, normal_at_start: Sequence[float]) -> tuple[Slip, ...]:
         states = tuple(
             Variable(
                 f"{contact.name}_{s.name}",
-                s.unit,
+                contact.unit(s.unit),
                 start=begin[i],
                 nominal=s.nominal,
                 kind=kinds.FRICTION_STATE,
@@ -341,11 +341,14 @@ def _outputs(eq: Equations, contacts: Sequence[Slip], put: Put) -> dict[str, Out
     for slip, normal in zip(contacts, expressions, strict=False):
         contact, name = slip.contact, slip.contact.name
         if slip.N is slip.normal:
-            found[f"{contact.pressed}_N"] = Output(normal, "N", "normal force", kinds.NORMAL_FORCE)
+            found[f"{contact.pressed}_N"] = Output(
+                normal, contact.unit("N"), "normal force", kinds.NORMAL_FORCE
+            )
         speed, size = _sizes(slip)
-        found[f"{name}_slip"] = Output(speed, "m/s", "sliding velocity, of a ball its size")
+        rate = contact.unit("m/s")
+        found[f"{name}_slip"] = Output(speed, rate, "sliding velocity, of a ball its size")
         found[f"{name}_friction"] = Output(
-            size, "N", "friction force opposing the slip", kinds.FRICTION
+            size, contact.unit("N"), "friction force opposing the slip", kinds.FRICTION
         )
         power = ca.dot(slip.force, contact.slip)
         found[f"{name}_power"] = Output(power, "W", "power taken by friction", kinds.FRICTION)

@@ -25,6 +25,7 @@ from typing import final
 import casadi as ca
 
 from symfric.foundation.numeric import Scalar, is_number, is_symbolic
+from symfric.foundation.units import turned
 from symfric.laws import Law
 from symfric.laws.base.law import check_law
 from symfric.laws.composed.isotropic import SpatialSlip, anisotropy
@@ -45,6 +46,8 @@ class JointFriction:
         width: width b of a guide that takes the moment about z [m]; None: it does not load it.
         preload: normal force in addition to the reactions [N].
         normal: constant normal force [N] instead of reactions; then no unknown is added.
+        turning: the law is one of the joint's rate [rad/s] and its force a moment [N m], of the
+            level `normal` [N m]; without a radius. So robots' files give friction.
         eps: width of |f|, sqrt(f^2 + eps^2) - eps [N]. Laws that divide by the normal force
             (bristles) need a preload above zero if the reactions can vanish.
     """
@@ -56,6 +59,7 @@ class JointFriction:
     preload: Scalar = 0.0
     normal: Scalar | None = None
     eps: float = 1e-4
+    turning: bool = False
 
     def __post_init__(self) -> None:
         check_law("friction", self.law)
@@ -75,7 +79,15 @@ class JointFriction:
                 f"law: expected an isotropic one, got {type(self.law).__name__}; a ball slips in "
                 f"any direction, and {reason}"
             )
-        if any(direction != "slide" for direction in rubs) and self.radius is None:
+        turns = any(direction != "slide" for direction in rubs)
+        if self.turning:
+            if "slide" in rubs or "ball" in rubs:
+                yield "turning: expected a joint that turns about an axis only"
+            if self.radius is not None:
+                yield f"radius: expected none with turning, got {self.radius!r}"
+            if self.normal is None:
+                yield "normal: expected the level [N m] of friction that turns, got none"
+        elif turns and self.radius is None:
             yield "radius: expected the bearing's radius [m], got none"
         limits = {
             "radius": (self.radius, True), "length": (self.length, True),
@@ -90,7 +102,7 @@ class JointFriction:
 
     @property
     def arm(self) -> Scalar:
-        """The bearing's radius [m]; 1 for friction along z only."""
+        """The bearing's radius [m]; 1 for friction along z only, and for a law of the moment."""
         return 1.0 if self.radius is None else self.radius
 
     def magnitude(self, *components: ca.SX) -> ca.SX:
@@ -150,6 +162,10 @@ class Contact:
     pressed: str
     slip: ca.SX
     F: ca.SX
+
+    def unit(self, of_sliding: str) -> str:
+        """A unit of the law: that of sliding, or of turning."""
+        return turned(of_sliding) if self.friction.turning else of_sliding
 
     @property
     def load(self) -> ca.SX:

@@ -2,9 +2,9 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import casadi as ca
 import numpy as np
@@ -13,6 +13,7 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, is_number
 from symfric.foundation.parameters import Parametric, Variable, parameters, symbolise
 from symfric.foundation.symbols import at_start, symbols_of
+from symfric.foundation.units import turned
 from symfric.laws import Law
 from symfric.laws.base.law import check_law, chosen
 from symfric.model import Event, Model, Monitor, Variables
@@ -150,3 +151,13 @@ def friction_states(law: Law, v: Scalar, N: Scalar) -> tuple[Variables, ca.SX]:
         for i, s in enumerate(law.states)
     )
     return variables, symbols_of(variables)
+
+
+def in_turning(model: Model) -> Model:
+    """The same equations with the units of a machine that turns."""
+    changed: dict[str, Any] = {
+        letter: tuple(replace(v, unit=turned(v.unit)) for v in getattr(model, letter))
+        for letter in "xzup"
+    }
+    outputs = {name: replace(o, unit=turned(o.unit)) for name, o in model.outputs.items()}
+    return replace(model, **changed, outputs=outputs)

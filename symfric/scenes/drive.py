@@ -6,10 +6,11 @@ from typing import ClassVar, final
 
 import casadi as ca
 
+from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable, param
 from symfric.model import Model, Output, Variables
-from symfric.scenes.base import GivenInput, Scene, contact
+from symfric.scenes.base import GivenInput, Scene, contact, in_turning
 
 
 def sine(t: ca.SX) -> ca.SX:
@@ -25,7 +26,8 @@ class Drive(Scene):
         x' = v,   m v' = force - F(v, N) - offset
 
     `force` is the input. With the normal force N = 1 N the coefficients mu of a law read as force
-    levels in newton, which is how the friction of a drive of unknown load is identified.
+    levels in newton, which is how the friction of a drive of unknown load is identified. With
+    turning = True the axis turns: the same equations in rad, rad/s, N m and kg m^2.
     Defaults: mass and load of the block of seed table 2 (N = m g).
     """
 
@@ -36,6 +38,12 @@ class Drive(Scene):
     N: Scalar = param(0.8 * 9.81, unit="N", role="load", doc="normal force", lower=0.0)
     offset: Scalar = param(0.0, unit="N", role="offset", doc="constant force opposing the input")
 
+    turning: bool = False
+
+    def __post_init__(self) -> None:
+        checks.flag("Drive: turning", self.turning)
+        super().__post_init__()
+
     def equations(self, p: Variables) -> Model:
         """States x, v and those of the law; input force; outputs friction, power."""
         x = Variable("x", "m", nominal=0.1, doc="position")
@@ -43,7 +51,7 @@ class Drive(Scene):
         force = Variable("force", "N", nominal=1.0, doc="driving force")
         applied = force.symbol - self.offset
         slip = contact(self.law, v.symbol, self.N, p, rest={"v": 0.0}, F_e=applied)
-        return Model(
+        model = Model(
             name="drive",
             x=(x, v, *slip.states),
             u=(force,),
@@ -56,3 +64,4 @@ class Drive(Scene):
                 "power": Output(slip.force * v.symbol, "W", "power taken by friction"),
             },
         )
+        return in_turning(model) if self.turning else model

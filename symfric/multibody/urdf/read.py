@@ -131,15 +131,15 @@ def tag_friction(
     if not laws or joint.kind in ("planar", "floating"):
         return None
     whole = laws[0] if len(laws) == 1 else Sum(tuple(laws))
-    return JointFriction(whole, radius=None if joint.kind == "prismatic" else 1.0, normal=normal)
+    return JointFriction(whole, normal=normal, turning=joint.kind != "prismatic")
 
 
 def relative(law: Law) -> Law:
     """`law` with its coefficients divided by the largest, so that it breaks away at N itself.
 
-    Coefficients are the parameters mu, mu_d, mu_s, ... of unit 1; a law without any stays.
+    Coefficients are the levels of unit 1; a law without any stays.
     """
-    known = {n: p for n, p in parameters(law).items() if n.split("_")[0] == "mu" and p.unit == "1"}
+    known = {n: p for n, p in parameters(law).items() if p.role == "level" and p.unit == "1"}
     numbers = {name: float(p.value) for name, p in known.items() if is_number(p.value)}
     top = max(numbers.values(), default=0.0)
     return with_values(law, {name: x / top for name, x in numbers.items()}) if top else law

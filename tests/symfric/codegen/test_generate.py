@@ -88,3 +88,14 @@ def test_block_and_law_give_the_same_code(tmp_path):
     direct = generate(LuGre(), tmp_path / "a", free=free)
     block = generate(law_block(LuGre(), free=free), tmp_path / "b")
     assert direct.manifest == block.manifest
+
+
+def test_header_of_a_law_that_turns_has_its_units(tmp_path):
+    made = generate(LuGre(), tmp_path / "b", real="double", turning=True)
+    text = made.header("double").read_text()
+    for unit in ("[rad/s]", "[N m]", "[N m/rad]", "[N m s/rad]", "[rad]"):
+        assert unit in text
+    for unit in ("[m/s]", "[N]", "[N/m]", "[N s/m]"):
+        assert unit not in text
+    with pytest.raises(ValueError, match="turning with a law only"):
+        generate(made.block, tmp_path / "c", turning=True)

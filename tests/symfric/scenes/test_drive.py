@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from symfric import Coulomb, LuGre, Stribeck, Sum, Viscous, drive, simulate
+from symfric.scenes import Drive
 
 
 def test_coulomb_braking_takes_the_closed_form_time_and_distance() -> None:
@@ -44,3 +45,16 @@ def test_units_and_names_of_the_signals() -> None:
         "friction": "N",
         "power": "W",
     }
+
+
+def test_axis_that_turns_has_the_equations_of_one_that_slides_and_its_own_units() -> None:
+    free = ["m", "sigma_0"]
+    slides, turns = Drive(LuGre()).model(free), Drive(LuGre(), turning=True).model(free)
+    runs = [simulate(m, 1.0, u={"force": 1.3}, backend="vm") for m in (slides, turns)]
+    assert runs[0].final == runs[1].final
+    assert turns.signals == {
+        "x": "rad", "v": "rad/s", "z": "rad", "force": "N m", "friction": "N m", "power": "W",
+    }  # fmt: skip
+    assert [p.unit for p in turns.p] == ["kg m^2", "N m/rad"]
+    with pytest.raises(ValueError, match="Drive: turning: expected True or False, got 1"):
+        Drive(LuGre(), turning=1)  # type: ignore[arg-type]

@@ -3,7 +3,8 @@
 import pytest
 from robots import MOVING, SMALL, random_robot
 
-from symfric import BrownMcPhee, LuGre, parameters, simulate
+from symfric import BrownMcPhee, Coulomb, LuGre, parameters, simulate
+from symfric.multibody import JointFriction
 from symfric.multibody.urdf.read import relative
 from symfric.scenes import Robot
 
@@ -41,3 +42,22 @@ def test_every_parameter_can_be_free() -> None:
     assert free.initial_state() == pytest.approx(fixed.initial_state(), abs=1e-12)
     last = [simulate(model, 0.2, rtol=1e-8).final for model in (free, fixed)]
     assert last[0] == pytest.approx(last[1], rel=1e-5, abs=1e-6)
+
+
+def test_joints_that_turn_have_units_of_turning_and_sliders_those_of_sliding() -> None:
+    """Slip [m/s] and friction [N] of hinges were rad/s and N m."""
+    hinge = Robot(LuGre(), SMALL).model()
+    slider = Robot(LuGre(), SMALL.replace("revolute", "prismatic")).model()
+    for model, slip, force, z in ((slider, "m/s", "N", "m"), (hinge, "rad/s", "N m", "rad")):
+        assert model.signals["hinge_slip"] == slip
+        assert model.signals["hinge_friction"] == force
+        assert model.signals["hinge_z"] == z
+
+
+def test_friction_of_a_moment_has_a_level_and_no_radius() -> None:
+    level = "normal: expected the level [N m] of friction that turns, got none"
+    assert list(JointFriction(Coulomb(), turning=True).problems(("turn",))) == [level]
+    slides = JointFriction(Coulomb(), normal=1.0, turning=True).problems(("slide",))
+    assert list(slides) == ["turning: expected a joint that turns about an axis only"]
+    both = JointFriction(Coulomb(), radius=0.1, normal=1.0, turning=True).problems(("turn",))
+    assert list(both) == ["radius: expected none with turning, got 0.1"]
