@@ -62,7 +62,7 @@ def test_a_defect_is_found(monkeypatch: pytest.MonkeyPatch, harm: str, kind: str
 
 
 def test_a_foreign_exception_comes_through(monkeypatch: pytest.MonkeyPatch) -> None:
-    def foreign(_: Case) -> Problem:
+    def foreign(*_: object) -> Problem:
         raise ZeroDivisionError("division by zero")
 
     monkeypatch.setattr("symfric.stress.judge.problem", foreign)
