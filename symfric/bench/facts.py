@@ -23,17 +23,17 @@ DRIFT_S = 100.0
 @final
 @dataclass(frozen=True)
 class Fact:
-    """A published number and ours.
+    """A reference number, from own solutions in other coordinates, and ours.
 
     Attributes:
-        digits: what the published one is good for; the difference should be below it.
+        digits: what the reference is good for; the difference should be below it.
     """
 
     case: str
     t: float
     signal: str
     value: float
-    published: float
+    reference: float
     digits: float
 
 
@@ -87,7 +87,7 @@ CASES: dict[str, MechanismScene] = {
     "slider_crank brown_mcphee": SliderCrank(BrownMcPhee(mu_s=0.1, mu_d=0.08, v_t=0.01)),
     "slider_crank self_tuning": SliderCrank(_tuned(0.1, 0.08)),
 }
-PUBLISHED: Mapping[str, dict[float, tuple[dict[str, float], dict[str, float]]]] = {
+REFERENCES: Mapping[str, dict[float, tuple[dict[str, float], dict[str, float]]]] = {
     "four_mass frictionless": {
         4.0: (
             _positions(-0.54021178, 4.97073146, 4.92867414, -2.15971352) | {"energy": 387.936521},
@@ -131,9 +131,9 @@ PUBLISHED: Mapping[str, dict[float, tuple[dict[str, float], dict[str, float]]]] 
 
 
 def facts() -> list[Fact]:
-    """All published numbers beside ours at rtol 1e-10."""
+    """All reference numbers beside ours at rtol 1e-10."""
     rows: list[Fact] = []
-    for case, by_time in PUBLISHED.items():
+    for case, by_time in REFERENCES.items():
         times = list(by_time)
         run = simulate(CASES[case].model(), times[-1], rtol=RTOL, t_eval=times)
         for k, (t, (values, digits)) in enumerate(by_time.items()):
@@ -150,7 +150,7 @@ def norms(formulations: tuple[str, ...] = ("joint", "absolute")) -> list[NormRow
     for case in ("four_mass brown_mcphee", "slider_crank brown_mcphee"):
         for formulation in formulations:
             model = CASES[case].mechanism().build(formulation=formulation)
-            run = simulate(model, max(PUBLISHED[case]))
+            run = simulate(model, max(REFERENCES[case]))
             rates = _largest(run, [v.name for v in model.x if v.name.endswith("_rate")])
             steepest = max(float(np.abs(np.gradient(run[n], run.t)).max()) for n in rates)
             fastest = max(rates.values())

@@ -117,7 +117,7 @@ class MultibodyBenchmark:
         compiled: what building and compiling a step takes.
         counts: unknowns, operations and nonzeros of variants of a mechanism.
         chains: the step of chains of growing length.
-        facts: published numbers beside ours.
+        facts: reference numbers beside ours.
         norms: what constraints leave over.
         drifts: energy of frictionless mechanisms.
         skipped: what did not run -> why.

@@ -31,7 +31,7 @@ def bench(
     """Measure symfric beside other integrators.
 
     Time, error and ratios at equal error. integrator: stick-slip of one mass, ensembles and
-    derivatives. multibody: mechanisms, the cost of their steps, what they do not need, published
+    derivatives. multibody: mechanisms, the cost of their steps, what they do not need, reference
     numbers. ivp: correct digits on problems with published solutions (Test Set for IVP Solvers).
     jitter: total variation of accelerations against law, step and transition velocity.
 

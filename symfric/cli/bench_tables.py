@@ -49,7 +49,7 @@ def integrator(result: "Benchmark") -> None:
 
 
 def multibody(result: "MultibodyBenchmark") -> None:
-    """Runs, ratios, compilation, counts, chains, published numbers, constraints and energy."""
+    """Runs, ratios, compilation, counts, chains, reference numbers, constraints and energy."""
     output.show_table(
         ["case", "integrator", "rtol", "error", "time [ms]", "steps", "gcc [s]"],
         [
@@ -107,9 +107,9 @@ def _costs(result: "MultibodyBenchmark") -> None:
 
 def _accuracy(result: "MultibodyBenchmark") -> None:
     output.show_table(
-        ["case", "t", "signal", "published", "off by", "digits"],
+        ["case", "t", "signal", "reference", "off by", "digits"],
         [
-            [r.case, r.t, r.signal, f"{r.published:.9g}", _short(r.value - r.published), r.digits]
+            [r.case, r.t, r.signal, f"{r.reference:.9g}", _short(r.value - r.reference), r.digits]
             for r in result.facts
         ],
         "Published numbers and what ours differ by; digits: what they are good for",

@@ -45,7 +45,7 @@ def drift(
     frequency: float = 10.0,
     t_end: float = 8.0,
 ) -> FigureData:
-    """Displacement of a block under a vibrating force (seed 3, figs. 8 and 9).
+    """Displacement of a block under a vibrating force (Lampaert et al. 2003, figs. 8, 9).
 
         F_e = 1.05 F_S t           up to 1 s, held until 1.05 s: it breaks away
         F_e = 0                    up to 1.5 s, or longer where it takes longer to come to rest

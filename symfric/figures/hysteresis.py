@@ -21,7 +21,7 @@ def hysteresis(
     speeds: Sequence[float] = (1.0, 5.0, 20.0),
     duration: float = 8.0,
 ) -> FigureData:
-    """Force over position along nested loops at several `speeds` (seed 3, figs. 4 and 5).
+    """Force over position along nested loops at several `speeds` (Lampaert et al. 2003).
 
     Columns t [s], x [m], v [m/s], F [N]. The loops turn at 1 and 2 pre-sliding distances and take
     `duration` [s] at speed 1. A law with non-local memory returns to the force of each turning

@@ -19,7 +19,7 @@ def lag(
     frequencies: Sequence[float] = (2.0, 5.0, 10.0),
     periods: int = 3,
 ) -> FigureData:
-    """Force over a velocity that rises and falls without reversal (seed 3, fig. 6).
+    """Force over a velocity that rises and falls without reversal (Lampaert et al. 2003, fig. 6).
 
         v = V [2.5 + 2 sin(2 pi f t)],   V the Stribeck velocity
 

@@ -8,7 +8,7 @@ from symfric.laws import AnyLaw, law_name, steady_force, steady_inputs
 
 
 def profile(law: AnyLaw, N: float = NORMAL_FORCE, given: Scales | None = None) -> FigureData:
-    """Force-velocity profile over +-5 Stribeck velocities (seed 0, fig. 1).
+    """Force-velocity profile over +-5 Stribeck velocities.
 
     Columns v [m/s], F [N]. Every law has one. Further inputs of a law, such as the applied force,
     have the values that the title says, with the sign of v.

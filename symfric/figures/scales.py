@@ -14,7 +14,7 @@ from symfric.laws import AnyLaw, Population, steady_force
 from symfric.model import finite
 
 MASS = 0.8
-"""Mass of the block where one is driven [kg], of seed table 2."""
+"""Mass of the block where one is driven [kg], that of `Rabinowicz`."""
 
 NORMAL_FORCE = MASS * 9.81
 """Normal force of the figures if none is given [N]."""

@@ -16,7 +16,7 @@ def steady_state(
     given: Scales | None = None,
     shares: Sequence[float] = (0.0, 0.25, 0.5, 1.0),
 ) -> FigureData:
-    """Force in steady sliding up to 10 Stribeck velocities V (seed 4, figs. 3.2, 3.3 and 5.3).
+    """Force in steady sliding up to 10 Stribeck velocities V (thesis, Lund 2015).
 
     Columns v [m/s], F [N]. A law with the viscous coefficient sigma_2 is shown with that of its
     own and, dashed, with those that add `shares` of the kinetic level at 10 V; the first, none,

@@ -19,7 +19,7 @@ def sweep_c(
     given: Scales | None = None,
     values: Sequence[float] = SHAPES,
 ) -> FigureData:
-    """Profiles for the shape factors `values` in [0, 2] (seed 0, fig. 7).
+    """Profiles for the shape factors `values` in [0, 2] (doi 10.1177/14644193231169325, fig. 7).
 
     Columns v [m/s], F [N]. `SelfTuning` computes C >= 1 from mu_d / mu_s; here C is set, as in
     `RuiWang` with D = mu_s N. C = 0 is no friction, C <= 1 monotone, C > 1 has a peak.
@@ -36,7 +36,7 @@ def sweep_b(
     given: Scales | None = None,
     values: Sequence[float] = STIFFNESSES,
 ) -> FigureData:
-    """Profiles for the stiffness factors `values` as shares of B (seed 0, fig. 8).
+    """Profiles for the stiffness factors `values` as shares of B (same source, fig. 8).
 
     Columns v [m/s], F [N]. B scales the velocity and leaves the peak as high as it is.
 
@@ -53,7 +53,7 @@ def sweep_e(
     given: Scales | None = None,
     values: Sequence[float] = CURVATURES,
 ) -> FigureData:
-    """Profiles for the curvature factors `values` below 1 (seed 0, fig. 9).
+    """Profiles for the curvature factors `values` below 1 (same source, fig. 9).
 
     Columns v [m/s], F [N]. E moves the peak and leaves its height and the slope at rest.
 

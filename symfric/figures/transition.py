@@ -19,7 +19,7 @@ def transition(
     frequencies: Sequence[float] = (2.0, 10.0),
     periods: int = 2,
 ) -> FigureData:
-    """Force over a sinusoidal velocity of 5 Stribeck velocities (seed 3, fig. 7).
+    """Force over a sinusoidal velocity of 5 Stribeck velocities (Lampaert et al. 2003).
 
     Columns t [s], x [m], v [m/s], F [N] of the last of `periods`, for each of `frequencies` [Hz].
     The contact goes from pre-sliding to sliding and back twice a period.

@@ -28,7 +28,7 @@ class Drive(Scene):
     `force` is the input. With the normal force N = 1 N the coefficients mu of a law read as force
     levels in newton, which is how the friction of a drive of unknown load is identified. With
     turning = True the axis turns: the same equations in rad, rad/s, N m and kg m^2.
-    Defaults: mass and load of the block of seed table 2 (N = m g).
+    Defaults: mass and load of the block of `Rabinowicz` (N = m g).
     """
 
     t_end: ClassVar[float] = 4.0

@@ -21,8 +21,9 @@ class PendulumBox(MechanismScene):
     `hinge` is the law of the hinge, with its own parameters (endings _1 and _2); without it the
     hinge has the law of the box.
 
-    Defaults: seed tables 6 and 7 (box 6 kg, pendulum 20 kg on 0.3 m, from 30 degrees). There the
-    pendulum's inertia is that of a point mass, and no radius of the hinge is given; 0.01 m here.
+    Defaults: Jing and Mi, Selection Mechanism of Friction Models, tables 6 and 7 (box 6 kg,
+    pendulum 20 kg on 0.3 m, from 30 degrees). There the pendulum's inertia is that of a point mass,
+    and no radius of the hinge is given; 0.01 m here.
     Limits: the ground does not pull: while N > 0 the box does not lift off, which is not checked.
     """
 

@@ -40,7 +40,7 @@ class QuarterCar(Scene):
     Defaults: section 3 of the paper, and its road of 50 mm (30 and 70 mm in its other runs). It
     does not give L_d and the times of the road. N_0 is chosen so that a law with mu_s = 0.15
     breaks away at the paper's 193.8 N; the paper has none, and its own law needs none.
-    Source: Al-Zughaibi, quarter-car friction, equations 1-13 (seed 1).
+    Source: Al-Zughaibi, quarter-car friction, equations 1-13.
     """
 
     t_end: ClassVar[float] = 10.0

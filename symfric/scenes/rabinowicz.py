@@ -22,8 +22,8 @@ class Rabinowicz(Scene):
     of the block relative to the belt, so while the belt carries the block the friction force F is
     negative: it opposes the block's motion relative to the belt.
 
-    Defaults: Marques-type comparison of eleven laws, tables 2 and 3 (m = 0.8 kg, k = 2.1 N/m,
-    belt 0.1 m/s); the block starts at x = 0 at rest.
+    Defaults: Jing and Mi, Selection Mechanism of Friction Models, tables 2 and 3 (m = 0.8 kg,
+    k = 2.1 N/m, belt 0.1 m/s); the block starts at x = 0 at rest.
     """
 
     t_end: ClassVar[float] = 20.0

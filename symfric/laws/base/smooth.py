@@ -27,7 +27,7 @@ def sign(x: Scalar, eps: Scalar) -> Scalar:
 def magnitude(x: Scalar, eps: Scalar) -> Scalar:
     """Smooth |x| = x tanh(x / eps), exactly 0 at x = 0.
 
-    Being zero at rest it does not relax a bristle that stands still (trap N6), and beyond 20 eps
+    Being zero at rest it does not relax a bristle that stands still, and beyond 20 eps
     it equals |x| to rounding. The float `eps = 0.0` gives |x| itself, with its kink at x = 0.
     """
     if equals(eps, 0.0):
@@ -40,7 +40,7 @@ def magnitude(x: Scalar, eps: Scalar) -> Scalar:
 def power(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
     """Smooth |x|^exponent = (x^2 + eps^2)^(exponent/2) - eps^exponent, exactly 0 at x = 0.
 
-    Finite with all derivatives in x and in the exponent (traps N1-N3). The float `exponent = 2.0`
+    Finite with all derivatives in x and in the exponent. The float `exponent = 2.0`
     gives x^2 exactly and costs one multiplication; the float `eps = 0.0` gives |x|^exponent
     itself, without a derivative at x = 0 for exponents below 1.
     """

@@ -104,7 +104,7 @@ class Population(Parametric, ABC):
         """States (states, count) and random numbers (count,) of unloaded contacts."""
 
     def begin(self) -> Contacts:
-        """Unloaded contacts, as the seed places them."""
+        """Unloaded contacts, where their random numbers place them."""
         random = np.random.default_rng(self.seed)
         return Contacts(*self._draw(random), random)
 

@@ -224,14 +224,15 @@ class SteadyStateLuGre(StaticLaw):
     forces, since the normal force of the published sets is not reported. The sets `pilot` and
     `main` hold from 140 to 500 mm/min only: at 1 m/s the viscous term of `pilot` alone is 230 N.
     Limits: `LuGre` in steady sliding; `Stribeck` with N mu = F.
-    Source: a thesis on identification of LuGre friction, equation 4.1 and tables 5.1, 5.2 (seed 4).
+    Source: A Friction Model for Laminator Nips, MSc thesis, Lund 2015, equation 4.1, tables 5.1
+    and 5.2.
     """
 
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="two sources",
-        source="thesis, equation 4.1 (seed 4); steady state of LuGre",
+        source="A Friction Model for Laminator Nips, MSc thesis, Lund 2015; LuGre",
         load="independent",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("F_C", "F_S"),)

@@ -41,14 +41,14 @@ class QuarterCarGeneral(StaticLaw):
     so that friction lessens the overshoot of the body, as the paper says.
     Limits: holds |f_sd| <= F_brk - F_eps at rest; mu = 0 leaves the simple law beyond v_eps;
     x_rel < L_d / (2 sin(theta)).
-    Source: Al-Zughaibi, quarter-car friction, equations 7-12 and 24 (seed 1), corrected as said.
+    Source: Al-Zughaibi, quarter-car friction, equations 7-12 and 24, corrected as said.
     """
 
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C2 at 0, |v| = v_eps, |f_sd| = F_brk -+ F_eps (as printed: jump at 0)",
         confidence="one source",
-        source="Al-Zughaibi, quarter-car friction (seed 1), corrected",
+        source="Al-Zughaibi, quarter-car friction, corrected",
         odd=False,
         load="independent",
     )
@@ -121,14 +121,14 @@ class QuarterCarSimple(StaticLaw):
     sigma_v are not given in the paper; their defaults are invented, as for `QuarterCarGeneral`.
     Limits: `Tustin` with a dynamic level of zero. Creeps under load; `QuarterCarGeneral` with
     mu = 0 holds at rest.
-    Source: Al-Zughaibi, quarter-car friction, equation 21 (seed 1), with the sign of e_1 corrected.
+    Source: Al-Zughaibi, quarter-car friction, equation 21, with the sign of e_1 corrected.
     """
 
     facts: ClassVar[Facts] = Facts(
         phenomena=("S", "St", "V"),
         smoothness="C∞",
         confidence="one source",
-        source="Al-Zughaibi, quarter-car friction (seed 1), corrected",
+        source="Al-Zughaibi, quarter-car friction, corrected",
         load="independent",
     )
 
