@@ -203,6 +203,10 @@ def _cross_validation(
 ) -> dict[str, float]:
     """Force errors on each of `folds` pieces with parameters fitted to the others."""
     force = signals.equations(signals.force)
+    if folds > task.rows:
+        raise ValueError(
+            f"identify: folds: expected at most {task.rows} pieces (equations), got {folds}"
+        )
     pieces = np.array_split(np.arange(task.rows), folds)
     error = np.zeros(task.rows)
     for piece in pieces:

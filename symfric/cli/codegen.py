@@ -8,7 +8,15 @@ from typing import Annotated, Any
 import typer
 
 from symfric.cli import output
-from symfric.cli.options import JsonOption, LawOption, SetOption, any_with, check_folder, numbers
+from symfric.cli.options import (
+    JsonOption,
+    LawOption,
+    SetOption,
+    any_with,
+    check_folder,
+    check_outputs,
+    numbers,
+)
 from symfric.cli.run import kind_of, scenes_with
 from symfric.codegen import Block, Generated, Verification, generate, plant_block, verify
 from symfric.foundation.parameters import check_names, parameters
@@ -64,14 +72,25 @@ def codegen(
 
     Example: symfric codegen --law lugre --out build --step-size 0.001
     """
-    kind = real or ("both" if scene is None else "double")
+    kind = real
+    if kind is None:
+        kind = "both" if scene is None else "double"
     check_names("--real", [kind], REALS)
     check_folder(out)
+    check_outputs(json)
     adjustable = None
     if scene is not None and turning:
         raise ValueError("--turning: expected with a law only: a scene knows what turns")
     if scene is not None:
-        made = partial(plant, scene, law, numbers("--set", settings), method or "auto", name, free)
+        made = partial(
+            plant,
+            scene,
+            law,
+            numbers("--set", settings),
+            "auto" if method is None else method,
+            name,
+            free,
+        )
         generated, adjustable = generate(made(step_size), out, real=REALS[kind]), made
     elif method is not None:
         raise ValueError("--method: expected with --scene only: the step of a law is exact")

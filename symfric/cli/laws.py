@@ -52,7 +52,9 @@ def laws(
     Example: symfric laws gms --figure hysteresis --compare lugre --plot loops.png
     """
     check_outputs(json, picture=plot)
-    if figure or others:
+    if normal_force is not None:
+        checks.number("--normal-force", normal_force, unit="N", above=0.0)
+    if figure is not None or others:
         behaviour(name, settings, figure, others or [], normal_force, plot, json)
         return
     every = [name] if name else [*ALL_LAWS, *POPULATIONS]
@@ -63,11 +65,7 @@ def laws(
         from symfric.figures.pictures import plot_catalogue, plot_laws  # noqa: PLC0415  (matplotlib is slow)
 
         draw = plot_laws if name else plot_catalogue
-        load = (
-            1.0
-            if normal_force is None
-            else checks.number("--normal-force", normal_force, unit="N", above=0.0)
-        )
+        load = 1.0 if normal_force is None else normal_force
         draw(chosen, load, plot)
     described = [{"name": text, **to_dict(law)} for text, law in chosen.items()]
     output.emit_json(described[0] if name else {"laws": described}, json)
@@ -88,13 +86,9 @@ def behaviour(
     """Compute a figure of one or several laws, and write, draw or summarise it."""
     if not name:
         raise ValueError("--figure, --compare: expected the name of a law before it, got none")
-    scenario = figure or "profile"
+    scenario = "profile" if figure is None else figure
     check_names("--figure", [scenario], [*FIGURES, *ALL_SCENES])
-    load = (
-        NORMAL_FORCE
-        if normal_force is None
-        else checks.number("--normal-force", normal_force, unit="N", above=0.0)
-    )
+    load = NORMAL_FORCE if normal_force is None else normal_force
     chosen = all_with([name, *others], settings)
     with output.progress(f"{scenario} of {', '.join([name, *others])}"):
         data = compare(chosen, scenario, load)

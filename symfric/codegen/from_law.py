@@ -88,6 +88,7 @@ def law_block(
         raise ValueError(f"{where}: expected numbers as parameters, got symbols {symbols}")
     check_names(where, free or (), known)
     names = runtime_parameters(law) if free is None else free
+    step_variable(where, h)  # asked for in a law without steps, too
     symbolic, runtime = symbolise(law, *names)
     block = _step(symbolic, runtime, h, where) if law.states else _function(symbolic, runtime)
     idle = [p.name for p in runtime if not ca.depends_on(block.everything, p.symbol)]

@@ -1,0 +1,395 @@
+"""Bad Python input at optimal control, identification, C and figures."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from bad_values import (
+    INF,
+    NAN,
+    Door,
+    Thing,
+    choice,
+    count,
+    flag,
+    function,
+    names,
+    number,
+    path,
+    refuses_all,
+    thing,
+    values,
+)
+
+import ocp
+import symfric as sf
+from identification import (
+    Dataset,
+    Filter,
+    identify,
+    identify_motion,
+    read_data,
+    synthetic_drive_data,
+)
+from symfric.codegen import generate, law_block, plant_block, verify
+from symfric.figures import FIGURES, compare, figure
+from symfric.laws import BrownMcPhee, Coulomb, LuGre, Stribeck
+
+
+def doors_of_control() -> Iterator[Door]:
+    model = sf.drive(BrownMcPhee(), free=["m"])
+    good = {
+        "model": model,
+        "T": 1.0,
+        "cost": ocp.integral(lambda s: s.force**2),
+        "initial": {"x": 0.0, "v": 0.0},
+        "final": {"x": 0.1, "v": 0.0},
+    }
+    ranges = [
+        3,
+        "x",
+        [("x", 1)],
+        Thing(),
+        {"nonsense": 1.0},
+        {3: 1.0},
+        {"x": None},
+        {"x": "1"},
+        {"x": NAN},
+        {"x": INF},
+        {"x": [0.0, 1.0, 2.0]},
+        {"x": (1.0, 0.0)},
+        {"x": (0.0,)},
+        {"x": (NAN, 1.0)},
+        {"x": True},
+        {"x": 1j},
+        {"x": Thing()},
+        {"x": (0.0, "a")},
+        True,
+    ]
+    yield Door(
+        "Problem",
+        ocp.Problem,
+        good,
+        {
+            "model": thing(BrownMcPhee(), sf.Model),
+            "T": [*number(0.0, -1.0), (0.5, 1.0)],
+            "cost": [
+                None,
+                3,
+                "x",
+                Thing(),
+                lambda s: s.x,
+                ocp.integral(lambda s: s.nonsense),
+                ocp.integral(lambda s: "a"),
+                ocp.integral(lambda s: None),
+                ocp.integral,
+                ocp.integral(lambda s: s.t * 0),
+                ocp.integral(lambda: 1),
+                ocp.integral(lambda s: ca.vertcat(s.x, s.x)),
+                ocp.integral(lambda s: NAN),
+                ocp.integral(lambda s: ca.SX.sym("a")),
+                ocp.integral(lambda s: ca.MX.sym("a")),
+            ],
+            "initial": ranges,
+            "final": ranges,
+            "bounds": ranges,
+            "via": [
+                3,
+                "x",
+                {"a": {}},
+                {0.5: 3},
+                {0.5: {"x": None}},
+                {0.0: {}},
+                {1.5: {}},
+                {NAN: {}},
+                {None: {}},
+                {0.5: {"nonsense": 1.0}},
+                Thing(),
+                [0.5],
+                {True: {}},
+            ],
+            "p": values("m", {"m": -1.0}),
+        },
+    )
+    yield Door(
+        "Free",
+        ocp.Free,
+        {"lower": 0.1, "upper": 1.0},
+        {
+            "lower": number(0.0, -1.0, 2.0),
+            "upper": number(0.0, 0.05),
+            "guess": number(5.0, optional=True),
+        },
+    )
+    for make in (ocp.integral, ocp.at_end):
+        yield Door(make.__name__, make, {}, {"expression": [None, *function()]})
+    yield Door("Cost * weight", lambda w: ocp.TIME * w, {}, {"w": number()})
+    yield Door(
+        "rest_to_rest",
+        ocp.rest_to_rest,
+        {"model": model, "distance": 0.1, "T": 1.0, "limit": 9.0},
+        {
+            "model": thing(),
+            "distance": number(),
+            "T": number(0.0),
+            "limit": number(0.0, -1.0),
+            "position": choice(),
+            "velocity": choice(),
+            "force": choice(),
+        },
+    )
+    problem = ocp.Problem(**good)
+    fast = {
+        "problem": problem,
+        "intervals": 4,
+        "verify": False,
+        "options": {"max_iter": 1},
+        "throw": False,
+    }
+    yield Door(
+        "solve",
+        ocp.solve,
+        fast,
+        {
+            "problem": thing(model, ocp.Problem),
+            "intervals": [
+                None,
+                "4",
+                0,
+                -1,
+                2.5,
+                NAN,
+                [],
+                [0.0],
+                [0.0, 0.5],
+                [0.0, 0.5, 0.5, 1.0],
+                {},
+                [0.0, NAN, 1.0],
+                Thing(),
+                True,
+                [[0.0, 1.0]],
+                1j,
+                10**9,
+            ],
+            "degree": [None, "3", 0, 10, 2.5, Thing(), [3], NAN, 1j],
+            "guess": [
+                3,
+                "x",
+                {"nonsense": 1.0},
+                {"x": "a"},
+                {"x": NAN},
+                {"x": [[1.0]]},
+                {"x": []},
+                {"x": lambda: 1},
+                {"x": lambda t: "a"},
+                {"x": lambda t: [1.0, 2.0]},
+                Thing(),
+                {"x": None},
+                {"x": 1j},
+                {3: 1.0},
+                True,
+            ],
+            "options": [
+                3,
+                "max_iter",
+                {"nonsense": 1},
+                {"max_iter": "a"},
+                {3: 1},
+                Thing(),
+                ["a"],
+                {"max_iter": None},
+                {"max_iter": -1},
+            ],
+            "verify": flag(),
+            "throw": flag(),
+            "progress": function(),
+            "tolerance": number(0.0, -1.0),
+        },
+    )
+
+
+def doors_of_identification() -> Iterator[Door]:
+    data = synthetic_drive_data()
+    yield Door(
+        "identify",
+        identify,
+        {"data": data, "law": "coulomb+viscous"},
+        {
+            "data": thing(Dataset, np.zeros((100, 3))),
+            "law": [*thing(Coulomb), LuGre(), "", "lugre", "coulomb+"],
+            "validate": thing()[1:],
+            "normal_force": number(0.0, -1.0),
+            "free": names("mu_d")[:-3],
+            "fixed": values("m"),
+            "filter": thing(Filter)[1:],
+            "folds": [*number(), 1, -1, 2.5],
+            "throw": flag(),
+            "progress": function(),
+        },
+    )
+    model = sf.rabinowicz(BrownMcPhee(), free=["mu_d"])
+    t = np.linspace(0.0, 0.05, 6)
+    good = {"model": model, "t": t, "measured": {"x": np.linspace(0.0, 5e-3, 6)}, "iterations": 1}
+    yield Door(
+        "identify_motion",
+        identify_motion,
+        good,
+        {
+            "model": thing(BrownMcPhee()),
+            "t": [
+                None,
+                3.0,
+                "abc",
+                [],
+                [0.0],
+                [[0.0]],
+                t[::-1],
+                t[:-1],
+                np.full(6, NAN),
+                Thing(),
+                1j,
+            ],
+            "measured": [
+                None,
+                3,
+                {},
+                {"nonsense": t},
+                {"x": 3.0},
+                {"x": t[:-1]},
+                {"x": t * NAN},
+                {"x": None},
+                {"x": "abc"},
+                {"x": [[1.0]]},
+                {3: t},
+                Thing(),
+                [t],
+            ],
+            "free": [*names("mu_d")[:-1], []],
+            "p": values("mu_d", {"mu_d": -1.0}),
+            "x0": values("v"),
+            "u": values("nothing"),
+            "rtol": number(0.0, -1.0, 1.0),
+            "iterations": count(),
+            "throw": flag(),
+        },
+    )
+    columns: dict[str, Any] = {"name": "d", "t": data.t, "x": data.x, "force": data.force}
+    bad = [None, 3.0, "abc", [], {}, Thing(), [[1.0]], data.t[:-1], data.t * NAN, 1j, ["a"] * 60]
+    yield Door(
+        "Dataset",
+        Dataset,
+        columns,
+        {
+            "t": [*bad, data.t[::-1], data.t * 0],
+            "x": bad,
+            "force": bad,
+            "v": bad[1:],
+        },
+    )
+    yield Door(
+        "read_data",
+        read_data,
+        {"path": "a.csv"},
+        {
+            "path": [None, 3, "", b"x", Thing(), [], "nothing.csv", ".", "a\0b"],
+            "columns": [3, "x", {"nonsense": "x"}, {"x": 3}, Thing()],
+        },
+    )
+
+
+def doors_of_code() -> Iterator[Door]:
+    yield Door(
+        "generate",
+        generate,
+        {"law": Stribeck(), "out": "c"},
+        {
+            "law": thing(Coulomb, sf.rabinowicz(LuGre())),
+            "out": path(),
+            "name": [3, "a b", "1a", "for", Thing(), [], ""],
+            "real": [None, 3, "half", ["half"], [], Thing(), [3]],
+            "free": [3, "mu_s", ["nonsense"], [3], Thing()],
+        },
+    )
+    yield Door(
+        "law_block",
+        law_block,
+        {"law": LuGre()},
+        {
+            "law": thing(LuGre),
+            "h": number(0.0, -1.0, optional=True),
+            "free": [3, "mu_s", ["nonsense"], [3], Thing()],
+            "name": [3, "a b", Thing(), ""],
+        },
+    )
+    yield Door(
+        "plant_block",
+        plant_block,
+        {"model": sf.rabinowicz(BrownMcPhee())},
+        {
+            "model": thing(LuGre()),
+            "h": number(0.0, -1.0, optional=True),
+            "method": choice(),
+            "name": [3, "a b", Thing(), ""],
+        },
+    )
+    yield Door("verify", verify, {}, {"generated": thing()})
+
+
+def doors_of_figures() -> Iterator[Door]:
+    yield Door(
+        "compare",
+        compare,
+        {"laws": [Coulomb()]},
+        {
+            "laws": [
+                None,
+                3,
+                [],
+                {},
+                Thing(),
+                [3],
+                [None],
+                ["nonsense"],
+                {"a": 3},
+                [Coulomb],
+                "lugre",
+                Coulomb(),
+            ],
+            "scenario": choice(),
+            "N": number(0.0, -1.0),
+        },
+    )
+    yield Door(
+        "figure",
+        figure,
+        {"law": Coulomb(), "name": "profile"},
+        {
+            "law": thing(Coulomb),
+            "name": choice(),
+            "N": number(0.0, -1.0),
+        },
+    )
+    for name, make in FIGURES.items():
+        yield Door(name, make, {"law": LuGre()}, {"law": thing(LuGre), "N": number(0.0, -1.0)})
+    data = compare([Coulomb()])
+    yield Door("FigureData[]", lambda name: data[name], {}, {"name": choice()})
+    yield Door("FigureData.plot", data.plot, {}, {"path": [*path(), "a.xyz", "."]})
+
+
+DOORS = {
+    "control": doors_of_control,
+    "identification": doors_of_identification,
+    "code": doors_of_code,
+    "figures": doors_of_figures,
+}
+
+
+@pytest.mark.parametrize("group", DOORS)
+def test_every_door_refuses_bad_input_in_a_sentence(
+    group: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    refuses_all(DOORS[group](), tmp_path)
