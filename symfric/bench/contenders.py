@@ -7,7 +7,6 @@ compiled loop alone, "symfric loop": to compare with where a run takes some mill
 """
 
 import os
-import subprocess
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,8 +19,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.compiler import find_compiler, no_compiler
 from symfric.integrator.arguments import chosen
-from symfric.integrator.compiled.compiler import FLAGS, find_compiler
+from symfric.integrator.compiled.compiler import FLAGS
 from symfric.integrator.equations.initial import (
     consistent,
     first_guess,
@@ -178,13 +178,12 @@ def compiled(function: ca.Function) -> tuple[ca.Function, float]:
     """`function` from generated C, and what the compiler took [s]; never from a cache.
 
     Raises:
-        RuntimeError: no compiler.
+        CompileError: no compiler.
     """
+    generator = ca.CodeGenerator(f"{function.name()}.c")
+    generator.add(function)
+    source = generator.dump()
     with TemporaryDirectory() as folder:
-        generator = ca.CodeGenerator(f"{function.name()}.c")
-        generator.add(function)
-        generator.generate(folder + "/")
-        source = (Path(folder) / f"{function.name()}.c").read_text(encoding="utf-8")
         library = Path(folder) / "generated.so"
         seconds = compile_time(source, library)
         return ca.external(function.name(), str(library)), seconds
@@ -194,13 +193,9 @@ def compile_time(source: str, target: str | Path = os.devnull) -> float:
     """Processor time [s] of the C compiler on `source`, with the flags that suit it best."""
     compiler = find_compiler()
     if compiler is None:
-        raise RuntimeError("bench: expected a C compiler, found none")
+        raise no_compiler()
     before = os.times()
-    subprocess.run(
-        [*compiler, *FASTEST, "-x", "c", "-", "-o", str(target), "-lm"],
-        input=source.encode(),
-        check=True,
-    )
+    compiler.run(*FASTEST, "-x", "c", "-", "-o", str(target), "-lm", code=source)
     after = os.times()
     user = after.children_user - before.children_user
     return user + after.children_system - before.children_system

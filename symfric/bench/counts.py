@@ -7,7 +7,7 @@ from typing import final
 import casadi as ca
 
 from symfric.bench.contenders import compile_time
-from symfric.integrator.compiled.compiler import find_compiler
+from symfric.foundation.compiler import find_compiler
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.engine import c_source

@@ -15,7 +15,7 @@ from symfric.bench import peers
 from symfric.bench.ensemble import EnsembleRow, measure_ensemble
 from symfric.bench.sensitivities import SensitivityRow, measure_sensitivities
 from symfric.bench.timing import best_time
-from symfric.integrator.compiled.compiler import find_compiler
+from symfric.foundation.compiler import find_compiler
 from symfric.integrator.simulate import simulate
 from symfric.laws import BrownMcPhee, Law, LuGre
 from symfric.model import Model

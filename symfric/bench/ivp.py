@@ -12,7 +12,7 @@ import numpy as np
 from symfric.bench.problems import PROBLEMS
 from symfric.bench.problems.problem import Problem
 from symfric.bench.timing import best_time
-from symfric.integrator.compiled.compiler import find_compiler
+from symfric.foundation.compiler import find_compiler
 from symfric.integrator.simulate import simulate
 from symfric.model import Model
 from symfric.results.trajectory import Trajectory

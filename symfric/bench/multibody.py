@@ -18,8 +18,8 @@ from symfric.bench.contenders import MAKERS, Contender
 from symfric.bench.counts import CompileRow, CountRow, compile_rows, counts
 from symfric.bench.facts import DRIFT_S, DriftRow, Fact, NormRow, drifts, facts, norms
 from symfric.bench.timing import best_time
+from symfric.foundation.compiler import find_compiler
 from symfric.foundation.files import written
-from symfric.integrator.compiled.compiler import find_compiler
 from symfric.integrator.simulate import simulate
 from symfric.laws import BrownMcPhee
 from symfric.scenes import MechanismScene, PendulumBox, SliderCrank

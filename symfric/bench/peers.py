@@ -2,8 +2,6 @@
 
 import warnings
 from collections.abc import Callable
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, cast
 
 import casadi as ca
@@ -11,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.numeric import flat_view
-from symfric.integrator.compiled.compiler import load
+from symfric.integrator.compiled.compiler import library
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.peers.casadi_integrators import peer
@@ -68,12 +66,9 @@ def casadi(model: Model, times: Array, rtol: float, plugin: str, compiled: bool)
 
 
 def _external(solver: ca.Function, name: str) -> ca.Function:
-    with TemporaryDirectory() as folder:
-        generator = ca.CodeGenerator(f"{name}.c")
-        generator.add(solver)
-        generator.generate(folder + "/")
-        library = load((Path(folder) / f"{name}.c").read_text(encoding="utf-8"))
-    return ca.external(name, library._name)
+    generator = ca.CodeGenerator(f"{name}.c")
+    generator.add(solver)
+    return ca.external(name, str(library(generator.dump(), name)))
 
 
 def scipy(model: Model, times: Array, rtol: float, method: str) -> Solve:

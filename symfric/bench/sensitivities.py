@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.bench.timing import best_time
-from symfric.integrator.compiled.compiler import find_compiler
+from symfric.foundation.compiler import find_compiler
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.peers.casadi_integrators import peer

@@ -18,6 +18,7 @@ from symfric.cli.identify import identify
 from symfric.cli.laws import laws
 from symfric.cli.run import run
 from symfric.cli.stress import stress
+from symfric.foundation.compiler import CompileError
 
 BAD_INPUT, FAILED_SOLVE, INTERRUPTED = 2, 1, 130
 
@@ -67,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refuse(error, INTERRUPTED if interrupted else FAILED_SOLVE)
     except (KeyboardInterrupt, typer.Abort):
         return _refuse(KeyboardInterrupt("interrupted"), INTERRUPTED)
-    except (ValueError, OSError, MemoryError, USAGE_ERROR) as error:
+    except (ValueError, OSError, MemoryError, CompileError, USAGE_ERROR) as error:
         return _refuse(error, BAD_INPUT)
 
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from symfric.codegen.block import GROUPS, Block
 from symfric.codegen.c99 import Real
-from symfric.codegen.compiler import CompileError
 from symfric.codegen.source import members, prefix
+from symfric.foundation.compiler import CompileError
 
 Array = NDArray[np.float64]
 

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from symfric.codegen.block import Block
 from symfric.codegen.c99 import REALS, Real
-from symfric.codegen.compiler import CompileError, Compiler, find_compiler, needed_symbols
+from symfric.codegen.compiler import compile_object, link_program, needed_symbols
 from symfric.codegen.generate import Generated
 from symfric.codegen.runaway import longest_step, runs_away, step_size
 from symfric.codegen.runner import program, run_c, run_vm
 from symfric.codegen.source import prefix, routines
 from symfric.foundation.checks import kind
+from symfric.foundation.compiler import CompileError, Compiler, find_compiler
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Variable
 
@@ -175,9 +176,9 @@ def _check(generated: Generated, real: Real, compiler: Compiler, inputs: Array) 
     with TemporaryDirectory(prefix="symfric-") as name:
         folder = Path(name)
         target, main = folder / f"{prefix(block, real)}.o", folder / "main.c"
-        warnings = compiler.object(generated.source(real.name), target)
+        warnings = compile_object(compiler, generated.source(real.name), target)
         write_text(main, program(block, real))
-        compiler.program([main, target], generated.folder, folder / "main")
+        link_program(compiler, [main, target], generated.folder, folder / "main")
         rows = run_c(block, real, folder / "main", inputs)
         needed = needed_symbols(target)
     own = rows[:, : len(block.states)] if real.size == 4 else None

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any, cast, final
 
@@ -12,8 +10,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.compiler import find_compiler
 from symfric.foundation.numeric import flat_view
-from symfric.integrator.compiled.compiler import find_compiler, library_path, load
+from symfric.integrator.compiled.compiler import library
 
 Array = NDArray[np.float64]
 CHAINED, SIDE_BY_SIDE = 16, 32
@@ -116,12 +115,9 @@ def external(function: ca.Function) -> ca.Function:
     """`function` compiled, or loaded from the cache.
 
     Raises:
-        RuntimeError: there is no compiler, or it failed.
+        CompileError: there is no compiler, or it failed.
     """
-    with TemporaryDirectory() as folder:
-        generator = ca.CodeGenerator("symfric_columns.c", {"static_aux": True})
-        generator.add(function)
-        generator.generate(folder + "/")
-        source = (Path(folder) / "symfric_columns.c").read_text(encoding="utf-8")
-    load(source)
-    return ca.external(function.name(), str(library_path(source)))
+    generator = ca.CodeGenerator("symfric_columns.c", {"static_aux": True})
+    generator.add(function)
+    path = library(generator.dump(), function.name())
+    return ca.external(function.name(), str(path))

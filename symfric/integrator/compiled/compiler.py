@@ -1,18 +1,14 @@
-"""Find a C compiler, compile a source once, and keep the result in the user's cache."""
+"""Compile a source once, keep the result in the user's cache, and load it from there."""
 
 import ctypes
 import hashlib
-import os
 import platform
-import shlex
-import shutil
-import subprocess
 import sys
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-from symfric.foundation.files import written
+from symfric.foundation.compiler import CompileError, Compiler, find_compiler, no_compiler
+from symfric.integrator.compiled.cache import Cache, caches
 
 FLAGS = (
     "-O2", "-march=native", "-fno-math-errno", "-ffp-contract=off",
@@ -24,94 +20,106 @@ divisions are taken out of the graph instead), no reordering. Looking for common
 has none left would take a third of the compiler's time."""
 
 
-@cache
-def find_compiler() -> tuple[str, ...] | None:
-    """Command of the C compiler: `$CC`, else gcc, clang or cc; None if there is none."""
-    wanted = os.environ.get("CC")
-    candidates = [shlex.split(wanted)] if wanted else [["gcc"], ["clang"], ["cc"]]
-    for command in candidates:
-        path = shutil.which(command[0]) if command else None
-        if path:
-            return (path, *command[1:])
-    return None
+def key_of(source: str, compiler: Compiler) -> str:
+    """Hash of the source, the compiler (path, size, time), its flags and the machine.
 
-
-def cache_folder() -> Path:
-    """Where compiled code is kept: `$SYMFRIC_CACHE`, else the user's cache folder."""
-    chosen = os.environ.get("SYMFRIC_CACHE")
-    if chosen:
-        return Path(chosen)
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA", Path.home()))
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    return base / "symfric"
-
-
-def library_path(source: str) -> Path | None:
-    """File that holds, or will hold, the compiled `source`; None without a compiler.
-
-    The name is a hash of the source, the compiler (path, size, time), its flags and the machine,
-    so that code of another kind is never loaded.
+    Code of another kind is never loaded, and a shared home does not mix processors.
     """
-    compiler = find_compiler()
-    if compiler is None:
-        return None
-    binary = Path(compiler[0]).stat()
-    parts = (source, compiler, FLAGS, binary.st_size, binary.st_mtime_ns, platform.machine())
-    name = hashlib.sha256(repr(parts).encode() + _processor()).hexdigest()[:32]
-    return cache_folder() / f"{name}.so"
+    binary = Path(compiler.command[0]).stat()
+    made_by = (compiler.command, FLAGS, binary.st_size, binary.st_mtime_ns)
+    machine = (sys.platform, platform.machine(), processor())
+    return hashlib.sha256(repr((source, made_by, machine)).encode()).hexdigest()[:32]
 
 
 @cache
-def _processor() -> bytes:
-    """What `-march=native` depends on, so that a shared home does not mix processors."""
+def processor() -> str:
+    """What `-march=native` depends on."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
-        return platform.processor().encode()
-    return next((line for line in lines if line.startswith(("flags", "Features"))), "").encode()
+        return platform.processor()
+    return next((line for line in lines if line.startswith(("flags", "Features"))), "")
 
 
-def load(source: str) -> ctypes.CDLL:
-    """The shared library of `source`, compiled unless the cache holds it.
+def compiled_before(source: str) -> Path | None:
+    """The library of `source` where a cache holds it, whole; None where it has to be compiled."""
+    compiler = find_compiler()
+    if compiler is None:
+        return None
+    key = key_of(source, compiler)
+    return next((path for place in caches() if (path := place.find(key))), None)
 
-    Several processes may do this at once: the file appears whole, under its final name. A damaged
-    one is compiled again.
+
+def load(source: str, *names: str) -> ctypes.CDLL:
+    """The shared library of `source` as `library` keeps it, loaded."""
+    return opened(library(source, *names), names)
+
+
+def library(source: str, *names: str) -> Path:
+    """The shared library of `source`, which defines `names`, compiled unless a cache holds it.
+
+    Several processes may do this at once: a file appears whole, under its final name.
 
     Raises:
-        RuntimeError: no compiler, no place for its result, or it refused the source; its first
+        CompileError: no compiler, no place for its result, or it refused the source; its first
             error is quoted.
     """
-    path, compiler = library_path(source), find_compiler()
-    if path is None or compiler is None:
-        raise RuntimeError(
-            "compile: expected a C compiler ($CC, gcc, clang or cc), found none; use backend='vm'"
-        )
-    if path.exists():
-        with suppress(OSError):
-            return ctypes.CDLL(str(path))
-    try:
-        with written(path) as temporary:
-            _compile(source, compiler, temporary)
-        return ctypes.CDLL(str(path))
-    except (ValueError, OSError) as error:
-        raise RuntimeError(
-            f"compile: expected to keep compiled code in {path.parent} and run it, got {error}; "
-            "set SYMFRIC_CACHE to a folder where that is allowed, or use backend='vm'"
-        ) from None
-
-
-def _compile(source: str, compiler: tuple[str, ...], target: Path) -> None:
-    done = subprocess.run(
-        [*compiler, *FLAGS, "-x", "c", "-", "-o", str(target), "-lm"],
-        input=source.encode(),
-        capture_output=True,
-        check=False,
+    compiler = find_compiler()
+    if compiler is None:
+        raise no_compiler()
+    key, problems = key_of(source, compiler), list[str]()
+    for place in caches():
+        known = place.find(key)
+        try:
+            if known is None:
+                known = _made(place, key, source, compiler, names)
+            opened(known, names)
+            return known
+        except OSError as error:
+            problems.append(f"{place.folder} ({error.strerror or error})")
+    raise CompileError(
+        f"compile: expected to keep compiled code and run it in {' or in '.join(problems)}; set "
+        "SYMFRIC_CACHE to a folder of yours where that is allowed, or use backend='vm'"
     )
-    if done.returncode:
-        lines = done.stderr.decode(errors="replace").strip().splitlines()
-        said = next((line for line in lines if "error" in line), "".join(lines[:1]))
-        raise RuntimeError(f"compile: {compiler[0]} failed: {said}")
+
+
+def _made(place: Cache, key: str, source: str, compiler: Compiler, names: tuple[str, ...]) -> Path:
+    """The library of `source`, compiled into a cache."""
+    with place.new(key) as temporary:
+        folder = {name: str(place.folder) for name in ("TMPDIR", "TMP", "TEMP")}
+        arguments = (*FLAGS, "-x", "c", "-", "-o", str(temporary), "-lm")
+        try:
+            compiler.run(*arguments, code=source, variables=folder)
+        except CompileError as error:
+            raise CompileError(f"compile: {_first_error(str(error))}") from None
+        opened(temporary, names)  # what cannot be used is not kept
+    place.evict()
+    found = place.find(key)
+    if found is None:
+        raise OSError(0, "what was written there is not what was read")
+    return found
+
+
+def opened(path: Path, names: tuple[str, ...]) -> ctypes.CDLL:
+    """The library at `path`.
+
+    Raises:
+        OSError: it is none, or may not run there.
+        CompileError: one of `names` is missing.
+    """
+    found = ctypes.CDLL(str(path))
+    missing = [name for name in names if not hasattr(found, name)]
+    if missing:
+        raise CompileError(
+            f"compile: expected a library with {', '.join(missing)}, found none in what {path.name}"
+            " holds; is $CC a C compiler?"
+        )
+    return found
+
+
+def _first_error(text: str) -> str:
+    """The head of what a compiler said, and its first error."""
+    head, _, said = text.partition("\n")
+    lines = said.strip().splitlines()
+    error = next((line for line in lines if "error" in line), "".join(lines[:1]))
+    return f"{head} {error}".strip()

@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.compiler import find_compiler
 from symfric.foundation.status import Status
 from symfric.integrator.compiled.columns import Columns
-from symfric.integrator.compiled.compiler import find_compiler
 from symfric.integrator.equations.initial import Equations, consistent_many, smallest_step
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.manifold import Manifold

@@ -130,7 +130,7 @@ class CompiledMembers:
     @classmethod
     def of(cls, source: str, signals: int) -> "CompiledMembers":
         """From the C of `many_source`; compiles, or loads from the cache."""
-        library = load(source)
+        library = load(source, "symfric_many")
         library.symfric_many.restype = None
         library.symfric_many.argtypes = [
             *[ctypes.c_void_p] * 2,

@@ -6,9 +6,7 @@ Both engines advance S in place and write a row (t0, t1, y0, y1, D) per accepted
 import ctypes
 from dataclasses import dataclass
 from enum import IntEnum
-from pathlib import Path
 from string import Template
-from tempfile import TemporaryDirectory
 from typing import Any, Protocol, cast, final
 
 import casadi as ca
@@ -149,7 +147,7 @@ class CompiledEngine:
     @classmethod
     def of_source(cls, source: str, n: int, dense_rows: int) -> "CompiledEngine":
         """The engine of generated C, for `n` unknowns."""
-        library = load(source)
+        library = load(source, "symfric_run")
         library.symfric_run.restype = ctypes.c_int
         library.symfric_run.argtypes = [
             *[ctypes.c_void_p] * 3,
@@ -183,13 +181,10 @@ def c_source(step: ca.Function, dense_rows: int, *others: ca.Function) -> str:
     `others` are Functions that further C calls by their names.
     """
     n = step.numel_in(0) - State.MEMORY
-    with TemporaryDirectory() as folder:
-        generator = ca.CodeGenerator("symfric_step.c", {"static_aux": True})
-        for function in (step, *others):
-            generator.add(function)
-        generator.generate(folder + "/")
-        code = (Path(folder) / "symfric_step.c").read_text(encoding="utf-8")
-    return code + Template(_LOOP).substitute(
+    generator = ca.CodeGenerator("symfric_step.c", {"static_aux": True})
+    for function in (step, *others):
+        generator.add(function)
+    return generator.dump() + Template(_LOOP).substitute(
         n=n,
         memory=State.MEMORY,
         t=State.T,

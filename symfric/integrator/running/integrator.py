@@ -10,9 +10,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.compiler import CompileError, find_compiler
 from symfric.foundation.symbols import stacked
 from symfric.integrator.compiled.columns import Columns
-from symfric.integrator.compiled.compiler import find_compiler, library_path
+from symfric.integrator.compiled.compiler import compiled_before
 from symfric.integrator.equations.blocks import refinement
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import InputData
@@ -182,7 +183,7 @@ class Integrator:
         """The compiled engine; compiles, or loads from the cache, on first use.
 
         Raises:
-            RuntimeError: there is no compiler, or it failed.
+            CompileError: there is no compiler, or it failed.
         """
         if "compiled" not in self._engines:
             begin = perf_counter()
@@ -205,7 +206,7 @@ class Integrator:
             return self._engines["compiled"]
         try:
             return self._best(left)
-        except RuntimeError:  # a broken compiler is no reason not to simulate
+        except CompileError:  # a broken compiler is no reason not to simulate
             self.compiles = False
             return self.vm()
 
@@ -218,7 +219,6 @@ class Integrator:
             return self.compiled()
         if expected > 2 * look_up and "looked up" not in self._engines:
             self._engines["looked up"] = self.vm()
-            path = library_path(c_source(self.step, self.tableau.H.shape[0]))
-            if path is not None and path.exists():
+            if compiled_before(c_source(self.step, self.tableau.H.shape[0])) is not None:
                 return self.compiled()
         return self.vm()

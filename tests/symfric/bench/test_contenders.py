@@ -6,7 +6,7 @@ import pytest
 from symfric import Model, simulate
 from symfric.bench.contenders import MAKERS, compile_time, compiled
 from symfric.bench.multibody import CASES
-from symfric.integrator.compiled.compiler import find_compiler
+from symfric.foundation.compiler import find_compiler
 
 WHAT = CASES["slider_crank"]
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")

@@ -3,7 +3,7 @@
 import pytest
 
 from symfric.bench.counts import CountRow, compile_rows, counts
-from symfric.integrator.compiled.compiler import find_compiler
+from symfric.foundation.compiler import find_compiler
 
 FOUR = (
     "frictionless",

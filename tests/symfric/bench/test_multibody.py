@@ -11,7 +11,7 @@ import pytest
 from symfric.bench import MultibodyBenchmark
 from symfric.bench.multibody import LOOP, OURS, RunRow
 from symfric.cli import main
-from symfric.integrator.compiled.compiler import find_compiler
+from symfric.foundation.compiler import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 

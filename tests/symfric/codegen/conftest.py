@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from symfric.codegen.compiler import Compiler, find_compiler
+from symfric.foundation.compiler import Compiler, find_compiler
 
 
 @pytest.fixture(scope="session")

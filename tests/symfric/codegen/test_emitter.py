@@ -10,6 +10,7 @@ import pytest
 from symfric import Output, Variable
 from symfric.codegen import Block, generate
 from symfric.codegen.c99 import DOUBLE, FLOAT, FORMS, FUNCTIONS, REALS
+from symfric.codegen.compiler import link_program
 from symfric.codegen.emitter import emit
 from symfric.codegen.graph import LEAVES, graph
 from symfric.codegen.runner import program, run_c, run_vm
@@ -101,7 +102,7 @@ def both(block, real, inputs, compiler, folder):
     generated = generate(block, folder, real=real)
     (folder / "main.c").write_text(program(block, REALS[real]))
     parts = [folder / "main.c", generated.source(real)]
-    compiler.program(parts, folder, folder / "main")
+    link_program(compiler, parts, folder, folder / "main")
     c = run_c(block, REALS[real], folder / "main", inputs)
     return c, run_vm(block, REALS[real], inputs)
 

@@ -20,7 +20,7 @@ from symfric import (
 )
 from symfric.codegen import generate, plant_block, verify
 from symfric.codegen.block import Block
-from symfric.codegen.compiler import Compiler
+from symfric.foundation.compiler import Compiler
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.model import Event
 from symfric.scenes import Arm, DoublePendulum

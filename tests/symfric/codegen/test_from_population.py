@@ -7,6 +7,7 @@ import pytest
 
 from symfric import GenericAsperity, RandomBristles
 from symfric.codegen import contact_block, generate, verify
+from symfric.codegen.compiler import link_program
 
 MAIN = """#include "generic_asperity_f64.h"
 #include <stdio.h>
@@ -44,7 +45,7 @@ def test_a_loop_in_c_is_the_population_of_numpy(compiler, tmp_path):
     made = generate(law, tmp_path, real="double")
     (tmp_path / "main.c").write_text(MAIN)
     program = tmp_path / "main"
-    compiler.program([tmp_path / "main.c", made.source("double")], tmp_path, program)
+    link_program(compiler, [tmp_path / "main.c", made.source("double")], tmp_path, program)
     t = np.arange(2001) * h
     x = 2e-5 * np.sin(40 * t)
     velocities = np.stack([np.diff(x) / h, np.full(2000, N)], axis=1)

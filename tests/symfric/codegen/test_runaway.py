@@ -8,9 +8,9 @@ import pytest
 from symfric import BrownMcPhee, LuGre, Model, Variable
 from symfric.codegen import Block, generate, plant_block, verify
 from symfric.codegen.c99 import REALS
-from symfric.codegen.compiler import Compiler
 from symfric.codegen.runaway import longest_step, runs_away, step_size
 from symfric.codegen.runner import run_vm
+from symfric.foundation.compiler import Compiler
 from symfric.scenes import Arm
 
 x = Variable("x", "m", start=1.0, nominal=2.0)

@@ -7,8 +7,9 @@ import pytest
 from symfric import Output, Variable
 from symfric.codegen import Block, generate
 from symfric.codegen.c99 import DOUBLE
-from symfric.codegen.compiler import CompileError
+from symfric.codegen.compiler import link_program
 from symfric.codegen.runner import program, run_c, run_vm, signals
+from symfric.foundation.compiler import CompileError
 
 
 def swap() -> Block:
@@ -55,7 +56,7 @@ BLOCKS = {"swap": swap, "mass": mass, "pair": pair, "constant": constant}
 def built(block, compiler, folder):
     made = generate(block, folder, real="double")
     (folder / "main.c").write_text(program(block, DOUBLE))
-    compiler.program([folder / "main.c", made.source("double")], folder, folder / "main")
+    link_program(compiler, [folder / "main.c", made.source("double")], folder, folder / "main")
     return folder / "main"
 
 

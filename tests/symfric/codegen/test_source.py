@@ -10,7 +10,7 @@ from law_cases import NO_STEP, SYMMETRIC
 from symfric import BrownMcPhee, LuGre, Output, Variable, Viscous
 from symfric.codegen import Block, generate, law_block
 from symfric.codegen.c99 import DOUBLE, FLOAT
-from symfric.codegen.compiler import FLAGS, WARNINGS
+from symfric.codegen.compiler import FLAGS, WARNINGS, compile_object
 from symfric.codegen.source import header, routines, source
 
 STRICT = [*WARNINGS, "-Werror"]
@@ -81,7 +81,7 @@ def test_cpp_links_against_the_c_objects(everything, compiler, tmp_path):
     objects = []
     for i, file in enumerate(sources):
         objects.append(tmp_path / f"{i}.o")
-        compiler.object(file, objects[-1])
+        compile_object(compiler, file, objects[-1])
     (tmp_path / "main.cpp").write_text(main.read_text())
     compiled(["g++"], [f"-I{main.parent}", tmp_path / "main.cpp", *objects, "-o", tmp_path / "m"])
     compiled([tmp_path / "m"], [])

@@ -11,8 +11,8 @@ from oracles import rabinowicz_brown_mcphee, rabinowicz_lugre
 from stored import stored
 
 from symfric import BrownMcPhee, Law, LuGre, Model, Variable, drive, rabinowicz, simulate
+from symfric.foundation.compiler import find_compiler
 from symfric.integrator import simulate_by_peer
-from symfric.integrator.compiled.compiler import find_compiler
 from symfric.integrator.peers.casadi_integrators import PEERS
 
 Array = NDArray[np.float64]

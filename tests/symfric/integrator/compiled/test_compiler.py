@@ -3,14 +3,17 @@
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from symfric import LuGre, Status, rabinowicz, simulate
+from symfric.cli import main
+from symfric.foundation import compiler as finder
+from symfric.foundation.compiler import CompileError, Compiler, find_compiler
 from symfric.integrator.compiled import compiler
-from symfric.integrator.compiled.compiler import cache_folder, find_compiler, library_path, load
+from symfric.integrator.compiled.compiler import compiled_before, key_of, library, load
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
@@ -18,34 +21,28 @@ from symfric.integrator.running.integrator import Integrator
 SOURCE = "int answer(void) { return 42; }\n"
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
+needs_shell = pytest.mark.skipif(sys.platform == "win32", reason="shell scripts as compilers")
 
 
 @pytest.fixture(autouse=True)
-def fresh(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
-    """An empty cache of compiled code, and the environment looked at anew."""
+def folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """An empty cache of compiled code."""
     monkeypatch.setenv("SYMFRIC_CACHE", str(tmp_path / "cache"))
-    find_compiler.cache_clear()
-    yield
-    find_compiler.cache_clear()
+    return tmp_path / "cache"
 
 
 @pytest.fixture
-def calls(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+def calls(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
     """Commands that were run."""
-    seen: list[list[str]] = []
-    run = subprocess.run
+    seen: list[tuple[str, ...]] = []
+    run = Compiler.run
 
-    def counted(command: list[str], **options: object) -> object:
-        seen.append(command)
-        return run(command, **options)  # type: ignore[call-overload]
+    def counted(self: Compiler, *arguments: str, **options: object) -> str:
+        seen.append((*self.command, *arguments))
+        return run(self, *arguments, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(compiler.subprocess, "run", counted)
+    monkeypatch.setattr(Compiler, "run", counted)
     return seen
-
-
-def choose_compiler(monkeypatch: pytest.MonkeyPatch, command: str) -> None:
-    monkeypatch.setenv("CC", command)
-    find_compiler.cache_clear()
 
 
 def integrator() -> Integrator:
@@ -54,88 +51,117 @@ def integrator() -> Integrator:
 
 
 @needs_compiler
-def test_second_load_comes_from_the_cache(calls: list[list[str]]) -> None:
-    assert load(SOURCE).answer() == 42
-    assert load(SOURCE).answer() == 42
+def test_second_load_comes_from_the_cache(calls: list[tuple[str, ...]], folder: Path) -> None:
+    assert compiled_before(SOURCE) is None
+    assert load(SOURCE, "answer").answer() == 42
+    assert load(SOURCE, "answer").answer() == 42
     assert len(calls) == 1
-    path = library_path(SOURCE)
-    assert path is not None
-    assert list(cache_folder().iterdir()) == [path]
+    path = compiled_before(SOURCE)
+    assert path == library(SOURCE)
+    assert list(folder.iterdir()) == [path]
 
 
 @needs_compiler
-def test_another_source_is_compiled_anew(calls: list[list[str]]) -> None:
+def test_another_source_is_compiled_anew(calls: list[tuple[str, ...]]) -> None:
     load(SOURCE)
     assert load(SOURCE.replace("42", "43")).answer() == 43
     assert len(calls) == 2
 
 
 @needs_compiler
-def test_other_flags_make_another_library(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = library_path(SOURCE)
-    monkeypatch.setattr(compiler, "FLAGS", (*compiler.FLAGS, "-g"))
-    assert library_path(SOURCE) != before
-
-
-@pytest.mark.parametrize(
-    ("system", "variable", "rest"),
-    [("linux", "XDG_CACHE_HOME", "symfric"), ("win32", "LOCALAPPDATA", "symfric")],
-)
-def test_cache_lies_where_the_system_keeps_caches(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, system: str, variable: str, rest: str
+def test_all_that_the_code_depends_on_is_in_its_name(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.delenv("SYMFRIC_CACHE")
-    monkeypatch.setattr(compiler.sys, "platform", system)
-    monkeypatch.setenv(variable, str(tmp_path))
-    assert cache_folder() == tmp_path / rest
-
-
-def test_cache_may_be_chosen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("SYMFRIC_CACHE", str(tmp_path / "mine"))
-    assert cache_folder() == tmp_path / "mine"
+    """Source, compiler and its age, options, flags, machine and processor."""
+    program = tmp_path / "cc"
+    program.write_bytes(b"one")
+    cc = Compiler((str(program),))
+    keys = [key_of(SOURCE, cc), key_of(SOURCE + " ", cc)]
+    keys.append(key_of(SOURCE, Compiler((*cc.command, "-O3"))))
+    other = tmp_path / "other"
+    other.write_bytes(b"one")
+    keys.append(key_of(SOURCE, Compiler((str(other),))))
+    os.utime(program, (1, 1))
+    keys.append(key_of(SOURCE, cc))
+    program.write_bytes(b"four")
+    os.utime(program, (1, 1))
+    keys.append(key_of(SOURCE, cc))
+    assert keys[-1] == key_of(SOURCE, cc)
+    for owner, name, value in (
+        (compiler, "FLAGS", (*compiler.FLAGS, "-g")),
+        (compiler, "processor", lambda: "flags : fpu sse"),
+        (compiler.platform, "machine", lambda: "aarch64"),
+        (compiler.sys, "platform", "plan9"),
+    ):
+        monkeypatch.setattr(owner, name, value)
+        keys.append(key_of(SOURCE, cc))
+    assert len(set(keys)) == len(keys)
 
 
 @needs_compiler
-def test_damaged_library_is_compiled_again(calls: list[list[str]]) -> None:
-    path = library_path(SOURCE)
-    assert path is not None
-    path.parent.mkdir()
-    path.write_bytes(b"half a file, for the disk was full")
-    assert load(SOURCE).answer() == 42
-    assert len(calls) == 1
+def test_damaged_library_is_compiled_again(calls: list[tuple[str, ...]]) -> None:
+    """Half a library was a SIGBUS in 4f644ad."""
+    path = library(SOURCE, "answer")
+    whole = path.read_bytes()
+    path.unlink()  # it is mapped
+    path.write_bytes(whole[: len(whole) // 2])
+    assert compiled_before(SOURCE) is None
+    assert load(SOURCE, "answer").answer() == 42
+    assert len(calls) == 2
+
+
+@needs_compiler
+def test_a_library_of_others_is_not_loaded(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    """Somebody knows the key and may write the folder."""
+    made = library("int answer(void) { return 666; }", "answer")
+    found = find_compiler()
+    assert found is not None
+    key = key_of(SOURCE, found)
+    planted = folder / f"{key}-{made.stem.split('-')[1]}.so"
+    made.rename(planted)
+    assert compiled_before(SOURCE) == planted
+    planted.chmod(0o777)
+    assert compiled_before(SOURCE) is None
+    assert load(SOURCE, "answer").answer() == 42
 
 
 @needs_compiler
 def test_compiler_may_be_chosen_with_options(
-    monkeypatch: pytest.MonkeyPatch, calls: list[list[str]]
+    monkeypatch: pytest.MonkeyPatch, calls: list[tuple[str, ...]]
 ) -> None:
-    command = find_compiler()
-    assert command is not None
-    choose_compiler(monkeypatch, f"{command[0]} -DANSWER=7")
+    found = find_compiler()
+    assert found is not None
+    monkeypatch.setenv("CC", f"{found.command[0]} -DANSWER=7")
     assert load("int answer(void) { return ANSWER; }").answer() == 7
-    assert calls[0][:2] == [command[0], "-DANSWER=7"]
+    assert calls[0][:2] == (found.command[0], "-DANSWER=7")
 
 
 @needs_compiler
-def test_refused_source_quotes_the_compiler_and_leaves_nothing_behind() -> None:
-    with pytest.raises(RuntimeError, match=r"compile: .* failed: .*error: .*nonsense"):
+def test_refused_source_quotes_the_compiler_and_leaves_nothing_behind(folder: Path) -> None:
+    with pytest.raises(CompileError, match=r"compile: .* failed .*error: .*nonsense"):
         load("int answer(void) { return nonsense; }")
-    assert list(cache_folder().iterdir()) == []
+    assert list(folder.iterdir()) == []
+
+
+@needs_compiler
+def test_a_missing_function_is_a_sentence_and_is_not_kept(folder: Path) -> None:
+    """It was an AttributeError."""
+    with pytest.raises(CompileError, match="compile: expected a library with question, found none"):
+        load(SOURCE, "question")
+    assert list(folder.iterdir()) == []
 
 
 @pytest.mark.parametrize("missing", ["/no/such/compiler", "no-such-compiler -O3"])
 def test_without_a_compiler_the_error_says_what_to_do(
     monkeypatch: pytest.MonkeyPatch, missing: str
 ) -> None:
-    choose_compiler(monkeypatch, missing)
-    assert find_compiler() is None
-    assert library_path(SOURCE) is None
-    with pytest.raises(
-        RuntimeError, match=r"expected a C compiler .* found none; use backend='vm'"
-    ):
+    monkeypatch.setenv("CC", missing)
+    message = r"expected a C compiler .* \$CC is .*, which is not found; use backend='vm'"
+    with pytest.raises(CompileError, match=message):
         load(SOURCE)
-    with pytest.raises(RuntimeError, match=r"expected a C compiler"):
+    with pytest.raises(CompileError, match=message):
         simulate(rabinowicz(LuGre()), 0.1, backend="compiled")
+    assert compiled_before(SOURCE) is None
 
 
 @needs_compiler
@@ -143,39 +169,66 @@ def test_folder_that_cannot_be_written_is_named(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("not a folder")
-    monkeypatch.setenv("SYMFRIC_CACHE", str(tmp_path / "file" / "cache"))
-    with pytest.raises(RuntimeError, match=r"keep compiled code in .*cache .* set SYMFRIC_CACHE"):
-        load(SOURCE)
+    for place, why in ((tmp_path / "file" / "cache", "Not a directory"), (Path("/proc"), "")):
+        monkeypatch.setenv("SYMFRIC_CACHE", str(place))
+        with pytest.raises(CompileError, match=rf"run it in {place} \({why}.* set SYMFRIC_CACHE"):
+            load(SOURCE)
+
+
+@needs_compiler
+def test_a_home_that_cannot_be_written_is_no_obstacle(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.delenv("SYMFRIC_CACHE")
+    (tmp_path / "home").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    path = library(SOURCE)
+    assert path.parent.parent == tmp_path
+    assert compiled_before(SOURCE) == path
 
 
 def broken_compilers(tmp_path: Path) -> dict[str, str]:
-    refusing = tmp_path / "refusing"
-    refusing.write_text("#!/bin/sh\necho 'licence expired' >&2\nexit 1\n")
-    silent = tmp_path / "silent"
-    silent.write_text("#!/bin/sh\nexit 0\n")
-    for script in (refusing, silent):
-        script.chmod(0o755)
-    return {"refusing": str(refusing), "silent": str(silent), "absent": "/no/such/compiler"}
+    scripts = {
+        "refusing": "echo 'licence expired' >&2; exit 1",
+        "silent": "exit 0",
+        "hanging": "sleep 60",
+    }
+    for name, text in scripts.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")
+        (tmp_path / name).chmod(0o755)
+    return {name: str(tmp_path / name) for name in scripts} | {"absent": "/no/such/compiler"}
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="shell scripts as compilers")
+@needs_shell
 @pytest.mark.parametrize(
     ("kind", "message"),
     [
-        ("refusing", "refusing failed: licence expired"),
+        ("refusing", "refusing failed with status 1: licence expired"),
         ("silent", "expected to keep compiled code"),
         ("absent", "expected a C compiler"),
+        ("hanging", "hanging came to no end within"),
     ],
 )
 def test_broken_compiler_is_an_error_only_where_compiled_code_is_asked_for(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kind: str, message: str
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    kind: str,
+    message: str,
 ) -> None:
-    choose_compiler(monkeypatch, broken_compilers(tmp_path)[kind])
+    monkeypatch.setenv("CC", broken_compilers(tmp_path)[kind])
+    monkeypatch.setattr(finder, "PATIENCE", 0.2)
+    monkeypatch.setattr(finder, "PER_BYTE", 0.0)
     chooser = integrator()
     assert chooser.choose("auto", left=1e6).name == "vm"
     assert chooser.choose("auto", left=1e6).name == "vm"
-    with pytest.raises(RuntimeError, match=message):
+    with pytest.raises(CompileError, match=message):
         chooser.choose("compiled", left=0.0)
+    assert main(["run", "rabinowicz", "--law", "viscous", "--backend", "compiled"]) == 2
+    told = capsys.readouterr().err
+    assert "internal error" not in told
+    assert message in told
 
 
 @needs_compiler
@@ -185,7 +238,7 @@ def test_compiling_begins_where_it_pays(left: float, name: str) -> None:
 
 
 @needs_compiler
-def test_compiled_code_in_the_cache_is_used_earlier(calls: list[list[str]]) -> None:
+def test_compiled_code_in_the_cache_is_used_earlier(calls: list[tuple[str, ...]]) -> None:
     integrator().choose("compiled", 0.0)
     short = 0.1
     assert integrator().choose("auto", short).name == "compiled"
@@ -193,7 +246,7 @@ def test_compiled_code_in_the_cache_is_used_earlier(calls: list[list[str]]) -> N
 
 
 @needs_compiler
-def test_same_model_built_again_needs_no_compiler(calls: list[list[str]]) -> None:
+def test_same_model_built_again_needs_no_compiler(calls: list[tuple[str, ...]]) -> None:
     runs = [simulate(rabinowicz(LuGre()), 1.0, backend="compiled") for _ in range(2)]
     assert [run.status for run in runs] == [Status.SUCCESS] * 2
     assert [run.statistics.backend for run in runs] == ["compiled"] * 2
@@ -201,15 +254,17 @@ def test_same_model_built_again_needs_no_compiler(calls: list[list[str]]) -> Non
 
 
 @needs_compiler
-def test_processes_may_compile_the_same_at_once(tmp_path: Path) -> None:
-    """Each ends with a whole library under the one name."""
+def test_processes_and_threads_may_compile_the_same_at_once(folder: Path) -> None:
+    """Each ends with a whole library."""
     script = (
-        f"from symfric.integrator.compiled.compiler import load; print(load({SOURCE!r}).answer())"
+        "from symfric.integrator.compiled.compiler import load; "
+        f"print(load({SOURCE!r}, 'answer').answer())"
     )
-    environment = os.environ | {"SYMFRIC_CACHE": str(tmp_path / "shared")}
     workers = [
-        subprocess.Popen([sys.executable, "-c", script], env=environment, stdout=subprocess.PIPE)
-        for _ in range(3)
+        subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE) for _ in range(2)
     ]
-    assert [worker.communicate(timeout=60)[0].strip() for worker in workers] == [b"42"] * 3
-    assert len(list((tmp_path / "shared").iterdir())) == 1
+    with ThreadPoolExecutor(3) as pool:
+        assert [found.answer() for found in pool.map(load, [SOURCE] * 3)] == [42] * 3
+    assert [worker.communicate(timeout=60)[0].strip() for worker in workers] == [b"42"] * 2
+    assert {path.suffix for path in folder.iterdir()} == {".so"}
+    assert not [path for path in folder.iterdir() if path.name.startswith(".")]

@@ -16,8 +16,8 @@ from symfric import (
     simulate,
     simulate_many,
 )
+from symfric.foundation.compiler import find_compiler
 from symfric.integrator.compiled.columns import Columns
-from symfric.integrator.compiled.compiler import find_compiler
 from symfric.integrator.equations.initial import consistent, consistent_many
 
 x = Variable("x", "m", start=1.0)

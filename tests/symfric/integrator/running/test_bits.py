@@ -24,7 +24,7 @@ from symfric import (
     simulate,
     simulate_many,
 )
-from symfric.integrator.compiled.compiler import find_compiler
+from symfric.foundation.compiler import find_compiler
 from symfric.integrator.running.integrator import Integrator
 from symfric.laws import ALL_LAWS
 from symfric.scenes import PendulumBox, SliderCrank

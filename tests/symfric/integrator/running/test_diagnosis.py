@@ -14,7 +14,7 @@ from symfric import (
     rabinowicz,
     simulate,
 )
-from symfric.integrator.compiled.compiler import find_compiler
+from symfric.foundation.compiler import find_compiler
 
 t = ca.SX.sym("t")
 x, y = Variable("x", "m"), Variable("y", "m", start=1.0)

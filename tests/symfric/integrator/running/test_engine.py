@@ -9,7 +9,7 @@ from closed_forms import assemble, smooth_dae, smooth_ode, timed_ode
 from numpy.typing import NDArray
 
 from symfric import BrownMcPhee, LuGre, Model, Variable, rabinowicz
-from symfric.integrator.compiled.compiler import find_compiler
+from symfric.foundation.compiler import find_compiler
 from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
 from symfric.integrator.running.engine import (
     CompiledEngine,

@@ -10,7 +10,7 @@ from hybrid import ball, coulomb_on_a_belt
 from oracles import rabinowicz_coulomb
 
 from symfric import Event, Hold, Linear, Model, Output, SolveError, Status, Variable, simulate
-from symfric.integrator.compiled.compiler import find_compiler
+from symfric.foundation.compiler import find_compiler
 from symfric.integrator.equations.inputs import Input
 
 G = 9.81

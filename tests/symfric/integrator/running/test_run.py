@@ -15,7 +15,7 @@ from symfric import (
     rabinowicz,
     simulate,
 )
-from symfric.integrator.compiled.compiler import find_compiler
+from symfric.foundation.compiler import find_compiler
 from symfric.integrator.running.integrator import Integrator
 
 x = Variable("x", "m", start=1.0)

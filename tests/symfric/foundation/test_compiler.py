@@ -1,0 +1,108 @@
+"""Finding a C compiler, and stopping one that does not come to an end."""
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from symfric.foundation import compiler as module
+from symfric.foundation.compiler import CompileError, Compiler, find_compiler, no_compiler
+
+needs_shell = pytest.mark.skipif(sys.platform == "win32", reason="shell scripts as compilers")
+
+
+def script(path: Path, text: str) -> Compiler:
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(0o755)
+    return Compiler((str(path),))
+
+
+def test_without_any_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("CC", raising=False)
+    assert find_compiler() is None
+    assert "found none; use backend='vm'" in str(no_compiler())
+
+
+def test_cc_comes_first_with_its_options_and_is_looked_at_each_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("CC", f"{sys.executable} -m whatever")
+    assert find_compiler() == Compiler((sys.executable, "-m", "whatever"))
+    monkeypatch.setenv("CC", f"{sys.executable} -m other")
+    assert find_compiler() == Compiler((sys.executable, "-m", "other"))
+
+
+@needs_shell
+def test_without_cc_the_first_that_is_there_is_taken(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    for cc in ("", "  ", None):
+        if cc is None:
+            monkeypatch.delenv("CC")
+        else:
+            monkeypatch.setenv("CC", cc)
+        for name in ("cc", "clang", "gcc"):
+            script(tmp_path / name, "")
+            assert find_compiler() == Compiler((str(tmp_path / name),))
+        for name in ("cc", "clang", "gcc"):
+            (tmp_path / name).unlink()
+
+
+def test_a_cc_that_does_not_exist_is_not_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    for wanted in ("no-such-compiler -O3", "/no/such/compiler", "'half a quotation"):
+        monkeypatch.setenv("CC", wanted)
+        assert find_compiler() is None
+        assert f"$CC is {wanted!r}, which is not found" in str(no_compiler())
+
+
+def test_an_explicit_compiler_must_exist() -> None:
+    with pytest.raises(ValueError, match="expected a C compiler, got 'no-such-compiler'"):
+        find_compiler("no-such-compiler")
+
+
+@needs_shell
+def test_what_it_says_is_returned_and_failure_is_an_error(tmp_path: Path) -> None:
+    told = script(tmp_path / "a", 'echo "$1 $EXTRA $(cat)" >&2').run(
+        "-c", code="int x;", variables={"EXTRA": "more"}
+    )
+    assert told.strip() == "-c more int x;"
+    with pytest.raises(CompileError, match="failed with status 3:\nno licence"):
+        script(tmp_path / "b", "echo no licence >&2; exit 3").run()
+    with pytest.raises(CompileError, match="does not start: Exec format error"):
+        broken = tmp_path / "c"
+        broken.write_bytes(b"\x00")
+        broken.chmod(0o755)
+        Compiler((str(broken),)).run()
+
+
+@needs_shell
+def test_one_that_hangs_is_stopped_with_what_it_started(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """4f644ad waited for ever, as it did for a child that kept its output open."""
+    monkeypatch.setattr(module, "PATIENCE", 0.2)
+    hanging = script(tmp_path / "hanging", f"sleep 60 & echo $! > {tmp_path / 'child'}; wait")
+    with pytest.raises(CompileError, match="hanging came to no end within 0 s"):
+        hanging.run()
+    child = int((tmp_path / "child").read_text())
+    state = Path(f"/proc/{child}/stat")
+    assert not state.exists() or state.read_text().split()[2] in "ZX"
+
+
+@needs_shell
+def test_an_interrupt_stops_it_too(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    waiting = script(tmp_path / "waiting", f"echo $$ > {tmp_path / 'pid'}; exec sleep 60")
+    monkeypatch.setattr(module.subprocess.Popen, "communicate", interrupted)
+    started: list[int] = []
+    end = module._end
+    monkeypatch.setattr(module, "_end", lambda process: (started.append(process.pid), end(process)))
+    with pytest.raises(KeyboardInterrupt):
+        waiting.run()
+    with pytest.raises(ProcessLookupError):
+        os.kill(started[0], 0)
