@@ -2,9 +2,10 @@
 
     TV = sum |a(t_k+1) - a(t_k)|,   t_k every millisecond
 
-Of the four-mass system over 4 s. The source of `SelfTuning` reports that one law jitters where the other does not. At
-equal velocity of the peak both have the same variation wherever the step resolves the transition,
-and where a fixed explicit step does not, h mu'(0) N / m > 2.8, both jitter.
+Of the four-mass system over 4 s. The source of `SelfTuning` reports that one law jitters where the
+other does not. At equal velocity of the peak both have the same variation wherever the step
+resolves the transition, and where a fixed explicit step does not, h mu'(0) N / m > 2.8, both
+jitter.
 """
 
 from collections.abc import Callable, Sequence
