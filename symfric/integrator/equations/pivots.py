@@ -11,7 +11,6 @@ does growth, where it harms. Where an order fails, threshold pivoting finds one 
 samples of the matrix at once, from any row and column, with least fill (Markowitz).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import final
@@ -65,20 +64,17 @@ class Factors:
         return ca.DM(self.matrix.sparsity(), 1).full() != 0
 
 
-def sound(A: Array, order: Order) -> bool:
-    """Whether elimination of A in this order is as good as any; a singular A has no better one."""
-    if not np.isfinite(A).all():
-        return True
-    return backward_error(A, order) <= SOUND or not regular(A)
-
-
 def backward_error(A: Array, order: Order) -> float:
-    """Omega of two solutions by elimination in this order, infinite where a pivot is zero."""
-    rows, columns = (list(places) for places in zip(*order, strict=True)) if order else ([], [])
-    n, permuted = len(rows), A[np.ix_(rows, columns)]
+    """Omega of two solutions by elimination in this order, infinite where a pivot is zero.
+
+    Of several matrices (..., n, n) that of the worst.
+    """
+    n = len(order)
+    rows, columns = np.array(order, dtype=np.intp).reshape(n, 2).T
+    permuted = A[..., rows[:, None], columns]
     _, unit = equilibrated(permuted)
     signs = np.where(np.arange(n) % 2, -1.0, 1.0)
-    right = permuted @ np.column_stack([unit, unit * signs])
+    right = permuted @ np.stack(np.broadcast_arrays(unit, unit * signs), axis=-1)
     with np.errstate(all="ignore"):
         x = _eliminated(permuted, right)
         over = np.abs(right - permuted @ x)
@@ -96,8 +92,8 @@ def regular(A: Array) -> bool:
     return bool(values[-1] > REGULAR * values[0])
 
 
-def best_order(pattern: NDArray[np.bool_], samples: Sequence[Array]) -> Order:
-    """The order of threshold pivoting in all samples at once.
+def best_order(pattern: NDArray[np.bool_], samples: Array) -> Order:
+    """The order of threshold pivoting in all samples (s, n, n) at once.
 
     Each pivot is at least `THRESHOLD` of what is left of its column, in every sample; among those
     the one that fills least; where there is none, the one that is largest in its worst sample.
@@ -105,8 +101,7 @@ def best_order(pattern: NDArray[np.bool_], samples: Sequence[Array]) -> Order:
     Raises:
         ValueError: structurally singular.
     """
-    n, left = pattern.shape[0], pattern.copy()
-    A = np.stack([equilibrated(sample)[0] for sample in samples])
+    n, left, (A, _) = pattern.shape[0], pattern.copy(), equilibrated(samples)
     rows, columns = np.ones(n, dtype=bool), np.ones(n, dtype=bool)
     order: list[tuple[int, int]] = []
     for _ in range(n):
@@ -137,11 +132,12 @@ def best_order(pattern: NDArray[np.bool_], samples: Sequence[Array]) -> Order:
 
 def _eliminated(A: Array, right: Array) -> Array:
     """X with A x = right, by elimination down the diagonal."""
-    left, x = A.copy(), right.copy()
-    for k in range(A.shape[0]):
-        factors = left[k + 1 :, k] / left[k, k]
-        left[k + 1 :, k + 1 :] -= np.outer(factors, left[k, k + 1 :])
-        x[k + 1 :] -= np.outer(factors, x[k])
-    for k in range(A.shape[0] - 1, -1, -1):
-        x[k] = (x[k] - left[k, k + 1 :] @ x[k + 1 :]) / left[k, k]
+    n, left = A.shape[-1], np.concatenate([A, right], axis=-1)
+    for k in range(n):
+        left[..., k, k + 1 :] /= left[..., k, k, None]
+        below = left[..., k + 1 :, k, None] * left[..., k, None, k + 1 :]
+        left[..., k + 1 :, k + 1 :] -= below
+    x = left[..., n:]
+    for k in range(n - 1, 0, -1):
+        x[..., :k, :] -= left[..., :k, k, None] * x[..., k, None, :]
     return x

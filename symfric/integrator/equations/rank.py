@@ -6,6 +6,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 VANISHES = 1e-11
 """What is left of an entry, with rows and columns near 1, that counts as zero."""
+ROUNDS = 4
+"""Of scaling rows and columns in turn."""
 
 
 def echelon(A: Array) -> tuple[list[int], Array]:
@@ -50,13 +52,16 @@ def null_space(A: Array) -> Array:
 
 
 def equilibrated(A: Array) -> tuple[Array, Array]:
-    """A with rows and columns scaled to largest entries near 1, and the scales of its columns."""
-    scaled, unit = A.copy(), np.ones(A.shape[1])
-    for _ in range(8):
-        for axis in (1, 0):
+    """Matrices (..., m, n) with largest entries of rows and columns near 1, and units of columns.
+
+    The unit of a column is what it was multiplied with.
+    """
+    scaled, unit = A.copy(), np.ones(A.shape[-1])
+    for _ in range(ROUNDS):
+        for axis in (-1, -2):
             size = np.abs(scaled).max(axis=axis, keepdims=True, initial=0.0)
-            factor = 1 / np.where(size > 0.0, size, 1.0)
-            scaled *= factor
-            if axis == 0:
-                unit *= factor[0]
+            size[size == 0.0] = 1.0
+            scaled /= size
+            if axis == -2:
+                unit = unit / size[..., 0, :]
     return scaled, unit

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.lu import Order
-from symfric.integrator.equations.pivots import Factors, backward_error, best_order, sound
+from symfric.integrator.equations.pivots import SOUND, Factors, backward_error, best_order, regular
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import Method
 from symfric.model import Model
@@ -41,12 +41,12 @@ def suited(system: System, method: Method, points: Sequence[Point], span: float)
     found: dict[str, Order] = {}
     for factors in method.factors(system):
         newest = _samples(factors, points[-1:], span)
-        if all(sound(A, factors.order) for A in newest):
+        before = backward_error(newest, factors.order)
+        if before <= SOUND or not any(regular(A) for A in newest):
             continue
         beside = [(_aside(system, y, sign), d) for y, d in points for sign in (-1.0, 1.0)]
-        samples = _samples(factors, [*points, *beside], span)
-        order = best_order(factors.pattern, samples)
-        if _worst(newest, order) < _worst(newest, factors.order):
+        order = best_order(factors.pattern, _samples(factors, [*points, *beside], span))
+        if backward_error(newest, order) < before:
             found[factors.name] = order
     return replace(system, orders={**system.orders, **found}) if found else system
 
@@ -68,14 +68,10 @@ def suited_to_start(system: System, method: Method, model: Model) -> System:
     return system
 
 
-def _samples(factors: Factors, points: Sequence[Point], span: float) -> list[Array]:
-    """The matrix at points and steps, where it is finite."""
-    every = (factors.at(y, step * span, d) for y, d in points for step in STEPS)
-    return [A for A in every if np.isfinite(A).all()]
-
-
-def _worst(samples: Sequence[Array], order: Order) -> float:
-    return max((backward_error(A, order) for A in samples), default=0.0)
+def _samples(factors: Factors, points: Sequence[Point], span: float) -> Array:
+    """The matrix at points and steps (samples, n, n), where it is finite."""
+    every = np.stack([factors.at(y, step * span, d) for y, d in points for step in STEPS])
+    return every[np.isfinite(every).all(axis=(1, 2))]
 
 
 def _aside(system: System, y: Array, sign: float) -> Array:

@@ -177,7 +177,7 @@ class _March:
             else:
                 self.run.keep(piece)
                 old = None if piece.t0.size else old
-                if reason is Stop.STEP_TOO_SMALL and not self.found_pivots():
+                if reason is Stop.STEP_TOO_SMALL:
                     self.run.stop(*explain(self.integrator, self.t, self.y, self.d, S[State.H]))
             if self.run.status is not Status.SUCCESS:
                 return
@@ -198,8 +198,10 @@ class _March:
         rows = EVENT_ROWS if self.eventful else ROWS
         records, made, reason = engine.run(self.S, R, rows, allowed, self.h_min)
         self.run.attempts += made
-        if made - records.shape[0] > max(records.shape[0], MANY_REJECTED):
-            self.found_pivots()
+        rejected = made - records.shape[0]
+        suspect = reason is Stop.STEP_TOO_SMALL or rejected > max(records.shape[0], MANY_REJECTED)
+        if suspect and self.found_pivots():
+            reason = Stop.ATTEMPTS
         if engine.name == "vm":
             spent, advance = perf_counter() - began, self.t - from_t
             self.integrator.vm_time += spent
