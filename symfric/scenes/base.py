@@ -103,7 +103,7 @@ def contact(
         inputs: what the machine offers to laws besides v and N.
 
     Raises:
-        ValueError: the law needs an input that the machine does not offer.
+        ValueError: the law needs an input that the machine does not offer, or a load where N is 0.
     """
     missing = [f"{i.name} ({i.doc})" for i in law.inputs if i.name not in inputs]
     if missing:
@@ -111,6 +111,11 @@ def contact(
             f"{type(law).__name__}: expected a law that needs no more than v, N"
             f"{''.join(f', {name}' for name in inputs)} here, got one that needs "
             f"{', '.join(missing)}"
+        )
+    if is_number(N) and N == 0 and divides_by_load(law):
+        raise ValueError(
+            f"{type(law).__name__}: expected a normal force above 0 N, by which the law divides, "
+            "got 0; lugre_normalised does not, and load_dependent(...) rounds it off"
         )
     given = chosen(law, inputs)
     states, z = friction_states(law, v, N)
@@ -132,6 +137,16 @@ def contact(
         slip_monitor(law, v, p),
         events,
     )
+
+
+def divides_by_load(law: Law) -> bool:
+    """Whether a law is not finite without a normal force."""
+    v, z = ca.SX(1.0), ca.SX([state.nominal for state in law.states])
+    try:
+        found = ca.veccat(law.force(v, 0.0, z), law.rate(v, 0.0, z))
+    except (ValueError, ZeroDivisionError):
+        return True
+    return not found.is_regular()
 
 
 def slip_monitor(law: Law, v: Scalar, p: Variables) -> tuple[Monitor, ...]:
