@@ -98,7 +98,7 @@ def tolerances(
     longest = np.inf
     if max_step is not None:
         longest = checks.number(f"{where}: max_step", max_step, unit="s", above=0.0)
-    return Tolerances(rtol, relative * nominal, event, max_steps, longest)
+    return Tolerances(rtol, relative * nominal, event, max_steps, longest, follow=atol is None)
 
 
 def stopping(

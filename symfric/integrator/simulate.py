@@ -30,6 +30,7 @@ from symfric.integrator.running.built import built
 from symfric.integrator.running.dense import Dense
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import Run, Tolerances, integrate
+from symfric.integrator.running.sizes import own_scale
 from symfric.model import Model
 from symfric.results.trajectory import Statistics, Trajectory
 
@@ -72,7 +73,9 @@ def simulate(
             those that are shorter in `times`.
         p: values of the model's parameters by name.
         rtol: relative tolerance of each step.
-        atol: absolute tolerance in multiples of each state's nominal value; default 0.1 rtol.
+        atol: absolute tolerance in multiples of each state's nominal value; default 0.1 rtol, and
+            for a motion of less than 1e-3 nominal that much of its own size, found by a first run.
+            Below 1e-12 nominal is rest.
         t_eval: times of the result [s]; default `samples` equal intervals. They force no steps.
         samples: number of equally spaced times.
         method: which formula; the numbers are of Rabinowicz's stick-slip over 20 s.
@@ -208,10 +211,15 @@ def _differentiated(trajectory: Trajectory, path: Path, which: Seeds) -> Traject
 
 
 def _difference(model: Model, one: Trajectory, other: Trajectory) -> float:
-    """Largest difference of a state over both runs, relative to its magnitude."""
+    """Largest difference of a state over both runs, relative to its magnitude.
+
+    That is its nominal value, or its largest value where that is larger or tiny (`own_scale`).
+    """
     n = min(one.t.size, other.t.size)
     worst = 0.0
     for v in model.x:
         a, b = one[v.name][:n], other[v.name][:n]
-        worst = max(worst, float(np.max(np.abs(a - b)) / max(np.max(np.abs(b)), v.nominal)))
+        size, nominal = np.abs(b).max(), np.array(v.nominal)
+        scale = np.maximum(size, own_scale(size, nominal))
+        worst = max(worst, float(np.abs(a - b).max() / scale))
     return worst

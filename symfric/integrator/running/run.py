@@ -1,7 +1,7 @@
 """Drive an integrator from start to end: input intervals, events, progress, failures."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import final
 
@@ -22,6 +22,7 @@ from symfric.integrator.running.events import (
     values,
 )
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.sizes import ROUNDS, finer, sizes
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
@@ -44,6 +45,7 @@ class Tolerances:
         event: tolerance of event times [s].
         max_steps: attempts allowed.
         max_step: longest step [s].
+        follow: whether `atol` shrinks to the size of a motion that is tiny.
     """
 
     rtol: float
@@ -51,6 +53,7 @@ class Tolerances:
     event: float
     max_steps: int
     max_step: float = np.inf
+    follow: bool = False
 
     def given(self, t_end: float, d: Array) -> Array:
         """What an attempt towards `t_end` does not change, for run data d (..., n_d)."""
@@ -96,7 +99,35 @@ def integrate(
     backend: str,
     progress: Callable[[float], None] | None,
 ) -> tuple[Run, Dense]:
-    """Integrate over all input intervals; the result holds whatever was reached."""
+    """Integrate over all input intervals; the result holds whatever was reached.
+
+    A motion that turns out to be tiny is integrated again on its own scale (`sizes`).
+    """
+    nominal = integrator.system.nominal
+    scale, allowed = nominal, tolerances
+    run, dense = _integrated(integrator, inputs, y0, p, allowed, backend, progress)
+    for _ in range(ROUNDS if tolerances.follow else 0):
+        own = finer(scale, sizes(dense, nominal.size), nominal)
+        if own is None or not run.status.ok:
+            break
+        scale, allowed = own, replace(tolerances, atol=tolerances.atol * own / nominal)
+        again = _integrated(run.integrator or integrator, inputs, y0, p, allowed, backend, progress)
+        if not again[0].status.ok and again[0].status is not Status.INTERRUPTED:
+            break
+        run, dense = again
+    return run, dense
+
+
+def _integrated(
+    integrator: Integrator,
+    inputs: InputData,
+    y0: Array,
+    p: Array,
+    tolerances: Tolerances,
+    backend: str,
+    progress: Callable[[float], None] | None,
+) -> tuple[Run, Dense]:
+    """One run over all input intervals."""
     d = np.concatenate([p, inputs.values[:, 0]])
     y = integrator.start(y0, d)
     march = _March(integrator, inputs, tolerances, backend, progress, y)
