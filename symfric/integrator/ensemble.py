@@ -120,7 +120,8 @@ def simulate_many(
             of this machine. Twice as many chunks are under way at once.
         chunk: members per task.
         out: folder that takes the results chunk by chunk, so that memory stays bounded; a call
-            with the same arguments resumes where an interrupted one stopped.
+            with the same arguments resumes where an interrupted one stopped, once the checksums
+            of what is there are right.
         progress: called with the fraction done.
 
     Returns:
@@ -132,7 +133,8 @@ def simulate_many(
         RuntimeError: compiled code was asked for, and there is no compiler or it failed.
 
     Warns:
-        UserWarning: rtol above 1e-5, where stick phases may get lost.
+        UserWarning: rtol above 1e-5, where stick phases may get lost; results in `out` that are
+            damaged, and computed again.
     """
     check_model("simulate_many", model)
     check_flags("simulate_many", progress)
@@ -166,7 +168,7 @@ def simulate_many(
         place = checks.path("simulate_many: out", out)
         folder = place / _identity(job, integrator, allowed, starts, picks)
     store = Store(folder, model.signals, members, looks.size)
-    todo = {first: pick for first, pick in picks.items() if not store.has(first)}
+    todo = {first: picks[first] for first in store.left(picks)}
     done, status = members - sum(_size(pick) for pick in todo.values()), Status.SUCCESS
     try:
         with (

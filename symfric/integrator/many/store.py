@@ -1,8 +1,15 @@
 """Results of an ensemble, in memory or in a folder that fills chunk by chunk."""
 
-from collections.abc import Iterable
+import stat
+import warnings
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
+from math import prod
 from pathlib import Path
 from typing import final
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,65 +18,120 @@ from symfric.foundation.files import written
 from symfric.integrator.many.chunk import Solved
 
 Array = NDArray[np.float64]
+BLOCK = 2**20
+"""Bytes written at once when a file is made."""
 
 
 @final
 class Store:
     """Signals of all members and what became of them.
 
-    In a folder every signal is an array file, memory-mapped, and a small file marks every chunk
-    that is complete; a later call goes on from there. The folder's own folder is named by a hash of
-    everything that the results depend on, so results of other arguments are never taken.
+    In a folder every signal is an array file, memory-mapped for reading, and a small file marks
+    every chunk that is complete, with the checksum of its results; a later call goes on from there.
+    What is missing, cut short, damaged or written by somebody else since is computed again. The
+    folder's own folder is named by a hash of everything that the results depend on, so results of
+    other arguments are never taken.
 
     Attributes:
         signals: name -> values (members, times).
         attempts, reached: attempts of each member, and the time [s] it reached.
         failed: number of a member -> sentence.
+        damaged: first members of chunks whose results are no longer what they were.
+
+    Raises:
+        ValueError: the folder cannot be written, or has no room for all results.
     """
 
     def __init__(self, folder: Path | None, names: Iterable[str], members: int, times: int) -> None:
-        self._folder = folder
+        self._folder, shape = folder, (members, times)
+        self._files: list[_ArrayFile] = []
         if folder is None:
-            self.signals = {name: np.full((members, times), np.nan) for name in names}
+            self.signals = {name: np.full(shape, np.nan) for name in names}
         else:
-            self.signals = {
-                name: _array_file(folder / f"{name}.npy", (members, times)) for name in names
-            }
+            files = {name: _ArrayFile(folder / f"{name}.npy", shape) for name in names}
+            for file in files.values():
+                file.make()
+            self._files = list(files.values())
+            self.signals = {name: file.array for name, file in files.items()}
         self.attempts = np.zeros(members, dtype=np.int64)
         self.reached = np.full(members, np.nan)
         self.failed: dict[int, str] = {}
+        self.damaged: list[int] = []
 
     def _mark(self, first: int) -> Path | None:
         return None if self._folder is None else self._folder / f"chunk-{first}.npz"
+
+    def left(self, firsts: Collection[int]) -> list[int]:
+        """Which of the chunks that start at `firsts` are not complete.
+
+        Warns:
+            UserWarning: some were, and their results are no longer what they were.
+        """
+        found = [first for first in firsts if not self.has(first)]
+        if self.damaged:
+            warnings.warn(
+                f"simulate_many: out: {len(self.damaged)} of {len(firsts)} chunks in "
+                f"'{self._folder}' are not what was written (deleted, cut short, changed); they "
+                "are computed again",
+                UserWarning,
+                stacklevel=3,
+            )
+        return found
 
     def has(self, first: int) -> bool:
         """Whether the chunk that starts at `first` was complete before; takes it over if so."""
         mark = self._mark(first)
         if mark is None or not mark.exists():
             return False
-        with np.load(mark) as saved:
-            failed = zip(saved["failed"].tolist(), saved["why"].tolist(), strict=True)
-            self._note(first, saved["attempts"], saved["reached"], dict(failed))
-        return True
+        try:
+            with mark.open("rb") as file, np.load(file) as saved:
+                attempts, reached = saved["attempts"], saved["reached"]
+                failed = dict(zip(saved["failed"].tolist(), saved["why"].tolist(), strict=True))
+                if str(saved["checksum"]) == self._checksum(first, attempts.size):
+                    self._note(first, attempts, reached, failed)
+                    return True
+        except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+            pass  # the mark itself is damaged
+        self.damaged.append(first)
+        return False
 
     def put(self, first: int, result: Solved) -> None:
-        """Take the results of the chunk that starts at `first`."""
-        size = result.attempts.size
-        for i, values in enumerate(self.signals.values()):
-            values[first : first + size] = result.signals[:, :, i]
-            if isinstance(values, np.memmap):
-                values.flush()
+        """Take the results of the chunk that starts at `first`.
+
+        Raises:
+            ValueError: they cannot be written; what is complete stays.
+        """
+        size, mark = result.attempts.size, self._mark(first)
         self._note(first, result.attempts, result.reached, result.failed)
-        mark = self._mark(first)
-        if mark is not None:
-            with written(mark) as temporary, temporary.open("wb") as file:
+        if mark is None:
+            for i, values in enumerate(self.signals.values()):
+                values[first : first + size] = result.signals[:, :, i]
+            return
+        try:
+            for i, file in enumerate(self._files):
+                file.write(first, result.signals[:, :, i])
+            with written(mark) as temporary, temporary.open("wb") as marker:
                 np.savez(
-                    file,
+                    marker,
                     attempts=result.attempts,
                     reached=result.reached,
                     failed=np.array(list(result.failed), dtype=np.int64),
                     why=np.array(list(result.failed.values()), dtype=np.str_),
+                    checksum=np.array(self._checksum(first, size)),
                 )
+        except OSError as error:
+            raise ValueError(
+                f"simulate_many: out: expected room for members from {first} on in "
+                f"'{self._folder}', got {error.strerror}; what is complete stays, call again to go "
+                "on"
+            ) from None
+
+    def _checksum(self, first: int, size: int) -> str:
+        """Hash of the results of members, as they are read back."""
+        total = sha256()
+        for values in self.signals.values():
+            total.update(np.ascontiguousarray(values[first : first + size]).tobytes())
+        return total.hexdigest()
 
     def _note(
         self, first: int, attempts: NDArray[np.int64], reached: Array, failed: dict[int, str]
@@ -79,11 +141,60 @@ class Store:
         self.failed |= {first + m: why for m, why in failed.items()}
 
 
-def _array_file(path: Path, shape: tuple[int, int]) -> Array:
-    """Memory-mapped array file, full of NaN when it is made."""
-    if not path.exists():
-        with written(path) as temporary:
-            array = np.lib.format.open_memmap(temporary, mode="w+", dtype=float, shape=shape)
-            array[:] = np.nan
-            array.flush()
-    return np.lib.format.open_memmap(path, mode="r+")
+@final
+@dataclass(frozen=True, eq=False)
+class _ArrayFile:
+    """An array file (`numpy.save`), written by rows and read by a map of it.
+
+    Writing through the map would end the process by a signal where the disk is full.
+    """
+
+    path: Path
+    shape: tuple[int, int]
+
+    def make(self) -> None:
+        """A file full of NaN, its room taken at once, unless there is one that is whole."""
+        if self._is_whole():
+            return
+        row = np.full(self.shape[1:], np.nan).tobytes()
+        rows = max(1, BLOCK // max(1, len(row)))
+        try:
+            with written(self.path) as temporary, temporary.open("wb") as file:
+                np.lib.format.write_array_header_1_0(file, self._header)
+                for first in range(0, self.shape[0], rows):
+                    file.write(row * min(rows, self.shape[0] - first))
+        except OSError as error:
+            raise ValueError(
+                f"simulate_many: out: expected {8e-6 * prod(self.shape):.3g} MB of room for "
+                f"'{self.path}', got {error.strerror}"
+            ) from None
+
+    @property
+    def _header(self) -> dict[str, object]:
+        return {"descr": "<f8", "fortran_order": False, "shape": self.shape}
+
+    def _is_whole(self) -> bool:
+        """Whether the file has the header and the size that it must have."""
+        try:
+            status = self.path.lstat()
+            if not stat.S_ISREG(status.st_mode):
+                return False
+            with self.path.open("rb") as file:
+                version = np.lib.format.read_magic(file)
+                header = np.lib.format.read_array_header_1_0(file) if version == (1, 0) else None
+                size = file.tell() + 8 * prod(self.shape)
+        except (OSError, ValueError):
+            return False
+        return header == (self.shape, False, np.dtype("<f8")) and status.st_size == size
+
+    @cached_property
+    def array(self) -> Array:
+        """The values, mapped; they cannot be changed by this."""
+        return np.lib.format.open_memmap(self.path, mode="r")
+
+    def write(self, first: int, rows: Array) -> None:
+        """Put `rows` in place of those from `first` on."""
+        end = self.path.stat().st_size
+        with self.path.open("r+b") as file:
+            file.seek(end - 8 * prod(self.shape) + 8 * first * self.shape[1])
+            file.write(np.ascontiguousarray(rows, dtype="<f8").tobytes())

@@ -1,5 +1,6 @@
 """Results of an ensemble in memory or in a folder: resumed, told apart, bounded in memory."""
 
+import signal
 import tracemalloc
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -204,3 +205,109 @@ def test_memory_stays_bounded_for_a_hundred_thousand_members(tmp_path: Path) -> 
     assert not many.failed
     end = many["x"][:, -1]
     assert np.diff(end) == pytest.approx(np.full(members - 1, np.diff(end).mean()), rel=1e-3)
+
+
+def finished(folder: Path) -> Path:
+    """A store of three chunks, complete."""
+    store = Store(folder, ["a", "b"], 6, 3)
+    for first in (0, 2, 4):
+        store.put(first, solved(first))
+    return folder
+
+
+def left(folder: Path) -> list[bool]:
+    """Which chunks a later store takes over; the others are put again and must be right then."""
+    store = Store(folder, ["a", "b"], 6, 3)
+    kept = [store.has(first) for first in (0, 2, 4)]
+    assert store.damaged == [2 * k for k, whole in enumerate(kept) if not whole]
+    for first in np.flatnonzero(~np.array(kept)) * 2:
+        store.put(int(first), solved(int(first)))
+    np.testing.assert_array_equal(store.signals["a"][:, 0], np.arange(6.0))
+    np.testing.assert_array_equal(np.load(folder / "b.npy")[:, 2], 100 + np.arange(6.0))
+    assert all(Store(folder, ["a", "b"], 6, 3).has(first) for first in (0, 2, 4))
+    return kept
+
+
+def test_what_is_damaged_is_computed_again(tmp_path: Path) -> None:
+    """4f644ad gave NaN for a deleted file, other values for one cut short, and said SUCCESS."""
+
+    def remove(path: Path) -> None:
+        path.unlink()
+
+    def cut(path: Path) -> None:
+        content = path.read_bytes()
+        path.unlink()  # it is mapped
+        path.write_bytes(content[:-20])
+
+    def flip(path: Path) -> None:
+        content = bytearray(path.read_bytes())
+        content[len(content) // 2] ^= 1
+        path.write_bytes(content)
+
+    def other_header(path: Path) -> None:
+        values = np.load(path)
+        path.unlink()
+        np.save(path, values.T)
+
+    def text(path: Path) -> None:
+        path.unlink()
+        path.write_text("no array")
+
+    cases = [("a.npy", remove, 0), ("b.npy", cut, 0), ("a.npy", flip, 2), ("a.npy", text, 0),
+             ("b.npy", other_header, 0), ("chunk-2.npz", cut, 2), ("chunk-4.npz", text, 2),
+             ("chunk-0.npz", flip, 2)]  # fmt: skip
+    for k, (name, damage, kept) in enumerate(cases):
+        folder = finished(tmp_path / str(k))
+        damage(folder / name)
+        assert sum(left(folder)) == kept, (name, damage.__name__)
+
+
+def test_damage_is_told_and_the_results_are_right(tmp_path: Path) -> None:
+    def run() -> Ensemble:
+        return simulate_many(
+            oscillator(), 0.1, x0={"x": np.linspace(0.0, 1.0, 6)}, chunk=2, out=tmp_path,
+            executor="serial", backend="vm",
+        )  # fmt: skip
+
+    first = run()
+    (folder,) = tmp_path.iterdir()
+    (folder / "x.npy").unlink()
+    with pytest.warns(UserWarning, match="out: 3 of 3 chunks in .* are not what was written"):
+        assert_same(run(), first)
+    assert_same(run(), first)
+
+
+def test_results_on_disk_cannot_be_changed_by_accident(tmp_path: Path) -> None:
+    store = Store(finished(tmp_path), ["a", "b"], 6, 3)
+    with pytest.raises(ValueError, match="read-only"):
+        store.signals["a"] *= 2
+
+
+def test_a_full_disk_is_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """4f644ad ended by SIGBUS, having reserved nothing."""
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (2**20, before[1]))
+        with pytest.raises(ValueError, match=r"out: expected 8 MB of room for '.*a.npy', got File"):
+            Store(tmp_path / "large", ["a"], 10_000, 100)
+        small = Store(tmp_path / "small", ["a", "b"], 6, 3)
+        small.put(0, solved(0))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (10, before[1]))
+        with pytest.raises(
+            ValueError, match=r"expected room for members from 2 on .* got File too large"
+        ):
+            small.put(2, solved(2))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert list((tmp_path / "large").iterdir()) == []
+    later = Store(tmp_path / "small", ["a", "b"], 6, 3)
+    assert (later.has(0), later.has(2)) == (True, False)
+
+
+def test_room_is_taken_when_the_files_are_made(tmp_path: Path) -> None:
+    Store(tmp_path, ["a"], 3000, 100)
+    assert (tmp_path / "a.npy").stat().st_blocks * 512 >= 3000 * 100 * 8
+    assert np.isnan(np.load(tmp_path / "a.npy")).all()
