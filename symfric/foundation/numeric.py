@@ -32,8 +32,10 @@ def is_casadi(*values: Scalar) -> bool:
 
 
 def is_number(value: Scalar) -> bool:
-    """Whether `value` is a plain number: an int or a float, NumPy's scalars included."""
-    return not isinstance(value, bool) and isinstance(value, Real)
+    """Whether `value` is a plain number: int, float, NumPy's scalars and 0-d arrays of them."""
+    if isinstance(value, np.ndarray):
+        return value.ndim == 0 and value.dtype.kind in "iuf"
+    return not isinstance(value, bool | np.bool_) and isinstance(value, Real)
 
 
 def equals(value: Scalar, number: float) -> bool:

@@ -1,7 +1,7 @@
 """What can be wrong with a mechanism: names, numbers, connections, start values, redundancy."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from difflib import get_close_matches
 from typing import final
 
@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.checks import shown
 from symfric.foundation.numeric import is_number, is_symbolic
 from symfric.foundation.symbols import strays
 from symfric.model import Variables
@@ -30,6 +31,14 @@ SINGULAR = 1e-12
 """Eigenvalues of a mass matrix of unit diagonal below this count as zero."""
 
 
+def texts(part: object) -> Iterator[str]:
+    """Names and places of a part that are no texts."""
+    for item in fields(part):  # type: ignore[arg-type]
+        value = getattr(part, item.name)
+        if item.type is str and not isinstance(value, str):
+            yield f"{item.name}: expected a text, got {shown(value)}"
+
+
 def naming(
     bodies: Sequence[Body],
     joints: Sequence[Joint],
@@ -44,7 +53,7 @@ def naming(
     every = [name for _, name in names]
     for kind, name in names:
         if not _identifier(name):
-            yield f"{kind} '{name}': expected a name that is a C identifier"
+            yield f"{kind} '{name}': expected a name that is a C identifier, got {shown(name)}"
         if every.count(name) > 1:
             yield f"{kind} '{name}': expected every name once"
     known = {b.name: b for b in bodies}

@@ -16,6 +16,7 @@ from typing import ClassVar, final
 
 import casadi as ca
 
+from symfric.foundation.checks import expression
 from symfric.foundation.numeric import Scalar
 from symfric.multibody.body import GROUND
 from symfric.multibody.forces import Axial, Load
@@ -137,9 +138,15 @@ class PrescribedMotion(Constraint):
 
     def held(self, kin: Kinematics, joints: dict[str, Joint]) -> Held:
         """motion(t) - s = 0."""
-        joint, target = joints[self.joint], ca.SX(self.motion(kin.t))
+        what = "motion: expected a function of time that returns one expression"
+        try:
+            target = ca.SX(expression("motion", self.motion(kin.t)))
+        except (TypeError, ValueError, ArithmeticError, RuntimeError) as error:
+            reason = str(error).rpartition(", got ")[2].partition("\n")[0]
+            return impossible(f"{what}, got {reason}; write casadi functions for those of math")
         if target.numel() != 1:
             return impossible(f"motion: expected one expression, got {target.numel()}")
+        joint = joints[self.joint]
         period = 2 * pi if wraps(kin, joint, self.direction) else None
         return linear(kin, self.name, [(joint, self.direction, 1.0)], target, period)
 

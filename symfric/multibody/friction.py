@@ -20,11 +20,13 @@ Source: Haug, Mech. Based Des. Struct. Mach., 2018, joint friction from multipli
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import final
 
 import casadi as ca
 
-from symfric.foundation.numeric import Scalar, is_number, is_symbolic
+from symfric.foundation.checks import as_number
+from symfric.foundation.numeric import Scalar, is_symbolic
 from symfric.foundation.units import turned
 from symfric.laws import Law
 from symfric.laws.base.law import check_law
@@ -95,9 +97,10 @@ class JointFriction:
             "normal": (self.normal, False), "eps": (self.eps, True),
         }  # fmt: skip
         for name, (value, strict) in limits.items():
-            if value is None or is_symbolic(value):
+            if is_symbolic(value) or (value is None and name not in ("preload", "eps")):
                 continue
-            if not is_number(value) or not (value > 0 or (value == 0 and not strict)):
+            size = as_number(value)
+            if size is None or not (0 < size < inf or (size == 0 and not strict)):
                 yield f"{name}: expected a number {'>' if strict else '>='} 0, got {value!r}"
 
     @property

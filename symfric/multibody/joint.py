@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import casadi as ca
+import numpy as np
 
 from symfric.foundation.numeric import Scalar, is_number
 from symfric.model.sketch import Symbol
@@ -123,4 +124,6 @@ def _several(given: object, n: int, quaternion: int | None) -> tuple[Scalar, ...
         return tuple(1.0 if i == quaternion else 0.0 for i in range(n))
     if isinstance(given, tuple):
         return given
-    return (given,) if is_number(given) or n == 1 else tuple(given)  # type: ignore[arg-type]
+    if n > 1 and isinstance(given, list | np.ndarray | ca.SX | ca.DM) and not is_number(given):
+        return tuple(given)  # type: ignore[arg-type]
+    return (given,)

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.checks import kind, many, number, shown
 from symfric.foundation.numeric import Scalar, equals
 from symfric.foundation.parameters import Variable, check_names
 from symfric.foundation.symbols import starts_of, symbols_of
@@ -73,7 +74,10 @@ class Mechanism:
         ideal: bool = False,
     ) -> None:
         """Add a rigid body; see `Body`."""
-        self.bodies.append(Body(name, mass, inertia, com, ideal=ideal))
+        if isinstance(name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+            self.bodies.append(Body(name, mass, inertia, com, ideal=ideal))
+        else:
+            self._wrong.append(f"body > name: expected a text, got {shown(name)}")
 
     def frame(
         self,
@@ -83,6 +87,9 @@ class Mechanism:
         x: Sequence[float] | None = None,
     ) -> None:
         """Add the frame "body.frame"; see `Frame`."""
+        if not isinstance(place, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+            self._wrong.append(f"frame: expected 'body.frame' of a known body, got {shown(place)}")
+            return
         try:
             self.frames.append((place, Frame(at, z, x)))
         except ValueError as error:
@@ -103,15 +110,19 @@ class Mechanism:
         """Add a constraint that is no joint: prescribed motion, a coupling, an expression."""
         self._take(self.constraints, constraint, Constraint)
 
-    def _take(self, group: list[Any], part: object, kind: type) -> None:
-        if isinstance(part, kind):
+    def _take(self, group: list[Any], part: object, wanted: type) -> None:
+        what = wanted.__name__
+        if not isinstance(part, wanted):
+            said = f"expected a {what} of symfric.multibody, got {shown(part)}"
+            self._wrong.append(f"{what.lower()}: {said}")
+        elif odd := list(checks.texts(part)):
+            self._wrong += [f"{what.lower()} {shown(getattr(part, 'name', ''))} > {t}" for t in odd]
+        else:
             group.append(part)
-            return
-        what = kind.__name__
-        self._wrong.append(f"{what.lower()}: expected a {what} of symfric.multibody, got {part!r}")
 
     def input(self, name: str, unit: str, start: float = 0.0, nominal: float = 1.0) -> ca.SX:
         """Add an input and return its symbol, for actuators and user forces."""
+        start = number(f"mechanism '{self.name}' > input '{name}' > start", start)
         variable = Variable(name, unit, start=start, nominal=nominal)
         self.inputs.append(variable)
         return variable.symbol
@@ -139,6 +150,7 @@ class Mechanism:
         chosen = (0 if formulation == "absolute" else 1) if index is None else index
         made = self.prepare(p, formulation)
         u = tuple(self.inputs)
+        p = tuple(p)
         guess = without_friction(made, p, u)
         parts = made.eq, tuple(self.joints), tuple(self.forces)
         more = partial(results, *parts, made.open_reactions), partial(sketch, *parts)
@@ -154,6 +166,10 @@ class Mechanism:
             ValueError: all mistakes at once, each with its path.
         """
         check_names(f"mechanism '{self.name}' formulation", [formulation], FORMULATIONS)
+        where = f"mechanism '{self.name}' > p"
+        p = many(where, p, "variables")
+        for variable in p:
+            kind(where, variable, Variable, "variables made by Variable(...)")
         symbols = symbols_of(p)
         values = ca.DM(starts_of(p))
         bodies, tree = self._hung(symbols, values)
@@ -197,7 +213,10 @@ class Mechanism:
         loose = list(checks.connected(bodies, tree))
         if weights and not bearings and not loose:
             # the start does not depend on masses
-            unit = {b.name: replace(b, mass=1.0, inertia=(1.0, 1.0, 1.0)) for b in bodies}
+            unit = {
+                b.name: replace(b, mass=1.0, inertia=(1.0, 1.0, 1.0), com=(0.0, 0.0, 0.0))
+                for b in bodies
+            }
             made = self._written(replace(tree, bodies=unit), p, values)
             weights += [*made.problems, *made.misfits]
         self._refuse([*weights, *bearings, *loose])
@@ -206,8 +225,8 @@ class Mechanism:
     def _placed(self) -> tuple[list[Body], list[str]]:
         """Bodies with their frames."""
         problems = list(self._wrong)
-        if not self.name.isidentifier():
-            problems.append("name: expected a C identifier")
+        if not isinstance(self.name, str) or not self.name.isidentifier():  # pyright: ignore[reportUnnecessaryIsInstance]
+            problems.append(f"name: expected a C identifier, got {shown(self.name)}")
         names = [body.name for body in self.bodies]
         places = [place for place, _ in self.frames]
         for place in places:

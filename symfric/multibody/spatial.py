@@ -10,6 +10,7 @@ Source: Nikravesh, Computer-Aided Analysis of Mechanical Systems, 1988, chapter 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from math import isfinite
 from typing import Any, final
 
 import casadi as ca
@@ -26,15 +27,21 @@ def vector(values: Vector) -> ca.SX:
 
 
 def is_vector(values: Any) -> bool:
-    """Whether `values` are three numbers or scalar symbols."""
-    if isinstance(values, ca.SX | ca.DM):
+    """Whether `values` are three finite numbers or scalar symbols."""
+    if isinstance(values, ca.DM):
+        return values.numel() == 3 and values.is_regular()
+    if isinstance(values, ca.SX):
         return values.numel() == 3
     return hasattr(values, "__len__") and len(values) == 3 and all(map(is_scalar, values))
 
 
 def is_scalar(value: Any) -> bool:
-    """Whether `value` is a number or one symbol."""
-    return is_number(value) or (isinstance(value, ca.SX | ca.DM) and value.numel() == 1)
+    """Whether `value` is a finite number or one symbol."""
+    if is_number(value):
+        return isfinite(value)
+    if isinstance(value, ca.DM):
+        return value.numel() == 1 and value.is_regular()
+    return isinstance(value, ca.SX) and value.numel() == 1
 
 
 def skew(a: ca.SX) -> ca.SX:

@@ -10,6 +10,7 @@ from xml.parsers import expat
 
 import numpy as np
 
+from symfric.foundation import checks
 from symfric.multibody.body import unphysical
 from symfric.multibody.urdf.notes import Array, Notes
 
@@ -128,7 +129,9 @@ def parse(source: str | Path, strict: bool = False) -> Urdf:
         OSError: the file cannot be read.
     """
     is_text = isinstance(source, str) and source.lstrip().startswith("<")
-    where = "urdf" if is_text else f"urdf '{source}'"
+    where = "urdf" if is_text else f"urdf '{checks.path('urdf', source)}'"
+    if not is_text and not Path(source).is_file():
+        raise ValueError(f"{where}: expected a file, got nothing there; check the path")
     content = str(source).strip().encode() if is_text else Path(source).read_bytes()
     try:
         robot = _tags(content, "utf-8" if is_text else None)
@@ -262,7 +265,7 @@ def _check_names(robot: ET.Element, notes: Notes) -> None:
             elif names.count(name) > 1:
                 notes.problems.append(f"{kind} '{name}': expected every name once")
         if kind == "link" and not names:
-            notes.problems.append("link: expected at least one, found none")
+            notes.problems.append("link: expected at least one, got none")
 
 
 def _tree_problems(links: Iterable[str], joints: Sequence[UrdfJoint]) -> Iterator[str]:

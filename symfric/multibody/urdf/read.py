@@ -9,9 +9,11 @@ from typing import final
 
 import numpy as np
 
-from symfric.foundation.numeric import Scalar, equals, is_number
+from symfric.foundation import checks
+from symfric.foundation.numeric import Scalar, equals, is_number, is_symbolic
 from symfric.foundation.parameters import check_names, parameters, with_values
 from symfric.laws import Coulomb, Law, Sum, Viscous
+from symfric.laws.base.law import check_law
 from symfric.multibody.body import GROUND, unphysical
 from symfric.multibody.couplings import Gear
 from symfric.multibody.forces import JointSpringDamper
@@ -84,6 +86,17 @@ def read_urdf(
     Limits: an inertia of which no body is made can make the motion gain energy; `build` refuses it
     where the mass matrix at the start is not positive definite.
     """
+    if law is not None:
+        check_law("urdf: law", law)
+    if not is_symbolic(level):
+        checks.number("urdf: level", level, lower=0.0)
+    checks.named("urdf: bearings", bearings)
+    for name, bearing in (bearings or {}).items():
+        checks.kind(
+            f"urdf: bearing '{name}'", bearing, JointFriction, "JointFriction(law, radius=...)"
+        )
+    for name, value in (("floating", floating), ("strict", strict)):
+        checks.flag(f"urdf: {name}", value)
     urdf, held = holding(parse(source, strict))
     places = carried(urdf)
     weights = {link: merged(urdf, places, link) for link in urdf.links if link == places[link].body}

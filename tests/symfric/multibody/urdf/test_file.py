@@ -88,7 +88,7 @@ def test_appearance_is_passed_over_and_everything_else_is_named() -> None:
     [
         ("<robot", r"^urdf: expected XML, got unclosed token: line 1, column 0"),
         ("<sdf/>", r"^urdf: expected <robot> as its outermost tag, got <sdf>"),
-        ('<robot name="a"/>', r"urdf 'a' > link: expected at least one, found none"),
+        ('<robot name="a"/>', r"urdf 'a' > link: expected at least one, got none"),
         (small(LINK), r"expected one link that no joint carries, got world, tip"),
         (small(joint()), r"joint 'wrist' > child: expected a link, got 'tip'"),
         (small(LINK, joint(), joint(name="other")),
@@ -201,5 +201,5 @@ def test_mistakes_in_a_file_name_the_file(tmp_path: Path) -> None:
         parse(path)
     path.write_text(SMALL.replace(' name="small"', ""))
     assert parse(path).name == "arm"
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(ValueError, match=r"leg.urdf': expected a file, got nothing there"):
         parse(tmp_path / "leg.urdf")
