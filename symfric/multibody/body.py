@@ -64,9 +64,11 @@ class Body:
             return
         both = ca.substitute(ca.vertcat(self.mass, ca.vec(ca.densify(self.J))), p, ca.SX(values))
         numbers = ca.DM(both).full().ravel()
+        if not np.isfinite(numbers).all():
+            given = ", ".join(_short(dict.fromkeys(numbers)))
+            yield f"mass, inertia: expected finite numbers, got {given}"
+            return
         if self.ideal:
-            if not np.isfinite(numbers).all():
-                yield f"mass, inertia: expected finite numbers, got {', '.join(_short(numbers))}"
             return
         hint = "; `ideal=True` takes a massless link or a point mass as it is"
         if not numbers[0] > 0:
