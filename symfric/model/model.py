@@ -34,8 +34,9 @@ class Model:
 
         x' = ode(t, x, z, u, p),   0 = alg(t, x, z, u, p)
 
-    Give `ode` and `alg`, or `residual` with `xdot` for a fully implicit model, or `holonomic` for
-    a mechanism, whose equations then are the only ones: `ode` and `alg` are made of them.
+    Give `ode` and `alg`, or `residual` with `xdot` for a fully implicit model of index 1, whose
+    matrix of rates may be singular (capacitors between nodes), or `holonomic` for a mechanism,
+    whose equations then are the only ones: `ode` and `alg` are made of them.
 
     Attributes:
         name: what the scene is called.

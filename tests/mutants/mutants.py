@@ -209,4 +209,49 @@ EMIT = (
     ),
 )  # fmt: skip
 
-MUTANTS = (*CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT)
+PIVOTS = "symfric/integrator/equations/pivots.py"
+SUITED = "symfric/integrator/methods/suited.py"
+T_SUITED = ("tests/symfric/integrator/methods/test_suited.py",)
+T_IMPLICIT = ("tests/symfric/integrator/equations/test_implicit.py",)
+
+DIFFERENTIAL_ALGEBRAIC = (
+    Mutant(
+        "pivots are sound in one sample only", PIVOTS, "share = np.min(size", "share = np.max(size",
+        ("tests/symfric/integrator/equations/test_pivots.py",),
+    ),
+    Mutant(
+        "pivots stay, sound or not", SUITED, "if before <= SOUND or", "if True or", T_SUITED,
+    ),
+    Mutant(
+        "pivots that fail on the way stay", RUN, "if suspect and self", "if False and self",
+        T_SUITED,
+    ),
+    Mutant(
+        "the smallest step is that of the whole span", INITIAL, "return 1e-15 * first_step(span)",
+        "return 1e-15 * span", ("tests/symfric/integrator/equations/test_initial.py",),
+    ),
+    Mutant(
+        "dependent equations are added instead of subtracted",
+        "symfric/integrator/equations/implicit.py", "at_rest[i] - sum(", "at_rest[i] + sum(",
+        T_IMPLICIT,
+    ),
+    Mutant(
+        "charges jump where start values become consistent",
+        "symfric/integrator/equations/rank.py", "basis[pivots] = -B", "basis[pivots] = B",
+        T_IMPLICIT,
+    ),
+    Mutant(
+        "algebraic unknowns forget parameters in derivatives",
+        "symfric/integrator/derivatives/sensitivity.py", "slope @ by_d + more)", "slope @ by_d)",
+        ("tests/symfric/integrator/derivatives/test_sensitivity.py::"
+         "test_algebraic_variables_follow_from_the_start_on",),
+    ),
+    Mutant(
+        "drift is that of the start", "symfric/bench/ivp.py", "np.abs(at[name]).max()",
+        "np.abs(at[name])[0]", ("tests/symfric/bench/test_ivp.py",),
+    ),
+)  # fmt: skip
+
+MUTANTS = (
+    *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
+)  # fmt: skip

@@ -14,8 +14,8 @@ Where dF/dx' is not constant, the rates v = B x' that the equations depend on ar
 
 with the same combination of equations that never depend on rates.
 
-Limits: the directions that a matrix maps to zero must not turn with the state. Write a nonlinear
-charge q(x) between several nodes as a state of its own, q' = i, 0 = q - q(x).
+Limits: the directions that a matrix maps to zero must not turn with states or parameters. Write
+such a charge q(x) as a state of its own, q' = i, 0 = q - q(x).
 """
 
 import casadi as ca
