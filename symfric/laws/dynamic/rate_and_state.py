@@ -23,13 +23,15 @@ class RateAndState(Law):
     D_c/v_eps. For v >> v_0 exp(-mu_0/a) the force is N [mu_0 + a ln(v/v_0) + b psi].
     Limits: steady state N [mu_0 + (a - b) ln(|v|/v_0)] sign(v): weakening for a < b, unstable on a
     spring softer than N (b - a)/D_c. A step of the velocity by the factor e raises mu by a, then
-    lowers it by b over a few D_c. Creeps under any load; no pre-sliding. Meant for slow slip: at
-    high velocity ratios the logarithm makes mu small or negative where a < b.
+    lowers it by b over a few D_c. Creeps under any load; no pre-sliding. At rest the slope
+    is N a/(2 v_0) exp((mu_0 + b psi)/a): from 1e15 N s/m on, the rounding of velocities in a
+    mechanism hides it, and steps fall without end. Meant for slow slip: at high velocity ratios the
+    logarithm makes mu small or negative where a < b.
     Source: Dieterich, J. Geophys. Res. 84, 1979; Ruina, J. Geophys. Res. 88, 1983; asinh form:
     Rice, Ben-Zion, PNAS 93, 1996.
 
     Raises:
-        ValueError: mu_0/a above 150, where derivatives overflow.
+        ValueError: mu_0/a above 150, or with the oldest contact's above 200: derivatives overflow.
     """
 
     facts: ClassVar[Facts] = Facts(
@@ -43,8 +45,8 @@ class RateAndState(Law):
     mu_0: Scalar = param(
         0.12, unit="1", role="level", doc="friction coefficient at v_0", lower=1e-12
     )
-    a: Scalar = param(0.005, unit="1", role="level", doc="direct effect", lower=1e-6)
-    b: Scalar = param(0.01, unit="1", role="level", doc="evolution effect", lower=0.0)
+    a: Scalar = param(0.01, unit="1", role="level", doc="direct effect", lower=1e-6)
+    b: Scalar = param(0.015, unit="1", role="level", doc="evolution effect", lower=0.0)
     v_0: Scalar = param(
         1e-6, unit="m/s", role="velocity scale", doc="reference velocity", lower=1e-15
     )
@@ -58,9 +60,13 @@ class RateAndState(Law):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if is_number(self.mu_0) and is_number(self.a) and self.mu_0 > 150 * self.a:
+        if not all(map(is_number, (self.mu_0, self.a, self.b, self.v_0, self.v_eps))):
+            return
+        oldest = self.mu_0 + self.b * max(log(self.v_0 / self.v_eps), 0.0)
+        if self.mu_0 > 150 * self.a or oldest > 200 * self.a:
             raise ValueError(
-                f"RateAndState: expected mu_0 <= 150 a, got mu_0 = {self.mu_0:g} and "
+                f"RateAndState: expected mu_0 <= 150 a and, of the oldest contact, "
+                f"mu_0 + b ln(v_0/v_eps) <= 200 a, got {self.mu_0:g} and {oldest:g} for "
                 f"a = {self.a:g}; the regularisation would overflow"
             )
 

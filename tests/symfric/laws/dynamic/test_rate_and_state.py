@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from symfric import drive, simulate
 from symfric.laws import RateAndState
-from symfric.scenes import DoublePendulum, FourMass, Pendulum, PendulumBox
+from symfric.scenes import Arm, DoublePendulum, FourMass, Pendulum, PendulumBox
 
 ROCK = {"mu_0": 0.6, "a": 0.005, "b": 0.01, "v_0": 1e-6, "D_c": 1e-5}
 
@@ -67,7 +67,7 @@ def test_regularised_form_is_odd_and_agrees_with_the_logarithm(v: float, psi: fl
 
 def test_creep_under_load_is_that_of_an_independent_integrator() -> None:
     """0.8 kg pulled with 0.9 of its steady strength, for ten seconds."""
-    law = RateAndState(mu_0=0.12)
+    law = RateAndState(mu_0=0.12, a=0.005, b=0.01)
     N, pull = 7.848, 0.9 * 0.12 * 7.848
 
     def rates(t: float, y: np.ndarray) -> list[float]:
@@ -82,13 +82,15 @@ def test_creep_under_load_is_that_of_an_independent_integrator() -> None:
 
 
 def test_overflow_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"mu_0 <= 150 a, got mu_0 = 0.6 and a = 0.003"):
+    with pytest.raises(ValueError, match=r"mu_0 <= 150 a .* got 0.6 and 0.807233 for a = 0.003"):
         RateAndState(mu_0=0.6, a=0.003)
+    with pytest.raises(ValueError, match=r"mu_0 \+ b ln\(v_0/v_eps\) <= 200 a, got 0.12 and"):
+        RateAndState(b=10.0)
 
 
 def test_machines_that_are_let_go_from_rest_run_with_defaults() -> None:
     """They stopped at once: the start was an age of months, with a slope of 1e25 N s/m at rest."""
-    for scene in (Pendulum, DoublePendulum, PendulumBox, FourMass):
+    for scene in (Pendulum, DoublePendulum, PendulumBox, FourMass, Arm):
         run = simulate(scene(RateAndState()).model(), 0.2, samples=2, backend="vm")
         assert run.status.ok, scene
     assert RateAndState().steady_state(0.0, 1.0)[0] == 0.0
