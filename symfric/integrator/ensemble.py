@@ -110,7 +110,7 @@ def simulate_many(
         p: parameters by name: numbers, or arrays with an entry per member.
         t_eval: times of the results [s]; default only `t_end`.
         rtol, method, event_tolerance, max_steps, max_step, times: as in `simulate`; the absolute
-            tolerance is 0.1 rtol nominal.
+            tolerance is 0.1 rtol nominal, for each member as `simulate` has it by default.
         backend: "compiled", "vm", or "auto": compiled where there is a compiler.
         executor: "serial", "threads" (the compiled loop holds no lock), "processes", or any
             `concurrent.futures.Executor`, such as a dask client's or mpi4py's: a task is plain

@@ -24,6 +24,7 @@ from symfric.integrator.many.members import (
 )
 from symfric.integrator.running.engine import Stop
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.sizes import ROUNDS, own_scale
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
@@ -75,7 +76,7 @@ class Job:
         free: as `System.free`, row by row.
         manifold: the constraints of a mechanism, Functions serialised; () where it is none.
         names: of the unknowns.
-        nx: number of differential states.
+        nominal: typical magnitudes of the differential states.
         breaks, data: input intervals and the data on them.
         times: times of the results [s].
         max_steps: attempts allowed for a member.
@@ -90,7 +91,7 @@ class Job:
     free: Rows
     manifold: Packed
     names: tuple[str, ...]
-    nx: int
+    nominal: Array
     breaks: Array
     data: Array
     times: Array
@@ -115,12 +116,17 @@ class Job:
             free=tuple(map(tuple, s.free.tolist())),
             manifold=_packed(s.manifold),
             names=s.names,
-            nx=s.nx,
+            nominal=s.nominal,
             breaks=inputs.breaks,
             data=inputs.values,
             times=times,
             max_steps=max_steps,
         )
+
+    @property
+    def nx(self) -> int:
+        """Number of differential states."""
+        return self.nominal.size
 
     def digest(self) -> str:
         """Hash of everything in it."""
@@ -205,7 +211,29 @@ def _vm(step: str, signals: str) -> VmMembers:
 
 
 def solve_chunk(job: Job, chunk: Chunk) -> Solved:
-    """Integrate the members of a chunk.
+    """Integrate the members of a chunk, those that hardly move again on their own scale."""
+    found, size = _solved(job, chunk)
+    scale, last = np.tile(job.nominal, (size.shape[0], 1)), np.arange(size.shape[0])
+    for _ in range(ROUNDS):
+        own = np.minimum(scale[last], own_scale(size, job.nominal))
+        small = (own < 0.1 * scale[last]).any(axis=1)
+        small &= ~np.isin(last, list(found.failed))
+        if not small.any():
+            break
+        last = last[small]
+        scale[last] = own[small]
+        R, atol = chunk.R[last], Given.atol(job.nx)
+        R[:, atol] *= scale[last] / job.nominal
+        again, size = _solved(job, Chunk(chunk.S[last], R))
+        better = np.array([m not in again.failed for m in range(last.size)])
+        last, size = last[better], size[better]
+        found.signals[last], found.attempts[last] = again.signals[better], again.attempts[better]
+        found.reached[last] = again.reached[better]
+    return found
+
+
+def _solved(job: Job, chunk: Chunk) -> tuple[Solved, Array]:
+    """The members of a chunk, and the largest magnitudes of their states (members, nx).
 
     Algebraic unknowns follow the jumps of inputs, so members with such unknowns stop together at
     the ends of the input intervals.
@@ -214,12 +242,14 @@ def solve_chunk(job: Job, chunk: Chunk) -> Solved:
     shape = (alive.size, job.times.size, job.n_signals)
     signals, attempts = np.full(shape, np.nan), np.zeros(alive.size, dtype=np.int64)
     failed: dict[int, str] = {}
+    size = np.zeros((alive.size, job.nx))
     for first, last in job.stretches:
         stretch, inside = job.stretch(first, last)
         if job.constraints:
             alive = _follow(job, chunk, S, alive, first, failed)
         part, made = S[alive], attempts[alive]
-        found, reason = runner.run(part, chunk.R[alive], made, stretch)
+        found, reason, largest = runner.run(part, chunk.R[alive], made, stretch)
+        size[alive] = np.maximum(size[alive], largest[:, : job.nx])
         S[alive], attempts[alive] = part, made
         signals[np.ix_(alive, inside)] = found
         for m, why, t in zip(
@@ -230,7 +260,7 @@ def solve_chunk(job: Job, chunk: Chunk) -> Solved:
                     f"{WHY[why].value} It stands at t = {t:g} s; simulate it alone for more."
                 )
         alive = alive[reason == Stop.END]
-    return Solved(signals, attempts, S[:, State.T].copy(), failed)
+    return Solved(signals, attempts, S[:, State.T].copy(), failed), size
 
 
 def _follow(

@@ -43,10 +43,13 @@ class Stretch:
     h_min: float
 
 
+Advanced = tuple[Array, Counts, Array]
+
+
 class Members(Protocol):
     """Runs members one after another."""
 
-    def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> tuple[Array, Counts]:
+    def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> Advanced:
         """Advance members over a stretch.
 
         Args:
@@ -56,7 +59,8 @@ class Members(Protocol):
             stretch: intervals and times.
 
         Returns:
-            Signals (members, times, signals), NaN from where a member stopped; why (members,).
+            Signals (members, times, signals), NaN from where a member stopped; why (members,);
+            largest magnitudes of the unknowns at the ends of steps (members, n).
         """
         ...
 
@@ -76,18 +80,20 @@ class VmMembers:
             VmEngine.of(ca.Function.deserialize(step)), Columns(ca.Function.deserialize(signals))
         )
 
-    def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> tuple[Array, Counts]:
+    def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> Advanced:
         """Advance members over a stretch."""
         found = np.full(
             (S.shape[0], stretch.times.size, self.signals.function.numel_out(0)), np.nan
         )
-        reason = np.zeros(S.shape[0], dtype=np.int64)
+        reason, largest = np.zeros(S.shape[0], dtype=np.int64), np.abs(S[:, State.Y])
         for m in range(S.shape[0]):
-            reason[m], made[m] = self._one(S[m], R[m].copy(), int(made[m]), stretch, found[m])
-        return found, reason
+            reason[m], made[m] = self._one(
+                S[m], R[m].copy(), int(made[m]), stretch, found[m], largest[m]
+            )
+        return found, reason, largest
 
     def _one(
-        self, S: Array, R: Array, made: int, stretch: Stretch, found: Array
+        self, S: Array, R: Array, made: int, stretch: Stretch, found: Array, largest: Array
     ) -> tuple[Stop, int]:
         n_data, n_d = stretch.data.shape[0], self.signals.function.numel_in(2)
         last, stop = stretch.breaks.size - 2, Stop.END
@@ -95,6 +101,8 @@ class VmMembers:
             R[Given.T_END], R[R.size - n_data :] = stretch.breaks[k + 1], stretch.data[:, k]
             from_t, y0 = S[State.T], S[State.Y].copy()
             records, made, stop = self._attempts(S, R, made, stretch)
+            ends = from_records(records, y0.size).y1
+            largest[:] = np.maximum(largest, np.abs(ends).max(axis=0, initial=0.0))
             at = stretch.times[(stretch.times >= stretch.breaks[k]) & (stretch.times <= S[State.T])]
             if k < last:
                 at = at[at < stretch.breaks[k + 1]]
@@ -140,15 +148,16 @@ class CompiledMembers:
             ctypes.c_void_p,
             *[ctypes.c_longlong] * 2,
             ctypes.c_double,
-            *[ctypes.c_void_p] * 3,
+            *[ctypes.c_void_p] * 4,
         ]
         return cls(library, signals)
 
-    def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> tuple[Array, Counts]:
+    def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> Advanced:
         """Advance members over a stretch."""
         members, data = S.shape[0], np.ascontiguousarray(stretch.data)
         found = np.empty((members, stretch.times.size, self.signals))
         reason, filled = np.zeros(members, dtype=np.int64), R.copy()
+        largest = np.abs(S[:, State.Y])
         self.library.symfric_many(
             S.ctypes.data,
             filled.ctypes.data,
@@ -165,8 +174,9 @@ class CompiledMembers:
             found.ctypes.data,
             reason.ctypes.data,
             made.ctypes.data,
+            largest.ctypes.data,
         )
-        return found, reason
+        return found, reason, largest
 
 
 def many_source(step: ca.Function, signals: ca.Function) -> str:
@@ -212,13 +222,13 @@ static void symfric_values(double t, const double *y, const double *d, double *v
 void symfric_many(double *S, double *R, long long size_R, long long members, const double *breaks,
                   const double *data, long long intervals, long long n_data, const double *times,
                   long long n_times, long long max_attempts, double h_min, double *out,
-                  long long *reason, long long *made)
+                  long long *reason, long long *made, double *largest)
 {
   enum { N = $n, MEM = $memory, ROWS = $dense_rows, WIDTH = $width, SIGNALS = $n_signals,
          T = $t, T_END = $t_end };
   double row[WIDTH], y[N];
   long long m, k, i, r, count[2];
-  for (m = 0; m < members; ++m, S += MEM + N, R += size_R) {
+  for (m = 0; m < members; ++m, S += MEM + N, R += size_R, largest += N) {
     const double *d = R + size_R - $n_d;
     long long next = 0;
     int stop = 0;
@@ -233,6 +243,7 @@ void symfric_many(double *S, double *R, long long size_R, long long members, con
         stop = symfric_run(S, R, row, 1, max_attempts - made[m], h_min, count);
         made[m] += count[1];
         if (!count[0]) break;
+        for (i = 0; i < N; ++i) largest[i] = fmax(largest[i], fabs(row[2 + N + i]));
         for (; next < n_times && times[next] <= row[1] && (last || times[next] < R[T_END]);
              ++next, out += SIGNALS) {
           const double s = (times[next] - row[0]) / (row[1] - row[0]);

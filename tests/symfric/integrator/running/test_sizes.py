@@ -6,7 +6,19 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symfric import BrownMcPhee, Event, Law, LuGre, Model, Stribeck, Variable, drive, simulate
+from symfric import (
+    BrownMcPhee,
+    Event,
+    Law,
+    LuGre,
+    Model,
+    Stribeck,
+    Variable,
+    drive,
+    simulate,
+    simulate_many,
+)
+from symfric.integrator.compiled.compiler import find_compiler
 from symfric.integrator.running.sizes import finer, own_scale
 
 x, v = Variable("x", "m"), Variable("v", "m/s")
@@ -28,6 +40,23 @@ def test_tiny_motions_are_as_accurate_as_large_ones(law: Law) -> None:
         size = np.abs(found[2][row]).max()
         for other in found[:2]:
             assert np.abs(other[row] - found[2][row]).max() < 2e-4 * size
+
+
+@pytest.mark.parametrize("backend", ["vm", "compiled"])
+def test_members_have_scales_of_their_own(backend: str) -> None:
+    """A swing of a metre beside ones of a nanometre, of nothing, and one with events."""
+    if backend == "compiled" and find_compiler() is None:
+        pytest.skip("no C compiler")
+    rates = ca.vertcat(v.symbol, -x.symbol)
+    turn = Event("turn", v.symbol, 0)
+    start = np.array([1.0, 1e-9, 0.0, 1e-6])
+    for events in ((), (turn,)):
+        model = Model("swing", x=(x, v), ode=rates, events=events)
+        many = simulate_many(model, 10.0, x0={"x": start}, backend=backend, executor="serial")
+        assert many["x"][:, 0] == pytest.approx(start * np.cos(10.0), rel=1e-5, abs=0.0)
+        for m in (0, 1):
+            alone = simulate(model, 10.0, x0={"x": start[m]}, t_eval=[10.0], backend=backend)
+            assert many["x"][m, 0] == alone.final["x"]
 
 
 def test_a_decay_from_a_nanometre_follows_its_closed_form() -> None:
