@@ -51,7 +51,7 @@ $(BIN)/python:
 
 $(VENV)/.runtime: pyproject.toml | $(BIN)/python
 	@echo "installing symfric into $(VENV)"
-	$(BIN)/python -m pip install --quiet --editable ".[mat]"
+	$(BIN)/python -m pip install --quiet --editable .
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.runtime

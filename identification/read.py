@@ -27,7 +27,7 @@ def read_data(path: str | Path, columns: Mapping[str, str] | None = None) -> Dat
     s, ms, us; m, cm, mm, um; N, mN, kN; m/s, mm/s, um/s become SI. Comma, semicolon or tab
     separates the cells; numbers have a decimal point.
 
-    MATLAB (needs scipy, the extra `symfric[mat]`): the EMPS benchmark files are recognised (force
+    MATLAB up to version 7: the EMPS benchmark files are recognised (force
     gtau*vir, position qm, controller); other files have variables with the names above or those
     in `columns`, in SI units.
 

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import dataclass, replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -83,12 +82,10 @@ def demo(
 def load_records(data: Path | None) -> tuple[tuple[Dataset, Dataset], tuple[str, ...], str]:
     """Two records, the laws to identify from them, and where they come from."""
     folder = data or (STAGE if STAGE.is_dir() else None)
-    if folder is not None and (data or find_spec("scipy")):
+    if folder is not None:
         one, other = (read_data(folder / name) for name in RECORDS)
         laws = ("coulomb+viscous", "asymmetric(coulomb+viscous)")
         return (one, other), laws, f"the measured EMPS stage in {folder}"
-    if folder is not None:
-        output.note(f"{folder} is there, but MATLAB files need scipy: pip install symfric[mat]")
     other = synthetic_drive_data(seed=1, speeds=(0.003, 0.02, 0.09))
     origin = "a simulated record (no measured one found; --data FOLDER takes the EMPS benchmark)"
     return (synthetic_drive_data(), other), ("stribeck",), origin

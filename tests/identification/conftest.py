@@ -11,7 +11,6 @@ EMPS = Path(__file__).resolve().parents[3] / "shared" / "data" / "EMPS"
 
 
 def _emps(name: str) -> Dataset:
-    pytest.importorskip("scipy")
     path = EMPS / name
     if not path.is_file():
         pytest.skip("the EMPS record is not on this machine (../shared/data/EMPS)")
