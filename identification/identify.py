@@ -1,5 +1,6 @@
 """Identify mass, offset and the friction law of a drive from force and position."""
 
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from identification.choice import Choice, choose, is_coefficient
 from identification.coordinates import coordinates
 from identification.data import Array, Dataset
+from identification.doubts import verdict
 from identification.errors import evaluate
 from identification.filters import Filter
 from identification.precision import precision
@@ -68,7 +70,11 @@ def identify(
 
     Raises:
         ValueError: a law with states, unknown names, data that cannot be used.
-        SolveError: the fit failed.
+        SolveError: the fit failed, or found what cannot be (a mass of nothing, a force that the
+            law does not explain).
+
+    Warns:
+        UserWarning: of a record that is clipped, has spikes or moves one way; so does `message`.
 
     Limits: force is taken at the sample instants; a command that is held for a sample leads by
     half of it, which lowers the viscous coefficient by about m w^2 h / 2 for motion at w [rad/s].
@@ -85,6 +91,7 @@ def identify(
     signals = differentiate(data, filter)
     v_max = float(np.abs(signals.v).max())
     load = checks.number("identify: normal_force", normal_force, unit="N", above=0.0)
+    folds = _fewer_than(folds, signals.kept.size)
     choice = choose(law, v_max, load, checks.names("identify: free", free), _numbers(fixed))
     if not choice.free:
         raise ValueError("identify: expected at least one free parameter, got all fixed")
@@ -106,6 +113,8 @@ def identify(
     crossed = _cross_validation(task, fit, signals, folds) if folds else {}
     tell("simulation", 0.8)
     estimates, correlation, undetermined = _estimates(drive, choice, task, fit)
+    errors = evaluate(drive, data, signals.filter)
+    end = verdict(fit.status, data, signals.v, linear, estimates, errors)
     result = Identification(
         law=law_name(law),
         drive=drive,
@@ -114,9 +123,9 @@ def identify(
         names=choice.free,
         correlation=correlation,
         undetermined=undetermined,
-        status=fit.status,
-        message=fit.status.value,
-        errors=evaluate(drive, data, signals.filter),
+        status=end.status,
+        message=end.message,
+        errors=errors,
         validation=None if validate is None else evaluate(drive, validate, signals.filter),
         cross_validation=crossed,
         linear=linear,
@@ -126,8 +135,10 @@ def identify(
         signals=signals,
     )
     tell("done", 1.0)
-    if throw and not fit.status.ok:
-        raise SolveError(f"identify {result.law}: {result.message}", fit.status, result)
+    if throw and not end.status.ok:
+        raise SolveError(f"identify {result.law}: {result.message}", end.status, result)
+    if end.record:
+        warnings.warn(f"data '{data.name}': {' '.join(end.record)}", stacklevel=2)
     return result
 
 
@@ -148,6 +159,14 @@ def _folds(folds: object) -> int:
     if found == 1:
         raise ValueError("identify: folds: expected 0 or at least 2, got 1")
     return found
+
+
+def _fewer_than(folds: int, equations: int) -> int:
+    if folds > equations:
+        raise ValueError(
+            f"identify: folds: expected at most {equations}, the number of equations, got {folds}"
+        )
+    return folds
 
 
 def _numbers(fixed: object) -> dict[str, float]:

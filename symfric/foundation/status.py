@@ -37,6 +37,10 @@ class Status(Enum):
         "No step fits better, although the derivatives say that one should: this is no minimum; "
         "start elsewhere or narrow the bounds."
     )
+    IMPLAUSIBLE = (
+        "The optimality conditions hold, but what was found cannot be meant: the record and what is "
+        "asked of it contradict each other."
+    )
     TERMINAL_MISS = (
         "The optimiser met its conditions, but the re-simulated control misses the target; "
         "use more intervals."

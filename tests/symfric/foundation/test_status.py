@@ -28,6 +28,7 @@ def test_results_that_met_their_tolerances_can_be_used() -> None:
         Status.INFEASIBLE,
         Status.MAX_ITERATIONS,
         Status.NO_DESCENT,
+        Status.IMPLAUSIBLE,
         Status.TERMINAL_MISS,
     ],
 )
