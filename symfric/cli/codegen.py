@@ -19,6 +19,8 @@ from symfric.cli.options import (
 )
 from symfric.cli.run import kind_of, scenes_with
 from symfric.codegen import Block, Generated, Verification, generate, plant_block, verify
+from symfric.foundation import checks
+from symfric.foundation.compiler import find_compiler
 from symfric.foundation.parameters import check_names, parameters
 
 REALS = {"double": ("double",), "float": ("float",), "both": ("double", "float")}
@@ -78,6 +80,8 @@ def codegen(
     check_names("--real", [kind], REALS)
     check_folder(out)
     check_outputs(json)
+    if compiler is not None:
+        find_compiler(checks.text("--compiler", compiler, "a C compiler"))
     adjustable = None
     if scene is not None and turning:
         raise ValueError("--turning: expected with a law only: a scene knows what turns")

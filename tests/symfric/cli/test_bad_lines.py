@@ -255,3 +255,23 @@ def test_every_bad_line_is_one_sentence_and_status_2(
 
 def _short(word: str) -> str:
     return repr(word[:40]) if len(word) > 40 or " " in word or not word else word
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [("CC", "/nonexistent/cc"), ("CC", "'"), ("CC", "false"), ("SYMFRIC_CACHE", "record.csv")],
+    ids=str,
+)
+def test_a_compiler_that_cannot_be_used_is_one_sentence(
+    setting: tuple[str, str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """`run --backend compiled` called all of these an internal error to be reported."""
+    monkeypatch.chdir(tmp_path)
+    prepare(tmp_path)
+    monkeypatch.setenv("SYMFRIC_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv(*setting)
+    line = "run rabinowicz --law coulomb --t-end 0.01 --backend compiled"
+    assert verdict(line.split(), capsys) == ""
