@@ -254,8 +254,8 @@ def array(
     """
     kinds = {0: "a number", 1: "a sequence of numbers", 2: "a matrix of numbers"}
     what = what or kinds.get(-1 if ndim is None else ndim, "numbers")
-    if isinstance(value, ca.DM):
-        value = value.full().squeeze()
+    if isinstance(value, ca.DM) or (isinstance(value, ca.SX) and value.is_constant()):
+        value = ca.DM(value).full().squeeze()
     try:
         found = np.asarray(value)
     except (ValueError, TypeError, RuntimeError):  # ragged; CasADi's own refusals
