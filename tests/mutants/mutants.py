@@ -131,6 +131,32 @@ FITS: tuple[Mutant, ...] = (
         "Coulomb friction and offset are one column", "identification/regress.py",
         '"offset": np.ones_like(v)', '"offset": sign', ("tests/identification/test_regress.py",),
     ),
+    Mutant(
+        "the fit of a motion stops at 1e-2", "identification/descent.py", "GAIN = 1e-10",
+        "GAIN = 1e-2", ("tests/identification/test_descent.py",),
+    ),
+    Mutant(
+        "the fit of a drive stops at 1e-2", "identification/problem.py", '"tol": 1e-10',
+        '"tol": 1e-2', ("tests/identification/test_identify.py",),
+    ),
+    Mutant(
+        "where no trial fits better is called a minimum", "identification/descent.py",
+        "if fall <= hidden:", "if fall >= 0:", ("tests/identification/test_descent.py",),
+    ),
+    Mutant(
+        "a mass of nothing is a result", "identification/doubts.py",
+        "Status.IMPLAUSIBLE if status.ok and against else status", "status",
+        ("tests/identification/test_doubts.py",),
+    ),
+    Mutant(
+        "what only the load could tell apart is fitted", "identification/choice.py",
+        "if name in asked or others is None or", "if True or",
+        ("tests/identification/test_choice.py",),
+    ),
+    Mutant(
+        "coordinates without a mass are not noticed", "symfric/multibody/checks.py",
+        "least[0] < SINGULAR", "least[0] < -1.0", ("tests/symfric/multibody/urdf/test_read.py",),
+    ),
 )  # fmt: skip
 
 CONSISTENT = (
