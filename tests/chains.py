@@ -87,6 +87,12 @@ class Solved:
     reactions: dict[str, Array]
 
 
+def at_start(eq: Equations, expressions: list[ca.SX]) -> list[ca.SX]:
+    """`expressions` with the angles of cut joints as the joints start."""
+    starts = [ca.SX(turn.angle.start) for turn in eq.turns]
+    return ca.substitute(expressions, [t.angle.symbol for t in eq.turns], starts)
+
+
 def solve(eq: Equations, q: Array, qd: Array, rounds: int = 60) -> Solved:
     """Solve the equations of motion with friction laws in the contacts by Newton's method."""
     N = ca.SX.sym("N", len(eq.contacts))
@@ -94,6 +100,7 @@ def solve(eq: Equations, q: Array, qd: Array, rounds: int = 60) -> Solved:
     unknowns = ca.vertcat(eq.a, eq.lam, N)
     rows = ca.vertcat(eq.balance, eq.phi_ddot, ca.vertcat(ca.SX(0, 1), *eq.normals) - N)
     rows = ca.substitute(rows, eq.F, ca.vertcat(ca.SX(0, 1), *forces))
+    (rows,) = at_start(eq, [rows])
     known = {s.__hash__() for s in ca.symvar(ca.vertcat(unknowns, eq.q, eq.qd))}
     inputs = ca.vertcat(ca.SX(0, 1), *(s for s in ca.symvar(rows) if s.__hash__() not in known))
     rows = ca.substitute(rows, inputs, ca.SX.zeros(inputs.numel()))
@@ -109,7 +116,7 @@ def solve(eq: Equations, q: Array, qd: Array, rounds: int = 60) -> Solved:
     }
     wrenches = {name: ca.vertcat(*w) for name, w in eq.reactions.items()}
     results = [ca.densify(e) for e in (*every.values(), *wrenches.values())]
-    results = ca.substitute(results, [inputs], [ca.SX.zeros(inputs.numel())])
+    results = ca.substitute(at_start(eq, results), [inputs], [ca.SX.zeros(inputs.numel())])
     values = ca.Function("values", [unknowns, eq.q, eq.qd, eq.F], results)
     applied = ca.Function("F", [unknowns, eq.q, eq.qd], [ca.vertcat(ca.SX(0, 1), *forces)])
     found = [m.full().ravel() for m in values.call([x, q, qd, applied(x, q, qd)])]

@@ -207,7 +207,7 @@ def test_unverified_solution_reports_no_miss() -> None:
 
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan")])
 def test_impossible_tolerance_is_refused(tolerance: float) -> None:
-    with pytest.raises(ValueError, match="solve: expected tolerance > 0"):
+    with pytest.raises(ValueError, match="solve: tolerance: expected a number > 0"):
         solve(least_effort(), tolerance=tolerance)
 
 

@@ -172,7 +172,7 @@ LATE = Model("clock", x=(x,), ode=-x.symbol, outputs={"now": Output(BOUNCE.t, "s
     [
         (BOUNCE, {}, "expected a model without events, got 1"),
         (LATE, {}, "got now; make time a state"),
-        (PENDULUM, {"h": 0.0}, "expected a step size > 0"),
+        (PENDULUM, {"h": 0.0}, r"h: expected a number > 0 \[s\]"),
         (PENDULUM, {"method": "rodas5"}, "did you mean rodas5p"),
         (PENDULUM, {"method": "exponential"}, "got the algebraic unknowns z"),
         (PENDULUM, {"name": "int"}, "free C identifier"),
