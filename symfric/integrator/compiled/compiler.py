@@ -4,6 +4,8 @@ import ctypes
 import hashlib
 import platform
 import sys
+import weakref
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -18,6 +20,8 @@ FLAGS = (
 result does not depend on which of them ran: no fused multiply-add, no reciprocals (repeated
 divisions are taken out of the graph instead), no reordering. Looking for common parts in code that
 has none left would take a third of the compiler's time."""
+
+_close: Callable[[int], None] | None = getattr(sys.modules["_ctypes"], "dlclose", None)
 
 
 def key_of(source: str, compiler: Compiler) -> str:
@@ -101,13 +105,16 @@ def _made(place: Cache, key: str, source: str, compiler: Compiler, names: tuple[
 
 
 def opened(path: Path, names: tuple[str, ...]) -> ctypes.CDLL:
-    """The library at `path`.
+    """The library at `path`, in memory until nobody holds it: a process maps some 10,000 at most.
 
     Raises:
         OSError: it is none, or may not run there.
         CompileError: one of `names` is missing.
     """
     found = ctypes.CDLL(str(path))
+    if _close is not None:
+        # at exit a thread may still be inside
+        weakref.finalize(found, _close, found._handle).atexit = False
     missing = [name for name in names if not hasattr(found, name)]
     if missing:
         raise CompileError(

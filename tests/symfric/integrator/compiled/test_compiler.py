@@ -1,5 +1,6 @@
 """Compiling once, keeping the result, and what happens where that is impossible."""
 
+import gc
 import os
 import subprocess
 import sys
@@ -268,3 +269,24 @@ def test_processes_and_threads_may_compile_the_same_at_once(folder: Path) -> Non
     assert [worker.communicate(timeout=60)[0].strip() for worker in workers] == [b"42"] * 2
     assert {path.suffix for path in folder.iterdir()} == {".so"}
     assert not [path for path in folder.iterdir() if path.name.startswith(".")]
+
+
+@needs_compiler
+@pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="needs the maps of Linux")
+def test_code_that_nobody_uses_is_not_kept_in_memory(folder: Path) -> None:
+    """4f644ad mapped every library for ever; a process has room for some 10,000."""
+
+    def mapped() -> int:
+        return Path("/proc/self/maps").read_text().count(str(folder))
+
+    one = load(SOURCE, "answer")
+    other = load(SOURCE.replace("42", "43"), "answer")
+    answer = one.answer
+    both = mapped()
+    del one, other
+    gc.collect()
+    assert both // 2 <= mapped() < both
+    assert answer() == 42
+    del answer
+    gc.collect()
+    assert mapped() == 0

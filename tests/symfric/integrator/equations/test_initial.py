@@ -173,3 +173,13 @@ def test_late_start_begins_with_a_step_that_time_can_resolve() -> None:
     model = Model("late", x=(x,), ode=-x.symbol)
     run = simulate(model, 1e9 + 1, t_start=1e9, rtol=1e-8)
     assert run.final["x"] == pytest.approx(np.exp(-1), rel=1e-7)
+
+
+def test_many_do_not_leap_to_a_far_solution() -> None:
+    """A full step from 1.9 goes uphill on sin z = 0, and on from there to 4 pi; damped, to pi."""
+    z = Variable("z", "1")
+    system = assemble(Model("waves", x=(x,), z=(z,), ode=-x.symbol, alg=ca.sin(z.symbol)))
+    y, none = np.array([[1.0, 1.9], [1.0, 3.0], [1.0, 0.3]]), np.zeros((3, 0))
+    found, failed = consistent_many(system, Columns(system.constraints), "here", y, none)
+    assert not failed
+    assert found[:, 1] == pytest.approx([np.pi, np.pi, 0.0], abs=1e-12)
