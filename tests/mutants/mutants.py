@@ -278,6 +278,68 @@ DIFFERENTIAL_ALGEBRAIC = (
     ),
 )  # fmt: skip
 
+BUILT = "symfric/integrator/running/built.py"
+KEPT = "symfric/integrator/compiled/cache.py"
+COMPILED = "symfric/integrator/compiled/compiler.py"
+STORE = "symfric/integrator/many/store.py"
+T_BUILT = ("tests/symfric/integrator/running/test_built.py",)
+T_KEPT = ("tests/symfric/integrator/compiled/test_cache.py",)
+T_COMPILED = ("tests/symfric/integrator/compiled/test_compiler.py",)
+T_STORE = ("tests/symfric/integrator/many/test_store.py",)
+
+CACHES = (
+    Mutant(
+        "a storm is one a hundred times later", EVENTS, "still_to_come < 1000 * self._tolerance",
+        "still_to_come < 10 * self._tolerance",
+        ("tests/symfric/integrator/running/test_storm.py",),
+    ),
+    Mutant(
+        "one key for all functions of time", "symfric/integrator/equations/inputs.py",
+        "sha256(ca.SX.serialize(expression).encode()).hexdigest()", '"function"',
+        ("tests/symfric/integrator/equations/test_inputs.py",),
+    ),
+    Mutant(
+        "integrators are never evicted", BUILT, "del known[next(iter(known))]", "pass", T_BUILT
+    ),
+    Mutant(
+        "one integrator for all methods", BUILT,
+        "key = (method.name, inputs.key)", "key = (inputs.key,)", T_BUILT,
+    ),
+    Mutant(
+        "the processor is left out of the hash", COMPILED,
+        "platform.machine(), processor()", "platform.machine()", T_COMPILED,
+    ),
+    Mutant(
+        "the compiler is left out of the hash", COMPILED,
+        "(compiler.command, FLAGS, binary.st_size", "(FLAGS, binary.st_size", T_COMPILED,
+    ),
+    Mutant("compiled code is never evicted", KEPT, "                    path.unlink()",
+        "                    pass", T_KEPT),
+    Mutant("the newest goes first", KEPT, "found.sort(reverse=True)", "found.sort()", T_KEPT),
+    Mutant(
+        "damaged code is loaded", KEPT,
+        'whole = path.stem.endswith(f"-{_digest(path.read_bytes())}")', "whole = True", T_KEPT,
+    ),
+    Mutant(
+        "code of others is loaded", KEPT,
+        "return found.st_uid in (0, os.getuid()) and not", "return not", T_KEPT,
+    ),
+    Mutant(
+        "the compiler fuses operations", COMPILED, '"-ffp-contract=off",', "",
+        ("tests/symfric/integrator/running/test_bits.py",),
+    ),
+    Mutant(
+        "the virtual machine ends with its batch", "symfric/integrator/running/engine.py",
+        "took[used:] = False", "pass", ("tests/symfric/integrator/running/test_engine.py",),
+    ),
+    Mutant(
+        "results on disk are taken unseen", STORE,
+        'if str(saved["checksum"]) == self._checksum(first, attempts.size):', "if True:", T_STORE,
+    ),
+    Mutant("a file cut short is taken", STORE, "and status.st_size == size", "", T_STORE),
+)  # fmt: skip
+
 MUTANTS = (
     *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
+    *CACHES,
 )  # fmt: skip
