@@ -249,7 +249,8 @@ DIFFERENTIAL_ALGEBRAIC = (
         "pivots stay, sound or not", SUITED, "if before <= SOUND or", "if True or", T_SUITED,
     ),
     Mutant(
-        "pivots that fail on the way stay", RUN, "if suspect and self", "if False and self",
+        "pivots that fail on the way stay", RUN, "if reason is Stop.STEP_TOO_SMALL and self.",
+        "if False and self.",
         T_SUITED,
     ),
     Mutant(

@@ -29,9 +29,8 @@ Array = NDArray[np.float64]
 ROWS, EVENT_ROWS = 2048, 64
 ATTEMPTS = {"vm": 2_000, "compiled": 50_000}
 """Attempts between two looks at progress and interrupts: tens of milliseconds."""
-MANY_REJECTED, MOST_ORDERS = 30, 8
-"""Rejections among a batch of attempts, if more than steps, that make pivots suspect; and how often
-others are tried."""
+MOST_ORDERS = 8
+"""How often pivots are replaced in a run."""
 
 
 @final
@@ -229,9 +228,7 @@ class _March:
         rows = EVENT_ROWS if self.eventful else ROWS
         records, made, reason = engine.run(self.S, R, rows, allowed, self.h_min)
         self.run.attempts += made
-        rejected = made - records.shape[0]
-        suspect = reason is Stop.STEP_TOO_SMALL or rejected > max(records.shape[0], MANY_REJECTED)
-        if suspect and self.found_pivots():
+        if reason is Stop.STEP_TOO_SMALL and self.found_pivots():
             reason = Stop.ATTEMPTS
         if engine.name == "vm":
             spent, advance = perf_counter() - began, self.t - from_t
@@ -240,7 +237,11 @@ class _March:
         return records, reason, left
 
     def found_pivots(self) -> bool:
-        """Whether steps failed for pivots that are not sound here; others are used from now on."""
+        """Whether steps failed for pivots that are not sound here; others are used from now on.
+
+        What such pivots spoil no step size mends: steps shrink to nothing there, and that is when
+        to look, at the same place whatever runs the steps.
+        """
         if len(self.places) > MOST_ORDERS:
             return False
         here = self.y.copy()
