@@ -38,8 +38,8 @@ class Status(Enum):
         "start elsewhere or narrow the bounds."
     )
     IMPLAUSIBLE = (
-        "The optimality conditions hold, but what was found cannot be meant: the record and what is "
-        "asked of it contradict each other."
+        "The optimality conditions hold, but what was found cannot be meant: the record and what "
+        "is asked of it contradict each other."
     )
     TERMINAL_MISS = (
         "The optimiser met its conditions, but the re-simulated control misses the target; "

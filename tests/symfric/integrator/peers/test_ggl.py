@@ -56,8 +56,8 @@ def test_all_formulations_go_to_the_same_motion(
 ) -> None:
     """Errors measured at rtol 1e-4 and 1e-8, with a factor of about three to spare.
 
-    The corrector of idas on ggl is at its limit there: its error at 1e-8 is between 2e-6 and 1.3e-5,
-    whatever rounds a last bit otherwise, and no smaller at 1e-9.
+    The corrector of idas on ggl is at its limit there: its error at 1e-8 is between 2e-6 and
+    1.3e-5, whatever rounds a last bit otherwise, and no smaller at 1e-9.
     """
     with pytest.warns(UserWarning, match="stick phases"):
         far = error(run(scene, formulation, peer, 1e-4), scene)
