@@ -44,7 +44,7 @@ def simulate_by_peer(
     """Integrate `model` as `simulate` does, with one of CasADi's own integrators.
 
     For comparisons: the constraints of mechanisms drift under them, they pass through friction that
-    jams without a sign of it, and they know no events.
+    jams without a sign of it, leap over friction peaks and pulses of inputs, and know no events.
 
     Args:
         model: the equations; the mass matrix must be diagonal.

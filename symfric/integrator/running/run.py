@@ -110,8 +110,10 @@ def integrate(
         if own is None or not run.status.ok:
             break
         scale, allowed = own, replace(tolerances, atol=tolerances.atol * own / nominal)
-        again = _integrated(run.integrator or integrator, inputs, y0, p, allowed, backend, progress)
+        again = _integrated(run.integrator or integrator, inputs, y0, p, allowed, backend, None)
         if not again[0].status.ok and again[0].status is not Status.INTERRUPTED:
+            why = again[0].message
+            run.message += f" Motions that are tiny were not resolved on their own scale: {why}"
             break
         run, dense = again
     return run, dense

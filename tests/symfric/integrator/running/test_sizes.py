@@ -91,7 +91,15 @@ def test_what_rests_or_is_rounding_has_no_scale_of_its_own() -> None:
     assert finer(own, size * 0.9, nominal) is None
 
 
-def test_a_run_that_does_not_need_another_takes_none() -> None:
-    told: list[float] = []
-    simulate(drive(LuGre()), 1.0, u={"force": 2.0}, progress=told.append, backend="vm")
-    assert told == sorted(told)
+def test_a_tiny_motion_that_could_not_be_resolved_is_said() -> None:
+    u = {"force": lambda t: 1e-6 * ca.sin(t)}
+    run = simulate(drive(LuGre()), 1.0, u=u, max_steps=30, backend="vm")
+    assert run.status.ok
+    assert "not resolved on their own scale: The maximum number of steps" in run.message
+
+
+def test_progress_does_not_go_back() -> None:
+    for force in (2.0, 1e-6):
+        told: list[float] = []
+        simulate(drive(LuGre()), 1.0, u={"force": force}, progress=told.append, backend="vm")
+        assert told == sorted(told)
