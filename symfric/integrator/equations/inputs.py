@@ -15,6 +15,8 @@ from symfric.foundation.symbols import stacked, strays
 from symfric.integrator.equations.onsets import onsets
 from symfric.model import Model
 
+NO_ROWS = ca.SX(0, 1)
+"""Made once: most calls need no more."""
 Array = NDArray[np.float64]
 
 
@@ -150,7 +152,7 @@ def input_data(
 
 def _undriven(t_start: float, t_end: float) -> InputData:
     """What a model without inputs takes."""
-    return InputData(stacked(()), stacked(()), np.array([t_start, t_end]), np.zeros((0, 1)), ())
+    return InputData(NO_ROWS, NO_ROWS, np.array([t_start, t_end]), np.zeros((0, 1)), ())
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ ROUNDS = 3
 
 def sizes(dense: Dense, nx: int) -> Array:
     """Largest magnitudes of the states over all steps, shape (nx,)."""
-    return np.maximum(np.abs(dense.y0[:, :nx]).max(axis=0), np.abs(dense.y1[:, :nx]).max(axis=0))
+    return np.maximum(np.abs(dense.y0[0, :nx]), np.abs(dense.y1[:, :nx]).max(axis=0))
 
 
 def own_scale(size: Array, nominal: Array) -> Array:
@@ -32,5 +32,7 @@ def own_scale(size: Array, nominal: Array) -> Array:
 
 def finer(scale: Array, size: Array, nominal: Array) -> Array | None:
     """The scale of another run of a motion of this `size`; None where `scale` serves."""
+    if (size >= SMALL * nominal).all():
+        return None
     own = np.minimum(scale, own_scale(size, nominal))
     return own if (own < 0.1 * scale).any() else None

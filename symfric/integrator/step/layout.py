@@ -55,5 +55,7 @@ class Given:
 
 def _joined(common: list[float], own: Array) -> Array:
     """The same first entries before every row of `own`."""
+    if own.ndim == 1:
+        return np.concatenate([common, own])
     shape = (*own.shape[:-1], len(common))
     return np.concatenate([np.broadcast_to(np.array(common), shape), own], axis=-1)
