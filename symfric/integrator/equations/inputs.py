@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import stacked, strays
-from symfric.integrator.equations.onsets import onsets
+from symfric.integrator.equations.onsets import onsets, pace
 from symfric.model import Model
 
 NO_ROWS = ca.SX(0, 1)
@@ -93,6 +93,7 @@ class InputData:
         breaks: interval ends in [t_start, t_end], shape (n + 1,).
         values: `data` on each interval, shape (n_data, n).
         key: the structure; two of a model with one key have the same equations.
+        pace: length [s] of straight pieces of functions of time where they are quickest, or inf.
     """
 
     expression: ca.SX
@@ -100,6 +101,7 @@ class InputData:
     breaks: Array
     values: Array
     key: tuple[str, ...]
+    pace: float = np.inf
 
     def interval(self, times: Array) -> NDArray[np.intp]:
         """Number of the interval that holds each time; at a break the later one."""
@@ -146,6 +148,7 @@ def input_data(
         breaks,
         np.vstack(values) if values else np.zeros((0, breaks.size - 1)),
         tuple(part.key for part in parts),
+        min((part.pace for part in parts), default=np.inf),
     )
     return found.stopping_at([t for part in parts for t in part.onsets])
 
@@ -159,7 +162,8 @@ def _undriven(t_start: float, t_end: float) -> InputData:
 class _Part:
     """One input: its expression, the data in it and their values on the intervals, structure.
 
-    `onsets` are times at which a step has to end, or it could leap over a pulse.
+    `onsets` are times at which a step has to end, or it could leap over a pulse; `pace` is the
+    length [s] of its straight pieces.
     """
 
     row: ca.SX
@@ -167,6 +171,7 @@ class _Part:
     data: tuple[ca.SX, ...] = ()
     values: tuple[Array, ...] = ()
     onsets: tuple[float, ...] = ()
+    pace: float = np.inf
 
 
 def _part(model: Model, variable: Variable, signal: Any, breaks: Array, begin: ca.SX) -> _Part:
@@ -177,8 +182,8 @@ def _part(model: Model, variable: Variable, signal: Any, breaks: Array, begin: c
             expression = _evaluated(where, signal, model)
             # the expression and not the function that wrote it: its data may have changed since
             key = sha256(ca.SX.serialize(expression).encode()).hexdigest()
-            times = onsets(_of_time(expression, model), float(breaks[0]), float(breaks[-1]))
-            return _Part(expression, key, onsets=times)
+            look = _of_time(expression, model), float(breaks[0]), float(breaks[-1])
+            return _Part(expression, key, onsets=onsets(*look), pace=pace(*look))
         # a number is data too: another value must not mean another integrator
         signal = Hold(breaks[:1], [checks.number(where, signal, hint=KINDS)])
     c, slope = ca.SX.sym(f"{variable.name}_k"), ca.SX.sym(f"{variable.name}_dot")

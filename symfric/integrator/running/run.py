@@ -26,6 +26,9 @@ from symfric.integrator.running.sizes import ROUNDS, finer, sizes
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
+PACES = 8
+"""Straight pieces of an input that a step may pass with events, which look at its quarters."""
+
 ROWS, EVENT_ROWS = 2048, 64
 ATTEMPTS = {"vm": 2_000, "compiled": 50_000}
 """Attempts between two looks at progress and interrupts: tens of milliseconds."""
@@ -103,6 +106,9 @@ def integrate(
     A motion that turns out to be tiny is integrated again on its own scale (`sizes`).
     """
     nominal = integrator.system.nominal
+    if integrator.model.events and inputs.pace < tolerances.max_step / PACES:
+        # where a machine rests, nothing but its events tells that an input has become too strong
+        tolerances = replace(tolerances, max_step=PACES * inputs.pace)
     scale, allowed = nominal, tolerances
     run, dense = _integrated(integrator, inputs, y0, p, allowed, backend, progress)
     for _ in range(ROUNDS if tolerances.follow else 0):

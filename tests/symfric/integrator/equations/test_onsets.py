@@ -9,7 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from symfric import BrownMcPhee, Model, Variable, drive, simulate, simulate_many
-from symfric.integrator.equations.onsets import DEPTH, changes, levels, onsets
+from symfric.integrator.equations.onsets import DEPTH, changes, levels, onsets, pace
+from symfric.laws import Karnopp
 
 Function = Callable[[ca.SX], ca.SX]
 x, force = Variable("x", "m"), Variable("force", "N")
@@ -89,3 +90,25 @@ def test_a_pulse_too_short_for_the_grid_is_hit_where_it_is_named() -> None:
     assert missed.final["x"] == 0.0
     assert hit.final["x"] == pytest.approx(1.0, rel=1e-5)
     assert AT in hit.step_times
+
+
+def test_pace_is_that_of_the_quickest_hundredth() -> None:
+    def of(function: Function) -> float:
+        t = ca.SX.sym("t")
+        return pace(ca.SX.serialize(ca.SX(function(t))), 0.0, 10.0)
+
+    for period in (0.1, 1.0, 7.0):
+        assert period / 110 < of(lambda t, T=period: 3 * ca.sin(2 * pi * t / T)) < period / 40
+    assert of(lambda t: ca.SX(2.0)) == of(lambda t: 2 * t - 1) == np.inf
+    assert of(lambda t: ca.if_else(t > 3, 1.0, 0.0)) > 0.05  # a jump is an onset, hardly a pace
+
+
+def test_load_that_is_too_strong_for_a_moment_in_every_period_ends_rest() -> None:
+    """By 4 %, for a tenth of the time: at rest steps grew over it, at the tighter tolerance."""
+    law, A, w = Karnopp(form="event", mu_d=0.025), 0.0831, 0.74
+    model = drive(law, m=8.8, N=0.5327)
+    for rtol in (1e-6, 1e-11):
+        run = simulate(model, 27.0, u={"force": lambda t: A * ca.sin(w * t)}, rtol=rtol)
+        slips = np.array([t for t, name in run.happened if name == "slip"])
+        first = np.arcsin(0.15 * 0.5327 / A) / w
+        assert slips == pytest.approx(first + pi / w * np.arange(6), abs=1e-6)
