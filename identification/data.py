@@ -140,8 +140,7 @@ class Dataset:
             ValueError: a step that is not positive or leaves too few samples.
         """
         step = float(np.median(np.diff(self.t))) if step is None else step
-        if not (np.isfinite(step) and step > 0):
-            raise ValueError(f"data '{self.name}': resampled: expected a step > 0 s, got {step}")
+        step = checks.number(f"data '{self.name}': resampled: step", step, unit="s", above=0.0)
         t = self.t[0] + step * np.arange(int((self.t[-1] - self.t[0]) / step * (1 + 1e-12)) + 1)
         return replace(
             self,

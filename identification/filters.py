@@ -14,6 +14,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation import checks
+
 Array = NDArray[np.float64]
 
 LOBES = 8
@@ -42,13 +44,13 @@ class Filter:
     v_min: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.cutoff) and self.cutoff > 0):
-            raise ValueError(f"Filter: cutoff: expected a positive number [Hz], got {self.cutoff}")
-        for name, value in (("decimation", self.decimation), ("order", self.order)):
-            if value < 1 or value != int(value):
-                raise ValueError(f"Filter: {name}: expected a whole number >= 1, got {value}")
-        if not (np.isfinite(self.v_min) and self.v_min >= 0):
-            raise ValueError(f"Filter: v_min: expected a speed >= 0 [m/s], got {self.v_min}")
+        cutoff = checks.number("Filter: cutoff", self.cutoff, unit="Hz", above=0.0)
+        object.__setattr__(self, "cutoff", cutoff)
+        for name in ("decimation", "order"):
+            whole = checks.count(f"Filter: {name}", getattr(self, name))
+            object.__setattr__(self, name, whole)
+        v_min = checks.number("Filter: v_min", self.v_min, unit="m/s", lower=0.0)
+        object.__setattr__(self, "v_min", v_min)
 
     def trim(self, step: float) -> int:
         """Samples to leave out at each end, where reflection and differences are not the data."""

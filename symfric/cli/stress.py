@@ -31,11 +31,12 @@ def stress(
     ] = 120.0,
     json: JsonOption = None,
 ) -> None:
-    """Simulate random laws in random scenes and judge each run against another method.
+    """Judge runs of random laws in random scenes.
 
-    Parameters by decades, tolerances, methods, inputs and start values are drawn, too. A case is
-    right, refused, loose, undecided, silently wrong, not finite, a crash or a hang; the last four
-    must not happen: their cases are saved, and the exit status is 1.
+    Each run is compared with another method at a hundredth of its tolerance. Parameters by
+    decades, tolerances, methods, inputs and start values are drawn, too. A case is right, refused,
+    loose, undecided, silently wrong, not finite, a crash or a hang; the last four must not happen:
+    their cases are saved, and the exit status is 1.
 
     Example: symfric stress --cases 1000 --seed 7 --json stress.json
 

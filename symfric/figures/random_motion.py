@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symfric.figures.data import Array
+from symfric.foundation import checks
 from symfric.integrator import Linear
 from symfric.integrator.equations.inputs import Input
 from symfric.laws import Population
-from symfric.model import finite
 
 
 def slid(
@@ -84,4 +84,4 @@ def _signal(force: Input, t: Array) -> Array:
     if callable(force):
         symbol = ca.SX.sym("t")
         return ca.Function("F_e", [symbol], [force(symbol)])(t).full().ravel()
-    return np.full(t.shape, finite("figure: force", force))
+    return np.full(t.shape, checks.number("figure: force", force))

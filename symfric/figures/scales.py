@@ -9,9 +9,9 @@ import numpy as np
 
 from symfric.figures.data import Array
 from symfric.figures.requirements import check_any, phenomena
+from symfric.foundation import checks
 from symfric.foundation.parameters import parameters
 from symfric.laws import AnyLaw, Population, steady_force
-from symfric.model import finite
 
 MASS = 0.8
 """Mass of the block where one is driven [kg], that of `Rabinowicz`."""
@@ -56,9 +56,8 @@ def scales(law: AnyLaw, N: float = NORMAL_FORCE) -> Scales:
         ValueError: no law, symbols for parameters, N that is not positive.
     """
     check_any("figure", law)
-    if finite("figure: N", N) <= 0:
-        raise ValueError(f"figure: N: expected a normal force above 0 N, got {N:g}")
-    known = {p.name: finite(f"figure: {p.name}", p.value) for p in parameters(law).values()}
+    checks.number("figure: N", N, unit="N", above=0.0)
+    known = {p.name: checks.number(f"figure: {p.name}", p.value) for p in parameters(law).values()}
     stiffness = _stiffness(law, N) if "P" in phenomena(law) else 0.0
     velocity = known.get("v_s", float(law.velocity_scale))
     if not isfinite(velocity):

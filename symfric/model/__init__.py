@@ -4,7 +4,6 @@ from symfric.model.holonomic import Holonomic as Holonomic
 from symfric.model.model import Model as Model
 from symfric.model.model import Variables as Variables
 from symfric.model.model import check_model as check_model
-from symfric.model.model import finite as finite
 from symfric.model.parts import Event as Event
 from symfric.model.parts import Monitor as Monitor
 from symfric.model.parts import Output as Output

@@ -214,7 +214,9 @@ class Model:
             if v.name in values:
                 v.within(f"{self.name}.{v.name}", values[v.name])
         numbers = {v.name: v.start for v in group} | values
-        return np.array([finite(f"{self.name}.{name}", x) for name, x in numbers.items()], float)
+        return np.array(
+            [checks.number(f"{self.name}.{name}", x) for name, x in numbers.items()], float
+        )
 
     def named(self, what: str, given: Mapping[str, Any] | None) -> dict[str, Any]:
         """What a user `given` by name for "x0", "u" or "p"; nothing for None.
@@ -243,7 +245,7 @@ class Model:
 
     def _checked(self, start: NDArray[np.float64]) -> NDArray[np.float64]:
         named = zip(self.x, start.tolist(), strict=True)
-        return np.array([finite(f"{self.name}.{v.name}", x) for v, x in named], float)
+        return np.array([checks.number(f"{self.name}.{v.name}", x) for v, x in named], float)
 
     def initial_states(
         self,
@@ -286,7 +288,7 @@ class Model:
         self, given: Mapping[str, float] | None, p: Mapping[str, float] | None
     ) -> tuple[NDArray[np.float64], ...]:
         numbers = self.named("x0", given)
-        given = {name: finite(f"{self.name}.{name}", x) for name, x in numbers.items()}
+        given = {name: checks.number(f"{self.name}.{name}", x) for name, x in numbers.items()}
         known = np.array([given.get(v.name, 0.0) for v in self.x])
         chosen = np.array([float(v.name in given) for v in self.x])
         return known, chosen, self.values("u"), self.values("p", p)
@@ -316,11 +318,6 @@ class Model:
 def _same(a: ca.SX, b: ca.SX) -> bool:
     """Whether two columns hold the same expressions."""
     return a.shape == b.shape and ca.is_equal(ca.densify(a), ca.densify(b))
-
-
-def finite(where: str, value: Any) -> float:
-    """`value` as a float, or an error that says where it stands."""
-    return checks.number(where, value)
 
 
 def check_model(where: str, model: object) -> None:

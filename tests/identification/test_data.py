@@ -72,7 +72,7 @@ def test_resampling_is_of_third_order_in_the_position() -> None:
 
 
 def test_resampling_step_must_be_positive() -> None:
-    with pytest.raises(ValueError, match="expected a step > 0 s, got -1"):
+    with pytest.raises(ValueError, match=r"resampled: step: expected a number > 0 \[s\], got -1"):
         record().resampled(-1)
 
 

@@ -54,11 +54,11 @@ def test_central_difference_is_of_second_order() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"cutoff": 0.0}, "cutoff: expected a positive number"),
-        ({"cutoff": float("nan")}, "cutoff: expected a positive number"),
+        ({"cutoff": 0.0}, "cutoff: expected a number > 0"),
+        ({"cutoff": float("nan")}, "cutoff: expected a number > 0"),
         ({"cutoff": 10.0, "decimation": 0}, "decimation: expected a whole number >= 1, got 0"),
         ({"cutoff": 10.0, "order": 2.5}, r"order: expected a whole number >= 1, got 2\.5"),
-        ({"cutoff": 10.0, "v_min": -1.0}, r"v_min: expected a speed >= 0 \[m/s\], got -1"),
+        ({"cutoff": 10.0, "v_min": -1.0}, r"v_min: expected a number >= 0 \[m/s\], got -1"),
     ],
 )
 def test_bad_filters_are_refused(arguments: dict[str, float], message: str) -> None:

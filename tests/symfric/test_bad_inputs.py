@@ -126,6 +126,19 @@ def doors_of_simulation() -> Iterator[Door]:
             "method": choice(),
         },
     )
+    peer = sf.integrator.simulate_by_peer
+    yield Door(
+        "simulate_by_peer",
+        peer,
+        {"model": model, "t_end": 0.01, "peer": "rosenbrock"},
+        {
+            **{k: v for k, v in common.items() if k in ("model", "t_end", "t_start", "rtol")},
+            "peer": [*choice(), "vm"],
+            "x0": values("v"),
+            "p": values("mu_d"),
+            "samples": count(1),
+        },
+    )
     bad_rows = [3.0, None, "ab", [NAN], [INF], [[0.0]], {}, Thing(), 1j, [None], ["a"], True]
     for kind in (sf.Hold, sf.Linear):
         yield Door(

@@ -1,4 +1,4 @@
-"""Bad numbers and kinds at laws and scenes: refused in one sentence when they are made."""
+"""Bad numbers and kinds at laws, scenes and figures: refused in one sentence."""
 
 from collections.abc import Iterator
 from dataclasses import fields
@@ -16,12 +16,14 @@ from bad_values import (
     names,
     number,
     parameter,
+    path,
     refuses_all,
     thing,
     values,
 )
 
 import symfric as sf
+from symfric.figures import FIGURES, compare, figure
 from symfric.laws import BrownMcPhee, Coulomb, LuGre, Stribeck
 from symfric.laws.names import ALL_LAWS, POPULATIONS, WRAPPERS
 from symfric.model import Model
@@ -69,6 +71,13 @@ def doors_of_laws() -> Iterator[Door]:
     for kind in (sf.GenericAsperity, sf.RandomBristles):
         bad = {"count": count(), "seed": [*number(-1), 1.5]}
         yield Door(kind.__name__, kind, {}, bad)
+    rows = [None, 3.0, "ab", [], [0.0], [0.0, NAN], [[0.0, 1.0]], {}, Thing(), [1j, 2], ["a", "b"]]
+    yield Door(
+        "Population.force",
+        sf.RandomBristles().force,
+        {"t": [0.0, 1.0], "x": [0.0, 1.0], "N": 1.0},
+        {"t": [*rows, [1.0, 0.0], [0.0, 0.0]], "x": rows, "N": number(-1.0)},
+    )
     yield Door(
         "law_from_text",
         sf.law_from_text,
@@ -130,9 +139,51 @@ def doors_of_scenes() -> Iterator[Door]:
     yield Door("Scene.model", Rabinowicz(BrownMcPhee()).model, {}, {"free": names("mu_d")})
 
 
+def doors_of_figures() -> Iterator[Door]:
+    yield Door(
+        "compare",
+        compare,
+        {"laws": [Coulomb()]},
+        {
+            "laws": [
+                None,
+                3,
+                [],
+                {},
+                Thing(),
+                [3],
+                [None],
+                ["nonsense"],
+                {"a": 3},
+                [Coulomb],
+                "lugre",
+                Coulomb(),
+            ],
+            "scenario": choice(),
+            "N": number(0.0, -1.0),
+        },
+    )
+    yield Door(
+        "figure",
+        figure,
+        {"law": Coulomb(), "name": "profile"},
+        {
+            "law": thing(Coulomb),
+            "name": choice(),
+            "N": number(0.0, -1.0),
+        },
+    )
+    for name, make in FIGURES.items():
+        yield Door(name, make, {"law": LuGre()}, {"law": thing(LuGre), "N": number(0.0, -1.0)})
+    data = compare([Coulomb()])
+    yield Door("FigureData[]", lambda name: data[name], {}, {"name": choice()})
+    yield Door("FigureData.plot", data.plot, {}, {"path": [*path(), "a.xyz", "."]})
+
+
 DOORS = {
     "laws": doors_of_laws,
     "scenes": doors_of_scenes,
+    "figures": doors_of_figures,
 }
 
 

@@ -1,4 +1,4 @@
-"""Bad Python input at optimal control, identification, C and figures."""
+"""Bad Python input at optimal control, identification and C."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -35,7 +35,6 @@ from identification import (
     synthetic_drive_data,
 )
 from symfric.codegen import generate, law_block, plant_block, verify
-from symfric.figures import FIGURES, compare, figure
 from symfric.laws import BrownMcPhee, Coulomb, LuGre, Stribeck
 
 
@@ -290,6 +289,18 @@ def doors_of_identification() -> Iterator[Door]:
         },
     )
     yield Door(
+        "Filter",
+        Filter,
+        {"cutoff": 10.0},
+        {
+            "cutoff": number(0.0, -1.0),
+            "decimation": count(),
+            "order": count(),
+            "v_min": number(-1.0),
+        },
+    )
+    yield Door("Dataset.resampled", data.resampled, {}, {"step": number(0.0, -1.0, optional=True)})
+    yield Door(
         "read_data",
         read_data,
         {"path": "a.csv"},
@@ -338,52 +349,10 @@ def doors_of_code() -> Iterator[Door]:
     yield Door("verify", verify, {}, {"generated": thing()})
 
 
-def doors_of_figures() -> Iterator[Door]:
-    yield Door(
-        "compare",
-        compare,
-        {"laws": [Coulomb()]},
-        {
-            "laws": [
-                None,
-                3,
-                [],
-                {},
-                Thing(),
-                [3],
-                [None],
-                ["nonsense"],
-                {"a": 3},
-                [Coulomb],
-                "lugre",
-                Coulomb(),
-            ],
-            "scenario": choice(),
-            "N": number(0.0, -1.0),
-        },
-    )
-    yield Door(
-        "figure",
-        figure,
-        {"law": Coulomb(), "name": "profile"},
-        {
-            "law": thing(Coulomb),
-            "name": choice(),
-            "N": number(0.0, -1.0),
-        },
-    )
-    for name, make in FIGURES.items():
-        yield Door(name, make, {"law": LuGre()}, {"law": thing(LuGre), "N": number(0.0, -1.0)})
-    data = compare([Coulomb()])
-    yield Door("FigureData[]", lambda name: data[name], {}, {"name": choice()})
-    yield Door("FigureData.plot", data.plot, {}, {"path": [*path(), "a.xyz", "."]})
-
-
 DOORS = {
     "control": doors_of_control,
     "identification": doors_of_identification,
     "code": doors_of_code,
-    "figures": doors_of_figures,
 }
 
 

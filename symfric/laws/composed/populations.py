@@ -128,8 +128,10 @@ class Population(Parametric, ABC):
         Raises:
             ValueError: t not rising, or other lengths.
         """
-        t, x = np.asarray(t, float), np.asarray(x, float)
-        if t.ndim != 1 or t.shape != x.shape or t.size < 2 or not (np.diff(t) > 0).all():
+        where = f"{type(self).__name__}.force"
+        t, x = checks.times(f"{where}: t", t), checks.array(f"{where}: x", x)
+        checks.number(f"{where}: N", N, unit="N", lower=0.0)
+        if t.shape != x.shape or t.size < 2:
             raise ValueError(
                 f"{type(self).__name__}: expected rising times t and as many positions x, got "
                 f"shapes {t.shape} and {x.shape}"
@@ -145,7 +147,9 @@ class Population(Parametric, ABC):
 
         Computed at 20 speeds a decade over the range of `v`, and interpolated between them.
         """
-        v = np.asarray(v, float)
+        where = f"{type(self).__name__}.steady_force"
+        v = checks.array(f"{where}: v", v, ndim=None)
+        checks.number(f"{where}: N", N, unit="N", lower=0.0)
         moving = np.abs(v[v != 0])
         if not moving.size:
             return np.zeros(v.shape)

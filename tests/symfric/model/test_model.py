@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from symfric import Model, Output, Variable, simulate
-from symfric.model import Event, Monitor, finite
+from symfric.model import Event, Monitor
 
 x, y = Variable("x", "m", start=1.0, nominal=0.1), Variable("y", "m/s")
 w, u, k = Variable("w", "N"), Variable("u", "N", start=2.0), Variable("k", "N/m", start=3.0)
@@ -160,17 +160,6 @@ def test_start_value_that_is_not_a_number_is_refused() -> None:
     )
     with pytest.raises(ValueError, match=r"log\.s: expected a finite number, got -?inf"):
         model.initial_state()
-
-
-@pytest.mark.parametrize("value", [1, 2.5, np.float64(3.0), ca.DM(5.0)])
-def test_finite_takes_numbers(value: object) -> None:
-    assert finite("here", value) == float(value)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("value", [np.inf, np.nan, "x", None, ca.SX.sym("s"), [1.0, 2.0]])
-def test_finite_refuses_everything_else(value: object) -> None:
-    with pytest.raises(ValueError, match="here: expected a finite number, got "):
-        finite("here", value)
 
 
 def test_details_are_written_when_asked_for_and_once() -> None:

@@ -1,0 +1,57 @@
+"""What the sentences of the doors say: the way out for those who stumble most often."""
+
+import math
+from typing import Any
+
+import casadi as ca
+import pytest
+
+import symfric as sf
+from symfric.multibody import Mechanism
+from symfric.scenes import Rabinowicz
+
+BELT = sf.rabinowicz(sf.BrownMcPhee())
+DRIVEN = sf.drive(sf.BrownMcPhee())
+STUMBLES: dict[str, tuple[Any, str]] = {
+    "a scene": (
+        lambda: sf.simulate(Rabinowicz(sf.LuGre()), 1.0),  # type: ignore[arg-type]
+        r"^simulate: expected a model, such as rabinowicz\(LuGre\(\)\), got Rabinowicz.*; "
+        r"call its model\(\)",
+    ),
+    "a law": (lambda: sf.flow(sf.LuGre()), "put the law in a scene"),  # type: ignore[arg-type]
+    "a mechanism": (
+        lambda: sf.simulate(Mechanism("m"), 1.0),  # type: ignore[arg-type]
+        r"call its build\(\)",
+    ),
+    "a class": (lambda: sf.rabinowicz(sf.LuGre), "got the class LuGre"),  # type: ignore[arg-type]
+    "a parameter that is fixed": (
+        lambda: sf.simulate(BELT, 1.0, p={"mu_s": 0.2}),
+        r"^model 'rabinowicz' p: expected no names, got mu_s; free it when the model is made, as "
+        r'in rabinowicz\(law, free=\["mu_s"\]\)$',
+    ),
+    "math in an input": (
+        lambda: sf.simulate(DRIVEN, 1.0, u={"force": lambda t: math.sin(t)}),  # type: ignore
+        r"^input 'force': expected a function of the symbolic time .* write casadi.sin\(t\) for m",
+    ),
+    "if in an input": (
+        lambda: sf.simulate(DRIVEN, 1.0, u={"force": lambda t: 1.0 if t > 0 else 0.0}),
+        r"got RuntimeError \(Cannot compute the truth .*casadi.if_else\(t > 1, a, b\) for a Python",
+    ),
+    "a text as names": (lambda: sf.rabinowicz(sf.LuGre(), free="mu_s"), r"write \['mu_s'\]"),
+    "MX in a model": (
+        lambda: sf.Output(ca.MX.sym("x"), "m"),  # type: ignore[arg-type]
+        "models are written with casadi.SX",
+    ),
+    "a method's name": (lambda: sf.simulate(BELT, 1.0, method="rodas5"), "did you mean rodas5p"),
+    "a law's name": (
+        lambda: sf.law_from_text("lugree"),
+        r"^law 'lugree': expected one of \d+ known names, got lugree; did you mean lugre\?$",
+    ),
+}
+
+
+@pytest.mark.parametrize("stumble", STUMBLES)
+def test_who_stumbles_is_told_the_way_out(stumble: str) -> None:
+    call, message = STUMBLES[stumble]
+    with pytest.raises(ValueError, match=message):
+        call()
