@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import pi
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import casadi as ca
 
@@ -175,7 +175,13 @@ class UserConstraint(Constraint):
     def held(self, kin: Kinematics, joints: dict[str, Joint]) -> Held:
         """The expressions, and their derivatives by the pose of every body."""
         probe = _probe(kin)
-        phi = ca.SX(self.expression(probe))
+        given: Any = self.expression(probe)
+        try:
+            phi = ca.SX(ca.vertcat(*given) if isinstance(given, tuple | list) else given)
+        except (NotImplementedError, RuntimeError):
+            return impossible(f"expression: expected one or a column of them, got {given!r}")
+        if phi.is_empty() or phi.size2() != 1:
+            return impossible(f"expression: expected one or a column of them, got {phi.shape}")
         moving = (m for name, m in probe.motion.items() if name != GROUND)
         rates = [x for m in moving for x in (m.w_B, m.v_B, m.dw_B, m.dv_B)]
         if ca.depends_on(phi, ca.vertcat(kin.qd, *rates)):

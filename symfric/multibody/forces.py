@@ -8,15 +8,16 @@ conservative, power = -dV/dt (a test checks it for every force).
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, fields
-from typing import final
+from typing import Any, final
 
 import casadi as ca
 
+from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, equals, is_number, is_symbolic
 from symfric.multibody.body import GROUND
 from symfric.multibody.joint import Joint
 from symfric.multibody.kinematics import Kinematics
-from symfric.multibody.spatial import Vector, vector
+from symfric.multibody.spatial import Vector, is_finite, is_vector, vector
 from symfric.multibody.topology import body_of
 
 ZERO = ca.SX(3, 1)
@@ -241,6 +242,14 @@ class UserForce(Force):
 
     def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
         """Force and moment as the user's expression gives them."""
-        force, moment = self.expression(kin)
+        given: Any = self.expression(kin)
+        pair = given if isinstance(given, tuple | list) and len(given) == 2 else (None, None)
+        if not all(is_vector(part) and is_finite(vector(part)) for part in pair):
+            raise checks.refused(
+                f"force '{self.name}' > expression",
+                "a force and a moment, three numbers or expressions each",
+                given,
+            )
+        force, moment = map(vector, pair)
         at, arm = kin.point(self.place)[0], kin.offset(self.place)
-        yield Load(body_of(self.place), vector(force), at, vector(moment), arm)
+        yield Load(body_of(self.place), force, at, moment, arm)

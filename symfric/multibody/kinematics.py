@@ -97,7 +97,10 @@ class Kinematics:
 
     def point(self, place: str) -> tuple[ca.SX, ca.SX]:
         """Position and velocity in the world of the origin of the frame "body.frame"."""
-        return self.motion[body_of(place)].point(frame_at(self.topology.bodies, place).p)
+        body, _, frame = place.partition(".")
+        if body not in self.motion or frame not in self.topology.bodies[body].frames:
+            raise ValueError(f"kinematics: expected a place 'body.frame', got {place}")
+        return self.motion[body].point(self.offset(place))
 
     def offset(self, place: str) -> ca.SX:
         """Position of the frame "body.frame" on its body, in the body's components."""

@@ -77,7 +77,9 @@ def _misfits(made: Prepared, at: checks.Position) -> Iterator[str]:
         return
     speed = J @ made.qd0 + phi_t[:, 0]
     worst = int(np.abs(speed).argmax())
-    if abs(speed[worst]) > checks.FITS * max(1.0, float(np.abs(made.qd0).max())):
+    if not np.isfinite(speed).all():
+        yield f"start: expected a finite velocity of {made.labels[worst]}, got {speed[worst]:.3g}"
+    elif abs(speed[worst]) > checks.FITS * max(1.0, float(np.abs(made.qd0).max())):
         near = made.qd0 - np.linalg.lstsq(J, speed, rcond=None)[0]
         pairs = zip(made.qd, near, strict=True)
         yield (

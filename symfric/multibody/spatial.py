@@ -35,6 +35,12 @@ def is_vector(values: Any) -> bool:
     return hasattr(values, "__len__") and len(values) == 3 and all(map(is_scalar, values))
 
 
+def is_finite(values: ca.SX) -> bool:
+    """Whether the numbers among the entries of `values` are finite."""
+    entries = (ca.SX(entry) for entry in ca.vertsplit(ca.densify(values)))
+    return all(not entry.is_constant() or abs(float(entry)) < ca.inf for entry in entries)
+
+
 def is_scalar(value: Any) -> bool:
     """Whether `value` is a finite number or one symbol."""
     if is_number(value):

@@ -9,6 +9,7 @@ from symfric.bench.problems import (
     pleiades,
     ring_modulator,
     robertson,
+    squeezer,
     transistor_amplifier,
     van_der_pol,
 )
@@ -26,6 +27,7 @@ PROBLEMS: tuple[Problem, ...] = tuple(
         pleiades,
         ring_modulator,
         andrews,
+        squeezer,
         car_axis,
     )
 )

@@ -25,12 +25,14 @@ class Trial:
         error: estimate of its error; None from a method of fixed steps.
         dense: coefficients d_1, d_2, ... of the dense output (see `Dense`).
         corrections: the last two Newton corrections of `end`; empty where nothing is iterated.
+        shift: what `end` was moved by to lie on the constraints of a mechanism; None without any.
     """
 
     end: Any
     error: Any = None
     dense: tuple[Any, ...] = ()
     corrections: tuple[Any, ...] = ()
+    shift: Any = None
 
 
 Trials = Callable[[Any, Any, Any], Trial]

@@ -25,6 +25,10 @@ SAFETY, GROW, SHRINK = 0.85, 8.0, 0.2
 E_FLOOR = 1e-6
 """Smallest error the controller believes."""
 
+FAR = 100.0
+"""Beyond so many tolerances a shift onto the constraints is none of the method's error: near a
+singular position it is a leap onto another branch."""
+
 KAPPA = 0.1
 """What Newton's method may leave over, in units of the tolerance."""
 
@@ -46,7 +50,8 @@ def steps(system: System, method: Method) -> Trials:
 
     def projected(y: Any, h: Any, d: Any) -> Trial:
         found = free(y, h, d)
-        return replace(found, end=manifold.project(found.end, d))
+        end = manifold.project(found.end, d)
+        return replace(found, end=end, shift=end - found.end)
 
     return projected
 
@@ -163,6 +168,7 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
     sound = e2 <= 1e20
     if system.manifold is not None and system.manifold.m:
         sound = ca.logic_and(sound, system.manifold.branch(y, y_new, d) > 0)
+        sound = ca.logic_and(sound, norm(trial.shift) < FAR**2)
     obstacle = obstacles(system, method)
     if obstacle is not None:
         sound = ca.logic_and(sound, ca.logic_not(obstacle(y_new, h, d) < 0))

@@ -66,7 +66,8 @@ class Tangent:
 
     def trial(self, found: Trial, y: Any, h: Any, d: Any, data: Any) -> Trial:
         """What a method made of a step in the chart, in the unknowns of the mechanism."""
-        end = self.polish(self.leave(found.end, data), d)
+        free = self.leave(found.end, data)
+        end = self.polish(free, d)
         dense = [self.lift(row, data) for row in found.dense]
         for i, column in enumerate(self.bend(y, end, h, data)[: len(dense)]):
             dense[i] = dense[i] + column
@@ -75,6 +76,7 @@ class Tangent:
             None if found.error is None else self.lift(found.error, data),
             tuple(dense),
             corrections=tuple(self.lift(change, data) for change in found.corrections),
+            shift=end - free,
         )
 
 

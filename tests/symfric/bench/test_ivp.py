@@ -9,12 +9,13 @@ import pytest
 from symfric import Model, Variable
 from symfric.bench import bench_ivp
 from symfric.bench.ivp import IvpBenchmark, IvpRow, correct_digits, measure
-from symfric.bench.problems import PROBLEMS, andrews, hires, ring_modulator
+from symfric.bench.problems import PROBLEMS, andrews, hires, ring_modulator, squeezer
 from symfric.bench.problems.problem import Problem
 from symfric.cli import main
 from symfric.integrator.simulate import simulate
 
-CHEAP = tuple(p for p in PROBLEMS if p is not ring_modulator.PROBLEM)
+CHEAP = tuple(p for p in PROBLEMS if p not in (ring_modulator.PROBLEM, squeezer.PROBLEM))
+"""The squeezer of joints is measured among mechanisms, in `multibody/test_iftomm.py`."""
 LATE = {("car axis", "rodas5p"): 4, ("ring modulator", "rodas5p"): 4}
 """What reaches fewer digits than wanted at rtol 1e-6: fast oscillations add up their phases."""
 MOST_STEPS = {
@@ -81,7 +82,7 @@ def test_failure_is_a_row_that_says_why() -> None:
 
 
 def test_every_problem_names_its_source_and_wants_digits() -> None:
-    assert len({p.name for p in PROBLEMS}) == len(PROBLEMS) == 10
+    assert len({p.name for p in PROBLEMS}) == len(PROBLEMS) == 11
     for problem in PROBLEMS:
         assert "Test Set" in problem.source
         assert set(problem.digits) == {1e-6, 1e-10}
