@@ -119,7 +119,9 @@ def read_urdf(
     if law is not None and equals(level, 0.0) and not any(joint.friction for joint in moved):
         left.append(f"{type(law).__name__}, because no joint has <dynamics friction>")
     changes = [f"{old} to {new}" for old, new in names.changed.items()]
+    still = grounded and not moved and weights[urdf.root].mass > 0
     texts = [
+        ("nothing moves", [f"floating=True frees the root '{urdf.root}'"] if still else []),
         ("taken as it is", urdf.doubts),
         ("held at zero, because they move no mass", [f"joint '{name}'" for name in held]),
         ("left out", left),

@@ -317,6 +317,11 @@ def test_mass_matrix_may_have_zeros_on_one_side_only() -> None:
     assert found[2:] == pytest.approx(np.linalg.solve(M, -bias), rel=1e-12)
 
 
+def test_a_single_body_is_told_how_it_moves() -> None:
+    with pytest.warns(UserWarning, match="nothing moves: floating=True frees the root 'world'"):
+        read_urdf(f"<robot name='r'>{bar('world', HEAVY)}</robot>")
+
+
 def test_bearing_of_a_fixed_joint_is_refused() -> None:
     with pytest.raises(ValueError, match="'dumb bell' bearings: expected one of spin, got weld"):
         read_urdf(WELDED, bearings={"weld": JointFriction(Coulomb(), radius=0.01)})
