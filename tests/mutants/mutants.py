@@ -340,7 +340,44 @@ CACHES = (
     Mutant("a file cut short is taken", STORE, "and status.st_size == size", "", T_STORE),
 )  # fmt: skip
 
+LEFT_OUT = (
+    Mutant(
+        "the newest integrator is forgotten", BUILT,
+        "del known[next(iter(known))]", "del known[next(reversed(known))]", T_BUILT,
+    ),
+    Mutant(
+        "code of a compiler that was replaced is loaded", COMPILED,
+        "FLAGS, binary.st_size, binary.st_mtime_ns)", "FLAGS)", T_COMPILED,
+    ),
+    Mutant(
+        "code compiled with other flags is loaded", COMPILED,
+        "(compiler.command, FLAGS,", "(compiler.command,", T_COMPILED,
+    ),
+    Mutant(
+        "gaps that grow again are a storm", EVENTS,
+        "if not alike or not (gaps[1:] < gaps[:-1]).all():", "if not alike:", T_EVENTS,
+    ),
+    Mutant(
+        "pulses of inputs are leapt over", "symfric/integrator/equations/onsets.py",
+        "if abs(level[i] - last) >= LEVELS:", "if abs(level[i] - last) >= 99:",
+        ("tests/symfric/integrator/equations/test_onsets.py",),
+    ),
+    Mutant(
+        "a fit takes trials that are worse", "identification/descent.py",
+        "elif trial.cost < point.cost:", "else:", ("tests/identification/test_descent.py",),
+    ),
+    Mutant(
+        "an ensemble of other inputs is taken over", "symfric/integrator/many/chunk.py",
+        "digest(*(getattr(self, f.name) for f in fields(self)))",
+        'digest(*(getattr(self, f.name) for f in fields(self) if f.name != "data"))', T_STORE,
+    ),
+    Mutant(
+        "members go into the rows before theirs", STORE,
+        "+ 8 * first * self.shape[1])", "+ 8 * max(0, first - 1) * self.shape[1])", T_STORE,
+    ),
+)  # fmt: skip
+
 MUTANTS = (
     *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
-    *CACHES,
+    *CACHES, *LEFT_OUT,
 )  # fmt: skip
