@@ -23,7 +23,7 @@ sys.path.insert(0, str(HERE))
 from mutants import MUTANTS, Mutant  # noqa: E402  (a script finds its neighbour)
 
 PACKAGES = ("symfric", "ocp", "identification", "tests", "examples")
-LIMIT = 300.0
+LIMIT = 120.0
 """Seconds after which tests count as hanging, which kills a mutant, too."""
 
 

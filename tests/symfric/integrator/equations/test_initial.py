@@ -105,6 +105,19 @@ def test_many_start_as_each_one_alone() -> None:
     assert sorted(failed) == [2, 4]
 
 
+def test_members_whose_residual_would_grow_take_the_same_branch_as_alone() -> None:
+    """z^3 = z from 0.45: full steps overshoot and end at -1, where damped ones find the near 0."""
+    z = Variable("z", "1")
+    model = Model("cubic", x=(x,), z=(z,), ode=-x.symbol, alg=z.symbol**3 - z.symbol)
+    system, guesses = assemble(model), np.array([0.45, 0.46, 0.9])
+    y, none = np.column_stack([np.ones(3), guesses]), np.zeros((3, 0))
+    found, failed = consistent_many(system, Columns(system.constraints), "here", y, none)
+    assert not failed
+    alone = [consistent(system, "here", y[m], none[m])[1] for m in range(3)]
+    assert found[:, 1] == pytest.approx(alone, abs=1e-12)
+    assert found[:, 1] == pytest.approx([0.0, 0.0, 1.0], abs=1e-12)
+
+
 def test_bristle_starts_in_steady_sliding() -> None:
     """At -0.1 m/s far above the Stribeck velocity: z = -mu_d N / sigma_0."""
     run = simulate(rabinowicz(LuGre()), 1e-3)
