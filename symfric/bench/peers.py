@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.bench.contenders import FASTEST
 from symfric.foundation.numeric import flat_view
 from symfric.integrator.compiled.compiler import library
 from symfric.integrator.equations.inputs import input_data
@@ -68,7 +69,7 @@ def casadi(model: Model, times: Array, rtol: float, plugin: str, compiled: bool)
 def _external(solver: ca.Function, name: str) -> ca.Function:
     generator = ca.CodeGenerator(f"{name}.c")
     generator.add(solver)
-    return ca.external(name, str(library(generator.dump(), name)))
+    return ca.external(name, str(library(generator.dump(), name, flags=FASTEST)))
 
 
 def scipy(model: Model, times: Array, rtol: float, method: str) -> Solve:

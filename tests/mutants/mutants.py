@@ -312,7 +312,7 @@ CACHES = (
     ),
     Mutant(
         "the compiler is left out of the hash", COMPILED,
-        "(compiler.command, FLAGS, binary.st_size", "(FLAGS, binary.st_size", T_COMPILED,
+        "(compiler.command, flags, binary.st_size", "(flags, binary.st_size", T_COMPILED,
     ),
     Mutant("compiled code is never evicted", KEPT, "                    path.unlink()",
         "                    pass", T_KEPT),

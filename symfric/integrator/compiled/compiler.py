@@ -24,13 +24,13 @@ has none left would take a third of the compiler's time."""
 _close: Callable[[int], None] | None = getattr(sys.modules["_ctypes"], "dlclose", None)
 
 
-def key_of(source: str, compiler: Compiler) -> str:
+def key_of(source: str, compiler: Compiler, flags: tuple[str, ...]) -> str:
     """Hash of the source, the compiler (path, size, time), its flags and the machine.
 
     Code of another kind is never loaded, and a shared home does not mix processors.
     """
     binary = Path(compiler.command[0]).stat()
-    made_by = (compiler.command, FLAGS, binary.st_size, binary.st_mtime_ns)
+    made_by = (compiler.command, flags, binary.st_size, binary.st_mtime_ns)
     machine = (sys.platform, platform.machine(), processor())
     return hashlib.sha256(repr((source, made_by, machine)).encode()).hexdigest()[:32]
 
@@ -50,7 +50,7 @@ def compiled_before(source: str) -> Path | None:
     compiler = find_compiler()
     if compiler is None:
         return None
-    key = key_of(source, compiler)
+    key = key_of(source, compiler, FLAGS)
     return next((path for place in caches() if (path := place.find(key))), None)
 
 
@@ -59,7 +59,7 @@ def load(source: str, *names: str) -> ctypes.CDLL:
     return opened(library(source, *names), names)
 
 
-def library(source: str, *names: str) -> Path:
+def library(source: str, *names: str, flags: tuple[str, ...] = FLAGS) -> Path:
     """The shared library of `source`, which defines `names`, compiled unless a cache holds it.
 
     Several processes may do this at once: a file appears whole, under its final name.
@@ -71,12 +71,12 @@ def library(source: str, *names: str) -> Path:
     compiler = find_compiler()
     if compiler is None:
         raise no_compiler()
-    key, problems = key_of(source, compiler), list[str]()
+    key, problems = key_of(source, compiler, flags), list[str]()
     for place in caches():
         known = place.find(key)
         try:
             if known is None:
-                known = _made(place, key, source, compiler, names)
+                known = _made(place, key, source, (compiler, flags), names)
             opened(known, names)
             return known
         except OSError as error:
@@ -87,11 +87,18 @@ def library(source: str, *names: str) -> Path:
     )
 
 
-def _made(place: Cache, key: str, source: str, compiler: Compiler, names: tuple[str, ...]) -> Path:
-    """The library of `source`, compiled into a cache."""
+def _made(
+    place: Cache,
+    key: str,
+    source: str,
+    how: tuple[Compiler, tuple[str, ...]],
+    names: tuple[str, ...],
+) -> Path:
+    """The library of `source`, compiled into a cache by a compiler with its flags."""
+    compiler, flags = how
     with place.new(key) as temporary:
         folder = {name: str(place.folder) for name in ("TMPDIR", "TMP", "TEMP")}
-        arguments = (*FLAGS, "-x", "c", "-", "-o", str(temporary), "-lm")
+        arguments = (*flags, "-x", "c", "-", "-o", str(temporary), "-lm")
         try:
             compiler.run(*arguments, code=source, variables=folder)
         except CompileError as error:

@@ -76,26 +76,26 @@ def test_all_that_the_code_depends_on_is_in_its_name(
     """Source, compiler and its age, options, flags, machine and processor."""
     program = tmp_path / "cc"
     program.write_bytes(b"one")
-    cc = Compiler((str(program),))
-    keys = [key_of(SOURCE, cc), key_of(SOURCE + " ", cc)]
-    keys.append(key_of(SOURCE, Compiler((*cc.command, "-O3"))))
+    cc, flags = Compiler((str(program),)), compiler.FLAGS
+    keys = [key_of(SOURCE, cc, flags), key_of(SOURCE + " ", cc, flags)]
+    keys.append(key_of(SOURCE, Compiler((*cc.command, "-O3")), flags))
     other = tmp_path / "other"
     other.write_bytes(b"one")
-    keys.append(key_of(SOURCE, Compiler((str(other),))))
+    keys.append(key_of(SOURCE, Compiler((str(other),)), flags))
     os.utime(program, (1, 1))
-    keys.append(key_of(SOURCE, cc))
+    keys.append(key_of(SOURCE, cc, flags))
     program.write_bytes(b"four")
     os.utime(program, (1, 1))
-    keys.append(key_of(SOURCE, cc))
-    assert keys[-1] == key_of(SOURCE, cc)
+    keys.append(key_of(SOURCE, cc, flags))
+    assert keys[-1] == key_of(SOURCE, cc, flags)
+    keys.append(key_of(SOURCE, cc, (*flags, "-g")))
     for owner, name, value in (
-        (compiler, "FLAGS", (*compiler.FLAGS, "-g")),
         (compiler, "processor", lambda: "flags : fpu sse"),
         (compiler.platform, "machine", lambda: "aarch64"),
         (compiler.sys, "platform", "plan9"),
     ):
         monkeypatch.setattr(owner, name, value)
-        keys.append(key_of(SOURCE, cc))
+        keys.append(key_of(SOURCE, cc, flags))
     assert len(set(keys)) == len(keys)
 
 
@@ -117,7 +117,7 @@ def test_a_library_of_others_is_not_loaded(monkeypatch: pytest.MonkeyPatch, fold
     made = library("int answer(void) { return 666; }", "answer")
     found = find_compiler()
     assert found is not None
-    key = key_of(SOURCE, found)
+    key = key_of(SOURCE, found, compiler.FLAGS)
     planted = folder / f"{key}-{made.stem.split('-')[1]}.so"
     made.rename(planted)
     assert compiled_before(SOURCE) == planted
