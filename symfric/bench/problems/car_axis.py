@@ -40,13 +40,16 @@ def springs(p: ca.SX, t: ca.SX) -> ca.SX:
 
 
 def model() -> Model:
-    """Positions of both ends of the axle, their rates, accelerations and two multipliers."""
+    """Positions of both ends of the axle, their rates, accelerations and two multipliers.
+
+    One end moves by 3 mm only: that is what is small.
+    """
     starts = {"xl": 0.0, "yl": 0.5, "xr": 1.0, "yr": 0.5}
     rates = {"xl": -0.5, "yl": 0.0, "xr": -0.5, "yr": 0.0}
-    positions = tuple(Variable(n, "m", start=starts[n], nominal=0.1) for n in NAMES)
-    velocities = tuple(Variable(f"{n}_dot", "m/s", start=rates[n], nominal=0.1) for n in NAMES)
-    accelerations = tuple(Variable(f"{n}_ddot", "m/s^2") for n in NAMES)
-    multipliers = tuple(Variable(f"lam_{i}", "N", nominal=1e-3) for i in (1, 2))
+    positions = tuple(Variable(n, "m", start=starts[n], nominal=1e-3) for n in NAMES)
+    velocities = tuple(Variable(f"{n}_dot", "m/s", start=rates[n], nominal=1e-3) for n in NAMES)
+    accelerations = tuple(Variable(f"{n}_ddot", "m/s^2", nominal=1e-2) for n in NAMES)
+    multipliers = tuple(Variable(f"lam_{i}", "N", nominal=1e-5) for i in (1, 2))
     p, v, a, lam = (
         ca.vertcat(*(w.symbol for w in group))
         for group in (positions, velocities, accelerations, multipliers)
