@@ -112,7 +112,7 @@ def _accuracy(result: "MultibodyBenchmark") -> None:
             [r.case, r.t, r.signal, f"{r.reference:.9g}", _short(r.value - r.reference), r.digits]
             for r in result.facts
         ],
-        "Published numbers and what ours differ by; digits: what they are good for",
+        "Reference numbers and what ours differ by; digits: what they are good for",
     )
     output.show_table(
         ["case", "coordinates", "phi [m]", "phi_dot, relative", "phi_ddot, relative"],

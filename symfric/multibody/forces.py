@@ -6,7 +6,7 @@ conservative, power = -dV/dt (a test checks it for every force).
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, final
 
@@ -243,13 +243,13 @@ class UserForce(Force):
     def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
         """Force and moment as the user's expression gives them."""
         given: Any = self.expression(kin)
-        pair = given if isinstance(given, tuple | list) and len(given) == 2 else (None, None)
-        if not all(is_vector(part) and is_finite(vector(part)) for part in pair):
+        pair: Sequence[Any] = given if isinstance(given, tuple | list) else ()
+        if len(pair) != 2 or not all(is_vector(x) and is_finite(vector(x)) for x in pair):
             raise checks.refused(
                 f"force '{self.name}' > expression",
                 "a force and a moment, three numbers or expressions each",
                 given,
             )
-        force, moment = map(vector, pair)
+        force, moment = vector(pair[0]), vector(pair[1])
         at, arm = kin.point(self.place)[0], kin.offset(self.place)
         yield Load(body_of(self.place), force, at, moment, arm)

@@ -6,7 +6,7 @@ from symfric.bench.facts import Fact, drifts, facts, norms
 
 
 @pytest.mark.parametrize("fact", facts(), ids=lambda f: f"{f.case}-{f.signal}-{f.t:g}")
-def test_published_numbers_are_met_to_their_digits(fact: Fact) -> None:
+def test_reference_numbers_are_met_to_their_digits(fact: Fact) -> None:
     assert fact.value == pytest.approx(fact.reference, abs=fact.digits)
 
 
