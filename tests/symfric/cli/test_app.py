@@ -115,6 +115,14 @@ def test_an_interrupt_while_everything_is_imported_is_one_sentence() -> None:
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "symfric: interrupted\n")
 
 
+def test_no_summary_of_a_command_is_cut(capsys: pytest.CaptureFixture[str]) -> None:
+    """At 80 columns `codegen`, `bench` and others ended in dots."""
+    assert main(["--help"]) == 0
+    shown = capsys.readouterr().out
+    assert "codegen" in shown
+    assert "..." not in shown.partition("Commands:")[2]
+
+
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"symfric {symfric.__version__}\n"
