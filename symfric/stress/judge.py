@@ -273,7 +273,10 @@ def amplification(ready: Problem, reference: Trajectory, limit: int) -> float:
         times, ends = ready.times[k:], list[Array]()
         for added in (0.0, 1.0):
             start = dict(zip(names, (y[:, k] + added * size[:, 0]).tolist(), strict=True))
-            run = _run(ready, ready.case.rtol / 100, _third(ready.case), limit, start, times)
+            try:
+                run = _run(ready, ready.case.rtol / 100, _third(ready.case), limit, start, times)
+            except ValueError:  # no algebraic unknowns found for the states on the way
+                return float("inf")
             if isinstance(run, SolveError):
                 return float("inf")
             ends.append(_table(run, times))

@@ -58,5 +58,7 @@ def by_scipy(ready: Problem) -> Array | None:
             return None
         if not done.success:
             return None
-        found[:, here], x = done.sol(times[here]), done.y[:, -1]
+        x = done.y[:, -1]
+        if here.any():
+            found[:, here] = done.sol(times[here])
     return found
