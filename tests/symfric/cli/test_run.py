@@ -188,7 +188,7 @@ def test_what_a_robot_leaves_out_is_warned_about(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (None, "arm.urdf': No such file or directory"),
+        (None, "arm.urdf': expected a file, got nothing there"),
         ("<robot>", "expected XML, got no element found"),
         (SMALL.replace("0 1 0", "0 1"), "urdf 'small' > joint 'hinge' > axis: expected 3 numbers"),
     ],
