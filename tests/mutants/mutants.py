@@ -347,11 +347,11 @@ LEFT_OUT = (
     ),
     Mutant(
         "code of a compiler that was replaced is loaded", COMPILED,
-        "FLAGS, binary.st_size, binary.st_mtime_ns)", "FLAGS)", T_COMPILED,
+        "flags, binary.st_size, binary.st_mtime_ns)", "flags)", T_COMPILED,
     ),
     Mutant(
         "code compiled with other flags is loaded", COMPILED,
-        "(compiler.command, FLAGS,", "(compiler.command,", T_COMPILED,
+        "(compiler.command, flags,", "(compiler.command,", T_COMPILED,
     ),
     Mutant(
         "gaps that grow again are a storm", EVENTS,
