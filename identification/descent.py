@@ -1,14 +1,14 @@
 """Nonlinear least squares inside a box, with an end that says what was reached.
 
-    minimise 1/2 r'r,   step s: (J'J + damping diag(J'J)) s = -J'r
+    minimise 1/2 r'r,   step s: the smallest |r + J s| with |s| <= radius
 
-Levenberg's and Marquardt's step, in which no coordinate moves by more than `REACH` at once.
-Whether the end is a minimum is judged by what a whole Gauss-Newton step would still gain, never by
-the size of a damped one:
+The radius of trust grows where the fall of the cost was what the derivatives promised, and shrinks
+where it was not. Whether the end is a minimum is judged by what a whole Gauss-Newton step would
+still gain, never by the size of a short one:
 
     fall = max over s of  r'r - |r + J s|^2     in the coordinates that no bound holds
 
-Source: J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630, 1978.
+Source: J. Nocedal, S. J. Wright, Numerical Optimization, 2nd ed., 2006, chapters 4 and 10.
 """
 
 from collections.abc import Callable
@@ -21,16 +21,16 @@ from numpy.typing import NDArray
 from identification.data import Array
 from symfric.foundation.status import Status
 
-REACH = 1.5
-"""Largest change of a coordinate in one step: of a logarithmic one a factor of 4.5."""
+START, NOWHERE = 1.0, 1e-12
+"""Radius of trust at the start, and below which there is no step."""
+POOR, GOOD = 0.25, 0.75
+"""Shares of the promised fall below which the radius shrinks, above which it grows."""
 GAIN = 1e-10
 """Fall of the cost, relative to it, below which nothing is left to gain."""
 NEAR = 0.1
 """Length of the last step, in standard errors, that is near enough where no trial does better."""
 FAR = 15.0
 """Longest step that is believed in: of a logarithmic coordinate a factor of three million."""
-START, MORE, LESS, STUCK = 1e-3, 5.0, 10.0, 1e12
-"""Damping at the start, its growth after a trial that fails, its fall after a good one, its end."""
 AT_BOUND = 1e-9
 """Distance to a bound below which a coordinate stands there."""
 
@@ -86,7 +86,7 @@ def descend(
             that it can hide are not asked for.
         steps: allowed.
     """
-    point, damping = start, START
+    point, radius = start, START
     for count in range(steps + 1):
         free = ~_held(point, low, high)
         fall = remaining(point, free)
@@ -94,10 +94,10 @@ def descend(
             return Descent(point, Status.SOLVED, count)
         if count == steps:
             break
-        found = _lower(at, point, free, (low, high), damping)
+        found = _lower(at, point, free, (low, high), radius)
         if isinstance(found, str):
             return Descent(point, *_verdict(point, fall, rounding, count, found))
-        point, damping = found
+        point, radius = found
     return Descent(point, Status.MAX_ITERATIONS, steps)
 
 
@@ -131,29 +131,53 @@ def _lower(
     point: Point,
     free: NDArray[np.bool_],
     box: tuple[Array, Array],
-    damping: float,
+    radius: float,
 ) -> tuple[Point, float] | str:
-    """The next point with its damping; why there is none."""
-    g, normal = point.J.T @ point.r, point.J.T @ point.J
-    weight = np.where(np.diag(normal) > 0, np.diag(normal), 1.0)
+    """The next point with its radius of trust; why there is none."""
     failed, tried, why = 0, 0, ""
-    while damping < STUCK:
-        matrix = (normal + np.diag(damping * weight))[np.ix_(free, free)]
+    parts = np.linalg.svd(point.J[:, free], full_matrices=False)
+    while radius > NOWHERE:
         step = np.zeros(point.w.size)
-        step[free] = -np.linalg.solve(matrix, g[free])
-        step *= min(1.0, REACH / max(float(np.abs(step).max()), 1e-300))
+        step[free] = _step(*parts, point.r, radius)
         w = np.clip(point.w + step, *box)
-        if (w == point.w).all():
+        taken = w - point.w
+        length = float(np.linalg.norm(taken))
+        if not length:
             break
         trial, tried = at(w), tried + 1
         if isinstance(trial, str):
-            failed, why = failed + 1, trial
-        elif trial.cost < point.cost:
-            return trial, damping / LESS
-        damping *= MORE
+            failed, why, radius = failed + 1, trial, length / 4
+            continue
+        promised = point.cost - float(np.sum((point.r + point.J @ taken) ** 2))
+        kept = (point.cost - trial.cost) / promised if promised > 0 else 0.0
+        if not kept > POOR:
+            radius = length / 4
+        elif kept > GOOD and length > 0.9 * radius:
+            radius = min(2 * radius, FAR)
+        if trial.cost < point.cost:
+            return trial, radius
     if not why:
         return f"all {tried} trials fit worse, so the derivatives do not describe the motion there"
     return f"{failed} of {tried} trials could not be simulated, the last because {why}"
+
+
+def _step(u: Array, s: Array, vt: Array, r: Array, radius: float) -> Array:
+    """The s that makes |r + J s| smallest with |s| <= radius, for J = u diag(s) vt."""
+    part, size = u.T @ r, np.maximum(s, 1e-300)
+
+    def length(damping: float) -> float:
+        return float(np.linalg.norm(part * size / (size**2 + damping)))
+
+    whole = s > 1e-14 * float(s.max(initial=0.0))
+    if float(np.linalg.norm((part / size)[whole])) <= radius:
+        return -vt.T @ np.where(whole, part / size, 0.0)
+    low, high = 0.0, float(np.linalg.norm(part * size)) / radius
+    for _ in range(60):
+        middle = (low + high) / 2 if low == 0.0 else float(np.sqrt(low * high))
+        low, high = (middle, high) if length(middle) > radius else (low, middle)
+        if high - low < 1e-3 * high:
+            break
+    return -vt.T @ (part * size / (size**2 + high))
 
 
 def _held(point: Point, low: Array, high: Array) -> NDArray[np.bool_]:

@@ -2,8 +2,8 @@
 
     minimise 1/2 sum_s sum_i ((y_s(t_i; p) - measured_s(t_i)) / scale_s)^2
 
-by Levenberg's and Marquardt's method (`identification.descent`) with the derivatives of the steps
-that the simulation took. It takes what `identify` does not: laws with states, several bodies,
+by Gauss-Newton steps in a region of trust (`identification.descent`) with the derivatives of the
+steps that the simulation took. It takes what `identify` does not: laws with states, several bodies,
 friction from reactions. Parameters that cannot be negative are fitted by their logarithm, because
 nobody knows their scale (a bristle's stiffness may be 1e3 or 1e8 N/m); the others by their value.
 """
@@ -169,7 +169,7 @@ def identify_motion(
     x0: Mapping[str, float] | None = None,
     u: Mapping[str, Input] | None = None,
     rtol: float = 1e-8,
-    iterations: int = 50,
+    iterations: int = 200,
     throw: bool = True,
 ) -> MotionFit:
     """Fit free parameters of a model to signals measured over a motion.

@@ -1,5 +1,7 @@
 """Least squares end at a minimum, or say why they do not."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -119,3 +121,28 @@ def test_no_fall_is_promised_by_a_coordinate_without_influence() -> None:
 def test_steps_run_out() -> None:
     end = descend(decay, decay(np.array([0.3, 3.0])), -FREE, FREE, 0.0, 2)
     assert (end.status, end.steps) == (Status.MAX_ITERATIONS, 2)
+
+
+def test_a_valley_is_followed_and_no_step_leaves_the_region_of_trust() -> None:
+    """Rosenbrock's function from the usual start; each trial within the radius that was trusted."""
+    tried = [np.array([-1.2, 1.0])]
+
+    def valley(w: Array) -> Point:
+        tried.append(w)
+        r = np.array([10 * (w[1] - w[0] ** 2), 1 - w[0]])
+        return Point(w, r, np.array([[-20 * w[0], 10.0], [-1.0, 0.0]]), None)
+
+    end = descend(valley, valley(tried[0]), -FREE, FREE, 0.0, 60)
+    assert end.status is Status.SOLVED
+    assert end.point.w == pytest.approx([1.0, 1.0], abs=1e-6)
+    assert max(np.linalg.norm(b - a) for a, b in pairwise(tried)) < 4.0
+
+
+def test_trust_grows_where_derivatives_keep_their_promise() -> None:
+    """A straight way of 60 from a first step of 1."""
+
+    def line(w: Array) -> Point:
+        return Point(w, w - 60.0, np.eye(1), None)
+
+    end = descend(line, line(np.zeros(1)), -FREE[:1], FREE[:1], 0.0, 12)
+    assert (end.status, end.point.w[0]) == (Status.SOLVED, pytest.approx(60.0))
