@@ -29,8 +29,9 @@ from symfric.model import Model
 from symfric.model.holonomic import Holonomic
 
 Array = NDArray[np.float64]
-DEPENDENT = 1e-5
-"""Ratio of singular values of phi_q at which a mechanism that cannot go on is called singular."""
+DEPENDENT = 1e-4
+"""Ratio of singular values of phi_q at which a mechanism that cannot go on is called singular: at
+tight tolerances rounding stops it that far ahead."""
 PULLING = 1e-3
 """Negative normal forces up to this times their typical size are errors of a step."""
 SHOCK = 1e-3

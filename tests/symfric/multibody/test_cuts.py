@@ -93,12 +93,14 @@ def instructions(links: int, law: Law | None) -> int:
     return block.instructions + 8 * stage
 
 
+@pytest.mark.slow
 def test_cost_of_a_step_grows_with_the_links_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(prepare, "LONG_WITH_FRICTION", 2)
     small, large = (instructions(n, BrownMcPhee()) for n in (12, 24))
     assert np.log2(large / small) < 1.15
 
 
+@pytest.mark.slow
 @each_law
 def test_cuts_are_made_where_they_pay(law: Law | None, monkeypatch: pytest.MonkeyPatch) -> None:
     longest = prepare.LONG if law is None else prepare.LONG_WITH_FRICTION

@@ -233,7 +233,7 @@ def test_friction_in_all_joints_is_the_same_in_both_formulations(reverse: bool) 
         assert motion == pytest.approx(whole.bodies[body], rel=1e-10, abs=1e-10), body
 
 
-@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+@pytest.mark.parametrize("formulation", ["joint", pytest.param("absolute", marks=pytest.mark.slow)])
 def test_friction_in_balls_and_crosses_takes_energy(formulation: str) -> None:
     """A double pendulum in space: what is missing is what friction took."""
     m = Mechanism("double")
