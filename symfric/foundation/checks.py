@@ -109,10 +109,11 @@ def number(
     Raises:
         ValueError: no number, NaN, infinite, or out of bounds.
     """
-    found, unit = as_number(value), f" [{unit}]" * bool(unit)
+    found = as_number(value)
     good = found is not None and isfinite(found) and lower <= found <= upper
     if found is None or not good or (above is not None and not found > above):
-        raise refused(where, _bounded(lower, upper, above) + unit, value, hint)
+        what = _bounded(lower, upper, above) + f" [{unit}]" * bool(unit)
+        raise refused(where, what, value, hint)
     return found
 
 
@@ -146,13 +147,13 @@ def count(
     Raises:
         ValueError: no whole number, or out of bounds.
     """
-    found: int | None = None
-    real = as_number(value)
+    found: int | None = value if type(value) is int and abs(value) < 2**63 else None
+    real = as_number(value) if found is None else None
     if real is not None and isfinite(real) and real == int(real):
         exact = isinstance(value, int | np.integer)
         found = operator.index(value) if exact else int(real)
-    bounds = f" >= {least}" if most is None else f" from {least} to {most}"
     if found is None or found < least or (most is not None and found > most):
+        bounds = f" >= {least}" if most is None else f" from {least} to {most}"
         raise refused(where, f"a whole number{bounds}", value, hint)
     return found
 
@@ -189,7 +190,8 @@ def choice(where: str, value: object, choices: Collection[str]) -> str:
     """`value` as one of the texts in `choices`; the nearest one is offered."""
     if not isinstance(value, str):
         raise refused(where, _one_of(choices), value)
-    check_names(where, [value], choices)
+    if value not in choices:
+        check_names(where, [value], choices)
     return value
 
 
@@ -235,6 +237,8 @@ def names(
     if isinstance(value, str):
         raise refused(where, "a sequence of names", value, f"write [{value!r}]")
     given = many(where, value, "names")
+    if not given:
+        return ()
     for name in given:
         text(where, name, "names")
     if len(set(given)) != len(given):
@@ -311,6 +315,8 @@ def check_names(where: str, given: Iterable[str], known: Collection[str], hint: 
     `hint` is what to do where none is close.
     """
     listed = list(given)
+    if not listed:
+        return
     odd = [name for name in listed if not isinstance(name, str)]  # pyright: ignore[reportUnnecessaryIsInstance]
     if odd:
         raise refused(where, _one_of(known), odd[0])
