@@ -36,7 +36,7 @@ def copied(folder: Path) -> Path:
     return folder
 
 
-def pytest(tree: Path, tests: Sequence[str]) -> tuple[int | None, str]:
+def pytest(tree: Path, tests: Sequence[str], limit: float = LIMIT) -> tuple[int | None, str]:
     """Exit status of the tests in `tree`, None where they find no end, and their last line."""
     # nothing made by one mutant, be it bytecode or compiled C, may meet another
     with TemporaryDirectory(prefix="symfric-mutant-cache-") as cache:
@@ -49,7 +49,7 @@ def pytest(tree: Path, tests: Sequence[str]) -> tuple[int | None, str]:
         try:
             done = subprocess.run(
                 [sys.executable, "-m", "pytest", *options, *tests], cwd=tree, env=environment,
-                capture_output=True, text=True, timeout=LIMIT, check=False,
+                capture_output=True, text=True, timeout=limit, check=False,
             )  # fmt: skip
         except subprocess.TimeoutExpired:
             return None, "no end"
@@ -102,7 +102,7 @@ def main() -> int:
     alive = 0
     with TemporaryDirectory(prefix="symfric-mutants-") as folder:
         trees = [copied(Path(folder) / str(k)) for k in range(max(1, given.workers))]
-        status, said = pytest(trees[0], tests)
+        status, said = pytest(trees[0], tests, LIMIT * len(tests))
         if status != 0:
             print(f"the tests fail without any mutant: {said}")
             return 1
