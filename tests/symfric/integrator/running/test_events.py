@@ -55,6 +55,13 @@ def test_bouncing_ball_hits_the_ground_at_the_times_of_the_closed_form(
     assert run.status is Status.SUCCESS
 
 
+def test_an_expression_that_dips_below_zero_within_one_long_step_is_seen() -> None:
+    """x' = 1 takes steps of most of the span; both ends lie above zero, a quarter below."""
+    dip = Event("dip", (t - 0.5) ** 2 - 0.04)
+    run = simulate(clock(dip), 1.0, rtol=1e-6)
+    assert [time for time, _ in run.happened] == pytest.approx([0.3, 0.7], abs=1e-9)
+
+
 def test_the_step_that_an_event_cuts_keeps_its_polynomial() -> None:
     """sin t up to an event: long steps of high order, the last one cut where the event is."""
     velocity = replace(y, start=1.0, unit="m/s")

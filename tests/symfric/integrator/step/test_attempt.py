@@ -100,6 +100,15 @@ def test_rejected_attempt_changes_nothing_but_the_step_size() -> None:
     assert S[REJECTED] == 1.0
 
 
+def test_what_is_rejected_first_is_hardly_above_the_tolerance() -> None:
+    """A rejected step shrinks to 0.85 h err^(-1/5), which tells err: none above 1 is accepted."""
+    lengths = 0.02 * 1.03 ** np.arange(60)
+    ends = [attempt(smooth_ode(), column((1.0, 1.0), h=h))[[H, REJECTED]] for h in lengths]
+    errors = [(0.85 * h / less) ** 5 for h, (less, no) in zip(lengths, ends, strict=True) if no]
+    assert 0 < len(errors) < lengths.size
+    assert 1.0 < errors[0] < 2.0
+
+
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8, 1e-10])
 def test_step_size_settles_where_the_error_is_just_allowed(rtol: float) -> None:
     """The error of a step goes with h^5 (estimate of order 4), so h goes with rtol^(1/5)."""
