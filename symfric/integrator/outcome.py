@@ -61,10 +61,12 @@ def trajectory_of(
         plain = partial(integrator.of_time, "signals")
         return rows(Columns((plain if drifts else integrator.refined)(expression)), at)
 
-    reached = times[(times >= dense.t0[0]) & (times <= dense.t1[-1])]
+    first, last = dense.t0[0], dense.t1[-1]
+    if times[0] < first or times[-1] > last:
+        times = times[(times >= first) & (times <= last)]
     return Trajectory(
         model.name,
-        reached,
+        times,
         dict(model.signals),
         run.status,
         run.message,

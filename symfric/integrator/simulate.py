@@ -135,10 +135,10 @@ def simulate(
     values = model.values("p", p)
     at_start = (y0, np.concatenate([values, inputs.values[:, 0]]))
     integrator = integrator.suited([at_start], t_end - t_start)
-    run, dense, statistics = _solve(integrator, inputs, y0, values, allowed, backend, progress)
-    trajectory = trajectory_of(
-        integrator, inputs, run, dense, values, looks, replace(statistics, build_time=build_time)
+    run, dense, statistics = _solve(
+        integrator, inputs, y0, values, allowed, backend, progress, build_time
     )
+    trajectory = trajectory_of(integrator, inputs, run, dense, values, looks, statistics)
     if throw and not trajectory.status.ok and trajectory.status is not Status.INTERRUPTED:
         raise SolveError(trajectory.message, trajectory.status, trajectory)
     if which is not None and run.steps:
@@ -164,6 +164,7 @@ def _solve(
     allowed: Tolerances,
     backend: str,
     progress: Callable[[float], None] | None,
+    build_time: float,
 ) -> tuple[Run, Dense, Statistics]:
     """Run the chosen engine."""
     compiled_before, begin = integrator.compile_time, perf_counter()
@@ -180,7 +181,7 @@ def _solve(
         factorisations=run.attempts * factorisations,
         events=len(run.happened),
         smallest_step=run.smallest if run.steps else float(np.min(dense.t1 - dense.t0)),
-        build_time=0.0,
+        build_time=build_time,
         compile_time=compile_time,
         run_time=perf_counter() - begin - compile_time,
     )

@@ -224,6 +224,8 @@ class Model:
         Raises:
             ValueError: no mapping, or a name that is not in the group.
         """
+        if given is None:
+            return {}
         known = [v.name for v in getattr(self, what[0])]
         values = checks.named(f"model '{self.name}' {what}", given)
         fixed = ", ".join(f'"{name}"' for name in values if name not in known)

@@ -22,7 +22,7 @@ from symfric.integrator.running.events import (
     values,
 )
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.sizes import ROUNDS, finer, sizes
+from symfric.integrator.running.sizes import ROUNDS, ample, finer, sizes
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
@@ -111,7 +111,7 @@ def integrate(
         tolerances = replace(tolerances, max_step=PACES * inputs.pace)
     scale, allowed = nominal, tolerances
     run, dense = _integrated(integrator, inputs, y0, p, allowed, backend, progress)
-    for _ in range(ROUNDS if tolerances.follow else 0):
+    for _ in range(ROUNDS if tolerances.follow and not ample(dense, nominal) else 0):
         own = finer(scale, sizes(dense, nominal.size), nominal)
         if own is None or not run.status.ok:
             break

@@ -24,6 +24,11 @@ def sizes(dense: Dense, nx: int) -> Array:
     return np.maximum(np.abs(dense.y0[0, :nx]), np.abs(dense.y1[:, :nx]).max(axis=0))
 
 
+def ample(dense: Dense, nominal: Array) -> bool:
+    """Whether no state ends small: what most runs do, told without a look at all their steps."""
+    return bool((np.abs(dense.y1[-1, : nominal.size]) >= SMALL * nominal).all())
+
+
 def own_scale(size: Array, nominal: Array) -> Array:
     """Typical magnitudes: `nominal`, or the `size` of what moves far less."""
     small = (size < SMALL * nominal) & (size > REST * nominal)
@@ -32,7 +37,5 @@ def own_scale(size: Array, nominal: Array) -> Array:
 
 def finer(scale: Array, size: Array, nominal: Array) -> Array | None:
     """The scale of another run of a motion of this `size`; None where `scale` serves."""
-    if (size >= SMALL * nominal).all():
-        return None
     own = np.minimum(scale, own_scale(size, nominal))
     return own if (own < 0.1 * scale).any() else None
