@@ -88,15 +88,21 @@ class VmEngine:
         found: list[Array] = []
         count = made = 0
         t_end = R[Given.T_END]
+        surely = max(h_min, FLOOR * max(abs(t_end), abs(S[State.T])))
         while S[State.T] < t_end and count < rows and made < attempts and _large(S, h_min).all():
             evaluate()
             before = np.vstack([S, S_out[:-1]])
             took = S_out[:, State.T] > before[:, State.T]
-            room = np.cumsum(took) - took < rows - count
-            goes = (before[:, State.T] < t_end) & _large(before, h_min) & room
-            # a batch goes beyond what the compiled loop would do: that is not taken
-            used = min(size if goes.all() else int(np.argmin(goes)), attempts - made)
-            took[used:] = False
+            used = size
+            if not (
+                S_out[-1, State.T] < t_end
+                and S_out[:, State.H].min() >= surely
+                and size <= min(rows - count, attempts - made)
+            ):  # a batch goes beyond what the compiled loop would do: that is not taken
+                room = np.cumsum(took) - took < rows - count
+                goes = (before[:, State.T] < t_end) & _large(before, h_min) & room
+                used = min(size if goes.all() else int(np.argmin(goes)), attempts - made)
+                took[used:] = False
             found.append(
                 np.hstack(
                     [
