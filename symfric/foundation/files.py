@@ -50,8 +50,7 @@ def check_file(path: str | Path) -> Path:
     """
     place = checks.path("output", path)
     try:
-        target = place.resolve()  # a link stays a link to the new file
-        target.is_symlink()
+        target = _resolved(place)  # a link stays a link to the new file
         if target.exists() and not target.is_file():
             kind = "a folder" if target.is_dir() else "a device"
             raise ValueError(f"output '{path}': expected a file name, got {kind}")
@@ -59,6 +58,13 @@ def check_file(path: str | Path) -> Path:
         raise ValueError(f"output '{path}': expected a file name, got {_reason(error)}") from None
     check_folder(target.parent)
     return target
+
+
+def _resolved(place: Path) -> Path:
+    """`place` with links followed; OSError for a circle of them, on which Python 3.13 is silent."""
+    with suppress(FileNotFoundError, NotADirectoryError):
+        place.stat()
+    return place.resolve()
 
 
 def check_folder(folder: str | Path) -> Path:
@@ -72,7 +78,7 @@ def check_folder(folder: str | Path) -> Path:
     """
     place = checks.path("output", folder)
     try:
-        absolute = place.resolve()
+        absolute = _resolved(place)
         existing = next(p for p in (absolute, *absolute.parents) if p.exists())
     except (OSError, RuntimeError) as error:
         raise ValueError(f"output '{folder}': expected a folder, got {_reason(error)}") from None
