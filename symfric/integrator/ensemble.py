@@ -36,6 +36,7 @@ from symfric.integrator.equations.inputs import Input, InputData, input_data
 from symfric.integrator.many.chunk import Chunk, Job, Solved, digest, solve_chunk
 from symfric.integrator.many.one_by_one import solve_one_by_one
 from symfric.integrator.many.store import Store
+from symfric.integrator.running.built import built
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import Tolerances
 from symfric.integrator.step.layout import State
@@ -147,7 +148,7 @@ def simulate_many(
     x0_of, p_of, members = _members(model, x0, p)
     inputs = input_data(model, u, t_start, t_end)
     inputs = stopping("simulate_many", inputs, times, t_start, t_end)
-    integrator = Integrator(model, inputs, formula)
+    integrator, _ = built(model, inputs, formula)
     nominal = integrator.system.nominal
     allowed = tolerances("simulate_many", rtol, None, nominal, event_tolerance, max_steps, max_step)
     starts = partial(_starts, integrator, t_start, x0_of, p_of)
@@ -160,7 +161,7 @@ def simulate_many(
         solve = partial(solve_chunk, job)
         prepare = partial(_chunk, inputs, allowed, starts)
         if isinstance(executor, str):
-            job.load()  # or every worker would compile it
+            job.program.load()  # or every worker would compile it
     firsts = range(0, members, chunk)
     picks = {first: slice(first, min(first + chunk, members)) for first in firsts}
     folder = None
@@ -271,8 +272,7 @@ def _suited(
         d = np.concatenate([p, inputs.values[:, 0]])
         with suppress(ValueError):  # no consistent start: that member is reported by its number
             points.append((integrator.start(y, d), d))
-            integrator = integrator.suited(points, span)
-    return integrator
+    return integrator.suited(points, span) if points else integrator
 
 
 def _chunk(

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -90,12 +91,16 @@ def test_equal_jobs_have_one_digest_and_every_field_counts() -> None:
         tuple: lambda value: (*value, "more"),
         np.ndarray: lambda value: value + 1e-15,
     }
-    digests = {
-        replace(job, **{f.name: others[type(value)](value)}).digest()
-        for f in fields(job)
-        for value in [getattr(job, f.name)]
-    }
-    assert len(digests - {job.digest()}) == len(fields(job))
+
+    def changed(whole: Any) -> list[Any]:
+        values = {f.name: getattr(whole, f.name) for f in fields(whole) if f.name != "program"}
+        return [
+            replace(whole, **{name: others[type(value)](value)}) for name, value in values.items()
+        ]
+
+    every = changed(job) + [replace(job, program=other) for other in changed(job.program)]
+    assert len(every) == len(fields(job)) - 1 + len(fields(job.program))
+    assert len({other.digest() for other in every} - {job.digest()}) == len(every)
 
 
 def test_digest_sees_what_numpy_does_not_print() -> None:

@@ -1,0 +1,134 @@
+"""The equations of an ensemble as plain data: source code and serialised Functions."""
+
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from threading import Lock
+from typing import Any, final
+from weakref import WeakKeyDictionary
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.integrator.compiled.columns import Columns
+from symfric.integrator.equations.initial import Equations
+from symfric.integrator.equations.manifold import Manifold
+from symfric.integrator.many.members import CompiledMembers, Members, VmMembers, many_source
+from symfric.integrator.running.integrator import Integrator
+
+Array = NDArray[np.float64]
+Rows = tuple[tuple[float, ...], ...]
+Packed = tuple[tuple[str, str | int], ...]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Program:
+    """What an integrator does, for workers that have nothing else of it; picklable.
+
+    Attributes:
+        where: for messages.
+        code: C of steps, signals and their loop, or the serialised step for the virtual machine.
+        compiled: which of the two.
+        signals: the serialised Function of the signals.
+        n_signals: how many there are.
+        constraints: the serialised algebraic equations, "" where there are none.
+        free: as `System.free`, row by row.
+        manifold: the constraints of a mechanism, Functions serialised; () where it is none.
+        names: of the unknowns.
+        nominal: typical magnitudes of the differential states.
+    """
+
+    where: str
+    code: str
+    compiled: bool
+    signals: str
+    n_signals: int
+    constraints: str
+    free: Rows
+    manifold: Packed
+    names: tuple[str, ...]
+    nominal: Array
+
+    @property
+    def nx(self) -> int:
+        """Number of differential states."""
+        return self.nominal.size
+
+    def load(self) -> Members:
+        """What runs the members; compiled once in a process."""
+        if self.compiled:
+            return _compiled(self.code, self.n_signals)
+        return _vm(self.code, self.signals)
+
+    def equations(self) -> tuple[Equations, Columns]:
+        """The algebraic equations, and their constraints for many columns."""
+        return _equations(self.names, self.nx, self.free, self.constraints, self.manifold)
+
+
+_KNOWN: WeakKeyDictionary[Integrator, dict[bool, Program]] = WeakKeyDictionary()
+_LOCK = Lock()
+
+
+def program(integrator: Integrator, compiled: bool) -> Program:
+    """The program of an integrator, written once and kept for as long as that lives."""
+    with _LOCK:
+        known = _KNOWN.setdefault(integrator, {})
+        if compiled not in known:
+            known[compiled] = _written(integrator, compiled)
+        return known[compiled]
+
+
+def _written(integrator: Integrator, compiled: bool) -> Program:
+    s, step = integrator.system, integrator.step
+    return Program(
+        where=f"simulate_many of '{integrator.model.name}'",
+        code=many_source(step, integrator.signals) if compiled else str(step.serialize()),
+        compiled=compiled,
+        signals=str(integrator.signals.serialize()),
+        n_signals=integrator.signals.numel_out(0),
+        constraints=str(s.constraints.serialize()) if s.algebraic[0] else "",
+        free=tuple(map(tuple, s.free.tolist())),
+        manifold=_packed(s.manifold),
+        names=s.names,
+        nominal=s.nominal,
+    )
+
+
+def _packed(manifold: Manifold | None) -> Packed:
+    """A mechanism's constraints as plain data, () where there are none."""
+    if manifold is None:
+        return ()
+    values = ((f.name, getattr(manifold, f.name)) for f in fields(manifold))
+    return tuple(
+        (name, str(value.serialize()) if isinstance(value, ca.Function) else value)
+        for name, value in values
+    )
+
+
+@lru_cache(16)
+def _equations(
+    names: tuple[str, ...],
+    nx: int,
+    free: Rows,
+    constraints: str,
+    manifold: Packed,
+) -> tuple[Equations, Columns]:
+    function, mechanism = ca.Function.deserialize(constraints), None
+    if manifold:
+        values: dict[str, Any] = {
+            name: ca.Function.deserialize(value) if isinstance(value, str) else value
+            for name, value in manifold
+        }
+        mechanism = Manifold(**values)
+    return Equations(names, nx, np.array(free), function, mechanism), Columns(function)
+
+
+@lru_cache(16)
+def _compiled(code: str, signals: int) -> CompiledMembers:
+    return CompiledMembers.of(code, signals)
+
+
+@lru_cache(16)
+def _vm(step: str, signals: str) -> VmMembers:
+    return VmMembers.of(step, signals)
