@@ -4,20 +4,15 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
+from importlib import import_module
 from io import TextIOWrapper
 from types import TracebackType
-from typing import Annotated, cast
+from typing import Annotated, Any, cast
 
 import typer
+from typer.core import TyperGroup
 
 from symfric import SolveError, Status, __version__
-from symfric.cli.bench import bench
-from symfric.cli.codegen import codegen
-from symfric.cli.demo import demo
-from symfric.cli.identify import identify
-from symfric.cli.laws import laws
-from symfric.cli.run import run
-from symfric.cli.stress import stress
 from symfric.foundation.compiler import CompileError
 
 BAD_INPUT, FAILED_SOLVE, INTERRUPTED = 2, 1, 130
@@ -25,15 +20,55 @@ BAD_INPUT, FAILED_SOLVE, INTERRUPTED = 2, 1, 130
 # Of all usage errors Typer exports only BadParameter; this is what they derive from.
 USAGE_ERROR = cast("type[typer.BadParameter]", typer.BadParameter.__mro__[2])
 
+COMMANDS = {
+    "laws": "List the friction laws, or show one in full.",
+    "run": "Simulate SCENE with a friction law.",
+    "identify": "Identify mass, offset and friction of a drive.",
+    "codegen": "Write a friction law or a plant as C99, and verify it.",
+    "demo": "Simulate, identify, optimise and generate C.",
+    "bench": "Measure symfric beside other integrators.",
+    "stress": "Judge runs of random laws in random scenes.",
+}
+"""What there is, and the first line of each; a command is loaded when it is called."""
+
+
+class Commands(TyperGroup):
+    """Loads the command that is called, and none for a list of them."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        known: dict[str, Any] = dict.fromkeys(COMMANDS)
+        self.commands = known  # for what was meant
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Their names, in the order of the help."""
+        return [*COMMANDS]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """The command of that name, None where there is no such one."""
+        if cmd_name not in COMMANDS:
+            return None
+        one = typer.Typer(**SETTINGS)
+        one.command()(getattr(import_module(f"symfric.cli.{cmd_name}"), cmd_name))
+        return typer.main.get_command(one)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the table of commands into a help text."""
+        with formatter.section("Commands"):
+            formatter.write_dl([*COMMANDS.items()])
+
+
+SETTINGS: dict[str, Any] = {
+    "add_completion": False,
+    "pretty_exceptions_enable": False,
+    "rich_markup_mode": None,  # units in brackets are not markup
+    "context_settings": {"help_option_names": ["-h", "--help"]},
+}
 app = typer.Typer(
+    cls=Commands,
     help="Friction laws from formula to simulation, identification, optimal control and C.",
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,  # units in brackets are not markup
-    context_settings={"help_option_names": ["-h", "--help"]},
+    **SETTINGS,
 )
-for function in (laws, run, identify, codegen, demo, bench, stress):
-    app.command()(function)
 
 
 @app.callback(invoke_without_command=True)
@@ -62,6 +97,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             warnings.showwarning = _show_warning
             command = typer.main.get_command(app)
             status = command.main(arguments, prog_name="symfric", standalone_mode=False)
+        if status == INTERRUPTED:  # what Typer makes of Ctrl-C, without a word
+            return _refuse(KeyboardInterrupt("interrupted"), INTERRUPTED)
         return status if isinstance(status, int) else 0
     except SolveError as error:
         interrupted = error.status is Status.INTERRUPTED

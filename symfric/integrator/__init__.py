@@ -1,12 +1,29 @@
 """Integration of a `Model` over time. Knows nothing of laws or mechanisms."""
 
-from symfric.integrator.by_peer import simulate_by_peer as simulate_by_peer
-from symfric.integrator.ensemble import Ensemble as Ensemble
-from symfric.integrator.ensemble import simulate_many as simulate_many
-from symfric.integrator.equations.inputs import Hold as Hold
-from symfric.integrator.equations.inputs import Input as Input
-from symfric.integrator.equations.inputs import Linear as Linear
-from symfric.integrator.flow import flow as flow
-from symfric.integrator.simulate import simulate as simulate
-from symfric.results.trajectory import Statistics as Statistics
-from symfric.results.trajectory import Trajectory as Trajectory
+from typing import TYPE_CHECKING
+
+from symfric.foundation.fronts import hand_out
+
+if TYPE_CHECKING:
+    from symfric.integrator.by_peer import simulate_by_peer as simulate_by_peer
+    from symfric.integrator.ensemble import Ensemble as Ensemble
+    from symfric.integrator.ensemble import simulate_many as simulate_many
+    from symfric.integrator.equations.inputs import Hold as Hold
+    from symfric.integrator.equations.inputs import Input as Input
+    from symfric.integrator.equations.inputs import Linear as Linear
+    from symfric.integrator.flow import flow as flow
+    from symfric.integrator.simulate import simulate as simulate
+    from symfric.results.trajectory import Statistics as Statistics
+    from symfric.results.trajectory import Trajectory as Trajectory
+else:
+    hand_out(
+        __name__,
+        {
+            "symfric.integrator.by_peer": "simulate_by_peer",
+            "symfric.integrator.ensemble": "Ensemble simulate_many",
+            "symfric.integrator.equations.inputs": "Hold Input Linear",
+            "symfric.integrator.flow": "flow",
+            "symfric.integrator.simulate": "simulate",
+            "symfric.results.trajectory": "Statistics Trajectory",
+        },
+    )

@@ -1,6 +1,6 @@
 """A positioning drive: one mass, a force input, friction and a constant offset."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, final
 
@@ -8,7 +8,8 @@ import casadi as ca
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
-from symfric.foundation.parameters import Variable, param
+from symfric.foundation.parameters import Variable, param, with_values
+from symfric.laws import Law
 from symfric.model import Model, Output, Variables
 from symfric.scenes.base import GivenInput, Scene, contact, in_turning
 
@@ -65,3 +66,12 @@ class Drive(Scene):
             },
         )
         return in_turning(model) if self.turning else model
+
+
+def drive(law: Law, *, free: Iterable[str] = (), **parameters: Scalar) -> Model:
+    """Model of a mass with force input and friction `law`.
+
+    `parameters` are m, N, offset and those of the law, by name. Those named in
+    `free` become symbols in `Model.p`.
+    """
+    return with_values(Drive(law), parameters).model(free)

@@ -1,12 +1,14 @@
 """Rabinowicz's stick-slip test: a block on a moving belt, held by a spring."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar, final
 
 import casadi as ca
 
 from symfric.foundation.numeric import Scalar
-from symfric.foundation.parameters import Variable, param
+from symfric.foundation.parameters import Variable, param, with_values
+from symfric.laws import Law
 from symfric.model import Model, Output, Variables
 from symfric.scenes.base import Scene, contact
 
@@ -53,3 +55,12 @@ class Rabinowicz(Scene):
                 "power": Output(slip.force * v_rel, "W", "power taken by the contact"),
             },
         )
+
+
+def rabinowicz(law: Law, *, free: Iterable[str] = (), **parameters: Scalar) -> Model:
+    """Model of a block on a belt with friction `law`.
+
+    `parameters` are m, k, v_belt, g and those of the law, by name. Those named in
+    `free` become symbols in `Model.p`.
+    """
+    return with_values(Rabinowicz(law), parameters).model(free)

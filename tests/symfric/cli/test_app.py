@@ -93,20 +93,21 @@ def test_debug_shows_where_an_error_comes_from(monkeypatch: pytest.MonkeyPatch) 
         main(["laws", "lugr"])
 
 
-def test_an_interrupt_while_everything_is_imported_is_one_sentence() -> None:
+@pytest.mark.parametrize(("module", "line"), [("typer", "--help"), ("casadi", "laws")])
+def test_an_interrupt_while_something_is_imported_is_one_sentence(module: str, line: str) -> None:
     """Ctrl-C in the first second printed a traceback."""
     stopped = (
         "import sys\n"
         "class Interrupt:\n"
         "    def find_spec(self, name, path=None, target=None):\n"
-        "        if name == 'casadi': raise KeyboardInterrupt\n"
+        f"        if name == '{module}': raise KeyboardInterrupt\n"
         "sys.meta_path.insert(0, Interrupt())\n"
         "from symfric_command import main\n"
         "sys.exit(main())\n"
     )
     root = Path(symfric.__file__).parents[1]
     done = subprocess.run(
-        [sys.executable, "-c", stopped],
+        [sys.executable, "-c", stopped, line],
         capture_output=True,
         text=True,
         check=False,

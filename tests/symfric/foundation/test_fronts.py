@@ -1,0 +1,98 @@
+"""Fronts hand out what they say, and load nothing before somebody asks."""
+
+import ast
+import importlib
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import symfric
+from symfric.cli.app import COMMANDS
+
+ROOT = Path(symfric.__file__).parent
+LAZY = [p for p in ROOT.rglob("__init__.py") if "hand_out(" in p.read_text(encoding="utf-8")]
+HEAVY = (
+    "matplotlib", "scipy", "multiprocessing", "concurrent.futures", "numpy", "casadi", "csv",
+    "symfric.laws", "symfric.multibody", "symfric.scenes", "symfric.integrator", "symfric.figures",
+)  # fmt: skip
+
+
+def front(path: Path) -> ModuleType:
+    return importlib.import_module(".".join(path.parent.relative_to(ROOT.parent).parts))
+
+
+def fresh(code: str) -> str:
+    """What a new interpreter prints."""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+def test_every_name_that_a_checker_sees_is_handed_out_and_no_other() -> None:
+    assert len(LAZY) >= 4
+    for path in LAZY:
+        seen: dict[str, str] = {}
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.If):
+                lines = [n for n in node.body if isinstance(n, ast.ImportFrom)]
+                seen |= {a.asname or a.name: str(n.module) for n in lines for a in n.names}
+        found = front(path)
+        assert found._places == seen, path
+        assert set(seen) <= set(dir(found))
+        for name, place in seen.items():
+            assert getattr(found, name) is getattr(importlib.import_module(place), name), name
+
+
+@pytest.mark.parametrize("call", ["import symfric", "import symfric_command, symfric.cli"])
+def test_importing_loads_nothing_heavy(call: str) -> None:
+    loaded = fresh(f"{call}\nimport sys; print(*sys.modules)").split()
+    heavy = [name for name in HEAVY if name in loaded]
+    assert not heavy
+    assert len([name for name in loaded if name.startswith("symfric")]) <= 8
+
+
+def test_version_and_help_load_no_command() -> None:
+    for option in ("--version", "--help"):
+        code = f"import sys, symfric.cli as c; c.main(['{option}']); print(*sys.modules)"
+        loaded = fresh(code).splitlines()[-1].split()
+        assert not [
+            n for n in loaded if n in ("casadi", "numpy", "symfric.cli.run", "symfric.laws")
+        ]
+
+
+def test_simulating_on_a_belt_loads_neither_mechanisms_nor_processes() -> None:
+    """And a room called as what it hands out, loaded before it, does not stand for it."""
+    code = (
+        "import symfric.integrator.simulate, symfric.scenes.rabinowicz, sys, symfric as sf;"
+        "sf.integrator.simulate(sf.scenes.rabinowicz(sf.BrownMcPhee()), 0.1); print(*sys.modules)"
+    )
+    loaded = fresh(code).split()
+    slow = ("matplotlib", "scipy", "symfric.multibody", "symfric.figures", "concurrent.futures")
+    assert not [name for name in slow if name in loaded]
+
+
+def test_names_pickle_star_and_rooms() -> None:
+    everything: dict[str, object] = {}
+    exec("from symfric import *", everything)
+    assert everything["BrownMcPhee"] is symfric.BrownMcPhee
+    assert set(symfric.__all__) <= set(everything)
+    assert pickle.loads(pickle.dumps(symfric.simulate)) is symfric.simulate
+    assert symfric.laws.LuGre is symfric.LuGre
+    assert symfric.results.trajectory.Trajectory is symfric.Trajectory
+
+
+def test_what_is_not_there() -> None:
+    with pytest.raises(AttributeError, match="module 'symfric' has no attribute 'LuGree'"):
+        _ = symfric.LuGree
+    assert not hasattr(symfric, "_nothing")
+    with pytest.raises(ImportError, match="cannot import name 'simulat'"):
+        exec("from symfric.integrator import simulat")
+
+
+def test_the_list_of_commands_says_what_they_say() -> None:
+    for name, line in COMMANDS.items():
+        function = getattr(importlib.import_module(f"symfric.cli.{name}"), name)
+        assert (function.__doc__ or "").splitlines()[0] == line
