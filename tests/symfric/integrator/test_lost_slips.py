@@ -1,0 +1,90 @@
+"""Random machines that stick and slip: no break-away is lost, whatever their scales.
+
+A block on a belt with mass, stiffness, levels and velocities drawn over decades. A slip is a
+stretch faster than a tenth of the fastest sliding; every one of the reference, by another formula
+at 1e-10, has to be there. `make stress` runs it.
+"""
+
+from dataclasses import dataclass
+from math import log10, pi, sqrt
+from typing import final
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from symfric import BrownMcPhee, Law, LuGre, simulate
+from symfric.scenes import Rabinowicz
+
+Array = NDArray[np.float64]
+SCENES, SEED = 500, 10
+CYCLES = 6
+
+
+@final
+@dataclass(frozen=True)
+class Machine:
+    """A scene and how long to look at it [s]."""
+
+    scene: Rabinowicz
+    t_end: float
+
+
+def drawn(rng: np.random.Generator) -> Machine:
+    """A machine that sticks for part of each of `CYCLES` cycles."""
+
+    def decades(low: float, high: float) -> float:
+        return float(10 ** rng.uniform(log10(low), log10(high)))
+
+    m, omega, g = decades(1e-2, 1e2), 2 * pi / decades(0.03, 10.0), 9.81
+    mu_s = float(rng.uniform(0.1, 1.0))
+    mu_d = mu_s * float(rng.uniform(0.4, 0.9))
+    fastest = (mu_s - mu_d) * g / omega  # of a slip from break-away, less the belt
+    belt = fastest * decades(0.02, 0.3)
+    width = belt * decades(1e-4, 3e-2)
+    law: Law
+    if rng.uniform() < 0.5:
+        law = BrownMcPhee(mu_s=mu_s, mu_d=mu_d, v_t=width)
+    else:
+        stiffness = decades(1e2, 1e4) * m * omega * omega
+        law = LuGre(
+            mu_s=mu_s, mu_d=mu_d, v_s=width, sigma_0=stiffness, sigma_1=2 * sqrt(m * stiffness)
+        )
+    stuck = 2 * (mu_s - mu_d) * g / (omega * omega * belt)
+    t_end = CYCLES * (stuck + 2 * pi / omega)
+    return Machine(Rabinowicz(law, m=m, k=m * omega * omega, v_belt=belt, g=g), t_end)
+
+
+def slips(machine: Machine, rtol: float, method: str = "auto") -> tuple[Array, float]:
+    """Times [s] at which slips begin, and half of the shortest time between two of them."""
+    run = simulate(machine.scene.model(), machine.t_end, rtol=rtol, method=method, samples=20001)
+    speed = np.abs(run["v_rel"])
+    fast = speed > 0.1 * speed.max()
+    begins = run.t[1:][fast[1:] & ~fast[:-1]]
+    return begins, float(np.diff(begins).min(initial=machine.t_end)) / 2
+
+
+def lost(machine: Machine, rtol: float) -> bool:
+    """Whether a slip of the reference is missing, or one too many is there."""
+    expected, near = slips(machine, 1e-10, "rodas4p")
+    found, _ = slips(machine, rtol)
+    before = machine.t_end - near  # the last one may begin beyond the end
+    return (expected < before).sum() != (found < before).sum() or any(
+        float(np.abs(found - t).min(initial=np.inf)) > near for t in expected[expected < before]
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.*rtol")
+@pytest.mark.parametrize(("rtol", "allowed"), [(1e-4, 1), (1e-5, 0), (1e-6, 0)])
+def test_no_break_away_of_500_random_machines_is_lost(rtol: float, allowed: int) -> None:
+    rng = np.random.default_rng(SEED)
+    failed = [k for k in range(SCENES) if lost(drawn(rng), rtol)]
+    assert len(failed) <= allowed, f"machines {failed}"
+
+
+def test_machines_that_are_drawn_stick_and_slip() -> None:
+    """Else the test above would prove nothing."""
+    rng = np.random.default_rng(SEED)
+    counts = [slips(drawn(rng), 1e-6)[0].size for _ in range(4)]
+    assert min(counts) >= CYCLES // 2
