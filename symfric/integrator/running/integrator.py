@@ -15,6 +15,7 @@ from symfric.foundation.symbols import stacked
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.compiled.compiler import compiled_before
 from symfric.integrator.equations.blocks import refinement
+from symfric.integrator.equations.following import Following, following
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.lu import Order
@@ -87,6 +88,11 @@ class Integrator:
         if s.timed:
             return ca.Function(name, [t, s.y, s.d], [driven])
         return ca.Function(name, [self.model.t, s.y, s.d], [driven])
+
+    @cached_property
+    def follow(self) -> Following | None:
+        """How algebraic unknowns follow a jump of inputs or of states; None without any."""
+        return following(self.system)
 
     @property
     def _every(self) -> ca.SX:

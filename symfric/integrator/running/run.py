@@ -292,7 +292,7 @@ class _March:
                 f"event '{events[which[0]].name}'.",
             )
         else:
-            self.make_consistent()
+            self.make_consistent(moved=any(events[i].reset for i in which))
         return old
 
     def before_start(self) -> Array | None:
@@ -313,8 +313,19 @@ class _March:
         self.make_consistent()
         return old
 
-    def make_consistent(self) -> None:
-        """Let the algebraic unknowns follow a jump, or stop the run where they cannot."""
+    def make_consistent(self, moved: bool = False) -> None:
+        """Let the algebraic unknowns follow a jump, or stop the run where they cannot.
+
+        Where states `moved`, those of a mechanism have to be put back onto its constraints, too.
+        """
+        follow, manifold = self.integrator.follow, self.integrator.system.manifold
+        if follow is None and manifold is None:
+            return
+        if follow is not None and not (moved and manifold is not None and manifold.m):
+            found = follow(self.y, self.d)
+            if found is not None:
+                self.y[:] = found
+                return
         where = f"simulate '{self.integrator.model.name}' at t = {self.t:.9g} s"
         try:
             self.y[:] = consistent(self.integrator.system, where, self.y, self.d)

@@ -1,8 +1,11 @@
 """Running: intervals, progress, interrupts, statistics."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
+import symfric.integrator.running.run as module
 from symfric import (
     BrownMcPhee,
     Hold,
@@ -16,6 +19,7 @@ from symfric import (
     simulate,
 )
 from symfric.foundation.compiler import find_compiler
+from symfric.integrator.equations.initial import consistent
 from symfric.integrator.running.integrator import Integrator
 
 x = Variable("x", "m", start=1.0)
@@ -127,6 +131,24 @@ def test_algebraic_variables_follow_a_jump_of_an_input() -> None:
     run = simulate(model, 2.0, u={"u": Hold([0.0, 1.0], [0.0, 10.0])}, t_eval=[0.9, 1.0, 1.5, 2.0])
     assert run["z"] == pytest.approx([0, 2, 2, 2], abs=1e-9)
     assert run["x"] == pytest.approx([0, 0, 1, 2], abs=1e-9)
+
+
+def test_a_jump_that_is_near_takes_no_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Near or far, the unknowns are the same; the search has done but the start."""
+    start, z, u = Variable("x", "m"), Variable("z", "1", start=0.9), Variable("u", "N")
+    alg = z.symbol + z.symbol**3 - u.symbol
+    model = Model("dae", x=(start,), z=(z,), u=(u,), ode=z.symbol, alg=alg)
+    searches: list[float] = []
+
+    def search(*arguments: Any) -> Any:
+        searches.append(arguments[2][0])
+        return consistent(*arguments)
+
+    monkeypatch.setattr(module, "consistent", search)
+    given = {"u": Hold([0.0, 1.0, 2.0], [2.0, 2.5, 1e3])}
+    run = simulate(model, 3.0, u=given, t_eval=[0.5, 1.5, 2.5])
+    assert run["z"] ** 3 + run["z"] == pytest.approx([2.0, 2.5, 1e3], rel=1e-12)
+    assert searches == pytest.approx([run.at([2.0])["x"][0]])
 
 
 def test_jump_of_an_input_to_where_no_solution_is_fails_with_what_was_reached() -> None:

@@ -1,0 +1,266 @@
+"""Algebraic unknowns that follow a jump of inputs, without a search: two corrections a round.
+
+Where input data jump, states and time stay, and algebraic unknowns move to the solution near the
+one before. With W = -dg/dz of the algebraic equations 0 = g(y, d), factorised once a round,
+
+    W s_1 = g(y),        W s_2 = g(y + s_1),        y <- y + s_1 + s_2
+
+is of order 3; equations that are linear in their unknowns, as of a machine without friction, need
+one round. It is done when
+
+    |W| |s_2| <= DONE |W| |z|
+
+in every equation. Unknowns of no mechanism may have many solutions, and have to stay near: there it
+goes on only while s_2 is at most half of s_1 (Deuflhard's monotonicity test with frozen
+derivatives, which neither units of equations nor of unknowns change). Normal forces N = |R(N)| of a
+mechanism are convex and Newton's method finds them from afar; what forbids a solution is the guard.
+Both loops over it, here in Python and `C_FOLLOW` in C, make the same comparisons
+of the same numbers, so that engines agree to the bit. Where it does not end well nothing has
+changed, and the damped search of `symfric.integrator.equations.initial` begins at the same guess.
+
+Source: Deuflhard, Newton Methods for Nonlinear Problems, 2004, sections 2.1 and 3.3.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from string import Template
+from typing import Any, cast, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.numeric import flat_view
+from symfric.integrator.equations.blocks import Slopes, slopes
+from symfric.integrator.equations.lu import SymbolicLU, factorise
+from symfric.integrator.equations.manifold import PULLING, SHOCK
+from symfric.integrator.equations.system import System
+
+Array = NDArray[np.float64]
+DONE = 1e-10
+"""Last correction, relative to what the equations are made of, behind which rounding is left."""
+ROUNDS = 6
+"""Most rounds; a solution that takes more is not near."""
+FAINT = 1e-3
+"""Equations of a mechanism with terms this small beside the largest are solved to its rounding:
+sideways of its plane, or where loads cancel, there is nothing else."""
+NEARER, ANY = 0.5, 1e10
+"""Largest s_2 over s_1 behind which it goes on: of a system of any kind, of a mechanism."""
+INLINE = 7000
+"""Rounds with more instructions are calls of blocks, which compile much faster."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Following:
+    """The unknowns after a jump, by a Function and what goes around it.
+
+    Attributes:
+        round: (y, d) -> y after one round, and (sizes of s_1 and s_2, guard). A negative guard
+            forbids what was found: friction has jammed, or a bearing pulls.
+        contraction: largest s_2 over s_1 behind which it goes on.
+    """
+
+    round: ca.Function
+    contraction: float
+
+    def __call__(self, y: Array, d: Array) -> Array | None:
+        """`y` with its algebraic unknowns at run data `d`; None where it takes a search."""
+        now, after, look = y.copy(), np.empty(y.size), np.empty(3)
+        buffer, call = cast(tuple[Any, Any], self.round.buffer())
+        data = np.ascontiguousarray(d, dtype=float)
+        for place, arrays in ((buffer.set_arg, (now, data)), (buffer.set_res, (after, look))):
+            for i, array in enumerate(arrays):
+                if array.size:
+                    place(i, flat_view(array))
+        for _ in range(ROUNDS):
+            call()
+            first, second, guard = look.tolist()
+            if not (second <= DONE or second <= self.contraction * first):
+                return None
+            now[:] = after
+            if second <= DONE:
+                return now if guard >= 0 else None
+        return None
+
+    @property
+    def c_source(self) -> str:
+        """The same as C, `int symfric_follow(double *y, const double *d)`.
+
+        It returns 0, or 1 and leaves y as it is. The C of `round` has to stand before it.
+        """
+        function = self.round
+        return Template(C_FOLLOW).substitute(
+            n=function.numel_in(0), rounds=ROUNDS, done=repr(DONE),
+            contraction=repr(self.contraction), name=function.name(),
+            arg=function.sz_arg(), res=function.sz_res(),
+            iw=max(1, function.sz_iw()), w=max(1, function.sz_w()),
+        )  # fmt: skip
+
+
+C_FOLLOW = """
+/* Algebraic unknowns of y follow a jump of d; 1 where it takes a search, and y is as it was. */
+int symfric_follow(double *y, const double *d)
+{
+  enum { N = $n };
+  double now[N], after[N], look[3], w[$w];
+  casadi_int iw[$iw];
+  const double *arg[$arg];
+  double *res[$res];
+  int i, k;
+  for (i = 0; i < N; ++i) now[i] = y[i];
+  for (k = 0; k < $rounds; ++k) {
+    arg[0] = now;
+    arg[1] = d;
+    res[0] = after;
+    res[1] = look;
+    $name(arg, res, iw, w, 0);
+    if (!(look[1] <= $done || look[1] <= $contraction * look[0])) return 1;
+    for (i = 0; i < N; ++i) now[i] = after[i];
+    if (look[1] <= $done) {
+      if (!(look[2] >= 0)) return 1;
+      for (i = 0; i < N; ++i) y[i] = now[i];
+      return 0;
+    }
+  }
+  return 1;
+}
+"""
+
+
+def following(system: System) -> Following | None:
+    """How the algebraic unknowns of `system` follow a jump; None where it has none."""
+    if not system.free.any():
+        return None
+    blocks = _blocks(system)
+    inlined = _round(system, blocks, ca.SX)
+    large = inlined.n_instructions() > INLINE
+    contraction = NEARER if system.manifold is None else ANY
+    return Following(_round(system, blocks, ca.MX) if large else inlined, contraction)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Blocks:
+    """What a round is made of.
+
+    Attributes:
+        residual: (y, d) -> g in the rows of y that it stands in, 0 elsewhere.
+        entries: (y, d) -> entries of W.
+        inner: (y, d) -> inner unknowns.
+        pack: entries -> factors.
+        solve: (factors, residual) -> s, and its part in y.
+        sizes: (entries, s_1, s_2, y after, inner unknowns) -> their sizes.
+        guard: (factors, y after, d) -> what must not be negative; None where nothing can be.
+    """
+
+    residual: ca.Function
+    entries: ca.Function
+    inner: ca.Function
+    pack: ca.Function
+    solve: ca.Function
+    sizes: ca.Function
+    guard: ca.Function | None
+
+
+def _round(system: System, blocks: _Blocks, kind: Any) -> ca.Function:
+    """One round; SX inlines everything, MX keeps the blocks as calls."""
+    y, d = kind.sym("y", system.n), kind.sym("d", system.d.numel())
+    entries = blocks.entries(y, d)
+    lu = blocks.pack(entries)
+    first, change = blocks.solve(lu, blocks.residual(y, d))
+    middle = y + change
+    second, change = blocks.solve(lu, blocks.residual(middle, d))
+    after = middle + change
+    sizes = blocks.sizes(entries, first, second, after, blocks.inner(y, d))
+    guard = kind(1) if blocks.guard is None else blocks.guard(lu, after, d)
+    results: Any = [ca.densify(after), ca.densify(ca.vertcat(sizes, guard))]
+    if kind is ca.SX:
+        results = ca.cse(results)
+    return ca.Function("symfric_round", [y, d], results, ["y", "d"], ["y_next", "look"])
+
+
+def _blocks(system: System) -> _Blocks:
+    """The blocks of a system."""
+    own, n, rows = slopes(system), system.n, system.algebraic[0]
+    full = own.matrix(system.mass, [i for i in range(n) if i not in rows])
+    order = system.orders.get("tiny", ())
+    kept = list(range(full.size1()))
+    if system.is_semi_explicit and not order:  # equations without rates stand for themselves
+        kept = [i for i in kept if i in rows or i >= n]
+    place = {row: k for k, row in enumerate(kept)}
+    W = ca.sparsify(full[kept, kept])
+    groups = [[place[i] for i in group if i in place] for group in own.pivots]
+    lu = factorise(W, groups, order)
+    residual, right = ca.SX(n, 1), ca.SX.sym("right", n)
+    residual[rows] = system.f[rows]
+    whole, change = ca.SX(own.J.size1(), 1), ca.SX(n, 1)
+    whole[:n] = right
+    s = lu.solve(ca.densify(whole[kept]))
+    moved = [i for i in kept if i < n]
+    change[moved] = s[: len(moved)]
+    symbols, entries = _used(W, own)
+    return _Blocks(
+        ca.Function("g", [system.y, system.d], [residual], {"cse": True}),
+        ca.Function("slopes_g", [system.y, system.d], [entries], {"cse": True}),
+        _inner(system),
+        ca.Function("pack_g", [symbols], [lu.packed], {"cse": True}),
+        ca.Function("solve_g", [lu.packed_symbol, right], [s, change]),
+        _sizes(system, W, symbols, moved, [place[i] for i in rows]),
+        _guard(system, lu, place),
+    )
+
+
+def _used(W: ca.SX, own: Slopes) -> tuple[ca.SX, ca.SX]:
+    """Symbols that W is written in, and what they stand for in terms of y and d."""
+    used = {s.__hash__() for s in ca.symvar(W)}
+    every = range(own.entries.numel())
+    kept = [k for k in every if ca.SX(own.entries[k]).__hash__() in used]
+    values = own.values(*own.values.sx_in())
+    return own.entries[kept], ca.SX(values)[kept]
+
+
+def _inner(system: System) -> ca.Function:
+    """Inner unknowns as a Function (y, d)."""
+    inner = system.inner
+    if inner is None:
+        return ca.Function("inner", [system.y, system.d], [ca.SX(0, 1)])
+    (values,), _ = ca.substitute_inplace([inner.l], [inner.values], [ca.SX(0, 1)])
+    return ca.Function("inner", [system.y, system.d], [values], {"cse": True})
+
+
+def _sizes(
+    system: System, W: ca.SX, symbols: ca.SX, moved: Sequence[int], rows: Sequence[int]
+) -> ca.Function:
+    """(entries, s_1, s_2, y, inner unknowns) -> largest |W| |s| / |W| |z| of an equation, twice."""
+    count, inner = W.size1(), W.size1() - len(moved)
+    first, second = ca.SX.sym("s_1", count), ca.SX.sym("s_2", count)
+    y, hidden = ca.SX.sym("y", system.n), ca.SX.sym("l", inner)
+    size = ca.fabs(W[list(rows), :])
+    unknowns = ca.vertcat(y[list(moved)], hidden + (first + second)[len(moved) :, 0])
+    scale = size @ ca.fabs(unknowns)
+    # what is zero in a mechanism, sideways of its plane, is rounding of the rest
+    scale += 1e-300 if system.manifold is None else FAINT * ca.mmax(scale) + 1e-300
+    found = [ca.mmax((size @ ca.fabs(s)) / scale) for s in (first, second)]
+    arguments = [symbols, first, second, y, hidden]
+    return ca.Function("sizes_g", arguments, [ca.vertcat(*found)], {"cse": True})
+
+
+def _guard(system: System, lu: SymbolicLU, place: dict[int, int]) -> ca.Function | None:
+    """(factors, y, d) -> what is negative where friction has jammed, or where a bearing pulls.
+
+    The loop from normal forces over friction and reactions back to them, I - dN/dN: its determinant
+    has the sign of all others together, and no pivot of it may fall below `SHOCK`.
+    """
+    manifold = system.manifold
+    if manifold is None:
+        return None
+    loop = [place[i] for i in system.algebraic[0][manifold.n + manifold.m :]]
+    conditions = [manifold.pressing(system.y, system.d) + PULLING]
+    if loop:
+        conditions += [(-1) ** manifold.n * lu.sign(), lu.pivots(loop) - SHOCK]
+    together = ca.vertcat(*conditions)
+    if not together.numel():
+        return None
+    arguments = [lu.packed_symbol, system.y, system.d]
+    return ca.Function("guard_g", arguments, [ca.mmin(together)], {"cse": True})
