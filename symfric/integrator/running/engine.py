@@ -16,18 +16,24 @@ from numpy.typing import NDArray
 from symfric.foundation.numeric import flat_view
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.initial import FLOOR
+from symfric.integrator.running.crossings import Crossings
+from symfric.integrator.running.events import Eventful, Happened, Search
+from symfric.integrator.running.search import search_source
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
 
 
 class Stop(IntEnum):
-    """Why an engine returned."""
+    """Why an engine returned; the last three are what events ask for (`running.events`)."""
 
     END = 0
     FULL = 1
     ATTEMPTS = 2
     STEP_TOO_SMALL = 3
+    TERMINAL = 4
+    STORM = 5
+    FOLLOW = 6
 
 
 class Engine(Protocol):
@@ -39,11 +45,18 @@ class Engine(Protocol):
         ...
 
     def run(
-        self, S: Array, R: Array, rows: int, attempts: int, h_min: float
+        self,
+        S: Array,
+        R: Array,
+        rows: int,
+        attempts: int,
+        h_min: float,
+        events: Eventful | None = None,
     ) -> tuple[Array, int, Stop]:
         """Advance S; return the records, the attempts made and why it stopped.
 
         A step that fell below `h_min`, or below what rounding leaves of t (`FLOOR`), stops it.
+        With `events` these are carried out on the way.
         """
         ...
 
@@ -72,10 +85,16 @@ class VmEngine:
         return cls(step, step.mapaccum("batch", size))
 
     def run(
-        self, S: Array, R: Array, rows: int, attempts: int, h_min: float
+        self,
+        S: Array,
+        R: Array,
+        rows: int,
+        attempts: int,
+        h_min: float,
+        events: Eventful | None = None,
     ) -> tuple[Array, int, Stop]:
         """Advance S; return the records, the attempts made and why it stopped."""
-        size = self.batch.size2_out(0)
+        size, search = self.batch.size2_out(0), None if events is None else Search(events)
         n = S.size - State.MEMORY
         S_out, D = np.zeros((size, S.size)), np.zeros((size, self.step.numel_out(1)))
         every = np.tile(R, size)
@@ -89,7 +108,10 @@ class VmEngine:
         count = made = 0
         t_end = R[Given.T_END]
         surely = max(h_min, FLOOR * max(abs(t_end), abs(S[State.T])))
+        asked = Happened.NOTHING
         while S[State.T] < t_end and count < rows and made < attempts and _large(S, h_min).all():
+            if asked or (events is not None and events.full):
+                break
             evaluate()
             before = np.vstack([S, S_out[:-1]])
             took = S_out[:, State.T] > before[:, State.T]
@@ -114,11 +136,38 @@ class VmEngine:
                     ]
                 )
             )
+            if search is not None:
+                found[-1], used, asked = _searched(search, found[-1], S_out, (took, used), R, count)
             count += found[-1].shape[0]
             made += used
             S[:] = S_out[used - 1]
         records = np.vstack(found) if found else np.zeros((0, width(n, D.shape[1] // n)))
-        return records, made, _reason(S, R, count >= rows, h_min)
+        full = count >= rows or (events is not None and events.full)
+        return records, made, Stop(asked) if asked else _reason(S, R, full, h_min)
+
+
+def _searched(
+    search: Search,
+    records: Array,
+    S_out: Array,
+    attempts: tuple[NDArray[np.bool_], int],
+    R: Array,
+    count: int,
+) -> tuple[Array, int, Happened]:
+    """Records of a batch up to the first events in it, how many attempts, what events ask for.
+
+    Args:
+        records, S_out: of the batch; the attempt that led to events goes on behind them.
+        attempts: which were accepted, and how many count.
+        R: what was given.
+        count: records before the batch.
+    """
+    took, used = attempts
+    for i, k in enumerate(np.flatnonzero(took)):
+        change, asked = search(records[i], S_out[k], R, count + i)
+        if change:
+            return records[: i + (change > 0)], int(k) + 1, asked
+    return records, used, Happened.NOTHING
 
 
 def _large(S: Array, h_min: float) -> NDArray[np.bool_]:
@@ -144,11 +193,12 @@ class CompiledEngine:
     name: str = "compiled"
 
     @classmethod
-    def of(cls, step: ca.Function, dense_rows: int) -> "CompiledEngine":
-        """Compile the step, or load it from the cache."""
-        return cls.of_source(
-            c_source(step, dense_rows), step.numel_in(0) - State.MEMORY, dense_rows
-        )
+    def of(
+        cls, step: ca.Function, dense_rows: int, crossings: Crossings | None = None
+    ) -> "CompiledEngine":
+        """Compile the step and the search for events, or load them from the cache."""
+        source = c_source(step, dense_rows, crossings=crossings)
+        return cls.of_source(source, step.numel_in(0) - State.MEMORY, dense_rows)
 
     @classmethod
     def of_source(cls, source: str, n: int, dense_rows: int) -> "CompiledEngine":
@@ -159,16 +209,23 @@ class CompiledEngine:
             *[ctypes.c_void_p] * 3,
             *[ctypes.c_longlong] * 2,
             ctypes.c_double,
-            ctypes.c_void_p,
+            *[ctypes.c_void_p] * 3,
+            ctypes.c_longlong,
         ]
         return cls(library, width(n, dense_rows))
 
     def run(
-        self, S: Array, R: Array, rows: int, attempts: int, h_min: float
+        self,
+        S: Array,
+        R: Array,
+        rows: int,
+        attempts: int,
+        h_min: float,
+        events: Eventful | None = None,
     ) -> tuple[Array, int, Stop]:
         """Advance S; return the records, the attempts made and why it stopped."""
         records = np.empty((rows, self.row))
-        counts = np.zeros(2, dtype=np.int64)
+        counts = np.zeros(3, dtype=np.int64)
         reason = self.library.symfric_run(
             S.ctypes.data,
             R.ctypes.data,
@@ -177,49 +234,68 @@ class CompiledEngine:
             attempts,
             h_min,
             counts.ctypes.data,
+            *((0, 0, 0) if events is None else events.pointers),
         )
+        if events is not None:
+            events.count = int(counts[2])
         return records[: counts[0]], int(counts[1]), Stop(reason)
 
 
-def c_source(step: ca.Function, dense_rows: int, *others: ca.Function) -> str:
+def c_source(
+    step: ca.Function,
+    dense_rows: int,
+    *others: ca.Function,
+    crossings: Crossings | None = None,
+) -> str:
     """C of the step as CasADi generates it, with the loop that calls it until it must stop.
 
-    `others` are Functions that further C calls by their names.
+    `others` are Functions that further C calls by their names. A model without events has nothing
+    of the search for them in its code.
     """
     n = step.numel_in(0) - State.MEMORY
     generator = ca.CodeGenerator("symfric_step.c", {"static_aux": True})
-    for function in (step, *others):
+    called = (step, *(crossings.functions if crossings else ()))
+    for function in (*called, *others):
         generator.add(function)
-    return generator.dump() + Template(_LOOP).substitute(
-        n=n,
-        memory=State.MEMORY,
-        t=State.T,
-        h=State.H,
-        t_end=Given.T_END,
-        width=width(n, dense_rows),
-        dense=2 + 2 * n,
-        dense_rows=dense_rows,
-        floor=repr(FLOOR),
-        arg=step.sz_arg(),
-        res=step.sz_res(),
-        iw=max(1, step.sz_iw()),
-        w=max(1, step.sz_w()),
+    hooks = dict.fromkeys(_HOOKS, "")
+    if crossings is not None:
+        places = {"d": step.numel_in(1) - crossings.data, "jump": crossings.width}
+        hooks = {name: Template(code).substitute(places) for name, code in _HOOKS.items()}
+    return (
+        generator.dump()
+        + search_source(crossings)
+        + Template(_LOOP).substitute(
+            n=n,
+            memory=State.MEMORY,
+            t=State.T,
+            h=State.H,
+            t_end=Given.T_END,
+            width=width(n, dense_rows),
+            dense=2 + 2 * n,
+            dense_rows=dense_rows,
+            floor=repr(FLOOR),
+            arg=step.sz_arg(),
+            res=step.sz_res(),
+            iw=max(1, *(f.sz_iw() for f in called)),
+            w=max(1, *(f.sz_w() for f in called)),
+            **hooks,
+        )
     )
 
 
 _LOOP = """
 /* Attempts from S towards R[T_END]; a row (t0, t1, y0, y1, D) per accepted step. */
 int symfric_run(double *S, const double *R, double *rows, long long max_rows,
-                long long max_attempts, double h_min, long long *counts)
+                long long max_attempts, double h_min, long long *counts$parameters)
 {
   enum { N = $n, MEM = $memory, WIDTH = $width, T = $t, H = $h, T_END = $t_end };
   double next[MEM + N], w[$w];
   casadi_int iw[$iw];
   const double *arg[$arg];
   double *res[$res];
-  long long i, count = 0, made = 0;
+  long long i, count = 0, made = 0;$variables
   while (S[T] < R[T_END] && count < max_rows && made < max_attempts
-         && S[H] >= h_min && S[H] >= $floor * fabs(S[T])) {
+         && S[H] >= h_min && S[H] >= $floor * fabs(S[T])$condition) {
     double *row = rows + count * WIDTH;
     arg[0] = S;
     arg[1] = R;
@@ -234,14 +310,34 @@ int symfric_run(double *S, const double *R, double *rows, long long max_rows,
         row[2 + i] = S[MEM + i];
         row[2 + N + i] = next[MEM + i];
       }
-      ++count;
+      ++count;$search
     }
     for (i = 0; i < MEM + N; ++i) S[i] = next[i];
   }
   counts[0] = count;
-  counts[1] = made;
+  counts[1] = made;$found
   if (S[T] >= R[T_END]) return 0;
   if (!(S[H] >= h_min && S[H] >= $floor * fabs(S[T]))) return 3;
-  return count >= max_rows ? 1 : 2;
+  return count >= max_rows$full ? 1 : 2;
 }
 """
+
+_HOOKS = {
+    "parameters": """,
+                double *memory, double *jumps, long long max_jumps""",
+    "variables": """
+  long long jumped = 0;
+  int stop = 0, happened;""",
+    "condition": """
+         && jumped < max_jumps && !stop""",
+    "search": """
+      happened = symfric_search(row, next, R + $d, memory, jumps + jumped * $jump, count - 1,
+                                iw, w, &stop);
+      jumped += happened != 0;
+      count -= happened < 0;""",
+    "found": """
+  counts[2] = jumped;
+  if (stop) return stop;""",
+    "full": " || jumped >= max_jumps",
+}
+"""What a model with events adds to the loop."""

@@ -1,162 +1,261 @@
-"""Events: zero crossings found on the dense output, located, and carried out."""
+"""Events: zero crossings in accepted steps, located, and carried out.
 
-from collections import deque
-from dataclasses import dataclass
-from typing import final
+The search in the virtual machine, and what both engines tell of it. It is written a second time in
+C (`symfric.integrator.running.search`), operation by operation.
+"""
 
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any, cast, final
+
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.integrator.running.dense import Dense
-from symfric.integrator.running.integrator import Integrator
+from symfric.foundation.numeric import flat_view
+from symfric.integrator.running.crossings import (
+    ALIKE,
+    KEPT,
+    LEAST,
+    LOOKS,
+    RESTART,
+    SOON,
+    Crossings,
+    Memory,
+)
+from symfric.integrator.step.layout import Record, State
 
 Array = NDArray[np.float64]
-LOOKS = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
-"""Where each step is looked at; a double crossing closer than this is not seen."""
+JUMPS = 512
+"""Jumps between two looks at what came of them."""
+
+
+class Happened(IntEnum):
+    """What events ask for."""
+
+    NOTHING = 0
+    TERMINAL = 4
+    STORM = 5
+    FOLLOW = 6
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Crossing:
-    """Events that happen together.
+class Jumps:
+    """Events that happened, a row each time.
 
     Attributes:
-        t: time [s].
-        step: number of the piece that holds it.
-        y: values just before, shape (n,).
-        which: numbers of the events.
+        step: number of accepted steps before it, shape (k,).
+        t: time [s], shape (k,).
+        before, after: unknowns just before and after it, shape (k, n).
+        which: the events that happened together, shape (k, events).
     """
 
-    t: float
-    step: int
-    y: Array
-    which: tuple[int, ...]
+    step: NDArray[np.intp]
+    t: Array
+    before: Array
+    after: Array
+    which: NDArray[np.bool_]
 
-    def before(self, piece: Dense) -> Dense:
-        """The pieces up to the crossing; the last one keeps its polynomial, rescaled."""
-        k = self.step
-        if self.t == piece.t0[k]:
-            return Dense(piece.t0[:k], piece.t1[:k], piece.y0[:k], piece.y1[:k], piece.D[:k])
-        cut = _shorten(piece, k, self.t)
-        return Dense(
-            np.append(piece.t0[:k], cut.t0),
-            np.append(piece.t1[:k], cut.t1),
-            np.vstack([piece.y0[:k], cut.y0]),
-            np.vstack([piece.y1[:k], self.y[None]]),
-            np.concatenate([piece.D[:k], cut.D]),
+    @classmethod
+    def of(cls, rows: Array, n: int, steps: int = 0) -> "Jumps":
+        """From records (steps before it, t, y before, y after, which), `steps` behind others."""
+        rows = rows.copy()
+        return cls(
+            rows[:, 0].astype(np.intp) + steps,
+            rows[:, 1],
+            rows[:, 2 : 2 + n],
+            rows[:, 2 + n : 2 + 2 * n],
+            rows[:, 2 + 2 * n :] != 0.0,
+        )
+
+    @classmethod
+    def joined(cls, parts: "list[Jumps]") -> "Jumps":
+        """Those of several stretches of a run, of which there is one at least."""
+        return cls(
+            np.concatenate([p.step for p in parts]),
+            np.concatenate([p.t for p in parts]),
+            np.concatenate([p.before for p in parts]),
+            np.concatenate([p.after for p in parts]),
+            np.concatenate([p.which for p in parts]),
         )
 
 
-def _shorten(piece: Dense, k: int, t: float) -> Dense:
-    """Piece `k` on [t0, t], as the same polynomial in the shorter interval."""
-    t0, t1 = piece.t0[k], piece.t1[k]
-    s = (t - t0) / (t1 - t0)
-    y0, y1, D = piece.y0[k], piece.y1[k], piece.D[k]
-    rows = D.shape[0]
-    # Coefficients in powers of theta, scaled, and brought back to the form of `Dense`.
-    powers = np.zeros((rows + 2, y0.size))
-    powers[0], powers[1] = y0, y1 - y0
-    for r in range(rows):
-        powers[r + 1] += D[r]
-        powers[r + 2] -= D[r]
-    powers *= s ** np.arange(rows + 2)[:, None]
-    new = np.zeros_like(D)
-    carry = np.zeros_like(y0)
-    for r in range(rows - 1, -1, -1):
-        new[r] = -(powers[r + 2] - (carry if r < rows - 1 else 0.0))
-        carry = new[r]
-    end = powers.sum(axis=0)
-    return Dense(np.array([t0]), np.array([t]), y0[None], end[None], new[None])
+@final
+@dataclass(eq=False)
+class Eventful:
+    """The events of one run under way: what engines read and write beside the steps.
 
-
-def first_crossing(
-    integrator: Integrator, piece: Dense, d: Array, old: Array | None, tolerance: float
-) -> Crossing | None:
-    """The earliest crossing in `piece`, or None.
-
-    Just after a jump, `old` holds the event values before it, with NaN for events that happened
-    there. The signs after it are those two tolerances later; an expression that the jump carried
-    through zero, not just to zero, is an event at the very start.
+    Attributes:
+        crossings: of the model.
+        tolerance: of event times [s].
+        memory: see `Memory`.
+        rows: records of jumps, the first `count` of them in use.
     """
-    steps = piece.t0.size
-    if not steps:
-        return None
-    g = _values(integrator, piece, d)
-    soon = min(0.1, 2 * tolerance / (piece.t1[0] - piece.t0[0]))
-    jumped = np.zeros(g.shape[0], dtype=bool)
-    if old is not None:
-        y = piece.piece(np.array([0]), np.array([soon]))[0]
-        new = values(integrator, piece.t0[0] + soon * (piece.t1[0] - piece.t0[0]), y, d)
-        jumped = passed(integrator, old, new) & (new != 0)
-        g[:, 0, 0] = new
-    hits = passed(integrator, g[:, :, :-1], g[:, :, 1:])
-    hits[jumped, 0, 0] = True
-    if not hits.any():
-        return None
-    order = hits.any(axis=0).reshape(-1)
-    first = int(np.argmax(order))
-    step, look = divmod(first, LOOKS.size - 1)
-    candidates = np.flatnonzero(hits[:, step, look])
-    h = piece.t1[step] - piece.t0[step]
-    low = LOOKS[look] if first or old is None else soon
-    roots = [
-        0.0
-        if first == 0 and jumped[i]
-        else _locate(integrator, piece, d, int(i), step, low, LOOKS[look + 1], tolerance / h)
-        for i in candidates
-    ]
-    theta = min(roots)
-    together = tuple(
-        int(i) for i, root in zip(candidates, roots, strict=True) if (root - theta) * h <= tolerance
-    )
-    y = piece.piece(np.array([step]), np.array([theta]))[0]
-    return Crossing(float(piece.t0[step] + theta * h), step, y, together)
+
+    crossings: Crossings
+    tolerance: float
+    count: int = 0
+    memory: Array = field(init=False)
+    rows: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.memory = Memory.new(self.crossings.count, self.tolerance)
+        self.rows = np.empty((JUMPS, self.crossings.width))
+
+    @property
+    def full(self) -> bool:
+        """Whether there is no room for another jump."""
+        return self.count >= self.rows.shape[0]
+
+    @property
+    def pointers(self) -> tuple[int, int, int]:
+        """Addresses of the memory and of the rows, and the room there, for compiled code."""
+        return self.memory.ctypes.data, self.rows.ctypes.data, self.rows.shape[0]
+
+    def jumps(self, steps: int) -> Jumps:
+        """Those of the last run of an engine, with `steps` steps before it."""
+        return Jumps.of(self.rows[: self.count], self.crossings.record.n, steps)
+
+    def jumped(self, before: Array | None) -> None:
+        """Start anew, behind a jump where the events had the values `before` it."""
+        self.memory[Memory.PHASE] = Memory.FRESH if before is None else Memory.JUMPED
+        if before is not None:
+            self.memory[Memory.before(self.crossings.count)] = before
 
 
-def passed(integrator: Integrator, before: Array, after: Array) -> NDArray[np.bool_]:
-    """Where events, numbered along the first axis, go through zero in their direction."""
-    directions = np.array([e.direction for e in integrator.model.events])
-    directions = directions.reshape(-1, *[1] * (before.ndim - 1))
-    rising = (before < 0) & (after >= 0) & (directions >= 0)
-    return rising | ((before > 0) & (after <= 0) & (directions <= 0))
+@final
+class Search:
+    """The search for events behind each accepted step, as the compiled loop makes it."""
+
+    def __init__(self, eventful: Eventful) -> None:
+        self.eventful, self.crossings = eventful, eventful.crossings
+        self.memory, self.tolerance = eventful.memory, eventful.tolerance
+        eventful.count = 0
+        self._before = self.memory[Memory.before(self.crossings.count)]
+        self._looks, self._values, self._cut, self._jump = map(_called, self.crossings.functions)
+        self._directions = np.array(self.crossings.directions)
+
+    def __call__(self, row: Array, S: Array, R: Array, rows: int) -> tuple[int, Happened]:
+        """Look for events in the accepted step `row`, behind `rows` others, which led to S.
+
+        The first ones are carried out: the row is cut there, S goes on behind them.
+
+        Returns:
+            1 where some happened, -1 where they did at the very start of the step and no row is
+            left, else 0; and what they ask for.
+        """
+        d = R[R.size - self.crossings.data :]
+        found = self._crossing(row, d)
+        if found is None:
+            return 0, Happened.NOTHING
+        theta, which = found
+        h = float(row[Record.T1] - row[Record.T0])
+        (cut,) = self._cut(np.array([theta]), row)
+        t, record = float(cut[Record.T1]), self.crossings.record
+        kept = t != row[Record.T0]
+        row[:] = cut if kept else row
+        self._before[:], fresh = self._jump(cut, d)
+        self._before[which] = np.nan
+        self.memory[Memory.PHASE] = Memory.JUMPED
+        before, after = cut[record.y1], cut[record.y1].copy()
+        for (event, state), value in zip(self.crossings.resets, fresh, strict=True):
+            after[state] = value if which[event] else after[state]
+        self.eventful.rows[self.eventful.count] = [rows + kept, t, *before, *after, *which]
+        self.eventful.count += 1
+        # steps beyond the event say nothing; its own is a guess only, what follows may be faster
+        S[:] = State.at(t, max(min(h, RESTART * self.tolerance), LEAST * h), after)
+        return (1 if kept else -1), self._asked(t, which)
+
+    def _asked(self, t: float, which: NDArray[np.bool_]) -> Happened:
+        """What the events `which` at time `t` ask for."""
+        if any(over for over, here in zip(self.crossings.terminal, which, strict=True) if here):
+            return Happened.TERMINAL
+        if storm(self.memory, t, which):
+            return Happened.STORM
+        return Happened.FOLLOW if self.crossings.follows else Happened.NOTHING
+
+    def _crossing(self, row: Array, d: Array) -> tuple[float, NDArray[np.bool_]] | None:
+        """Where in the step the first events happen, and which.
+
+        Just after a jump, the signs behind it are those a few tolerances later; an expression that
+        the jump carried through zero, not just to zero, is an event at the very start.
+        """
+        memory, count = self.memory, self.crossings.count
+        h, low = float(row[Record.T1] - row[Record.T0]), 0.0
+        g = np.empty((len(LOOKS), count))
+        jumped = np.zeros(count, dtype=bool)
+        if memory[Memory.PHASE] == Memory.ON:
+            g[0] = self._before
+        elif memory[Memory.PHASE] == Memory.FRESH:
+            g[0] = self._values(np.zeros(1), row, d)[0]
+        else:
+            low = min(SOON * self.tolerance / h, 0.1)
+            g[0] = self._values(np.array([low]), row, d)[0]
+            jumped = self._passed(self._before, g[0]) & (g[0] != 0)
+        g[1:] = self._looks(row, d)[0].reshape(-1, count)
+        hits = self._passed(g[:-1], g[1:])
+        hits[0] |= jumped
+        if not hits.any():
+            self._before[:] = g[-1]
+            memory[Memory.PHASE] = Memory.ON
+            return None
+        look = int(np.argmax(hits.any(axis=1)))
+        begin, roots = LOOKS[look] if look else low, np.full(count, np.inf)
+        for i in np.flatnonzero(hits[look]):
+
+            def value(theta: float, i: int = int(i)) -> float:
+                return float(self._values(np.array([theta]), row, d)[0][i])
+
+            ends = float(g[look, i]), float(g[look + 1, i])
+            at_once = look == 0 and jumped[i]
+            roots[i] = (
+                0.0
+                if at_once
+                else locate(value, begin, LOOKS[look + 1], ends, max(self.tolerance / h, 1e-15))
+            )
+        theta = float(roots.min())
+        return theta, (roots - theta) * h <= self.tolerance
+
+    def _passed(self, before: Array, after: Array) -> NDArray[np.bool_]:
+        """Where events, numbered along the last axis, go through zero in their direction."""
+        rising = (before < 0) & (after >= 0) & (self._directions >= 0)
+        return rising | ((before > 0) & (after <= 0) & (self._directions <= 0))
 
 
-def _values(integrator: Integrator, piece: Dense, d: Array) -> Array:
-    """Event expressions at the looks, shape (events, steps, looks)."""
-    steps, looks = piece.t0.size, LOOKS.size
-    k = np.repeat(np.arange(steps), looks)
-    theta = np.tile(LOOKS, steps)
-    y = piece.piece(k, theta)
-    t = piece.t0[k] + theta * (piece.t1[k] - piece.t0[k])
-    count = k.size
-    values = integrator.events.map(count)(t[None, :], y.T, np.tile(d[:, None], (1, count)))
-    return values.full().reshape(-1, steps, looks)
+def _called(function: ca.Function) -> Callable[..., list[Array]]:
+    """`function` of flat arrays, with a buffer of its own that its results lie in."""
+    arguments = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
+    results = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
+    buffer, call = cast(tuple[Any, Any], function.buffer())
+    for place, arrays in ((buffer.set_arg, arguments), (buffer.set_res, results)):
+        for i, array in enumerate(arrays):
+            if array.size:
+                place(i, flat_view(array))
+
+    def called(*values: Array, _alive: object = buffer) -> list[Array]:
+        for argument, value in zip(arguments, values, strict=True):
+            argument[:] = value
+        call()
+        return results
+
+    return called
 
 
-def _locate(
-    integrator: Integrator,
-    piece: Dense,
-    d: Array,
-    event: int,
-    step: int,
-    low: float,
-    high: float,
-    tolerance: float,
+def locate(
+    value: Callable[[float], float], a: float, b: float, ends: tuple[float, float], tolerance: float
 ) -> float:
-    """Root in theta of one event on one step, by the Illinois method; the side after the root."""
-    index = np.array([step])
-    h = piece.t1[step] - piece.t0[step]
+    """Root in [a, b] of a function with values of two signs at the `ends`; the side after it.
 
-    def value(theta: float) -> float:
-        y = piece.piece(index, np.array([theta]))[0]
-        return float(integrator.events(piece.t0[step] + theta * h, y, d)[event])
-
-    a, b, fa, fb = low, high, value(low), value(high)
-    if fa == 0.0 or fb == 0.0:
-        return b if fb == 0.0 else a
+    By the Illinois method.
+    """
+    fa, fb = ends
+    if fb == 0.0:
+        return b
     side = 0
     for _ in range(100):
-        if b - a <= max(tolerance, 1e-15):
+        if not b - a > tolerance:
             break
         c = (fa * b - fb * a) / (fa - fb)
         c = min(max(c, a + 1e-3 * (b - a)), b - 1e-3 * (b - a)) if side else c
@@ -174,46 +273,27 @@ def _locate(
     return b
 
 
-def values(integrator: Integrator, t: float, y: Array, d: Array) -> Array:
-    """Event expressions at one point, shape (events,)."""
-    return integrator.events(t, y, d).full().ravel()
+def storm(memory: Array, t: float, which: NDArray[np.bool_]) -> bool:
+    """Whether the events `which` at time `t` complete a storm; they are remembered.
 
-
-def resets(integrator: Integrator, t: float, y: Array, d: Array, which: tuple[int, ...]) -> Array:
-    """Values after the events `which`; all resets read the values `y` before them."""
-    after = y.copy()
-    names = [v.name for v in integrator.model.x]
-    for i in which:
-        for state, function in integrator.resets[i].items():
-            after[names.index(state)] = float(function(t, y, d))
-    return after
-
-
-@final
-class EventStorm:
-    """Notices events that pile up at one time (Zeno) instead of letting the clock stand still.
-
-    A storm is four events of one kind in a row at distances that shrink like a geometric series
-    with less than a thousand event tolerances still to come; or a hundred events less than a few
-    tolerances, or roundings of the clock, apart. Events that are merely many, of a fast machine or
-    within a long run, are none.
+    Events that pile up at one time (Zeno) must not let the clock stand still. A storm is four
+    events of one kind in a row at distances that shrink like a geometric series with less than a
+    thousand event tolerances still to come; or a hundred events less than a few tolerances, or
+    roundings of the clock, apart. Events that are merely many, of a fast machine or within a long
+    run, are none.
     """
-
-    def __init__(self, tolerance: float) -> None:
-        self._recent: deque[tuple[float, tuple[int, ...]]] = deque(maxlen=100)
-        self._tolerance = tolerance
-
-    def raged_at(self, t: float, which: tuple[int, ...]) -> bool:
-        """Whether the events `which` at time `t` complete a storm."""
-        self._recent.append((t, which))
-        full = len(self._recent) == self._recent.maxlen
-        apart = max(self._tolerance, float(np.spacing(abs(t))))
-        if full and t - self._recent[0][0] < 10 * apart * len(self._recent):
-            return True
-        last = list(self._recent)[-4:]
-        gaps = np.diff([time for time, _ in last])
-        alike = len(last) == 4 and len({events for _, events in last}) == 1
-        if not alike or not (gaps[1:] < gaps[:-1]).all():
-            return False
-        still_to_come = gaps[-1] * gaps[-1] / (gaps[-2] - gaps[-1])
-        return bool(still_to_come < 1000 * self._tolerance)
+    last, times = memory[Memory.last(which.size)], memory[Memory.TIMES]
+    memory[Memory.ALIKE] = memory[Memory.ALIKE] + 1 if (last == which).all() else 1
+    last[:] = which
+    count = int(memory[Memory.COUNT]) + 1
+    times[(count - 1) % KEPT] = t
+    memory[Memory.COUNT] = count
+    tolerance = float(memory[Memory.TOLERANCE])
+    apart = max(tolerance, float(np.spacing(abs(t))))
+    if count >= KEPT and t - times[count % KEPT] < 10 * apart * KEPT:
+        return True
+    if memory[Memory.ALIKE] < ALIKE:
+        return False
+    recent = times[np.arange(count - ALIKE, count) % KEPT]
+    a, b, c = (float(gap) for gap in np.diff(recent))
+    return b < a and c < b and c * c / (b - c) < 1000 * tolerance

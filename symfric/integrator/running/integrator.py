@@ -22,6 +22,7 @@ from symfric.integrator.equations.lu import Order
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.method import Method
 from symfric.integrator.methods.suited import suited
+from symfric.integrator.running.crossings import Crossings, crossings
 from symfric.integrator.running.engine import CompiledEngine, Engine, VmEngine, c_source
 from symfric.integrator.step.attempt import build_step
 from symfric.model import Model
@@ -32,6 +33,9 @@ Orders = tuple[tuple[str, Order], ...]
 INLINE = 7000
 """Steps with more instructions are calls of blocks, which compile much faster; both engines run the
 same form."""
+
+BATCH, EVENT_BATCH = 32, 4
+"""Attempts of one call of the virtual machine; those behind an event are made in vain."""
 
 
 @final
@@ -70,16 +74,26 @@ class Integrator:
             self.step = build_step(self.system, self.tableau, ca.MX)
         self.f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
         self.events = self._event_function()
-        self.resets = [
-            {state: self.of_time("reset", ca.SX(new)) for state, new in event.reset.items()}
-            for event in self.model.events
-        ]
+        self.crossings = self._crossings() if self.model.events else None
         self.build_time = perf_counter() - begin
 
     def _event_function(self) -> ca.Function:
         """Event expressions as a Function (t, y, d)."""
         values = stacked(ca.SX(e.expression) for e in self.model.events)
         return self.of_time("events", values)
+
+    def _crossings(self) -> Crossings:
+        """What the search for events evaluates."""
+        model, system = self.model, self.system
+        resets = stacked(ca.SX(new) for event in model.events for new in event.reset.values())
+        return crossings(
+            model.events,
+            [v.name for v in model.x],
+            self.events,
+            self.of_time("resets", resets),
+            self.tableau.H.shape[0],
+            follows=bool(system.free.any()) or system.manifold is not None,
+        )
 
     def of_time(self, name: str, expression: ca.SX) -> ca.Function:
         """`expression` of the model as a Function (t, y, d), inputs put in."""
@@ -182,7 +196,8 @@ class Integrator:
     def vm(self) -> Engine:
         """The engine that needs no compiler."""
         if "vm" not in self._engines:
-            self._engines["vm"] = VmEngine.of(self.step)
+            size = EVENT_BATCH if self.model.events else BATCH
+            self._engines["vm"] = VmEngine.of(self.step, size)
         return self._engines["vm"]
 
     def compiled(self) -> Engine:
@@ -193,7 +208,8 @@ class Integrator:
         """
         if "compiled" not in self._engines:
             begin = perf_counter()
-            self._engines["compiled"] = CompiledEngine.of(self.step, self.tableau.H.shape[0])
+            rows = self.tableau.H.shape[0]
+            self._engines["compiled"] = CompiledEngine.of(self.step, rows, self.crossings)
             self.compile_time = perf_counter() - begin
         return self._engines["compiled"]
 
@@ -225,6 +241,7 @@ class Integrator:
             return self.compiled()
         if expected > 2 * look_up and "looked up" not in self._engines:
             self._engines["looked up"] = self.vm()
-            if compiled_before(c_source(self.step, self.tableau.H.shape[0])) is not None:
+            rows = self.tableau.H.shape[0]
+            if compiled_before(c_source(self.step, rows, crossings=self.crossings)) is not None:
                 return self.compiled()
         return self.vm()

@@ -14,13 +14,7 @@ from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.dense import Dense, from_records, join
 from symfric.integrator.running.diagnosis import explain
 from symfric.integrator.running.engine import Stop
-from symfric.integrator.running.events import (
-    Crossing,
-    EventStorm,
-    first_crossing,
-    resets,
-    values,
-)
+from symfric.integrator.running.events import Eventful, Jumps
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.sizes import ROUNDS, ample, finer, sizes
 from symfric.integrator.step.layout import Given, State
@@ -29,7 +23,7 @@ Array = NDArray[np.float64]
 PACES = 8
 """Straight pieces of an input that a step may pass with events, which look at its quarters."""
 
-ROWS, EVENT_ROWS = 2048, 64
+ROWS = 2048
 ATTEMPTS = {"vm": 2_000, "compiled": 50_000}
 """Attempts between two looks at progress and interrupts: tens of milliseconds."""
 MOST_ORDERS = 8
@@ -71,6 +65,7 @@ class Run:
     """
 
     dense: list[Dense] = field(default_factory=list[Dense])
+    jumps: list[Jumps] = field(default_factory=list[Jumps])
     happened: list[tuple[float, str]] = field(default_factory=list[tuple[float, str]])
     steps: int = 0
     attempts: int = 0
@@ -172,8 +167,8 @@ class _March:
         self.h_min = smallest_step(span)
         h = min(first_step(span, self.t_start), tolerances.max_step)
         self.S = State.at(self.t_start, h, y)
-        self.eventful = bool(integrator.model.events)
-        self.storm = EventStorm(tolerances.event)
+        crossings = integrator.crossings
+        self.events = None if crossings is None else Eventful(crossings, tolerances.event)
         self.run, self.d = Run(), np.zeros(0)
         self.span, self.places = span, [y.copy()]
 
@@ -191,32 +186,26 @@ class _March:
         """Integrate over all input intervals, each with its own run data d = (p, data)."""
         for k in range(self.inputs.breaks.size - 1):
             before, self.d = self.d, np.concatenate([p, self.inputs.values[:, k]])
-            old = self.jump(before) if k else self.before_start()
+            if k:
+                self.jump(before)
+            else:
+                self.before_start()
             if self.run.status is Status.SUCCESS:
-                self.interval(float(self.inputs.breaks[k + 1]), old)
+                self.interval(float(self.inputs.breaks[k + 1]))
             if self.run.status is not Status.SUCCESS:
                 return
 
-    def interval(self, end: float, old: Array | None) -> None:
-        """Integrate up to `end`, on which d is constant.
-
-        `old` holds the values of the event expressions before the jump that led here, if one did.
-        """
-        S, n, left = self.S, self.integrator.system.n, 0.0
+    def interval(self, end: float) -> None:
+        """Integrate up to `end`, on which d is constant."""
+        n, left = self.integrator.system.n, 0.0
         R = self.tolerances.given(end, self.d)
         while self.t < end:
             records, reason, left = self.attempts(R, left)
             if self.run.status is not Status.SUCCESS:
                 return
-            piece = from_records(records, n)
-            crossing = self.crossing(piece, old) if self.eventful else None
-            if crossing is not None:
-                old = self.happen(piece, crossing)
-            else:
-                self.run.keep(piece)
-                old = None if piece.t0.size else old
-                if reason is Stop.STEP_TOO_SMALL:
-                    self.run.stop(*explain(self.integrator, self.t, self.y, self.d, S[State.H]))
+            self.happen()
+            self.run.keep(from_records(records, n))
+            self.heed(reason)
             if self.run.status is not Status.SUCCESS:
                 return
             if self.progress is not None:
@@ -233,8 +222,8 @@ class _March:
             )
             return np.zeros((0, 0)), Stop.ATTEMPTS, left
         began, from_t = perf_counter(), self.t
-        rows = EVENT_ROWS if self.eventful else ROWS
-        records, made, reason = engine.run(self.S, R, rows, allowed, self.h_min)
+        limits = ROWS, allowed, self.h_min
+        records, made, reason = engine.run(self.S, R, *limits, self.events)
         self.run.attempts += made
         if reason is Stop.STEP_TOO_SMALL and self.found_pivots():
             reason = Stop.ATTEMPTS
@@ -263,55 +252,55 @@ class _March:
         self.S[:] = State.at(self.t, h, here)
         return True
 
-    def crossing(self, piece: Dense, old: Array | None) -> Crossing | None:
-        """The first event in `piece`."""
-        return first_crossing(self.integrator, piece, self.d, old, self.tolerances.event)
+    def happen(self) -> None:
+        """Take note of the events in the steps to come."""
+        if self.events is None or not self.events.count:
+            return
+        jumps = self.events.jumps(self.run.steps)
+        events = self.integrator.model.events
+        times, numbers = np.nonzero(jumps.which)
+        found = zip(jumps.t[times].tolist(), numbers.tolist(), strict=True)
+        self.run.happened += [(t, events[i].name) for t, i in found]
+        self.run.jumps.append(jumps)
 
-    def happen(self, piece: Dense, crossing: Crossing) -> Array:
-        """Cut the run at an event, carry it out and go on from there."""
-        self.run.keep(crossing.before(piece))
-        # steps beyond the event say nothing; its own is a guess only, what follows may be faster
-        h = float(piece.t1[crossing.step] - piece.t0[crossing.step])
-        h = max(min(h, self.tolerances.event * 1e3), 1e-3 * h)
-        self.S[:] = State.at(crossing.t, h, crossing.y)
-        return self.carry_out(crossing.which)
-
-    def carry_out(self, which: tuple[int, ...]) -> Array:
-        """Apply the resets of the events `which`; event values before them, NaN for themselves."""
-        events, t = self.integrator.model.events, self.t
-        old = values(self.integrator, t, self.y, self.d)
-        old[list(which)] = np.nan
-        self.y[:] = resets(self.integrator, t, self.y, self.d, which)
-        self.run.happened += [(t, events[i].name) for i in which]
-        if any(events[i].terminal for i in which):
+    def heed(self, reason: Stop) -> None:
+        """Do what the `reason` to stop asks for."""
+        if reason is Stop.STEP_TOO_SMALL:
+            h = self.S[State.H]
+            self.run.stop(*explain(self.integrator, self.t, self.y, self.d, h))
+        elif reason is Stop.TERMINAL:
             self.run.stop(Status.TERMINATED)
-        elif self.storm.raged_at(t, which):
+        elif reason is Stop.STORM:
+            which = self.run.jumps[-1].which[-1]
+            name = self.integrator.model.events[int(np.argmax(which))].name
             self.run.stop(
                 Status.EVENT_STORM,
-                f"{Status.EVENT_STORM.value} It stands at t = {t:.9g} s, "
-                f"event '{events[which[0]].name}'.",
+                f"{Status.EVENT_STORM.value} It stands at t = {self.t:.9g} s, event '{name}'.",
             )
-        else:
-            self.make_consistent(moved=any(events[i].reset for i in which))
-        return old
+        elif reason is Stop.FOLLOW:
+            last, events = self.run.jumps[-1], self.integrator.model.events
+            self.make_consistent(moved=any(events[i].reset for i in np.flatnonzero(last.which[-1])))
+            last.after[-1] = self.y
 
-    def before_start(self) -> Array | None:
-        """Event values as if just before the start, where some have happened by it; else None."""
+    def before_start(self) -> None:
+        """Events that have happened by the start have values as if just before it."""
+        if self.events is None:
+            return
         events = self.integrator.model.events
-        if not any(event.at_start for event in events):
-            return None
-        now = values(self.integrator, self.t, self.y, self.d)
-        return np.array(
-            [-e.direction if e.at_start else x for e, x in zip(events, now, strict=True)]
-        )
+        if any(event.at_start for event in events):
+            now = self.values(self.d)
+            signs = (-e.direction if e.at_start else x for e, x in zip(events, now, strict=True))
+            self.events.jumped(np.array(list(signs)))
 
-    def jump(self, before: Array) -> Array | None:
-        """Take over new input data, which algebraic unknowns follow; event values before them."""
-        old = None
-        if self.eventful:
-            old = values(self.integrator, self.t, self.y, before)
+    def jump(self, before: Array) -> None:
+        """Take over new input data, from those `before`; algebraic unknowns follow."""
+        if self.events is not None:
+            self.events.jumped(self.values(before))
         self.make_consistent()
-        return old
+
+    def values(self, d: Array) -> Array:
+        """Values of the events here with run data `d`."""
+        return self.integrator.events(self.t, self.y, d).full().ravel()
 
     def make_consistent(self, moved: bool = False) -> None:
         """Let the algebraic unknowns follow a jump, or stop the run where they cannot.

@@ -2,11 +2,13 @@
 
     S = (t, h, h_old, growth_old, rejected, y)     what an attempt changes
     R = (t_end, rtol, h_max, atol[nx], d)          what it does not
+    (t0, t1, y0, y1, D)                            what is kept of an accepted one, `Record`
 
 Columns of many members are the rows of a matrix.
 """
 
-from typing import final
+from dataclasses import dataclass
+from typing import ClassVar, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -51,6 +53,41 @@ class Given:
     def d(nx: int) -> slice:
         """Run data behind the tolerances of `nx` states."""
         return slice(Given.FIXED + nx, None)
+
+
+@final
+@dataclass(frozen=True)
+class Record:
+    """Places in the record (t0, t1, y0, y1, D) of an accepted step.
+
+    Attributes:
+        n: number of unknowns.
+        rows: of the dense output D, each of length n.
+    """
+
+    n: int
+    rows: int
+    T0: ClassVar[int] = 0
+    T1: ClassVar[int] = 1
+
+    @property
+    def width(self) -> int:
+        """Length of a record."""
+        return 2 + (2 + self.rows) * self.n
+
+    @property
+    def y0(self) -> slice:
+        """Unknowns at the start."""
+        return slice(2, 2 + self.n)
+
+    @property
+    def y1(self) -> slice:
+        """Unknowns at the end."""
+        return slice(2 + self.n, 2 + 2 * self.n)
+
+    def bend(self, k: int) -> slice:
+        """Row `k` of the dense output."""
+        return slice(2 + (2 + k) * self.n, 2 + (3 + k) * self.n)
 
 
 def _joined(common: list[float], own: Array) -> Array:

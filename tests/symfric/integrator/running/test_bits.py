@@ -9,16 +9,21 @@ from typing import Any
 
 import casadi as ca
 import pytest
+from hybrid import ball
 
 import symfric.integrator.running.integrator as module
 from symfric import (
     BrownMcPhee,
+    Event,
     ExactCoulomb,
+    Hold,
     Linear,
     LuGre,
+    MaxwellSlip,
     Model,
     RateAndState,
     Trajectory,
+    Variable,
     drive,
     rabinowicz,
     simulate,
@@ -34,9 +39,27 @@ LAW = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
 FORCE = {"force": lambda t: 12 * ca.sin(3 * t)}
 SAMPLED = {"force": Linear([0.0, 0.4, 0.9], [0.0, 15.0, -15.0])}
 
+
+def eventful_dae() -> Model:
+    """An algebraic unknown that follows a reset and a jump of an input, and has an event itself."""
+    x, y = Variable("x", "1"), Variable("y", "1", start=1.0)
+    z, u = Variable("z", "1"), Variable("u", "1")
+    return Model(
+        "dae", x=(x, y), z=(z,), u=(u,), ode=ca.vertcat(y.symbol, -z.symbol),
+        alg=z.symbol + z.symbol**3 - 4 * x.symbol - u.symbol,
+        events=(
+            Event("back", z.symbol - 0.5, 0, reset={"x": x.symbol / 2, "y": -0.9 * y.symbol}),
+            Event("turn", y.symbol, -1),
+        ),
+    )  # fmt: skip
+
+
 Case = tuple[Callable[[], Model], float, dict[str, Any]]
 CASES: dict[str, Case] = {
     "events": (lambda: drive(ExactCoulomb()), 2.0, {"u": FORCE}),
+    "storm": (lambda: ball(0.8), 5.0, {"rtol": 1e-10}),
+    "many events": (lambda: drive(MaxwellSlip(form="event")), 2.0, {"u": SAMPLED}),
+    "events of an unknown": (eventful_dae, 3.0, {"u": {"u": Hold([0, 1], [0, 2])}}),
     "samples": (lambda: drive(LuGre()), 1.0, {"u": SAMPLED}),
     "exponentials": (lambda: rabinowicz(RateAndState(), free=["k"]), 0.5, {"p": {"k": 3.0}}),
     "normal force": (lambda: PendulumBox(LAW).model(), 2.0, {}),

@@ -6,9 +6,10 @@ from hybrid import ball
 from numpy.typing import NDArray
 
 from symfric import LuGre, rabinowicz, simulate
+from symfric.integrator.running.crossings import cutting
 from symfric.integrator.running.dense import Dense, from_records, hermite, join
 from symfric.integrator.running.engine import width
-from symfric.integrator.running.events import Crossing
+from symfric.integrator.step.layout import Record
 
 Array = NDArray[np.float64]
 RNG = np.random.default_rng(7)
@@ -58,20 +59,16 @@ def test_piece_is_a_polynomial_one_degree_above_its_rows(rows: int, degree: int)
 
 
 @pytest.mark.parametrize("rows", [0, 1, 2, 3])
-@pytest.mark.parametrize("t", [1.001, 1.37, 1.999])
-def test_piece_cut_at_an_event_keeps_its_polynomial(rows: int, t: float) -> None:
-    whole = pieces(rows)
-    y = whole(np.array([t]))[:, 0]
-    cut = Crossing(t, 1, y, (0,)).before(whole)
-    assert (cut.t0.tolist(), cut.t1.tolist()) == ([0.0, 1.0], [1.0, t])
-    times = np.linspace(0, t, 101)
+@pytest.mark.parametrize("theta", [0.001, 0.37, 0.999, 1.0])
+def test_step_cut_at_an_event_keeps_its_polynomial(rows: int, theta: float) -> None:
+    whole = pieces(rows, 1)
+    at = Record(2, rows)
+    assert at.width == width(2, rows)
+    row = np.concatenate([whole.t0, whole.t1, whole.y0[0], whole.y1[0], whole.D.ravel()])
+    cut = from_records(cutting(at)(theta, row).full().T, 2)
+    assert (cut.t0.tolist(), cut.t1.tolist()) == ([0.0], [theta])
+    times = np.linspace(0, theta, 101)
     assert cut(times) == pytest.approx(whole(times), abs=1e-12)
-
-
-def test_cut_at_the_start_of_a_piece_leaves_no_empty_piece() -> None:
-    whole = pieces(3)
-    cut = Crossing(1.0, 1, whole.y0[1], (0,)).before(whole)
-    assert cut.t1.tolist() == [1.0]
 
 
 def test_value_at_a_jump_is_that_after_it() -> None:

@@ -1,15 +1,18 @@
 """What is a storm of events and what is none, on both sides of every threshold."""
 
-from symfric.integrator.running.events import EventStorm
+import numpy as np
+
+from symfric.integrator.running.crossings import Memory
+from symfric.integrator.running.events import storm
 
 TOLERANCE = 2.0**-33
 
 
 def raged(times: list[float], which: list[tuple[int, ...]] | None = None) -> list[int]:
     """Numbers of the events at `times` that complete a storm."""
-    storm = EventStorm(TOLERANCE)
-    kinds = which or [(0,)] * len(times)
-    return [k for k, (t, w) in enumerate(zip(times, kinds, strict=True)) if storm.raged_at(t, w)]
+    memory, kinds = Memory.new(3, TOLERANCE), which or [(0,)] * len(times)
+    flags = [np.isin(np.arange(3), kind) for kind in kinds]
+    return [k for k, (t, w) in enumerate(zip(times, flags, strict=True)) if storm(memory, t, w)]
 
 
 def shrinking(last: float) -> list[float]:

@@ -1,0 +1,186 @@
+"""Zero crossings within an accepted step: what both engines evaluate.
+
+Everything that takes arithmetic on many numbers is a Function, so that virtual machine and compiled
+code agree to the bit. What is left, signs and the Illinois method, is written twice, in the same
+operations: in Python (`symfric.integrator.running.events`) and in C (`.search`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.integrator.equations.quotients import divided_once
+from symfric.integrator.step.layout import Record
+from symfric.model.parts import Event
+
+Array = NDArray[np.float64]
+LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Where each step is looked at; a double crossing closer than this is not seen."""
+KEPT = 100
+"""Times of events that are remembered, to notice a storm."""
+ALIKE = 4
+"""Events of one kind in a row whose distances are looked at."""
+SOON = 2.0
+"""Event tolerances after a jump at which the signs behind it are taken."""
+RESTART, LEAST = 1e3, 1e-3
+"""The step after an event: so many event tolerances, and at least this part of the step cut."""
+
+
+@final
+class Memory:
+    """What is remembered of events between steps, a column of numbers that both engines share.
+
+    phase, tolerance [s], number of jumps, how many of the last ones were of one kind, times of the
+    last jumps, then for each event: its value before the step to come, and whether it took part in
+    the last jump.
+    """
+
+    PHASE, TOLERANCE, COUNT, ALIKE = range(4)
+    TIMES = slice(4, 4 + KEPT)
+    FRESH, JUMPED, ON = 0.0, 1.0, 2.0
+    """Phases: the values are those at the start of the step; before a jump there, NaN for events
+    that took part in it; or at the end of the step before."""
+
+    @staticmethod
+    def before(count: int) -> slice:
+        """Values of `count` events."""
+        return slice(4 + KEPT, 4 + KEPT + count)
+
+    @staticmethod
+    def last(count: int) -> slice:
+        """Which of `count` events took part in the last jump."""
+        return slice(4 + KEPT + count, 4 + KEPT + 2 * count)
+
+    @staticmethod
+    def new(count: int, tolerance: float) -> Array:
+        """Nothing has happened yet; `tolerance` [s] of event times."""
+        memory = np.zeros(4 + KEPT + 2 * count)
+        memory[Memory.TOLERANCE] = tolerance
+        return memory
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Crossings:
+    """The events of a model on one accepted step, a record row (t0, t1, y0, y1, D).
+
+    Attributes:
+        looks: (row, d) -> their values at `LOOKS` but the first, one look after the other.
+        values: (theta, row, d) -> their values within the step.
+        cut: (theta, row) -> the row up to there, the same polynomial.
+        jump: (row, d) -> their values at its end, and all resets from there.
+        record: where things stand in a row.
+        directions, terminal: of each event.
+        resets: of each reset, in order: number of the event and of the state that it sets.
+        follows: whether algebraic unknowns follow a reset.
+    """
+
+    looks: ca.Function
+    values: ca.Function
+    cut: ca.Function
+    jump: ca.Function
+    record: Record
+    directions: tuple[int, ...]
+    terminal: tuple[bool, ...]
+    resets: tuple[tuple[int, int], ...]
+    follows: bool
+
+    @property
+    def count(self) -> int:
+        """Number of events."""
+        return len(self.directions)
+
+    @property
+    def width(self) -> int:
+        """Length of the record of a jump: (steps before it, t, y before, y after, which)."""
+        return 2 + 2 * self.record.n + self.count
+
+    @property
+    def data(self) -> int:
+        """Number of run data d."""
+        return self.jump.numel_in(1)
+
+    @property
+    def functions(self) -> tuple[ca.Function, ...]:
+        """What the compiled search calls."""
+        return self.looks, self.values, self.cut, self.jump
+
+
+def crossings(
+    events: Sequence[Event],
+    states: Sequence[str],
+    expressions: ca.Function,
+    resets: ca.Function,
+    rows: int,
+    follows: bool,
+) -> Crossings:
+    """Build the Functions.
+
+    Args:
+        events: of the model.
+        states: names, in the order of y.
+        expressions: (t, y, d) -> value of each event.
+        resets: (t, y, d) -> value of each reset, event after event.
+        rows: of the dense output.
+        follows: as in `Crossings`.
+    """
+    at = Record(expressions.numel_in(1), rows)
+    row, d = ca.SX.sym("row", at.width), ca.SX.sym("d", expressions.numel_in(2))
+    theta = ca.SX.sym("theta")
+    end = row[at.T1], row[at.y1]
+    looks = [_place(at, row, s) if s < 1 else end for s in LOOKS[1:]]
+    states = list(states)
+    return Crossings(
+        _function("looks", [row, d], [ca.vertcat(*(expressions(*look, d) for look in looks))]),
+        _function("values", [theta, row, d], [expressions(*_inside(at, row, theta), d)]),
+        cutting(at),
+        _function("jump", [row, d], [expressions(*end, d), resets(*end, d)]),
+        at,
+        tuple(e.direction for e in events),
+        tuple(e.terminal for e in events),
+        tuple((i, states.index(name)) for i, e in enumerate(events) for name in e.reset),
+        follows,
+    )
+
+
+def _function(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Function:
+    dense = [ca.densify(divided_once(result)) for result in results]
+    return ca.Function(f"symfric_{name}", arguments, dense, {"cse": True})
+
+
+def _place(at: Record, row: ca.SX, theta: Any) -> tuple[ca.SX, ca.SX]:
+    """Time and unknowns within a step, as in `Dense`."""
+    bend: Any = 0.0
+    for k in reversed(range(at.rows)):
+        bend = row[at.bend(k)] + theta * bend
+    t = row[at.T0] + theta * (row[at.T1] - row[at.T0])
+    return t, (1 - theta) * row[at.y0] + theta * (row[at.y1] + (1 - theta) * bend)
+
+
+def _inside(at: Record, row: ca.SX, theta: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """The same, with a time that rounding does not carry beyond the end."""
+    t, y = _place(at, row, theta)
+    return ca.if_else(theta < 1, ca.fmin(t, row[at.T1]), row[at.T1]), y
+
+
+def cutting(at: Record) -> ca.Function:
+    """(theta, row) -> the row up to theta, the same polynomial.
+
+    Its coefficients are those with d'_k - d'_(k+1) = theta^(k+1) [d_k - d_(k+1)], d_(r+1) = 0.
+    """
+    row, theta = ca.SX.sym("row", at.width), ca.SX.sym("theta")
+    t, y = _inside(at, row, theta)
+    powers = [theta * theta]
+    for _ in range(at.rows - 1):
+        powers.append(powers[-1] * theta)
+    bends: list[ca.SX] = []
+    old, new = ca.SX.zeros(at.n), ca.SX.zeros(at.n)
+    for k in reversed(range(at.rows)):
+        here = row[at.bend(k)]
+        new, old = new + powers[k] * (here - old), here
+        bends.insert(0, new)
+    return _function("cut", [theta, row], [ca.vertcat(row[at.T0], t, row[at.y0], y, *bends)])

@@ -1,0 +1,238 @@
+"""The search for events behind each accepted step, in C; in Python it is `running.events`."""
+
+from collections.abc import Iterable
+from string import Template
+
+from symfric.integrator.running.crossings import (
+    ALIKE,
+    KEPT,
+    LEAST,
+    LOOKS,
+    RESTART,
+    SOON,
+    Crossings,
+)
+from symfric.integrator.step.layout import GROWTH_MEMORY, State
+
+
+def search_source(crossings: Crossings | None) -> str:
+    """C of the search in an accepted step, to be called behind it; none without events."""
+    if crossings is None:
+        return ""
+    functions, m = crossings.functions, len(crossings.resets)
+    return Template(_SEARCH).substitute(
+        n=crossings.record.n,
+        events=crossings.count,
+        looks=len(LOOKS) - 1,
+        resets=m,
+        row=crossings.record.width,
+        y0=crossings.record.y0.start,
+        y1=crossings.record.y1.start,
+        at_looks=", ".join(map(repr, LOOKS)),
+        directions=_table(crossings.directions),
+        terminal=_table(crossings.terminal),
+        by_event=_table(i for i, _ in crossings.resets),
+        of_state=_table(j for _, j in crossings.resets),
+        kept=KEPT,
+        alike=ALIKE,
+        soon=repr(SOON),
+        restart=repr(RESTART),
+        least=repr(LEAST),
+        growth=repr(GROWTH_MEMORY),
+        memory=State.MEMORY,
+        follows=int(crossings.follows),
+        arg=max(f.sz_arg() for f in functions),
+        res=max(f.sz_res() for f in functions),
+    )
+
+
+def _table(values: Iterable[int]) -> str:
+    """Entries of a C array, which has at least one."""
+    return ", ".join(str(int(value)) for value in values) or "0"
+
+
+_SEARCH = """
+/* Zero crossings in an accepted step; M is what is remembered between steps. */
+enum { EVENTS = $events, LOOKS = $looks, RESETS = $resets, UNKNOWNS = $n, KEPT = $kept };
+enum { PHASE, TOLERANCE, COUNT, ALIKE, TIMES, BEFORE = TIMES + KEPT, LAST = BEFORE + EVENTS };
+enum { FRESH, JUMPED, ON };
+static const double symfric_look_at[] = { $at_looks };
+static const int symfric_directions[] = { $directions };
+static const int symfric_terminal[] = { $terminal };
+static const int symfric_by_event[] = { $by_event };
+static const int symfric_of_state[] = { $of_state };
+
+typedef struct { const double *row, *d; casadi_int *iw; double *w; } symfric_place;
+
+static void symfric_within(const symfric_place *p, double theta, double *g)
+{
+  const double *arg[$arg];
+  double *res[$res];
+  arg[0] = &theta;
+  arg[1] = p->row;
+  arg[2] = p->d;
+  res[0] = g;
+  symfric_values(arg, res, p->iw, p->w, 0);
+}
+
+static int symfric_passed(double before, double after, int direction)
+{
+  return (before < 0 && after >= 0 && direction >= 0)
+      || (before > 0 && after <= 0 && direction <= 0);
+}
+
+/* Root of one event in [a, b] by the Illinois method; the side after the root. */
+static double symfric_locate(const symfric_place *p, int event, double a, double b,
+                             double fa, double fb, double tolerance)
+{
+  double g[EVENTS], c, fc, low, high;
+  int k, side = 0;
+  if (fb == 0) return b;
+  for (k = 0; k < 100 && b - a > tolerance; ++k) {
+    c = (fa * b - fb * a) / (fa - fb);
+    low = a + 1e-3 * (b - a);
+    high = b - 1e-3 * (b - a);
+    if (side && low > c) c = low;
+    if (side && high < c) c = high;
+    symfric_within(p, c, g);
+    fc = g[event];
+    if (fc == 0) return c;
+    if ((fc > 0) == (fb > 0)) {
+      b = c;
+      fb = fc;
+      if (side == 1) fa = fa / 2;
+      side = 1;
+    } else {
+      a = c;
+      fa = fc;
+      if (side == -1) fb = fb / 2;
+      side = -1;
+    }
+  }
+  return b;
+}
+
+/* Where in the step the first events happen, and which; -1 where none does. */
+static double symfric_crossing(const symfric_place *p, double *M, double *which)
+{
+  const double *arg[$arg], *g0, *g1;
+  double *res[$res];
+  double g[(LOOKS + 1) * EVENTS], root[EVENTS], low = 0, theta, first, share;
+  double h = p->row[1] - p->row[0];
+  int jumped[EVENTS], i, look, any;
+  for (i = 0; i < EVENTS; ++i) jumped[i] = 0;
+  if (M[PHASE] == ON) {
+    for (i = 0; i < EVENTS; ++i) g[i] = M[BEFORE + i];
+  } else if (M[PHASE] == FRESH) {
+    symfric_within(p, 0, g);
+  } else {
+    low = $soon * M[TOLERANCE] / h;
+    if (low > 0.1) low = 0.1;
+    symfric_within(p, low, g);
+    for (i = 0; i < EVENTS; ++i)
+      jumped[i] = symfric_passed(M[BEFORE + i], g[i], symfric_directions[i]) && g[i] != 0;
+  }
+  arg[0] = p->row;
+  arg[1] = p->d;
+  res[0] = g + EVENTS;
+  symfric_looks(arg, res, p->iw, p->w, 0);
+  share = M[TOLERANCE] / h;
+  if (share < 1e-15) share = 1e-15;
+  for (look = 0; look < LOOKS; ++look) {
+    g0 = g + look * EVENTS;
+    g1 = g0 + EVENTS;
+    first = 2;
+    for (i = 0; i < EVENTS; ++i) {
+      root[i] = 2;
+      if (look == 0 && jumped[i])
+        root[i] = 0;
+      else if (symfric_passed(g0[i], g1[i], symfric_directions[i]))
+        root[i] = symfric_locate(p, i, look ? symfric_look_at[look] : low,
+                                 symfric_look_at[look + 1], g0[i], g1[i], share);
+      if (root[i] < first) first = root[i];
+    }
+    if (first > 1) continue;
+    for (i = 0; i < EVENTS; ++i)
+      which[i] = root[i] <= 1 && (root[i] - first) * h <= M[TOLERANCE];
+    return first;
+  }
+  for (i = 0; i < EVENTS; ++i) M[BEFORE + i] = g[LOOKS * EVENTS + i];
+  M[PHASE] = ON;
+  return -1;
+}
+
+/* Whether the events at time t complete a storm, see EventStorm. */
+static int symfric_storm(double *M, double t, const double *which)
+{
+  int i, alike = 1;
+  long long count = (long long)M[COUNT];
+  double apart, a, b, c;
+  for (i = 0; i < EVENTS; ++i)
+    if (M[LAST + i] != which[i]) alike = 0;
+  for (i = 0; i < EVENTS; ++i) M[LAST + i] = which[i];
+  M[TIMES + count % KEPT] = t;
+  M[COUNT] = (double)++count;
+  M[ALIKE] = alike ? M[ALIKE] + 1 : 1;
+  apart = nextafter(fabs(t), INFINITY) - fabs(t);
+  if (apart < M[TOLERANCE]) apart = M[TOLERANCE];
+  if (count >= KEPT && t - M[TIMES + count % KEPT] < 10 * apart * KEPT) return 1;
+  if (M[ALIKE] < $alike) return 0;
+  a = M[TIMES + (count - 3) % KEPT] - M[TIMES + (count - 4) % KEPT];
+  b = M[TIMES + (count - 2) % KEPT] - M[TIMES + (count - 3) % KEPT];
+  c = t - M[TIMES + (count - 2) % KEPT];
+  return b < a && c < b && c * c / (b - c) < 1000 * M[TOLERANCE];
+}
+
+/* Looks for events in the accepted step `row`, which led to S. The first ones are carried out: the
+   row is cut there, S goes on behind them, and `jump` tells of them. Returns 1 then, -1 where they
+   happen at the very start and no row is left, else 0. */
+static int symfric_search(double *row, double *S, const double *d, double *M, double *jump,
+                          long long rows, casadi_int *iw, double *w, int *stop)
+{
+  symfric_place p = { row, d, iw, w };
+  const double *arg[$arg];
+  double *res[$res], *which = jump + 2 + 2 * UNKNOWNS, *after = jump + 2 + UNKNOWNS;
+  double cut[$row], fresh[RESETS + 1], theta = symfric_crossing(&p, M, which);
+  double h = row[1] - row[0], least;
+  int i, over = 0, kept;
+  if (theta < 0) return 0;
+  arg[0] = &theta;
+  arg[1] = row;
+  res[0] = cut;
+  symfric_cut(arg, res, iw, w, 0);
+  kept = cut[1] != row[0];
+  if (kept)
+    for (i = 0; i < $row; ++i) row[i] = cut[i];
+  arg[0] = cut;
+  arg[1] = d;
+  res[0] = M + BEFORE;
+  res[1] = fresh;
+  symfric_jump(arg, res, iw, w, 0);
+  M[PHASE] = JUMPED;
+  for (i = 0; i < EVENTS; ++i)
+    if (which[i] != 0) M[BEFORE + i] = NAN;
+  jump[0] = (double)(kept ? rows + 1 : rows);
+  jump[1] = cut[1];
+  for (i = 0; i < UNKNOWNS; ++i) jump[2 + i] = after[i] = cut[$y1 + i];
+  for (i = 0; i < RESETS; ++i)
+    if (which[symfric_by_event[i]] != 0) after[symfric_of_state[i]] = fresh[i];
+  least = $least * h;
+  if ($restart * M[TOLERANCE] < h) h = $restart * M[TOLERANCE];
+  if (h < least) h = least;
+  S[0] = cut[1];
+  S[1] = h;
+  S[2] = h;
+  S[3] = $growth;
+  S[4] = 0;
+  for (i = 0; i < UNKNOWNS; ++i) S[$memory + i] = after[i];
+  for (i = 0; i < EVENTS; ++i)
+    if (which[i] != 0 && symfric_terminal[i]) over = 1;
+  if (over)
+    *stop = 4;
+  else if (symfric_storm(M, cut[1], which))
+    *stop = 5;
+  else if ($follows)
+    *stop = 6;
+  return kept ? 1 : -1;
+}
+"""
