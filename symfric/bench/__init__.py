@@ -9,4 +9,6 @@ from symfric.bench.ivp import bench_ivp as bench_ivp
 from symfric.bench.jitter import jitter as jitter
 from symfric.bench.multibody import MultibodyBenchmark as MultibodyBenchmark
 from symfric.bench.multibody import bench_multibody as bench_multibody
+from symfric.bench.regularisation import RegularisationBenchmark as RegularisationBenchmark
+from symfric.bench.regularisation import bench_regularisation as bench_regularisation
 from symfric.bench.sensitivities import SensitivityRow as SensitivityRow

@@ -9,7 +9,7 @@ from symfric.cli import bench_tables, output
 from symfric.cli.options import JsonOption, PlotOption, check_outputs
 from symfric.foundation.parameters import check_names
 
-SUBJECTS = ("integrator", "multibody", "ivp", "jitter")
+SUBJECTS = ("integrator", "multibody", "ivp", "jitter", "regularisation")
 
 
 def bench(
@@ -24,7 +24,7 @@ def bench(
     plot: PlotOption = None,
     csv: Annotated[
         Path | None,
-        typer.Option("--csv", metavar="FILE.csv", help="Write the runs; multibody only."),
+        typer.Option("--csv", metavar="FILE.csv", help="Runs of multibody, regularisation."),
     ] = None,
     json: JsonOption = None,
 ) -> None:
@@ -34,12 +34,14 @@ def bench(
     derivatives. multibody: mechanisms, the cost of their steps, what they do not need, reference
     numbers. ivp: correct digits on problems with published solutions (Test Set for IVP Solvers).
     jitter: total variation of accelerations against law, step and transition velocity.
+    regularisation: error of smooth laws against dry friction, over their width or stiffness.
 
     Example: symfric bench multibody --plot bench.png --csv runs.csv
     """
     check_names("bench", [subject], SUBJECTS)
-    given = [o for o, value in (("--links", links), ("--csv", csv)) if value is not None]
-    if given and subject != "multibody":
+    only = (("--links", links, ("multibody",)), ("--csv", csv, ("multibody", "regularisation")))
+    given = [o for o, value, where in only if value is not None and subject not in where]
+    if given:
         raise ValueError(f"bench {subject}: expected no {', '.join(given)}, got one")
     check_outputs(json, csv, picture=plot)
     if subject == "integrator":
@@ -48,6 +50,8 @@ def bench(
         _multibody(quick, links, plot, csv, json)
     elif subject == "ivp":
         _ivp(quick, plot, json)
+    elif subject == "regularisation":
+        _regularisation(quick, plot, csv, json)
     else:
         _jitter(quick, plot, json)
     output.say_written(plot, csv, json)
@@ -108,6 +112,20 @@ def _jitter(quick: bool, plot: Path | None, json: str | None) -> None:
     output.emit_json(data.to_dict(), json)
     if json != "-":
         bench_tables.jitter(data)
+
+
+def _regularisation(quick: bool, plot: Path | None, csv: Path | None, json: str | None) -> None:
+    from symfric.bench import bench_regularisation  # noqa: PLC0415  (only this command needs it)
+
+    with output.progress("measuring") as tell:
+        result = bench_regularisation(quick=quick, progress=lambda _, fraction: tell(fraction))
+    if plot:
+        result.plot(plot)
+    if csv:
+        result.write_csv(csv)
+    output.emit_json(result.to_dict(), json)
+    if json != "-":
+        bench_tables.regularisation(result)
 
 
 def lengths(text: str) -> tuple[int, ...]:

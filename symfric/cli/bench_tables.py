@@ -6,7 +6,12 @@ from symfric.cli import output
 from symfric.figures import FigureData
 
 if TYPE_CHECKING:
-    from symfric.bench import Benchmark, IvpBenchmark, MultibodyBenchmark
+    from symfric.bench import (
+        Benchmark,
+        IvpBenchmark,
+        MultibodyBenchmark,
+        RegularisationBenchmark,
+    )
 
 
 def integrator(result: "Benchmark") -> None:
@@ -160,6 +165,35 @@ def jitter(data: FigureData) -> None:
         ],
         data.title,
     )
+
+
+def regularisation(result: "RegularisationBenchmark") -> None:
+    """A table per case, a line per width: errors at each tolerance, order and cost."""
+    for case in dict.fromkeys(row.case for row in result.rows):
+        own = [row for row in result.rows if row.case == case]
+        first, rtols = own[0], list(dict.fromkeys(row.rtol for row in own))
+        lines = [
+            [row for row in own if row.value == x] for x in dict.fromkeys(r.value for r in own)
+        ]
+        cyclic = any(line[-1].cycle_error == line[-1].cycle_error for line in lines)
+        output.show_table(
+            [f"{first.parameter} [{first.unit}]", *(f"{rtol:g}" for rtol in rtols), "order",
+             *(["cycle"] if cyclic else []), "steps", "[ms]"],
+            [
+                [_short(line[0].value), *(_short(r.error) for r in line),
+                 _known(line[-1].order, 2),
+                 *([_known(line[-1].cycle_error, 3)] if cyclic else []), line[0].steps,
+                 _short(1e3 * line[0].time_s)]
+                for line in lines
+            ],
+            f"{case}: error at each rtol against {first.reference}, good for "
+            f"{first.uncertain:.1g}; order and cycle at the smallest rtol, cost at the largest",
+        )  # fmt: skip
+
+
+def _known(value: float, digits: int) -> float | str:
+    """So many digits; empty where there is no number."""
+    return "" if value != value else float(f"{value:.{digits}g}")
 
 
 def _skipped(reasons: dict[str, str]) -> None:

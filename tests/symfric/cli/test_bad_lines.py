@@ -72,6 +72,7 @@ def lines() -> Iterator[list[str]]:
         "demo --data none",
         "bench multibody --links 0",
         "bench jitter --csv x.csv",
+        "bench regularisation --links 2",
         "demo extra",
         "laws --set mu_d=1",
         "laws --figure lag",

@@ -1,0 +1,263 @@
+"""Error of smooth friction against dry friction, over what makes it smooth.
+
+    error = max over signals and times of |x(s) - x(0)| / (largest - smallest value of x(0))
+
+s scales v_t or, inversely, the stiffness of bristles. x(0) is the motion with set-valued friction
+of the same levels where the machine can have it; else a run at a sixteenth of the smallest width,
+whose own error follows from the order in which the last runs converge. Every width is run at
+several tolerances: where their curves part, the error of the law ends and that of the integrator
+begins. Where the motion is periodic, a second error is that of the last cycle, its period and its
+amplitude, which does not grow with the number of cycles.
+"""
+
+import csv
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from math import log, nan
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.figures.regularisation import (
+    Bed,
+    Regularisation,
+    Sample,
+    distance,
+    regularisation,
+    sample,
+)
+from symfric.foundation.files import written
+from symfric.foundation.parameters import parameters
+from symfric.laws import BrownMcPhee, ExactCoulomb, Law, LuGre, steady_force
+from symfric.results.trajectory import Trajectory
+from symfric.scenes import FourMass, PendulumBox, Rabinowicz, Scene, SliderCrank
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+RTOLS = (1e-5, 1e-6, 1e-8)
+"""Relative tolerances of the runs."""
+FINE = 1e-10
+"""That of references."""
+HALF_DECADES = tuple(10.0 ** (-k / 2) for k in range(9))
+"""Factors of the widths: four decades."""
+BEYOND = 1 / 16
+"""Factor of the smallest width at which a reference is run where no exact law can be."""
+STILL = 1e-12
+"""What an instant may be off a sample [s] to be that sample."""
+ROUNDS = 3
+"""Calls, the fastest of which is the time."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A law in a machine.
+
+    Attributes:
+        law: at its largest width.
+        scene: law -> machine.
+        exact: the law that it tends to, where the machine can have it.
+        cycle: whether the motion is periodic.
+    """
+
+    name: str
+    law: Law
+    scene: Callable[[Law], Scene]
+    t_end: float
+    exact: Callable[[Law], Law] | None = None
+    cycle: bool = False
+    of: tuple[str, ...] | None = None
+
+
+@final
+@dataclass(frozen=True)
+class RegularisationRow:
+    """One width at one tolerance.
+
+    Attributes:
+        parameter, unit, value: what makes the law smooth.
+        error: largest difference from dry friction, relative to the size of the motion.
+        cycle_error: that of period and amplitude of the last cycle; NaN where there is none.
+        order: in which the error falls from the width before; NaN at the first.
+        time_s: CPU time of a call [s].
+        reference: what it is compared with.
+        uncertain: error of the reference.
+    """
+
+    case: str
+    parameter: str
+    unit: str
+    value: float
+    rtol: float
+    error: float
+    cycle_error: float
+    order: float
+    time_s: float
+    steps: int
+    attempts: int
+    reference: str
+    uncertain: float
+
+
+def peak(law: Law) -> float:
+    """Largest coefficient of friction of a static law in steady sliding, near its v_t."""
+    scale = float(law.velocity_scale)  # pyright: ignore[reportArgumentType]
+    return float(steady_force(law, np.linspace(0.5, 2.0, 30001) * scale, 1.0).max())
+
+
+def _coulomb(law: Law) -> Law:
+    """Dry friction with the levels of Brown-McPhee, whose peak is 0.05 % short of mu_s."""
+    return ExactCoulomb(mu_s=peak(law), mu_d=parameters(law)["mu_d"].value)
+
+
+def _brown(mu_s: float, mu_d: float) -> Law:
+    return BrownMcPhee(mu_s=mu_s, mu_d=mu_d, v_t=1e-2)
+
+
+def _lugre(mu_s: float, mu_d: float) -> Law:
+    return LuGre(mu_s=mu_s, mu_d=mu_d, v_s=1e-2, sigma_0=1e3, sigma_1=10.0, sigma_2=0.0)
+
+
+def _slow_crank(law: Law) -> Scene:
+    """Started with 1 rad/s, so that it comes to rest."""
+    return SliderCrank(law, omega=1.0)
+
+
+CASES = (
+    Case("rabinowicz brown_mcphee", _brown(0.15, 0.1), Rabinowicz, 20.0, _coulomb, True, ("x",)),
+    Case("pendulum_box brown_mcphee", _brown(0.15, 0.1), PendulumBox, 15.0),
+    Case("four_mass brown_mcphee", _brown(0.12, 0.1), FourMass, 4.0),
+    Case("slider_crank brown_mcphee", _brown(0.1, 0.08), _slow_crank, 5.0),
+    Case("rabinowicz lugre", _lugre(0.15, 0.1), Rabinowicz, 20.0, None, True, ("x",)),
+    Case("four_mass lugre", _lugre(0.12, 0.1), FourMass, 4.0),
+)
+
+
+@final
+@dataclass(frozen=True)
+class RegularisationBenchmark:
+    """All rows."""
+
+    rows: tuple[RegularisationRow, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data; NaN becomes null."""
+        rows = [asdict(row) for row in self.rows]
+        return {"rows": [{k: None if v != v else v for k, v in row.items()} for row in rows]}
+
+    def write_csv(self, path: str | Path) -> None:
+        """Write the rows, a line each."""
+        with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+            table = csv.writer(file)
+            names = [f.name for f in fields(RegularisationRow)]
+            table.writerow(names)
+            table.writerows([getattr(row, name) for name in names] for row in self.rows)
+
+    def plot(self, path: str | Path | None = None) -> "Figure":
+        """Error against width above, CPU time below, a column per case, a line per tolerance."""
+        from symfric.bench.pictures import plot_regularisation  # noqa: PLC0415
+
+        return plot_regularisation(self.rows, path)
+
+
+def bench_regularisation(
+    *,
+    quick: bool = False,
+    cases: Sequence[Case] = CASES,
+    factors: Sequence[float] = HALF_DECADES,
+    rtols: Sequence[float] = RTOLS,
+    progress: Callable[[str, float], None] | None = None,
+) -> RegularisationBenchmark:
+    """Run every case at every width and tolerance; `quick` takes every second width once."""
+    factors = factors[::2] if quick else factors
+    rows: list[RegularisationRow] = []
+    for number, case in enumerate(cases):
+        if progress is not None:
+            progress(case.name, number / len(cases))
+        rows += _measured(case, factors, rtols, 1 if quick else ROUNDS)
+    return RegularisationBenchmark(tuple(rows))
+
+
+def _measured(
+    case: Case, factors: Sequence[float], rtols: Sequence[float], rounds: int
+) -> list[RegularisationRow]:
+    """The rows of a case: tolerance by tolerance, width by width."""
+    knob = regularisation("bench", case.law)
+    model = case.scene(case.law).model(knob.names)
+    bed = Bed(case.name, lambda _: model, case.t_end, case.of, free=True)
+    reference, of_what, uncertain = _reference(case, knob, bed, factors)
+    cycles = replace(bed, of=last_cycle) if case.cycle else None
+    exact = _reference(case, knob, cycles, factors)[0] if cycles else None
+    name, unit = knob.names[0], parameters(case.law)[knob.names[0]].unit
+    rows: list[RegularisationRow] = []
+    for rtol in rtols:
+        before: tuple[float, float] | None = None
+        for s in factors:
+            run = _at(bed, knob, s, rtol, rounds)
+            error, in_cycle, order = distance(run, reference), nan, nan
+            if cycles and exact:
+                in_cycle = distance(_at(cycles, knob, s, rtol), exact)
+            if before is not None and error > 0 < before[1]:
+                order = log(before[1] / error) / log(before[0] / s)
+            before = s, error
+            rows.append(
+                RegularisationRow(
+                    case.name, name, unit, run.values[name], rtol, error, in_cycle, order,
+                    run.time_s, run.steps, run.attempts, of_what, uncertain,
+                )
+            )  # fmt: skip
+    return rows
+
+
+def _at(bed: Bed, knob: Regularisation, s: float, rtol: float, rounds: int = 1) -> Sample:
+    return sample(bed, knob.law, rtol, s, knob.values(s), rounds)
+
+
+def _reference(
+    case: Case, knob: Regularisation, bed: Bed, factors: Sequence[float]
+) -> tuple[Sample, str, float]:
+    """The motion with dry friction, what it is, and its error."""
+    if case.exact is not None:
+        law = case.exact(case.law)
+        exact = case.scene(law).model()
+        own = Bed(case.name, lambda _: exact, case.t_end, bed.of)
+        return sample(own, law, FINE), type(law).__name__, FINE
+    last = factors[-1] * BEYOND
+    coarse, middle, finest = (_at(bed, knob, last * r**2, FINE) for r in (4.0, 2.0, 1.0))
+    wide, near = distance(coarse, middle), distance(middle, finest)
+    order = log(wide / near) / log(4.0) if wide > near > 0 else nan
+    name = knob.names[0]
+    # near = C s^q (4^q - 1) where s is the finest width
+    left = near / (4.0**order - 1.0) if order == order else near
+    return finest, f"{name} = {finest.values[name]:.3g}", max(left, FINE)
+
+
+def last_cycle(run: Trajectory) -> Array:
+    """Period [s] and amplitude [m] of the last stick-slip cycle of `x`; empty without two cycles.
+
+    A cycle goes from one largest elongation to the next, the smallest between them. These are where
+    the cubic through four samples of the velocity passes through zero.
+    """
+    t, x, v = run.t, run["x"], run["v"]
+    falls = np.flatnonzero((v[1:-2] > 0) & (v[2:-1] <= 0)) + 1
+    if falls.size < 2:
+        return np.zeros(0)
+    rises = np.flatnonzero((v[1:-2] < 0) & (v[2:-1] >= 0)) + 1
+    low = rises[(rises > falls[-2]) & (rises < falls[-1])][-1]
+    (first, _), (_, least), (last, most) = (_turn(t, x, v, k) for k in (falls[-2], low, falls[-1]))
+    return np.array([last - first, most - least])
+
+
+def _turn(t: Array, x: Array, v: Array, k: int) -> tuple[float, float]:
+    """Instant and value of the extreme of x between the samples k and k + 1."""
+    h = float(t[k + 1] - t[k])
+    rate = np.polynomial.Polynomial.fit(t[k - 1 : k + 3] - t[k], v[k - 1 : k + 3], 3).convert()
+    roots = rate.roots()
+    inside = roots.real[(np.abs(roots.imag) < STILL) & (roots.real > -STILL) & (roots.real < h)]
+    way = rate.integ()
+    at = float(inside[0])
+    return float(t[k]) + at, float(x[k] + way(at) - way(0.0))

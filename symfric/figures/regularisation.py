@@ -1,0 +1,264 @@
+"""What makes a law smooth, and how far it thereby is from dry friction.
+
+A smooth law has a width, such as v_t, below which it creeps instead of resting; bristles have a
+stiffness. As all widths of a law shrink with a factor s (stiffnesses grow with 1/s) its motion
+tends to that with dry, set-valued friction,
+
+    |x(s) - x(0)| = C s^q
+
+The order q is a matter of what the motion does, not of the law alone:
+
+    1      a contact that comes to rest and stays there: it creeps at a velocity of order v_t; with
+           tanh times a logarithm
+    2/3    break-away over a falling branch that is itself of width v_t (Brown-McPhee): the state
+           lingers at the peak, the fold of the stick branch
+    1/2    bristles that are turned: time to slide their deflection F/sigma_0 from rest
+    > 1    a contact that only slides, 3 with Brown-McPhee, whose tail falls like (v_t/v)^3
+
+Far from the limit there is no order at all: where rest is longer than motion, creep is everything.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from time import process_time
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation import checks
+from symfric.foundation.numeric import is_number
+from symfric.foundation.parameters import Parameter, parameters, with_values
+from symfric.integrator.simulate import simulate
+from symfric.laws import Law
+from symfric.laws.base.law import check_law
+from symfric.model import Model
+from symfric.model.kinds import POSITION
+from symfric.results.trajectory import Trajectory
+from symfric.scenes import Scene
+
+Array = NDArray[np.float64]
+Measure = Sequence[str] | Callable[[Trajectory], Array]
+"""Signals by name, or a function that takes numbers from a trajectory, such as periods."""
+Builder = Scene | type[Scene] | Callable[[Law], Model]
+SAMPLES = 2001
+"""Times at which motions are compared."""
+NEGLIGIBLE = 1e-9
+"""Widths below this [m/s] only round off a modulus; they are not what makes a law smooth."""
+STILL = 1e-9
+"""A signal that moves by less than this times its nominal size is measured by the latter."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Regularisation:
+    """The parameters that make `law` smooth, scaled together by a factor s; dry friction at s = 0.
+
+    Attributes:
+        names: what is scaled: widths and velocities by s, stiffnesses and inverse velocities by
+            1/s.
+    """
+
+    law: Law
+    names: tuple[str, ...]
+
+    def values(self, s: float) -> dict[str, float]:
+        """Their values at the factor `s`."""
+        known = parameters(self.law)
+        return {
+            n: float(known[n].value) / s if _grows(known[n]) else float(known[n].value) * s
+            for n in self.names
+        }
+
+    def at(self, s: float) -> Law:
+        """The law at the factor `s`."""
+        return with_values(self.law, self.values(s))
+
+    def factor(self, value: float) -> float:
+        """The factor at which the first of the parameters has this value."""
+        first = parameters(self.law)[self.names[0]]
+        now = float(first.value)
+        return now / value if _grows(first) else value / now
+
+
+def regularisation(
+    where: str, law: Law, parameter: str | Iterable[str] | None = None
+) -> Regularisation:
+    """What makes `law` smooth: `parameter`, or what its roles say.
+
+    Those are the stiffnesses of a law with bristles; else its smoothing widths [m/s]; else its
+    transition velocity.
+
+    Raises:
+        ValueError: no law, no such parameter, or several velocities that may be meant.
+    """
+    check_law(f"{where}: law", law)
+    known = parameters(law)
+    if parameter is not None:
+        given = [parameter] if isinstance(parameter, str) else parameter
+        return _numbers(where, law, checks.names(f"{where}: parameter", given, known))
+    scales = [n for n, p in known.items() if p.role == "velocity scale"]
+    widths = [n for n, p in known.items() if p.role == "width" and p.unit in ("m/s", "rad/s")]
+    widths = [n for n in widths if float(known[n].value) > NEGLIGIBLE]
+    stiff = [n for n, p in known.items() if p.role == "stiffness"] if law.states else []
+    named = [n for n in scales if known[n].field == "v_t"]
+    found = stiff or widths or named or scales
+    if not found:
+        raise ValueError(
+            f"{where}: law: expected a law with a width or a stiffness, got {type(law).__name__}, "
+            "which has none; is it dry already, or smooth by nature?"
+        )
+    if found is scales and len(scales) > 1:
+        raise ValueError(
+            f"{where}: parameter: expected what makes {type(law).__name__} smooth, one of "
+            f"{', '.join(scales)}, got none"
+        )
+    return _numbers(where, law, tuple(found))
+
+
+def _numbers(where: str, law: Law, names: tuple[str, ...]) -> Regularisation:
+    """`names`, whose values have to be positive numbers."""
+    known = parameters(law)
+    for name in names:
+        value = known[name].value
+        if not is_number(value) or not float(value) > 0.0:
+            raise checks.refused(f"{where}: law: {name}", "a number > 0 to start from", value)
+    if not names:
+        raise ValueError(f"{where}: parameter: expected the names of one or more, got none")
+    return Regularisation(law, names)
+
+
+def _grows(p: Parameter) -> bool:
+    """Whether the parameter grows as the law gets dry: a stiffness, an inverse velocity."""
+    return p.role == "stiffness" or p.unit in ("s/m", "s/rad", "1/m")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Bed:
+    """Where laws are compared: a machine that takes any of them, and what is looked at.
+
+    Attributes:
+        name: of the machine.
+        model: law -> equations.
+        t_end: how long [s].
+        of: which signals, or which numbers; None for the positions.
+        free: whether the widths are parameters of one model and not numbers in each.
+    """
+
+    name: str
+    model: Callable[[Law], Model]
+    t_end: float
+    of: Measure | None = None
+    free: bool = False
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """One run.
+
+    Attributes:
+        s: factor of the widths.
+        values: what they are.
+        rtol: relative tolerance of the run.
+        steps, attempts: of the integrator.
+        time_s: CPU time of the call [s].
+        motion: what was looked at, shape (signals, times).
+        size: of each row, that errors are relative to.
+    """
+
+    s: float
+    values: dict[str, float]
+    rtol: float
+    steps: int
+    attempts: int
+    time_s: float
+    motion: Array
+    size: Array
+
+
+def bed_of(where: str, scene: object, t_end: float | None, of: Measure | None = None) -> Bed:
+    """A scene, a class of scenes or a function law -> model as a bed.
+
+    Raises:
+        ValueError: none of these, or no end where nothing says one.
+    """
+    known = scene if isinstance(scene, type) else type(scene)
+    if issubclass(known, Scene):
+        end = _end(where, known.t_end if t_end is None else t_end)
+        if isinstance(scene, Scene):
+            return Bed(known.__name__, lambda law: replace(scene, law=law).model(), end, of)
+        return Bed(known.__name__, lambda law: known(law).model(), end, of)
+    if not callable(scene):
+        raise checks.refused(
+            f"{where}: scene", "a scene such as FourMass, or a function law -> Model", scene
+        )
+    if t_end is None:
+        raise ValueError(f"{where}: t_end: expected the end of the motion [s], got none")
+    build = scene
+    name = getattr(build, "__name__", type(build).__name__)
+
+    def model(law: Law) -> Model:
+        made: object = build(law)
+        return checks.kind(f"{where}: scene({type(law).__name__})", made, Model, "a Model")
+
+    return Bed(name, model, _end(where, t_end), of)
+
+
+def _end(where: str, t_end: object) -> float:
+    return checks.number(f"{where}: t_end", t_end, unit="s", above=0.0)
+
+
+def sample(
+    bed: Bed,
+    law: Law,
+    rtol: float,
+    s: float = 0.0,
+    values: dict[str, float] | None = None,
+    repeats: int = 1,
+) -> Sample:
+    """Run the machine of `bed` with `law`, timed as the fastest of `repeats` calls.
+
+    Raises:
+        SolveError: the run failed.
+    """
+    model = bed.model(law)
+
+    def timed() -> tuple[float, Trajectory]:
+        begin = process_time()
+        p = values if bed.free else None
+        run = simulate(model, bed.t_end, rtol=rtol, samples=SAMPLES, p=p)
+        return process_time() - begin, run
+
+    spent, run = min((timed() for _ in range(repeats)), key=lambda pair: pair[0])
+    motion, size = _looked_at(bed, model, run, law)
+    steps, lost = run.statistics.steps, run.statistics.rejections
+    return Sample(s, values or {}, rtol, steps, steps + lost, spent, motion, size)
+
+
+def _looked_at(bed: Bed, model: Model, run: Trajectory, law: Law) -> tuple[Array, Array]:
+    """What errors are measured on, and relative to what."""
+    if bed.of is not None and callable(bed.of):
+        rows = np.atleast_2d(np.asarray(bed.of(run), float)).reshape(-1, 1)
+        return rows, np.abs(rows).max(axis=1)
+    own = {state.name for state in law.states}
+    machine = [v.name for v in model.x if v.name not in own]
+    positions = [v.name for v in model.x if v.kind == POSITION]
+    names = checks.names("of", bed.of, model.signals) if bed.of else (positions or machine)
+    rows = np.array([run[name] for name in names])
+    nominal = {v.name: v.nominal for v in model.x}
+    least = STILL * np.array([nominal.get(name, 1.0) for name in names])
+    moved = np.ptp(rows, axis=1)
+    return rows, np.where(moved > least, moved, least / STILL)
+
+
+def distance(one: Sample, reference: Sample) -> float:
+    """Largest difference of two motions at any time, relative to the size of the reference.
+
+    NaN where they are not comparable: another number of cycles, say.
+    """
+    if one.motion.shape != reference.motion.shape:
+        return float("nan")
+    off = np.abs(one.motion - reference.motion).max(axis=1)
+    return float((off / reference.size).max())

@@ -1,0 +1,114 @@
+"""What makes a law smooth, and where laws are compared."""
+
+import numpy as np
+import pytest
+
+from symfric import (
+    ALL_LAWS,
+    BrownMcPhee,
+    Coulomb,
+    DuanSingh,
+    LuGre,
+    MaxwellSlip,
+    Specker,
+    Viscous,
+    parameters,
+    rabinowicz,
+    symbolise,
+)
+from symfric.figures.regularisation import bed_of, distance, regularisation, sample
+from symfric.laws import Law
+from symfric.scenes import PendulumBox, Rabinowicz
+
+
+@pytest.mark.parametrize(
+    ("law", "names"),
+    [
+        (BrownMcPhee(), ("v_t",)),
+        (Coulomb(), ("v_eps",)),
+        (Specker(), ("v_t",)),
+        (LuGre(), ("sigma_0",)),
+        (MaxwellSlip(), ("k_1", "k_2", "k_3", "k_4")),
+    ],
+)
+def test_roles_say_what_makes_a_law_smooth(law: Law, names: tuple[str, ...]) -> None:
+    assert regularisation("here", law).names == names
+
+
+def test_stiffness_and_inverse_velocity_grow_where_widths_shrink() -> None:
+    soft, wide = regularisation("here", LuGre(sigma_0=1e4)), regularisation("here", BrownMcPhee())
+    slope = regularisation("here", DuanSingh(sigma=50.0), "sigma")
+    assert soft.values(0.1) == pytest.approx({"sigma_0": 1e5})
+    assert wide.values(0.1) == pytest.approx({"v_t": 1e-4})
+    assert slope.values(0.5) == pytest.approx({"sigma": 100.0})
+    for knob in (soft, wide, slope):
+        assert knob.factor(knob.values(0.3)[knob.names[0]]) == pytest.approx(0.3)
+        assert parameters(knob.at(0.3))[knob.names[0]].value == knob.values(0.3)[knob.names[0]]
+
+
+def test_every_law_either_says_or_asks() -> None:
+    for law in ALL_LAWS.values():
+        try:
+            assert regularisation("here", law()).names
+        except ValueError as error:
+            assert "here: parameter: expected what" in str(error) or "is it dry" in str(error)
+
+
+@pytest.mark.parametrize(
+    ("law", "parameter", "message"),
+    [
+        (Viscous(), None, "expected a law with a width or a stiffness, got Viscous"),
+        (DuanSingh(), None, "smooth, one of c, sigma, got none"),
+        (BrownMcPhee(), "v_s", "expected one of mu_s, mu_d, v_t, mu_v, N_t, got v_s"),
+        (BrownMcPhee(), (), "expected the names of one or more"),
+        (symbolise(BrownMcPhee(), "v_t")[0], None, "v_t: expected a number > 0"),
+        (Coulomb(v_eps=0.0), "v_eps", "v_eps: expected a number > 0"),
+        ("lugre", None, "law: expected a law such as LuGre"),
+    ],
+)
+def test_what_cannot_be_scaled_is_refused(law: Law, parameter: str | None, message: str) -> None:
+    with pytest.raises(ValueError, match="here: ") as error:
+        regularisation("here", law, parameter)
+    assert message in str(error.value)
+
+
+def test_a_bed_is_a_scene_its_class_or_a_function() -> None:
+    law = BrownMcPhee()
+    for scene, t_end in ((Rabinowicz(law), None), (Rabinowicz, None), (rabinowicz, 20.0)):
+        bed = bed_of("here", scene, t_end)
+        assert bed.model(law).name == "rabinowicz"
+        assert bed.t_end == 20.0
+    assert bed_of("here", Rabinowicz(law, m=2.0), 3.0).t_end == 3.0
+
+
+@pytest.mark.parametrize(
+    ("scene", "t_end", "message"),
+    [
+        (rabinowicz, None, "t_end: expected the end of the motion [s], got none"),
+        ("rabinowicz", 1.0, "scene: expected a scene such as FourMass"),
+        (Rabinowicz, -1.0, "t_end: expected a number > 0"),
+    ],
+)
+def test_what_is_no_bed_is_refused(scene: object, t_end: float | None, message: str) -> None:
+    with pytest.raises(ValueError, match="here: ") as error:
+        bed_of("here", scene, t_end)
+    assert message in str(error.value)
+
+
+def test_a_function_that_gives_no_model_is_refused() -> None:
+    with pytest.raises(ValueError, match="Model"):
+        bed_of("here", lambda law: law, 1.0).model(BrownMcPhee())
+
+
+def test_motions_are_compared_by_positions_relative_to_how_far_they_go() -> None:
+    wide, narrow = (BrownMcPhee(v_t=v_t) for v_t in (1e-2, 1e-3))
+    bed = bed_of("here", PendulumBox, 1.0)
+    one, other = (sample(bed, law, 1e-6) for law in (wide, narrow))
+    assert one.motion.shape[0] == 2
+    off = np.abs(one.motion - other.motion).max(axis=1)
+    assert distance(one, other) == pytest.approx((off / np.ptp(other.motion, axis=1)).max())
+    assert distance(other, other) == 0.0
+    named = bed_of("here", PendulumBox, 1.0, ("phi",))
+    assert sample(named, wide, 1e-6).motion.shape[0] == 1
+    last = bed_of("here", PendulumBox, 1.0, lambda run: run["phi"][-1:])
+    assert sample(last, wide, 1e-6).motion.shape == (1, 1)
