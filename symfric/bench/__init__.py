@@ -1,5 +1,7 @@
 """Benchmarks: run time against error, ratios within one run. May import everything."""
 
+from symfric.bench.calls import CallBenchmark as CallBenchmark
+from symfric.bench.calls import bench_calls as bench_calls
 from symfric.bench.ensemble import EnsembleRow as EnsembleRow
 from symfric.bench.integrator import Benchmark as Benchmark
 from symfric.bench.integrator import Row as Row

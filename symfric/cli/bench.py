@@ -9,7 +9,7 @@ from symfric.cli import bench_tables, output
 from symfric.cli.options import JsonOption, PlotOption, check_outputs
 from symfric.foundation.parameters import check_names
 
-SUBJECTS = ("integrator", "multibody", "ivp", "jitter", "regularisation")
+SUBJECTS = ("integrator", "calls", "multibody", "ivp", "jitter", "regularisation")
 
 
 def bench(
@@ -31,10 +31,11 @@ def bench(
     """Measure symfric beside other integrators.
 
     Time, error and ratios at equal error. integrator: stick-slip of one mass, ensembles and
-    derivatives. multibody: mechanisms, the cost of their steps, what they do not need, reference
-    numbers. ivp: correct digits on problems with published solutions (Test Set for IVP Solvers).
-    jitter: total variation of accelerations against law, step and transition velocity.
-    regularisation: error of smooth laws against dry friction, over their width or stiffness.
+    derivatives. calls: many short steps, events, gradients, signals, import. multibody: mechanisms,
+    the cost of their steps, what they do not need, reference numbers. ivp: correct digits on
+    problems with published solutions (Test Set for IVP Solvers). jitter: total variation of
+    accelerations against law, step and transition velocity. regularisation: error of smooth laws
+    against dry friction, over their width or stiffness.
 
     Example: symfric bench multibody --plot bench.png --csv runs.csv
     """
@@ -46,6 +47,8 @@ def bench(
     check_outputs(json, csv, picture=plot)
     if subject == "integrator":
         _integrator(quick, plot, json)
+    elif subject == "calls":
+        _calls(quick, plot, json)
     elif subject == "multibody":
         _multibody(quick, links, plot, csv, json)
     elif subject == "ivp":
@@ -67,6 +70,18 @@ def _integrator(quick: bool, plot: Path | None, json: str | None) -> None:
     output.emit_json(result.to_dict(), json)
     if json != "-":
         bench_tables.integrator(result)
+
+
+def _calls(quick: bool, plot: Path | None, json: str | None) -> None:
+    from symfric.bench import bench_calls  # noqa: PLC0415  (only this command needs it)
+
+    if plot:
+        raise ValueError("bench calls: expected no --plot, got one; it is a table")
+    with output.progress("measuring") as tell:
+        result = bench_calls(quick=quick, progress=lambda _, fraction: tell(fraction))
+    output.emit_json(result.to_dict(), json)
+    if json != "-":
+        bench_tables.calls(result)
 
 
 def _multibody(

@@ -8,6 +8,7 @@ from symfric.figures import FigureData
 if TYPE_CHECKING:
     from symfric.bench import (
         Benchmark,
+        CallBenchmark,
         IvpBenchmark,
         MultibodyBenchmark,
         RegularisationBenchmark,
@@ -51,6 +52,19 @@ def integrator(result: "Benchmark") -> None:
         "Derivatives by p parameters: time of the run with them over that of the run alone",
     )  # fmt: skip
     _skipped(result.skipped)
+
+
+def calls(result: "CallBenchmark") -> None:
+    """What is done by which way, and what that costs."""
+    output.show_table(
+        ["task", "by", "time [us]", "per", "error", "ratio"],
+        [
+            [r.task, r.who, _short(r.time_us), r.per, _short(r.error) if r.error == r.error else "",
+             round(r.ratio, 2)]
+            for r in result.rows
+        ],
+        "Processor time; ratio: over the first way of the task",
+    )  # fmt: skip
 
 
 def multibody(result: "MultibodyBenchmark") -> None:

@@ -1,0 +1,267 @@
+"""Where users feel speed beside one long run: many short calls, events, gradients, signals, import.
+
+Times are processor time of whole calls from Python, the shortest of rounds in which all contenders
+take turns; ratios are over the first of each task, which is ours.
+"""
+
+import subprocess
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from functools import partial
+from math import nan
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.bench.contenders import compiled
+from symfric.bench.peers import buffered
+from symfric.bench.timing import interleaved
+from symfric.foundation.compiler import find_compiler
+from symfric.integrator.equations.inputs import Hold, input_data
+from symfric.integrator.equations.system import system
+from symfric.integrator.peers.casadi_integrators import peer
+from symfric.integrator.running.run import Tolerances
+from symfric.integrator.simulate import simulate
+from symfric.laws import GMS, BrownMcPhee, Law, LuGre, MaxwellSlip
+from symfric.laws.dynamic.gms import Element
+from symfric.model import Model
+from symfric.results.trajectory import Trajectory
+from symfric.scenes import Arm, Drive, FourBar, Rabinowicz
+
+Array = NDArray[np.float64]
+Calls = dict[str, Callable[[], object]]
+SEED, RTOL = 10, 1e-6
+TORQUES = (30.0, 30.0, 15.0, 2.0, 1.0, 0.2)
+"""Largest torques [N m] of the joints of the arm, from the base on."""
+FREE = ("mu_s", "mu_d", "k", "v_belt")
+
+
+@final
+@dataclass(frozen=True)
+class CallRow:
+    """One way to do a task.
+
+    Attributes:
+        task: what is done, with the scene.
+        who: by which way.
+        time_us: shortest processor time [us] of what `per` names.
+        per: step, run, call, import.
+        error: relative error of the result, NaN where there is none.
+        ratio: over the time of the first way of the task.
+    """
+
+    task: str
+    who: str
+    time_us: float
+    per: str
+    error: float
+    ratio: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class CallBenchmark:
+    """All rows of one run of the benchmark."""
+
+    rows: tuple[CallRow, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Rows; errors that there are none of are left out."""
+        return {"rows": [{k: v for k, v in asdict(r).items() if v == v} for r in self.rows]}
+
+
+def bench_calls(
+    *, quick: bool = False, progress: Callable[[str, float], None] | None = None
+) -> CallBenchmark:
+    """Measure all tasks on this machine.
+
+    Args:
+        quick: fewer steps, elements, points and rounds; for tests.
+        progress: called with what is measured and the fraction done.
+    """
+    tasks = (_drive, _arm, _events, _gradient, _signals, _imports)
+    rows: list[CallRow] = []
+    for k, task in enumerate(tasks):
+        if progress is not None:
+            progress(task.__name__.strip("_"), k / len(tasks))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # loose tolerances are measured on purpose
+            rows += task(quick)
+    return CallBenchmark(tuple(rows))
+
+
+def _rows(
+    task: str, per: str, calls: Calls, errors: dict[str, float], count: int, rounds: int
+) -> Iterator[CallRow]:
+    best = interleaved(calls, rounds)
+    first = next(iter(best.values()))
+    for who, time in best.items():
+        yield CallRow(task, who, 1e6 * time / count, per, errors[who], time / first)
+
+
+# ---- many short steps, each with inputs of its own ----
+
+
+def _drive(quick: bool) -> Iterator[CallRow]:
+    """A belt drive in steps of 5 ms."""
+    model, count = Drive(LuGre()).model(), 50 if quick else 1000
+    forces = np.random.default_rng(SEED).uniform(-15.0, 15.0, (count, 1))
+    yield from _stepped("drive, steps of 5 ms", model, 5e-3, forces, 2 if quick else 5)
+
+
+def _arm(quick: bool) -> Iterator[CallRow]:
+    """An arm of six joints under torques sampled at 1 kHz."""
+    model, count = Arm(BrownMcPhee()).model(), 20 if quick else 1000
+    torques = np.random.default_rng(SEED).uniform(-1.0, 1.0, (count, 6)) * TORQUES
+    yield from _stepped("arm, steps of 1 ms", model, 1e-3, torques, 1 if quick else 3)
+
+
+def _stepped(task: str, model: Model, dt: float, u: Array, rounds: int) -> Iterator[CallRow]:
+    """`u` holds an input a column, a step a row."""
+    names = [v.name for v in model.u]
+    hold = {n: Hold(dt * np.arange(len(u)), u[:, i]) for i, n in enumerate(names)}
+
+    def at_once(rtol: float = RTOL) -> Array:
+        run = simulate(model, dt * len(u), u=hold, rtol=rtol, samples=2, backend=_backend())
+        return np.array([run[v.name][-1] for v in model.x])
+
+    ways: dict[str, Callable[[], Array]] = {"one simulate, Hold": at_once}
+    ways["casadi rosenbrock"] = _stepping_peer(model, dt, u)
+    exact = at_once(1e-10)
+    scale = np.array([v.nominal for v in model.x])
+    scale = np.maximum(scale, np.abs(exact))
+    errors = {who: float(np.max(np.abs(way() - exact) / scale)) for who, way in ways.items()}
+    yield from _rows(task, "step", dict(ways), errors, len(u), rounds)
+
+
+def _stepping_peer(model: Model, dt: float, u: Array) -> Callable[[], Array]:
+    """CasADi's `rosenbrock`, compiled where there is a compiler, called through its buffer."""
+    inputs = input_data(model, {v.name: Hold([0.0, dt], [0.0, 1.0]) for v in model.u}, 0.0, dt)
+    whole = system(model, inputs)
+    tolerances = Tolerances(RTOL, 0.1 * RTOL * whole.nominal, 0.0, 10_000_000)
+    problem = peer(whole, inputs, np.zeros(0), tolerances, "rosenbrock")
+    solver = ca.integrator("stepping", "rosenbrock", problem.dae, 0.0, dt, problem.options)
+    function = compiled(solver)[0] if find_compiler() else solver
+    x, z, data = (
+        ca.MX.sym("x", whole.nx),
+        ca.MX.sym("z", solver.numel_in("z0")),
+        ca.MX.sym("u", u.shape[1]),
+    )
+    ends = function(x0=x, z0=z, u=data)
+    whole_call = ca.Function("step", [ca.vertcat(x, z, data)], [ca.vertcat(ends["xf"], ends["zf"])])
+    given, call, found = buffered(whole_call)
+    start = model.initial_state() / whole.nominal
+
+    def solve() -> Array:
+        given[:] = 0.0
+        given[: start.size] = start
+        for row in u:
+            given[found.size :] = row
+            call()
+            given[: found.size] = found
+        return found[: start.size] * whole.nominal
+
+    return solve
+
+
+# ---- events ----
+
+
+def _events(quick: bool) -> Iterator[CallRow]:
+    """Exact memory, element by element, beside its smooth form."""
+    elements = 4 if quick else 30
+    pairs: dict[str, Callable[[str], Law]] = {
+        f"rabinowicz gms, {elements} elements": partial(_gms, elements),
+        "rabinowicz maxwell_slip, 4 elements": lambda form: MaxwellSlip(form=form),
+    }
+    for task, law in pairs.items():
+        calls = {
+            form: partial(simulate, Rabinowicz(law(form)).model(), 20.0, rtol=RTOL, samples=401)
+            for form in ("smooth", "event")
+        }
+        yield from _rows(task, "run", dict(calls), dict.fromkeys(calls, nan), 1, 1 if quick else 3)
+
+
+def _gms(count: int, form: str) -> Law:
+    """Elements of equal shares that begin to slip one after the other, together 1e5 N/m."""
+    weights = np.linspace(5.0, 1.0, count)
+    stiffness = 1e5 * weights / weights.sum()
+    return GMS(elements=tuple(Element(float(k), 1.0 / count) for k in stiffness), form=form)
+
+
+# ---- gradients ----
+
+
+def _gradient(quick: bool) -> Iterator[CallRow]:
+    """Of the mean square of a block's position at 401 times by four parameters."""
+    model, times = Rabinowicz(BrownMcPhee()).model(free=FREE), np.linspace(0.0, 20.0, 401)
+
+    def run(sensitivities: tuple[str, ...] = (), rtol: float = RTOL) -> Trajectory:
+        return simulate(
+            model, 20.0, rtol=rtol, t_eval=times, sensitivities=sensitivities, backend=_backend()
+        )
+
+    plain = run(rtol=1e-11)["x"]
+
+    def forward(rtol: float = RTOL) -> Array:
+        slopes = run(FREE, rtol).sensitivities
+        return np.array([plain @ slopes[name]["x"] for name in FREE])
+
+    def adjoint() -> Array:
+        return np.array(list(run(FREE).gradient({"x": plain}).values()))
+
+    ways = {"run": lambda: run()["x"], "forward": forward, "adjoint": adjoint}
+    exact = forward(1e-11)
+    errors = {"run": nan} | {
+        who: float(np.max(np.abs(ways[who]() / exact - 1))) for who in ("forward", "adjoint")
+    }
+    yield from _rows("gradient, 4 parameters", "run", dict(ways), errors, 1, 2 if quick else 20)
+
+
+# ---- signals ----
+
+
+def _signals(quick: bool) -> Iterator[CallRow]:
+    """All signals of a mechanism at 2001 times."""
+    for name, scene in {"four_bar": FourBar(BrownMcPhee()), "arm": Arm(BrownMcPhee())}.items():
+        runs = {
+            backend: simulate(scene.model(), 0.1, samples=51 if quick else 2001, backend=backend)
+            for backend in dict.fromkeys((_backend(), "vm"))
+        }
+        calls: Calls = {who: partial(run.at, run.t) for who, run in runs.items()}
+        yield from _rows(
+            f"signals of {name}", "call", calls, dict.fromkeys(calls, nan), 1, 1 if quick else 3
+        )
+
+
+# ---- import ----
+
+
+def _imports(quick: bool) -> Iterator[CallRow]:
+    """A fresh interpreter: the package, what a first simulation takes of it, and CasADi alone."""
+    texts = {
+        "import symfric": "import symfric",
+        "from symfric import simulate, ...": "from symfric import LuGre, rabinowicz, simulate",
+        "import casadi": "import casadi",
+    }
+    best = dict.fromkeys(texts, np.inf)
+    for _ in range(1 if quick else 7):
+        for who, text in texts.items():
+            best[who] = min(best[who], _spent_by(text))
+    for who, time in best.items():
+        yield CallRow("import", who, 1e6 * time, "import", nan, time / best["import symfric"])
+
+
+def _spent_by(text: str) -> float:
+    """Processor time [s] that an import takes in a fresh interpreter."""
+    code = f"from time import process_time as now; t = now(); {text}; print(now() - t)"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    return float(done.stdout)
+
+
+def _backend() -> str:
+    return "compiled" if find_compiler() else "vm"
