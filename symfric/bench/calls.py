@@ -179,11 +179,13 @@ def _events(quick: bool) -> Iterator[CallRow]:
         "rabinowicz maxwell_slip, 4 elements": lambda form: MaxwellSlip(form=form),
     }
     for task, law in pairs.items():
-        calls = {
-            form: partial(simulate, Rabinowicz(law(form)).model(), 20.0, rtol=RTOL, samples=401)
-            for form in ("smooth", "event")
-        }
-        yield from _rows(task, "run", dict(calls), dict.fromkeys(calls, nan), 1, 1 if quick else 3)
+        models = {form: Rabinowicz(law(form)).model() for form in ("smooth", "event")}
+
+        def run(form: str, of: dict[str, Model] = models) -> Trajectory:
+            return simulate(of[form], 20.0, rtol=RTOL, samples=401, backend=_backend())
+
+        calls: Calls = {form: partial(run, form) for form in models}
+        yield from _rows(task, "run", calls, dict.fromkeys(calls, nan), 1, 1 if quick else 3)
 
 
 def _gms(count: int, form: str) -> Law:
