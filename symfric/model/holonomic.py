@@ -59,6 +59,8 @@ class Holonomic:
         pressing: SX (k, 1), normal forces over their typical size, which must not be negative.
         pressed: what they are, in words.
         advice: what to try where friction and reactions have no solution; may be empty.
+        applied: how many forces that friction at rest must carry are among the algebraic variables,
+            next to the multipliers; with their equations next to those of the constraints.
     """
 
     n: int
@@ -73,6 +75,7 @@ class Holonomic:
     pressing: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
     pressed: tuple[str, ...] = ()
     advice: str = ""
+    applied: int = 0
 
     @cached_property
     def explicit(self) -> tuple[ca.SX, ca.SX]:

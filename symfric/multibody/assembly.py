@@ -6,7 +6,8 @@ ground (absolute coordinates) the inverse has a closed form,
     M^-1 = diag(I/m, E' J_W^-1 E / 4 + p p' / weight),
 
 with J_W the inertia in world components; otherwise M is factorised as L D L'. The multipliers of
-loops and those normal forces that depend on reactions are algebraic variables.
+loops, the forces that laws with true rest must carry and those normal forces that depend on
+reactions are algebraic variables.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,12 +26,11 @@ from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.model import Event, Model, Monitor, Output, Variables, kinds
 from symfric.model.holonomic import Holonomic, Inner
 from symfric.model.sketch import Sketch
-from symfric.multibody.body import GROUND
+from symfric.multibody.applied import Carried, carried, inertias
 from symfric.multibody.equations import Equations
 from symfric.multibody.friction import Contact
-from symfric.multibody.joints import Floating
+from symfric.multibody.mass import solve_mass
 from symfric.multibody.results import Put
-from symfric.multibody.spatial import euler_e
 from symfric.multibody.topology import Topology
 
 Details = Callable[[ca.SX, Put], Mapping[str, Output]]
@@ -49,6 +49,7 @@ class Slip:
         normal: the expression of it in terms of accelerations and multipliers.
         states, rate: of the law.
         force: friction force [N], of a ball a vector.
+        carried: what a law that asks for it gets besides v and N.
     """
 
     contact: Contact
@@ -58,6 +59,7 @@ class Slip:
     states: Variables
     rate: ca.SX
     force: ca.SX
+    carried: Carried
 
 
 def coordinates(topology: Topology) -> tuple[Variables, Variables]:
@@ -92,35 +94,6 @@ def keeps_deflection(law: Law) -> bool:
     return ca.depends_on(slope, z) and ca.depends_on(ca.SX(law.steady_state(v, N)), N)
 
 
-def mirrored(M: ca.SX) -> ca.SX:
-    """A symmetric matrix from one that is symmetric in value, but not in its zeros.
-
-    What cancels on one side of the diagonal by itself may stand as 0 x there on the other.
-    """
-    if M.sparsity().is_symmetric():
-        return M
-    upper = ca.project(M, M.sparsity() * M.T.sparsity())
-    return ca.triu2symm(ca.triu(upper))
-
-
-def solve_mass(eq: Equations, right: ca.SX) -> ca.SX:
-    """M^-1 times the columns of `right`, by blocks where bodies float freely."""
-    topology = eq.kin.topology
-    free = [isinstance(link.joint, Floating) and link.base == GROUND for link in topology.links]
-    if not all(free) or not free:
-        D, L, order = ca.ldl(mirrored(eq.mass))
-        return ca.ldl_solve(ca.densify(right), D, L, order) if eq.n else right
-    rows: list[ca.SX] = []
-    for link in topology.links:
-        body, own = topology.bodies[link.body], right[link.rows, 0]
-        p, R = eq.q[link.rows, 0][3:], eq.kin.motion[link.body].R
-        weight = ca.trace(body.J)
-        turning = euler_e(p).T @ (R @ ca.solve(body.J, R.T @ (euler_e(p) @ own[3:])))
-        rows.append(own[:3] / body.mass)
-        rows.append(turning / 4 + p * (ca.dot(p, own[3:]) / weight))
-    return ca.vertcat(*rows)
-
-
 def slips(eq: Equations, normal_at_start: Sequence[float]) -> tuple[Slip, ...]:
     """Friction laws at work in all contacts."""
     found: list[Slip] = []
@@ -153,12 +126,13 @@ def slips(eq: Equations, normal_at_start: Sequence[float]) -> tuple[Slip, ...]:
             )
             for i, s in enumerate(law.states)
         )
-        z = symbols_of(states)
+        z, asked = symbols_of(states), carried(eq, contact)
         # a ball may turn about some axes only; what is put for the symbols of F must be dense
         rate, force = (
-            ca.densify(ca.SX(of(contact.slip, pressing, z))) for of in (law.rate, law.force)
+            ca.densify(ca.SX(of(contact.slip, pressing, z, **asked.inputs)))
+            for of in (law.rate, law.force)
         )
-        found.append(Slip(contact, unknown, pressing, normal, states, rate, force))
+        found.append(Slip(contact, unknown, pressing, normal, states, rate, force, asked))
     return tuple(found)
 
 
@@ -186,6 +160,7 @@ def assemble(
         cut: the equations of a long chain once more, with cuts.
     """
     contacts = slips(eq, guess["N"].tolist())
+    inertia = inertias(f"mechanism '{name}'", eq, [s.carried for s in contacts], q, p)
     units = {label: part.unit for part in eq.held for label in part.labels}
     multipliers = tuple(
         Variable(
@@ -202,6 +177,8 @@ def assemble(
     symbols = symbols_of(multipliers)
     before, after = ca.vertcat(eq.lam, eq.F), ca.vertcat(symbols, forces)
     p_column = symbols_of(p)
+    applied = [v for s in contacts for v in s.carried.unknown]
+    needed = stacked(s.carried.needed(s.force, m) for s, m in zip(contacts, inertia, strict=True))
     balance, normals, phi_ddot = ca.substitute(
         [eq.balance, stacked(s.normal - s.N for s in pressed), eq.phi_ddot],
         [before],
@@ -211,13 +188,14 @@ def assemble(
         eq.n,
         eq.phi,
         eq.a,
-        ca.vertcat(balance, phi_ddot, normals),
+        ca.vertcat(balance, phi_ddot, needed, normals),
         stacked((*(t.rate for t in eq.turns), *(s.rate for s in contacts))),
         partial(solve_mass, eq),
         eq.norms,
         index,
         None if cut is None else _inner(cut, eq, contacts, forces),
         *_pressing(contacts, ca.vertcat(eq.a, before)),
+        applied=len(applied),
     )
 
     def put(expressions: Sequence[ca.SX]) -> list[ca.SX]:
@@ -229,7 +207,7 @@ def assemble(
     return Model(
         name=name,
         x=(*q, *qd, *(t.angle for t in eq.turns), *(v for s in contacts for v in s.states)),
-        z=(*multipliers, *(v for s in contacts for v in s.unknown)),
+        z=(*multipliers, *applied, *(v for s in contacts for v in s.unknown)),
         u=u,
         p=p,
         outputs=_outputs(eq, contacts, put),
@@ -316,7 +294,7 @@ def _switches(slip: Slip, qd: Variables) -> tuple[Event, ...]:
             at_start=s.at_start,
             rtol=s.rtol,
         )
-        for s in contact.law.switches(contact.slip, slip.N, z)
+        for s in slip.carried.switches(slip.N, z)
     )
 
 

@@ -136,10 +136,11 @@ def _rubbing(where: str, joint: Joint, friction: object, known: ca.SX) -> Iterat
     yield from (f"{where}: {text}" for text in friction.problems(joint.rubs))
     law, v, N = friction.law, ca.SX.sym("v"), ca.SX.sym("N")
     z = ca.SX.sym("z", len(law.states))
+    offered = {i.name: ca.SX.sym(i.name) for i in law.inputs}
     given = [value for name, value in vars(friction).items() if name != "law"]
-    if not law.inputs:
-        given += [law.force(v, N, z), law.rate(v, N, z)]
-    yield from undeclared(where, given, ca.vertcat(v, N, z, known), "parameters and inputs")
+    given += [law.force(v, N, z, **offered), law.rate(v, N, z, **offered)]
+    known = ca.vertcat(v, N, z, *offered.values(), known)
+    yield from undeclared(where, given, known, "parameters and inputs")
 
 
 def undeclared(where: str, values: Iterable[object], known: ca.SX, expected: str) -> Iterator[str]:

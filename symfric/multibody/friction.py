@@ -32,6 +32,9 @@ from symfric.laws import Law
 from symfric.laws.base.law import check_law
 from symfric.laws.composed.isotropic import SpatialSlip, anisotropy
 
+OFFERED = ("F_e", "dv")
+"""What a joint gives a law besides v and N: the applied force and the sliding acceleration."""
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -70,11 +73,16 @@ class JointFriction:
         """What is wrong for a joint in which friction acts in the directions `rubs`."""
         if not rubs:
             yield "expected a revolute, prismatic, cylindrical, universal or spherical joint"
-        if self.law.inputs:
-            needs = ", ".join(i.name for i in self.law.inputs)
+        offered = () if "ball" in rubs else OFFERED
+        if strange := [i.name for i in self.law.inputs if i.name not in offered]:
             yield (
-                f"law: expected one that needs v and N alone, got {type(self.law).__name__}, which "
-                f"needs {needs}; a joint has no such input"
+                f"law: expected one that needs no more than {', '.join(('v', 'N', *offered))} here,"
+                f" got {type(self.law).__name__}, which needs {', '.join(strange)}; "
+                + (
+                    "a ball slips in any direction"
+                    if "ball" in rubs
+                    else "a joint has no such input"
+                )
             )
         elif "ball" in rubs and (reason := anisotropy(self.law)):
             yield (

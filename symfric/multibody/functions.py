@@ -44,6 +44,13 @@ def functions(
     u, parameters = (symbols_of(group) for group in (mechanism.inputs, p))
     still = [ca.SX.zeros(x.numel()) for x in (a, lam, eq.F)]
     (bias,) = ca.substitute([eq.balance], [a, lam, eq.F], still)
+    if asking := [c for c in eq.contacts if c.law.inputs]:
+        raise ValueError(
+            f"mechanism '{mechanism.name}' > joint '{asking[0].joint}' > friction > law: expected "
+            "one that needs v and N alone, got "
+            f"{type(asking[0].friction.law).__name__}, whose force at rest is what the motion asks "
+            "for; `build` gives a model of it"
+        )
     contacts = slips(eq, [1.0] * len(eq.contacts))
     z = stacked(s.symbol for c in contacts for s in c.states)
     forces = stacked(c.force for c in contacts)

@@ -251,7 +251,8 @@ def with_cuts(made: Prepared, joints: Sequence[Joint], forces: Sequence[Force]) 
     """The equations of a long open chain with cuts; None where they would not pay."""
     eq, topology = made.eq, made.eq.kin.topology
     loaded = ca.depends_on(stacked(eq.normals), eq.a)
-    if eq.m or topology.depth < (LONG_WITH_FRICTION if loaded else LONG):
+    asked = any(c.law.inputs for c in eq.contacts)
+    if asked or eq.m or topology.depth < (LONG_WITH_FRICTION if loaded else LONG):
         return None
     return equations(topology, joints, forces, (), eq.q, eq.qd, eq.kin.t, cuts=Cuts())
 

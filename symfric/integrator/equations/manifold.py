@@ -56,7 +56,9 @@ class Manifold:
         polish: the same from nearby.
         defect: (y, d) -> constraints and their rates.
         n, m, first: numbers of accelerations, of multipliers and of states. The algebraic unknowns
-            are accelerations, multipliers, normal forces, in this order after the states.
+            are accelerations, multipliers, forces that rest must carry, normal forces, in this
+            order after the states.
+        applied: number of the forces that rest must carry.
         basis: where y holds V, a basis of the tangent space, column by column.
         slope: (y, d) -> derivatives of the algebraic equations by the algebraic unknowns.
         branch: (y0, y1, d) -> sign of det(phi_q(q1) phi_q(q0)'), which turns where a step leads
@@ -71,11 +73,17 @@ class Manifold:
     n: int
     m: int
     first: int
+    applied: int
     basis: range
     slope: ca.Function
     branch: ca.Function
     pressing: ca.Function
     pressed: tuple[str, ...]
+
+    @property
+    def loop(self) -> int:
+        """Where the normal forces begin among the algebraic unknowns."""
+        return self.n + self.m + self.applied
 
     @property
     def charted(self) -> bool:
@@ -152,6 +160,7 @@ def manifold(model: Model, y: ca.SX, d: ca.SX, f: ca.SX, u: ca.SX) -> Manifold:
         n,
         m,
         nx,
+        mechanics.applied,
         range(algebraic[-1] + 1, algebraic[-1] + 1 + _of_basis(mechanics)),
         slope,
         ca.Function("branch", [before, y, d], [branch], {"cse": True}),
@@ -199,7 +208,7 @@ def pulls(manifold: Manifold, y: Array, d: Array, margin: float) -> str:
 
 def grows(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array, margin: float) -> str:
     """Normal forces that grow with the friction that they cause."""
-    k = manifold.n + manifold.m
+    k = manifold.loop
     if manifold.slope.size1_out(0) == k:
         return ""
     A = manifold.slope(y, d).full()

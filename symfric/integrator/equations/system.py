@@ -76,8 +76,8 @@ class System:
 
     @property
     def rubs(self) -> bool:
-        """Whether something slides in it that its model names."""
-        return self.slips > 0
+        """Whether something slides in it that its model names, or may rest in it."""
+        return self.slips > 0 or (self.manifold is not None and self.manifold.applied > 0)
 
     @cached_property
     def J(self) -> ca.SX:

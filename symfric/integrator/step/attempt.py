@@ -72,7 +72,7 @@ def obstacles(system: System, method: Method) -> Callable[[Any, Any, Any], Any] 
     if gamma is None or (manifold is not None and not system.rubs):
         return None
     inside = system if chart is None else chart.reduced
-    loop = [] if manifold is None else inside.algebraic[0][manifold.n + manifold.m :]
+    loop = [] if manifold is None else inside.algebraic[0][manifold.loop :]
     every = signs(inside, gamma, loop)
 
     def sign(y: Any, h: Any, d: Any) -> Any:

@@ -27,6 +27,7 @@ from symfric.laws import (
     Law,
     LuGreNormalised,
     MaxwellSlip,
+    QuarterCarGeneral,
     Slider,
 )
 from symfric.multibody import JointFriction, Mechanism, Revolute, Spherical, Universal
@@ -93,7 +94,12 @@ def test_absent_reactions_leave_no_trace() -> None:
     ("friction", "rubs", "message"),
     [
         (JointFriction(LAW), TURN, "radius: expected the bearing's radius"),
-        (JointFriction(Karnopp()), SLIDE, "got Karnopp, which needs F_e"),
+        (JointFriction(Karnopp(), radius=0.1), ("ball",), "got Karnopp, which needs F_e; a ball"),
+        (
+            JointFriction(QuarterCarGeneral()),
+            SLIDE,
+            "which needs x_rel, v_rel; a joint has no such input",
+        ),
         (JointFriction(LAW), (), "expected a revolute, prismatic, cylindrical, universal or"),
         (JointFriction(LAW, radius=-1.0), TURN, "radius: expected a number > 0, got -1"),
         (JointFriction(LAW, length=0.0), SLIDE, "length: expected a number > 0"),

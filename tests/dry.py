@@ -1,0 +1,115 @@
+"""Dry friction by its modes, in plain NumPy and SciPy: every mode is tried, the valid one kept.
+
+Nothing here imports symfric. A contact that slides keeps its direction until its velocity passes
+through zero, one that rests until its force passes mu_s N. There all modes of the contacts at rest
+are tried: rest is valid up to mu_s N, sliding where the sliding velocity grows in its direction.
+Of several valid ones the one with most rest is taken, but what just broke away does slide.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from math import cos, sin
+
+import numpy as np
+from mechanics import newton, size
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+Array = NDArray[np.float64]
+Modes = tuple[int, ...]
+Solve = Callable[[Array, Modes], tuple[Array, Array, Array]]
+"""State and modes -> accelerations, friction forces and normal forces of all contacts."""
+
+
+@dataclass
+class DryMotion:
+    """Times, modes and pieces of a motion; y = (positions, velocities)."""
+
+    solve: Solve
+    mu_s: float
+    happened: list[tuple[float, Modes]] = field(default_factory=list)
+    pieces: list = field(default_factory=list)
+
+    def run(self, y: Array, t_end: float) -> "DryMotion":
+        """Integrate from y at t = 0, each stretch between two changes of mode on its own."""
+        k, t = y.size // 2, 0.0
+        modes, broke = self.valid(y, np.sign(y[k:]).astype(int).tolist()), []
+        while t < t_end:
+            self.happened.append((t, modes))
+            moving = np.abs(modes)
+            found = solve_ivp(
+                lambda t, y, m=modes, on=moving: [*y[k:], *(on * self.solve(y, m)[0])],
+                (t, t_end), y, "DOP853", events=[self._watch(i, modes) for i in range(k)],
+                dense_output=True, rtol=1e-12, atol=1e-14, max_step=0.02,
+            )  # fmt: skip
+            self.pieces.append(found.sol)
+            t, y = float(found.t[-1]), found.y[:, -1].copy()
+            if found.status != 1:
+                return self
+            ends = [i for i in range(k) if len(found.t_events[i])]
+            broke = [i for i in ends if modes[i] == 0]
+            fixed = [0 if i in ends else m for i, m in enumerate(modes)]
+            y[k:] *= np.abs(fixed)
+            modes = self.valid(y, fixed, broke)
+        return self
+
+    def valid(self, y: Array, fixed: Sequence[int], broke: Sequence[int] = ()) -> Modes:
+        """The modes that satisfy all conditions where those of moving contacts are `fixed`."""
+        found: list[Modes] = []
+        for modes in product(*((m,) if m else (0, 1, -1) for m in fixed)):
+            a, F, N = self.solve(y, modes)
+            held = np.abs(F) <= self.mu_s * N + 1e-9
+            pairs = zip(fixed, modes, held, a * modes > 0, strict=True)
+            if all(f or (h if m == 0 else ahead) for f, m, h, ahead in pairs):
+                found.append(modes)
+        moving = [m for m in found if all(m[i] for i in broke)] or found
+        return max(moving, key=lambda m: m.count(0))
+
+    def _watch(self, i: int, modes: Modes) -> Callable[[float, Array], float]:
+        def stops(t: float, y: Array) -> float:
+            return modes[i] * float(y[y.size // 2 + i])
+
+        def breaks(t: float, y: Array) -> float:
+            _, F, N = self.solve(y, modes)
+            return self.mu_s * N[i] - abs(F[i])
+
+        watch = stops if modes[i] else breaks
+        watch.direction, watch.terminal = -1, True  # type: ignore[attr-defined]
+        return watch
+
+    def at(self, times: Array) -> Array:
+        """States there, a column each."""
+        starts = np.array([t for t, _ in self.happened])
+        pieces = np.searchsorted(starts, times, side="right") - 1
+        return np.column_stack([self.pieces[i](t) for i, t in zip(pieces, times, strict=True)])
+
+
+def pendulum_box(mu_d: float) -> Solve:
+    """Box and point mass of the scene; y = (x, phi, x', phi'), both contacts slide at mu_d."""
+    m_box, m, L, R, g = 6.0, 20.0, 0.3, 0.01, 9.81
+    last = {}
+
+    def solve(y: Array, modes: Modes) -> tuple[Array, Array, Array]:
+        _, phi, _, w = y
+
+        def residual(u: Array) -> Array:
+            ax, alpha, F_x, F_phi, ground, hinge = u
+            hx = m * (ax + L * (alpha * cos(phi) - w * w * sin(phi)))
+            hz = m * (L * (alpha * sin(phi) + w * w * cos(phi)) + g)
+            return np.array(
+                [
+                    m_box * ax + hx + F_x,
+                    hx * L * cos(phi) + hz * L * sin(phi) + R * F_phi,
+                    F_x - modes[0] * mu_d * ground if modes[0] else ax,
+                    F_phi - modes[1] * mu_d * hinge if modes[1] else alpha,
+                    ground - size(m_box * g + hz),
+                    hinge - size(hx, hz),
+                ]
+            )
+
+        u = newton(residual, last.get(modes, np.array([0.0, 0.0, 0.0, 0.0, 255.0, 196.0])))
+        last[modes] = u
+        return u[:2], u[2:4], u[4:]
+
+    return solve
