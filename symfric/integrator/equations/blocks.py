@@ -58,9 +58,8 @@ def slopes(system: System) -> Slopes:
         (put,), _ = ca.substitute_inplace([hidden], [inner.values], [NONE])
     named, entries, values = _named(ca.sparsify(slope))
     of_l = ca.Function("slopes", [hidden, y, d], [values])
-    return Slopes(
-        named, entries, ca.Function("slopes", [y, d], [of_l(put, y, d)], {"cse": True}), pivots
-    )
+    at = ca.Function("slopes", [y, d], [of_l(put, y, d)], {"cse": True})
+    return Slopes(named, entries, system.in_steps(at), pivots)
 
 
 def _named(matrix: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
@@ -119,8 +118,9 @@ def blocks(system: System, gamma: float) -> Blocks:
     right, memory = ca.SX.sym("right", system.n), ca.SX.sym("memory", system.n)
     W = own.matrix(system.mass * reciprocal(gamma * h))
     lu = factorise(W, own.pivots, system.orders.get("step", ()))
+    f = ca.Function("f", [system.y, system.d], [system.f], {"cse": True})
     return Blocks(
-        ca.Function("f", [system.y, system.d], [system.f], {"cse": True}),
+        system.in_steps(f),
         own.values,
         ca.Function("pack", [own.entries, h], [lu.packed], {"cse": True}),
         ca.Function(

@@ -8,8 +8,7 @@ from collections import Counter
 import casadi as ca
 
 from symfric.foundation.numeric import reciprocal
-
-OTHERS = (ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST)
+from symfric.integrator.equations.instructions import rewritten
 
 
 def divided_once(expression: ca.SX) -> ca.SX:
@@ -24,29 +23,19 @@ def divided_once(expression: ca.SX) -> ca.SX:
     places = [function.instruction_output(k) for k in range(count)]
     divisors = _divisors(operations, operands, places)
     often = Counter(divisors.values())
-    work: dict[int, ca.SX] = {}
     inverse: dict[int, ca.SX] = {}
-    found = [ca.SX(0)] * expression.nnz()
-    for k, operation in enumerate(operations):
-        at = operands[k]
-        if operation == ca.OP_OUTPUT:
-            found[places[k][1]] = work[at[0]]
-            continue
-        divisor = divisors.get(k, 0)
-        if operation == ca.OP_INPUT:
-            value = arguments[at[0]]
-        elif operation == ca.OP_CONST:
-            value = ca.SX(function.instruction_constant(k))
-        elif k in divisors and (often[divisor] > 1 or operations[divisor] == ca.OP_CONST):
-            if divisor not in inverse:
-                inverse[divisor] = reciprocal(work[at[1]])
-            value = work[at[0]] * inverse[divisor]
-        elif len(at) == 1:
-            value = ca.SX.unary(operation, work[at[0]])
-        else:
-            value = ca.SX.binary(operation, work[at[0]], work[at[1]])
-        work[places[k][0]] = value
-    return ca.SX(expression.sparsity(), ca.vertcat(*found))
+
+    def rule(k: int, operands: list[ca.SX]) -> ca.SX | None:
+        if k not in divisors:
+            return None
+        divisor = divisors[k]
+        if often[divisor] == 1 and operations[divisor] != ca.OP_CONST:
+            return None
+        if divisor not in inverse:
+            inverse[divisor] = reciprocal(operands[1])
+        return operands[0] * inverse[divisor]
+
+    return rewritten(function, arguments, rule)[0]
 
 
 def _divisors(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.symbols import stacked
+from symfric.integrator.equations.branches import branchless
 from symfric.integrator.equations.implicit import implicit_columns
 from symfric.integrator.equations.index import check_index
 from symfric.integrator.equations.inputs import InputData
@@ -50,6 +51,7 @@ class System:
         orders: pivots of the factors of each matrix by its name, where those that fill least are
             not sound (`symfric.integrator.equations.pivots`).
         slope: Jacobian of f where it is not to be derived from f.
+        branchless: whether its steps write tanh out (`symfric.integrator.equations.branches`).
     """
 
     y: ca.SX
@@ -68,6 +70,7 @@ class System:
     slips: int = 0
     inner: Inner | None = None
     orders: Mapping[str, Order] = field(default_factory=dict[str, Order])
+    branchless: bool = True
 
     @property
     def n(self) -> int:
@@ -83,6 +86,15 @@ class System:
     def J(self) -> ca.SX:
         """Jacobian of f, shape (n, n)."""
         return ca.jacobian(self.f, self.y) if self.slope is None else self.slope
+
+    @cached_property
+    def plain(self) -> "System":
+        """The same with tanh as it is, for steps of which derivatives are taken."""
+        return replace(self, slope=self.J, branchless=False)
+
+    def in_steps(self, function: ca.Function) -> ca.Function:
+        """A `function` of the equations as its steps call it."""
+        return branchless(function) if self.branchless else function
 
     @cached_property
     def is_ode(self) -> bool:

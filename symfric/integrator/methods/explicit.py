@@ -48,7 +48,7 @@ class Explicit(Method):
             ValueError: algebraic unknowns, or a mass matrix other than the identity.
         """
         need_ode(system, self.name)
-        f = ca.Function("f", [system.y, system.d], [system.f], {"cse": True})
+        f = system.in_steps(ca.Function("f", [system.y, system.d], [system.f], {"cse": True}))
 
         def trial(y: Any, h: Any, d: Any) -> Trial:
             k: list[Any] = []

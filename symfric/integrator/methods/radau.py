@@ -155,8 +155,9 @@ def pair(system: System, alpha: float, beta: float) -> Pair:
     lu = factorise(matrix(J), groups, system.orders.get("pair", ()))
     right, memory = ca.SX.sym("right", 2 * n), ca.SX.sym("memory", 2 * n)
     solution = lu.solve(right + ca.diagcat(M, M) @ memory)
+    factor = ca.Function("factor_pair", [system.y, h, system.d], [lu.packed], {"cse": True})
     return Pair(
-        ca.Function("factor_pair", [system.y, h, system.d], [lu.packed], {"cse": True}),
+        system.in_steps(factor),
         ca.Function("solve_pair", [lu.packed_symbol, right, memory], [solution]),
         Factors(
             "pair", ca.Function("J", [system.y, system.d], [J]), (entries, h), matrix(entries),

@@ -94,7 +94,7 @@ def build_fixed(system: System, method: Method, kind: Any = ca.SX) -> ca.Functio
     """The bare step (y, h, d) -> y_next, without error control: what derivatives are taken of."""
     y, d = kind.sym("y", system.n), kind.sym("d", system.d.numel())
     h = kind.sym("h")
-    end = steps(system, method)(y, h, d).end
+    end = steps(system.plain, method)(y, h, d).end
     return ca.Function("fixed", [y, h, d], [end], ["y", "h", "d"], ["y_next"], {"cse": True})
 
 
@@ -102,7 +102,7 @@ def build_dense_step(system: System, method: Method) -> ca.Function:
     """The bare step with its dense output, (y, h, d) -> all = (y_next, D), for sensitivities."""
     y, d = ca.SX.sym("y", system.n), ca.SX.sym("d", system.d.numel())
     h = ca.SX.sym("h")
-    trial = steps(system, method)(y, h, d)
+    trial = steps(system.plain, method)(y, h, d)
     everything = ca.vertcat(trial.end, *trial.dense)
     return ca.Function("dense", [y, h, d], [everything], ["y", "h", "d"], ["all"], {"cse": True})
 

@@ -270,6 +270,7 @@ def _reduced(system: System, rows: _Rows, constraints: _Constraints, chart: _Cha
             tuple(range(differential)),
         ),
         slope=_slope(system, y_c, rows, constraints, chart),
+        branchless=system.branchless,
     )
 
 
