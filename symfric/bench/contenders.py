@@ -34,7 +34,8 @@ from symfric.integrator.peers.casadi_integrators import peer
 from symfric.integrator.running.dense import from_records
 from symfric.integrator.running.engine import Stop
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.run import ATTEMPTS, ROWS, Tolerances
+from symfric.integrator.running.loop import ROWS
+from symfric.integrator.running.run import ATTEMPTS, Tolerances
 from symfric.integrator.simulate import simulate
 from symfric.integrator.step.layout import Given, State
 from symfric.model import Model

@@ -10,8 +10,8 @@ from symfric.bench.contenders import compile_time
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
-from symfric.integrator.running.engine import c_source
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.loop import c_source
 from symfric.laws import BrownMcPhee
 from symfric.model import Model
 from symfric.multibody import JointFriction, Mechanism, Revolute

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from time import perf_counter
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from symfric.foundation import checks
@@ -79,18 +78,22 @@ def simulate_by_peer(
     allowed = tolerances(where, rtol, atol, system.nominal, 1e-10, max_steps)
     y0 = first_guess(system, model, model.initial_state(x0, p), t_start)
     values = model.values("p", p)
-    run, dense, counts = integrate_by_peer(system, inputs, y0, values, times, allowed, peer)
-    statistics = Statistics(
-        backend=run.engine,
-        method="Rosenbrock 5(4)" if peer == "rosenbrock" else "BDF",
-        events=0,
-        smallest_step=float(np.min(dense.t1 - dense.t0)),
-        build_time=built_at - begin if fresh else 0.0,
-        compile_time=0.0,
-        run_time=perf_counter() - built_at,
-        **counts,
-    )
-    trajectory = trajectory_of(integrator, inputs, run, dense, values, times, statistics)
+    run, counts = integrate_by_peer(system, inputs, y0, values, times, allowed, peer)
+    run_time = perf_counter() - built_at
+
+    def count() -> Statistics:
+        return Statistics(
+            backend=run.engine,
+            method="Rosenbrock 5(4)" if peer == "rosenbrock" else "BDF",
+            events=0,
+            smallest_step=run.extent.shortest,
+            build_time=built_at - begin if fresh else 0.0,
+            compile_time=0.0,
+            run_time=run_time,
+            **counts,
+        )
+
+    trajectory = trajectory_of(integrator, inputs, run, values, count)
     if throw and not trajectory.status.ok:
         raise SolveError(trajectory.message, trajectory.status, trajectory)
     return trajectory

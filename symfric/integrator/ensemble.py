@@ -299,9 +299,10 @@ def _identity(
     """Hash of everything that the results depend on, and of how they are cut in chunks."""
     parts: list[Any] = [job.digest(), tolerances.rtol, tolerances.atol, list(picks)]
     parts.append(tolerances.max_step)
-    for event, reset in zip(integrator.model.events, integrator.resets, strict=True):
-        parts += [event.name, event.direction, event.terminal, tolerances.event]
-        parts += [(name, str(function.serialize())) for name, function in reset.items()]
+    for event in integrator.model.events:
+        parts += [event.name, event.direction, event.terminal, tolerances.event, list(event.reset)]
+    if integrator.crossings is not None:
+        parts.append(str(integrator.crossings.jump.serialize()))
     parts.append(str(integrator.events.serialize()))
     for pick in picks.values():
         parts.append(digest(*starts(pick)))

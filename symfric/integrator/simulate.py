@@ -29,7 +29,8 @@ from symfric.integrator.outcome import trajectory_of
 from symfric.integrator.running.built import built
 from symfric.integrator.running.dense import Dense
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.run import Run, Tolerances, integrate
+from symfric.integrator.running.record import Run
+from symfric.integrator.running.run import Tolerances, integrate
 from symfric.integrator.running.sizes import own_scale
 from symfric.model import Model
 from symfric.results.trajectory import Statistics, Trajectory
@@ -135,24 +136,25 @@ def simulate(
     values = model.values("p", p)
     at_start = (y0, np.concatenate([values, inputs.values[:, 0]]))
     integrator = integrator.suited([at_start], t_end - t_start)
-    run, dense, statistics = _solve(
-        integrator, inputs, y0, values, allowed, backend, progress, build_time
+    run, count = _solve(
+        integrator, inputs, y0, values, allowed, backend, progress, build_time, looks
     )
-    trajectory = trajectory_of(integrator, inputs, run, dense, values, looks, statistics)
+    trajectory = trajectory_of(integrator, inputs, run, values, count)
     if throw and not trajectory.status.ok and trajectory.status is not Status.INTERRUPTED:
         raise SolveError(trajectory.message, trajectory.status, trajectory)
     if which is not None and run.steps:
-        path = Path(run.integrator or integrator, dense, inputs, values, backend)
+        path = Path(run.integrator or integrator, run.dense, inputs, values, backend)
         trajectory = _differentiated(trajectory, path, which)
     if measure_error and trajectory.status.ok:
         finer = simulate(
             model, t_end, t_start=t_start, x0=x0, u=u, p=p, rtol=max(rtol / 100, 1e-13),
             atol=None if atol is None else atol / 100, event_tolerance=event_tolerance,
             t_eval=trajectory.t, method=another(formula), backend=backend,
-            max_step=float(np.diff(trajectory.step_times).max()) / 2, times=times,
+            max_step=run.extent.longest / 2, times=times,
         )  # fmt: skip
         error = _difference(model, trajectory, finer)
-        trajectory = replace(trajectory, statistics=replace(trajectory.statistics, error=error))
+        measured = replace(trajectory.statistics, error=error)
+        trajectory = replace(trajectory, count=lambda: measured)
     return trajectory
 
 
@@ -165,27 +167,32 @@ def _solve(
     backend: str,
     progress: Callable[[float], None] | None,
     build_time: float,
-) -> tuple[Run, Dense, Statistics]:
-    """Run the chosen engine."""
+    times: Array,
+) -> tuple[Run, Callable[[], Statistics]]:
+    """Run the chosen engine; what came of it and what it took."""
     compiled_before, begin = integrator.compile_time, perf_counter()
-    run, dense = integrate(integrator, inputs, y0, p, allowed, backend, progress)
-    evaluations, jacobians, factorisations = integrator.tableau.work(integrator.system)
+    run = integrate(integrator, inputs, y0, p, allowed, backend, progress, times)
     compile_time = integrator.compile_time - compiled_before
-    statistics = Statistics(
-        backend=run.engine,
-        method=integrator.tableau.name,
-        steps=run.steps,
-        rejections=run.attempts - run.steps,
-        evaluations=run.attempts * evaluations,
-        jacobians=run.attempts * jacobians,
-        factorisations=run.attempts * factorisations,
-        events=len(run.happened),
-        smallest_step=run.smallest if run.steps else float(np.min(dense.t1 - dense.t0)),
-        build_time=build_time,
-        compile_time=compile_time,
-        run_time=perf_counter() - begin - compile_time,
-    )
-    return run, dense, statistics
+    run_time = perf_counter() - begin - compile_time
+
+    def count() -> Statistics:
+        evaluations, jacobians, factorisations = integrator.tableau.work(integrator.system)
+        return Statistics(
+            backend=run.engine,
+            method=integrator.tableau.name,
+            steps=run.steps,
+            rejections=run.attempts - run.steps,
+            evaluations=run.attempts * evaluations,
+            jacobians=run.attempts * jacobians,
+            factorisations=run.attempts * factorisations,
+            events=len(run.happened),
+            smallest_step=run.extent.shortest,
+            build_time=build_time,
+            compile_time=compile_time,
+            run_time=run_time,
+        )
+
+    return run, count
 
 
 def _differentiated(trajectory: Trajectory, path: Path, which: Seeds) -> Trajectory:

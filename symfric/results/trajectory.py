@@ -78,8 +78,9 @@ class Trajectory:
         t: times of the result [s], shape (n,).
         units: name -> unit of every signal.
         status: how it ended; `message` says it in a sentence.
-        statistics: steps, evaluations, times.
-        step_times: ends of the accepted steps [s], shape (steps + 1,).
+        count: makes `statistics`: steps, evaluations, times.
+        span: first time and the last one reached [s].
+        ends: makes `step_times`.
         states: the states alone, at any times; cheaper than all signals.
         evaluate: all signals at any times.
         express: an expression of the model at any times, shape (rows, n).
@@ -94,8 +95,9 @@ class Trajectory:
     units: dict[str, str]
     status: Status
     message: str
-    statistics: Statistics
-    step_times: Array
+    count: Callable[[], Statistics]
+    span: tuple[float, float]
+    ends: Callable[[], Array]
     states: Callable[[Array], dict[str, Array]]
     evaluate: Callable[[Array], dict[str, Array]]
     express: Callable[[ca.SX, Array], Array]
@@ -103,6 +105,20 @@ class Trajectory:
     happened: tuple[tuple[float, str], ...] = ()
     differentiate: Callable[[Array], dict[str, dict[str, Array]]] | None = None
     pull_back: Callable[[Mapping[str, Array]], dict[str, float]] | None = None
+
+    @cached_property
+    def statistics(self) -> Statistics:
+        """Steps, evaluations, times."""
+        return self.count()
+
+    @cached_property
+    def step_times(self) -> Array:
+        """Ends of the accepted steps [s], shape (steps + 1,).
+
+        A run whose steps would take much memory has not kept them, and is run again for them, as it
+        is for values between the times `t`.
+        """
+        return self.ends()
 
     @cached_property
     def signals(self) -> dict[str, Array]:
@@ -283,7 +299,7 @@ class Trajectory:
         at = np.atleast_1d(checks.array(where, times, ndim=None, what="times [s]"))
         if at.ndim > 1:
             raise checks.refused(where, "a time or a sequence of times [s]", times)
-        first, last = self.step_times[0], self.step_times[-1]
+        first, last = self.span
         if at.size and not (first <= at.min() and at.max() <= last):
             raise ValueError(
                 f"trajectory of '{self.scene}': expected times in [{first:g}, {last:g}] s, "
@@ -294,7 +310,7 @@ class Trajectory:
     @cached_property
     def final(self) -> dict[str, float]:
         """All signals at the last time reached."""
-        return {k: float(v[0]) for k, v in self.evaluate(self.step_times[-1:]).items()}
+        return {k: float(v[0]) for k, v in self.evaluate(np.array(self.span[1:])).items()}
 
     def plot(self, *names: str, path: str | Path | None = None, label: str = "") -> "Figure":
         """One panel per signal over time, labelled with units; saved to `path` if given.

@@ -103,6 +103,11 @@ class InputData:
     key: tuple[str, ...]
     pace: float = np.inf
 
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time [s]."""
+        return float(self.breaks[0]), float(self.breaks[-1])
+
     def interval(self, times: Array) -> NDArray[np.intp]:
         """Number of the interval that holds each time; at a break the later one."""
         return np.searchsorted(self.breaks[1:-1], times, side="right")

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from symfric.integrator.compiled.columns import Columns, densified
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.running.dense import from_records
-from symfric.integrator.running.engine import Stop, VmEngine, c_source, width
+from symfric.integrator.running.engine import Stop, VmEngine
+from symfric.integrator.running.loop import c_source, width
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]

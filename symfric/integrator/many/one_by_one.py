@@ -35,7 +35,7 @@ def solve_one_by_one(
     attempts, failed = np.zeros(count, dtype=np.int64), dict[int, str]()
     for m in range(count):
         try:
-            run, dense = integrate(integrator, inputs, y0[m], p[m], tolerances, backend, None)
+            run = integrate(integrator, inputs, y0[m], p[m], tolerances, backend, None, times)
         except ValueError as error:  # no consistent start
             failed[m], reached[m] = str(error), inputs.breaks[0]
             continue
@@ -43,8 +43,9 @@ def solve_one_by_one(
             raise KeyboardInterrupt
         if not run.status.ok:
             failed[m] = run.message
-        attempts[m], reached[m] = run.attempts, dense.t1[-1]
-        at = times[times <= reached[m]]
+        attempts[m], reached[m] = run.attempts, run.reached
+        y = run.outputs.reached
+        at = times[: y.shape[1]]
         d = np.hstack([np.tile(p[m], (at.size, 1)), inputs.values[:, inputs.interval(at)].T])
-        (signals[m, : at.size],) = integrator.signal_columns([at, dense(at).T, d])
+        (signals[m, : at.size],) = integrator.signal_columns([at, y.T, d])
     return Solved(signals, attempts, reached, failed)

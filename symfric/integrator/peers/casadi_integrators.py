@@ -19,7 +19,9 @@ from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.system import System
 from symfric.integrator.peers.ggl import stabilised
 from symfric.integrator.running.dense import Dense, hermite
-from symfric.integrator.running.run import Run, Tolerances
+from symfric.integrator.running.outputs import Outputs
+from symfric.integrator.running.record import Run
+from symfric.integrator.running.run import Tolerances
 
 Array = NDArray[np.float64]
 PEERS = ("sundials", "rosenbrock", "ggl")
@@ -150,14 +152,15 @@ def integrate_by_peer(
     times: Array,
     tolerances: Tolerances,
     name: str,
-) -> tuple[Run, Dense, dict[str, int]]:
+) -> tuple[Run, dict[str, int]]:
     """Integrate with CasADi over `times`; a failure keeps what came before it."""
     problem = peer(system, inputs, p, tolerances, name)
     (rates, nominal), columns = rates_of(problem.system), problem.system.algebraic[1]
     y = consistent(system, "simulate_by_peer", y0, np.concatenate([p, inputs.values[:, 0]]))
     y = np.concatenate([y, np.zeros(problem.system.n - system.n)])
     grid = np.unique(np.concatenate([inputs.breaks, times]))
-    run = Run(engine=f"casadi {problem.plugin}")
+    outputs = Outputs.at(times, system.n)
+    run = Run(float(grid[0]), y[: system.n], outputs, engine=f"casadi {problem.plugin}")
     found, counts = y[:, None], dict.fromkeys(COUNTS, 0)
     pieces = [np.arange(1, grid.size)]
     while pieces:
@@ -184,7 +187,10 @@ def integrate_by_peer(
         found = np.hstack([found, part])
         for name, value in _counts(solver).items():
             counts[name] += value
-    return run, _dense(system, inputs, p, grid[: found.shape[1]], found[: system.n]), counts
+    dense = _dense(system, inputs, p, grid[: found.shape[1]], found[: system.n])
+    run.keep(dense)
+    outputs.fill(dense, last=True)
+    return run, counts
 
 
 def _counts(solver: ca.Function) -> dict[str, int]:

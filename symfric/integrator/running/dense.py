@@ -30,6 +30,11 @@ class Dense:
     y1: Array
     D: Array
 
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes."""
+        return sum(a.nbytes for a in (self.t0, self.t1, self.y0, self.y1, self.D))
+
     def __call__(self, times: Array) -> Array:
         """Values at `times`, shape (n, m); at an event the value after it."""
         k = np.searchsorted(self.t0[1:], times, side="right")
@@ -54,10 +59,9 @@ def hermite(t: Array, y: Array, slope: Array) -> Dense:
     return Dense(t[:-1], t[1:], y[:, :-1].T, y[:, 1:].T, D)
 
 
-def from_records(records: Array, n: int) -> Dense:
-    """Pieces from the rows (t0, t1, y0, y1, D) that a step engine writes."""
+def pieces_of(records: Array, n: int) -> Dense:
+    """Pieces as views of the rows (t0, t1, y0, y1, D) that a step engine writes."""
     k, rows = records.shape[0], (records.shape[1] - 2) // n - 2
-    records = records.copy()  # of the rows in use; the buffer behind them is much larger
     return Dense(
         records[:, 0],
         records[:, 1],
@@ -65,6 +69,11 @@ def from_records(records: Array, n: int) -> Dense:
         records[:, 2 + n : 2 + 2 * n],
         records[:, 2 + 2 * n :].reshape(k, rows, n),
     )
+
+
+def from_records(records: Array, n: int) -> Dense:
+    """Pieces of records whose buffer may be written over."""
+    return pieces_of(records.copy(), n)
 
 
 def join(pieces: list[Dense]) -> Dense:

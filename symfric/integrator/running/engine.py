@@ -6,7 +6,6 @@ Both engines advance S in place and write a row (t0, t1, y0, y1, D) per accepted
 import ctypes
 from dataclasses import dataclass
 from enum import IntEnum
-from string import Template
 from typing import Any, Protocol, cast, final
 
 import casadi as ca
@@ -17,8 +16,9 @@ from symfric.foundation.numeric import flat_view
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.running.crossings import Crossings
+from symfric.integrator.running.dense import pieces_of
 from symfric.integrator.running.events import Eventful, Happened, Search
-from symfric.integrator.running.search import search_source
+from symfric.integrator.running.loop import Work, loop_source, width
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
@@ -36,8 +36,12 @@ class Stop(IntEnum):
     FOLLOW = 6
 
 
+STOPS = tuple(Stop)
+"""By number."""
+
+
 class Engine(Protocol):
-    """Runs attempts until the end time, a full record, a number of attempts or a tiny step."""
+    """Runs attempts until the end, a full record, a number of attempts or a tiny step."""
 
     @property
     def name(self) -> str:
@@ -45,25 +49,20 @@ class Engine(Protocol):
         ...
 
     def run(
-        self,
-        S: Array,
-        R: Array,
-        rows: int,
-        attempts: int,
-        h_min: float,
-        events: Eventful | None = None,
+        self, S: Array, R: Array, rows: int, attempts: int, h_min: float
     ) -> tuple[Array, int, Stop]:
-        """Advance S; return the records, the attempts made and why it stopped.
+        """Advance S with one R; return the records, the attempts made and why it stopped.
 
         A step that fell below `h_min`, or below what rounding leaves of t (`FLOOR`), stops it.
-        With `events` these are carried out on the way.
         """
         ...
 
+    def march(self, work: Work, attempts: int) -> tuple[Array, int, Stop]:
+        """Advance `work` over its input intervals up to `until`, and fill its outputs.
 
-def width(n: int, dense_rows: int) -> int:
-    """Length of a record row."""
-    return 2 + 2 * n + dense_rows * n
+        Returns records that the next call writes over, the attempts made and why it stopped.
+        """
+        ...
 
 
 @final
@@ -93,7 +92,10 @@ class VmEngine:
         h_min: float,
         events: Eventful | None = None,
     ) -> tuple[Array, int, Stop]:
-        """Advance S; return the records, the attempts made and why it stopped."""
+        """Advance S; return the records, the attempts made and why it stopped.
+
+        With `events` these are carried out on the way.
+        """
         size, search = self.batch.size2_out(0), None if events is None else Search(events)
         n = S.size - State.MEMORY
         S_out, D = np.zeros((size, S.size)), np.zeros((size, self.step.numel_out(1)))
@@ -137,13 +139,34 @@ class VmEngine:
                 )
             )
             if search is not None:
-                found[-1], used, asked = _searched(search, found[-1], S_out, (took, used), R, count)
+                found[-1], used, asked = _searched(search, found[-1], S_out, (took, used), R)
             count += found[-1].shape[0]
             made += used
             S[:] = S_out[used - 1]
         records = np.vstack(found) if found else np.zeros((0, width(n, D.shape[1] // n)))
         full = count >= rows or (events is not None and events.full)
         return records, made, Stop(asked) if asked else _reason(S, R, full, h_min)
+
+    def march(self, work: Work, attempts: int) -> tuple[Array, int, Stop]:
+        """Advance `work`; return the records, the attempts made and why it stopped."""
+        loop, found, count, made = work.loop, list[Array](), 0, 0
+        if work.events is not None:
+            work.events.count = work.events.steps = 0
+        while True:
+            records, tried, stop = self.run(
+                work.S, work.R, loop.max_rows - count, attempts - made, loop.h_min, work.events
+            )
+            found.append(records)
+            count, made = count + records.shape[0], made + tried
+            if records.shape[0]:
+                work.outputs.fill(pieces_of(records, work.n))
+            if stop is not Stop.END or loop.interval + 1 == loop.until:
+                break
+            work.enter(loop.interval + 1)
+            if count == loop.max_rows or made == attempts:
+                stop = Stop.FULL if count == loop.max_rows else Stop.ATTEMPTS
+                break
+        return found[0] if len(found) == 1 else np.vstack(found), made, stop
 
 
 def _searched(
@@ -152,7 +175,6 @@ def _searched(
     S_out: Array,
     attempts: tuple[NDArray[np.bool_], int],
     R: Array,
-    count: int,
 ) -> tuple[Array, int, Happened]:
     """Records of a batch up to the first events in it, how many attempts, what events ask for.
 
@@ -160,11 +182,10 @@ def _searched(
         records, S_out: of the batch; the attempt that led to events goes on behind them.
         attempts: which were accepted, and how many count.
         R: what was given.
-        count: records before the batch.
     """
     took, used = attempts
     for i, k in enumerate(np.flatnonzero(took)):
-        change, asked = search(records[i], S_out[k], R, count + i)
+        change, asked = search(records[i], S_out[k], R)
         if change:
             return records[: i + (change > 0)], int(k) + 1, asked
     return records, used, Happened.NOTHING
@@ -189,7 +210,9 @@ class CompiledEngine:
     """Attempts in a compiled loop around the generated C of the step; releases the GIL."""
 
     library: ctypes.CDLL
-    row: int
+    n: int
+    given: int
+    dense_rows: int
     name: str = "compiled"
 
     @classmethod
@@ -197,147 +220,31 @@ class CompiledEngine:
         cls, step: ca.Function, dense_rows: int, crossings: Crossings | None = None
     ) -> "CompiledEngine":
         """Compile the step and the search for events, or load them from the cache."""
-        source = c_source(step, dense_rows, crossings=crossings)
-        return cls.of_source(source, step.numel_in(0) - State.MEMORY, dense_rows)
-
-    @classmethod
-    def of_source(cls, source: str, n: int, dense_rows: int) -> "CompiledEngine":
-        """The engine of generated C, for `n` unknowns."""
-        library = load(source, "symfric_run")
-        library.symfric_run.restype = ctypes.c_int
-        library.symfric_run.argtypes = [
-            *[ctypes.c_void_p] * 3,
-            *[ctypes.c_longlong] * 2,
-            ctypes.c_double,
-            *[ctypes.c_void_p] * 3,
-            ctypes.c_longlong,
-        ]
-        return cls(library, width(n, dense_rows))
+        library = load(loop_source(step, dense_rows, crossings), "symfric_march")
+        library.symfric_march.restype = ctypes.c_int
+        library.symfric_march.argtypes = [ctypes.c_void_p]
+        return cls(library, step.numel_in(0) - State.MEMORY, step.numel_in(1), dense_rows)
 
     def run(
-        self,
-        S: Array,
-        R: Array,
-        rows: int,
-        attempts: int,
-        h_min: float,
-        events: Eventful | None = None,
+        self, S: Array, R: Array, rows: int, attempts: int, h_min: float
     ) -> tuple[Array, int, Stop]:
         """Advance S; return the records, the attempts made and why it stopped."""
-        records = np.empty((rows, self.row))
-        counts = np.zeros(3, dtype=np.int64)
-        reason = self.library.symfric_run(
-            S.ctypes.data,
-            R.ctypes.data,
-            records.ctypes.data,
-            rows,
-            attempts,
-            h_min,
-            counts.ctypes.data,
-            *((0, 0, 0) if events is None else events.pointers),
-        )
-        if events is not None:
-            events.count = int(counts[2])
-        return records[: counts[0]], int(counts[1]), Stop(reason)
+        work = Work(self.n, self.given, self.dense_rows, rows)
+        work.S[:], work.R[:] = S, R
+        if S[State.T] >= R[Given.T_END]:
+            return work.rows[:0], 0, Stop.END
+        work.over(np.array([S[State.T], R[Given.T_END]]), np.zeros((0, 1)))
+        work.loop.h_min, work.loop.until = h_min, 1
+        records, made, stop = self.march(work, attempts)
+        S[:] = work.S
+        return records, made, stop
 
-
-def c_source(
-    step: ca.Function,
-    dense_rows: int,
-    *others: ca.Function,
-    crossings: Crossings | None = None,
-) -> str:
-    """C of the step as CasADi generates it, with the loop that calls it until it must stop.
-
-    `others` are Functions that further C calls by their names. A model without events has nothing
-    of the search for them in its code.
-    """
-    n = step.numel_in(0) - State.MEMORY
-    generator = ca.CodeGenerator("symfric_step.c", {"static_aux": True})
-    called = (step, *(crossings.functions if crossings else ()))
-    for function in (*called, *others):
-        generator.add(function)
-    hooks = dict.fromkeys(_HOOKS, "")
-    if crossings is not None:
-        places = {"d": step.numel_in(1) - crossings.data, "jump": crossings.width}
-        hooks = {name: Template(code).substitute(places) for name, code in _HOOKS.items()}
-    return (
-        generator.dump()
-        + search_source(crossings)
-        + Template(_LOOP).substitute(
-            n=n,
-            memory=State.MEMORY,
-            t=State.T,
-            h=State.H,
-            t_end=Given.T_END,
-            width=width(n, dense_rows),
-            dense=2 + 2 * n,
-            dense_rows=dense_rows,
-            floor=repr(FLOOR),
-            arg=step.sz_arg(),
-            res=step.sz_res(),
-            iw=max(1, *(f.sz_iw() for f in called)),
-            w=max(1, *(f.sz_w() for f in called)),
-            **hooks,
-        )
-    )
-
-
-_LOOP = """
-/* Attempts from S towards R[T_END]; a row (t0, t1, y0, y1, D) per accepted step. */
-int symfric_run(double *S, const double *R, double *rows, long long max_rows,
-                long long max_attempts, double h_min, long long *counts$parameters)
-{
-  enum { N = $n, MEM = $memory, WIDTH = $width, T = $t, H = $h, T_END = $t_end };
-  double next[MEM + N], w[$w];
-  casadi_int iw[$iw];
-  const double *arg[$arg];
-  double *res[$res];
-  long long i, count = 0, made = 0;$variables
-  while (S[T] < R[T_END] && count < max_rows && made < max_attempts
-         && S[H] >= h_min && S[H] >= $floor * fabs(S[T])$condition) {
-    double *row = rows + count * WIDTH;
-    arg[0] = S;
-    arg[1] = R;
-    res[0] = next;
-    res[1] = row + $dense;
-    symfric_step(arg, res, iw, w, 0);
-    ++made;
-    if (next[T] > S[T]) {
-      row[0] = S[T];
-      row[1] = next[T];
-      for (i = 0; i < N; ++i) {
-        row[2 + i] = S[MEM + i];
-        row[2 + N + i] = next[MEM + i];
-      }
-      ++count;$search
-    }
-    for (i = 0; i < MEM + N; ++i) S[i] = next[i];
-  }
-  counts[0] = count;
-  counts[1] = made;$found
-  if (S[T] >= R[T_END]) return 0;
-  if (!(S[H] >= h_min && S[H] >= $floor * fabs(S[T]))) return 3;
-  return count >= max_rows$full ? 1 : 2;
-}
-"""
-
-_HOOKS = {
-    "parameters": """,
-                double *memory, double *jumps, long long max_jumps""",
-    "variables": """
-  long long jumped = 0;
-  int stop = 0, happened;""",
-    "condition": """
-         && jumped < max_jumps && !stop""",
-    "search": """
-      happened = symfric_search(row, next, R + $d, memory, jumps + jumped * $jump, count - 1,
-                                iw, w, &stop);
-      jumped += happened != 0;
-      count -= happened < 0;""",
-    "found": """
-  counts[2] = jumped;
-  if (stop) return stop;""",
-    "full": " || jumped >= max_jumps",
-}
-"""What a model with events adds to the loop."""
+    def march(self, work: Work, attempts: int) -> tuple[Array, int, Stop]:
+        """Advance `work`; return records in its buffer, the attempts made and why it stopped."""
+        loop, outputs = work.loop, work.outputs
+        loop.max_attempts, loop.found = attempts, outputs.found
+        reason = self.library.symfric_march(work.address)
+        outputs.found = loop.found
+        if work.events is not None:
+            work.events.count = loop.jumped
+        return work.rows[: loop.count], loop.made, STOPS[reason]

@@ -90,6 +90,7 @@ class Eventful:
     Attributes:
         crossings: of the model.
         tolerance: of event times [s].
+        steps: accepted ones in the call of an engine that is under way.
         memory: see `Memory`.
         rows: records of jumps, the first `count` of them in use.
     """
@@ -97,6 +98,7 @@ class Eventful:
     crossings: Crossings
     tolerance: float
     count: int = 0
+    steps: int = 0
     memory: Array = field(init=False)
     rows: Array = field(init=False)
 
@@ -132,13 +134,12 @@ class Search:
     def __init__(self, eventful: Eventful) -> None:
         self.eventful, self.crossings = eventful, eventful.crossings
         self.memory, self.tolerance = eventful.memory, eventful.tolerance
-        eventful.count = 0
         self._before = self.memory[Memory.before(self.crossings.count)]
         self._looks, self._values, self._cut, self._jump = map(_called, self.crossings.functions)
         self._directions = np.array(self.crossings.directions)
 
-    def __call__(self, row: Array, S: Array, R: Array, rows: int) -> tuple[int, Happened]:
-        """Look for events in the accepted step `row`, behind `rows` others, which led to S.
+    def __call__(self, row: Array, S: Array, R: Array) -> tuple[int, Happened]:
+        """Look for events in the accepted step `row`, which led to S.
 
         The first ones are carried out: the row is cut there, S goes on behind them.
 
@@ -149,6 +150,7 @@ class Search:
         d = R[R.size - self.crossings.data :]
         found = self._crossing(row, d)
         if found is None:
+            self.eventful.steps += 1
             return 0, Happened.NOTHING
         theta, which = found
         h = float(row[Record.T1] - row[Record.T0])
@@ -162,7 +164,9 @@ class Search:
         before, after = cut[record.y1], cut[record.y1].copy()
         for (event, state), value in zip(self.crossings.resets, fresh, strict=True):
             after[state] = value if which[event] else after[state]
-        self.eventful.rows[self.eventful.count] = [rows + kept, t, *before, *after, *which]
+        self.eventful.steps += kept
+        steps = self.eventful.steps
+        self.eventful.rows[self.eventful.count] = [steps, t, *before, *after, *which]
         self.eventful.count += 1
         # steps beyond the event say nothing; its own is a guess only, what follows may be faster
         S[:] = State.at(t, max(min(h, RESTART * self.tolerance), LEAST * h), after)

@@ -23,7 +23,8 @@ from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.method import Method
 from symfric.integrator.methods.suited import suited
 from symfric.integrator.running.crossings import Crossings, crossings
-from symfric.integrator.running.engine import CompiledEngine, Engine, VmEngine, c_source
+from symfric.integrator.running.engine import CompiledEngine, Engine, VmEngine
+from symfric.integrator.running.loop import Work, loop_source
 from symfric.integrator.step.attempt import build_step
 from symfric.model import Model
 
@@ -36,6 +37,9 @@ same form."""
 
 BATCH, EVENT_BATCH = 32, 4
 """Attempts of one call of the virtual machine; those behind an event are made in vain."""
+
+SPARE = 2
+"""Sets of buffers kept: one for a run, one for a run within its callback."""
 
 
 @final
@@ -64,6 +68,7 @@ class Integrator:
     )
     _judged: dict[Point, "Integrator"] = field(default_factory=dict[Point, "Integrator"])
     _others: dict[Orders, "Integrator"] = field(default_factory=dict[Orders, "Integrator"])
+    _spare: list[Work] = field(default_factory=list[Work])
 
     def __post_init__(self) -> None:
         begin = perf_counter()
@@ -193,6 +198,18 @@ class Integrator:
             self._others[orders] = Integrator(self.model, self.inputs, self.tableau, whole)
         return self._others[orders]
 
+    def borrow(self) -> Work:
+        """Buffers for a run, which nobody else has: threads and callbacks may run another one."""
+        try:
+            return self._spare.pop()
+        except IndexError:
+            return Work(self.system.n, self.step.numel_in(1), self.tableau.H.shape[0])
+
+    def give_back(self, work: Work) -> None:
+        """Buffers that a run needs no longer; a few are kept for the next one."""
+        if len(self._spare) < SPARE:
+            self._spare.append(work)
+
     def vm(self) -> Engine:
         """The engine that needs no compiler."""
         if "vm" not in self._engines:
@@ -242,6 +259,6 @@ class Integrator:
         if expected > 2 * look_up and "looked up" not in self._engines:
             self._engines["looked up"] = self.vm()
             rows = self.tableau.H.shape[0]
-            if compiled_before(c_source(self.step, rows, crossings=self.crossings)) is not None:
+            if compiled_before(loop_source(self.step, rows, self.crossings)) is not None:
                 return self.compiled()
         return self.vm()

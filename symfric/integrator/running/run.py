@@ -1,7 +1,8 @@
 """Drive an integrator from start to end: input intervals, events, progress, failures."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import partial
 from time import perf_counter
 from typing import final
 
@@ -11,19 +12,22 @@ from numpy.typing import NDArray
 from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import consistent, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.running.dense import Dense, from_records, join
 from symfric.integrator.running.diagnosis import explain
 from symfric.integrator.running.engine import Stop
-from symfric.integrator.running.events import Eventful, Jumps
+from symfric.integrator.running.events import Eventful
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.sizes import ROUNDS, ample, finer, sizes
+from symfric.integrator.running.loop import Work
+from symfric.integrator.running.outputs import Outputs
+from symfric.integrator.running.record import MOST_BYTES, Run
+from symfric.integrator.running.sizes import ROUNDS, ample, finer
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
 PACES = 8
 """Straight pieces of an input that a step may pass with events, which look at its quarters."""
 
-ROWS = 2048
+NOWHERE = np.zeros(0)
+"""No times of a result."""
 ATTEMPTS = {"vm": 2_000, "compiled": 50_000}
 """Attempts between two looks at progress and interrupts: tens of milliseconds."""
 MOST_ORDERS = 8
@@ -56,37 +60,6 @@ class Tolerances:
         return Given.of(t_end, self.rtol, self.max_step, self.atol, d)
 
 
-@final
-@dataclass(eq=False)
-class Run:
-    """What a run has produced so far; a mutable record that survives interrupts and failures.
-
-    `integrator` is the one it ended with: pivots that fail on the way are replaced.
-    """
-
-    dense: list[Dense] = field(default_factory=list[Dense])
-    jumps: list[Jumps] = field(default_factory=list[Jumps])
-    happened: list[tuple[float, str]] = field(default_factory=list[tuple[float, str]])
-    steps: int = 0
-    attempts: int = 0
-    smallest: float = np.inf
-    engine: str = ""
-    integrator: Integrator | None = None
-    status: Status = Status.SUCCESS
-    message: str = Status.SUCCESS.value
-
-    def keep(self, piece: Dense) -> None:
-        """Append accepted steps with their continuous solution, and count them."""
-        if piece.t0.size:
-            self.dense.append(piece)
-            self.steps += piece.t0.size
-            self.smallest = min(self.smallest, float((piece.t1 - piece.t0).min()))
-
-    def stop(self, status: Status, message: str | None = None) -> None:
-        """End the run with `status`, said in `message` or in the sentence of the status."""
-        self.status, self.message = status, message or status.value
-
-
 def integrate(
     integrator: Integrator,
     inputs: InputData,
@@ -95,8 +68,9 @@ def integrate(
     tolerances: Tolerances,
     backend: str,
     progress: Callable[[float], None] | None,
-) -> tuple[Run, Dense]:
-    """Integrate over all input intervals; the result holds whatever was reached.
+    times: Array = NOWHERE,
+) -> Run:
+    """Integrate over all input intervals, with outputs at `times`; the run holds what was reached.
 
     A motion that turns out to be tiny is integrated again on its own scale (`sizes`).
     """
@@ -105,19 +79,21 @@ def integrate(
         # where a machine rests, nothing but its events tells that an input has become too strong
         tolerances = replace(tolerances, max_step=PACES * inputs.pace)
     scale, allowed = nominal, tolerances
-    run, dense = _integrated(integrator, inputs, y0, p, allowed, backend, progress)
-    for _ in range(ROUNDS if tolerances.follow and not ample(dense, nominal) else 0):
-        own = finer(scale, sizes(dense, nominal.size), nominal)
+    run = _integrated(integrator, inputs, y0, p, allowed, backend, progress, times)
+    for _ in range(ROUNDS if tolerances.follow and not ample(run.end, nominal) else 0):
+        own = finer(scale, run.extent.largest[: nominal.size], nominal)
         if own is None or not run.status.ok:
             break
         scale, allowed = own, replace(tolerances, atol=tolerances.atol * own / nominal)
-        again = _integrated(run.integrator or integrator, inputs, y0, p, allowed, backend, None)
-        if not again[0].status.ok and again[0].status is not Status.INTERRUPTED:
-            why = again[0].message
-            run.message += f" Motions that are tiny were not resolved on their own scale: {why}"
+        start = run.integrator or integrator
+        again = _integrated(start, inputs, y0, p, allowed, backend, None, times)
+        if not again.status.ok and again.status is not Status.INTERRUPTED:
+            run.message += (
+                f" Motions that are tiny were not resolved on their own scale: {again.message}"
+            )
             break
-        run, dense = again
-    return run, dense
+        run = again
+    return run
 
 
 def _integrated(
@@ -128,23 +104,31 @@ def _integrated(
     tolerances: Tolerances,
     backend: str,
     progress: Callable[[float], None] | None,
-) -> tuple[Run, Dense]:
-    """One run over all input intervals."""
-    d = np.concatenate([p, inputs.values[:, 0]])
-    y = integrator.start(y0, d)
-    march = _March(integrator, inputs, tolerances, backend, progress, y)
+    times: Array,
+    most: float | None = None,
+) -> Run:
+    """One run over all input intervals; it keeps steps of up to `most` bytes."""
+    data = inputs.values[:, 0]
+    y = integrator.start(y0, np.concatenate([p, data]) if data.size else p)
+    work = integrator.borrow()
+    march = _March(integrator, inputs, tolerances, backend, progress, y, p, times, work)
+    run = march.run
+    run.most = MOST_BYTES if most is None else most
     try:
-        march.whole(p)
+        march.whole()
     except KeyboardInterrupt:
         reached = f"{Status.INTERRUPTED.value} It reaches t = {march.t:g} s."
-        march.run.stop(Status.INTERRUPTED, reached)
-    run = march.run
+        run.stop(Status.INTERRUPTED, reached)
+        run.outputs.back_to(run.reached)
+    march.finish()
     run.integrator = march.integrator
-    if not run.dense:
-        empty = np.zeros((1, integrator.tableau.H.shape[0], y.size))
-        start = inputs.breaks[:1]
-        run.dense.append(Dense(start, start + 1e-300, y[None], y[None], empty))
-    return run, join(run.dense)
+    integrator.give_back(work)
+    if not run.complete:
+        same = replace(tolerances, max_steps=run.attempts)
+        run.again = partial(
+            _integrated, integrator, inputs, y0, p, same, backend, None, NOWHERE, np.inf
+        )
+    return run
 
 
 @final
@@ -159,18 +143,28 @@ class _March:
         backend: str,
         progress: Callable[[float], None] | None,
         y: Array,
+        p: Array,
+        times: Array,
+        work: Work,
     ) -> None:
         self.integrator, self.inputs, self.tolerances = integrator, inputs, tolerances
-        self.backend, self.progress = backend, progress
-        self.t_start, self.t_end = float(inputs.breaks[0]), float(inputs.breaks[-1])
-        span = self.t_end - self.t_start
-        self.h_min = smallest_step(span)
-        h = min(first_step(span, self.t_start), tolerances.max_step)
-        self.S = State.at(self.t_start, h, y)
-        crossings = integrator.crossings
+        self.backend, self.progress, self.work = backend, progress, work
+        self.t_start, self.t_end = inputs.span
+        self.span = self.t_end - self.t_start
+        system, crossings = integrator.system, integrator.crossings
         self.events = None if crossings is None else Eventful(crossings, tolerances.event)
-        self.run, self.d = Run(), np.zeros(0)
-        self.span, self.places = span, [y.copy()]
+        h = min(first_step(self.span, self.t_start), tolerances.max_step)
+        State.begin(work.S, self.t_start, h, y)
+        Given.begin(work.R, tolerances.rtol, tolerances.max_step, tolerances.atol, p)
+        work.loop.h_min = smallest_step(self.span)
+        outputs = Outputs.at(times, system.n)
+        work.want(outputs, self.events)
+        work.over(inputs.breaks, inputs.values)
+        # what an engine need not come back for
+        alone = crossings is None and integrator.follow is None and system.manifold is None
+        self.reach = work.loop.intervals if alone else 1
+        self.run = Run(self.t_start, y, outputs)
+        self.places = [y]
 
     @property
     def t(self) -> float:
@@ -178,40 +172,59 @@ class _March:
         return float(self.S[State.T])
 
     @property
+    def S(self) -> Array:
+        """The step's memory and unknowns."""
+        return self.work.S
+
+    @property
     def y(self) -> Array:
-        """Unknowns there; a view of S."""
+        """Unknowns; a view of S."""
         return self.S[State.Y]
 
-    def whole(self, p: Array) -> None:
-        """Integrate over all input intervals, each with its own run data d = (p, data)."""
-        for k in range(self.inputs.breaks.size - 1):
-            before, self.d = self.d, np.concatenate([p, self.inputs.values[:, k]])
-            if k:
-                self.jump(before)
-            else:
-                self.before_start()
-            if self.run.status is Status.SUCCESS:
-                self.interval(float(self.inputs.breaks[k + 1]))
+    @property
+    def d(self) -> Array:
+        """Run data on the input interval that is under way, as a copy."""
+        return self.work.R[Given.d(self.integrator.system.nx)].copy()
+
+    def whole(self) -> None:
+        """Integrate over all input intervals, as many at once as need nobody in between."""
+        loop = self.work.loop
+        self.before_start()
+        while True:
+            loop.until = min(loop.interval + self.reach, loop.intervals)
+            self.stretch()
+            if self.run.status is not Status.SUCCESS or loop.until == loop.intervals:
+                return
+            self.jump()
             if self.run.status is not Status.SUCCESS:
                 return
 
-    def interval(self, end: float) -> None:
-        """Integrate up to `end`, on which d is constant."""
-        n, left = self.integrator.system.n, 0.0
-        R = self.tolerances.given(end, self.d)
+    def stretch(self) -> None:
+        """Integrate up to the end of the last interval that engines may enter."""
+        left, end = 0.0, float(self.work.breaks[self.work.loop.until])
         while self.t < end:
-            records, reason, left = self.attempts(R, left)
+            records, reason, left = self.attempts(left)
             if self.run.status is not Status.SUCCESS:
                 return
             self.happen()
-            self.run.keep(from_records(records, n))
+            self.run.keep(records.copy())
             self.heed(reason)
             if self.run.status is not Status.SUCCESS:
                 return
-            if self.progress is not None:
-                self.progress((self.t - self.t_start) / (self.t_end - self.t_start))
+            self.report()
 
-    def attempts(self, R: Array, left: float) -> tuple[Array, Stop, float]:
+    def report(self) -> None:
+        """Tell how far it is."""
+        if self.progress is not None:
+            self.progress((self.t - self.t_start) / self.span)
+
+    def finish(self) -> None:
+        """Outputs at the very end, where engines did not know that it is."""
+        outputs = self.run.outputs
+        if outputs.found < outputs.times.size:
+            outputs.fill(self.run.last, last=True)
+
+    def attempts(self, left: float) -> tuple[Array, Stop, float]:
         """A batch of attempts: records, why it stopped, time [s] the VM will still need."""
         engine = self.integrator.choose(self.backend, left)
         self.run.engine = engine.name
@@ -220,10 +233,9 @@ class _March:
             self.run.stop(
                 Status.MAX_STEPS, f"{Status.MAX_STEPS.value} It stands at t = {self.t:g} s."
             )
-            return np.zeros((0, 0)), Stop.ATTEMPTS, left
+            return self.work.rows[:0], Stop.ATTEMPTS, left
         began, from_t = perf_counter(), self.t
-        limits = ROWS, allowed, self.h_min
-        records, made, reason = engine.run(self.S, R, *limits, self.events)
+        records, made, reason = engine.march(self.work, allowed)
         self.run.attempts += made
         if reason is Stop.STEP_TOO_SMALL and self.found_pivots():
             reason = Stop.ATTEMPTS
@@ -241,8 +253,8 @@ class _March:
         """
         if len(self.places) > MOST_ORDERS:
             return False
-        here = self.y.copy()
-        points = [(y, self.d) for y in (*self.places, here)]
+        here, d = self.y.copy(), self.d
+        points = [(y, d) for y in (*self.places, here)]
         other = self.integrator.suited(points, self.span)
         if other is self.integrator:
             return False
@@ -292,10 +304,11 @@ class _March:
             signs = (-e.direction if e.at_start else x for e, x in zip(events, now, strict=True))
             self.events.jumped(np.array(list(signs)))
 
-    def jump(self, before: Array) -> None:
-        """Take over new input data, from those `before`; algebraic unknowns follow."""
+    def jump(self) -> None:
+        """Take over new input data, which algebraic unknowns follow."""
         if self.events is not None:
-            self.events.jumped(self.values(before))
+            self.events.jumped(self.values(self.d))
+        self.work.enter(self.work.loop.until)
         self.make_consistent()
 
     def values(self, d: Array) -> Array:

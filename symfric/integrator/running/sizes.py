@@ -8,8 +8,6 @@ nanometre not at all. So a run that turns out to be that small is run again on i
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.integrator.running.dense import Dense
-
 Array = NDArray[np.float64]
 SMALL, REST = 1e-3, 1e-12
 """Sizes, in nominal values, below which a motion has a scale of its own and is none any more: what
@@ -19,14 +17,9 @@ ROUNDS = 3
 """How often: a motion that was not resolved at all may have been taken for a larger one."""
 
 
-def sizes(dense: Dense, nx: int) -> Array:
-    """Largest magnitudes of the states over all steps, shape (nx,)."""
-    return np.maximum(np.abs(dense.y0[0, :nx]), np.abs(dense.y1[:, :nx]).max(axis=0))
-
-
-def ample(dense: Dense, nominal: Array) -> bool:
+def ample(end: Array, nominal: Array) -> bool:
     """Whether no state ends small: what most runs do, told without a look at all their steps."""
-    return bool((np.abs(dense.y1[-1, : nominal.size]) >= SMALL * nominal).all())
+    return bool((np.abs(end[: nominal.size]) >= SMALL * nominal).all())
 
 
 def own_scale(size: Array, nominal: Array) -> Array:

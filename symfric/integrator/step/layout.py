@@ -31,6 +31,12 @@ class State:
         """S at the time `t` with nothing before it, to try the step `h`; y (..., n)."""
         return _joined([t, h, h, GROWTH_MEMORY, 0.0], np.asarray(y, dtype=float))
 
+    @staticmethod
+    def begin(S: Array, t: float, h: float, y: Array) -> None:
+        """`at`, written into S."""
+        S[: State.MEMORY] = (t, h, h, GROWTH_MEMORY, 0.0)
+        S[State.Y] = y
+
 
 @final
 class Given:
@@ -43,6 +49,14 @@ class Given:
     def of(t_end: float, rtol: float, h_max: float, atol: ArrayLike, d: ArrayLike) -> Array:
         """R for run data d (..., n_d) and atol (nx,)."""
         return _joined([t_end, rtol, h_max, *np.asarray(atol, dtype=float)], np.asarray(d))
+
+    @staticmethod
+    def begin(R: Array, rtol: float, h_max: float, atol: Array, p: Array) -> None:
+        """What holds on all intervals, written into R: all but their ends and their data."""
+        nx = atol.size
+        R[Given.RTOL], R[Given.H_MAX], R[Given.atol(nx)] = rtol, h_max, atol
+        if p.size:
+            R[Given.FIXED + nx : Given.FIXED + nx + p.size] = p
 
     @staticmethod
     def atol(nx: int) -> slice:

@@ -57,7 +57,7 @@ def test_interrupt_goes_on_to_the_ensemble(monkeypatch: pytest.MonkeyPatch) -> N
         def interrupt(_: float) -> None:
             raise KeyboardInterrupt
 
-        return real(*arguments[:-1], interrupt)
+        return real(*arguments[:-2], interrupt, arguments[-1])
 
     monkeypatch.setattr(one_by_one, "integrate", pressed)
     with pytest.raises(KeyboardInterrupt):

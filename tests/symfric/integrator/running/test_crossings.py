@@ -32,10 +32,8 @@ def test_each_jump_is_kept_with_the_values_on_both_sides(backend: str) -> None:
     inputs = input_data(model, None, 0.0, 1.5)
     integrator = Integrator(model, inputs, ADAPTIVE["rodas5p"])
     allowed = Tolerances(1e-6, np.full(2, 1e-7), 1e-10, 1000)
-    run, dense = integrate(
-        integrator, inputs, np.array([0.0, 2.0]), np.zeros(0), allowed, backend, None
-    )
-    jumps = Jumps.joined(run.jumps)
+    run = integrate(integrator, inputs, np.array([0.0, 2.0]), np.zeros(0), allowed, backend, None)
+    dense, jumps = run.dense, Jumps.joined(run.jumps)
     assert jumps.which.tolist() == [[True, True, False], [False, False, True]]
     assert jumps.t == pytest.approx([1, 1], abs=1e-9)
     assert jumps.before == pytest.approx(np.array([[1, 2], [2, -1]]), abs=1e-9)

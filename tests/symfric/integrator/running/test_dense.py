@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from symfric import LuGre, rabinowicz, simulate
 from symfric.integrator.running.crossings import cutting
 from symfric.integrator.running.dense import Dense, from_records, hermite, join
-from symfric.integrator.running.engine import width
+from symfric.integrator.running.loop import width
 from symfric.integrator.step.layout import Record
 
 Array = NDArray[np.float64]

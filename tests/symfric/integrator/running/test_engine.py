@@ -11,14 +11,8 @@ from numpy.typing import NDArray
 from symfric import BrownMcPhee, LuGre, Model, Variable, rabinowicz
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
-from symfric.integrator.running.engine import (
-    CompiledEngine,
-    Engine,
-    Stop,
-    VmEngine,
-    c_source,
-    width,
-)
+from symfric.integrator.running.engine import CompiledEngine, Engine, Stop, VmEngine
+from symfric.integrator.running.loop import c_source, width
 from symfric.integrator.step.attempt import build_step
 from symfric.integrator.step.layout import Given, State
 

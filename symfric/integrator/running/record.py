@@ -1,0 +1,149 @@
+"""What a run has produced: accepted steps, as many as are worth their memory, and what happened."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.status import Status
+from symfric.integrator.running.dense import Dense, join, pieces_of
+from symfric.integrator.running.events import Jumps
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.outputs import Outputs
+
+Array = NDArray[np.float64]
+MOST_BYTES = 64 * 2**20
+"""Of accepted steps that a run keeps. A longer one keeps none: its results stand at their times,
+and who asks for what lies between lets it run again, to the bit."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Extent:
+    """Shortest and longest accepted step [s], largest magnitudes of the unknowns (n,)."""
+
+    shortest: float
+    longest: float
+    largest: Array
+
+
+@final
+@dataclass(eq=False)
+class Run:
+    """What a run has produced so far; a mutable record that survives interrupts and failures.
+
+    Attributes:
+        t, y: where it started.
+        outputs: unknowns at the times of the result.
+        jumps: the events that happened, with the unknowns on both sides.
+        happened: (time, name) of every event.
+        steps, attempts: how many, accepted and all.
+        engine: what ran it.
+        most: bytes of accepted steps that it keeps.
+        integrator: the one it ended with: pivots that fail on the way are replaced.
+        again: runs it once more and keeps all steps.
+        status, message: how it ended.
+    """
+
+    t: float
+    y: Array
+    outputs: Outputs
+    jumps: list[Jumps] = field(default_factory=list[Jumps])
+    happened: list[tuple[float, str]] = field(default_factory=list[tuple[float, str]])
+    steps: int = 0
+    attempts: int = 0
+    engine: str = ""
+    integrator: Integrator | None = None
+    again: Callable[[], "Run"] | None = None
+    status: Status = Status.SUCCESS
+    message: str = Status.SUCCESS.value
+    most: float = MOST_BYTES
+    _kept: list[Dense | Array] = field(default_factory=list[Dense | Array])
+    _held: int = 0
+    _before: Extent | None = None
+
+    def keep(self, piece: Dense | Array) -> None:
+        """Append accepted steps with their continuous solution, or rows of records of them.
+
+        They belong to the run from now on.
+        """
+        count = piece.shape[0] if isinstance(piece, np.ndarray) else piece.t0.size
+        if not count:
+            return
+        self.steps += count
+        self._kept.append(piece)
+        self._held += piece.nbytes
+        if self._held > self.most:
+            self._before, self._kept = self.extent, [self.last]
+
+    @property
+    def kept(self) -> int:
+        """How many accepted steps are in memory."""
+        return sum(p.shape[0] if isinstance(p, np.ndarray) else p.t0.size for p in self._kept)
+
+    @property
+    def complete(self) -> bool:
+        """Whether all accepted steps are kept."""
+        return self._before is None
+
+    def stop(self, status: Status, message: str | None = None) -> None:
+        """End the run with `status`, said in `message` or in the sentence of the status."""
+        self.status, self.message = status, message or status.value
+
+    def _pieces(self) -> list[Dense]:
+        n = self.y.size
+        found = [pieces_of(p, n) if isinstance(p, np.ndarray) else p for p in self._kept]
+        if found:
+            return found
+        at, y = np.array([self.t]), self.y[None]
+        return [Dense(at, at + 1e-300, y, y, np.zeros((1, 0, n)))]
+
+    @cached_property
+    def dense(self) -> Dense:
+        """The continuous solution over all accepted steps, of a long run by another one."""
+        if self._before is not None and self.again is not None:
+            return self.again().dense
+        return join(self._pieces())
+
+    @property
+    def last(self) -> Dense:
+        """The last accepted step, as a copy."""
+        p = self._pieces()[-1]
+        return Dense(*(a[-1:].copy() for a in (p.t0, p.t1, p.y0, p.y1, p.D)))
+
+    @property
+    def reached(self) -> float:
+        """Time at the end of the last accepted step [s]."""
+        if not self._kept:
+            return self.t
+        p = self._kept[-1]
+        return float(p[-1, 1] if isinstance(p, np.ndarray) else p.t1[-1])
+
+    @property
+    def end(self) -> Array:
+        """Unknowns at the end of the last accepted step, shape (n,)."""
+        if not self._kept:
+            return self.y
+        p, n = self._kept[-1], self.y.size
+        return p[-1, 2 + n : 2 + 2 * n] if isinstance(p, np.ndarray) else p.y1[-1]
+
+    @property
+    def extent(self) -> Extent:
+        """How long the steps are and how large the unknowns become."""
+        found = self._pieces()
+        before = self._before or Extent(np.inf, 0.0, np.abs(found[0].y0[0]))
+        lengths = [p.t1 - p.t0 for p in found]
+        return Extent(
+            min(before.shortest, *(float(h.min()) for h in lengths)),
+            max(before.longest, *(float(h.max()) for h in lengths)),
+            np.max([before.largest, *(np.abs(p.y1).max(axis=0) for p in found)], axis=0),
+        )
+
+    def over(self, times: Array) -> Dense:
+        """A continuous solution that covers `times` [s]: the last step alone where that will do."""
+        if self._before is not None and times.size and times.min() >= self._pieces()[-1].t0[0]:
+            return self.last
+        return self.dense
