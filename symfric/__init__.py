@@ -18,11 +18,13 @@ if TYPE_CHECKING:
     from symfric.integrator import Ensemble as Ensemble
     from symfric.integrator import Hold as Hold
     from symfric.integrator import Linear as Linear
+    from symfric.integrator import Plant as Plant
     from symfric.integrator import Statistics as Statistics
     from symfric.integrator import Trajectory as Trajectory
     from symfric.integrator import flow as flow
     from symfric.integrator import simulate as simulate
     from symfric.integrator import simulate_many as simulate_many
+    from symfric.integrator import stepper as stepper
     from symfric.laws import ALL_LAWS as ALL_LAWS
     from symfric.laws import BAM as BAM
     from symfric.laws import GMS as GMS
@@ -110,8 +112,8 @@ else:
             "symfric.foundation.parameters": "Parameter Variable parameters symbolise with_values",
             "symfric.foundation.status": "SolveError Status",
             "symfric.integrator": """
-                Ensemble Hold Linear Statistics Trajectory flow simulate
-                simulate_many
+                Ensemble Hold Linear Plant Statistics Trajectory flow simulate
+                simulate_many stepper
             """,
             "symfric.laws": """
                 ALL_LAWS BAM GMS POPULATIONS Ambrosio Andersson Armstrong Asymmetric

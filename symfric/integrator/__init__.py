@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from symfric.integrator.equations.inputs import Linear as Linear
     from symfric.integrator.flow import flow as flow
     from symfric.integrator.simulate import simulate as simulate
+    from symfric.integrator.stepper import Plant as Plant
+    from symfric.integrator.stepper import stepper as stepper
     from symfric.results.trajectory import Statistics as Statistics
     from symfric.results.trajectory import Trajectory as Trajectory
 else:
@@ -24,6 +26,7 @@ else:
             "symfric.integrator.equations.inputs": "Hold Input Linear",
             "symfric.integrator.flow": "flow",
             "symfric.integrator.simulate": "simulate",
+            "symfric.integrator.stepper": "Plant stepper",
             "symfric.results.trajectory": "Statistics Trajectory",
         },
     )

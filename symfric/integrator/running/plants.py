@@ -1,0 +1,363 @@
+"""Plants that go from sample to sample with inputs held: all of them in one call, without records.
+
+As in `symfric.integrator.running.engine` there are two engines, which do the same operations in one
+order: a loop in C around the generated step, and one in Python around CasADi's virtual machine.
+"""
+
+import ctypes
+from collections.abc import Callable
+from dataclasses import dataclass
+from string import Template
+from time import perf_counter
+from typing import Any, cast, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.compiler import find_compiler
+from symfric.foundation.numeric import flat_view
+from symfric.integrator.compiled.compiler import load
+from symfric.integrator.equations.initial import FLOOR
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.step.layout import Given, State
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+END, ATTEMPTS, STEP_TOO_SMALL, SEARCH, AGAIN = 0, 2, 3, 4, 5
+"""Why a plant stands: at its sample, out of attempts, steps fell to nothing, its algebraic unknowns
+are too far from the last ones to follow (`symfric.integrator.equations.following`); or it stands no
+more, because somebody has helped it."""
+REFUSED = -1
+"""What `Advance` returns where an input is no finite number, and nothing has happened."""
+
+Advance = Callable[[int], int]
+"""Take over inputs and go on to the next sample (1), or on with those that are to go AGAIN (0); how
+many plants did not get there."""
+
+
+@final
+@dataclass(eq=False)
+class Plants:
+    """What changes in plants of one model; both engines work on these arrays.
+
+    Attributes:
+        S, R: columns of an attempt, a row each plant (`symfric.integrator.step.layout`).
+        u: inputs to hold next, shape (plants, nu); the last run data are those held now.
+        begin: start times [s]; the k-th sample of a plant is at begin + k dt.
+        count: k.
+        ready: whether its algebraic unknowns fit the inputs to hold next already.
+        why: END ... SEARCH.
+        made: attempts in its last interval.
+        dt: interval [s].
+        attempts: allowed in one.
+        h_min: step [s] below which a plant stands.
+    """
+
+    S: Array
+    R: Array
+    u: Array
+    begin: Array
+    count: Counts
+    ready: Counts
+    why: Counts
+    made: Counts
+    dt: float
+    attempts: int
+    h_min: float
+
+    def copy(self) -> "Plants":
+        """The same, in memory of its own."""
+        arrays = (self.S, self.R, self.u, self.begin, self.count, self.ready, self.why, self.made)
+        return Plants(*(a.copy() for a in arrays), self.dt, self.attempts, self.h_min)  # type: ignore[arg-type]
+
+
+class _Members(ctypes.Structure):
+    """`symfric_members` of the C below."""
+
+    _fields_ = (
+        *((name, ctypes.c_longlong) for name in ("members", "attempts")),
+        *((name, ctypes.c_double) for name in ("dt", "h_min")),
+        *((n, ctypes.c_void_p) for n in ("S", "R", "u", "begin", "count", "ready", "why", "made")),
+    )
+
+    @classmethod
+    def of(cls, plants: Plants) -> "_Members":
+        """The addresses of arrays that somebody else keeps alive."""
+        p = plants
+        arrays = (p.S, p.R, p.u, p.begin, p.count, p.ready, p.why, p.made)
+        addresses = (array.ctypes.data for array in arrays)
+        return cls(p.S.shape[0], p.attempts, p.dt, p.h_min, *addresses)
+
+
+def compiled(integrator: Integrator, plants: Plants) -> Advance:
+    """The loop in C.
+
+    Raises:
+        CompileError: there is no compiler, or it failed.
+    """
+    function = _library(integrator).symfric_plants
+    members = _Members.of(plants)
+    address = ctypes.addressof(members)
+
+    def advance(begin: int, _alive: object = (members, plants)) -> int:
+        return int(function(address, begin))
+
+    return advance
+
+
+def _library(integrator: Integrator) -> ctypes.CDLL:
+    """The compiled loop, which the integrator keeps."""
+    kept = integrator.__dict__
+    if "plants" not in kept:
+        library = load(c_source(integrator), "symfric_plants")
+        library.symfric_plants.restype = ctypes.c_longlong
+        library.symfric_plants.argtypes = [ctypes.c_void_p, ctypes.c_int]
+        kept["plants"] = library
+    return cast(ctypes.CDLL, kept["plants"])
+
+
+def in_vm(integrator: Integrator, plants: Plants) -> Advance:
+    """The loop in Python; needs no compiler."""
+    step, follow, nx = integrator.step, integrator.follow, integrator.system.nx
+    S, R, after = (np.zeros(k) for k in (step.numel_in(0), step.numel_in(1), step.numel_in(0)))
+    buffer, attempt = cast(tuple[Any, Any], step.buffer())
+    buffer.set_arg(0, flat_view(S))
+    buffer.set_arg(1, flat_view(R))
+    buffer.set_res(0, flat_view(after))
+    data, held = Given.d(nx), plants.u.shape[1]
+
+    def runs(b: int) -> int:
+        S[:], R[:], made = plants.S[b], plants.R[b], 0
+        end = R[Given.T_END]
+        while S[State.T] < end and made < plants.attempts and _large(S, plants.h_min):
+            attempt()
+            S[:] = after
+            made += 1
+        plants.S[b] = S
+        plants.made[b] += made
+        if S[State.T] >= end:
+            return END
+        return ATTEMPTS if _large(S, plants.h_min) else STEP_TOO_SMALL
+
+    def takes_over(b: int) -> bool:
+        plants.count[b] += 1
+        plants.made[b] = 0
+        own = plants.R[b]
+        own[Given.T_END] = plants.begin[b] + plants.count[b] * plants.dt
+        own[own.size - held :] = plants.u[b]
+        if follow is None or plants.ready[b]:
+            return True
+        found = follow(plants.S[b, State.Y], own[data])
+        if found is None:
+            return False
+        plants.S[b, State.Y] = found
+        return True
+
+    def advance(begin: int, _alive: object = buffer) -> int:
+        if begin and not np.isfinite(plants.u).all():
+            return REFUSED
+        for b in range(plants.S.shape[0]):
+            if begin and not takes_over(b):
+                plants.why[b] = SEARCH
+            elif begin or plants.why[b] == AGAIN:
+                plants.ready[b] = 0
+                plants.why[b] = runs(b)
+        return int(np.count_nonzero(plants.why))
+
+    return advance
+
+
+def _large(S: Array, h_min: float) -> bool:
+    """Whether the step is large enough to go on; NaN is not."""
+    h = S[State.H]
+    return bool(h >= h_min and h >= FLOOR * abs(S[State.T]))
+
+
+def c_source(integrator: Integrator) -> str:
+    """C of the step, of what follows a jump, and of the loop around them."""
+    step, follow = integrator.step, integrator.follow
+    nx, n_d = integrator.system.nx, integrator.system.d.numel()
+    nu = integrator.inputs.data.numel()
+    generator = ca.CodeGenerator("symfric_plants.c", {"static_aux": True})
+    generator.add(step)
+    if follow is not None:
+        generator.add(follow.round)
+    own = _FOLLOWS_NOTHING if follow is None else follow.c_source
+    loop = Template(_MEMBERS + _LOOP).substitute(
+        columns=step.numel_in(0), given=step.numel_in(1), nu=nu,
+        memory=State.MEMORY, t=State.T, h=State.H, t_end=Given.T_END, floor=repr(FLOOR),
+        data=Given.d(nx).start, held=Given.d(nx).start + n_d - nu,
+        attempts=ATTEMPTS, too_small=STEP_TOO_SMALL, search=SEARCH, again=AGAIN, refused=REFUSED,
+        arg=step.sz_arg(), res=step.sz_res(), iw=max(1, step.sz_iw()), w=max(1, step.sz_w()),
+    )  # fmt: skip
+    return generator.dump() + own + loop
+
+
+_FOLLOWS_NOTHING = """
+static int symfric_follow(double *y, const double *d) { return 0; }
+"""
+
+_MEMBERS = """
+typedef struct {
+  long long members, attempts;
+  double dt, h_min;
+  double *S, *R, *u, *begin;
+  long long *count, *ready, *why, *made;
+} symfric_members;
+"""
+
+_LOOP = """
+enum { COLUMNS = $columns, GIVEN = $given, NU = $nu, MEM = $memory, T = $t, H = $h,
+       T_END = $t_end, DATA = $data, HELD = $held };
+
+/* Attempts towards R[T_END]; why they ended. */
+static int symfric_runs(const symfric_members *m, double *S, const double *R, long long *made)
+{
+  double next[COLUMNS], w[$w];
+  casadi_int iw[$iw];
+  const double *arg[$arg];
+  double *res[$res];
+  long long tried = 0;
+  int i;
+  while (S[T] < R[T_END] && tried < m->attempts
+         && S[H] >= m->h_min && S[H] >= $floor * fabs(S[T])) {
+    arg[0] = S;
+    arg[1] = R;
+    res[0] = next;
+    res[1] = 0;
+    symfric_step(arg, res, iw, w, 0);
+    ++tried;
+    for (i = 0; i < COLUMNS; ++i) S[i] = next[i];
+  }
+  *made += tried;
+  if (S[T] >= R[T_END]) return 0;
+  return S[H] >= m->h_min && S[H] >= $floor * fabs(S[T]) ? $attempts : $too_small;
+}
+
+/* New inputs and the time of the next sample; whether algebraic unknowns could follow. */
+static int symfric_takes_over(const symfric_members *m, long long b)
+{
+  double *R = m->R + b * GIVEN;
+  int i;
+  ++m->count[b];
+  m->made[b] = 0;
+  R[T_END] = m->begin[b] + m->count[b] * m->dt;
+  for (i = 0; i < NU; ++i) R[HELD + i] = m->u[b * NU + i];
+  return m->ready[b] || !symfric_follow(m->S + b * COLUMNS + MEM, R + DATA);
+}
+
+/* All plants go to their next sample; how many did not get there. */
+long long symfric_plants(const symfric_members *m, int begin)
+{
+  long long b, failed = 0;
+  if (begin)
+    for (b = 0; b < m->members * NU; ++b)
+      if (!(m->u[b] - m->u[b] == 0)) return $refused;
+  for (b = 0; b < m->members; ++b) {
+    if (begin && !symfric_takes_over(m, b)) {
+      m->why[b] = $search;
+    } else if (begin || m->why[b] == $again) {
+      m->ready[b] = 0;
+      m->why[b] = symfric_runs(m, m->S + b * COLUMNS, m->R + b * GIVEN, m->made + b);
+    }
+    failed += m->why[b] != 0;
+  }
+  return failed;
+}
+"""
+
+
+@final
+@dataclass(eq=False)
+class Looks:
+    """All signals of plants where they stand: in the virtual machine until compiling pays.
+
+    Attributes:
+        integrator: of the plants.
+        plants: where they stand.
+        values: the signals, shape (plants, signals); what a look writes.
+    """
+
+    integrator: Integrator
+    plants: Plants
+    values: Array
+    spent: float = 0.0
+    _compiled: Callable[[], None] | None = None
+
+    def __call__(self, backend: str) -> Array:
+        """Look, by "vm", "compiled" or "auto"."""
+        if self._compiled is None and self._pays(backend):
+            self._compiled = self._in_c()
+        if self._compiled is not None:
+            self._compiled()
+        else:
+            began = perf_counter()
+            self._in_vm()
+            self.spent += perf_counter() - began
+        return self.values
+
+    def _pays(self, backend: str) -> bool:
+        if backend == "vm" or find_compiler() is None:
+            return False
+        n = self.integrator.signals.n_instructions()
+        return backend == "compiled" or self.spent > 2 * (0.1 + 1.5e-4 * n)
+
+    def _in_vm(self) -> None:
+        function, nx = self.integrator.signals, self.integrator.system.nx
+        p, data = self.plants, Given.d(nx)
+        for S, R, out in zip(p.S, p.R, self.values, strict=True):
+            buffer, call = cast(tuple[Any, Any], function.buffer())
+            rows = (S[State.T : State.T + 1], S[State.Y], R[data])
+            for i, array in enumerate(rows):
+                if array.size:
+                    buffer.set_arg(i, flat_view(array))
+            buffer.set_res(0, flat_view(out))
+            call()
+
+    def _in_c(self) -> Callable[[], None]:
+        library = load(look_source(self.integrator), "symfric_look")
+        library.symfric_look.restype = None
+        library.symfric_look.argtypes = [ctypes.c_void_p] * 2
+        members, out = _Members.of(self.plants), self.values.ctypes.data
+        address = ctypes.addressof(members)
+
+        def look(_alive: object = (members, library)) -> None:
+            library.symfric_look(address, out)
+
+        return look
+
+
+def look_source(integrator: Integrator) -> str:
+    """C of the signals, and of the loop over plants."""
+    function, nx = integrator.signals, integrator.system.nx
+    generator = ca.CodeGenerator("symfric_look.c", {"static_aux": True})
+    generator.add(function)
+    loop = Template(_MEMBERS + _LOOK).substitute(
+        columns=integrator.step.numel_in(0), given=integrator.step.numel_in(1),
+        memory=State.MEMORY, t=State.T, data=Given.d(nx).start, rows=function.numel_out(0),
+        arg=function.sz_arg(), res=function.sz_res(), name=function.name(),
+        iw=max(1, function.sz_iw()), w=max(1, function.sz_w()),
+    )  # fmt: skip
+    return generator.dump() + loop
+
+
+_LOOK = """
+/* The signals of every plant where it stands. */
+void symfric_look(const symfric_members *m, double *out)
+{
+  double w[$w];
+  casadi_int iw[$iw];
+  const double *arg[$arg];
+  double *res[$res];
+  long long b;
+  for (b = 0; b < m->members; ++b) {
+    const double *S = m->S + b * $columns;
+    arg[0] = S + $t;
+    arg[1] = S + $memory;
+    arg[2] = m->R + b * $given + $data;
+    res[0] = out + b * $rows;
+    $name(arg, res, iw, w, 0);
+  }
+}
+"""
