@@ -112,9 +112,10 @@ def _plants(
     d = np.hstack([np.tile(model.values("p"), (members, 1)), u])
     begin = np.full(members, t_start)
     count, ready, why, made = (np.zeros(members, dtype=np.int64) for _ in range(4))
-    S = State.at(t_start, dt, np.zeros((members, system.n)))
+    columns = (State.at(t_start, dt, np.zeros((members, system.n))), allowed.given(t_start, d))
+    S, R = (np.ascontiguousarray(rows) for rows in columns)
     return Plants(
-        S, allowed.given(t_start, d), u, begin, count, ready, why, made,
+        S, R, u, begin, count, ready, why, made,
         dt, allowed.max_steps, smallest_step(SAMPLES * dt),
     )  # fmt: skip
 
@@ -167,7 +168,8 @@ class Plant:
         Raises:
             ValueError: unknown names, another shape, no finite numbers; nothing has happened.
             SolveError: a plant did not get to its sample; `failed` says which one and why, and
-                `partial` holds the states. `reset` it, or go on from where it stands.
+                `partial` holds the states. `reset` it, or have it go on to that sample
+                from where it stands, with other inputs.
         """
         if u is not None:
             self._take(u)
@@ -210,6 +212,7 @@ class Plant:
         for b, guess, own, y in zip(which, guesses, values, found, strict=True):
             plants.S[b] = State.at(plants.begin[b], h, y)
             plants.R[b, Given.d(system.nx)] = np.concatenate([own, held])
+            plants.R[b, Given.T_END] = plants.begin[b]
             plants.u[b], plants.count[b], plants.why[b] = held, 0, 0
             self._fresh[b] = guess
             self.failed.pop(b, None)
@@ -297,7 +300,7 @@ class Plant:
         for b, guess in self._fresh.items():
             d = plants.R[b, Given.d(system.nx)].copy()
             d[d.size - nu :] = plants.u[b]
-            if system.free.any():
+            if system.free.any() and (d != plants.R[b, Given.d(system.nx)]).any():
                 plants.S[b, State.Y] = consistent(system, "stepper", guess, d)
             plants.ready[b] = 1
         self._fresh.clear()
@@ -323,8 +326,9 @@ class Plant:
         self.failed |= lost
         if lost:
             b, (status, message) = next(iter(lost.items()))
-            which = "" if self._batch is None else f"plant {b} of {len(lost)} that failed: "
-            raise SolveError(which + message, status, self._x.copy())
+            which = "" if self._batch is None else f"plant {b}: "
+            more = f" ({len(lost)} plants failed.)" if len(lost) > 1 else ""
+            raise SolveError(which + message + more, status, self._x.copy())
 
     def _help(self, b: int) -> tuple[Status, str] | None:
         """Have a plant go on, or say why it cannot."""
@@ -387,7 +391,7 @@ class Plant:
         """Unknowns from which consistent ones are sought, and parameters, a row for each plant."""
         plants, system, count = self._plants, self._integrator.system, len(which)
         own = plants.R[which, Given.d(system.nx)].T
-        every = {v.name: p.get(v.name, own[i]) for i, v in enumerate(self.model.p)}
+        every = {v.name: own[i] for i, v in enumerate(self.model.p)} | p
         if not count:
             return np.zeros((0, system.n)), np.zeros((0, len(every)))
         x, values = self.model.initial_states(x0, every, count)

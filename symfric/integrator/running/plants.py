@@ -39,13 +39,13 @@ many plants did not get there."""
 @final
 @dataclass(eq=False)
 class Plants:
-    """What changes in plants of one model; both engines work on these arrays.
+    """What changes in plants of one model; both engines work on these arrays, row by row in memory.
 
     Attributes:
         S, R: columns of an attempt, a row each plant (`symfric.integrator.step.layout`).
         u: inputs to hold next, shape (plants, nu); the last run data are those held now.
         begin: start times [s]; the k-th sample of a plant is at begin + k dt.
-        count: k.
+        count: k; it stays where a plant has not reached it.
         ready: whether its algebraic unknowns fit the inputs to hold next already.
         why: END ... SEARCH.
         made: attempts in its last interval.
@@ -141,9 +141,9 @@ def in_vm(integrator: Integrator, plants: Plants) -> Advance:
         return ATTEMPTS if _large(S, plants.h_min) else STEP_TOO_SMALL
 
     def takes_over(b: int) -> bool:
-        plants.count[b] += 1
-        plants.made[b] = 0
         own = plants.R[b]
+        plants.count[b] += plants.S[b, State.T] >= own[Given.T_END]
+        plants.made[b] = 0
         own[Given.T_END] = plants.begin[b] + plants.count[b] * plants.dt
         own[own.size - held :] = plants.u[b]
         if follow is None or plants.ready[b]:
@@ -240,7 +240,7 @@ static int symfric_takes_over(const symfric_members *m, long long b)
 {
   double *R = m->R + b * GIVEN;
   int i;
-  ++m->count[b];
+  m->count[b] += m->S[b * COLUMNS + T] >= R[T_END];
   m->made[b] = 0;
   R[T_END] = m->begin[b] + m->count[b] * m->dt;
   for (i = 0; i < NU; ++i) R[HELD + i] = m->u[b * NU + i];

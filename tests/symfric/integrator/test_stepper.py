@@ -1,0 +1,272 @@
+"""Plants from sample to sample: the bits of `simulate`, many at once, what stands in the way."""
+
+import sys
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from symfric import (
+    BrownMcPhee,
+    ExactCoulomb,
+    Hold,
+    LuGre,
+    Model,
+    Plant,
+    SolveError,
+    Status,
+    Variable,
+    drive,
+    simulate,
+    stepper,
+)
+from symfric.foundation.compiler import find_compiler
+from symfric.integrator.running import plants
+from symfric.integrator.stepper import SAMPLES
+from symfric.scenes import SliderCrank
+
+Array = NDArray[np.float64]
+LAW = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
+x, z, u = Variable("x", "m"), Variable("z", "1"), Variable("u", "N")
+BACKENDS = ["vm"] + ["compiled"] * (find_compiler() is not None)
+each_backend = pytest.mark.parametrize("backend", BACKENDS)
+
+
+def followed() -> Model:
+    """x' = z with z + z^3 = u - x: an algebraic unknown that follows what is held."""
+    alg = z.symbol + z.symbol**3 - u.symbol + x.symbol
+    return Model("followed", x=(x,), z=(z,), u=(u,), ode=z.symbol, alg=alg)
+
+
+def pushed() -> Model:
+    """x' = u - x: x(t + dt) = u + (x - u) exp(-dt)."""
+    return Model("pushed", x=(x,), u=(u,), ode=u.symbol - x.symbol)
+
+
+def burst() -> Model:
+    """x' = x^2 + u: infinite after a while."""
+    return Model("burst", x=(x,), u=(u,), ode=x.symbol**2 + u.symbol)
+
+
+def walk(plant: Plant, held: Array) -> Array:
+    """States at the samples, shape (samples, nx)."""
+    return np.array([plant.step(row) for row in held])
+
+
+@pytest.mark.parametrize("make", [lambda: drive(LuGre()), followed], ids=["bristles", "algebraic"])
+def test_samples_have_the_bits_of_one_simulation(make: Any) -> None:
+    model, dt, rng = make(), 1e-3, np.random.default_rng(0)
+    held = np.cumsum(rng.normal(size=(SAMPLES, 1)), axis=0) * 0.1
+    t = np.arange(SAMPLES + 1) * dt
+    force = {model.u[0].name: Hold(t[:-1], held[:, 0])}
+    run = simulate(model, t[-1], u=force, t_eval=t[1:], rtol=1e-5, backend="auto")
+    names = [*model.signals]
+    for backend in BACKENDS:
+        plant = stepper(model, dt, rtol=1e-5, backend=backend)
+        found = walk(plant, held)
+        for i, v in enumerate(model.x):
+            np.testing.assert_array_equal(found[:, i], run[v.name])
+        assert plant.t == t[-1]
+        assert [*plant.signals] == names
+        assert [plant[name] for name in names] == [run[name][-1] for name in names]
+
+
+@each_backend
+def test_accurate_whatever_the_interval(backend: str) -> None:
+    for dt in (1e-3, 0.5, 30.0):
+        plant = stepper(pushed(), dt, rtol=1e-8, backend=backend, x0={"x": 0.3})
+        value = 0.3
+        for held in (1.0, -2.0, 0.1):
+            value = held + (value - held) * np.exp(-dt)
+            assert plant.step(held) == pytest.approx([value], abs=1e-7)
+
+
+@each_backend
+def test_a_batch_is_each_one_alone(backend: str) -> None:
+    """With parameters and starts of their own, and one of them put back on the way."""
+    model = drive(LuGre(), free=["m"])
+    held = np.random.default_rng(1).normal(size=(30, 3)) * 3
+    mass, start = np.array([0.5, 0.8, 1.1]), np.array([0.0, 0.1, -0.1])
+    many = stepper(model, 5e-3, batch=3, x0={"v": start}, p={"m": mass}, backend=backend)
+    together = np.array([many.step(row[:, None]) for row in held])
+    for b in range(3):
+        own = {"x0": {"v": float(start[b])}, "p": {"m": float(mass[b])}}
+        one = stepper(model, 5e-3, backend=backend, **own)
+        np.testing.assert_array_equal(walk(one, held[:, [b]]), together[:, b])
+    again = many.reset(x0={"v": [0.1]}, members=[1])
+    np.testing.assert_array_equal(again[[0, 2]], together[-1][[0, 2]])
+    assert many.t.tolist() == pytest.approx([0.15, 0.0, 0.15])
+    np.testing.assert_array_equal(many.step(held[0][:, None])[1], together[0, 1])
+    assert many["v"].shape == (3,)
+    assert many.signals["force"].tolist() == held[0].tolist()
+
+
+def test_both_engines_have_the_same_bits() -> None:
+    if len(BACKENDS) < 2:
+        pytest.skip("no C compiler here")
+    for model in (followed(), SliderCrank(LAW).model(), drive(LuGre())):
+        held = np.random.default_rng(2).normal(size=(20, len(model.u))) * 3
+        vm, compiled = (stepper(model, 2e-3, backend=backend) for backend in BACKENDS)
+        np.testing.assert_array_equal(walk(vm, held), walk(compiled, held))
+        assert vm.attempts == compiled.attempts
+        np.testing.assert_array_equal([*vm.signals.values()], [*compiled.signals.values()])
+
+
+def test_a_thousand_samples_are_compiled_once_and_searched_for_never(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    calls: list[str] = []
+    load = plants.load
+    monkeypatch.setattr(plants, "load", lambda *a: calls.append(a[1]) or load(*a))
+    model = followed()
+    plant = stepper(model, 1e-2, backend=BACKENDS[-1])
+    stepper(model, 1e-3, backend=BACKENDS[-1]).copy()
+    monkeypatch.setattr(sys.modules[Plant.__module__], "consistent", None)
+    walk(plant, np.sin(0.01 * np.arange(1000))[:, None])
+    assert calls == ["symfric_plants"] * (len(BACKENDS) - 1)
+
+
+def test_a_copy_goes_its_own_way() -> None:
+    one = stepper(followed(), 0.1, backend="vm")
+    one.step(1.0)
+    other = one.copy()
+    at = one.x
+    apart = other.step(-5.0)
+    assert (one.x == at).all()
+    assert apart[0] < at[0]
+    assert (one.t, other.t) == pytest.approx((0.1, 0.2))
+    np.testing.assert_array_equal(one.copy().step(2.0), one.step(2.0))
+
+
+def test_what_step_returns_is_not_written_again() -> None:
+    plant = stepper(pushed(), 0.1, backend="vm")
+    first = plant.step(1.0)
+    kept = first.copy()
+    plant.step(5.0)
+    np.testing.assert_array_equal(first, kept)
+
+
+def test_reset_repeats_to_the_bit() -> None:
+    plant = stepper(drive(LuGre(), free=["m"]), 5e-3, x0={"v": 0.1}, backend="vm")
+    held = np.random.default_rng(3).normal(size=(20, 1)) * 3
+    first = walk(plant, held)
+    assert plant.reset(x0={"v": 0.1}).tolist() == plant.x.tolist()
+    assert plant.t == 0.0
+    assert plant.u.tolist() == [0.0]
+    np.testing.assert_array_equal(walk(plant, held), first)
+    plant.reset(x0={"v": 0.1}, p={"m": 2.0})
+    assert (walk(plant, held) != first).any()
+    plant.reset(x0={"v": 0.1})
+    heavy = walk(plant, held)
+    fresh = stepper(drive(LuGre(), free=["m"]), 5e-3, p={"m": 2.0}, x0={"v": 0.1}, backend="vm")
+    np.testing.assert_array_equal(heavy, walk(fresh, held))
+
+
+def test_inputs_come_by_name_as_numbers_and_as_arrays() -> None:
+    a, b = Variable("a", "N"), Variable("b", "N", start=0.5)
+    model = Model("two", x=(x,), u=(a, b), ode=a.symbol + 10 * b.symbol)
+    plant = stepper(model, 1.0, backend="vm")
+    assert plant.step() == pytest.approx([5.0])
+    assert plant.step({"a": 1.0}) == pytest.approx([11.0])
+    assert plant.step([2.0, 0.0]) == pytest.approx([13.0])
+    assert plant.step({"b": np.float32(1.0)}) == pytest.approx([25.0])
+    many = stepper(model, 1.0, batch=2, backend="vm")
+    assert many.step({"a": [1.0, 2.0]})[:, 0] == pytest.approx([6.0, 7.0])
+    nothing = stepper(Model("decay", x=(x,), ode=-x.symbol), 1.0, x0={"x": 1.0}, backend="vm")
+    assert nothing.step() == pytest.approx([np.exp(-1)], rel=1e-5)
+
+
+def test_time_in_the_equations_begins_where_it_is_told() -> None:
+    t = ca.SX.sym("t")
+    model = Model("timed", x=(x,), ode=2 * t, t=t)
+    plant = stepper(model, 0.5, t_start=3.0, backend="vm")
+    assert plant.step() == pytest.approx([3.5**2 - 9])
+    assert plant.step() == pytest.approx([16.0 - 9])
+    assert plant.t == 4.0
+
+
+@each_backend
+def test_a_failure_says_when_and_keeps_the_others(backend: str) -> None:
+    plant = stepper(burst(), 0.5, batch=3, backend=backend)
+    plant.step([[0.0], [1.0], [0.0]])
+    with pytest.raises(
+        SolveError, match=r"plant 1: stepper 'burst': stopped at t = 0\.65.*x = .* grows"
+    ) as e:
+        plant.step([[0.0], [100.0], [2.0]])
+    assert [*plant.failed] == [1]
+    assert e.value.partial.shape == (3, 1)
+    assert plant.t[[0, 2]].tolist() == [1.0, 1.0]
+    assert 0.5 < plant.t[1] < 1.0
+    plant.reset(members=[1])
+    assert not plant.failed
+    plant.step([[0.0], [0.0], [0.0]])
+    assert plant.t.tolist() == [1.5, 0.5, 1.5]
+
+
+@each_backend
+def test_unknowns_without_a_solution_fail_and_may_go_on(backend: str) -> None:
+    w, held = Variable("z", "1", start=1.0), Variable("u", "N", start=1.0)
+    root = w.symbol**2 - held.symbol
+    model = Model("root", x=(x,), z=(w,), u=(held,), ode=w.symbol, alg=root)
+    plant = stepper(model, 1.0, backend=backend)
+    plant.step(4.0)
+    with pytest.raises(SolveError, match="no solution of the algebraic") as caught:
+        plant.step(-1.0)
+    assert caught.value.status is Status.SINGULAR
+    assert plant.t == 1.0
+    assert plant.step(9.0) == pytest.approx([5.0])
+
+
+@each_backend
+def test_attempts_are_bounded(backend: str) -> None:
+    plant = stepper(drive(LuGre()), 1.0, max_steps=10, backend=backend)
+    with pytest.raises(SolveError, match=r"at t = .* s: The maximum number of steps") as caught:
+        plant.step(3.0)
+    assert caught.value.status is Status.MAX_STEPS
+    assert plant.attempts == 10
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ([1.0, 2.0], r"u: expected shape \(1,\) or \(\), got \(2,\)"),
+        ({"forse": 1.0}, "force"),
+        ({"force": [1.0, 2.0]}, "u: force: expected shape"),
+        (float("nan"), "u: expected finite numbers"),
+        ("a", "u: expected numbers"),
+    ],
+)
+@each_backend
+def test_bad_inputs_are_refused_and_nothing_has_happened(
+    given: Any, message: str, backend: str
+) -> None:
+    plant = stepper(drive(LuGre()), 1e-2, backend=backend)
+    plant.step(1.0)
+    at = plant.x
+    with pytest.raises(ValueError, match=message):
+        plant.step(given)
+    assert (plant.x == at).all()
+    assert plant.t == 1e-2
+    assert (plant.copy().step(1.0) == plant.step()).all()
+
+
+def test_bad_arguments_are_refused() -> None:
+    model = drive(LuGre(), free=["m"])
+    for message, arguments in (
+        ("dt: expected", {"dt": 0.0}),
+        ("batch: expected", {"batch": 0}),
+        ("x0: v: expected a number, got shape", {"x0": {"v": [1.0, 2.0]}}),
+        ("p: m: expected", {"p": {"m": -1.0}}),
+        ("backend: expected", {"backend": "fast"}),
+    ):
+        with pytest.raises(ValueError, match=message):
+            stepper(model, **{"dt": 1e-3, **arguments})
+    many = stepper(model, 1e-3, batch=2, backend="vm")
+    with pytest.raises(ValueError, match="expected a number or an array of 2, got shape"):
+        many.reset(x0={"v": [1.0, 2.0, 3.0]})
+    with pytest.raises(ValueError, match="expected different numbers"):
+        many.reset(members=[1, 1])
+    with pytest.raises(ValueError, match="without events"):
+        stepper(drive(ExactCoulomb()), 1e-3)
