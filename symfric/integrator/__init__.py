@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from symfric.integrator.equations.inputs import Input as Input
     from symfric.integrator.equations.inputs import Linear as Linear
     from symfric.integrator.flow import flow as flow
+    from symfric.integrator.plant import Plant as Plant
     from symfric.integrator.simulate import simulate as simulate
-    from symfric.integrator.stepper import Plant as Plant
     from symfric.integrator.stepper import stepper as stepper
     from symfric.results.trajectory import Statistics as Statistics
     from symfric.results.trajectory import Trajectory as Trajectory
@@ -26,7 +26,8 @@ else:
             "symfric.integrator.equations.inputs": "Hold Input Linear",
             "symfric.integrator.flow": "flow",
             "symfric.integrator.simulate": "simulate",
-            "symfric.integrator.stepper": "Plant stepper",
+            "symfric.integrator.plant": "Plant",
+            "symfric.integrator.stepper": "stepper",
             "symfric.results.trajectory": "Statistics Trajectory",
         },
     )

@@ -23,8 +23,8 @@ from symfric import (
     stepper,
 )
 from symfric.foundation.compiler import find_compiler
+from symfric.integrator.plant import SAMPLES
 from symfric.integrator.running import plants
-from symfric.integrator.stepper import SAMPLES
 from symfric.scenes import SliderCrank
 
 Array = NDArray[np.float64]

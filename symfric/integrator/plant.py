@@ -1,0 +1,322 @@
+"""A plant: a model that goes from sample to sample with its inputs held."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symfric.foundation import checks
+from symfric.foundation.compiler import find_compiler
+from symfric.foundation.status import SolveError, Status
+from symfric.integrator.equations.initial import consistent, first_guess, first_step
+from symfric.integrator.running.diagnosis import explain
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.plants import (
+    AGAIN,
+    ATTEMPTS,
+    REFUSED,
+    SEARCH,
+    Advance,
+    Looks,
+    Plants,
+    compiled,
+    in_vm,
+)
+from symfric.integrator.running.run import MOST_ORDERS
+from symfric.integrator.step.layout import Given, State
+
+Array = NDArray[np.float64]
+Numbers = Mapping[str, ArrayLike]
+SAMPLES = 1000
+"""A plant begins with the first step of a run of so many samples."""
+
+
+@final
+class Plant:
+    """A model that goes from sample to sample; made by `stepper`.
+
+    Attributes:
+        model: its equations.
+        dt: interval [s].
+        failed: number of a plant that did not reach its sample -> why, after a `SolveError`.
+    """
+
+    def __init__(
+        self, integrator: Integrator, plants: Plants, backend: str, batch: int | None
+    ) -> None:
+        self.model, self.dt = integrator.model, plants.dt
+        self.failed: dict[int, tuple[Status, str]] = {}
+        self._plants, self._batch = plants, batch
+        self._backend = "vm" if backend == "auto" and find_compiler() is None else backend
+        self._fresh: dict[int, Array] = {}
+        self._own, self._places = integrator, list[tuple[Array, Array]]()
+        self._use(integrator)
+
+    def _use(self, integrator: Integrator) -> None:
+        """Go on with an integrator of the same equations."""
+        self._integrator, plants = integrator, self._plants
+        make = in_vm if self._backend == "vm" else compiled
+        self._advance: Advance = make(integrator, plants)
+        signals = np.zeros((plants.S.shape[0], integrator.signals.numel_out(0)))
+        self._looks, self._seen = Looks(integrator, plants, signals), False
+        nx, one = integrator.system.nx, self._batch is None
+        states = plants.S[:, State.MEMORY : State.MEMORY + nx]
+        self._x: Array = states[0] if one else states
+        self._u: Array = plants.u[0] if one else plants.u
+
+    def __repr__(self) -> str:
+        many = "" if self._batch is None else f" x {self._batch}"
+        return f"<plant '{self.model.name}'{many}, dt = {self.dt:g} s>"
+
+    def step(self, u: ArrayLike | Numbers | None = None) -> Array:
+        """Hold inputs for `dt` and return the states at the end, shape (nx,) or (batch, nx).
+
+        Args:
+            u: inputs in the order of the model, shape (nu,) or (batch, nu); a number where there
+                is one input and one plant; or by name, with the others as they were. What was held
+                last by default; at first, that is where the model's inputs start.
+
+        Raises:
+            ValueError: unknown names, another shape, no finite numbers; nothing has happened.
+            SolveError: a plant did not get to its sample; `failed` says which one and why, and
+                `partial` holds the states. `reset` it, or have it go on to that sample
+                from where it stands, with other inputs.
+        """
+        if u is not None:
+            self._take(u)
+        if self._fresh:
+            self._settle()
+        self._seen = False
+        if short := self._advance(1):
+            self._mend(short)
+        return self._x.copy()
+
+    def reset(
+        self,
+        x0: Numbers | None = None,
+        p: Numbers | None = None,
+        members: Sequence[int] | None = None,
+    ) -> Array:
+        """Put plants back to the start, with inputs where those of the model start.
+
+        Args:
+            x0: start values by name; the others start where the model says.
+            p: parameters by name; the others stay as they are.
+            members: numbers of the plants; default all. Arrays in `x0` and `p` have an entry each.
+
+        Returns:
+            The states of all plants, as `step` does.
+
+        Raises:
+            ValueError: unknown names, other lengths, no consistent start; nothing has happened.
+        """
+        which = self._which(members)
+        guesses, values = self._starts(
+            self._each("x0", x0, which), self._each("p", p, which), which
+        )
+        plants, system = self._plants, self._integrator.system
+        held = self.model.values("u")
+        found: list[Array] = []
+        for guess, own in zip(guesses, values, strict=True):
+            found.append(consistent(system, "stepper", guess, np.concatenate([own, held])))
+        h = min(first_step(SAMPLES * self.dt, plants.begin[0]), float(plants.R[0, Given.H_MAX]))
+        for b, guess, own, y in zip(which, guesses, values, found, strict=True):
+            plants.S[b] = State.at(plants.begin[b], h, y)
+            plants.R[b, Given.d(system.nx)] = np.concatenate([own, held])
+            plants.R[b, Given.T_END] = plants.begin[b]
+            plants.u[b], plants.count[b], plants.why[b] = held, 0, 0
+            self._fresh[b] = guess
+            self.failed.pop(b, None)
+        self._suit(which, guesses)
+        self._seen = False
+        return self._x.copy()
+
+    def copy(self) -> "Plant":
+        """A plant in the same state that goes its own way."""
+        other = Plant(self._integrator, self._plants.copy(), self._backend, self._batch)
+        other._fresh, other.failed = dict(self._fresh), dict(self.failed)
+        return other
+
+    @property
+    def t(self) -> Any:
+        """Time [s]: a number, or of every plant, shape (batch,)."""
+        t = self._plants.S[:, State.T]
+        return float(t[0]) if self._batch is None else t.copy()
+
+    @property
+    def x(self) -> Array:
+        """States, shape (nx,) or (batch, nx)."""
+        return self._x.copy()
+
+    @property
+    def u(self) -> Array:
+        """Inputs held now, shape (nu,) or (batch, nu)."""
+        nu = self._u.shape[-1]
+        held = self._plants.R[:, self._plants.R.shape[1] - nu :]
+        return (held[0] if self._batch is None else held).copy()
+
+    @property
+    def attempts(self) -> int:
+        """Attempts of all plants in the last interval."""
+        return int(self._plants.made.sum())
+
+    @property
+    def signals(self) -> dict[str, Any]:
+        """Name -> value of every signal: states, algebraic variables, inputs, outputs."""
+        columns = self._looked.T
+        values = columns[:, 0].tolist() if self._batch is None else columns.copy()
+        return dict(zip(self.model.signals, values, strict=True))
+
+    def __getitem__(self, name: str) -> Any:
+        names = list(self.model.signals)
+        checks.check_names(f"plant of '{self.model.name}'", [name], names)
+        values = self._looked[:, names.index(name)]
+        return float(values[0]) if self._batch is None else values.copy()
+
+    @property
+    def _looked(self) -> Array:
+        """All signals, shape (plants, signals)."""
+        if not self._seen:
+            self._looks(self._backend)
+            self._seen = True
+        return self._looks.values
+
+    def _take(self, u: ArrayLike | Numbers) -> None:
+        """Write the inputs to hold next."""
+        where, own = f"plant of '{self.model.name}': u", self._u
+        if isinstance(u, Mapping):
+            for name, value in self.model.named("u", u).items():
+                i = next(k for k, v in enumerate(self.model.u) if v.name == name)
+                self._write(f"{where}: {name}", own[..., i : i + 1], value)
+        else:
+            self._write(where, own, u)
+
+    def _write(self, where: str, place: Array, value: Any) -> None:
+        shape = np.shape(value)
+        single = place.shape[-1] == 1 and shape == place.shape[:-1]
+        if shape != place.shape and not single:
+            or_ = f" or {place.shape[:-1]}" if place.shape[-1] == 1 else ""
+            raise ValueError(f"{where}: expected shape {place.shape}{or_}, got {shape}")
+        try:
+            place[...] = np.reshape(value, place.shape) if single else value
+        except (TypeError, ValueError):
+            raise checks.refused(where, "numbers", value) from None
+
+    def _settle(self) -> None:
+        """Let plants that have not moved yet start with the inputs that they are to hold."""
+        plants, system = self._plants, self._integrator.system
+        nu = plants.u.shape[1]
+        if not np.isfinite(plants.u).all():
+            return
+        for b, guess in self._fresh.items():
+            d = plants.R[b, Given.d(system.nx)].copy()
+            d[d.size - nu :] = plants.u[b]
+            if system.free.any() and (d != plants.R[b, Given.d(system.nx)]).any():
+                plants.S[b, State.Y] = consistent(system, "stepper", guess, d)
+            plants.ready[b] = 1
+        self._fresh.clear()
+
+    def _mend(self, short: int) -> None:
+        """Help the plants that did not get to their sample, and tell of those that cannot."""
+        plants = self._plants
+        if short == REFUSED:
+            given = self._u.tolist()
+            plants.u[:] = plants.R[:, plants.R.shape[1] - plants.u.shape[1] :]
+            where = f"plant of '{self.model.name}': u"
+            raise checks.refused(where, "finite numbers", given)
+        lost: dict[int, tuple[Status, str]] = {}
+        while True:
+            stand = [b for b in np.flatnonzero(plants.why).tolist() if b not in lost]
+            for b in stand:
+                why = self._help(b)
+                if why is not None:
+                    lost[b] = why
+            if len(lost) == np.count_nonzero(plants.why):
+                break
+            self._advance(0)
+        self.failed |= lost
+        if lost:
+            b, (status, message) = next(iter(lost.items()))
+            which = "" if self._batch is None else f"plant {b}: "
+            more = f" ({len(lost)} plants failed.)" if len(lost) > 1 else ""
+            raise SolveError(which + message + more, status, self._x.copy())
+
+    def _help(self, b: int) -> tuple[Status, str] | None:
+        """Have a plant go on, or say why it cannot."""
+        plants, system = self._plants, self._integrator.system
+        t, y, d = plants.S[b, State.T], plants.S[b, State.Y], plants.R[b, Given.d(system.nx)]
+        where = f"stepper '{self.model.name}' at t = {t:.9g} s"
+        if plants.why[b] == ATTEMPTS:
+            return Status.MAX_STEPS, f"{where}: {Status.MAX_STEPS.value}"
+        if plants.why[b] == SEARCH:
+            try:
+                y[:] = consistent(system, where, y.copy(), d)
+            except ValueError as error:
+                return Status.SINGULAR, str(error)
+        elif not self._found_pivots(y.copy(), d.copy()):
+            status, message = explain(self._integrator, t, y, d, float(plants.S[b, State.H]))
+            return status, message.replace("simulate", "stepper", 1)
+        plants.why[b] = AGAIN
+        return None
+
+    def _found_pivots(self, y: Array, d: Array) -> bool:
+        """Whether other pivots are sound where steps failed; they are used from now on."""
+        if len(self._places) > MOST_ORDERS:
+            return False
+        other = self._integrator.suited([*self._places, (y, d)], SAMPLES * self.dt)
+        if other is self._integrator:
+            return False
+        self._places.append((y, d))
+        self._use(other)
+        return True
+
+    def _which(self, members: Sequence[int] | None) -> list[int]:
+        """Numbers of plants."""
+        count = self._plants.S.shape[0]
+        if members is None:
+            return list(range(count))
+        where = f"plant of '{self.model.name}': reset: members"
+        found = [checks.count(where, b, least=0, most=count - 1) for b in members]
+        if len(set(found)) < len(found):
+            raise ValueError(f"{where}: expected different numbers, got {found}")
+        return found
+
+    def _each(self, what: str, given: Numbers | None, which: list[int]) -> dict[str, Array]:
+        """Values by name, an entry for each of the plants `which`."""
+        found: dict[str, Array] = {}
+        for name, value in self.model.named(what, given).items():
+            where = f"plant of '{self.model.name}': {what}: {name}"
+            numbers = checks.array(where, value, ndim=None)
+            if numbers.shape not in ((), (len(which),)) or (numbers.ndim and self._batch is None):
+                many = "" if self._batch is None else f" or an array of {len(which)}"
+                raise ValueError(f"{where}: expected a number{many}, got shape {numbers.shape}")
+            found[name] = np.broadcast_to(numbers, (len(which),))
+        for v in self.model.p if what == "p" else ():
+            for end in (np.min, np.max) if v.name in found and which else ():
+                v.within(f"plant of '{self.model.name}': p: {v.name}", float(end(found[v.name])))
+        return found
+
+    def _starts(
+        self, x0: dict[str, Array], p: dict[str, Array], which: list[int]
+    ) -> tuple[Array, Array]:
+        """Unknowns from which consistent ones are sought, and parameters, a row for each plant."""
+        plants, system, count = self._plants, self._integrator.system, len(which)
+        own = plants.R[which, Given.d(system.nx)].T
+        every = {v.name: own[i] for i, v in enumerate(self.model.p)} | p
+        if not count:
+            return np.zeros((0, system.n)), np.zeros((0, len(every)))
+        x, values = self.model.initial_states(x0, every, count)
+        y = first_guess(system, self.model, x)
+        if system.timed:
+            y[:, -1] = plants.begin[which]
+        return y, values
+
+    def _suit(self, which: list[int], guesses: Array) -> None:
+        """Use pivots that are sound at the start of the first plant."""
+        if which:
+            d = self._plants.R[which[0], Given.d(self._integrator.system.nx)]
+            suited = self._own.suited([(guesses[0], d.copy())], SAMPLES * self.dt)
+            self._places = [(guesses[0], d.copy())]
+            if suited is not self._integrator:
+                self._use(suited)
