@@ -27,20 +27,22 @@ ALIKE = 4
 SOON = 2.0
 """Event tolerances after a jump at which the signs behind it are taken."""
 RESTART, LEAST = 1e3, 1e-3
-"""The step after an event: so many event tolerances, and at least this part of the step cut."""
+"""The step after an event: so many event tolerances, and at least this part of the step cut. It
+tells the signs behind the event; the next one is as long as the step cut, if error control agrees:
+what follows an event of friction is mostly as smooth as what was before it."""
 
 
 @final
 class Memory:
     """What is remembered of events between steps, a column of numbers that both engines share.
 
-    phase, tolerance [s], number of jumps, how many of the last ones were of one kind, times of the
-    last jumps, then for each event: its value before the step to come, and whether it took part in
-    the last jump.
+    phase, tolerance [s], number of jumps, how many of the last ones were of one kind, the step [s]
+    to go on with behind a jump, times of the last jumps, then for each event: its value before the
+    step to come, and whether it took part in the last jump.
     """
 
-    PHASE, TOLERANCE, COUNT, ALIKE = range(4)
-    TIMES = slice(4, 4 + KEPT)
+    PHASE, TOLERANCE, COUNT, ALIKE, RESUME = range(5)
+    TIMES = slice(5, 5 + KEPT)
     FRESH, JUMPED, ON = 0.0, 1.0, 2.0
     """Phases: the values are those at the start of the step; before a jump there, NaN for events
     that took part in it; or at the end of the step before."""
@@ -48,17 +50,17 @@ class Memory:
     @staticmethod
     def before(count: int) -> slice:
         """Values of `count` events."""
-        return slice(4 + KEPT, 4 + KEPT + count)
+        return slice(5 + KEPT, 5 + KEPT + count)
 
     @staticmethod
     def last(count: int) -> slice:
         """Which of `count` events took part in the last jump."""
-        return slice(4 + KEPT + count, 4 + KEPT + 2 * count)
+        return slice(5 + KEPT + count, 5 + KEPT + 2 * count)
 
     @staticmethod
     def new(count: int, tolerance: float) -> Array:
         """Nothing has happened yet; `tolerance` [s] of event times."""
-        memory = np.zeros(4 + KEPT + 2 * count)
+        memory = np.zeros(5 + KEPT + 2 * count)
         memory[Memory.TOLERANCE] = tolerance
         return memory
 

@@ -17,7 +17,7 @@ from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.running.crossings import Crossings
 from symfric.integrator.running.dense import pieces_of
-from symfric.integrator.running.events import Eventful, Happened, Search
+from symfric.integrator.running.events import Change, Eventful, Happened, Search
 from symfric.integrator.running.loop import Work, loop_source, width
 from symfric.integrator.step.layout import Given, State
 
@@ -187,7 +187,7 @@ def _searched(
     for i, k in enumerate(np.flatnonzero(took)):
         change, asked = search(records[i], S_out[k], R)
         if change:
-            return records[: i + (change > 0)], int(k) + 1, asked
+            return records[: i + (change is not Change.DROPPED)], int(k) + 1, asked
     return records, used, Happened.NOTHING
 
 

@@ -24,11 +24,20 @@ from symfric.integrator.running.crossings import (
     Crossings,
     Memory,
 )
-from symfric.integrator.step.layout import Record, State
+from symfric.integrator.step.layout import Given, Record, State
 
 Array = NDArray[np.float64]
 JUMPS = 512
 """Jumps between two looks at what came of them."""
+
+
+class Change(IntEnum):
+    """What the search changed of a step."""
+
+    NOTHING = 0
+    RESUMED = 1
+    CUT = 2
+    DROPPED = 3
 
 
 class Happened(IntEnum):
@@ -138,22 +147,21 @@ class Search:
         self._looks, self._values, self._cut, self._jump = map(_called, self.crossings.functions)
         self._directions = np.array(self.crossings.directions)
 
-    def __call__(self, row: Array, S: Array, R: Array) -> tuple[int, Happened]:
+    def __call__(self, row: Array, S: Array, R: Array) -> tuple[Change, Happened]:
         """Look for events in the accepted step `row`, which led to S.
 
-        The first ones are carried out: the row is cut there, S goes on behind them.
-
-        Returns:
-            1 where some happened, -1 where they did at the very start of the step and no row is
-            left, else 0; and what they ask for.
+        The first ones are carried out: the row is cut there, S goes on behind them. Where they
+        happen at the very start of the step, no row is left. Without events S may get a longer
+        step, if there was one just before.
         """
         d = R[R.size - self.crossings.data :]
         found = self._crossing(row, d)
         if found is None:
             self.eventful.steps += 1
-            return 0, Happened.NOTHING
+            return self._resume(S, float(R[Given.H_MAX])), Happened.NOTHING
         theta, which = found
         h = float(row[Record.T1] - row[Record.T0])
+        self.memory[Memory.RESUME] = max(self.memory[Memory.RESUME], h)
         (cut,) = self._cut(np.array([theta]), row)
         t, record = float(cut[Record.T1]), self.crossings.record
         kept = t != row[Record.T0]
@@ -170,7 +178,16 @@ class Search:
         self.eventful.count += 1
         # steps beyond the event say nothing; its own is a guess only, what follows may be faster
         S[:] = State.at(t, max(min(h, RESTART * self.tolerance), LEAST * h), after)
-        return (1 if kept else -1), self._asked(t, which)
+        return (Change.CUT if kept else Change.DROPPED), self._asked(t, which)
+
+    def _resume(self, S: Array, h_max: float) -> Change:
+        """Go back to the step that an event cut."""
+        h = min(float(self.memory[Memory.RESUME]), h_max)
+        self.memory[Memory.RESUME] = 0.0
+        if S[State.H] >= h:
+            return Change.NOTHING
+        S[State.H] = h
+        return Change.RESUMED
 
     def _asked(self, t: float, which: NDArray[np.bool_]) -> Happened:
         """What the events `which` at time `t` ask for."""

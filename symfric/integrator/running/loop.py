@@ -111,7 +111,7 @@ def c_source(
     for function in (step, *(crossings.functions if crossings else ()), *others):
         generator.add(function)
     attempts = Template(ATTEMPTS).substitute(_numbers(step, dense_rows, crossings))
-    return generator.dump() + search_source(crossings) + attempts
+    return generator.dump() + search_source(crossings, step.numel_in(1)) + attempts
 
 
 def loop_source(step: ca.Function, dense_rows: int, crossings: Crossings | None = None) -> str:
@@ -129,8 +129,8 @@ def _numbers(
     called = (step, *(crossings.functions if crossings else ()))
     hooks = dict.fromkeys(EVENTS, "")
     if crossings is not None:
-        places = {"d": given - crossings.data, "jump": crossings.width}
-        hooks = {name: Template(code).substitute(places) for name, code in EVENTS.items()}
+        place = {"jump": crossings.width}
+        hooks = {name: Template(code).substitute(place) for name, code in EVENTS.items()}
     return hooks | {
         "n": n,
         "memory": State.MEMORY,
@@ -197,10 +197,10 @@ EVENTS = {
     "condition": """
          && jumped < max_jumps && !stop""",
     "search": """
-      happened = symfric_search(row, next, R + $d, memory, jumps + jumped * $jump, count - 1,
-                                iw, w, &stop);
-      jumped += happened != 0;
-      count -= happened < 0;""",
+      happened = symfric_search(row, next, R, memory, jumps + jumped * $jump, count - 1, iw, w,
+                                &stop);
+      jumped += happened >= CUT;
+      count -= happened == DROPPED;""",
     "found": """
   counts[2] = jumped;
   if (stop) return stop;""",

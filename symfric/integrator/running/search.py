@@ -12,11 +12,14 @@ from symfric.integrator.running.crossings import (
     SOON,
     Crossings,
 )
-from symfric.integrator.step.layout import GROWTH_MEMORY, State
+from symfric.integrator.step.layout import GROWTH_MEMORY, Given, State
 
 
-def search_source(crossings: Crossings | None) -> str:
-    """C of the search in an accepted step, to be called behind it; none without events."""
+def search_source(crossings: Crossings | None, given: int) -> str:
+    """C of the search in an accepted step, to be called behind it; none without events.
+
+    `given` is the length of R.
+    """
     if crossings is None:
         return ""
     functions, m = crossings.functions, len(crossings.resets)
@@ -40,6 +43,8 @@ def search_source(crossings: Crossings | None) -> str:
         least=repr(LEAST),
         growth=repr(GROWTH_MEMORY),
         memory=State.MEMORY,
+        d=given - crossings.data,
+        h_max=Given.H_MAX,
         follows=int(crossings.follows),
         arg=max(f.sz_arg() for f in functions),
         res=max(f.sz_res() for f in functions),
@@ -54,8 +59,10 @@ def _table(values: Iterable[int]) -> str:
 _SEARCH = """
 /* Zero crossings in an accepted step; M is what is remembered between steps. */
 enum { EVENTS = $events, LOOKS = $looks, RESETS = $resets, UNKNOWNS = $n, KEPT = $kept };
-enum { PHASE, TOLERANCE, COUNT, ALIKE, TIMES, BEFORE = TIMES + KEPT, LAST = BEFORE + EVENTS };
+enum { PHASE, TOLERANCE, COUNT, ALIKE, RESUME, TIMES };
+enum { BEFORE = TIMES + KEPT, LAST = BEFORE + EVENTS };
 enum { FRESH, JUMPED, ON };
+enum { NOTHING, RESUMED, CUT, DROPPED };
 static const double symfric_look_at[] = { $at_looks };
 static const int symfric_directions[] = { $directions };
 static const int symfric_terminal[] = { $terminal };
@@ -184,18 +191,26 @@ static int symfric_storm(double *M, double t, const double *which)
 }
 
 /* Looks for events in the accepted step `row`, which led to S. The first ones are carried out: the
-   row is cut there, S goes on behind them, and `jump` tells of them. Returns 1 then, -1 where they
-   happen at the very start and no row is left, else 0. */
-static int symfric_search(double *row, double *S, const double *d, double *M, double *jump,
+   row is cut there, S goes on behind them, and `jump` tells of them. Where they happen at the very
+   start, no row is left. Without events S may get a longer step, if there was one just before. */
+static int symfric_search(double *row, double *S, const double *R, double *M, double *jump,
                           long long rows, casadi_int *iw, double *w, int *stop)
 {
+  const double *d = R + $d;
   symfric_place p = { row, d, iw, w };
   const double *arg[$arg];
   double *res[$res], *which = jump + 2 + 2 * UNKNOWNS, *after = jump + 2 + UNKNOWNS;
   double cut[$row], fresh[RESETS + 1], theta = symfric_crossing(&p, M, which);
   double h = row[1] - row[0], least;
   int i, over = 0, kept;
-  if (theta < 0) return 0;
+  if (theta < 0) {
+    h = R[$h_max] < M[RESUME] ? R[$h_max] : M[RESUME];
+    M[RESUME] = 0;
+    if (S[1] >= h) return NOTHING;
+    S[1] = h;
+    return RESUMED;
+  }
+  if (M[RESUME] < h) M[RESUME] = h;
   arg[0] = &theta;
   arg[1] = row;
   res[0] = cut;
@@ -233,6 +248,6 @@ static int symfric_search(double *row, double *S, const double *d, double *M, do
     *stop = 5;
   else if ($follows)
     *stop = 6;
-  return kept ? 1 : -1;
+  return kept ? CUT : DROPPED;
 }
 """
