@@ -22,7 +22,9 @@ from symfric.integrator.arguments import (
     tolerances,
 )
 from symfric.integrator.derivatives.adjoint import gradient
-from symfric.integrator.derivatives.sensitivity import Path, Seeds, forward, of_signals, seeds
+from symfric.integrator.derivatives.path import Path
+from symfric.integrator.derivatives.seeds import Seeds, seeds
+from symfric.integrator.derivatives.sensitivity import Slopes, forward, of_signals
 from symfric.integrator.equations.initial import first_guess
 from symfric.integrator.equations.inputs import Input, InputData, input_data
 from symfric.integrator.outcome import trajectory_of
@@ -100,8 +102,9 @@ def simulate(
             model with short events of its own, such as a function of time in its equations.
         times: increasing times [s] at which a step has to end.
         sensitivities: free parameters by name and start values as "x0.v"; the trajectory then
-            gives the derivatives of all signals (`Trajectory.sensitivities`) and gradients of
-            sums of them (`Trajectory.gradient`), exact for the steps that were taken.
+            gives the derivatives of all signals (`Trajectory.sensitivities`), gradients of sums of
+            them (`Trajectory.gradient`) and those of event times
+            (`Trajectory.event_sensitivities`), exact for the steps that were taken.
         measure_error: run again at rtol/100, by another formula in steps half as long, and report
             the difference in the statistics.
         progress: called with the fraction done every few tens of milliseconds.
@@ -143,7 +146,16 @@ def simulate(
     if throw and not trajectory.status.ok and trajectory.status is not Status.INTERRUPTED:
         raise SolveError(trajectory.message, trajectory.status, trajectory)
     if which is not None and run.steps:
-        path = Path(run.integrator or integrator, run.dense, inputs, values, backend)
+        path = Path(
+            run.integrator or integrator,
+            run.dense,
+            inputs,
+            values,
+            backend,
+            y0,
+            run.jumps,
+            allowed.event,
+        )
         trajectory = _differentiated(trajectory, path, which)
     if measure_error and trajectory.status.ok:
         finer = simulate(
@@ -200,11 +212,11 @@ def _differentiated(trajectory: Trajectory, path: Path, which: Seeds) -> Traject
     names = list(trajectory.units)
 
     @cache
-    def solution() -> Dense:
+    def solution() -> Slopes:
         return forward(path, which)
 
     def differentiate(at: Array) -> dict[str, dict[str, Array]]:
-        values = of_signals(path, which, solution(), at)
+        values = of_signals(path, which, solution().dense, at)
         return {
             seed: dict(zip(names, rows, strict=True))
             for seed, rows in zip(which.names, values, strict=True)
@@ -215,7 +227,11 @@ def _differentiated(trajectory: Trajectory, path: Path, which: Seeds) -> Traject
         every = np.vstack([weights.get(name, zero) for name in names])
         return gradient(path, which, trajectory.t, every)
 
-    return replace(trajectory, differentiate=differentiate, pull_back=pull_back)
+    def delays() -> dict[str, Array]:
+        times = np.repeat(solution().times, [len(jump.which) for jump in path.jumps], axis=0)
+        return dict(zip(which.names, times.T, strict=True))
+
+    return replace(trajectory, differentiate=differentiate, pull_back=pull_back, delays=delays)
 
 
 def _difference(model: Model, one: Trajectory, other: Trajectory) -> float:

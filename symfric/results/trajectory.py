@@ -87,6 +87,7 @@ class Trajectory:
         model: the model that was simulated.
         happened: (time [s], name) of every event.
         differentiate: derivatives of all signals at any times, where they were asked for.
+        delays: derivatives of the times of `happened`, likewise.
         pull_back: gradient of a weighted sum of signals at `t`, likewise.
     """
 
@@ -105,6 +106,7 @@ class Trajectory:
     happened: tuple[tuple[float, str], ...] = ()
     differentiate: Callable[[Array], dict[str, dict[str, Array]]] | None = None
     pull_back: Callable[[Mapping[str, Array]], dict[str, float]] | None = None
+    delays: Callable[[], dict[str, Array]] | None = None
 
     @cached_property
     def statistics(self) -> Statistics:
@@ -156,12 +158,29 @@ class Trajectory:
     def sensitivities(self) -> dict[str, dict[str, Array]]:
         """Derivatives at `t`: name as given to `simulate` -> signal -> values, shape (n,).
 
+        They jump where an event moves with the name; at its time they are those behind it.
+
         Raises:
-            ValueError: none were asked for.
+            ValueError: none were asked for, or an event has no derivative: its expression only
+                touches zero, it comes with a jump of an input, or with another event whose order
+                matters.
         """
         if self.differentiate is None:
             raise self._without_derivatives
         return self.differentiate(self.t)
+
+    @cached_property
+    def event_sensitivities(self) -> dict[str, Array]:
+        """Derivatives of the times of `happened`: name -> [s per unit], shape (events,).
+
+        That of a terminal event is the derivative of the end time.
+
+        Raises:
+            ValueError: as in `sensitivities`.
+        """
+        if self.delays is None:
+            raise self._without_derivatives
+        return self.delays()
 
     def gradient(self, weights: Mapping[str, ArrayLike]) -> dict[str, float]:
         """Derivatives of the sum over signals s and times t_i of weights[s][i] s(t_i).

@@ -277,9 +277,20 @@ DIFFERENTIAL_ALGEBRAIC = (
     ),
     Mutant(
         "algebraic unknowns forget parameters in derivatives",
-        "symfric/integrator/derivatives/sensitivity.py", "slope @ by_d + more)", "slope @ by_d)",
+        "symfric/integrator/derivatives/saltation.py", "slope @ by_d + more)", "slope @ by_d)",
         ("tests/symfric/integrator/derivatives/test_sensitivity.py::"
          "test_algebraic_variables_follow_from_the_start_on",),
+    ),
+    Mutant(
+        "an event does not move with what is differentiated",
+        "symfric/integrator/derivatives/saltation.py", "-np.concatenate([by_y, by_d]) / rate",
+        "0 * np.concatenate([by_y, by_d]) / rate",
+        ("tests/symfric/integrator/derivatives/test_saltation.py",),
+    ),
+    Mutant(
+        "a step behind an event keeps its size", "symfric/integrator/derivatives/sensitivity.py",
+        "of_h[0] = -X[-1]", "of_h[0] = 0",
+        ("tests/symfric/integrator/derivatives/test_saltation.py",),
     ),
     Mutant(
         "drift is that of the start", "symfric/bench/ivp.py", "np.abs(at[name]).max()",

@@ -1,15 +1,15 @@
 """Gradients by one sweep backwards over the accepted steps, whatever the number of parameters."""
 
+from typing import final
+
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.integrator.derivatives.sensitivity import (
-    Path,
-    Seeds,
-    derivatives,
-    made_consistent,
-    signal_slopes,
-)
+from symfric.integrator.derivatives.functions import derivatives, whole_step
+from symfric.integrator.derivatives.path import Jump, Path, Piece
+from symfric.integrator.derivatives.saltation import passage
+from symfric.integrator.derivatives.seeds import Seeds
+from symfric.integrator.derivatives.sensitivity import signal_slopes
 
 Array = NDArray[np.float64]
 
@@ -23,34 +23,81 @@ def gradient(path: Path, which: Seeds, times: Array, weights: Array) -> dict[str
         times: t_j [s], shape (m,).
         weights: shape (signals, m).
     """
-    s, made = path.integrator.system, derivatives(path.integrator)
+    s = path.integrator.system
     by_y, by_d = signal_slopes(path, times)
     # a signal without weight may have no derivative, as a norm at zero
     used = np.flatnonzero(weights.any(axis=1))
     weights, by_y, by_d = weights[used], by_y[:, used], by_d[:, used]
     by_data = np.einsum("rm,mrd->d", weights, by_d)
-    on_steps = _on_steps(path, times, np.einsum("rm,mrn->mn", weights, by_y))
-    adjoint = np.zeros(s.n)
+    looks = _Looks(path, times, np.einsum("rm,mrn->mn", weights, by_y))
+    adjoint = np.zeros(s.n + 1)
     for piece in reversed(path.pieces):
-        steps = [a[piece][::-1] for a in (*path.steps, on_steps)]
-        before, of_data = made.reverse(steps, adjoint, path.backend)
-        by_data += of_data.sum(axis=0)
-        adjoint = before[-1]
-        by_before, by_start = made_consistent(path, piece)
-        by_data += by_start.T @ adjoint
-        adjoint = by_before.T @ adjoint
+        if piece.count:
+            adjoint, more = _swept_back(path, piece, looks, adjoint)
+            by_data += more
+        for jump in reversed(piece.opening):
+            move = passage(path, jump)
+            by_data += move.by_data.T @ adjoint
+            adjoint = move.by_state.T @ adjoint
     through_start = adjoint[: s.nx] @ which.start
     through_data = by_data @ which.of_data(by_data.size)
     return dict(zip(which.names, (through_start + through_data).tolist(), strict=True))
 
 
-def _on_steps(path: Path, times: Array, by_y: Array) -> Array:
-    """Weights of values at times, (times, n), carried to the steps: start, end, dense output."""
-    dense, n = path.dense, by_y.shape[1]
-    rows = dense.D.shape[1]
-    k = np.clip(np.searchsorted(dense.t0, times, side="right") - 1, 0, dense.t0.size - 1)
-    theta = (times - dense.t0[k]) / (dense.t1[k] - dense.t0[k])
-    basis = np.stack([1 - theta, theta, *(theta**r * (1 - theta) for r in range(1, rows + 1))])
-    total = np.zeros((dense.t0.size, rows + 2, n))
-    np.add.at(total, k, basis.T[:, :, None] * by_y[:, None, :])
-    return total.reshape(dense.t0.size, -1)
+def _swept_back(path: Path, piece: Piece, looks: "_Looks", adjoint: Array) -> tuple[Array, Array]:
+    """Adjoints at the start of a piece, of y and of the time of that start, and of d."""
+    k, after, made = piece.steps, adjoint[:-1], derivatives(path.integrator)
+    if path.cuts(k.stop):
+        looks.add(k.stop - 1, float(path.dense.t1[k.stop - 1]), after)
+        after = np.zeros_like(after)
+    steps = [*(a[k][::-1] for a in path.steps), looks.weights(k)[::-1]]
+    before, of_data, *of_h = made.reverse(steps, after, path.backend)
+    moved = 0.0
+    if any(isinstance(jump, Jump) for jump in piece.opening):
+        moved = looks.ahead(k.start) - float(of_h[0][-1, 0])
+    return np.append(before[-1], moved), of_data.sum(axis=0)
+
+
+@final
+class _Looks:
+    """Weights of the solution at times, carried to the steps.
+
+    Args:
+        path: the run.
+        times: t_j [s], shape (m,).
+        by_y: weights of y there, shape (m, n).
+    """
+
+    def __init__(self, path: Path, times: Array, by_y: Array) -> None:
+        t0, (steps, rows, n) = path.dense.t0, path.dense.D.shape
+        self.path, self.by_y = path, by_y
+        self.step = np.clip(np.searchsorted(t0, times, side="right") - 1, 0, steps - 1)
+        self.theta = (times - t0[self.step]) / path.size[self.step]
+        self.total = np.zeros((steps, rows + 2, n))
+        np.add.at(self.total, self.step, self._basis(self.theta)[:, :, None] * by_y[:, None, :])
+        self.cut: tuple[int, float, Array] = (-1, 0.0, np.zeros(n))
+
+    def _basis(self, theta: Array) -> Array:
+        """Shares of start, end and dense output in a value, shape (m, rows + 2)."""
+        rows = range(1, self.total.shape[1] - 1)
+        return np.stack([1 - theta, theta, *(theta**r * (1 - theta) for r in rows)], axis=1)
+
+    def weights(self, steps: slice) -> Array:
+        """Of start, end and dense output of steps, a row each."""
+        return self.total[steps].reshape(self.total[steps].shape[0], -1)
+
+    def add(self, step: int, t: float, weight: Array) -> None:
+        """A weight of y at the time [s] of the event that cut a step."""
+        theta = (t - self.path.dense.t0[step]) / self.path.size[step]
+        self.total[step] += self._basis(np.array([theta]))[0, :, None] * weight
+        self.cut = (step, theta, weight)
+
+    def ahead(self, step: int) -> float:
+        """What a later start of a step adds to the sum through the places of times in it."""
+        inside = self.step == step
+        theta, by_y = self.theta[inside], self.by_y[inside]
+        if self.cut[0] == step:
+            theta, by_y = np.append(theta, self.cut[1]), np.vstack([by_y, self.cut[2]])
+        whole = whole_step(self.path, step)
+        slopes = whole.rates(np.zeros(theta.size, dtype=np.intp), theta)
+        return -float(((1 - theta)[:, None] * slopes * by_y).sum())

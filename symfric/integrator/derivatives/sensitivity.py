@@ -1,254 +1,106 @@
 """Derivatives of what was computed: the accepted steps, differentiated with their sizes held fixed.
 
 The step-size controller takes no part (internal numerical differentiation), so the derivatives are
-those of the discrete solution and exact to rounding.
+those of the discrete solution and exact to rounding. An event moves with what is differentiated:
+the step that it cuts ends, and the next one begins, where the dense output has the event
+(`saltation`); all other steps end at fixed times.
 """
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import pairwise
 from typing import final
-from weakref import WeakKeyDictionary
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.parameters import check_names
-from symfric.integrator.compiled.columns import Columns
-from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.equations.system import System
-from symfric.integrator.running.dense import Dense
-from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.attempt import build_dense_step
-from symfric.model import Model
+from symfric.integrator.derivatives.functions import derivatives, whole_step
+from symfric.integrator.derivatives.path import Jump, Path, Piece
+from symfric.integrator.derivatives.saltation import passage
+from symfric.integrator.derivatives.seeds import Seeds
+from symfric.integrator.running.dense import Dense, join
 
 Array = NDArray[np.float64]
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Seeds:
-    """What to differentiate with respect to.
+class Slopes:
+    """Derivatives of a run.
 
     Attributes:
-        names: as the user wrote them: a parameter, or "x0.v" for the start value of a state.
-        parameters: row in p of each name, -1 for a start value.
-        start: derivative of the start values of x by each name, shape (nx, names).
+        dense: of the solution at fixed times, as dense output of names * n columns, those of a name
+            together.
+        times: of the times of its jumps, shape (jumps, names).
     """
 
-    names: tuple[str, ...]
-    parameters: tuple[int, ...]
-    start: Array
-
-    def of_data(self, n_d: int) -> Array:
-        """Derivative of the run data d by each name, shape (n_d, names)."""
-        selector = np.zeros((n_d, len(self.names)))
-        for column, row in enumerate(self.parameters):
-            if row >= 0:
-                selector[row, column] = 1.0
-        return selector
-
-
-def seeds(
-    model: Model,
-    names: Sequence[str],
-    x0: Mapping[str, float] | None,
-    p: Mapping[str, float] | None,
-) -> Seeds:
-    """Look the names up; `x0` and `p` as in `simulate`.
-
-    A start value that follows from others, as a bristle's in steady sliding does, is differentiated
-    along with them.
-
-    Raises:
-        ValueError: a name that is neither a free parameter nor "x0." and a state; a model with
-            events, whose jumps are not differentiated.
-    """
-    free, states = [v.name for v in model.p], [v.name for v in model.x]
-    known = [*free, *(f"x0.{name}" for name in states)]
-    check_names(f"sensitivities of '{model.name}' (parameters must be free)", names, known)
-    if model.events:
-        raise ValueError(
-            f"sensitivities of '{model.name}': expected a model without events, got "
-            f"{len(model.events)}; use a smooth or bristle law"
-        )
-    by_p = model.start_by_parameters(x0, p)
-    columns = [
-        by_p[:, free.index(n)] if n in free else model.start_by_state(n[3:], x0, p) for n in names
-    ]
-    rows = tuple(free.index(n) if n in free else -1 for n in names)
-    return Seeds(tuple(names), rows, np.column_stack(columns))
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Path:
-    """The accepted steps of a run, and the numbers they were made with."""
-
-    integrator: Integrator
     dense: Dense
-    inputs: InputData
-    p: Array
-    backend: str
-
-    def data(self, interval: NDArray[np.intp]) -> Array:
-        """Run data d on input intervals, shape (intervals, n_d)."""
-        p = np.tile(self.p, (interval.size, 1))
-        return np.hstack([p, self.inputs.values[:, interval].T])
-
-    def data_at(self, times: Array) -> Array:
-        """Run data d at times, shape (times, n_d)."""
-        return self.data(self.inputs.interval(times))
-
-    @cached_property
-    def interval(self) -> NDArray[np.intp]:
-        """Input interval of every step."""
-        return self.inputs.interval((self.dense.t0 + self.dense.t1) / 2)
-
-    @cached_property
-    def steps(self) -> list[Array]:
-        """Start y, size h and run data d of every step."""
-        return [self.dense.y0, self.dense.t1 - self.dense.t0, self.data(self.interval)]
-
-    @cached_property
-    def pieces(self) -> list[slice]:
-        """Steps between two jumps of the inputs, which algebraic unknowns follow."""
-        cuts = [0, self.dense.t0.size]
-        if self.integrator.system.algebraic[0]:
-            cuts[1:1] = [int(k) + 1 for k in np.flatnonzero(np.diff(self.interval))]
-        return [slice(a, b) for a, b in pairwise(cuts)]
+    times: Array
 
 
-@final
-@dataclass(eq=False)
-class Derivatives:
-    """Functions that differentiate the steps of one integrator, made when first needed."""
-
-    system: System
-    step: ca.Function
-    signals: ca.Function
-
-    def __post_init__(self) -> None:
-        self._forward: dict[tuple[int, ...], Columns] = {}
-
-    @property
-    def symbols(self) -> list[ca.SX]:
-        """Arguments y, h, d of the step."""
-        return [ca.SX.sym(name, self.step.numel_in(i)) for i, name in enumerate("yhd")]
-
-    def forward(self, which: Seeds) -> Columns:
-        """(S, y, h, d) -> (S after the step, that of its dense output), S of shape (n, names)."""
-        if which.parameters not in self._forward:
-            n, names = self.system.n, len(which.names)
-            y, h, d = self.symbols
-            S, of_d = ca.SX.sym("S", n, names), ca.DM(which.of_data(d.numel()))
-            pushed = self.step.forward(names)(
-                y, h, d, self.step(y, h, d), S, ca.SX(1, names), ca.SX(ca.sparsify(of_d))
-            )
-            results = ca.cse([ca.densify(pushed[:n, :]), ca.densify(pushed[n:, :])])
-            function = ca.Function("forward", [S, y, h, d], results)
-            self._forward[which.parameters] = Columns(function, chained=True)
-        return self._forward[which.parameters]
-
-    @cached_property
-    def reverse(self) -> Columns:
-        """(adjoint of the end, y, h, d, weights) -> (adjoint of y, of d).
-
-        `weights` are those of the start and of all results of the step, end first.
-        """
-        n, (y, h, d) = self.system.n, self.symbols
-        every = self.step(y, h, d)
-        after, weights = ca.SX.sym("after", n), ca.SX.sym("weights", n + every.numel())
-        inner = weights[n:] + ca.vertcat(after, ca.SX(every.numel() - n, 1))
-        by_y, _, by_d = self.step.reverse(1)(y, h, d, every, inner)
-        results = ca.cse([ca.densify(by_y + weights[:n]), ca.densify(by_d)])
-        return Columns(ca.Function("reverse", [after, y, h, d, weights], results), chained=True)
-
-    @cached_property
-    def algebraic(self) -> ca.Function:
-        """Derivatives of the algebraic equations (y, d) -> (by y, by d)."""
-        s = self.system
-        alg = s.f[s.algebraic[0]]
-        return ca.Function("algebraic", [s.y, s.d], [ca.jacobian(alg, s.y), ca.jacobian(alg, s.d)])
-
-    @cached_property
-    def assembly(self) -> ca.Function | None:
-        """Derivatives of the start of a mechanism (y, d) -> (by y, by d); None for others."""
-        if self.system.manifold is None:
-            return None
-        y, _, d = self.symbols
-        on = self.system.manifold.project(y, d)
-        return ca.Function("assembly", [y, d], [ca.jacobian(on, y), ca.jacobian(on, d)])
-
-    @cached_property
-    def of_signals(self) -> Columns:
-        """Derivatives of the signals (t, y, d) -> (by y, by d)."""
-        t, y, d = (ca.SX.sym(n, self.signals.numel_in(i)) for i, n in enumerate("tyd"))
-        values = self.signals(t, y, d)
-        return Columns(
-            ca.Function("of_signals", [t, y, d], [ca.jacobian(values, y), ca.jacobian(values, d)])
-        )
-
-
-_MADE: WeakKeyDictionary[Integrator, Derivatives] = WeakKeyDictionary()
-
-
-def derivatives(integrator: Integrator) -> Derivatives:
-    """The Functions for `integrator`."""
-    if integrator not in _MADE:
-        step = build_dense_step(integrator.system, integrator.tableau)
-        _MADE[integrator] = Derivatives(integrator.system, step, integrator.signals)
-    return _MADE[integrator]
-
-
-def made_consistent(path: Path, piece: slice) -> tuple[Array, Array]:
-    """Derivatives of the unknowns at the start of a piece by those before it, and by d.
-
-    Algebraic unknowns follow the others; at the very start those of a mechanism are put onto its
-    constraints before.
-    """
-    made = derivatives(path.integrator)
-    n, free = made.system.n, made.system.free
-    y, d = path.steps[0][piece.start], path.steps[2][piece.start]
-    by_before, by_d = np.eye(n), np.zeros((n, d.size))
-    if piece.start == 0 and made.assembly is not None:
-        by_before, by_d = (m.full() for m in made.assembly.call([y, d]))
-    if free.size:
-        slope, more = (m.full() for m in made.algebraic.call([y, d]))
-        by_before -= free @ np.linalg.solve(slope @ free, slope @ by_before)
-        by_d -= free @ np.linalg.solve(slope @ free, slope @ by_d + more)
-    return by_before, by_d
-
-
-def forward(path: Path, which: Seeds) -> Dense:
-    """Derivatives of the solution as dense output of names * n columns, those of a name together.
-
-    All directions go along in one sweep over the steps.
-    """
+def forward(path: Path, which: Seeds) -> Slopes:
+    """Derivatives of the solution; all directions go along in one sweep over the steps."""
     s, names = path.integrator.system, len(which.names)
-    sweep = derivatives(path.integrator).forward(which)
-    moved = np.zeros((s.n, names))
-    moved[: s.nx] = which.start
-    begin, end, bend = [], [], []
+    of_d = which.of_data(s.d.numel())
+    state = np.zeros((s.n + 1, names))
+    state[: s.nx] = which.start
+    pieces, times = list[Dense](), list[Array]()
     for piece in path.pieces:
-        by_before, by_d = made_consistent(path, piece)
-        moved = by_before @ moved + by_d @ which.of_data(s.d.numel())
-        after, inner = sweep([a[piece] for a in path.steps], moved.T, path.backend)
-        begin.append(np.vstack([moved.T.reshape(1, -1), after[:-1]]))
-        end.append(after)
-        bend.append(inner)
-        moved = after[-1].reshape(names, s.n).T
-    count = path.dense.t0.size
-    D = np.vstack(bend).reshape(count, names, -1, s.n).transpose(0, 2, 1, 3)
-    return Dense(
-        path.dense.t0,
-        path.dense.t1,
-        np.vstack(begin),
-        np.vstack(end),
-        D.reshape(count, -1, names * s.n),
-    )
+        for jump in piece.opening:
+            move = passage(path, jump)
+            state = move.by_state @ state + move.by_data @ of_d
+            if isinstance(jump, Jump):
+                times.append(state[-1])
+        if piece.count:
+            pieces.append(_swept(path, which, piece, state))
+            state = np.vstack([pieces[-1].y1[-1].reshape(names, s.n).T, np.zeros(names)])
+    return Slopes(join(pieces), np.array(times).reshape(-1, names))
+
+
+def _swept(path: Path, which: Seeds, piece: Piece, state: Array) -> Dense:
+    """Derivatives over a piece, from those at its start and of the time of its start."""
+    n, names, k = path.integrator.system.n, len(which.names), piece.steps
+    steps = [a[k] for a in path.steps]
+    if path.integrator.model.events:
+        of_h = np.zeros((piece.count, names))
+        of_h[0] = -state[-1]
+        steps.append(of_h)
+    after, inner = derivatives(path.integrator).forward(which)(steps, state[:n].T, path.backend)
+    begin = np.vstack([state[:n].T.reshape(1, -1), after[:-1]])
+    bent = inner.reshape(piece.count, names, -1, n).transpose(0, 2, 1, 3)
+    bent = bent.reshape(piece.count, -1, names * n)
+    t0, t1 = path.dense.t0[k], path.dense.t1[k]
+    if state[-1].any():
+        ahead, bend = _ahead(whole_step(path, k.start))
+        begin[0] -= np.outer(state[-1], ahead).ravel()
+        bent[0] -= np.einsum("s,rn->rsn", state[-1], bend).reshape(bent.shape[1], -1)
+    found = Dense(t0, t1, begin, after, bent)
+    if not path.cuts(k.stop):
+        return found
+    end, bent[-1] = _cut(found, (t1[-1] - t0[-1]) / path.size[k][-1])
+    return Dense(t0, t1, begin, np.vstack([after[:-1], end]), bent)
+
+
+def _cut(dense: Dense, theta: float) -> tuple[Array, Array]:
+    """End and D of the last piece up to theta, the same polynomial (`running.crossings`)."""
+    old, new = np.zeros(dense.y0.shape[1]), np.zeros(dense.y0.shape[1])
+    D = np.empty_like(dense.D[-1])
+    for k in reversed(range(D.shape[0])):
+        new = new + theta ** (k + 2) * (dense.D[-1, k] - old)
+        old, D[k] = dense.D[-1, k], new
+    return dense.piece(np.array([dense.t0.size - 1]), np.array([theta])), D
+
+
+def _ahead(step: Dense) -> tuple[Array, Array]:
+    """(1 - theta) y'(theta) of one step in the form of `Dense`: its start and its D; it ends at 0.
+
+    That is by how much the solution at a fixed time falls behind where the step starts later and
+    ends at its time.
+    """
+    D = step.D[0]
+    # y = sum_j c_j theta^j, of which (y_theta - y_theta(0)) / theta is D
+    start = step.y1[0] - step.y0[0] + D[0]
+    c = np.vstack([D[1:], np.zeros_like(D[:1])]) - D
+    h = step.t1[0] - step.t0[0]
+    return start / h, np.arange(2, len(c) + 2)[:, None] * c / h
 
 
 def signal_slopes(path: Path, times: Array) -> tuple[Array, Array]:

@@ -98,8 +98,8 @@ class Crossings:
 
     @property
     def width(self) -> int:
-        """Length of the record of a jump: (steps before it, t, y before, y after, which)."""
-        return 2 + 2 * self.record.n + self.count
+        """Length of the record of a jump: (steps before it, t, size, y before, y after, which)."""
+        return 3 + 2 * self.record.n + self.count
 
     @property
     def data(self) -> int:

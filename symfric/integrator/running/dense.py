@@ -48,6 +48,16 @@ class Dense:
             bend = self.D[k, row] + s * bend
         return (1 - s) * self.y0[k] + s * (self.y1[k] + (1 - s) * bend)
 
+    def rates(self, k: NDArray[np.intp], theta: Array) -> Array:
+        """Rates of the pieces `k` at `theta`, shape (m, n)."""
+        s = theta[:, None]
+        bend, slope = np.zeros_like(self.y0[k]), np.zeros_like(self.y0[k])
+        for row in range(self.D.shape[1] - 1, -1, -1):
+            slope = bend + s * slope
+            bend = self.D[k, row] + s * bend
+        rise = self.y1[k] - self.y0[k] + (1 - 2 * s) * bend + s * (1 - s) * slope
+        return rise / (self.t1 - self.t0)[k, None]
+
 
 def hermite(t: Array, y: Array, slope: Array) -> Dense:
     """Cubic Hermite interpolation through y (n, m) with slopes (n, m) at times t (m,)."""

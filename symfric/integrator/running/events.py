@@ -57,26 +57,30 @@ class Jumps:
     Attributes:
         step: number of accepted steps before it, shape (k,).
         t: time [s], shape (k,).
+        size: of the step that they cut [s], in full; negative where nothing of it is left, 0 where
+            a jump led there and no motion, shape (k,).
         before, after: unknowns just before and after it, shape (k, n).
         which: the events that happened together, shape (k, events).
     """
 
     step: NDArray[np.intp]
     t: Array
+    size: Array
     before: Array
     after: Array
     which: NDArray[np.bool_]
 
     @classmethod
     def of(cls, rows: Array, n: int, steps: int = 0) -> "Jumps":
-        """From records (steps before it, t, y before, y after, which), `steps` behind others."""
+        """From records (steps before it, t, size, y before, y after, which), `steps` behind others."""
         rows = rows.copy()
         return cls(
             rows[:, 0].astype(np.intp) + steps,
             rows[:, 1],
-            rows[:, 2 : 2 + n],
-            rows[:, 2 + n : 2 + 2 * n],
-            rows[:, 2 + 2 * n :] != 0.0,
+            rows[:, 2],
+            rows[:, 3 : 3 + n],
+            rows[:, 3 + n : 3 + 2 * n],
+            rows[:, 3 + 2 * n :] != 0.0,
         )
 
     @classmethod
@@ -85,6 +89,7 @@ class Jumps:
         return cls(
             np.concatenate([p.step for p in parts]),
             np.concatenate([p.t for p in parts]),
+            np.concatenate([p.size for p in parts]),
             np.concatenate([p.before for p in parts]),
             np.concatenate([p.after for p in parts]),
             np.concatenate([p.which for p in parts]),
@@ -165,6 +170,7 @@ class Search:
         (cut,) = self._cut(np.array([theta]), row)
         t, record = float(cut[Record.T1]), self.crossings.record
         kept = t != row[Record.T0]
+        size = (h if kept else -h) if theta > 0 else 0.0
         row[:] = cut if kept else row
         self._before[:], fresh = self._jump(cut, d)
         self._before[which] = np.nan
@@ -174,7 +180,7 @@ class Search:
             after[state] = value if which[event] else after[state]
         self.eventful.steps += kept
         steps = self.eventful.steps
-        self.eventful.rows[self.eventful.count] = [steps, t, *before, *after, *which]
+        self.eventful.rows[self.eventful.count] = [steps, t, size, *before, *after, *which]
         self.eventful.count += 1
         # steps beyond the event say nothing; its own is a guess only, what follows may be faster
         S[:] = State.at(t, max(min(h, RESTART * self.tolerance), LEAST * h), after)

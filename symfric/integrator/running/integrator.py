@@ -79,6 +79,7 @@ class Integrator:
             self.step = build_step(self.system, self.tableau, ca.MX)
         self.f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
         self.events = self._event_function()
+        self.resets = self._reset_function()
         self.crossings = self._crossings() if self.model.events else None
         self.build_time = perf_counter() - begin
 
@@ -87,15 +88,19 @@ class Integrator:
         values = stacked(ca.SX(e.expression) for e in self.model.events)
         return self.of_time("events", values)
 
+    def _reset_function(self) -> ca.Function:
+        """Values of all resets, event after event, as a Function (t, y, d)."""
+        resets = (ca.SX(new) for event in self.model.events for new in event.reset.values())
+        return self.of_time("resets", stacked(resets))
+
     def _crossings(self) -> Crossings:
         """What the search for events evaluates."""
         model, system = self.model, self.system
-        resets = stacked(ca.SX(new) for event in model.events for new in event.reset.values())
         return crossings(
             model.events,
             [v.name for v in model.x],
             self.events,
-            self.of_time("resets", resets),
+            self.resets,
             self.tableau.H.shape[0],
             follows=bool(system.free.any()) or system.manifold is not None,
         )

@@ -199,7 +199,7 @@ static int symfric_search(double *row, double *S, const double *R, double *M, do
   const double *d = R + $d;
   symfric_place p = { row, d, iw, w };
   const double *arg[$arg];
-  double *res[$res], *which = jump + 2 + 2 * UNKNOWNS, *after = jump + 2 + UNKNOWNS;
+  double *res[$res], *which = jump + 3 + 2 * UNKNOWNS, *after = jump + 3 + UNKNOWNS;
   double cut[$row], fresh[RESETS + 1], theta = symfric_crossing(&p, M, which);
   double h = row[1] - row[0], least;
   int i, over = 0, kept;
@@ -228,7 +228,8 @@ static int symfric_search(double *row, double *S, const double *R, double *M, do
     if (which[i] != 0) M[BEFORE + i] = NAN;
   jump[0] = (double)(kept ? rows + 1 : rows);
   jump[1] = cut[1];
-  for (i = 0; i < UNKNOWNS; ++i) jump[2 + i] = after[i] = cut[$y1 + i];
+  jump[2] = theta > 0 ? (kept ? h : -h) : 0;
+  for (i = 0; i < UNKNOWNS; ++i) jump[3 + i] = after[i] = cut[$y1 + i];
   for (i = 0; i < RESETS; ++i)
     if (which[symfric_by_event[i]] != 0) after[symfric_of_state[i]] = fresh[i];
   least = $least * h;

@@ -29,7 +29,6 @@ from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.peers.casadi_integrators import peer
 from symfric.integrator.running.run import Tolerances
-from symfric.model import Event
 
 Array = NDArray[np.float64]
 LAWS: dict[str, Law] = {"brown_mcphee": BrownMcPhee(), "lugre": LuGre()}
@@ -284,11 +283,6 @@ def test_run_that_failed_at_once_has_no_derivatives() -> None:
         simulate(model, 1.0, sensitivities=["p"])
 
 
-def eventful() -> Model:
-    x = Variable("x", "m", start=1.0)
-    return Model("falling", x=(x,), ode=ca.SX(-1.0), events=(Event("ground", x.symbol),))
-
-
 @pytest.mark.parametrize(
     ("make", "arguments", "message"),
     [
@@ -299,7 +293,6 @@ def eventful() -> Model:
             {"sensitivities": ["mu_s"]},
             r"'rabinowicz' \(parameters must be free\): expected one of k, .* got mu_s",
         ),
-        (eventful, {"sensitivities": ["x0.x"]}, "expected a model without events, got 1"),
     ],
 )
 def test_bad_requests_are_refused_saying_what_is_possible(

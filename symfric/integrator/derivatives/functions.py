@@ -1,0 +1,161 @@
+"""The Functions that differentiate the steps of an integrator, and what happens between them."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import final
+from weakref import WeakKeyDictionary
+
+import casadi as ca
+
+from symfric.integrator.compiled.columns import Columns
+from symfric.integrator.derivatives.path import Path
+from symfric.integrator.derivatives.seeds import Seeds
+from symfric.integrator.equations.system import System
+from symfric.integrator.running.dense import Dense
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.step.attempt import build_dense_step
+
+
+@final
+@dataclass(eq=False)
+class Derivatives:
+    """Functions that differentiate the steps of one integrator, made when first needed."""
+
+    system: System
+    step: ca.Function
+    signals: ca.Function
+    events: ca.Function
+    resets: ca.Function
+
+    def __post_init__(self) -> None:
+        self._forward: dict[tuple[int, ...], Columns] = {}
+
+    @property
+    def symbols(self) -> list[ca.SX]:
+        """Arguments y, h, d of the step."""
+        return [ca.SX.sym(name, self.step.numel_in(i)) for i, name in enumerate("yhd")]
+
+    def forward(self, which: Seeds) -> Columns:
+        """(S, y, h, d, h') -> (S after the step, that of its dense output).
+
+        S of shape (n, names); h' holds the derivatives of the size, and is no argument where
+        nothing jumps.
+        """
+        if which.parameters not in self._forward:
+            n, names = self.system.n, len(which.names)
+            y, h, d = self.symbols
+            S, of_d = ca.SX.sym("S", n, names), ca.DM(which.of_data(d.numel()))
+            of_h = [ca.SX.sym("of_h", 1, names)] if self.eventful else []
+            pushed = self.step.forward(names)(
+                y,
+                h,
+                d,
+                self.step(y, h, d),
+                S,
+                of_h[0] if of_h else ca.SX(1, names),
+                ca.SX(ca.sparsify(of_d)),
+            )
+            results = ca.cse([ca.densify(pushed[:n, :]), ca.densify(pushed[n:, :])])
+            function = ca.Function("forward", [S, y, h, d, *of_h], results)
+            self._forward[which.parameters] = Columns(function, chained=True)
+        return self._forward[which.parameters]
+
+    @cached_property
+    def reverse(self) -> Columns:
+        """(adjoint of the end, y, h, d, weights) -> (adjoint of y, of d, of h).
+
+        `weights` are those of the start and of all results of the step, end first. The size h has
+        an adjoint where something jumps.
+        """
+        n, (y, h, d) = self.system.n, self.symbols
+        every = self.step(y, h, d)
+        after, weights = ca.SX.sym("after", n), ca.SX.sym("weights", n + every.numel())
+        inner = weights[n:] + ca.vertcat(after, ca.SX(every.numel() - n, 1))
+        by_y, by_h, by_d = self.step.reverse(1)(y, h, d, every, inner)
+        of_h = [ca.densify(by_h)] if self.eventful else []
+        results = ca.cse([ca.densify(by_y + weights[:n]), ca.densify(by_d), *of_h])
+        return Columns(ca.Function("reverse", [after, y, h, d, weights], results), chained=True)
+
+    @cached_property
+    def algebraic(self) -> ca.Function:
+        """Derivatives of the algebraic equations (y, d) -> (by y, by d)."""
+        s = self.system
+        alg = s.f[s.algebraic[0]]
+        return ca.Function("algebraic", [s.y, s.d], [ca.jacobian(alg, s.y), ca.jacobian(alg, s.d)])
+
+    @cached_property
+    def assembly(self) -> ca.Function | None:
+        """Derivatives of the start of a mechanism (y, d) -> (by y, by d); None for others."""
+        if self.system.manifold is None:
+            return None
+        y, _, d = self.symbols
+        on = self.system.manifold.project(y, d)
+        return ca.Function("assembly", [y, d], [ca.jacobian(on, y), ca.jacobian(on, d)])
+
+    @cached_property
+    def rates(self) -> ca.Function:
+        """(y, d) -> matrix and right-hand side of all rates y', those of algebraic unknowns, too.
+
+        Equations without rates are differentiated by time: M y' = f and g_y y' = 0.
+        """
+        s, (rows, _) = self.system, self.system.algebraic
+        matrix, right = ca.SX(s.mass), ca.SX(s.f)
+        if rows:
+            matrix[rows, :] = ca.jacobian(s.f[rows], s.y)
+            right[rows] = 0
+        return ca.Function("rates", [s.y, s.d], [matrix, right])
+
+    @cached_property
+    def of_events(self) -> ca.Function:
+        """Derivatives of the event expressions (t, y, d) -> (by t, by y, by d)."""
+        return _slopes("of_events", self.events)
+
+    @cached_property
+    def of_resets(self) -> ca.Function:
+        """Those of the values of all resets."""
+        return _slopes("of_resets", self.resets)
+
+    @property
+    def eventful(self) -> bool:
+        """Whether something may jump."""
+        return self.events.numel_out(0) > 0
+
+    @cached_property
+    def of_signals(self) -> Columns:
+        """Derivatives of the signals (t, y, d) -> (by y, by d)."""
+        t, y, d = (ca.SX.sym(n, self.signals.numel_in(i)) for i, n in enumerate("tyd"))
+        values = self.signals(t, y, d)
+        return Columns(
+            ca.Function("of_signals", [t, y, d], [ca.jacobian(values, y), ca.jacobian(values, d)])
+        )
+
+
+def _slopes(name: str, function: ca.Function) -> ca.Function:
+    """Derivatives of a Function (t, y, d) by each of its arguments."""
+    arguments = [ca.SX.sym(n, function.numel_in(i)) for i, n in enumerate("tyd")]
+    values = function(*arguments)
+    return ca.Function(name, arguments, [ca.jacobian(values, x) for x in arguments])
+
+
+_MADE: WeakKeyDictionary[Integrator, Derivatives] = WeakKeyDictionary()
+
+
+def derivatives(integrator: Integrator) -> Derivatives:
+    """The Functions for `integrator`."""
+    if integrator not in _MADE:
+        _MADE[integrator] = Derivatives(
+            integrator.system,
+            build_dense_step(integrator.system, integrator.tableau),
+            integrator.signals,
+            integrator.events,
+            integrator.resets,
+        )
+    return _MADE[integrator]
+
+
+def whole_step(path: Path, k: int) -> Dense:
+    """Step number k in full, also where an event cut it."""
+    y0, h, d = (a[k] for a in path.steps)
+    every = derivatives(path.integrator).step(y0, h, d).full().reshape(1, -1, y0.size)
+    t0 = path.dense.t0[k : k + 1]
+    return Dense(t0, t0 + h, y0[None], every[:, 0], every[:, 1:])

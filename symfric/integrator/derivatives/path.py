@@ -1,0 +1,181 @@
+"""A run as its derivatives see it: accepted steps, and jumps between them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.integrator.equations.inputs import InputData
+from symfric.integrator.running.dense import Dense
+from symfric.integrator.running.events import Jumps
+from symfric.integrator.running.integrator import Integrator
+
+Array = NDArray[np.float64]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Jump:
+    """Events that happened together.
+
+    Attributes:
+        step: number of accepted steps before.
+        t: time [s].
+        size: of the step that they cut [s], in full; 0 where they cut none.
+        at_once: whether another jump led to them, and no motion.
+        before, after: unknowns before and behind them, shape (n,).
+        which: numbers of the events.
+    """
+
+    step: int
+    t: float
+    size: float
+    at_once: bool
+    before: Array
+    after: Array
+    which: tuple[int, ...]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Break:
+    """New input data, which algebraic unknowns follow.
+
+    Attributes:
+        step: number of the first step with them.
+        t: time [s].
+    """
+
+    step: int
+    t: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Steps without a jump in between; there are none behind an event that ends a run.
+
+    Attributes:
+        opening: the jumps before, in their order; None is the start.
+        steps: which.
+    """
+
+    opening: tuple[Jump | Break | None, ...]
+    steps: slice
+
+    @property
+    def count(self) -> int:
+        """Number of steps."""
+        return int(self.steps.stop - self.steps.start)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The accepted steps of a run, and the numbers they were made with.
+
+    Attributes:
+        integrator, inputs, p, backend: what was run, and how.
+        dense: the continuous solution.
+        guess: unknowns from which consistent ones at the start were found.
+        happened: events that were carried out.
+        tolerance: how sharply they were located [s].
+    """
+
+    integrator: Integrator
+    dense: Dense
+    inputs: InputData
+    p: Array
+    backend: str
+    guess: Array
+    happened: Sequence[Jumps] = ()
+    tolerance: float = 0.0
+
+    def data(self, interval: NDArray[np.intp]) -> Array:
+        """Run data d on input intervals, shape (intervals, n_d)."""
+        p = np.tile(self.p, (interval.size, 1))
+        return np.hstack([p, self.inputs.values[:, interval].T])
+
+    def data_at(self, times: Array) -> Array:
+        """Run data d at times, shape (times, n_d)."""
+        return self.data(self.inputs.interval(times))
+
+    @cached_property
+    def jumps(self) -> list[Jump]:
+        """Events that were carried out, one after another."""
+        return [
+            Jump(
+                int(some.step[i]),
+                float(some.t[i]),
+                max(float(some.size[i]), 0.0),
+                bool(some.size[i] == 0),
+                some.before[i],
+                some.after[i],
+                tuple(np.flatnonzero(some.which[i]).tolist()),
+            )
+            for some in self.happened
+            for i in range(some.t.size)
+        ]
+
+    @cached_property
+    def interval(self) -> NDArray[np.intp]:
+        """Input interval of every step."""
+        return self.inputs.interval((self.dense.t0 + self.dense.t1) / 2)
+
+    @cached_property
+    def size(self) -> Array:
+        """Size of every step [s], in full where an event cut it."""
+        size = self.dense.t1 - self.dense.t0
+        for jump in self.jumps:
+            if jump.size:
+                size[jump.step - 1] = jump.size
+        return size
+
+    @cached_property
+    def steps(self) -> list[Array]:
+        """Start y, size h and run data d of every step."""
+        return [self.dense.y0, self.size, self.data(self.interval)]
+
+    def cuts(self, step: int) -> bool:
+        """Whether an event cut the step before number `step`."""
+        return step in self._cuts
+
+    @cached_property
+    def _cuts(self) -> set[int]:
+        return {jump.step for jump in self.jumps if jump.size}
+
+    def place(self, jump: Jump) -> int:
+        """Input interval in which events happened, at a break the one before unless at once."""
+        if jump.size:
+            return int(self.interval[jump.step - 1])
+        return int(self.inputs.interval(np.array([jump.t]))[0])
+
+    @cached_property
+    def breaks(self) -> list[Break]:
+        """Jumps of the inputs, where algebraic unknowns follow."""
+        if not self.integrator.system.algebraic[0]:
+            return []
+        steps = np.flatnonzero(np.diff(self.interval)) + 1
+        return [Break(int(k), float(self.dense.t0[k])) for k in steps]
+
+    @cached_property
+    def pieces(self) -> list[Piece]:
+        """Steps between two jumps."""
+        openings: dict[int, list[Jump | Break | None]] = {0: [None]}
+        breaks = self.breaks
+        for jump in self.jumps:
+            # an event right on a break was before it, unless the break brought it about
+            before = [b for b in breaks if b.step <= jump.step and (b.t < jump.t or jump.at_once)]
+            breaks = breaks[len(before) :]
+            for mark in (*before, jump):
+                openings.setdefault(mark.step, []).append(mark)
+        for mark in breaks:
+            openings.setdefault(mark.step, []).append(mark)
+        ends = [*list(openings)[1:], self.dense.t0.size]
+        return [
+            Piece(tuple(marks), slice(k, end))
+            for (k, marks), end in zip(openings.items(), ends, strict=True)
+        ]

@@ -1,0 +1,242 @@
+"""Derivatives through events: closed forms, differences of tight runs, and what has none."""
+
+from collections.abc import Mapping
+
+import casadi as ca
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from stored import stored
+
+from symfric import (
+    GMS,
+    ExactCoulomb,
+    Hold,
+    Karnopp,
+    LeineSwitch,
+    Linear,
+    MaxwellSlip,
+    Model,
+    Trajectory,
+    Variable,
+    drive,
+    rabinowicz,
+    simulate,
+)
+from symfric.model import Event
+
+Array = NDArray[np.float64]
+
+
+def ball() -> Model:
+    """Dropped from height h; it bounces with the restitution e."""
+    h, v = Variable("h", "m", start=1.0), Variable("v", "m/s")
+    g, e = Variable("g", "m/s^2", start=9.81), Variable("e", "1", start=0.8)
+    bounce = Event("bounce", h.symbol, direction=-1, reset={"v": -e.symbol * v.symbol})
+    return Model("ball", x=(h, v), p=(g, e), ode=ca.vertcat(v.symbol, -g.symbol), events=(bounce,))
+
+
+def bounced(t: Array, h: complex, g: complex, e: complex) -> tuple[Array, Array, Array]:
+    """Height and velocity of the ball at times before its third bounce, and times of the bounces.
+
+    Complex numbers carry a derivative in their imaginary part.
+    """
+    fall = np.sqrt(2 * h / g)
+    bounces = np.array([fall, fall + 2 * e * fall])
+    impact = np.sqrt(2 * h * g)
+    flights = [(0.0, h, 0.0), (bounces[0], 0.0, e * impact), (bounces[1], 0.0, e**2 * impact)]
+    k = np.searchsorted(bounces.real, t, side="right")
+    began, height, speed = (np.array([flights[i][j] for i in k]) for j in range(3))
+    later = t - began
+    return height + speed * later - g * later**2 / 2, speed - g * later, bounces
+
+
+@pytest.mark.parametrize("backend", ["vm", "compiled"])
+def test_bouncing_ball_meets_its_closed_form(backend: str) -> None:
+    """Before and behind each bounce, states and times of events, forwards and backwards."""
+    at = {"x0.h": 1.0, "g": 9.81, "e": 0.8}
+    times = np.array([0.0, 0.2, 0.4515, 0.4516, 0.7, 1.0, 1.1739, 1.174, 1.5])
+    run = simulate(ball(), 1.5, t_eval=times, backend=backend, sensitivities=[*at])
+    assert [name for _, name in run.happened] == ["bounce"] * 2
+    weights = {"h": np.arange(9.0), "v": np.ones(9)}
+    gradient = run.gradient(weights)
+    for name in at:
+        numbers = {k: complex(x, 1e-20 * (k == name)) for k, x in at.items()}
+        h, v, bounces = (a.imag / 1e-20 for a in bounced(times, *numbers.values()))
+        slopes = run.sensitivities[name]
+        assert slopes["h"] == pytest.approx(h, rel=0, abs=1e-7)
+        assert slopes["v"] == pytest.approx(v, rel=0, abs=1e-7)
+        assert run.event_sensitivities[name] == pytest.approx(bounces, abs=1e-8)
+        assert gradient[name] == pytest.approx(weights["h"] @ h + weights["v"] @ v, abs=1e-6)
+
+
+def test_stick_and_slip_on_a_belt_meet_their_closed_form() -> None:
+    """The block sticks until k x = mu_s N, and slides as an oscillator about k x = mu_d N.
+
+    Sticking it goes on with the velocity that it starts with, which is that of the belt.
+    """
+    at = {"mu_s": 0.15, "mu_d": 0.1, "k": 2.1, "x0.v": 0.1}
+    times = np.array([5.0, 5.59, 5.7, 6.3])
+    run = simulate(
+        rabinowicz(ExactCoulomb(), free=["mu_s", "mu_d", "k"]), 6.5, x0={"v": 0.1, "mode": 0.0},
+        t_eval=times, sensitivities=[*at],
+    )  # fmt: skip
+    weight, m = 0.8 * 9.81, 0.8
+    for name in at:
+        mu_s, mu_d, k, belt = (complex(x, 1e-20 * (n == name)) for n, x in at.items())
+        leaves = mu_s * weight / (k * belt)
+        w, later = np.sqrt(k / m), times - leaves
+        slides = (mu_d + (mu_s - mu_d) * np.cos(w * later)) * weight / k
+        slides = slides + belt / w * np.sin(w * later)
+        x = np.where(times < leaves.real, belt * times, slides).imag / 1e-20
+        assert run.sensitivities[name]["x"] == pytest.approx(x, rel=1e-6, abs=1e-7)
+        assert run.event_sensitivities[name][0] == pytest.approx(leaves.imag / 1e-20, rel=1e-7)
+
+
+GRID = np.linspace(0.0, 4.0, 41)
+WAVE = 2.2 * np.sin(np.pi * GRID)
+CASES = {
+    "exact_belt": (rabinowicz(ExactCoulomb(), free=["mu_s", "k"]), 20.0, None),
+    "karnopp_belt": (rabinowicz(Karnopp(form="event"), free=["mu_d", "m"]), 20.0, None),
+    "leine_belt": (rabinowicz(LeineSwitch(form="event"), free=["mu_s", "k"]), 20.0, None),
+    "exact_drive": (drive(ExactCoulomb(), free=["m", "N"]), 4.0, Linear(GRID, WAVE)),
+    "gms_drive": (drive(GMS(form="event"), free=["m", "N"]), 4.0, lambda t: 2 * ca.sin(ca.pi * t)),
+    "maxwell_drive": (drive(MaxwellSlip(form="event"), free=["m", "N"]), 4.0, Hold(GRID, WAVE)),
+}  # fmt: skip
+
+
+def run_of(case: str, p: Mapping[str, float], **how: object) -> Trajectory:
+    model, t_end, force = CASES[case]
+    u = None if force is None else {"force": force}
+    x0 = {"v": 0.02} if force is None else None
+    at = np.linspace(0.0, t_end, 15)[1:]
+    return simulate(model, t_end, x0=x0, u=u, p=p, t_eval=at, **how)  # pyright: ignore[reportArgumentType]
+
+
+def quotients(case: str) -> Array:
+    """Central differences of x and v by each parameter, a row each."""
+    rows: list[Array] = []
+    for parameter in CASES[case][0].p:
+        at = float(parameter.start)
+        above, below = (
+            run_of(case, {parameter.name: at * s}, rtol=1e-12, event_tolerance=1e-14)
+            for s in (1 + 1e-5, 1 - 1e-5)
+        )
+        rows += [(above[s] - below[s]) / (2e-5 * at) for s in ("x", "v")]
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_laws_by_events_meet_differences_of_tight_runs(case: str) -> None:
+    names = [v.name for v in CASES[case][0].p]
+    run = run_of(case, {}, rtol=1e-9, sensitivities=names)
+    assert run.statistics.events >= 4
+    found = np.array([run.sensitivities[name][s] for name in names for s in ("x", "v")])
+    expected = stored(f"saltation_{case}", lambda: quotients(case))
+    size = np.abs(expected).max(axis=1, keepdims=True)
+    np.testing.assert_allclose(found / size, expected / size, rtol=0, atol=1e-6)
+    weights = {"x": np.cos(run.t), "v": np.ones(run.t.size)}
+    by_hand = [weights["x"] @ found[2 * i] + found[2 * i + 1].sum() for i in range(len(names))]
+    assert [*run.gradient(weights).values()] == pytest.approx(by_hand, rel=1e-9)
+
+
+def counter(events: tuple[Event, ...], x: Variable, *others: Variable) -> Model:
+    """x' = p, all others at rest."""
+    p = Variable("p", "1/s", start=2.0)
+    still = ca.SX.zeros(len(others))
+    return Model("counter", x=(x, *others), p=(p,), ode=ca.vertcat(p.symbol, still), events=events)
+
+
+def test_end_of_a_run_that_an_event_ends_has_a_derivative() -> None:
+    """x = p t reaches 1 at 1/p."""
+    x = Variable("x", "1")
+    model = counter((Event("full", x.symbol - 1, terminal=True),), x)
+    run = simulate(model, 3.0, samples=4, sensitivities=["p", "x0.x"])
+    assert run.event_sensitivities["p"] == pytest.approx([-0.25])
+    assert run.event_sensitivities["x0.x"] == pytest.approx([-0.5])
+    assert run.sensitivities["p"]["x"] == pytest.approx(run.t)
+
+
+def test_event_that_another_one_brings_about_moves_along() -> None:
+    """x = 1 lets y jump over zero, which lets z take the value of t: z = 1/p."""
+    t = ca.SX.sym("t")
+    x, y, z = Variable("x", "1"), Variable("y", "1", start=-1.0), Variable("z", "1")
+    p = Variable("p", "1/s", start=2.0)
+    events = (
+        Event("first", x.symbol - 1, reset={"y": 3 * p.symbol}),
+        Event("second", y.symbol, reset={"z": t * y.symbol}),
+    )
+    model = Model("chain", x=(x, y, z), p=(p,), ode=ca.vertcat(p.symbol, 0, 0), events=events, t=t)
+    run = simulate(model, 1.0, t_eval=[0.4, 0.6], sensitivities=["p"])
+    assert run.event_sensitivities["p"] == pytest.approx([-0.25, -0.25])
+    assert run["z"] == pytest.approx([0.0, 3.0])
+    assert run.sensitivities["p"]["y"] == pytest.approx([0.0, 3.0])
+    assert run.sensitivities["p"]["z"] == pytest.approx([0.0, 0.0], abs=1e-9)  # 3 p / p
+
+
+def test_events_of_time_alone_do_not_move_even_with_jumps_of_the_inputs() -> None:
+    """v' = u/m, and v is halved at t = 1, when u jumps."""
+    t, v, m = ca.SX.sym("t"), Variable("v", "m/s"), Variable("m", "kg", start=2.0)
+    u = Variable("u", "N")
+    half = Event("half", t - 1, direction=1, reset={"v": v.symbol / 2})
+    model = Model("pushed", x=(v,), u=(u,), p=(m,), ode=u.symbol / m.symbol, events=(half,), t=t)
+    run = simulate(
+        model, 2.0, u={"u": Hold([0.0, 1.0], [1.0, -3.0])}, t_eval=[0.9, 1.1, 2.0],
+        sensitivities=["m"],
+    )  # fmt: skip
+    assert run["v"] == pytest.approx([0.45, 0.1, -1.25])
+    assert run.sensitivities["m"]["v"] == pytest.approx([-0.225, -0.05, 0.625])
+    assert run.event_sensitivities["m"] == [0.0]
+
+
+def twins(mixing: float) -> Model:
+    """Two points that reach their walls at one time; each rebounds with a part of the other."""
+    x, y = Variable("x", "m", start=1.0), Variable("y", "m", start=2.0)
+    v, w = Variable("v", "m/s", start=-1.0), Variable("w", "m/s", start=-2.0)
+    events = (
+        Event("wall x", x.symbol, -1, reset={"v": -v.symbol + mixing * w.symbol}),
+        Event("wall y", y.symbol, -1, reset={"w": -w.symbol + mixing * v.symbol}),
+    )
+    return Model("twins", x=(x, y, v, w), ode=ca.vertcat(v.symbol, w.symbol, 0, 0), events=events)
+
+
+def test_events_at_one_time_that_do_not_disturb_each_other_are_taken_one_by_one() -> None:
+    times = [0.5, 1.5, 2.0]
+    run = simulate(twins(0.0), 2.0, t_eval=times, sensitivities=["x0.x", "x0.w"])
+    assert run.statistics.events == 2
+    assert run.sensitivities["x0.x"]["x"] == pytest.approx([1.0, -1.0, -1.0])
+    assert run.sensitivities["x0.x"]["y"] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    assert run.sensitivities["x0.w"]["y"][2] == pytest.approx(-2.0)
+    weights = {"x": [0.0, 0.0, 1.0], "y": [0.0, 0.0, 1.0]}
+    assert run.gradient(weights) == pytest.approx({"x0.x": -1.0, "x0.w": -2.0})
+
+
+def cubed() -> Model:
+    x = Variable("x", "1")
+    return counter((Event("touch", (x.symbol - 1) ** 3),), x)
+
+
+def at_a_jump() -> Model:
+    """x = t reaches 1 when u jumps."""
+    x, u = Variable("x", "m"), Variable("u", "m/s")
+    done = Event("done", x.symbol - 1.0 + 1e-12, direction=1)
+    return Model("pushed", x=(x,), u=(u,), ode=u.symbol, events=(done,))
+
+
+@pytest.mark.parametrize(
+    ("model", "seed", "message"),
+    [
+        (twins(0.5), "x0.x", "event 'wall x', 'wall y' at t = 1 s: .* lead elsewhere in another"),
+        (cubed(), "p", "event 'touch' at t = 0.5 s: .*touches it at a rate of .* per second"),
+        (at_a_jump(), "x0.x", "event 'done' at t = 1 s: .* apart from the jumps of the inputs"),
+    ],
+)
+def test_motion_without_a_derivative_is_named_with_event_and_time(
+    model: Model, seed: str, message: str
+) -> None:
+    u = {"u": Hold([0.0, 1.0], [1.0, 2.0])} if model.u else None
+    run = simulate(model, 2.0, u=u, samples=3, sensitivities=[seed])
+    with pytest.raises(ValueError, match=message):
+        _ = run.sensitivities
+    with pytest.raises(ValueError, match=message):
+        run.gradient({"x": 1.0})
