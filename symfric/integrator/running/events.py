@@ -72,7 +72,7 @@ class Jumps:
 
     @classmethod
     def of(cls, rows: Array, n: int, steps: int = 0) -> "Jumps":
-        """From records (steps before it, t, size, y before, y after, which), `steps` behind others."""
+        """From records (steps before, t, size, y before, y after, which), `steps` behind others."""
         rows = rows.copy()
         return cls(
             rows[:, 0].astype(np.intp) + steps,
