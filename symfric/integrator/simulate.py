@@ -29,7 +29,6 @@ from symfric.integrator.equations.initial import first_guess
 from symfric.integrator.equations.inputs import Input, InputData, input_data
 from symfric.integrator.outcome import trajectory_of
 from symfric.integrator.running.built import built
-from symfric.integrator.running.dense import Dense
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Run
 from symfric.integrator.running.run import Tolerances, integrate
