@@ -161,9 +161,8 @@ class Trajectory:
         They jump where an event moves with the name; at its time they are those behind it.
 
         Raises:
-            ValueError: none were asked for, or an event has no derivative: its expression only
-                touches zero, it comes with a jump of an input, or with another event whose order
-                matters.
+            ValueError: none were asked for, or an event has none: its expression only touches
+                zero, it comes with a jump of an input, or with an event whose order matters.
         """
         if self.differentiate is None:
             raise self._without_derivatives
@@ -173,10 +172,7 @@ class Trajectory:
     def event_sensitivities(self) -> dict[str, Array]:
         """Derivatives of the times of `happened`: name -> [s per unit], shape (events,).
 
-        That of a terminal event is the derivative of the end time.
-
-        Raises:
-            ValueError: as in `sensitivities`.
+        That of a terminal event is the derivative of the end time. Refused as `sensitivities` is.
         """
         if self.delays is None:
             raise self._without_derivatives
