@@ -163,6 +163,8 @@ class VmEngine:
             if stop is not Stop.END or loop.interval + 1 == loop.until:
                 break
             work.enter(loop.interval + 1)
+            if work.events is not None:
+                work.events.entered()
             if count == loop.max_rows or made == attempts:
                 stop = Stop.FULL if count == loop.max_rows else Stop.ATTEMPTS
                 break

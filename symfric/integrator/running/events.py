@@ -134,11 +134,17 @@ class Eventful:
         """Those of the last run of an engine, with `steps` steps before it."""
         return Jumps.of(self.rows[: self.count], self.crossings.record.n, steps)
 
-    def jumped(self, before: Array | None) -> None:
-        """Start anew, behind a jump where the events had the values `before` it."""
-        self.memory[Memory.PHASE] = Memory.FRESH if before is None else Memory.JUMPED
-        if before is not None:
-            self.memory[Memory.before(self.crossings.count)] = before
+    def entered(self) -> None:
+        """Run data jump: what the events were with those before is what they were at the end of
+        the last step, or before a jump there.
+        """
+        if self.memory[Memory.PHASE] == Memory.ON:
+            self.memory[Memory.PHASE] = Memory.JUMPED
+
+    def jumped(self, before: Array) -> None:
+        """Start behind a jump where the events had the values `before` it."""
+        self.memory[Memory.PHASE] = Memory.JUMPED
+        self.memory[Memory.before(self.crossings.count)] = before
 
 
 @final

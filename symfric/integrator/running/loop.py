@@ -210,6 +210,8 @@ EVENTS = {
     "noted": """
     for (i = 0; i < counts[2]; ++i) L->jumps[(L->jumped + i) * $jump] += (double)L->count;
     L->jumped += counts[2];""",
+    "entered": """
+      if (L->memory[PHASE] == ON) L->memory[PHASE] = JUMPED;""",
     "no_room": " || L->jumped == L->max_jumps",
 }
 """What a model with events adds to the attempts, and to what calls them."""
@@ -271,7 +273,7 @@ int symfric_march(symfric_loop *L)
       ++L->interval;
       L->R[T_END] = L->breaks[L->interval + 1];
       for (i = 0; i < L->n_data; ++i)
-        L->R[GIVEN - L->n_data + i] = L->data[i * L->intervals + L->interval];
+        L->R[GIVEN - L->n_data + i] = L->data[i * L->intervals + L->interval];$entered
     }
     if (L->count == L->max_rows$no_room) return 1;
     if (L->made == L->max_attempts) return 2;

@@ -161,7 +161,7 @@ class _March:
         work.want(outputs, self.events)
         work.over(inputs.breaks, inputs.values)
         # what an engine need not come back for
-        alone = crossings is None and integrator.follow is None and system.manifold is None
+        alone = integrator.follow is None and system.manifold is None
         self.reach = work.loop.intervals if alone else 1
         self.run = Run(self.t_start, y, outputs)
         self.places = [y]
@@ -300,20 +300,16 @@ class _March:
             return
         events = self.integrator.model.events
         if any(event.at_start for event in events):
-            now = self.values(self.d)
+            now = self.integrator.events(self.t, self.y, self.d).full().ravel()
             signs = (-e.direction if e.at_start else x for e, x in zip(events, now, strict=True))
             self.events.jumped(np.array(list(signs)))
 
     def jump(self) -> None:
         """Take over new input data, which algebraic unknowns follow."""
         if self.events is not None:
-            self.events.jumped(self.values(self.d))
+            self.events.entered()
         self.work.enter(self.work.loop.until)
         self.make_consistent()
-
-    def values(self, d: Array) -> Array:
-        """Values of the events here with run data `d`."""
-        return self.integrator.events(self.t, self.y, d).full().ravel()
 
     def make_consistent(self, moved: bool = False) -> None:
         """Let the algebraic unknowns follow a jump, or stop the run where they cannot.
