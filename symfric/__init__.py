@@ -6,8 +6,10 @@ from symfric.foundation.fronts import hand_out
 
 if TYPE_CHECKING:
     from symfric.figures import FigureData as FigureData
+    from symfric.figures import Recommendation as Recommendation
     from symfric.figures import compare as compare
     from symfric.figures import figure as figure
+    from symfric.figures import recommended as recommended
     from symfric.foundation.parameters import Parameter as Parameter
     from symfric.foundation.parameters import Variable as Variable
     from symfric.foundation.parameters import parameters as parameters
@@ -108,7 +110,7 @@ else:
     hand_out(
         __name__,
         {
-            "symfric.figures": "FigureData compare figure",
+            "symfric.figures": "FigureData Recommendation compare figure recommended",
             "symfric.foundation.parameters": "Parameter Variable parameters symbolise with_values",
             "symfric.foundation.status": "SolveError Status",
             "symfric.integrator": """

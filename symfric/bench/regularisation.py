@@ -30,7 +30,7 @@ from symfric.figures.regularisation import (
 )
 from symfric.foundation.files import written
 from symfric.foundation.parameters import parameters
-from symfric.laws import BrownMcPhee, ExactCoulomb, Law, LuGre, steady_force
+from symfric.laws import BrownMcPhee, ExactCoulomb, Law, LuGre, LuGreNormalised, steady_force
 from symfric.results.trajectory import Trajectory
 from symfric.scenes import FourMass, PendulumBox, Rabinowicz, Scene, SliderCrank
 
@@ -118,8 +118,8 @@ def _brown(mu_s: float, mu_d: float) -> Law:
     return BrownMcPhee(mu_s=mu_s, mu_d=mu_d, v_t=1e-2)
 
 
-def _lugre(mu_s: float, mu_d: float) -> Law:
-    return LuGre(mu_s=mu_s, mu_d=mu_d, v_s=1e-2, sigma_0=1e3, sigma_1=10.0, sigma_2=0.0)
+def _lugre(kind: type[LuGre | LuGreNormalised]) -> Law:
+    return kind(mu_s=0.15, mu_d=0.1, v_s=1e-2, sigma_0=1e3, sigma_1=10.0, sigma_2=0.0)
 
 
 def _slow_crank(law: Law) -> Scene:
@@ -132,8 +132,8 @@ CASES = (
     Case("pendulum_box brown_mcphee", _brown(0.15, 0.1), PendulumBox, 15.0),
     Case("four_mass brown_mcphee", _brown(0.12, 0.1), FourMass, 4.0),
     Case("slider_crank brown_mcphee", _brown(0.1, 0.08), _slow_crank, 5.0),
-    Case("rabinowicz lugre", _lugre(0.15, 0.1), Rabinowicz, 20.0, None, True, ("x",)),
-    Case("four_mass lugre", _lugre(0.12, 0.1), FourMass, 4.0),
+    Case("rabinowicz lugre", _lugre(LuGre), Rabinowicz, 20.0, None, True, ("x",)),
+    Case("four_mass lugre_normalised", _lugre(LuGreNormalised), FourMass, 4.0),
 )
 
 

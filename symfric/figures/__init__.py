@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from symfric.figures.hysteresis import hysteresis as hysteresis
     from symfric.figures.lag import lag as lag
     from symfric.figures.profile import profile as profile
+    from symfric.figures.recommended import Recommendation as Recommendation
+    from symfric.figures.recommended import recommended as recommended
     from symfric.figures.requirements import phenomena as phenomena
     from symfric.figures.scales import Scales as Scales
     from symfric.figures.scales import scales as scales
@@ -35,6 +37,7 @@ else:
             "symfric.figures.hysteresis": "hysteresis",
             "symfric.figures.lag": "lag",
             "symfric.figures.profile": "profile",
+            "symfric.figures.recommended": "Recommendation recommended",
             "symfric.figures.requirements": "phenomena",
             "symfric.figures.scales": "Scales scales",
             "symfric.figures.steady_state": "steady_state",

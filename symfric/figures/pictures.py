@@ -101,6 +101,8 @@ def plot_figure(data: "FigureData", path: str | Path | None = None) -> Figure:
     height = {1: 4.0, 2: 2.6}.get(len(data.panels), 1.7)
     figure, axes = panels(len(data.panels), 7.0, height, shared=len(abscissae) == 1)
     dashes = ["-", "--", ":", "-."]
+    for axis in axes:  # before any of those that share their abscissa is logarithmic
+        axis.ticklabel_format(axis="both", style="sci", scilimits=(-2, 4), useMathText=True)
     for axis, (x, y) in zip(axes, data.panels, strict=True):
         for c in data.curves:
             case = cases.index(c.case)
@@ -111,9 +113,10 @@ def plot_figure(data: "FigureData", path: str | Path | None = None) -> Figure:
                 c[x], c[y], dash, color=f"C{number % 10}", linewidth=1.2,
                 marker="o" if data.dots else None, markersize=4, label=label,
             )  # fmt: skip
-        axis.ticklabel_format(axis="both", style="sci", scilimits=(-2, 4), useMathText=True)
         if x in data.log:
             axis.set_xscale("log")
+        if y in data.log:
+            axis.set_yscale("log")
         axis.set_ylabel(f"{y} [{data.units[y]}]")
         if axis is axes[-1] or len(abscissae) > 1:
             axis.set_xlabel(f"{x} [{data.units[x]}]")

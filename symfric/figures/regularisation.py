@@ -18,7 +18,7 @@ The order q is a matter of what the motion does, not of the law alone:
 Far from the limit there is no order at all: where rest is longer than motion, creep is everything.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import process_time
 from typing import final
@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Parameter, parameters, with_values
+from symfric.integrator.equations.inputs import Input
 from symfric.integrator.simulate import simulate
 from symfric.laws import Law
 from symfric.laws.base.law import check_law
@@ -45,6 +46,8 @@ SAMPLES = 2001
 """Times at which motions are compared."""
 NEGLIGIBLE = 1e-9
 """Widths below this [m/s] only round off a modulus; they are not what makes a law smooth."""
+DIGITS = 12
+"""Of scaled parameters: what is behind is rounding."""
 STILL = 1e-9
 """A signal that moves by less than this times its nominal size is measured by the latter."""
 
@@ -56,7 +59,7 @@ class Regularisation:
 
     Attributes:
         names: what is scaled: widths and velocities by s, stiffnesses and inverse velocities by
-            1/s.
+            1/s, the damping of bristles by 1/sqrt(s), so that it stays the same part of critical.
     """
 
     law: Law
@@ -65,10 +68,8 @@ class Regularisation:
     def values(self, s: float) -> dict[str, float]:
         """Their values at the factor `s`."""
         known = parameters(self.law)
-        return {
-            n: float(known[n].value) / s if _grows(known[n]) else float(known[n].value) * s
-            for n in self.names
-        }
+        scaled = {n: float(known[n].value) * s ** _power(known[n]) for n in self.names}
+        return {n: float(f"{value:.{DIGITS}g}") for n, value in scaled.items()}
 
     def at(self, s: float) -> Law:
         """The law at the factor `s`."""
@@ -78,7 +79,7 @@ class Regularisation:
         """The factor at which the first of the parameters has this value."""
         first = parameters(self.law)[self.names[0]]
         now = float(first.value)
-        return now / value if _grows(first) else value / now
+        return (value / now) ** (1 / _power(first))
 
 
 def regularisation(
@@ -86,8 +87,8 @@ def regularisation(
 ) -> Regularisation:
     """What makes `law` smooth: `parameter`, or what its roles say.
 
-    Those are the stiffnesses of a law with bristles; else its smoothing widths [m/s]; else its
-    transition velocity.
+    Those are the stiffnesses of a law with bristles, and their damping; else its smoothing widths
+    [m/s]; else its transition velocity.
 
     Raises:
         ValueError: no law, no such parameter, or several velocities that may be meant.
@@ -101,6 +102,7 @@ def regularisation(
     widths = [n for n, p in known.items() if p.role == "width" and p.unit in ("m/s", "rad/s")]
     widths = [n for n in widths if float(known[n].value) > NEGLIGIBLE]
     stiff = [n for n, p in known.items() if p.role == "stiffness"] if law.states else []
+    stiff += [n for n, p in known.items() if stiff and p.role == "damping" and p.value != 0.0]
     named = [n for n in scales if known[n].field == "v_t"]
     found = stiff or widths or named or scales
     if not found:
@@ -128,9 +130,11 @@ def _numbers(where: str, law: Law, names: tuple[str, ...]) -> Regularisation:
     return Regularisation(law, names)
 
 
-def _grows(p: Parameter) -> bool:
-    """Whether the parameter grows as the law gets dry: a stiffness, an inverse velocity."""
-    return p.role == "stiffness" or p.unit in ("s/m", "s/rad", "1/m")
+def _power(p: Parameter) -> float:
+    """Power of s with which the parameter is scaled."""
+    if p.role == "damping":
+        return -0.5
+    return -1.0 if p.role == "stiffness" or p.unit in ("s/m", "s/rad", "1/m") else 1.0
 
 
 @final
@@ -144,6 +148,7 @@ class Bed:
         t_end: how long [s].
         of: which signals, or which numbers; None for the positions.
         free: whether the widths are parameters of one model and not numbers in each.
+        u: inputs of the model.
     """
 
     name: str
@@ -151,6 +156,7 @@ class Bed:
     t_end: float
     of: Measure | None = None
     free: bool = False
+    u: Mapping[str, Input] | None = None
 
 
 @final
@@ -178,18 +184,29 @@ class Sample:
     size: Array
 
 
-def bed_of(where: str, scene: object, t_end: float | None, of: Measure | None = None) -> Bed:
+def bed_of(
+    where: str,
+    scene: object,
+    t_end: float | None,
+    of: Measure | None = None,
+    u: Mapping[str, Input] | None = None,
+) -> Bed:
     """A scene, a class of scenes or a function law -> model as a bed.
+
+    A scene is driven as it is when nobody says how, unless `u` says so.
 
     Raises:
         ValueError: none of these, or no end where nothing says one.
     """
+    if of is not None and not callable(of):
+        of = checks.names(f"{where}: of", of)
     known = scene if isinstance(scene, type) else type(scene)
     if issubclass(known, Scene):
         end = _end(where, known.t_end if t_end is None else t_end)
+        u = {name: given.function for name, given in known.inputs.items()} | dict(u or {})
         if isinstance(scene, Scene):
-            return Bed(known.__name__, lambda law: replace(scene, law=law).model(), end, of)
-        return Bed(known.__name__, lambda law: known(law).model(), end, of)
+            return Bed(known.__name__, lambda law: replace(scene, law=law).model(), end, of, u=u)
+        return Bed(known.__name__, lambda law: known(law).model(), end, of, u=u)
     if not callable(scene):
         raise checks.refused(
             f"{where}: scene", "a scene such as FourMass, or a function law -> Model", scene
@@ -203,7 +220,7 @@ def bed_of(where: str, scene: object, t_end: float | None, of: Measure | None = 
         made: object = build(law)
         return checks.kind(f"{where}: scene({type(law).__name__})", made, Model, "a Model")
 
-    return Bed(name, model, _end(where, t_end), of)
+    return Bed(name, model, _end(where, t_end), of, u=u)
 
 
 def _end(where: str, t_end: object) -> float:
@@ -217,6 +234,7 @@ def sample(
     s: float = 0.0,
     values: dict[str, float] | None = None,
     repeats: int = 1,
+    max_steps: int = 10_000_000,
 ) -> Sample:
     """Run the machine of `bed` with `law`, timed as the fastest of `repeats` calls.
 
@@ -228,7 +246,9 @@ def sample(
     def timed() -> tuple[float, Trajectory]:
         begin = process_time()
         p = values if bed.free else None
-        run = simulate(model, bed.t_end, rtol=rtol, samples=SAMPLES, p=p)
+        run = simulate(
+            model, bed.t_end, rtol=rtol, samples=SAMPLES, p=p, u=bed.u, max_steps=max_steps
+        )
         return process_time() - begin, run
 
     spent, run = min((timed() for _ in range(repeats)), key=lambda pair: pair[0])
@@ -239,13 +259,14 @@ def sample(
 
 def _looked_at(bed: Bed, model: Model, run: Trajectory, law: Law) -> tuple[Array, Array]:
     """What errors are measured on, and relative to what."""
-    if bed.of is not None and callable(bed.of):
-        rows = np.atleast_2d(np.asarray(bed.of(run), float)).reshape(-1, 1)
-        return rows, np.abs(rows).max(axis=1)
+    if callable(bed.of):
+        rows = checks.array(f"{bed.name}: of", bed.of(run), ndim=None, nan=True).reshape(-1, 1)
+        size = np.abs(rows)[:, 0]
+        return rows, np.where(size > 0, size, 1.0)
     own = {state.name for state in law.states}
     machine = [v.name for v in model.x if v.name not in own]
     positions = [v.name for v in model.x if v.kind == POSITION]
-    names = checks.names("of", bed.of, model.signals) if bed.of else (positions or machine)
+    names = bed.of or positions or machine
     rows = np.array([run[name] for name in names])
     nominal = {v.name: v.nominal for v in model.x}
     least = STILL * np.array([nominal.get(name, 1.0) for name in names])
@@ -258,7 +279,7 @@ def distance(one: Sample, reference: Sample) -> float:
 
     NaN where they are not comparable: another number of cycles, say.
     """
-    if one.motion.shape != reference.motion.shape:
+    if one.motion.shape != reference.motion.shape or not one.motion.size:
         return float("nan")
     off = np.abs(one.motion - reference.motion).max(axis=1)
     return float((off / reference.size).max())

@@ -27,7 +27,8 @@ from symfric.scenes import PendulumBox, Rabinowicz
         (BrownMcPhee(), ("v_t",)),
         (Coulomb(), ("v_eps",)),
         (Specker(), ("v_t",)),
-        (LuGre(), ("sigma_0",)),
+        (LuGre(), ("sigma_0", "sigma_1")),
+        (LuGre(sigma_1=0.0), ("sigma_0",)),
         (MaxwellSlip(), ("k_1", "k_2", "k_3", "k_4")),
     ],
 )
@@ -36,9 +37,10 @@ def test_roles_say_what_makes_a_law_smooth(law: Law, names: tuple[str, ...]) -> 
 
 
 def test_stiffness_and_inverse_velocity_grow_where_widths_shrink() -> None:
-    soft, wide = regularisation("here", LuGre(sigma_0=1e4)), regularisation("here", BrownMcPhee())
+    soft = regularisation("here", LuGre(sigma_0=1e4, sigma_1=10.0))
+    wide = regularisation("here", BrownMcPhee())
     slope = regularisation("here", DuanSingh(sigma=50.0), "sigma")
-    assert soft.values(0.1) == pytest.approx({"sigma_0": 1e5})
+    assert soft.values(0.01) == pytest.approx({"sigma_0": 1e6, "sigma_1": 100.0})
     assert wide.values(0.1) == pytest.approx({"v_t": 1e-4})
     assert slope.values(0.5) == pytest.approx({"sigma": 100.0})
     for knob in (soft, wide, slope):
