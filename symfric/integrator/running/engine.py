@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import flat_view
 from symfric.integrator.compiled.compiler import load
+from symfric.integrator.equations.following import Following
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.running.crossings import Crossings
 from symfric.integrator.running.dense import pieces_of
@@ -25,7 +26,9 @@ Array = NDArray[np.float64]
 
 
 class Stop(IntEnum):
-    """Why an engine returned; the last three are what events ask for (`running.events`)."""
+    """Why an engine returned: also for what events ask for (`running.events`), and for algebraic
+    unknowns that have to be searched for behind a jump of inputs.
+    """
 
     END = 0
     FULL = 1
@@ -34,6 +37,7 @@ class Stop(IntEnum):
     TERMINAL = 4
     STORM = 5
     FOLLOW = 6
+    SEARCH = 7
 
 
 STOPS = tuple(Stop)
@@ -58,7 +62,7 @@ class Engine(Protocol):
         ...
 
     def march(self, work: Work, attempts: int) -> tuple[Array, int, Stop]:
-        """Advance `work` over its input intervals up to `until`, and fill its outputs.
+        """Advance `work` over its input intervals, and fill its outputs.
 
         Returns records that the next call writes over, the attempts made and why it stopped.
         """
@@ -76,12 +80,13 @@ class VmEngine:
 
     step: ca.Function
     batch: ca.Function
+    follows: bool = False
     name: str = "vm"
 
     @classmethod
-    def of(cls, step: ca.Function, size: int = 32) -> "VmEngine":
-        """The engine for a step Function."""
-        return cls(step, step.mapaccum("batch", size))
+    def of(cls, step: ca.Function, size: int = 32, follows: bool = False) -> "VmEngine":
+        """The engine for a step Function; algebraic unknowns, if any, `follow` jumps of inputs."""
+        return cls(step, step.mapaccum("batch", size), follows)
 
     def run(
         self,
@@ -160,11 +165,14 @@ class VmEngine:
             count, made = count + records.shape[0], made + tried
             if records.shape[0]:
                 work.outputs.fill(pieces_of(records, work.n))
-            if stop is not Stop.END or loop.interval + 1 == loop.until:
+            if stop is not Stop.END or loop.interval + 1 == loop.intervals:
                 break
             work.enter(loop.interval + 1)
             if work.events is not None:
                 work.events.entered()
+            if self.follows:
+                stop = Stop.SEARCH
+                break
             if count == loop.max_rows or made == attempts:
                 stop = Stop.FULL if count == loop.max_rows else Stop.ATTEMPTS
                 break
@@ -219,10 +227,16 @@ class CompiledEngine:
 
     @classmethod
     def of(
-        cls, step: ca.Function, dense_rows: int, crossings: Crossings | None = None
+        cls,
+        step: ca.Function,
+        dense_rows: int,
+        crossings: Crossings | None = None,
+        follows: bool = False,
+        follow: Following | None = None,
     ) -> "CompiledEngine":
-        """Compile the step and the search for events, or load them from the cache."""
-        library = load(loop_source(step, dense_rows, crossings), "symfric_march")
+        """Compile the loop of these parts (`loop_source`), or load it from the cache."""
+        source = loop_source(step, dense_rows, crossings, follows, follow)
+        library = load(source, "symfric_march")
         library.symfric_march.restype = ctypes.c_int
         library.symfric_march.argtypes = [ctypes.c_void_p]
         return cls(library, step.numel_in(0) - State.MEMORY, step.numel_in(1), dense_rows)
@@ -236,7 +250,7 @@ class CompiledEngine:
         if S[State.T] >= R[Given.T_END]:
             return work.rows[:0], 0, Stop.END
         work.over(np.array([S[State.T], R[Given.T_END]]), np.zeros((0, 1)))
-        work.loop.h_min, work.loop.until = h_min, 1
+        work.loop.h_min = h_min
         records, made, stop = self.march(work, attempts)
         S[:] = work.S
         return records, made, stop

@@ -30,6 +30,7 @@ from symfric.model import Model
 
 Array = NDArray[np.float64]
 Point = tuple[bytes | float, ...]
+Parts = tuple[ca.Function, int, Crossings | None, bool, Following | None]
 Orders = tuple[tuple[str, Order], ...]
 INLINE = 7000
 """Steps with more instructions are calls of blocks, which compile much faster; both engines run the
@@ -95,14 +96,13 @@ class Integrator:
 
     def _crossings(self) -> Crossings:
         """What the search for events evaluates."""
-        model, system = self.model, self.system
         return crossings(
-            model.events,
-            [v.name for v in model.x],
+            self.model.events,
+            [v.name for v in self.model.x],
             self.events,
             self.resets,
             self.tableau.H.shape[0],
-            follows=bool(system.free.any()) or system.manifold is not None,
+            self.follows,
         )
 
     def of_time(self, name: str, expression: ca.SX) -> ca.Function:
@@ -112,6 +112,11 @@ class Integrator:
         if s.timed:
             return ca.Function(name, [t, s.y, s.d], [driven])
         return ca.Function(name, [self.model.t, s.y, s.d], [driven])
+
+    @property
+    def follows(self) -> bool:
+        """Whether there are algebraic unknowns, which follow jumps."""
+        return bool(self.system.free.any()) or self.system.manifold is not None
 
     @cached_property
     def follow(self) -> Following | None:
@@ -219,8 +224,15 @@ class Integrator:
         """The engine that needs no compiler."""
         if "vm" not in self._engines:
             size = EVENT_BATCH if self.model.events else BATCH
-            self._engines["vm"] = VmEngine.of(self.step, size)
+            self._engines["vm"] = VmEngine.of(self.step, size, self.follows)
         return self._engines["vm"]
+
+    @property
+    def _parts(self) -> Parts:
+        """What the compiled loop is made of."""
+        # what nothing drives seldom jumps: not worth the compiler's time
+        follow = self.follow if self.follows and self.model.u else None
+        return self.step, self.tableau.H.shape[0], self.crossings, self.follows, follow
 
     def compiled(self) -> Engine:
         """The compiled engine; compiles, or loads from the cache, on first use.
@@ -230,8 +242,7 @@ class Integrator:
         """
         if "compiled" not in self._engines:
             begin = perf_counter()
-            rows = self.tableau.H.shape[0]
-            self._engines["compiled"] = CompiledEngine.of(self.step, rows, self.crossings)
+            self._engines["compiled"] = CompiledEngine.of(*self._parts)
             self.compile_time = perf_counter() - begin
         return self._engines["compiled"]
 
@@ -263,7 +274,6 @@ class Integrator:
             return self.compiled()
         if expected > 2 * look_up and "looked up" not in self._engines:
             self._engines["looked up"] = self.vm()
-            rows = self.tableau.H.shape[0]
-            if compiled_before(loop_source(self.step, rows, self.crossings)) is not None:
+            if compiled_before(loop_source(*self._parts)) is not None:
                 return self.compiled()
         return self.vm()

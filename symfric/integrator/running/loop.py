@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.integrator.equations.following import Following
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.running.crossings import Crossings
 from symfric.integrator.running.events import Eventful
@@ -42,7 +43,7 @@ class Loop(ctypes.Structure):
         *(
             (name, ctypes.c_longlong)
             for name in ("max_rows", "max_attempts", "max_jumps", "n_times", "found", "intervals",
-                         "interval", "until", "n_data", "count", "made", "jumped")
+                         "interval", "n_data", "count", "made", "jumped")
         ),
     )  # fmt: skip
 
@@ -114,11 +115,30 @@ def c_source(
     return generator.dump() + search_source(crossings, step.numel_in(1)) + attempts
 
 
-def loop_source(step: ca.Function, dense_rows: int, crossings: Crossings | None = None) -> str:
-    """C of the whole loop."""
+def loop_source(
+    step: ca.Function,
+    dense_rows: int,
+    crossings: Crossings | None = None,
+    follows: bool = False,
+    follow: Following | None = None,
+) -> str:
+    """C of the whole loop.
+
+    Args:
+        step, dense_rows: one attempt.
+        crossings: events.
+        follows: whether there are algebraic unknowns, which follow a jump of inputs.
+        follow: how; where it is left out, the loop returns at each jump.
+    """
     numbers = _numbers(step, dense_rows, crossings)
-    pieces = Template(STRUCT + OUTPUTS + MARCH).substitute(numbers)
-    return c_source(step, dense_rows, crossings=crossings) + pieces
+    followed = "\n      return 7;" if follows else ""
+    if follow is not None:
+        data = step.numel_in(1) - follow.round.numel_in(1)
+        followed = f"\n      if (symfric_follow(L->S + {State.MEMORY}, L->R + {data})) return 7;"
+    pieces = Template(STRUCT + OUTPUTS + MARCH).substitute(numbers, followed=followed)
+    others = () if follow is None else (follow.round,)
+    jump = "" if follow is None else follow.c_source
+    return c_source(step, dense_rows, *others, crossings=crossings) + jump + pieces
 
 
 def _numbers(
@@ -225,8 +245,8 @@ typedef struct {
   const double *breaks, *data;
   double *memory, *jumps;
   double h_min;
-  long long max_rows, max_attempts, max_jumps, n_times, found, intervals, interval, until, n_data,
-            count, made, jumped;
+  long long max_rows, max_attempts, max_jumps, n_times, found, intervals, interval, n_data;
+  long long count, made, jumped;
 } symfric_loop;
 """
 
@@ -252,8 +272,8 @@ static void symfric_outputs(symfric_loop *L, const double *row, int last)
 """
 
 MARCH = """
-/* Steps up to input interval `until`, a full record, a number of attempts, a tiny step, or what
-   events ask for. */
+/* Steps over all input intervals, up to a full record, a number of attempts, a tiny step, or what
+   events ask for; 7 where algebraic unknowns have to be searched for behind a jump of inputs. */
 int symfric_march(symfric_loop *L)
 {
   enum { WIDTH = $width, T_END = $t_end, GIVEN = $given };
@@ -269,11 +289,11 @@ int symfric_march(symfric_loop *L)
     }
     if (stop >= 3) return stop;
     if (stop == 0) {
-      if (L->interval + 1 == L->until) return 0;
+      if (L->interval + 1 == L->intervals) return 0;
       ++L->interval;
       L->R[T_END] = L->breaks[L->interval + 1];
       for (i = 0; i < L->n_data; ++i)
-        L->R[GIVEN - L->n_data + i] = L->data[i * L->intervals + L->interval];$entered
+        L->R[GIVEN - L->n_data + i] = L->data[i * L->intervals + L->interval];$entered$followed
     }
     if (L->count == L->max_rows$no_room) return 1;
     if (L->made == L->max_attempts) return 2;

@@ -160,9 +160,6 @@ class _March:
         outputs = Outputs.at(times, system.n)
         work.want(outputs, self.events)
         work.over(inputs.breaks, inputs.values)
-        # what an engine need not come back for
-        alone = integrator.follow is None and system.manifold is None
-        self.reach = work.loop.intervals if alone else 1
         self.run = Run(self.t_start, y, outputs)
         self.places = [y]
 
@@ -187,36 +184,17 @@ class _March:
         return self.work.R[Given.d(self.integrator.system.nx)].copy()
 
     def whole(self) -> None:
-        """Integrate over all input intervals, as many at once as need nobody in between."""
-        loop = self.work.loop
+        """Integrate over all input intervals."""
         self.before_start()
-        while True:
-            loop.until = min(loop.interval + self.reach, loop.intervals)
-            self.stretch()
-            if self.run.status is not Status.SUCCESS or loop.until == loop.intervals:
-                return
-            self.jump()
-            if self.run.status is not Status.SUCCESS:
-                return
-
-    def stretch(self) -> None:
-        """Integrate up to the end of the last interval that engines may enter."""
-        left, end = 0.0, float(self.work.breaks[self.work.loop.until])
-        while self.t < end:
+        left, reason = 0.0, Stop.FULL
+        while reason is not Stop.END and self.run.status is Status.SUCCESS:
             records, reason, left = self.attempts(left)
-            if self.run.status is not Status.SUCCESS:
-                return
-            self.happen()
-            self.run.keep(records.copy())
-            self.heed(reason)
-            if self.run.status is not Status.SUCCESS:
-                return
-            self.report()
-
-    def report(self) -> None:
-        """Tell how far it is."""
-        if self.progress is not None:
-            self.progress((self.t - self.t_start) / self.span)
+            if self.run.status is Status.SUCCESS:
+                self.happen()
+                self.run.keep(records.copy())
+                self.heed(reason)
+            if self.run.status is Status.SUCCESS and self.progress is not None:
+                self.progress((self.t - self.t_start) / self.span)
 
     def finish(self) -> None:
         """Outputs at the very end, where engines did not know that it is."""
@@ -289,6 +267,8 @@ class _March:
                 Status.EVENT_STORM,
                 f"{Status.EVENT_STORM.value} It stands at t = {self.t:.9g} s, event '{name}'.",
             )
+        elif reason is Stop.SEARCH:
+            self.make_consistent()
         elif reason is Stop.FOLLOW:
             last, events = self.run.jumps[-1], self.integrator.model.events
             self.make_consistent(moved=any(events[i].reset for i in np.flatnonzero(last.which[-1])))
@@ -303,13 +283,6 @@ class _March:
             now = self.integrator.events(self.t, self.y, self.d).full().ravel()
             signs = (-e.direction if e.at_start else x for e, x in zip(events, now, strict=True))
             self.events.jumped(np.array(list(signs)))
-
-    def jump(self) -> None:
-        """Take over new input data, which algebraic unknowns follow."""
-        if self.events is not None:
-            self.events.entered()
-        self.work.enter(self.work.loop.until)
-        self.make_consistent()
 
     def make_consistent(self, moved: bool = False) -> None:
         """Let the algebraic unknowns follow a jump, or stop the run where they cannot.

@@ -32,6 +32,7 @@ from symfric import (
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.running import run
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.run import _March
 from symfric.laws import ALL_LAWS
 from symfric.scenes import PendulumBox, SliderCrank
 
@@ -55,6 +56,16 @@ def eventful_dae() -> Model:
     )  # fmt: skip
 
 
+HELD = {"force": Hold([0.0, 0.3, 0.4, 0.9], [0.0, 15.0, -15.0, 20.0])}
+
+
+def cubic() -> Model:
+    """z + z^3 = x + u: near jumps of u are followed in the loop, a far one takes a search."""
+    x, z, u = Variable("x", "1"), Variable("z", "1"), Variable("u", "1")
+    alg = z.symbol + z.symbol**3 - x.symbol - u.symbol
+    return Model("cubic", x=(x,), z=(z,), u=(u,), ode=-z.symbol, alg=alg)
+
+
 Case = tuple[Callable[[], Model], float, dict[str, Any]]
 CASES: dict[str, Case] = {
     "events": (lambda: drive(ExactCoulomb()), 2.0, {"u": FORCE}),
@@ -62,9 +73,11 @@ CASES: dict[str, Case] = {
     "many events": (lambda: drive(MaxwellSlip(form="event")), 2.0, {"u": SAMPLED}),
     "events of an unknown": (eventful_dae, 3.0, {"u": {"u": Hold([0, 1], [0, 2])}}),
     "samples": (lambda: drive(LuGre()), 1.0, {"u": SAMPLED}),
+    "held events": (lambda: drive(ExactCoulomb()), 2.0, {"u": HELD}),
+    "held cubic": (cubic, 2.0, {"u": {"u": Hold([0.0, 0.5, 1.0], [0.0, 0.4, 90.0])}}),
     "exponentials": (lambda: rabinowicz(RateAndState(), free=["k"]), 0.5, {"p": {"k": 3.0}}),
     "normal force": (lambda: PendulumBox(LAW).model(), 2.0, {}),
-    "loop": (lambda: SliderCrank(LAW).model(), 0.1, {}),
+    "loop": (lambda: SliderCrank(LAW).model(), 0.1, {"times": [0.02, 0.04]}),
     "few steps": (lambda: rabinowicz(LuGre()), 5.0, {"max_steps": 70}),
     "loose": (lambda: rabinowicz(LuGre()), 5.0, {"method": "radau5"}),
 }
@@ -175,3 +188,21 @@ def test_every_law_gives_the_same_bits_by_both_engines() -> None:
             assert vm == compiled, model.name
             count += 1
     assert count > 80
+
+
+@needs_compiler
+def test_only_a_far_jump_is_searched_for_behind_the_compiled_loop(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two jumps of three: the loop comes back for the far one alone."""
+    searched = list[float]()
+    search = _March.make_consistent
+
+    def counted(self: _March, moved: bool = False) -> None:
+        searched.append(self.t)
+        search(self, moved)
+
+    monkeypatch.setattr(_March, "make_consistent", counted)
+    _, t_end, arguments = CASES["held cubic"]
+    simulate(cubic(), t_end, backend="compiled", **arguments)
+    assert searched == [1.0]
