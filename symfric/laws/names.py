@@ -5,17 +5,10 @@ from re import fullmatch
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
 from symfric.laws.base.law import Law, check_law
+from symfric.laws.catalogue import ALL_LAWS
 from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum
 from symfric.laws.composed.populations import AnyLaw, GenericAsperity, Population, RandomBristles
 from symfric.laws.composed.wrap import Lagged, TemperatureDependent
-from symfric.laws.dynamic import DYNAMIC_LAWS
-from symfric.laws.static import STATIC_LAWS
-
-ALL_LAWS: dict[str, type[Law]] = {
-    **STATIC_LAWS,
-    **DYNAMIC_LAWS,
-}
-"""Every law that stands alone, by name; the contract tests run over it."""
 
 POPULATIONS: dict[str, type[GenericAsperity | RandomBristles]] = {
     "generic_asperity": GenericAsperity,

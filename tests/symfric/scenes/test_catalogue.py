@@ -3,7 +3,7 @@
 import pytest
 
 from symfric import Law, rabinowicz, simulate
-from symfric.laws.dynamic import DYNAMIC_LAWS
+from symfric.laws.catalogue import DYNAMIC_LAWS
 
 IDEAL, WITHOUT_STICTION = 0.5705, 0.4354
 
