@@ -6,8 +6,11 @@ from concurrent.futures import Executor, Future
 from typing import Any
 
 import numpy as np
+import pytest
 
+import symfric.integrator.many.members as members
 from symfric import Ensemble, Model, Variable
+from symfric.integrator.many.vectors import lanes_header
 
 
 class Inline(Executor):
@@ -28,6 +31,25 @@ class Inline(Executor):
 
     def _gone(self) -> None:
         self.alive -= 1
+
+
+def with_functions_of_libm(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lanes whose functions are those of libm: a member has the bits of a run of its own then."""
+    ones = ("exp", "expm1", "log", "tanh", "sin", "cos", "tan", "atan", "asin", "acos")
+    text = "".join(
+        f"static V of_libm_{f}(V x) {{ for (int l = 0; l < LANES; ++l) x[l] = {f}(x[l]);"
+        f" return x; }}\n#define v_{f} of_libm_{f}\n"
+        for f in ones
+    ) + "".join(
+        f"static V of_libm_{f}(V x, V y) {{ for (int l = 0; l < LANES; ++l)"
+        f" x[l] = {f}(x[l], y[l]); return x; }}\n#define v_{f} of_libm_{f}\n"
+        for f in ("pow", "atan2")
+    )
+    text += (
+        "static V of_libm_sincos(V x, V *c) { *c = of_libm_cos(x); return of_libm_sin(x); }\n"
+        "#define v_sincos of_libm_sincos\n"
+    )
+    monkeypatch.setattr(members, "lanes_header", lambda lanes=0: lanes_header(lanes) + text)
 
 
 def assert_same(one: Ensemble, other: Ensemble) -> None:

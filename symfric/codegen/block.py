@@ -11,8 +11,8 @@ from typing import final
 import casadi as ca
 
 from symfric.codegen.c99 import FUNCTIONS
-from symfric.codegen.graph import graph
 from symfric.foundation import checks
+from symfric.foundation.graph import graph
 from symfric.foundation.symbols import strays, symbols_of
 from symfric.model import Output, Variables
 

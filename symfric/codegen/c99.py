@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from symfric.codegen.graph import SELECT
+from symfric.foundation.graph import SELECT
 
 TERNARY, LOGIC, EQUAL, ORDER, SUM, PRODUCT, SIGN, ATOM = range(1, 9)
 """How tightly a C expression binds."""

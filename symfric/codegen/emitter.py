@@ -24,7 +24,7 @@ from symfric.codegen.c99 import (
     form,
     operation_name,
 )
-from symfric.codegen.graph import LEAVES, Graph
+from symfric.foundation.graph import LEAVES, Graph
 
 LONGEST = 5
 """Operations of an operand beyond which it becomes a local."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import casadi as ca
 
 from symfric.codegen.c99 import TRANSCENDENTAL
-from symfric.codegen.graph import graph
+from symfric.foundation.graph import graph
 from symfric.foundation.parameters import parameters, with_values
 from symfric.laws import Law
 

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.codegen.graph import LEAVES, graph, rebuild
+from symfric.foundation.graph import LEAVES, graph, rebuild
 from symfric.integrator.methods.exponential import phi1_phi2
 
 

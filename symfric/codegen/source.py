@@ -17,7 +17,7 @@ import casadi as ca
 from symfric.codegen.block import GROUPS, Block
 from symfric.codegen.c99 import TRANSCENDENTAL, Real, macro
 from symfric.codegen.emitter import emit
-from symfric.codegen.graph import graph
+from symfric.foundation.graph import graph
 
 WIDTH = 100
 

@@ -211,10 +211,10 @@ EMIT = (
         "return self.text if self.binds >= least else", "return self.text if True else", T_EMITTER,
     ),
     Mutant(
-        "the parts of a conditional change places", "symfric/codegen/graph.py",
+        "the parts of a conditional change places", "symfric/foundation/graph.py",
         "return Node(SELECT, (yes.args[0], yes.args[1], no.args[1]))",
         "return Node(SELECT, (yes.args[0], no.args[1], yes.args[1]))",
-        ("tests/symfric/codegen/test_graph.py",),
+        ("tests/symfric/foundation/test_graph.py",),
     ),
     Mutant(
         "a shared value is written out each time", EMITTER,

@@ -89,17 +89,15 @@ class Job:
             [(k, k + 1) for k in range(intervals)] if self.program.constraints else [(0, intervals)]
         )
 
-    def stretch(self, first: int, last: int) -> tuple[Stretch, Indices]:
+    def stretch(self, first: int, last: int, members: int) -> tuple[Stretch, Indices]:
         """The input intervals first ... last - 1, and which of the times belong to them."""
         breaks = self.breaks[first : last + 1]
         h_min = smallest_step(float(self.breaks[-1] - self.breaks[0]))
-        ends = np.inf if last == self.breaks.size - 1 else breaks[-1]
-        inside = np.flatnonzero((self.times >= breaks[0]) & (self.times < ends))
-        data = np.ascontiguousarray(self.data[:, first:last])
-        return (
-            Stretch(breaks, data, self.times[inside], self.max_steps, h_min),
-            inside,
-        )
+        until = np.inf if last == self.breaks.size - 1 else breaks[-1]
+        inside = np.flatnonzero((self.times >= breaks[0]) & (self.times < until))
+        data, times = self.data[None, :, first:last], self.times[None, inside]
+        ends, h_min = np.full(members, breaks[-1]), np.full(members, h_min)
+        return Stretch(breaks, data, ends, h_min, times, self.max_steps), inside
 
 
 def digest(*parts: object) -> str:
@@ -150,9 +148,9 @@ def _solved(job: Job, chunk: Chunk) -> tuple[Solved, Array]:
     failed: dict[int, str] = {}
     size = np.zeros((alive.size, job.program.nx))
     for first, last in job.stretches:
-        stretch, inside = job.stretch(first, last)
         if job.program.constraints:
             alive = _follow(job, chunk, S, alive, first, failed)
+        stretch, inside = job.stretch(first, last, alive.size)
         part, made = S[alive], attempts[alive]
         found, reason, largest = runner.run(part, chunk.R[alive], made, stretch)
         size[alive] = np.maximum(size[alive], largest[:, : job.program.nx])

@@ -12,8 +12,8 @@ from symfric.codegen import Block, generate
 from symfric.codegen.c99 import DOUBLE, FLOAT, FORMS, FUNCTIONS, REALS
 from symfric.codegen.compiler import link_program
 from symfric.codegen.emitter import emit
-from symfric.codegen.graph import LEAVES, graph
 from symfric.codegen.runner import program, run_c, run_vm
+from symfric.foundation.graph import LEAVES, graph
 
 a, b = Variable("a", "1"), Variable("b", "1")
 x, y = a.symbol, b.symbol

@@ -19,7 +19,7 @@ from symfric import (
     simulate,
 )
 from symfric.codegen import law_block
-from symfric.codegen.graph import graph
+from symfric.foundation.graph import graph
 from symfric.laws import (
     GMS,
     Armstrong,

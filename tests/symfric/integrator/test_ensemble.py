@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from differentiable import oscillator, pendulum, root, switched
-from ensembles import Inline, after, assert_same, explosive
+from ensembles import Inline, after, assert_same, explosive, with_functions_of_libm
 
 from symfric import (
     BrownMcPhee,
@@ -46,8 +46,14 @@ def assert_member(many: Ensemble, m: int, model: Model, t_end: float, **argument
 
 @each_engine
 @pytest.mark.parametrize("law", LAWS)
-def test_members_are_what_simulate_gives(law: str, backend: str) -> None:
-    """Over start values and parameters; at the start, between the steps and at the end."""
+def test_members_are_what_simulate_gives(
+    law: str, backend: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Over start values and parameters; at the start, between the steps and at the end.
+
+    With the functions of libm: see `test_own_functions_change_no_member` for others.
+    """
+    with_functions_of_libm(monkeypatch)
     model = rabinowicz(LAWS[law], free=["mu_s", "k"])
     times, mu_s = [0.0, 0.3, 2.71, 9.0], np.linspace(0.12, 0.18, 7)
     many = simulate_many(
@@ -64,6 +70,18 @@ def test_members_are_what_simulate_gives(law: str, backend: str) -> None:
             many, m, model, 9.0, x0={"v": VELOCITIES[m]}, p={"mu_s": mu_s[m], "k": 2.0},
             backend=backend,
         )  # fmt: skip
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_own_functions_change_no_member(law: str) -> None:
+    """Their last digit is another than libm's; steps, which follow it, end within the tolerance."""
+    model, times = rabinowicz(LAWS[law]), [2.71, 9.0]
+    many = simulate_many(model, 9.0, x0={"v": VELOCITIES}, t_eval=times, backend="compiled")
+    vm = simulate_many(model, 9.0, x0={"v": VELOCITIES}, t_eval=times, backend="vm", rtol=1e-10)
+    plain = simulate_many(model, 9.0, x0={"v": VELOCITIES}, t_eval=times, backend="vm")
+    error, of_vm = (np.abs(found["x"] - vm["x"]).max() for found in (many, plain))
+    assert error < max(3 * of_vm, 1e-6)
+    assert many.attempts == pytest.approx(plain.attempts, rel=0.05)
 
 
 INPUTS: dict[str, tuple[Callable[[], Model], Any]] = {

@@ -75,9 +75,9 @@ def test_only_members_with_algebraic_unknowns_stop_at_every_input_interval() -> 
 def test_time_at_which_an_interval_begins_belongs_to_it() -> None:
     u: dict[str, Input] = {"u": Hold([0.0, 0.5], [1.0, -1.0])}
     job, _ = task(switched(), [1.0, 0.0], u=u)
-    (first, of_first), (last, of_last) = (job.stretch(*s) for s in job.stretches)
-    assert (first.times.tolist(), of_first.tolist()) == ([0.0], [0])
-    assert (last.times.tolist(), of_last.tolist()) == ([0.5, 1.0], [1, 2])
+    (first, of_first), (last, of_last) = (job.stretch(*s, 2) for s in job.stretches)
+    assert (first.times.tolist(), of_first.tolist()) == ([[0.0]], [0])
+    assert (last.times.tolist(), of_last.tolist()) == ([[0.5, 1.0]], [1, 2])
 
 
 def test_equal_jobs_have_one_digest_and_every_field_counts() -> None:

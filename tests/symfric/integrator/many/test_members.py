@@ -1,6 +1,7 @@
 """The loop over members: compiled and in the virtual machine, where they stop and go on."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -41,8 +42,11 @@ def columns(inputs: InputData, model: Model, starts: list[list[float]]) -> tuple
     return S, np.tile(R, (len(starts), 1)), np.zeros(len(starts), dtype=np.int64)
 
 
-def stretch(inputs: InputData, times: list[float], max_steps: int = 10_000) -> Stretch:
-    return Stretch(inputs.breaks, inputs.values, np.array(times), max_steps, 1e-15)
+def stretch(
+    inputs: InputData, times: list[float], members: int = 1, max_steps: int = 10_000
+) -> Stretch:
+    ends, h_min = np.full(members, inputs.breaks[-1]), np.full(members, 1e-15)
+    return Stretch(inputs.breaks, inputs.values[None], ends, h_min, np.array([times]), max_steps)
 
 
 @each_loop
@@ -52,7 +56,7 @@ def test_held_input_belongs_to_the_interval_that_it_begins(make: Make) -> None:
     S, R, made = columns(inputs, model, [[1.0, 0.0], [0.0, 0.0]])
     before = R.copy()
     found, reason, _ = make(Integrator(model, inputs, RODAS5P)).run(
-        S, R, made, stretch(inputs, [0.0, 0.1, 0.3, 0.5, 0.6, 1.0])
+        S, R, made, stretch(inputs, [0.0, 0.1, 0.3, 0.5, 0.6, 1.0], 2)
     )
     assert found[:, :, 2].tolist() == [[1.0, 1.0, -2.0, -2.0, 3.0, 3.0]] * 2
     assert found[0, 0].tolist() == [1.0, 0.0, 1.0, 2.0]
@@ -70,7 +74,7 @@ def test_attempts_made_before_count(make: Make) -> None:
     members = make(Integrator(model, inputs, RODAS5P))
     S, R, made = columns(inputs, model, [[1.0, 0.0], [1.0, 0.0]])
     made[1] = 64
-    found, reason, largest = members.run(S, R, made, stretch(inputs, [0.0, 100.0], max_steps=96))
+    found, reason, largest = members.run(S, R, made, stretch(inputs, [0.0, 100.0], 2, max_steps=96))
     assert largest[:, 0].tolist() == [1.0, 1.0]  # it swings about zero from there
     assert (largest[:, 1] > 1).all()
     assert reason.tolist() == [Stop.ATTEMPTS] * 2
@@ -89,7 +93,7 @@ def test_two_stretches_are_one(make: Make) -> None:
     whole, *_ = members.run(S.copy(), R, made.copy(), stretch(inputs, times))
     parts = []
     for a, b, at in ((0.0, 1.0, [0.5]), (1.0, 2.0, [1.5, 2.0])):
-        part = Stretch(np.array([a, b]), inputs.values, np.array(at), 10_000, 1e-15)
+        part = replace(stretch(inputs, at), breaks=np.array([a, b]), ends=np.array([b]))
         parts.append(members.run(S, R, made, part)[0])
     assert np.concatenate(parts, axis=1) == pytest.approx(whole, rel=1e-5)
 

@@ -3,7 +3,7 @@
 import casadi as ca
 import pytest
 
-from symfric.codegen.graph import SELECT, graph, rebuild
+from symfric.foundation.graph import SELECT, graph, rebuild
 
 x, y = ca.SX.sym("x"), ca.SX.sym("y")
 

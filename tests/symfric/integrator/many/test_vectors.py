@@ -1,0 +1,214 @@
+"""Members side by side: the functions of lanes.h, and that nobody's bits depend on a neighbour."""
+
+import ctypes
+from collections.abc import Callable
+
+import casadi as ca
+import numpy as np
+import pytest
+from differentiable import oscillator
+from ensembles import explosive
+
+from symfric import LuGre, Model, rabinowicz
+from symfric.integrator.compiled.compiler import load
+from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.many import vectors
+from symfric.integrator.many.members import CompiledMembers, Stretch, many_source
+from symfric.integrator.many.vectors import lanes_header, vector_source
+from symfric.integrator.methods.tableaux import RODAS5P
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.step.layout import Given, State
+
+LOOP = """
+void apply(const double *x, const double *y, double *out, long long n)
+{
+  V a, b, o[ROWS], w[WORK + 1];
+  const V *arg[2] = {&a, &b};
+  V *res[1] = {o};
+  for (long long k = 0; k < n; k += LANES) {
+    for (int l = 0; l < LANES; ++l) a[l] = x[k + l], b[l] = y[k + l];
+    f(arg, res, w);
+    for (int i = 0; i < ROWS; ++i)
+      for (int l = 0; l < LANES; ++l) out[i * n + k + l] = o[i][l];
+  }
+}
+"""
+ARITHMETIC: dict[str, Callable[[ca.SX, ca.SX], ca.SX]] = {
+    "sum": lambda x, y: x + y, "difference": lambda x, y: x - y, "product": lambda x, y: x * y,
+    "quotient": lambda x, y: x / y, "square": lambda x, y: x * x, "negative": lambda x, y: -x,
+    "inverse": lambda x, y: 1 / x, "root": lambda x, y: ca.sqrt(x), "size": lambda x, y: ca.fabs(x),
+    "sign": lambda x, y: ca.sign(x), "smaller": ca.fmin, "larger": ca.fmax,
+    "less": lambda x, y: x < y, "at most": lambda x, y: x <= y, "equal": lambda x, y: x == y,
+    "other": lambda x, y: x != y, "both": ca.logic_and, "one": ca.logic_or,
+    "not": lambda x, y: ca.logic_not(x), "choice": lambda x, y: ca.if_else(x < y, x, y),
+    "choice by a number": lambda x, y: ca.if_else(x, y, 2 * x),
+    "half a choice": lambda x, y: ca.if_else(y > x, x, 0), "count": lambda x, y: (x < y) + (x > 1),
+    "floor": lambda x, y: ca.floor(x), "erf": lambda x, y: ca.erf(x), "constant": lambda x, y: 0.1,
+    "sinh": lambda x, y: ca.sinh(x), "fmod": ca.fmod, "sign of": ca.copysign,
+}  # fmt: skip
+"""What has the bits of CasADi's virtual machine."""
+
+UNITS: dict[str, tuple[Callable[..., ca.SX], Callable[..., np.ndarray], float]] = {
+    "exp": (ca.exp, np.exp, 1.0), "expm1": (ca.expm1, np.expm1, 2.0), "log": (ca.log, np.log, 1.0),
+    "tanh": (ca.tanh, np.tanh, 3.0), "sin": (ca.sin, np.sin, 1.0), "cos": (ca.cos, np.cos, 1.0),
+    "tan": (ca.tan, np.tan, 2.5), "atan": (ca.atan, np.arctan, 2.0),
+    "asin": (ca.asin, np.arcsin, 3.0), "acos": (ca.acos, np.arccos, 4.0),
+}  # fmt: skip
+"""Function, the same of NumPy, and how many units of the last place it may be off."""
+
+SPECIAL = np.array([
+    0.0, -0.0, np.inf, -np.inf, np.nan, 5e-324, -5e-324, 1e-310, 1e-300, -1e300, 1.0, -1.0, 0.5,
+    709.7, 709.79, -708.5, -745.0, -746.5, 1e6, 1.0001e6, 1e22, 20.0, -40.0, np.pi, 1e-9, 1e18,
+])  # fmt: skip
+
+
+def applied(function: ca.Function, x: np.ndarray, y: np.ndarray, lanes: int = 0) -> np.ndarray:
+    """Rows of a Function of (x, y), an entry for each pair."""
+    rows, pad = function.numel_out(0), -x.size % 8
+    x, y = (np.concatenate([a, a[:pad]]) for a in (x, y))
+    text, work = vector_source("f", function)
+    sizes = f"#define ROWS {rows}\n#define WORK {work}\n"
+    library = load(lanes_header(lanes) + text + sizes + LOOP, "apply")
+    found = np.empty((rows, x.size))
+    library.apply(
+        *(ctypes.c_void_p(a.ctypes.data) for a in (x, y, found)), ctypes.c_longlong(x.size)
+    )
+    return found[:, : x.size - pad]
+
+
+def together(*expressions: Callable[[ca.SX, ca.SX], ca.SX]) -> ca.Function:
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    rows = ca.vertcat(*(ca.densify(ca.SX(f(x, y))) for f in expressions))
+    return ca.Function("f", [x, y], [rows])
+
+
+def numbers() -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of ordinary, large, tiny and special numbers."""
+    rng = np.random.default_rng(1)
+    x = np.concatenate([
+        rng.normal(size=2000), rng.uniform(-700, 700, 2000), np.arange(-2000, 2000) * np.pi / 2,
+        rng.normal(size=2000) * 10.0 ** rng.uniform(-12, 5, 2000), rng.uniform(-1e6, 1e6, 2000),
+        1 + rng.normal(size=1000) * 1e-4, np.repeat(SPECIAL, SPECIAL.size),
+    ])  # fmt: skip
+    y = np.concatenate([
+        rng.normal(size=x.size - SPECIAL.size**2) * 10.0 ** rng.uniform(-3, 1.0, 1),
+        np.tile(SPECIAL, SPECIAL.size),
+    ])  # fmt: skip
+    return x, y
+
+
+def units(found: np.ndarray, exact: np.ndarray) -> np.ndarray:
+    """Error in units of the last place; 0 where both are the same, not finite numbers included."""
+    as_double = exact.astype(float)
+    same = (found == as_double) | (np.isnan(found) & np.isnan(as_double))
+    finite = np.isfinite(found) & np.isfinite(as_double)
+    off = np.abs(found - exact) / np.spacing(np.abs(as_double))
+    return np.where(same & ~finite, 0.0, np.where(finite, off, np.inf)).astype(float)
+
+
+def test_arithmetic_has_the_bits_of_the_virtual_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where it is cut into parts that hand on what they have computed."""
+    x, y = numbers()
+    function = together(*ARITHMETIC.values())
+    exact = function.map(x.size)(x[None], y[None]).full()
+    for part in (vectors.PART, 3):
+        monkeypatch.setattr(vectors, "PART", part)
+        found = applied(function, x, y)
+        for name, one, other in zip(ARITHMETIC, found, exact, strict=True):
+            np.testing.assert_array_equal(one, other, name)
+            zero = (other == 0) & (name not in ("smaller", "larger"))  # C leaves that open
+            np.testing.assert_array_equal(np.signbit(one[zero]), np.signbit(other[zero]), name)
+
+
+def test_functions_are_right_in_all_but_the_last_digits() -> None:
+    x, y = numbers()
+    found = applied(together(*(lambda x, y, f=f: f(x) for f, _, _ in UNITS.values())), x, y)
+    with np.errstate(all="ignore"):
+        for got, (name, (_, exact, most)) in zip(found, UNITS.items(), strict=True):
+            right = exact(x.astype(np.longdouble))
+            off = units(got, right)
+            assert off.max() <= most, (name, x[off.argmax()], got[off.argmax()])
+            assert off.mean() < 0.5, name
+            known = ~np.isnan(got)
+            assert (np.signbit(got) == np.signbit(right))[known].all(), name
+
+
+def test_powers_and_angles_of_pairs() -> None:
+    """Powers lose a unit for every hundred that their logarithm has."""
+    x, y = numbers()
+    power, angle = applied(together(lambda x, y: x**y, ca.atan2), x, y)
+    with np.errstate(all="ignore"):
+        right = np.power(x.astype(np.longdouble), y.astype(np.longdouble))
+        off = units(power, right)
+        most = 1 + np.where(np.isfinite(power), np.abs(np.log(np.abs(x)) * y) / 30, 0)
+        assert (off <= np.where(np.isfinite(most), most, 1)).all()
+        assert units(angle, np.arctan2(x.astype(np.longdouble), y.astype(np.longdouble))).max() < 3
+
+
+def test_what_c_does_not_know_is_refused() -> None:
+    with pytest.raises(ValueError, match="expected operations that C knows, got number"):
+        vector_source("f", together(lambda x, y: ca.erfinv(x)))
+
+
+def each_lanes(lanes: list[int]) -> pytest.MarkDecorator:
+    slow = [pytest.param(n, marks=pytest.mark.slow) for n in lanes[1:]]
+    return pytest.mark.parametrize("lanes", [lanes[0], *slow])
+
+
+@each_lanes([2, 1, 4, 8])
+def test_bits_of_functions_do_not_depend_on_the_number_of_lanes(lanes: int) -> None:
+    x, y = numbers()
+    function = together(
+        *(lambda x, y, f=f: f(x) for f, _, _ in UNITS.values()), lambda x, y: x**y, ca.atan2
+    )
+    np.testing.assert_array_equal(applied(function, x, y, lanes), applied(function, x, y))
+
+
+def run(model: Model, starts: np.ndarray, p: np.ndarray, ends: np.ndarray, lanes: int = 0) -> tuple:
+    """Members over [0, ends]: all that comes out."""
+    inputs = input_data(model, None, 0.0, float(ends.max()))
+    integrator = Integrator(model, inputs, RODAS5P)
+    source = many_source(integrator.step, integrator.signals, lanes)
+    members = CompiledMembers.of(source, integrator.signals.numel_out(0))
+    S = State.at(0.0, 1e-8, starts)
+    d = np.hstack([p, np.tile(inputs.values[:, 0], (starts.shape[0], 1))])
+    R = Given.of(0.0, 1e-6, np.inf, 1e-7 * model.nominal("x"), d)
+    made, h_min = np.zeros(starts.shape[0], dtype=np.int64), np.full(starts.shape[0], 1e-23)
+    times = np.array([[0.0, 0.1, 0.35, 1.0, 3.0]])
+    found, reason, largest = members.run(
+        S, R, made, Stretch(inputs.breaks, inputs.values[None], ends, h_min, times, 3000)
+    )
+    return found, reason, largest, S, made
+
+
+def mixed(lanes: int = 0, pick: slice = slice(None)) -> list[tuple]:
+    """Runs of 1e-4 to 3 s, one that explodes, one of NaN, one that needs too many steps."""
+    ends = np.array([3.0, 1e-4, 0.5, 3.0, 1.0, 2.0, 0.35])
+    belt = np.array([[0.0, v, 0.0] for v in np.linspace(-0.1, 0.1, 7)])
+    stiff = np.array([1.0, 4.0, 1e10, 2.0, np.nan, 5.0, 1.0])
+    burst = np.array([0.1, 2.0, 0.5, np.nan, 0.0, 0.4, 1e9])
+    none, swing = np.zeros((7, 0)), np.tile([1.0, 0.0], (7, 1))
+    return [
+        run(rabinowicz(LuGre()), belt[pick], none[pick], ends[pick], lanes),
+        run(oscillator(), swing[pick], np.stack([stiff, 0 * stiff], 1)[pick], ends[pick], lanes),
+        run(explosive(), np.ones((7, 1))[pick], burst[pick, None], ends[pick], lanes),
+    ]
+
+
+@each_lanes([2, 1, 4, 8])
+def test_a_member_does_not_depend_on_lanes_and_neighbours(lanes: int) -> None:
+    whole = mixed()
+    for one, other in zip(whole, mixed(lanes), strict=True):
+        for a, b in zip(one, other, strict=True):
+            np.testing.assert_array_equal(a, b)
+    for m in (0, 1, 4):
+        for one, alone in zip(whole, mixed(pick=slice(m, m + 1)), strict=True):
+            for a, b in zip(one, alone, strict=True):
+                np.testing.assert_array_equal(a[m], b[0])
+    (found, reason, _, S, made), swing, burst = whole
+    assert reason.tolist() == [0] * 7
+    assert S[:, State.T].tolist() == [3.0, 1e-4, 0.5, 3.0, 1.0, 2.0, 0.35]
+    assert np.isfinite(found[:, :, 0]).sum(axis=1).tolist() == [5, 1, 3, 5, 4, 4, 3]
+    assert made[1] < made[0] / 5
+    assert swing[1].tolist() == [0, 0, 2, 0, 3, 0, 0]
+    assert burst[1].tolist() == [0, 0, 0, 3, 0, 0, 3]
