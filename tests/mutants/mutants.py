@@ -299,6 +299,8 @@ STORE = "symfric/integrator/many/store.py"
 T_BUILT = ("tests/symfric/integrator/running/test_built.py",)
 T_KEPT = ("tests/symfric/integrator/compiled/test_cache.py",)
 T_COMPILED = ("tests/symfric/integrator/compiled/test_compiler.py",)
+LOOP, LANES = "symfric/integrator/many/loop.h", "symfric/integrator/many/lanes.h"
+T_LANES = ("tests/symfric/integrator/many/test_vectors.py",)
 T_STORE = ("tests/symfric/integrator/many/test_store.py",)
 
 CACHES = (
@@ -381,8 +383,24 @@ LEFT_OUT = (
     ),
     Mutant(
         "an ensemble of other inputs is taken over", "symfric/integrator/many/chunk.py",
-        "digest(*(getattr(self, f.name) for f in fields(self)))",
-        'digest(*(getattr(self, f.name) for f in fields(self) if f.name != "data"))', T_STORE,
+        "own = (self.breaks, self.data, self.times,", "own = (self.breaks, self.times,", T_STORE,
+    ),
+    Mutant(
+        "results wait for a member that is gone", LOOP,
+        "if (common->ready) give(common);", "", T_LANES,
+    ),
+    Mutant(
+        "a lane keeps the attempts of the member before", LOOP,
+        "x->left[l] = all->max_attempts - all->made[m];", "", T_LANES,
+    ),
+    Mutant(
+        "angles are reduced by a pi of less digits", LANES,
+        "const V small = (e1 + e2) - k * 0x1.b839a252049c1p-104;", "const V small = ALL(0.);",
+        T_LANES,
+    ),
+    Mutant(
+        "a value is lost between parts of vector code", "symfric/integrator/many/vectors.py",
+        "if self.last.get(i, k) > k:", "if self.last.get(i, k) > k + 1:", T_LANES,
     ),
     Mutant(
         "members go into the rows before theirs", STORE,

@@ -147,9 +147,9 @@ static inline V raised(V x, V small)
 static V v_exp(V x)
 {
   const V within = above(below(x, 709.), -708.);
-  const I sound = (I)(within == x) | (I)(x != x), none = (I)(x < -746.);
-  const V found = where(~none, raised(within, (V){}));
-  const unsigned far = which(~(sound | none));
+  const I none = (I)(x < -746.), beyond = (I)(x > 710.), edge = (I)(within != x) & (I)(x == x);
+  const V found = pick(beyond, ALL(INFINITY), where(~none, raised(within, (V){})));
+  const unsigned far = which(edge & ~none & ~beyond);
   return far ? far_exp(x, found, far) : found;
 }
 
