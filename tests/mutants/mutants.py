@@ -3,19 +3,8 @@
 Where the line of a mutant is rewritten, rewrite the mutant: `tests/test_mutants.py` says so.
 """
 
-from dataclasses import dataclass
-
-
-@dataclass(frozen=True)
-class Mutant:
-    """A defect: `old`, which stands in `file` exactly once, becomes `new`; `tests` must fail."""
-
-    name: str
-    file: str
-    old: str
-    new: str
-    tests: tuple[str, ...]
-
+from mutants.ensembles import ENSEMBLES
+from mutants.mutant import Mutant
 
 STEP = "symfric/integrator/step/attempt.py"
 WATCH = "symfric/integrator/step/watch.py"
@@ -295,13 +284,9 @@ DIFFERENTIAL_ALGEBRAIC = (
 BUILT = "symfric/integrator/running/built.py"
 KEPT = "symfric/integrator/compiled/cache.py"
 COMPILED = "symfric/integrator/compiled/compiler.py"
-STORE = "symfric/integrator/many/store.py"
 T_BUILT = ("tests/symfric/integrator/running/test_built.py",)
 T_KEPT = ("tests/symfric/integrator/compiled/test_cache.py",)
 T_COMPILED = ("tests/symfric/integrator/compiled/test_compiler.py",)
-LOOP, LANES = "symfric/integrator/many/loop.h", "symfric/integrator/many/lanes.h"
-T_LANES = ("tests/symfric/integrator/many/test_vectors.py",)
-T_STORE = ("tests/symfric/integrator/many/test_store.py",)
 
 CACHES = (
     Mutant(
@@ -348,11 +333,6 @@ CACHES = (
         "the virtual machine ends with its batch", "symfric/integrator/running/engine.py",
         "took[used:] = False", "pass", ("tests/symfric/integrator/running/test_engine.py",),
     ),
-    Mutant(
-        "results on disk are taken unseen", STORE,
-        'if str(saved["checksum"]) == self._checksum(first, attempts.size):', "if True:", T_STORE,
-    ),
-    Mutant("a file cut short is taken", STORE, "and status.st_size == size", "", T_STORE),
 )  # fmt: skip
 
 LEFT_OUT = (
@@ -381,34 +361,9 @@ LEFT_OUT = (
         "a fit takes trials that are worse", "identification/descent.py",
         "if trial.cost < point.cost:", "if True:", ("tests/identification/test_descent.py",),
     ),
-    Mutant(
-        "an ensemble of other inputs is taken over", "symfric/integrator/many/chunk.py",
-        "own = (self.breaks, self.data, self.times,", "own = (self.breaks, self.times,", T_STORE,
-    ),
-    Mutant(
-        "results wait for a member that is gone", LOOP,
-        "if (common->ready) give(common);", "", T_LANES,
-    ),
-    Mutant(
-        "a lane keeps the attempts of the member before", LOOP,
-        "x->left[l] = all->max_attempts - all->made[m];", "", T_LANES,
-    ),
-    Mutant(
-        "angles are reduced by a pi of less digits", LANES,
-        "const V small = (e1 + e2) - k * 0x1.b839a252049c1p-104;", "const V small = ALL(0.);",
-        T_LANES,
-    ),
-    Mutant(
-        "a value is lost between parts of vector code", "symfric/integrator/many/vectors.py",
-        "if self.last.get(i, k) > k:", "if self.last.get(i, k) > k + 1:", T_LANES,
-    ),
-    Mutant(
-        "members go into the rows before theirs", STORE,
-        "+ 8 * first * self.shape[1])", "+ 8 * max(0, first - 1) * self.shape[1])", T_STORE,
-    ),
 )  # fmt: skip
 
 MUTANTS = (
     *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
-    *CACHES, *LEFT_OUT,
+    *CACHES, *ENSEMBLES, *LEFT_OUT,
 )  # fmt: skip

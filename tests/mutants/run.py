@@ -18,9 +18,10 @@ from tempfile import TemporaryDirectory
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
-sys.path.insert(0, str(HERE))
+sys.path.insert(0, str(HERE.parent))
 
-from mutants import MUTANTS, Mutant  # noqa: E402  (a script finds its neighbour)
+from mutants.mutant import Mutant  # noqa: E402  (a script finds its neighbours)
+from mutants.mutants import MUTANTS  # noqa: E402
 
 PACKAGES = ("symfric", "ocp", "identification", "tests", "examples")
 LIMIT = 120.0
