@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import stacked, strays
+from symfric.integrator.equations.constants import lifted
 from symfric.integrator.equations.onsets import onsets, pace
 from symfric.model import Model
 
@@ -127,8 +128,8 @@ def input_data(
 ) -> InputData:
     """Collect the inputs `given` by name; the others keep their start value.
 
-    Numbers and samples become data, expressions go into the equations. There are breaks at all
-    samples, and where a function of time changes its pace.
+    Numbers and samples become data, expressions go into the equations with their numbers as data.
+    There are breaks at all samples, and where a function of time changes its pace.
 
     Raises:
         ValueError: unknown name or a value of another kind.
@@ -185,10 +186,14 @@ def _part(model: Model, variable: Variable, signal: Any, breaks: Array, begin: c
     if not isinstance(signal, Sampled):
         if callable(signal):
             expression = _evaluated(where, signal, model)
-            # the expression and not the function that wrote it: its data may have changed since
-            key = sha256(ca.SX.serialize(expression).encode()).hexdigest()
             look = _of_time(expression, model), float(breaks[0]), float(breaks[-1])
-            return _Part(expression, key, onsets=onsets(*look), pace=pace(*look))
+            own = stacked([model.t, *(model.vector(letter) for letter in "xzp")])
+            made, data, numbers = lifted(expression, own, variable.name)
+            # the structure of the expression and not the function that wrote it: what that refers
+            # to may have changed since, and its numbers are data
+            key = sha256(ca.SX.serialize(made).encode()).hexdigest()
+            values = tuple(np.full(breaks.size - 1, number) for number in numbers)
+            return _Part(made, key, (data,), values, onsets(*look), pace(*look))
         # a number is data too: another value must not mean another integrator
         signal = Hold(breaks[:1], [checks.number(where, signal, hint=KINDS)])
     c, slope = ca.SX.sym(f"{variable.name}_k"), ca.SX.sym(f"{variable.name}_dot")

@@ -82,7 +82,7 @@ def test_samples_are_copied_and_cannot_be_written() -> None:
 def test_structure_is_the_expression_and_not_who_wrote_it() -> None:
     """4f644ad took the function object for the structure."""
     one, same, other = (made(force=f).key for f in (
-        lambda t: ca.sin(2 * t), lambda t: ca.sin(2 * t), lambda t: ca.sin(3 * t)
+        lambda t: ca.sin(2 * t), lambda t: ca.sin(3 * t), lambda t: ca.cos(2 * t)
     ))  # fmt: skip
     assert one == same != other
     assert len({one, made().key, made(torque=lambda t: ca.sin(2 * t)).key}) == 3

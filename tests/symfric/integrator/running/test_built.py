@@ -21,7 +21,8 @@ def cart() -> Model:
 
 
 def wave(model: Model, k: int) -> tuple[Integrator, bool]:
-    inputs = input_data(model, {"force": lambda t: ca.sin(k * t)}, 0.0, 1.0)
+    # exponents are structure, other numbers data
+    inputs = input_data(model, {"force": lambda t: (1 + ca.sin(t)) ** (k + 0.5)}, 0.0, 1.0)
     return built(model, inputs, METHODS["rodas3"])
 
 
