@@ -272,7 +272,8 @@ def _suited(
         d = np.concatenate([p, inputs.values[:, 0]])
         with suppress(ValueError):  # no consistent start: that member is reported by its number
             points.append((integrator.start(y, d), d))
-    return integrator.suited(points, span) if points else integrator
+            integrator = integrator.suited(points, span)
+    return integrator
 
 
 def _chunk(

@@ -32,6 +32,9 @@ Array = NDArray[np.float64]
 Point = tuple[bytes | float, ...]
 Parts = tuple[ca.Function, int, Crossings | None, bool, Following | None]
 Orders = tuple[tuple[str, Order], ...]
+JUDGED = 4
+"""Arguments of `Integrator.suited` whose answers are remembered."""
+
 INLINE = 7000
 """Steps with more instructions are calls of blocks, which compile much faster; both engines run the
 same form."""
@@ -198,7 +201,9 @@ class Integrator:
             consistent_at = [(self.start(*points[0]), points[0][1]), *points[1:]]
             whole = suited(self.system, self.tableau, consistent_at, span)
             found = self if whole is self.system else self._other(whole)
-            self._judged = {key: found}
+            while len(self._judged) >= JUDGED:
+                del self._judged[next(iter(self._judged))]
+            self._judged[key] = found
         return found
 
     def _other(self, whole: System) -> "Integrator":
