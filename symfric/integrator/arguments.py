@@ -24,11 +24,11 @@ MOST_SAMPLES = 10**7
 
 
 def check_span(
-    where: str, model: Model, t_start: float, t_end: float, rtol: float
+    where: str, model: Model, t_start: float, t_end: float, rtol: float, stacklevel: int = 4
 ) -> tuple[float, float, float]:
     """Start and end [s] and relative tolerance, that of the model's events at most.
 
-    Warns of a loose one.
+    Warns of a loose one, in the line that is `stacklevel` calls above this warning.
 
     Raises:
         ValueError: no numbers, an empty span, a tolerance out of range.
@@ -39,14 +39,19 @@ def check_span(
         raise ValueError(f"{where}: expected t_end > t_start = {t_start:g} s, got {t_end:g} s")
     rtol = checks.number(f"{where}: rtol", rtol, lower=1e-13, upper=0.1)
     rtol = min((event.rtol for event in model.events if event.rtol < rtol), default=rtol)
+    warn_of_loose(where, rtol, stacklevel)
+    return t_start, t_end, rtol
+
+
+def warn_of_loose(where: str, rtol: float, stacklevel: int) -> None:
+    """Warn of a relative tolerance that is loose."""
     if rtol > LOOSE:
         warnings.warn(
             f"{where}: rtol = {rtol:g} is above {LOOSE:g}; whole stick phases may be lost "
             "without a sign of it, compare with a tighter run",
             UserWarning,
-            stacklevel=3,
+            stacklevel=stacklevel,
         )
-    return t_start, t_end, rtol
 
 
 def check_times(where: str, t_start: float, t_end: float, t_eval: ArrayLike) -> Array:
@@ -67,7 +72,8 @@ def result_times(
 def check_flags(where: str, progress: object = None, **flags: object) -> None:
     """Refuse what is no truth value, and a `progress` that cannot be called."""
     for name, value in flags.items():
-        checks.flag(f"{where}: {name}", value)
+        if value is not True and value is not False:
+            checks.flag(f"{where}: {name}", value)
     if progress is not None:
         checks.function(f"{where}: progress", progress, "a function of the fraction done")
 
@@ -105,7 +111,7 @@ def stopping(
     where: str, inputs: InputData, times: ArrayLike, t_start: float, t_end: float
 ) -> InputData:
     """`inputs` with an end of a step at each of `times` [s]."""
-    if np.size(times) == 0:
+    if (isinstance(times, tuple) and not times) or np.size(times) == 0:
         return inputs
     return inputs.stopping_at(checks.times(f"{where}: times", times, t_start, t_end))
 

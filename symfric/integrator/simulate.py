@@ -15,11 +15,8 @@ from symfric.integrator.arguments import (
     another,
     check_flags,
     check_model,
-    check_span,
-    chosen,
-    result_times,
+    check_times,
     stopping,
-    tolerances,
 )
 from symfric.integrator.derivatives.adjoint import gradient
 from symfric.integrator.derivatives.path import Path
@@ -33,6 +30,7 @@ from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Run
 from symfric.integrator.running.run import Tolerances, integrate
 from symfric.integrator.running.sizes import own_scale
+from symfric.integrator.settings import settings
 from symfric.model import Model
 from symfric.results.trajectory import Statistics, Trajectory
 
@@ -121,23 +119,28 @@ def simulate(
     """
     check_model("simulate", model)
     check_flags("simulate", progress, measure_error=measure_error, throw=throw)
-    t_start, t_end, rtol = check_span("simulate", model, t_start, t_end, rtol)
-    formula = chosen("simulate", method, rtol)
+    asked = settings(
+        model, t_start, t_end, rtol, atol, samples, method, event_tolerance, max_steps, max_step
+    )
+    t_start, t_end, formula, allowed = asked.t_start, asked.t_end, asked.formula, asked.allowed
     checks.choice("simulate: backend", backend, BACKENDS)
-    sensitivities = checks.names("simulate: sensitivities", sensitivities)
-    looks = result_times("simulate", t_start, t_end, t_eval, samples)
+    if sensitivities != ():
+        sensitivities = checks.names("simulate: sensitivities", sensitivities)
+    if t_eval is None:
+        looks = asked.times.copy()
+    else:
+        looks = check_times("simulate", t_start, t_end, t_eval)
     begin = perf_counter()
     inputs = input_data(model, u, t_start, t_end)
     inputs = stopping("simulate", inputs, times, t_start, t_end)
     integrator, fresh = built(model, inputs, formula)
     build_time = perf_counter() - begin if fresh else 0.0
     which = seeds(model, sensitivities, x0, p) if sensitivities else None
-    nominal = integrator.system.nominal
-    allowed = tolerances("simulate", rtol, atol, nominal, event_tolerance, max_steps, max_step)
     y0 = first_guess(integrator.system, model, model.initial_state(x0, p), t_start)
     values = model.values("p", p)
-    at_start = (y0, np.concatenate([values, inputs.values[:, 0]]))
-    integrator = integrator.suited([at_start], t_end - t_start)
+    if integrator.has_pivots:
+        at_start = (y0, np.concatenate([values, inputs.values[:, 0]]))
+        integrator = integrator.suited([at_start], t_end - t_start)
     run, count = _solve(
         integrator, inputs, y0, values, allowed, backend, progress, build_time, looks
     )
@@ -158,7 +161,7 @@ def simulate(
         trajectory = _differentiated(trajectory, path, which)
     if measure_error and trajectory.status.ok:
         finer = simulate(
-            model, t_end, t_start=t_start, x0=x0, u=u, p=p, rtol=max(rtol / 100, 1e-13),
+            model, t_end, t_start=t_start, x0=x0, u=u, p=p, rtol=max(allowed.rtol / 100, 1e-13),
             atol=None if atol is None else atol / 100, event_tolerance=event_tolerance,
             t_eval=trajectory.t, method=another(formula), backend=backend,
             max_step=run.extent.longest / 2, times=times,

@@ -209,6 +209,8 @@ class Model:
     def values(self, letter: str, given: Mapping[str, float] | None = None) -> NDArray[np.float64]:
         """Numbers of the group "u" or "p": start values, replaced by those `given` by name."""
         group: Variables = getattr(self, letter)
+        if not group and given is None:
+            return np.zeros(0)
         values = self.named(letter, given)
         for v in self.p if letter == "p" else ():
             if v.name in values:

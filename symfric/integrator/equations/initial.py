@@ -56,6 +56,8 @@ def first_guess(system: System, model: Model, x: Array, t: float = 0.0) -> Array
         x: states, shape (..., nx).
         t: time [s].
     """
+    if x.shape[-1] == system.n:
+        return x.copy()
     y = np.zeros((*x.shape[:-1], system.n))
     y[..., : system.nx] = x
     starts = {v.name: number(f"model '{model.name}' {v.name}", v.start) for v in model.z}

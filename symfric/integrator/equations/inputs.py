@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from hashlib import sha256
 from typing import Any, final
 
@@ -159,6 +160,7 @@ def input_data(
     return found.stopping_at([t for part in parts for t in part.onsets])
 
 
+@lru_cache
 def _undriven(t_start: float, t_end: float) -> InputData:
     """What a model without inputs takes."""
     return InputData(NO_ROWS, NO_ROWS, np.array([t_start, t_end]), np.zeros((0, 1)), ())

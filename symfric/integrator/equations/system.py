@@ -72,7 +72,7 @@ class System:
     orders: Mapping[str, Order] = field(default_factory=dict[str, Order])
     branchless: bool = True
 
-    @property
+    @cached_property
     def n(self) -> int:
         """Number of unknowns."""
         return self.y.numel()

@@ -116,7 +116,7 @@ class Integrator:
             return ca.Function(name, [t, s.y, s.d], [driven])
         return ca.Function(name, [self.model.t, s.y, s.d], [driven])
 
-    @property
+    @cached_property
     def follows(self) -> bool:
         """Whether there are algebraic unknowns, which follow jumps."""
         return bool(self.system.free.any()) or self.system.manifold is not None
@@ -177,11 +177,18 @@ class Integrator:
         Raises:
             ValueError: none near.
         """
+        if not self.follows:
+            return y
         key = (y.tobytes(), d.tobytes())
         if key not in self._starts:
             found = consistent(self.system, f"model '{self.model.name}'", y, d)
             self._starts = {key: found}
         return self._starts[key]
+
+    @cached_property
+    def has_pivots(self) -> bool:
+        """Whether there is a choice of pivots, which may be sound here and not there."""
+        return self.system.manifold is None and not self.system.is_ode
 
     def suited(self, points: Sequence[tuple[Array, Array]], span: float) -> "Integrator":
         """The integrator itself, or one of the same model whose pivots are sound.
@@ -193,7 +200,7 @@ class Integrator:
                 the first follow.
             span: its length [s].
         """
-        if self.system.manifold is not None or self.system.is_ode:
+        if not self.has_pivots:
             return self
         key = (*(part.tobytes() for point in points for part in point), span)
         found = self._judged.get(key)

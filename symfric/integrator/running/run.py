@@ -212,12 +212,13 @@ class _March:
                 Status.MAX_STEPS, f"{Status.MAX_STEPS.value} It stands at t = {self.t:g} s."
             )
             return self.work.rows[:0], Stop.ATTEMPTS, left
-        began, from_t = perf_counter(), self.t
+        virtual = engine.name == "vm"
+        began, from_t = (perf_counter(), self.t) if virtual else (0.0, 0.0)
         records, made, reason = engine.march(self.work, allowed)
         self.run.attempts += made
         if reason is Stop.STEP_TOO_SMALL and self.found_pivots():
             reason = Stop.ATTEMPTS
-        if engine.name == "vm":
+        if virtual:
             spent, advance = perf_counter() - began, self.t - from_t
             self.integrator.vm_time += spent
             left = spent * (self.t_end - self.t) / advance if advance > 0 else left
