@@ -6,13 +6,18 @@ import shutil
 import signal
 import subprocess
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 NAMES = ("gcc", "clang", "cc")
 PATIENCE, PER_BYTE = 60.0, 1e-4
 """Seconds that a compiler may take for nothing, and for each byte of C: a hundred times the usual,
 for machines under load; one that waits for something is stopped."""
+GRACE = 1.0
+"""Seconds for a compiler that was asked to stop."""
+KILL = getattr(signal, "SIGKILL", signal.SIGTERM)
 
 
 class CompileError(RuntimeError):
@@ -36,41 +41,71 @@ class Compiler:
         Raises:
             CompileError: it cannot be started, refuses the code, or does not come to an end.
         """
-        limit = PATIENCE + PER_BYTE * len(code)
-        environment = {**os.environ, "LC_ALL": "C", **(variables or {})}
-        try:
-            process = subprocess.Popen(
-                [*self.command, *arguments],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.PIPE,
-                env=environment,
-                start_new_session=True,
-            )
-        except OSError as error:
-            raise CompileError(f"{self} does not start: {error.strerror}") from None
+        process = self.start(*arguments, stdin=subprocess.PIPE, variables=variables)
+        limit = patience(code)
         try:
             said = process.communicate(code.encode(), timeout=limit)[1].decode(errors="replace")
         except subprocess.TimeoutExpired:
             raise CompileError(f"{self} came to no end within {limit:.0f} s") from None
         finally:
-            _end(process)
+            end(process)
         if process.returncode:
             raise CompileError(f"{self} failed with status {process.returncode}:\n{said}")
         return said
 
+    def start(
+        self,
+        *arguments: str,
+        stdin: IO[bytes] | int,
+        stderr: int = subprocess.PIPE,
+        variables: Mapping[str, str] | None = None,
+    ) -> subprocess.Popen[bytes]:
+        """Its process, which leads a session of its own; `end` stops and closes it.
 
-def _end(process: subprocess.Popen[bytes]) -> None:
-    """Stop a compiler that still runs, after an interrupt too, and what it has started."""
+        Raises:
+            CompileError: it cannot be started.
+        """
+        try:
+            return subprocess.Popen(
+                [*self.command, *arguments],
+                stdin=stdin,
+                stdout=subprocess.DEVNULL,
+                stderr=stderr,
+                env={**os.environ, "LC_ALL": "C", **(variables or {})},
+                start_new_session=True,
+            )
+        except OSError as error:
+            raise CompileError(f"{self} does not start: {error.strerror}") from None
+
+
+def patience(code: str) -> float:
+    """Seconds that a compiler may take for `code`."""
+    return PATIENCE + PER_BYTE * len(code)
+
+
+def end(process: subprocess.Popen[bytes]) -> None:
+    """Stop a compiler that still runs, after an interrupt too, and what it has started.
+
+    It is asked first: then it takes its temporary files away.
+    """
     if process.poll() is None:
-        if hasattr(os, "killpg"):
-            os.killpg(process.pid, signal.SIGKILL)
-        else:
-            process.kill()
+        _signal(process, signal.SIGTERM)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(GRACE)
+        _signal(process, KILL)
         process.wait()
     for stream in (process.stdin, process.stderr):
         if stream is not None:
             stream.close()
+
+
+def _signal(process: subprocess.Popen[bytes], number: int) -> None:
+    """Send a signal to all that a compiler has started; there may be nobody left."""
+    with suppress(ProcessLookupError, PermissionError):
+        if hasattr(os, "killpg"):
+            os.killpg(process.pid, number)
+        else:
+            process.send_signal(number)
 
 
 def find_compiler(name: str | None = None) -> Compiler | None:

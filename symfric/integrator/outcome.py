@@ -22,6 +22,7 @@ def trajectory_of(
     run: Run,
     p: Array,
     count: Callable[[], Statistics],
+    backend: str = "vm",
 ) -> Trajectory:
     """The trajectory of a run.
 
@@ -29,13 +30,14 @@ def trajectory_of(
         integrator, inputs, p: what was run.
         run: what came of it; of the times of its outputs those that were reached.
         count: what it took.
+        backend: what evaluates signals: "vm", else whatever is predicted to be fastest.
 
     Foreign integrators let the constraints of mechanisms drift, and their results show it; ours
     hold them to the tolerance between steps, and exactly at results.
     """
     model, outputs = integrator.model, run.outputs
     names, drifts = model.signals, run.engine.startswith("casadi")
-    times = outputs.times
+    times, engine = outputs.times, "vm" if backend == "vm" else "auto"
     if outputs.found < times.size:
         times = times[: outputs.found]
 
@@ -45,14 +47,14 @@ def trajectory_of(
     def states(at: Array) -> dict[str, Array]:
         y, columns = unknowns(at), None if drifts else integrator.states
         if columns is not None:
-            y = columns([y.T, data(at)])[0].T
+            y = columns([y.T, data(at)], backend=engine)[0].T
         return dict(zip(names, y[: len(model.x)], strict=False))
 
     def data(at: Array) -> Array:
         return np.hstack([np.tile(p, (at.size, 1)), inputs.values[:, inputs.interval(at)].T])
 
     def rows(columns: Columns, at: Array) -> Array:
-        (values,) = columns([at, unknowns(at).T, data(at)])
+        (values,) = columns([at, unknowns(at).T, data(at)], backend=engine)
         return np.ascontiguousarray(values.T)
 
     def evaluate(at: Array) -> dict[str, Array]:

@@ -90,8 +90,9 @@ def simulate(
             that only slide. Bristles and sticking cost it 20 to 100 times the steps. No cheap
             criterion proves an equation not to be stiff, so it is never chosen by itself.
         backend: the engine: "vm" needs no compiler; "compiled" compiles the step once and keeps
-            it in the user's cache; "auto" starts in the former and goes over to the latter when
-            that is predicted to pay. Both give the same bits. Integrators of others have a door of
+            it in the user's cache; "auto" starts in the former, has the step compiled beside when
+            that is predicted to pay, and goes over to it, in this run or a later one, when it is
+            there. So do signals. Both give the same bits. Integrators of others have a door of
             their own, `simulate_by_peer`.
         event_tolerance: how sharply events are located [s].
         max_steps: attempts allowed.
@@ -144,7 +145,7 @@ def simulate(
     run, count = _solve(
         integrator, inputs, y0, values, allowed, backend, progress, build_time, looks
     )
-    trajectory = trajectory_of(integrator, inputs, run, values, count)
+    trajectory = trajectory_of(integrator, inputs, run, values, count, backend)
     if throw and not trajectory.status.ok and trajectory.status is not Status.INTERRUPTED:
         raise SolveError(trajectory.message, trajectory.status, trajectory)
     if which is not None and run.steps:

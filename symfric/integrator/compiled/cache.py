@@ -82,6 +82,16 @@ class Cache:
         Raises:
             OSError: the folder cannot be made or written, or is somebody else's.
         """
+        temporary = self.begin(key)
+        try:
+            yield temporary
+            self.keep(key, temporary)
+        finally:
+            with suppress(FileNotFoundError):
+                temporary.unlink()
+
+    def begin(self, key: str) -> Path:
+        """An empty temporary file in the folder; raises as `new` does."""
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         found = self.folder.stat()
         if not trusted(found) and hasattr(os, "getuid") and found.st_uid == os.getuid():
@@ -90,15 +100,13 @@ class Cache:
             raise OSError(0, "others may write there")
         handle, name = tempfile.mkstemp(prefix=f".{key}-", suffix=".so", dir=self.folder)
         os.close(handle)
-        temporary = Path(name)
-        try:
-            yield temporary
-            content = temporary.read_bytes()
-            temporary.chmod(0o700)
-            temporary.replace(self.folder / f"{key}-{_digest(content)}.so")
-        finally:
-            with suppress(FileNotFoundError):
-                temporary.unlink()
+        return Path(name)
+
+    def keep(self, key: str, temporary: Path) -> None:
+        """Keep a temporary file under `key`."""
+        content = temporary.read_bytes()
+        temporary.chmod(0o700)
+        temporary.replace(self.folder / f"{key}-{_digest(content)}.so")
 
     def evict(self) -> None:
         """Remove the files used longest ago until the others fit, and unfinished ones."""

@@ -10,13 +10,16 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.compiler import find_compiler
+from symfric.foundation.compiler import CompileError
 from symfric.foundation.numeric import flat_view
+from symfric.integrator.compiled.background import Prospect
 from symfric.integrator.compiled.compiler import library
 
 Array = NDArray[np.float64]
 CHAINED, SIDE_BY_SIDE = 16, 32
 """Columns of one call; the last call repeats its last column."""
+PER_INSTRUCTION = 3e-9
+"""Seconds that the virtual machine needs."""
 
 
 @final
@@ -50,19 +53,27 @@ class Columns:
 
     @cached_property
     def _compiled(self) -> ca.Function:
-        return external(self._batch)
+        return external(self._batch, self._prospect.written())
+
+    @cached_property
+    def _prospect(self) -> Prospect:
+        name, n = self._batch.name(), self.function.n_instructions()
+        return Prospect(lambda: c_code(self._batch), (name,), n)
 
     def _choose(self, backend: str, count: int) -> ca.Function:
         """The virtual machine or compiled code; "auto" compiles when that is predicted to pay."""
         if backend == "compiled":
             return self._compiled
-        if backend == "vm" or find_compiler() is None:
+        if backend == "vm":
             return self._batch
         if "_compiled" in self.__dict__:
             return self._compiled
-        n = self.function.n_instructions()
-        expected = self.spent + 3e-9 * n * count
-        return self._compiled if expected > 2 * (0.1 + 1.5e-4 * n) else self._batch
+        if self._prospect.pays(self.spent + PER_INSTRUCTION * self._prospect.instructions * count):
+            try:
+                return self._compiled
+            except CompileError:  # a broken compiler is no reason not to evaluate
+                self._prospect.hopeless = True
+        return self._batch
 
     def __call__(
         self, rows: Sequence[Array], first: Array | None = None, backend: str = "vm"
@@ -111,13 +122,18 @@ def densified(function: ca.Function) -> ca.Function:
     return ca.Function(function.name(), arguments, results)
 
 
-def external(function: ca.Function) -> ca.Function:
-    """`function` compiled, or loaded from the cache.
+def c_code(function: ca.Function) -> str:
+    """C of `function` as CasADi generates it."""
+    generator = ca.CodeGenerator("symfric_columns.c", {"static_aux": True})
+    generator.add(function)
+    return generator.dump()
+
+
+def external(function: ca.Function, source: str = "") -> ca.Function:
+    """`function` compiled, or loaded from the cache; its `source` where that is known.
 
     Raises:
         CompileError: there is no compiler, or it failed.
     """
-    generator = ca.CodeGenerator("symfric_columns.c", {"static_aux": True})
-    generator.add(function)
-    path = library(generator.dump(), function.name())
+    path = library(source or c_code(function), function.name())
     return ca.external(function.name(), str(path))

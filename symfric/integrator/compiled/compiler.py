@@ -2,14 +2,28 @@
 
 import ctypes
 import hashlib
+import os
 import platform
+import subprocess
 import sys
 import weakref
 from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryFile
+from time import perf_counter
+from typing import final
 
-from symfric.foundation.compiler import CompileError, Compiler, find_compiler, no_compiler
+from symfric.foundation.compiler import (
+    CompileError,
+    Compiler,
+    end,
+    find_compiler,
+    no_compiler,
+    patience,
+)
 from symfric.integrator.compiled.cache import Cache, caches
 
 FLAGS = (
@@ -20,6 +34,9 @@ FLAGS = (
 result does not depend on which of them ran: no fused multiply-add, no reciprocals (repeated
 divisions are taken out of the graph instead), no reordering. Looking for common parts in code that
 has none left would take a third of the compiler's time."""
+
+NICENESS = 10
+"""Of a compiler beside something else."""
 
 _close: Callable[[int], None] | None = getattr(sys.modules["_ctypes"], "dlclose", None)
 
@@ -97,10 +114,8 @@ def _made(
     """The library of `source`, compiled into a cache by a compiler with its flags."""
     compiler, flags = how
     with place.new(key) as temporary:
-        folder = {name: str(place.folder) for name in ("TMPDIR", "TMP", "TEMP")}
-        arguments = (*flags, "-x", "c", "-", "-o", str(temporary), "-lm")
         try:
-            compiler.run(*arguments, code=source, variables=folder)
+            compiler.run(*_arguments(flags, temporary), code=source, variables=_folders(place))
         except CompileError as error:
             raise CompileError(f"compile: {_first_error(str(error))}") from None
         opened(temporary, names)  # what cannot be used is not kept
@@ -109,6 +124,96 @@ def _made(
     if found is None:
         raise OSError(0, "what was written there is not what was read")
     return found
+
+
+def _arguments(flags: tuple[str, ...], path: Path) -> tuple[str, ...]:
+    return (*flags, "-x", "c", "-", "-o", str(path), "-lm")
+
+
+def _folders(place: Cache) -> dict[str, str]:
+    """Where a compiler keeps what it needs for a moment."""
+    return {name: str(place.folder) for name in ("TMPDIR", "TMP", "TEMP")}
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Unfinished:
+    """A library whose compiler runs beside this process.
+
+    Attributes:
+        process: the compiler.
+        path: of the temporary file that it writes.
+        place, key: where in which cache the library will lie.
+        names: what it defines.
+        limit: when [s] it is given up, on the clock of `perf_counter`.
+    """
+
+    process: subprocess.Popen[bytes]
+    path: Path
+    place: Cache
+    key: str
+    names: tuple[str, ...]
+    limit: float
+
+    def finish(self) -> bool:
+        """Whether the library lies in the cache, where it is put now.
+
+        Raises:
+            CompileError: the compiler refused the source, came to no end, or made no such library.
+        """
+        status = self.process.poll()
+        if status is None and perf_counter() < self.limit:
+            return False
+        try:
+            if status != 0:
+                raise CompileError(f"compile: status {status}")
+            opened(self.path, self.names)
+            self.place.keep(self.key, self.path)
+        except OSError as error:
+            raise CompileError(f"compile: {error}") from None
+        finally:
+            self.stop()
+        self.place.evict()
+        return True
+
+    def stop(self) -> None:
+        """Stop the compiler where it still runs, and take away what it has written."""
+        end(self.process)
+        with suppress(OSError):
+            self.path.unlink()
+
+
+def begun(source: str, names: tuple[str, ...]) -> Unfinished:
+    """The library of `source`, which defines `names`, being compiled at low priority.
+
+    Raises:
+        CompileError: no compiler, no place for its result, or it does not start.
+    """
+    compiler = find_compiler()
+    if compiler is None:
+        raise no_compiler()
+    key = key_of(source, compiler, FLAGS)
+    for place in caches():
+        with suppress(OSError), TemporaryFile() as text:
+            text.write(source.encode())
+            text.seek(0)
+            path = place.begin(key)
+            try:
+                process = compiler.start(
+                    *_arguments(FLAGS, path),
+                    stdin=text,
+                    stderr=subprocess.DEVNULL,
+                    variables=_folders(place),
+                )
+            except CompileError:
+                path.unlink()
+                raise
+            if hasattr(os, "setpriority"):
+                with suppress(OSError):
+                    os.setpriority(os.PRIO_PGRP, process.pid, NICENESS)
+            limit = perf_counter() + patience(source)
+            return Unfinished(process, path, place, key, names, limit)
+    raise CompileError("compile: expected a place to keep compiled code, found none")
 
 
 def opened(path: Path, names: tuple[str, ...]) -> ctypes.CDLL:

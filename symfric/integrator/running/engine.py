@@ -233,9 +233,13 @@ class CompiledEngine:
         crossings: Crossings | None = None,
         follows: bool = False,
         follow: Following | None = None,
+        source: str = "",
     ) -> "CompiledEngine":
-        """Compile the loop of these parts (`loop_source`), or load it from the cache."""
-        source = loop_source(step, dense_rows, crossings, follows, follow)
+        """Compile the loop of these parts (`loop_source`), or load it from the cache.
+
+        `source` is its C where that is written.
+        """
+        source = source or loop_source(step, dense_rows, crossings, follows, follow)
         library = load(source, "symfric_march")
         library.symfric_march.restype = ctypes.c_int
         library.symfric_march.argtypes = [ctypes.c_void_p]

@@ -10,10 +10,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.compiler import CompileError, find_compiler
+from symfric.foundation.compiler import CompileError
 from symfric.foundation.symbols import stacked
+from symfric.integrator.compiled.background import Prospect
 from symfric.integrator.compiled.columns import Columns
-from symfric.integrator.compiled.compiler import compiled_before
 from symfric.integrator.equations.blocks import refinement
 from symfric.integrator.equations.following import Following, following
 from symfric.integrator.equations.initial import consistent
@@ -54,8 +54,7 @@ class Integrator:
     Which engine runs is a question of speed alone: both give the same bits.
 
     Mutable only in what it remembers: its engines, the time spent in the virtual machine, from
-    which it decides when compiling pays, whether compiling failed, the last start, and others of
-    its kind with other pivots.
+    which it decides when compiling pays, the last start, and others of its kind with other pivots.
     """
 
     model: Model
@@ -65,7 +64,6 @@ class Integrator:
     build_time: float = 0.0
     compile_time: float = 0.0
     vm_time: float = 0.0
-    compiles: bool = True
     _engines: dict[str, Engine] = field(default_factory=dict[str, Engine])
     _starts: dict[tuple[bytes, bytes], Array] = field(
         default_factory=dict[tuple[bytes, bytes], Array]
@@ -85,7 +83,12 @@ class Integrator:
         self.events = self._event_function()
         self.resets = self._reset_function()
         self.crossings = self._crossings() if self.model.events else None
+        self.prospect = Prospect(self._written, ("symfric_march",), self.instructions)
         self.build_time = perf_counter() - begin
+
+    def _written(self) -> str:
+        """C of the loop."""
+        return loop_source(*self._parts)
 
     def _event_function(self) -> ca.Function:
         """Event expressions as a Function (t, y, d)."""
@@ -254,7 +257,8 @@ class Integrator:
         """
         if "compiled" not in self._engines:
             begin = perf_counter()
-            self._engines["compiled"] = CompiledEngine.of(*self._parts)
+            source = self.prospect.written()
+            self._engines["compiled"] = CompiledEngine.of(*self._parts, source=source)
             self.compile_time = perf_counter() - begin
         return self._engines["compiled"]
 
@@ -267,25 +271,13 @@ class Integrator:
         """
         if backend == "compiled":
             return self.compiled()
-        if backend == "vm" or not self.compiles or find_compiler() is None:
+        if backend == "vm":
             return self.vm()
         if "compiled" in self._engines:
             return self._engines["compiled"]
-        try:
-            return self._best(left)
-        except CompileError:  # a broken compiler is no reason not to simulate
-            self.compiles = False
-            return self.vm()
-
-    def _best(self, left: float) -> Engine:
-        """The compiled engine where it pays or lies in the cache, else the virtual machine."""
-        n = self.instructions
-        look_up, compile_ = 2e-3 + 1e-5 * n, 0.1 + 1.5e-4 * n
-        expected = max(left, self.vm_time)
-        if expected > 2 * compile_:
-            return self.compiled()
-        if expected > 2 * look_up and "looked up" not in self._engines:
-            self._engines["looked up"] = self.vm()
-            if compiled_before(loop_source(*self._parts)) is not None:
+        if self.prospect.pays(max(left, self.vm_time)):
+            try:
                 return self.compiled()
+            except CompileError:  # a broken compiler is no reason not to simulate
+                self.prospect.hopeless = True
         return self.vm()

@@ -112,8 +112,8 @@ def test_an_interrupt_stops_it_too(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     waiting = script(tmp_path / "waiting", f"echo $$ > {tmp_path / 'pid'}; exec sleep 60")
     monkeypatch.setattr(module.subprocess.Popen, "communicate", interrupted)
     started: list[int] = []
-    end = module._end
-    monkeypatch.setattr(module, "_end", lambda process: (started.append(process.pid), end(process)))
+    end = module.end
+    monkeypatch.setattr(module, "end", lambda process: (started.append(process.pid), end(process)))
     with pytest.raises(KeyboardInterrupt):
         waiting.run()
     with pytest.raises(ProcessLookupError):

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symfric.integrator.compiled import columns
+from symfric.integrator.compiled import background, columns
 from symfric.integrator.compiled.columns import CHAINED, SIDE_BY_SIDE, Columns
 
 x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
@@ -59,11 +59,13 @@ def test_arguments_and_results_may_be_empty() -> None:
 def test_auto_compiles_when_it_is_predicted_to_pay(monkeypatch: pytest.MonkeyPatch) -> None:
     compiled: list[str] = []
 
-    def compile_(function: ca.Function) -> ca.Function:
+    def compile_(function: ca.Function, source: str) -> ca.Function:
         compiled.append(function.name())
+        assert function.name() in source
         return function
 
     monkeypatch.setattr(columns, "external", compile_)
+    monkeypatch.setattr(background, "processors", lambda: 1)
     double = Columns(ca.Function("double", [u], [2 * u]))
     double([np.zeros(1)], backend="auto")
     double([np.zeros(1)], backend="vm")
@@ -79,7 +81,7 @@ def test_auto_compiles_when_it_is_predicted_to_pay(monkeypatch: pytest.MonkeyPat
 def test_without_a_compiler_auto_stays_in_the_virtual_machine(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(columns, "find_compiler", lambda: None)
+    monkeypatch.setattr(background, "find_compiler", lambda: None)
     double = Columns(ca.Function("double", [u], [2 * u]), spent=100.0)
     (found,) = double([np.array([3.0])], backend="auto")
     np.testing.assert_array_equal(found, [[6.0]])

@@ -42,9 +42,9 @@ def called(monkeypatch: pytest.MonkeyPatch) -> list[Columns]:
     calls: list[Columns] = []
     call = Columns.__call__
 
-    def counted(self: Columns, *arguments: object) -> object:
+    def counted(self: Columns, *arguments: object, **engine: object) -> object:
         calls.append(self)
-        return call(self, *arguments)  # type: ignore[arg-type]
+        return call(self, *arguments, **engine)  # type: ignore[arg-type]
 
     monkeypatch.setattr(Columns, "__call__", counted)
     return calls
