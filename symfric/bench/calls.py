@@ -27,6 +27,7 @@ from symfric.integrator.equations.system import system
 from symfric.integrator.peers.casadi_integrators import peer
 from symfric.integrator.running.run import Tolerances
 from symfric.integrator.simulate import simulate
+from symfric.integrator.stepper import stepper
 from symfric.laws import GMS, BrownMcPhee, Law, LuGre, MaxwellSlip
 from symfric.laws.dynamic.gms import Element
 from symfric.model import Model
@@ -130,7 +131,15 @@ def _stepped(task: str, model: Model, dt: float, u: Array, rounds: int) -> Itera
         run = simulate(model, dt * len(u), u=hold, rtol=rtol, samples=2, backend=_backend())
         return np.array([run[v.name][-1] for v in model.x])
 
-    ways: dict[str, Callable[[], Array]] = {"one simulate, Hold": at_once}
+    plant = stepper(model, dt, rtol=RTOL, backend=_backend())
+
+    def step_by_step() -> Array:
+        plant.reset()
+        for row in u:
+            plant.step(row)
+        return plant.x.copy()
+
+    ways: dict[str, Callable[[], Array]] = {"stepper": step_by_step, "one simulate, Hold": at_once}
     ways["casadi rosenbrock"] = _stepping_peer(model, dt, u)
     exact = at_once(1e-10)
     scale = np.array([v.nominal for v in model.x])
