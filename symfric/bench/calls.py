@@ -116,10 +116,14 @@ def _drive(quick: bool) -> Iterator[CallRow]:
 
 
 def _arm(quick: bool) -> Iterator[CallRow]:
-    """An arm of six joints under torques sampled at 1 kHz."""
+    """An arm of six joints under torques held for 1 ms each: a controller's, and mere noise."""
     model, count = Arm(BrownMcPhee()).model(), 20 if quick else 1000
-    torques = np.random.default_rng(SEED).uniform(-1.0, 1.0, (count, 6)) * TORQUES
-    yield from _stepped("arm, steps of 1 ms", model, 1e-3, torques, 1 if quick else 3)
+    t = 1e-3 * np.arange(count)
+    smooth = np.sin(2 * np.pi * np.outer(t, np.linspace(1.0, 4.0, 6))) * TORQUES
+    noise = np.random.default_rng(SEED).uniform(-1.0, 1.0, (count, 6)) * TORQUES
+    rounds = 1 if quick else 3
+    yield from _stepped("arm, 1 kHz, sines", model, 1e-3, smooth, rounds)
+    yield from _stepped("arm, 1 kHz, noise", model, 1e-3, noise, rounds)
 
 
 def _stepped(task: str, model: Model, dt: float, u: Array, rounds: int) -> Iterator[CallRow]:

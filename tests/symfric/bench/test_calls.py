@@ -17,7 +17,7 @@ def test_every_task_is_measured_and_right(tmp_path: Path) -> None:
     tasks: dict[str, list[dict[str, float]]] = {}
     for row in rows:
         tasks.setdefault(row["task"], []).append(row)
-    assert len(tasks) == 8
+    assert len(tasks) == 9
     for ways in tasks.values():
         assert ways[0]["ratio"] == 1.0
         assert all(way["time_us"] > 0 for way in ways)
