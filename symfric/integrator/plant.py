@@ -7,16 +7,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.compiler import find_compiler
+from symfric.foundation.compiler import CompileError, find_compiler
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.equations.initial import consistent, first_guess, first_step
+from symfric.integrator.running.crossings import Memory
 from symfric.integrator.running.diagnosis import explain
+from symfric.integrator.running.eventful_plants import with_events
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.plants import (
     AGAIN,
     ATTEMPTS,
+    END,
+    OVER,
     REFUSED,
     SEARCH,
+    STORM,
     Advance,
     Looks,
     Plants,
@@ -43,11 +48,16 @@ class Plant:
     """
 
     def __init__(
-        self, integrator: Integrator, plants: Plants, backend: str, batch: int | None
+        self,
+        integrator: Integrator,
+        plants: Plants,
+        backend: str,
+        batch: int | None,
+        tolerance: float,
     ) -> None:
         self.model, self.dt = integrator.model, plants.dt
         self.failed: dict[int, tuple[Status, str]] = {}
-        self._plants, self._batch = plants, batch
+        self._plants, self._batch, self._tolerance = plants, batch, tolerance
         self._backend = "vm" if backend == "auto" and find_compiler() is None else backend
         self._fresh: dict[int, Array] = {}
         self._own, self._places = integrator, list[tuple[Array, Array]]()
@@ -56,14 +66,27 @@ class Plant:
     def _use(self, integrator: Integrator) -> None:
         """Go on with an integrator of the same equations."""
         self._integrator, plants = integrator, self._plants
-        make = in_vm if self._backend == "vm" else compiled
-        self._advance: Advance = make(integrator, plants)
+        try:
+            self._advance = self._loop(integrator)
+        except CompileError:
+            if self._backend == "compiled":
+                raise
+            self._backend = "vm"  # a broken compiler is no reason not to go on
+            self._advance = self._loop(integrator)
         signals = np.zeros((plants.S.shape[0], integrator.signals.numel_out(0)))
         self._looks, self._seen = Looks(integrator, plants, signals), False
         nx, one = integrator.system.nx, self._batch is None
         states = plants.S[:, State.MEMORY : State.MEMORY + nx]
         self._x: Array = states[0] if one else states
         self._u: Array = plants.u[0] if one else plants.u
+
+    def _loop(self, integrator: Integrator) -> Advance:
+        """What makes the plants go on."""
+        vm, plants = self._backend == "vm", self._plants
+        if integrator.crossings is not None:
+            engine = integrator.vm() if vm else integrator.compiled()
+            return with_events(integrator, plants, engine, self._tolerance)
+        return in_vm(integrator, plants) if vm else compiled(integrator, plants)
 
     def __repr__(self) -> str:
         many = "" if self._batch is None else f" x {self._batch}"
@@ -121,11 +144,13 @@ class Plant:
         for guess, own in zip(guesses, values, strict=True):
             found.append(consistent(system, "stepper", guess, np.concatenate([own, held])))
         h = min(first_step(SAMPLES * self.dt, plants.begin[0]), float(plants.R[0, Given.H_MAX]))
+        remembered = Memory.new(len(self.model.events), self._tolerance)
         for b, guess, own, y in zip(which, guesses, values, found, strict=True):
             plants.S[b] = State.at(plants.begin[b], h, y)
             plants.R[b, Given.d(system.nx)] = np.concatenate([own, held])
             plants.R[b, Given.T_END] = plants.begin[b]
-            plants.u[b], plants.count[b], plants.why[b] = held, 0, 0
+            plants.u[b], plants.count[b], plants.why[b] = held, 0, END
+            plants.memory[b] = remembered
             self._fresh[b] = guess
             self.failed.pop(b, None)
         self._suit(which, guesses)
@@ -134,7 +159,8 @@ class Plant:
 
     def copy(self) -> "Plant":
         """A plant in the same state that goes its own way."""
-        other = Plant(self._integrator, self._plants.copy(), self._backend, self._batch)
+        plants = self._plants.copy()
+        other = Plant(self._integrator, plants, self._backend, self._batch, self._tolerance)
         other._fresh, other.failed = dict(self._fresh), dict(self.failed)
         return other
 
@@ -160,6 +186,20 @@ class Plant:
     def attempts(self) -> int:
         """Attempts of all plants in the last interval."""
         return int(self._plants.made.sum())
+
+    @property
+    def happened(self) -> list[Any]:
+        """(time [s], name) of the events of the last interval; with a batch (plant, time, name)."""
+        found = self._plants.happened
+        return [event[1:] for event in found] if self._batch is None else list(found)
+
+    @property
+    def terminated(self) -> Any:
+        """Whether a terminal event has ended the run of a plant, which stands there until `reset`;
+        with a batch of every plant, shape (batch,).
+        """
+        over = self._plants.why == OVER
+        return bool(over[0]) if self._batch is None else over
 
     @property
     def signals(self) -> dict[str, Any]:
@@ -227,12 +267,12 @@ class Plant:
             raise checks.refused(where, "finite numbers", given)
         lost: dict[int, tuple[Status, str]] = {}
         while True:
-            stand = [b for b in np.flatnonzero(plants.why).tolist() if b not in lost]
+            stand = [b for b in np.flatnonzero(plants.why > 0).tolist() if b not in lost]
             for b in stand:
                 why = self._help(b)
                 if why is not None:
                     lost[b] = why
-            if len(lost) == np.count_nonzero(plants.why):
+            if len(lost) == np.count_nonzero(plants.why > 0):
                 break
             self._advance(0)
         self.failed |= lost
@@ -249,6 +289,8 @@ class Plant:
         where = f"stepper '{self.model.name}' at t = {t:.9g} s"
         if plants.why[b] == ATTEMPTS:
             return Status.MAX_STEPS, f"{where}: {Status.MAX_STEPS.value}"
+        if plants.why[b] == STORM:
+            return Status.EVENT_STORM, f"{where}: {Status.EVENT_STORM.value}"
         if plants.why[b] == SEARCH:
             try:
                 y[:] = consistent(system, where, y.copy(), d)

@@ -8,6 +8,7 @@ from symfric.integrator.equations.initial import smallest_step
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.plant import SAMPLES, Numbers, Plant
 from symfric.integrator.running.built import built
+from symfric.integrator.running.crossings import Memory
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.plants import Plants
 from symfric.integrator.running.run import Tolerances
@@ -27,6 +28,7 @@ def stepper(
     atol: float | None = None,
     method: str = "auto",
     backend: str = "auto",
+    event_tolerance: float = 1e-10,
     max_steps: int = 100_000,
     max_step: float | None = None,
 ) -> Plant:
@@ -43,20 +45,20 @@ def stepper(
     that are not tiny (`simulate` runs those again with an `atol` of their own).
 
     Args:
-        model: the equations, without events.
+        model: the equations. Events happen inside the intervals; plants with events go one after
+            the other, and each costs some tens of microseconds more.
         dt: interval [s] between samples.
         t_start: time [s] of the start.
         x0, p: start values and parameters by name, as in `simulate`; with `batch` arrays, too.
         batch: number of plants that go together, all by one call; then inputs, states and signals
             have a row for each plant.
-        rtol, atol, method, max_step: as in `simulate`.
+        rtol, atol, method, event_tolerance, max_step: as in `simulate`.
         backend: "compiled", "vm", or "auto": compiled (once, kept in the user's cache) where there
             is a compiler.
         max_steps: attempts allowed in one interval.
 
     Raises:
-        ValueError: bad input; no consistent start; a model with events, whose modes would change
-            inside an interval (use `simulate` from sample to sample).
+        ValueError: bad input; no consistent start.
         CompileError: compiled code was asked for, and there is no compiler or it failed.
 
     Warns:
@@ -64,9 +66,6 @@ def stepper(
     """
     where = "stepper"
     check_model(where, model)
-    if model.events:
-        names = checks.listed(event.name for event in model.events)
-        raise ValueError(f"{where}: expected a model without events, got {names}; use simulate")
     dt = checks.number(f"{where}: dt", dt, unit="s", above=0.0)
     t_start = checks.number(f"{where}: t_start", t_start, unit="s")
     _, t_end, rtol = check_span(where, model, t_start, t_start + dt, rtol)
@@ -76,8 +75,11 @@ def stepper(
     # as held samples, each input is one number of the run data
     inputs = input_data(model, {v.name: float(v.start) for v in model.u}, t_start, t_end)
     integrator, _ = built(model, inputs, formula)
-    allowed = tolerances(where, rtol, atol, integrator.system.nominal, 1.0, max_steps, max_step)
-    plant = Plant(integrator, _plants(integrator, members, dt, t_start, allowed), backend, batch)
+    allowed = tolerances(
+        where, rtol, atol, integrator.system.nominal, event_tolerance, max_steps, max_step
+    )
+    plants = _plants(integrator, members, dt, t_start, allowed)
+    plant = Plant(integrator, plants, backend, batch, allowed.event)
     plant.reset(x0, p)
     return plant
 
@@ -96,4 +98,5 @@ def _plants(
     return Plants(
         S, R, u, begin, count, ready, why, made,
         dt, allowed.max_steps, smallest_step(SAMPLES * dt),
+        np.tile(Memory.new(len(model.events), allowed.event), (members, 1)),
     )  # fmt: skip

@@ -6,7 +6,7 @@ order: a loop in C around the generated step, and one in Python around CasADi's 
 
 import ctypes
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from string import Template
 from time import perf_counter
 from typing import Any, cast, final
@@ -24,10 +24,10 @@ from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
-END, ATTEMPTS, STEP_TOO_SMALL, SEARCH, AGAIN = 0, 2, 3, 4, 5
+END, ATTEMPTS, STEP_TOO_SMALL, SEARCH, AGAIN, STORM, OVER = 0, 2, 3, 4, 5, 6, -1
 """Why a plant stands: at its sample, out of attempts, steps fell to nothing, its algebraic unknowns
-are too far from the last ones to follow (`symfric.integrator.equations.following`); or it stands no
-more, because somebody has helped it."""
+are too far from the last ones to follow (`symfric.integrator.equations.following`), it stands no
+more because somebody has helped it, events pile up, a terminal event has ended its run."""
 REFUSED = -1
 """What `Advance` returns where an input is no finite number, and nothing has happened."""
 
@@ -52,6 +52,8 @@ class Plants:
         dt: interval [s].
         attempts: allowed in one.
         h_min: step [s] below which a plant stands.
+        memory: what is remembered of events, a row each plant; without columns if there are none.
+        happened: (plant, time [s], name) of the events of the last interval.
     """
 
     S: Array
@@ -65,11 +67,17 @@ class Plants:
     dt: float
     attempts: int
     h_min: float
+    memory: Array
+    happened: list[tuple[int, float, str]] = field(default_factory=list[tuple[int, float, str]])
 
     def copy(self) -> "Plants":
         """The same, in memory of its own."""
-        arrays = (self.S, self.R, self.u, self.begin, self.count, self.ready, self.why, self.made)
-        return Plants(*(a.copy() for a in arrays), self.dt, self.attempts, self.h_min)  # type: ignore[arg-type]
+        own = {name: getattr(self, name).copy() for name in (*SHARED, "memory", "happened")}
+        return replace(self, **own)
+
+
+SHARED = ("S", "R", "u", "begin", "count", "ready", "why", "made")
+"""What C reads and writes, in this order."""
 
 
 class _Members(ctypes.Structure):
@@ -78,16 +86,14 @@ class _Members(ctypes.Structure):
     _fields_ = (
         *((name, ctypes.c_longlong) for name in ("members", "attempts")),
         *((name, ctypes.c_double) for name in ("dt", "h_min")),
-        *((n, ctypes.c_void_p) for n in ("S", "R", "u", "begin", "count", "ready", "why", "made")),
+        *((name, ctypes.c_void_p) for name in SHARED),
     )
 
     @classmethod
     def of(cls, plants: Plants) -> "_Members":
         """The addresses of arrays that somebody else keeps alive."""
-        p = plants
-        arrays = (p.S, p.R, p.u, p.begin, p.count, p.ready, p.why, p.made)
-        addresses = (array.ctypes.data for array in arrays)
-        return cls(p.S.shape[0], p.attempts, p.dt, p.h_min, *addresses)
+        addresses = (getattr(plants, name).ctypes.data for name in SHARED)
+        return cls(plants.S.shape[0], plants.attempts, plants.dt, plants.h_min, *addresses)
 
 
 def compiled(integrator: Integrator, plants: Plants) -> Advance:

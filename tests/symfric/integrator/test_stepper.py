@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from symfric import (
     BrownMcPhee,
-    ExactCoulomb,
     Hold,
     LuGre,
     Model,
@@ -268,5 +267,3 @@ def test_bad_arguments_are_refused() -> None:
         many.reset(x0={"v": [1.0, 2.0, 3.0]})
     with pytest.raises(ValueError, match="expected different numbers"):
         many.reset(members=[1, 1])
-    with pytest.raises(ValueError, match="without events"):
-        stepper(drive(ExactCoulomb()), 1e-3)
