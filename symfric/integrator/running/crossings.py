@@ -20,6 +20,9 @@ from symfric.model.parts import Event
 Array = NDArray[np.float64]
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Where each step is looked at; a double crossing closer than this is not seen."""
+SHARPER = 1e-3
+"""Events are located to this part of the tolerance: a ball whose impacts are all late gains by it,
+and where it loses little by them it would bounce for ever."""
 KEPT = 100
 """Times of events that are remembered, to notice a storm."""
 ALIKE = 4

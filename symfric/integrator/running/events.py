@@ -20,6 +20,7 @@ from symfric.integrator.running.crossings import (
     LEAST,
     LOOKS,
     RESTART,
+    SHARPER,
     SOON,
     Crossings,
     Memory,
@@ -235,6 +236,7 @@ class Search:
             memory[Memory.PHASE] = Memory.ON
             return None
         look = int(np.argmax(hits.any(axis=1)))
+        share = max(SHARPER * self.tolerance / h, 1e-15)
         begin, roots = LOOKS[look] if look else low, np.full(count, np.inf)
         for i in np.flatnonzero(hits[look]):
 
@@ -243,11 +245,7 @@ class Search:
 
             ends = float(g[look, i]), float(g[look + 1, i])
             at_once = look == 0 and jumped[i]
-            roots[i] = (
-                0.0
-                if at_once
-                else locate(value, begin, LOOKS[look + 1], ends, max(self.tolerance / h, 1e-15))
-            )
+            roots[i] = 0.0 if at_once else locate(value, begin, LOOKS[look + 1], ends, share)
         theta = float(roots.min())
         return theta, (roots - theta) * h <= self.tolerance
 

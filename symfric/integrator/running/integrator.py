@@ -84,11 +84,18 @@ class Integrator:
         self.resets = self._reset_function()
         self.crossings = self._crossings() if self.model.events else None
         self.prospect = Prospect(self._written, ("symfric_march",), self.instructions)
+        self.schedules = self._schedules()
         self.build_time = perf_counter() - begin
 
     def _written(self) -> str:
         """C of the loop."""
         return loop_source(*self._parts)
+
+    def _schedules(self) -> tuple[str, ...]:
+        """Event expressions in time alone, serialised: error control sees nothing of them."""
+        own, t = [ca.SX(event.expression) for event in self.model.events], self.model.t
+        alone = (e for e in own if not any(not ca.is_equal(s, t) for s in ca.symvar(e)))
+        return tuple(ca.SX.serialize(e) for e in alone)
 
     def _event_function(self) -> ca.Function:
         """Event expressions as a Function (t, y, d)."""

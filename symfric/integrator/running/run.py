@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import consistent, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData
+from symfric.integrator.equations.onsets import pace
 from symfric.integrator.running.diagnosis import explain
 from symfric.integrator.running.engine import Stop
 from symfric.integrator.running.events import Eventful
@@ -75,9 +76,10 @@ def integrate(
     A motion that turns out to be tiny is integrated again on its own scale (`sizes`).
     """
     nominal = integrator.system.nominal
-    if integrator.model.events and inputs.pace < tolerances.max_step / PACES:
+    if integrator.model.events:
         # where a machine rests, nothing but its events tells that an input has become too strong
-        tolerances = replace(tolerances, max_step=PACES * inputs.pace)
+        quickest = min([inputs.pace, *(pace(f, *inputs.span) for f in integrator.schedules)])
+        tolerances = replace(tolerances, max_step=min(tolerances.max_step, PACES * quickest))
     scale, allowed = nominal, tolerances
     run = _integrated(integrator, inputs, y0, p, allowed, backend, progress, times)
     for _ in range(ROUNDS if tolerances.follow and not ample(run.end, nominal) else 0):

@@ -9,6 +9,7 @@ from symfric.integrator.running.crossings import (
     LEAST,
     LOOKS,
     RESTART,
+    SHARPER,
     SOON,
     Crossings,
 )
@@ -38,6 +39,7 @@ def search_source(crossings: Crossings | None, given: int) -> str:
         of_state=_table(j for _, j in crossings.resets),
         kept=KEPT,
         alike=ALIKE,
+        sharper=repr(SHARPER),
         soon=repr(SOON),
         restart=repr(RESTART),
         least=repr(LEAST),
@@ -143,7 +145,7 @@ static double symfric_crossing(const symfric_place *p, double *M, double *which)
   arg[1] = p->d;
   res[0] = g + EVENTS;
   symfric_looks(arg, res, p->iw, p->w, 0);
-  share = M[TOLERANCE] / h;
+  share = $sharper * M[TOLERANCE] / h;
   if (share < 1e-15) share = 1e-15;
   for (look = 0; look < LOOKS; ++look) {
     g0 = g + look * EVENTS;

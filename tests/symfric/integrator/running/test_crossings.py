@@ -3,8 +3,9 @@
 import casadi as ca
 import numpy as np
 import pytest
+from hybrid import ball
 
-from symfric import Event, Model, Variable
+from symfric import Event, Model, Status, Variable, simulate
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import ADAPTIVE
@@ -44,3 +45,24 @@ def test_each_jump_is_kept_with_the_values_on_both_sides(backend: str) -> None:
     assert dense.y1[first - 1].tolist() == jumps.before[0].tolist()
     assert dense.y0[first].tolist() == jumps.after[1].tolist()
     assert (np.diff(dense.t0) > 0).all()
+
+
+def test_events_of_time_alone_are_not_leapt_over() -> None:
+    """x' = 1 takes steps of most of the span; 8 s of a clock that strikes 31 times."""
+    t = ca.SX.sym("t")
+    strike = Event("strike", ca.sin(10 * t))
+    run = simulate(Model("clock", x=(x,), ode=ca.SX(1), events=(strike,), t=t), 10.0)
+    assert [time for time, _ in run.happened] == pytest.approx(np.pi / 10 * np.arange(1, 32))
+    late = Event("late", t - 5, 1, terminal=True)
+    run = simulate(Model("clock", x=(x,), ode=ca.SX(1), events=(late,), t=t), 10.0)
+    assert run.statistics.steps < 20
+
+
+@each_backend
+def test_a_ball_that_loses_little_comes_to_rest_too(backend: str) -> None:
+    """Its impacts were a tenth of a nanosecond late, which kept it bouncing for ever."""
+    run = simulate(ball(0.97), 60.0, backend=backend, throw=False)
+    assert run.status is Status.EVENT_STORM
+    fall = np.sqrt(2 / 9.81)
+    assert run.step_times[-1] == pytest.approx(fall * (1 + 2 * 0.97 / 0.03), rel=1e-6)
+    assert len(run.happened) < 900
