@@ -42,7 +42,7 @@ def trajectory_of(
         times = times[: outputs.found]
 
     def unknowns(at: Array) -> Array:
-        return outputs.reached.copy() if at is times else run.over(at)(at)
+        return outputs.reached.copy() if at is times else run.at(at)
 
     def states(at: Array) -> dict[str, Array]:
         y, columns = unknowns(at), None if drifts else integrator.states

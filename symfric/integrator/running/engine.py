@@ -4,7 +4,8 @@ Both engines advance S in place and write a row (t0, t1, y0, y1, D) per accepted
 """
 
 import ctypes
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any, Protocol, cast, final
 
@@ -42,6 +43,8 @@ class Stop(IntEnum):
 
 STOPS = tuple(Stop)
 """By number."""
+BATCH, FEW = 32, 8
+"""Attempts of one call of the virtual machine, and in intervals that do not take that many more."""
 
 
 class Engine(Protocol):
@@ -70,6 +73,23 @@ class Engine(Protocol):
 
 
 @final
+class _Batch:
+    """Attempts of one call of the virtual machine, with buffers of their own."""
+
+    def __init__(self, step: ca.Function, size: int) -> None:
+        self.size = size
+        self.S, self.S_out = np.zeros(step.numel_in(0)), np.zeros((size, step.numel_in(0)))
+        self.R, self.D = np.zeros((size, step.numel_in(1))), np.zeros((size, step.numel_out(1)))
+        self._buffer, call = cast(tuple[Any, Any], step.mapaccum("batch", size).buffer())
+        self.call: Callable[[], None] = call
+        self._buffer.set_arg(0, flat_view(self.S))
+        self._buffer.set_arg(1, flat_view(self.R))
+        self._buffer.set_res(0, flat_view(self.S_out))
+        if self.D.size:
+            self._buffer.set_res(1, flat_view(self.D))
+
+
+@final
 @dataclass(frozen=True, eq=False)
 class VmEngine:
     """Attempts in CasADi's virtual machine, in batches of one call; needs no compiler.
@@ -79,14 +99,22 @@ class VmEngine:
     """
 
     step: ca.Function
-    batch: ca.Function
+    size: int
     follows: bool = False
     name: str = "vm"
+    _batches: dict[int, list["_Batch"]] = field(default_factory=dict[int, list["_Batch"]])
 
     @classmethod
-    def of(cls, step: ca.Function, size: int = 32, follows: bool = False) -> "VmEngine":
+    def of(cls, step: ca.Function, size: int = BATCH, follows: bool = False) -> "VmEngine":
         """The engine for a step Function; algebraic unknowns, if any, `follow` jumps of inputs."""
-        return cls(step, step.mapaccum("batch", size), follows)
+        return cls(step, size, follows)
+
+    def _batch(self, size: int) -> "_Batch":
+        """So many attempts; buffers that nobody else has, to be given back."""
+        try:
+            return self._batches.setdefault(size, []).pop()
+        except IndexError:
+            return _Batch(self.step, size)
 
     def run(
         self,
@@ -96,21 +124,15 @@ class VmEngine:
         attempts: int,
         h_min: float,
         events: Eventful | None = None,
+        size: int = 0,
     ) -> tuple[Array, int, Stop]:
         """Advance S; return the records, the attempts made and why it stopped.
 
-        With `events` these are carried out on the way.
+        With `events` these are carried out on the way; `size` attempts are made in one call.
         """
-        size, search = self.batch.size2_out(0), None if events is None else Search(events)
-        n = S.size - State.MEMORY
-        S_out, D = np.zeros((size, S.size)), np.zeros((size, self.step.numel_out(1)))
-        every = np.tile(R, size)
-        buffer, evaluate = cast(tuple[Any, Any], self.batch.buffer())
-        buffer.set_arg(0, flat_view(S))
-        buffer.set_arg(1, flat_view(every))
-        buffer.set_res(0, flat_view(S_out))
-        if D.size:
-            buffer.set_res(1, flat_view(D))
+        batch, search = self._batch(size or self.size), None if events is None else Search(events)
+        size, S_out, D = batch.size, batch.S_out, batch.D
+        batch.R[:] = R
         found: list[Array] = []
         count = made = 0
         t_end = R[Given.T_END]
@@ -119,7 +141,8 @@ class VmEngine:
         while S[State.T] < t_end and count < rows and made < attempts and _large(S, h_min).all():
             if asked or (events is not None and events.full):
                 break
-            evaluate()
+            batch.S[:] = S
+            batch.call()
             before = np.vstack([S, S_out[:-1]])
             took = S_out[:, State.T] > before[:, State.T]
             used = size
@@ -148,6 +171,8 @@ class VmEngine:
             count += found[-1].shape[0]
             made += used
             S[:] = S_out[used - 1]
+        self._batches[size].append(batch)
+        n = S.size - State.MEMORY
         records = np.vstack(found) if found else np.zeros((0, width(n, D.shape[1] // n)))
         full = count >= rows or (events is not None and events.full)
         return records, made, Stop(asked) if asked else _reason(S, R, full, h_min)
@@ -155,12 +180,13 @@ class VmEngine:
     def march(self, work: Work, attempts: int) -> tuple[Array, int, Stop]:
         """Advance `work`; return the records, the attempts made and why it stopped."""
         loop, found, count, made = work.loop, list[Array](), 0, 0
+        size = self.size
         if work.events is not None:
             work.events.count = work.events.steps = 0
         while True:
-            records, tried, stop = self.run(
-                work.S, work.R, loop.max_rows - count, attempts - made, loop.h_min, work.events
-            )
+            limits = loop.max_rows - count, attempts - made, loop.h_min
+            records, tried, stop = self.run(work.S, work.R, *limits, work.events, size)
+            size = self.size if tried > FEW else min(self.size, FEW)
             found.append(records)
             count, made = count + records.shape[0], made + tried
             if records.shape[0]:

@@ -23,7 +23,7 @@ from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.method import Method
 from symfric.integrator.methods.suited import suited
 from symfric.integrator.running.crossings import Crossings, crossings
-from symfric.integrator.running.engine import CompiledEngine, Engine, VmEngine
+from symfric.integrator.running.engine import BATCH, CompiledEngine, Engine, VmEngine
 from symfric.integrator.running.loop import Work, loop_source
 from symfric.integrator.step.attempt import build_step
 from symfric.model import Model
@@ -39,8 +39,8 @@ INLINE = 7000
 """Steps with more instructions are calls of blocks, which compile much faster; both engines run the
 same form."""
 
-BATCH, EVENT_BATCH = 32, 4
-"""Attempts of one call of the virtual machine; those behind an event are made in vain."""
+EVENT_BATCH = 4
+"""Attempts of one call of the virtual machine with events; those behind one are made in vain."""
 
 SPARE = 2
 """Sets of buffers kept: one for a run, one for a run within its callback."""

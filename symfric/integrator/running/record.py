@@ -44,7 +44,8 @@ class Run:
         engine: what ran it.
         most: bytes of accepted steps that it keeps.
         integrator: the one it ended with: pivots that fail on the way are replaced.
-        again: runs it once more and keeps all steps.
+        again: (times, bytes) -> another run with these outputs, which keeps so many bytes of steps;
+            None where this one has kept all.
         status, message: how it ended.
     """
 
@@ -57,7 +58,7 @@ class Run:
     attempts: int = 0
     engine: str = ""
     integrator: Integrator | None = None
-    again: Callable[[], "Run"] | None = None
+    again: Callable[[Array, float], "Run"] | None = None
     status: Status = Status.SUCCESS
     message: str = Status.SUCCESS.value
     most: float = MOST_BYTES
@@ -104,8 +105,8 @@ class Run:
     @cached_property
     def dense(self) -> Dense:
         """The continuous solution over all accepted steps, of a long run by another one."""
-        if self._before is not None and self.again is not None:
-            return self.again().dense
+        if self.again is not None:
+            return self.again(np.zeros(0), np.inf).dense
         return join(self._pieces())
 
     @property
@@ -142,8 +143,11 @@ class Run:
             np.max([before.largest, *(np.abs(p.y1).max(axis=0) for p in found)], axis=0),
         )
 
-    def over(self, times: Array) -> Dense:
-        """A continuous solution that covers `times` [s]: the last step alone where that will do."""
-        if self._before is not None and times.size and times.min() >= self._pieces()[-1].t0[0]:
-            return self.last
-        return self.dense
+    def at(self, times: Array) -> Array:
+        """Unknowns at `times` [s], shape (n, times), of a long run as outputs of another one."""
+        if self.again is None or "dense" in self.__dict__:
+            return self.dense(times)
+        if times.size and times.min() >= self._pieces()[-1].t0[0]:
+            return self.last(times)
+        wanted, places = np.unique(times, return_inverse=True)
+        return self.again(wanted, self.most).outputs.values[:, places]

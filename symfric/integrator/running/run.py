@@ -127,9 +127,7 @@ def _integrated(
     integrator.give_back(work)
     if not run.complete:
         same = replace(tolerances, max_steps=run.attempts)
-        run.again = partial(
-            _integrated, integrator, inputs, y0, p, same, backend, None, NOWHERE, np.inf
-        )
+        run.again = partial(_integrated, integrator, inputs, y0, p, same, backend, None)
     return run
 
 
