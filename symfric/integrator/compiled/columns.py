@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from symfric.foundation.compiler import CompileError
 from symfric.foundation.numeric import flat_view
 from symfric.integrator.compiled.background import Prospect
-from symfric.integrator.compiled.compiler import library
+from symfric.integrator.compiled.rows import NAME, Rows, rows_source
 
 Array = NDArray[np.float64]
 CHAINED, SIDE_BY_SIDE = 16, 32
-"""Columns of one call; the last call repeats its last column."""
+"""Columns of one call of the virtual machine; the last call repeats its last column."""
 PER_INSTRUCTION = 3e-9
 """Seconds that the virtual machine needs."""
 
@@ -45,27 +45,30 @@ class Columns:
         return CHAINED if self.chained else SIDE_BY_SIDE
 
     @cached_property
-    def _batch(self) -> ca.Function:
-        dense = densified(self.function)
-        if self.chained:
-            return dense.mapaccum(f"{dense.name()}_{self.size}", self.size)
-        return dense.map(self.size)
+    def _dense(self) -> ca.Function:
+        return densified(self.function)
 
     @cached_property
-    def _compiled(self) -> ca.Function:
-        return external(self._batch, self._prospect.written())
+    def _batch(self) -> ca.Function:
+        if self.chained:
+            return self._dense.mapaccum(f"{self._dense.name()}_{self.size}", self.size)
+        return self._dense.map(self.size)
 
     @cached_property
     def _prospect(self) -> Prospect:
-        name, n = self._batch.name(), self.function.n_instructions()
-        return Prospect(lambda: c_code(self._batch), (name,), n)
+        n = self.function.n_instructions()
+        return Prospect(lambda: rows_source(self._dense), (NAME,), n)
 
-    def _choose(self, backend: str, count: int) -> ca.Function:
-        """The virtual machine or compiled code; "auto" compiles when that is predicted to pay."""
+    @cached_property
+    def _compiled(self) -> Rows:
+        return Rows.of(self._dense, self.chained, self._prospect.written())
+
+    def _choose(self, backend: str, count: int) -> Rows | None:
+        """Compiled code, or none; "auto" compiles when that is predicted to pay."""
         if backend == "compiled":
             return self._compiled
         if backend == "vm":
-            return self._batch
+            return None
         if "_compiled" in self.__dict__:
             return self._compiled
         if self._prospect.pays(self.spent + PER_INSTRUCTION * self._prospect.instructions * count):
@@ -73,7 +76,7 @@ class Columns:
                 return self._compiled
             except CompileError:  # a broken compiler is no reason not to evaluate
                 self._prospect.hopeless = True
-        return self._batch
+        return None
 
     def __call__(
         self, rows: Sequence[Array], first: Array | None = None, backend: str = "vm"
@@ -86,7 +89,10 @@ class Columns:
             backend: "vm", "compiled" or "auto".
         """
         count, most, began = rows[0].shape[0], self.size, perf_counter()
-        batch = self._choose(backend, count)
+        compiled = self._choose(backend, count)
+        if compiled is not None:
+            return compiled(rows, first)
+        batch = self._batch
         arguments = [np.zeros(batch.numel_in(i)) for i in range(batch.n_in())]
         results = [np.zeros((most, batch.numel_out(i) // most)) for i in range(batch.n_out())]
         found = [np.empty((count, result.shape[1])) for result in results]
@@ -108,8 +114,7 @@ class Columns:
                 whole[begin : begin + size] = result[:size]
             if self.chained:
                 arguments[0][:] = results[0][-1]
-        if batch is self._batch:
-            self.spent += perf_counter() - began
+        self.spent += perf_counter() - began
         return found
 
 
@@ -120,20 +125,3 @@ def densified(function: ca.Function) -> ca.Function:
     arguments = function.mx_in()
     results = [ca.densify(result) for result in function.call(arguments)]
     return ca.Function(function.name(), arguments, results)
-
-
-def c_code(function: ca.Function) -> str:
-    """C of `function` as CasADi generates it."""
-    generator = ca.CodeGenerator("symfric_columns.c", {"static_aux": True})
-    generator.add(function)
-    return generator.dump()
-
-
-def external(function: ca.Function, source: str = "") -> ca.Function:
-    """`function` compiled, or loaded from the cache; its `source` where that is known.
-
-    Raises:
-        CompileError: there is no compiler, or it failed.
-    """
-    path = library(source or c_code(function), function.name())
-    return ca.external(function.name(), str(path))

@@ -1,11 +1,14 @@
 """Functions applied to columns: the same numbers in every batch, engine and order."""
 
+from types import SimpleNamespace
+
 import casadi as ca
 import numpy as np
 import pytest
 
 from symfric.integrator.compiled import background, columns
 from symfric.integrator.compiled.columns import CHAINED, SIDE_BY_SIDE, Columns
+from symfric.integrator.compiled.rows import Rows
 
 x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
 
@@ -56,17 +59,28 @@ def test_arguments_and_results_may_be_empty() -> None:
     assert empty.shape == (2, 0)
 
 
+@each_engine
+def test_rows_may_lie_backwards_apart_or_all_in_one_place(backend: str) -> None:
+    """As the steps of a run do, swept back with one set of data."""
+    table = np.arange(24.0).reshape(4, 6)
+    both = Columns(ca.Function("both", [x, u], [x * u]))
+    (found,) = both([table[::-1, 2:4], np.broadcast_to(3.0, (4, 1))], backend=backend)
+    np.testing.assert_array_equal(found, 3 * table[::-1, 2:4])
+    (found,) = both([table[:, ::3], np.asfortranarray(table)[:, 1]], backend=backend)
+    np.testing.assert_array_equal(found, table[:, ::3] * table[:, 1:2])
+
+
 def test_auto_compiles_when_it_is_predicted_to_pay(monkeypatch: pytest.MonkeyPatch) -> None:
     compiled: list[str] = []
 
-    def compile_(function: ca.Function, source: str) -> ca.Function:
+    def compile_(function: ca.Function, chained: bool, source: str) -> columns.Rows:
         compiled.append(function.name())
         assert function.name() in source
-        return function
+        return Rows.of(function, chained, source)
 
-    monkeypatch.setattr(columns, "external", compile_)
+    monkeypatch.setattr(columns, "Rows", SimpleNamespace(of=compile_))
     monkeypatch.setattr(background, "processors", lambda: 1)
-    double = Columns(ca.Function("double", [u], [2 * u]))
+    double = Columns(ca.Function("twice", [u], [2 * u]))
     double([np.zeros(1)], backend="auto")
     double([np.zeros(1)], backend="vm")
     assert compiled == []
@@ -82,6 +96,6 @@ def test_without_a_compiler_auto_stays_in_the_virtual_machine(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(background, "find_compiler", lambda: None)
-    double = Columns(ca.Function("double", [u], [2 * u]), spent=100.0)
+    double = Columns(ca.Function("twice", [u], [2 * u]), spent=100.0)
     (found,) = double([np.array([3.0])], backend="auto")
     np.testing.assert_array_equal(found, [[6.0]])

@@ -1,0 +1,104 @@
+"""A Function applied to the rows of arrays by a loop in C, where they lie: nothing is copied."""
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+from string import Template
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.integrator.compiled.compiler import load
+
+Array = NDArray[np.float64]
+NAME = "symfric_rows"
+NUMBER = np.dtype(np.float64).itemsize
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """A compiled Function with dense results.
+
+    Attributes:
+        library: holds `symfric_rows`.
+        sizes: of its arguments and of its results.
+        chained: the first result of a row is the first argument of the next one.
+    """
+
+    library: ctypes.CDLL
+    sizes: tuple[tuple[int, ...], tuple[int, ...]]
+    chained: bool
+
+    @classmethod
+    def of(cls, function: ca.Function, chained: bool, source: str = "") -> "Rows":
+        """Compile `source`, which is `rows_source`, or load it from the cache.
+
+        Raises:
+            CompileError: there is no compiler, or it failed.
+        """
+        library = load(source or rows_source(function), NAME)
+        library.symfric_rows.restype = None
+        library.symfric_rows.argtypes = [ctypes.c_longlong, ctypes.c_int, *[ctypes.c_void_p] * 2]
+        into = tuple(function.numel_in(i) for i in range(function.n_in()))
+        out = tuple(function.numel_out(i) for i in range(function.n_out()))
+        return cls(library, (into, out), chained)
+
+    def __call__(self, rows: Sequence[Array], first: Array | None = None) -> list[Array]:
+        """Results of all rows; see `Columns`."""
+        into, out = self.sizes
+        count, begin = rows[0].shape[0], int(self.chained)
+        arrays = [_in_rows(a, size) for a, size in zip(rows, into[begin:], strict=True)]
+        if first is not None:
+            arrays.insert(0, np.ascontiguousarray(first, dtype=float).reshape(1, -1))
+        results = [np.empty((count, size)) for size in out]
+        # address of the first row, and how far the next one is
+        places = np.array([(a.ctypes.data, a.strides[0]) for a in (*arrays, *results)])
+        k = len(arrays)
+        self.library.symfric_rows(count, begin, places[:k].ctypes.data, places[k:].ctypes.data)
+        return results
+
+
+def _in_rows(array: Array, size: int) -> Array:
+    """An array whose rows are `size` numbers side by side each; itself, where they are."""
+    flat = array if array.ndim == 2 else array.reshape(array.shape[0], size)
+    beside = size <= 1 or flat.strides[1] == NUMBER
+    return flat if beside and flat.dtype == np.float64 else np.ascontiguousarray(flat, dtype=float)
+
+
+def rows_source(function: ca.Function) -> str:
+    """C of `function` as CasADi generates it, with the loop over rows."""
+    generator = ca.CodeGenerator("symfric_rows.c", {"static_aux": True})
+    generator.add(function)
+    return generator.dump() + Template(_LOOP).substitute(
+        name=function.name(),
+        arguments=function.n_in(),
+        results=function.n_out(),
+        arg=max(1, function.sz_arg()),
+        res=max(1, function.sz_res()),
+        iw=max(1, function.sz_iw()),
+        w=max(1, function.sz_w()),
+    )
+
+
+_LOOP = """
+typedef struct { char *at; long long apart; } symfric_place;
+
+/* Row after row of arguments and results; the first result goes on where they are chained. */
+void symfric_rows(long long count, int chained, const symfric_place *in, const symfric_place *out)
+{
+  const double *arg[$arg];
+  double *res[$res], w[$w];
+  casadi_int iw[$iw];
+  long long k;
+  int i;
+  for (k = 0; k < count; ++k) {
+    for (i = 0; i < $arguments; ++i) arg[i] = (const double *)(in[i].at + k * in[i].apart);
+    if (chained) arg[0] = (const double *)(k ? out[0].at + (k - 1) * out[0].apart : in[0].at);
+    for (i = 0; i < $results; ++i) res[i] = (double *)(out[i].at + k * out[i].apart);
+    $name(arg, res, iw, w, 0);
+  }
+}
+"""
