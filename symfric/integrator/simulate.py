@@ -158,6 +158,7 @@ def simulate(
             y0,
             run.jumps,
             allowed.event,
+            (trajectory.t, run.outputs.reached),
         )
         trajectory = _differentiated(trajectory, path, which)
     if measure_error and trajectory.status.ok:
@@ -226,9 +227,8 @@ def _differentiated(trajectory: Trajectory, path: Path, which: Seeds) -> Traject
         }
 
     def pull_back(weights: Mapping[str, Array]) -> dict[str, float]:
-        zero = np.zeros(trajectory.t.size)
-        every = np.vstack([weights.get(name, zero) for name in names])
-        return gradient(path, which, trajectory.t, every)
+        used = {names.index(name): w for name, w in weights.items() if w.any()}
+        return gradient(path, which, trajectory.t, used)
 
     def delays() -> dict[str, Array]:
         times = np.repeat(solution().times, [len(jump.which) for jump in path.jumps], axis=0)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import evaluate
+from symfric.foundation.numeric import evaluate, evaluate_all
 from symfric.foundation.parameters import Variable, check_names
 from symfric.foundation.symbols import stacked, symbols_of
 from symfric.model.holonomic import Holonomic
@@ -275,7 +275,7 @@ class Model:
         self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None
     ) -> NDArray[np.float64]:
         """Derivative of `initial_state` with respect to p, shape (nx, n_p)."""
-        return self._start_slopes(*self._start_arguments(given, p))[0].full()
+        return evaluate_all(self._start_slopes, *self._start_arguments(given, p))[0]
 
     def start_by_state(
         self,
@@ -286,7 +286,7 @@ class Model:
         """Derivative of `initial_state` with respect to the start value of a state, shape (nx,)."""
         i = [v.name for v in self.x].index(name)
         chosen = dict(given or {}) | {name: float(self.initial_state(given, p)[i])}
-        return self._start_slopes(*self._start_arguments(chosen, p))[1].full()[:, i]
+        return evaluate_all(self._start_slopes, *self._start_arguments(chosen, p))[1][:, i]
 
     def _start_arguments(
         self, given: Mapping[str, float] | None, p: Mapping[str, float] | None
@@ -316,7 +316,10 @@ class Model:
     @cached_property
     def _start_slopes(self) -> ca.Function:
         """Derivatives of `_start` by p and by the values given."""
-        return self._start.factory("slopes", self._start.name_in(), ["jac:x:p", "jac:x:known"])
+        arguments = self._start.sx_in()
+        x = self._start(*arguments)
+        slopes = [ca.densify(ca.jacobian(x, arguments[i])) for i in (3, 0)]
+        return ca.Function("slopes", arguments, slopes)
 
 
 def _same(a: ca.SX, b: ca.SX) -> bool:

@@ -1,5 +1,6 @@
 """Gradients by one sweep backwards over the accepted steps, whatever the number of parameters."""
 
+from collections.abc import Mapping
 from typing import final
 
 import numpy as np
@@ -9,27 +10,28 @@ from symfric.integrator.derivatives.functions import derivatives, whole_step
 from symfric.integrator.derivatives.path import Jump, Path, Piece
 from symfric.integrator.derivatives.saltation import passage
 from symfric.integrator.derivatives.seeds import Seeds
-from symfric.integrator.derivatives.sensitivity import signal_slopes
 
 Array = NDArray[np.float64]
 
 
-def gradient(path: Path, which: Seeds, times: Array, weights: Array) -> dict[str, float]:
+def gradient(
+    path: Path, which: Seeds, times: Array, weights: Mapping[int, Array]
+) -> dict[str, float]:
     """Derivatives of sum_ij weights_ij signal_i(t_j), of the discrete solution, exact to rounding.
 
     Args:
         path: the run.
         which: what to differentiate with respect to.
-        times: t_j [s], shape (m,).
-        weights: shape (signals, m).
+        times: t_j [s], increasing, shape (m,).
+        weights: number of a signal -> its weights, shape (m,); no others need a derivative.
     """
-    s = path.integrator.system
-    by_y, by_d = signal_slopes(path, times)
-    # a signal without weight may have no derivative, as a norm at zero
-    used = np.flatnonzero(weights.any(axis=1))
-    weights, by_y, by_d = weights[used], by_y[:, used], by_d[:, used]
-    by_data = np.einsum("rm,mrd->d", weights, by_d)
-    looks = _Looks(path, times, np.einsum("rm,mrn->mn", weights, by_y))
+    s, used = path.integrator.system, tuple(weights)
+    if not used:
+        return dict.fromkeys(which.names, 0.0)
+    every = np.array([*weights.values()]).T
+    rows = [times, path.unknowns(times), path.data_at(times), every]
+    by_y, of_d = derivatives(path.integrator).weighted(used)(rows, backend=path.backend)
+    looks, by_data = _Looks(path, times, by_y), of_d.sum(axis=0)
     adjoint = np.zeros(s.n + 1)
     for piece in reversed(path.pieces):
         if piece.count:
@@ -39,9 +41,8 @@ def gradient(path: Path, which: Seeds, times: Array, weights: Array) -> dict[str
             move = passage(path, jump)
             by_data += move.by_data.T @ adjoint
             adjoint = move.by_state.T @ adjoint
-    through_start = adjoint[: s.nx] @ which.start
-    through_data = by_data @ which.of_data(by_data.size)
-    return dict(zip(which.names, (through_start + through_data).tolist(), strict=True))
+    found = adjoint[: s.nx] @ which.start + which.through(by_data)
+    return dict(zip(which.names, found.tolist(), strict=True))
 
 
 def _swept_back(path: Path, piece: Piece, looks: "_Looks", adjoint: Array) -> tuple[Array, Array]:
@@ -71,16 +72,24 @@ class _Looks:
     def __init__(self, path: Path, times: Array, by_y: Array) -> None:
         t0, (steps, rows, n) = path.dense.t0, path.dense.D.shape
         self.path, self.by_y = path, by_y
-        self.step = np.clip(np.searchsorted(t0, times, side="right") - 1, 0, steps - 1)
+        self.step = np.searchsorted(t0[1:], times, side="right")
         self.theta = (times - t0[self.step]) / path.size[self.step]
         self.total = np.zeros((steps, rows + 2, n))
-        np.add.at(self.total, self.step, self._basis(self.theta)[:, :, None] * by_y[:, None, :])
+        shares = self._basis(self.theta)[:, :, None] * by_y[:, None, :]
+        if times.size > 1:
+            first = np.append(0, np.flatnonzero(self.step[1:] != self.step[:-1]) + 1)
+            self.total[self.step[first]] = np.add.reduceat(shares, first)
+        else:
+            self.total[self.step] = shares
         self.cut: tuple[int, float, Array] = (-1, 0.0, np.zeros(n))
 
     def _basis(self, theta: Array) -> Array:
         """Shares of start, end and dense output in a value, shape (m, rows + 2)."""
-        rows = range(1, self.total.shape[1] - 1)
-        return np.stack([1 - theta, theta, *(theta**r * (1 - theta) for r in rows)], axis=1)
+        shares = np.empty((theta.size, self.total.shape[1]))
+        shares[:, 0], shares[:, 1] = 1 - theta, theta
+        for row in range(2, shares.shape[1]):
+            shares[:, row] = theta * (shares[:, row - 1] if row > 2 else shares[:, 0])
+        return shares
 
     def weights(self, steps: slice) -> Array:
         """Of start, end and dense output of steps, a row each."""

@@ -6,14 +6,20 @@ from typing import final
 from weakref import WeakKeyDictionary
 
 import casadi as ca
+import numpy as np
 
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.derivatives.path import Path
 from symfric.integrator.derivatives.seeds import Seeds
+from symfric.integrator.equations.branches import branchless
+from symfric.integrator.equations.quotients import divided_once
 from symfric.integrator.equations.system import System
 from symfric.integrator.running.dense import Dense
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.attempt import build_dense_step
+
+LARGE = 5000
+"""Functions with more instructions stay as they are: reading them takes time."""
 
 
 @final
@@ -29,6 +35,8 @@ class Derivatives:
 
     def __post_init__(self) -> None:
         self._forward: dict[tuple[int, ...], Columns] = {}
+        self._weighted: dict[tuple[int, ...], Columns] = {}
+        self._signals: dict[tuple[int, ...], Columns] = {}
 
     @property
     def symbols(self) -> list[ca.SX]:
@@ -36,7 +44,7 @@ class Derivatives:
         return [ca.SX.sym(name, self.step.numel_in(i)) for i, name in enumerate("yhd")]
 
     def forward(self, which: Seeds) -> Columns:
-        """(S, y, h, d, h') -> (S after the step, that of its dense output).
+        """(S, y, h, d, h') -> (S after the step, the same of each row of its dense output).
 
         S of shape (n, names); h' holds the derivatives of the size, and is no argument where
         nothing jumps.
@@ -55,8 +63,9 @@ class Derivatives:
                 of_h[0] if of_h else ca.SX(1, names),
                 ca.SX(ca.sparsify(of_d)),
             )
-            results = ca.cse([ca.densify(pushed[:n, :]), ca.densify(pushed[n:, :])])
-            function = ca.Function("forward", [S, y, h, d, *of_h], results)
+            inner = [ca.vec(part) for part in ca.vertsplit(pushed, n)[1:]]
+            results = [ca.densify(pushed[:n, :]), ca.densify(ca.vertcat(ca.SX(0, 1), *inner))]
+            function = fast("forward", [S, y, h, d, *of_h], results)
             self._forward[which.parameters] = Columns(function, chained=True)
         return self._forward[which.parameters]
 
@@ -73,8 +82,8 @@ class Derivatives:
         inner = weights[n:] + ca.vertcat(after, ca.SX(every.numel() - n, 1))
         by_y, by_h, by_d = self.step.reverse(1)(y, h, d, every, inner)
         of_h = [ca.densify(by_h)] if self.eventful else []
-        results = ca.cse([ca.densify(by_y + weights[:n]), ca.densify(by_d), *of_h])
-        return Columns(ca.Function("reverse", [after, y, h, d, weights], results), chained=True)
+        results = [ca.densify(by_y + weights[:n]), ca.densify(by_d), *of_h]
+        return Columns(fast("reverse", [after, y, h, d, weights], results), chained=True)
 
     @cached_property
     def algebraic(self) -> ca.Function:
@@ -120,14 +129,50 @@ class Derivatives:
         """Whether something may jump."""
         return self.events.numel_out(0) > 0
 
-    @cached_property
-    def of_signals(self) -> Columns:
-        """Derivatives of the signals (t, y, d) -> (by y, by d)."""
-        t, y, d = (ca.SX.sym(n, self.signals.numel_in(i)) for i, n in enumerate("tyd"))
-        values = self.signals(t, y, d)
-        return Columns(
-            ca.Function("of_signals", [t, y, d], [ca.jacobian(values, y), ca.jacobian(values, d)])
-        )
+    def of_signals(self, which: Seeds) -> Columns:
+        """Derivatives of all signals (t, y, d, S) -> (signals, names)."""
+        if which.parameters not in self._signals:
+            names, arguments = len(which.names), self.at_times
+            of_d = ca.SX(ca.sparsify(ca.DM(which.of_data(arguments[2].numel()))))
+            S = ca.SX.sym("S", self.system.n, names)
+            values, direction = self.signals(*arguments), ca.vertcat(S, of_d)
+            pushed = ca.jtimes(values, ca.vertcat(*arguments[1:]), direction)
+            self._signals[which.parameters] = Columns(
+                fast("of_signals", [*arguments, S], [ca.densify(pushed)])
+            )
+        return self._signals[which.parameters]
+
+    @property
+    def at_times(self) -> list[ca.SX]:
+        """Arguments t, y, d of the signals."""
+        return [ca.SX.sym(n, self.signals.numel_in(i)) for i, n in enumerate("tyd")]
+
+    def weighted(self, used: tuple[int, ...]) -> Columns:
+        """Derivatives of a weighted sum of signals (t, y, d, weights) -> (by y, by d).
+
+        Only of those `used`: others may have no derivative, as a norm at zero.
+        """
+        if used not in self._weighted:
+            t, y, d = self.at_times
+            values, w = self.signals(t, y, d)[list(used)], ca.SX.sym("w", len(used))
+            results = [ca.densify(ca.jtimes(values, x, w, True)) for x in (y, d)]
+            self._weighted[used] = Columns(fast("weighted", [t, y, d, w], results))
+        return self._weighted[used]
+
+
+def fast(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Function:
+    """The Function with fewer divisions and tanh written out; as it is where it is large.
+
+    A step divides several times by one number and calls tanh, and its derivatives more often.
+    """
+    function = ca.Function(name, arguments, ca.cse(results))
+    if function.n_instructions() > LARGE:
+        return function
+    ends = np.cumsum([0, *(result.numel() for result in results)]).tolist()
+    column = divided_once(ca.vertcat(*(ca.vec(result) for result in ca.cse(results))))
+    parts = ca.vertsplit(column, ends)
+    shaped = [ca.reshape(a, b.shape) for a, b in zip(parts, results, strict=True)]
+    return branchless(ca.Function(name, arguments, ca.cse(shaped)), LARGE)
 
 
 def _slopes(name: str, function: ca.Function) -> ca.Function:

@@ -83,6 +83,7 @@ class Path:
         guess: unknowns from which consistent ones at the start were found.
         happened: events that were carried out.
         tolerance: how sharply they were located [s].
+        known: times of the result [s] and unknowns there, shape (n, times).
     """
 
     integrator: Integrator
@@ -93,15 +94,30 @@ class Path:
     guess: Array
     happened: Sequence[Jumps] = ()
     tolerance: float = 0.0
+    known: tuple[Array, Array] | None = None
+
+    def unknowns(self, times: Array) -> Array:
+        """Unknowns y at times, shape (times, n)."""
+        if self.known is not None and times is self.known[0]:
+            return self.known[1].T
+        return self.dense(times).T
 
     def data(self, interval: NDArray[np.intp]) -> Array:
         """Run data d on input intervals, shape (intervals, n_d)."""
+        if self.inputs.values.shape[1] == 1:
+            d = np.concatenate([self.p, self.inputs.values[:, 0]])
+            return np.ndarray((interval.size, d.size), float, d, 0, (0, d.itemsize))
         p = np.tile(self.p, (interval.size, 1))
         return np.hstack([p, self.inputs.values[:, interval].T])
 
     def data_at(self, times: Array) -> Array:
         """Run data d at times, shape (times, n_d)."""
-        return self.data(self.inputs.interval(times))
+        return self.data(self._intervals(times))
+
+    def _intervals(self, times: Array) -> NDArray[np.intp]:
+        if self.inputs.breaks.size == 2:
+            return np.zeros(times.size, dtype=np.intp)
+        return self.inputs.interval(times)
 
     @cached_property
     def jumps(self) -> list[Jump]:
@@ -123,7 +139,7 @@ class Path:
     @cached_property
     def interval(self) -> NDArray[np.intp]:
         """Input interval of every step."""
-        return self.inputs.interval((self.dense.t0 + self.dense.t1) / 2)
+        return self._intervals((self.dense.t0 + self.dense.t1) / 2)
 
     @cached_property
     def size(self) -> Array:

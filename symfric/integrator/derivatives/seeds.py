@@ -36,6 +36,10 @@ class Seeds:
                 selector[row, column] = 1.0
         return selector
 
+    def through(self, by_data: Array) -> Array:
+        """Derivative by each name from that by the run data, shape (names,)."""
+        return np.array([by_data[row] if row >= 0 else 0.0 for row in self.parameters])
+
 
 def seeds(
     model: Model,

@@ -65,8 +65,7 @@ def _swept(path: Path, which: Seeds, piece: Piece, state: Array) -> Dense:
         steps.append(of_h)
     after, inner = derivatives(path.integrator).forward(which)(steps, state[:n].T, path.backend)
     begin = np.vstack([state[:n].T.reshape(1, -1), after[:-1]])
-    bent = inner.reshape(piece.count, names, -1, n).transpose(0, 2, 1, 3)
-    bent = bent.reshape(piece.count, -1, names * n)
+    bent = inner.reshape(piece.count, path.dense.D.shape[1], names * n)
     t0, t1 = path.dense.t0[k], path.dense.t1[k]
     if state[-1].any():
         ahead, bend = _ahead(whole_step(path, k.start))
@@ -103,16 +102,6 @@ def _ahead(step: Dense) -> tuple[Array, Array]:
     return start / h, np.arange(2, len(c) + 2)[:, None] * c / h
 
 
-def signal_slopes(path: Path, times: Array) -> tuple[Array, Array]:
-    """Derivatives of all signals at times by y and by d, shapes (times, signals, n or n_d)."""
-    arguments = [times, path.dense(times).T, path.data_at(times)]
-    by_y, by_d = derivatives(path.integrator).of_signals(arguments, backend=path.backend)
-    signals, n_d = path.integrator.signals.numel_out(0), path.integrator.system.d.numel()
-    # CasADi stores column by column
-    by_y = by_y.reshape(times.size, path.integrator.system.n, signals).transpose(0, 2, 1)
-    return by_y, by_d.reshape(times.size, n_d, signals).transpose(0, 2, 1)
-
-
 def of_signals(path: Path, which: Seeds, solution: Dense, times: Array) -> Array:
     """Derivatives of all signals at times, shape (names, signals, times).
 
@@ -122,7 +111,7 @@ def of_signals(path: Path, which: Seeds, solution: Dense, times: Array) -> Array
         solution: derivatives of the solution, from `forward`.
         times: where [s].
     """
-    by_y, by_d = signal_slopes(path, times)
-    S = solution(times).reshape(len(which.names), -1, times.size)
-    through_y = np.einsum("mrn,snm->srm", by_y, S)
-    return through_y + np.einsum("mrd,ds->srm", by_d, which.of_data(by_d.shape[2]))
+    rows = [times, path.unknowns(times), path.data_at(times), solution(times).T]
+    (found,) = derivatives(path.integrator).of_signals(which)(rows, backend=path.backend)
+    # CasADi stores column by column
+    return np.ascontiguousarray(found.T).reshape(len(which.names), -1, times.size)

@@ -43,10 +43,15 @@ def _polynomial(coefficients: Sequence[float], x: ca.SX) -> ca.SX:
     return value
 
 
-def branchless(function: ca.Function) -> ca.Function:
-    """The SX `function` with every tanh written out; itself where it has none, or is large."""
+def branchless(function: ca.Function, most: int = LARGE) -> ca.Function:
+    """The SX `function` with every tanh written out; itself where it has none, or is large.
+
+    Args:
+        function: of columns, or matrices.
+        most: instructions that it may have.
+    """
     count = function.n_instructions()
-    if count > LARGE or ca.OP_TANH not in map(function.instruction_id, range(count)):
+    if count > most or ca.OP_TANH not in map(function.instruction_id, range(count)):
         return function
 
     def rule(k: int, operands: list[ca.SX]) -> ca.SX | None:
