@@ -82,6 +82,7 @@ class Crossings:
         directions, terminal: of each event.
         resets: of each reset, in order: number of the event and of the state that it sets.
         follows: whether algebraic unknowns follow a reset.
+        closes: whether loops have to be closed again behind it.
     """
 
     looks: ca.Function
@@ -93,6 +94,7 @@ class Crossings:
     terminal: tuple[bool, ...]
     resets: tuple[tuple[int, int], ...]
     follows: bool
+    closes: bool
 
     @property
     def count(self) -> int:
@@ -122,6 +124,7 @@ def crossings(
     resets: ca.Function,
     rows: int,
     follows: bool,
+    closes: bool,
 ) -> Crossings:
     """Build the Functions.
 
@@ -131,7 +134,7 @@ def crossings(
         expressions: (t, y, d) -> value of each event.
         resets: (t, y, d) -> value of each reset, event after event.
         rows: of the dense output.
-        follows: as in `Crossings`.
+        follows, closes: as in `Crossings`.
     """
     at = Record(expressions.numel_in(1), rows)
     row, d = ca.SX.sym("row", at.width), ca.SX.sym("d", expressions.numel_in(2))
@@ -149,6 +152,7 @@ def crossings(
         tuple(e.terminal for e in events),
         tuple((i, states.index(name)) for i, e in enumerate(events) for name in e.reset),
         follows,
+        closes,
     )
 
 

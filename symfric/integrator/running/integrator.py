@@ -109,6 +109,7 @@ class Integrator:
 
     def _crossings(self) -> Crossings:
         """What the search for events evaluates."""
+        manifold = self.system.manifold
         return crossings(
             self.model.events,
             [v.name for v in self.model.x],
@@ -116,6 +117,7 @@ class Integrator:
             self.resets,
             self.tableau.H.shape[0],
             self.follows,
+            manifold is not None and manifold.m > 0,
         )
 
     def of_time(self, name: str, expression: ca.SX) -> ca.Function:
@@ -253,7 +255,8 @@ class Integrator:
     def _parts(self) -> Parts:
         """What the compiled loop is made of."""
         # what nothing drives seldom jumps: not worth the compiler's time
-        follow = self.follow if self.follows and self.model.u else None
+        jumps = bool(self.model.u or self.model.events)
+        follow = self.follow if self.follows and jumps else None
         return self.step, self.tableau.H.shape[0], self.crossings, self.follows, follow
 
     def compiled(self) -> Engine:

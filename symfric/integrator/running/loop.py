@@ -128,14 +128,18 @@ def loop_source(
         step, dense_rows: one attempt.
         crossings: events.
         follows: whether there are algebraic unknowns, which follow a jump of inputs.
-        follow: how; where it is left out, the loop returns at each jump.
+        follow: how; where it is left out, the loop returns at each jump, and at each event.
     """
     numbers = _numbers(step, dense_rows, crossings)
-    followed = "\n      return 7;" if follows else ""
+    numbers |= {"followed": "\n      return 7;" if follows else "", "settled": ""}
     if follow is not None:
         data = step.numel_in(1) - follow.round.numel_in(1)
-        followed = f"\n      if (symfric_follow(L->S + {State.MEMORY}, L->R + {data})) return 7;"
-    pieces = Template(STRUCT + OUTPUTS + MARCH).substitute(numbers, followed=followed)
+        call = f"symfric_follow(L->S + {State.MEMORY}, L->R + {data})"
+        numbers["followed"] = f"\n      if ({call}) return 7;"
+        if crossings is not None and not crossings.closes:
+            place = {"call": call, "jump": crossings.width}
+            numbers["settled"] = Template(SETTLED).substitute(numbers, **place)
+    pieces = Template(STRUCT + OUTPUTS + MARCH).substitute(numbers)
     others = () if follow is None else (follow.round,)
     jump = "" if follow is None else follow.c_source
     return c_source(step, dense_rows, *others, crossings=crossings) + jump + pieces
@@ -236,6 +240,14 @@ EVENTS = {
 }
 """What a model with events adds to the attempts, and to what calls them."""
 
+SETTLED = """
+    if (stop == 6 && !$call) {
+      double *after = L->jumps + (L->jumped - 1) * $jump + 2 + $n;
+      for (i = 0; i < $n; ++i) after[i] = L->S[$memory + i];
+      stop = 1;
+    }"""
+"""Algebraic unknowns behind an event; where they have to be searched for, the loop returns."""
+
 STRUCT = """
 /* A run under way: buffers, limits, and how far it is. */
 typedef struct {
@@ -282,7 +294,7 @@ int symfric_march(symfric_loop *L)
     double *row = L->rows + L->count * WIDTH;
     long long counts[3], i;
     int stop = symfric_run(L->S, L->R, row, 1, L->max_attempts - L->made, L->h_min, counts$handed);
-    L->made += counts[1];$noted
+    L->made += counts[1];$noted$settled
     if (counts[0]) {
       ++L->count;
       symfric_outputs(L, row, stop == 0 && L->interval + 1 == L->intervals);
