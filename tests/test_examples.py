@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -27,7 +28,14 @@ def moves_are_solved_and_saved(printed: str, folder: Path) -> None:
     assert abs(data["terminal_miss"]["x"]) < 1e-3
 
 
+def drive_has_learnt_to_stop(printed: str, folder: Path) -> None:
+    (_, before), (_, after) = (re.findall(r"(-?\d+\.\d+)", line) for line in printed.splitlines())
+    assert float(before) > 20.0
+    assert float(after) < 0.5
+
+
 SAYS = {
+    "learn_drive": drive_has_learnt_to_stop,
     "rabinowicz": period_is_between_those_of_two_laws,
     "optimal_move": moves_are_solved_and_saved,
 }
