@@ -8,130 +8,325 @@ constraints,
 for the sliding velocity s and the friction force F: with F_e instead of F, and all other friction
 forces as they are, s would not change. It is an algebraic unknown F_e of its own. A contact at
 rest carries it, F = F_e, so that the equation says ds/dt = 0 whatever W is; contacts that rest
-together share what holds them by their equations together.
+independently of each other share what holds them by their equations together.
+
+In a loop of one degree of freedom all contacts rest together: s_i = g_i(q) omega, with omega the
+speed along the tangent of its constraints. No equation tells how they share the force that holds
+the loop, T = sum g_i F_i. They hold it as long as they can, and that is with equal shares of what
+each can hold at most,
+
+    F_i = sign(g_i) S_i T / sum |g_k| S_k,   |T| <= sum |g_k| S_k,   S_i = mu_s N_i
+
+A contact whose g_i passes through zero (a slider in its dead centre) turns and does not stop.
+Laws without modes get g_i in place of sign(g_i), which does not jump there: the contact that moves
+most carries most.
 
 A law by modes slides without asking for F_e; what it needs is the sign of |F_e| - mu_s N at rest.
 For it W is a constant, that of the start, and costs nothing.
+Limits: a loop of several degrees of freedom takes as many such contacts as are independent; a loop
+of one has no constraint that moves with time.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import chain
 from typing import final
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import at_start, starts_of, symbols_of
+from symfric.laws import Law
+from symfric.laws.base import smooth
 from symfric.laws.base.law import Switch
-from symfric.model import Variables
+from symfric.laws.composed.isotropic import SpatialSlip
+from symfric.model import Variables, kinds
 from symfric.multibody.equations import Equations
 from symfric.multibody.friction import Contact
-from symfric.multibody.mass import mobility
+from symfric.multibody.mass import mobility, null_direction
 
+Array = NDArray[np.float64]
 IMMOVABLE = 1e-10
 """Share of W that constraints leave of what it is without them, below which they hold a contact."""
+MINORS = 8
+"""Coordinates of a loop of one degree of freedom at most; its tangent is made of their minors."""
+FORCE = "F_e"
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Carried:
-    """What the law of a contact gets besides v and N.
+class Rest:
+    """Contacts that come to rest together, and the force that then holds them.
 
     Attributes:
-        contact: where.
-        unknown: F_e as algebraic variable, where the law asks for it.
-        inputs: by name.
-        change: sliding acceleration ds/dt.
+        name: of the contact, or of the loop.
+        members: numbers of the contacts.
+        along: g_i = s_i / omega of each.
+        rate: omega; the sliding velocity of a contact by itself.
+        change: its rate of change, at rest at least.
+        force: F_e or T, an algebraic variable.
+        inertia: 1 / W of omega.
+        by_modes: whether its laws rest by a mode.
+        direction: of a loop by modes, the sign of omega, 0 at rest.
+        still: names of the joint rates that are zero at rest.
     """
 
-    contact: Contact
-    unknown: Variables
-    inputs: dict[str, ca.SX]
+    name: str
+    members: tuple[int, ...]
+    along: tuple[ca.SX, ...]
+    rate: ca.SX
     change: ca.SX
+    force: Variable
+    inertia: ca.SX
+    by_modes: bool
+    direction: Variables
+    still: tuple[str, ...]
 
-    def needed(self, force: ca.SX, inertia: ca.SX) -> ca.SX:
-        """What is zero at the right F_e, shape (1, 1); no rows where nobody asks."""
-        if not self.unknown:
-            return ca.SX(0, 1)
-        return force + inertia * self.change - self.unknown[0].symbol
+    def shares(self, levels: Sequence[ca.SX], floors: Sequence[float]) -> list[ca.SX]:
+        """F_e of each member, of which `levels` [N] are what they can hold.
+
+        A floor [N] keeps the quotient finite where nothing presses at all.
+        """
+        if not self.is_loop:
+            return [self.force.symbol]
+        above = [S + floor for S, floor in zip(levels, floors, strict=True)]
+        signs = [forward(g) if self.by_modes else g for g in self.along]
+        weights = [sign * S for sign, S in zip(signs, above, strict=True)]
+        total = sum((g * w for g, w in zip(self.along, weights, strict=True)), start=ca.SX(0))
+        return [w / total * self.force.symbol for w in weights]
+
+    def capacity(self, levels: Sequence[ca.SX]) -> ca.SX:
+        """The largest force along omega that `levels` hold."""
+        pairs = zip(self.along, levels, strict=True)
+        return sum((smooth.magnitude(g, 0.0) * S for g, S in pairs), start=ca.SX(0))
 
     @property
-    def by_modes(self) -> bool:
-        """Whether its law rests by a mode."""
-        one = ca.SX(1.0)
-        z = ca.SX.ones(len(self.contact.law.states))
-        return bool(self.contact.law.switches(one, one, z, **dict.fromkeys(self.inputs, one)))
+    def is_loop(self) -> bool:
+        """Whether its members move together along the tangent of constraints."""
+        return not self.along[0].is_one()
 
-    def by_rates(self, eq: Equations) -> ca.SX:
-        """Derivatives G of the sliding velocity by the rates, shape (1, n)."""
-        return ca.jacobian(self.contact.slip, eq.qd)
+    def needed(self, forces: Sequence[ca.SX]) -> ca.SX:
+        """What is zero at the right force, shape (1, 1)."""
+        held = sum((g * F for g, F in zip(self.along, forces, strict=True)), start=ca.SX(0))
+        return held + self.inertia * self.change - self.force.symbol
 
-    def switches(self, N: ca.SX, z: ca.SX) -> tuple[Switch, ...]:
-        """Mode changes of the law.
 
-        What stops, rests first: whether it can is only known once the equations of rest are solved.
-        """
-        law, slip = self.contact.law, self.contact.slip
-        found = law.switches(slip, N, z, **self.inputs)
-        if not self.inputs:
-            return found
-        idle = law.switches(slip, N, z, **{name: ca.SX(0.0) for name in self.inputs})
-        return tuple(
-            replace(s, reset=other.reset) if s.halts else s
-            for s, other in zip(found, idle, strict=True)
+def forward(x: ca.SX) -> ca.SX:
+    """1 where x >= 0, else -1."""
+    return ca.SX(smooth.choose(x < 0, -1.0, 1.0))
+
+
+def sliding_change(eq: Equations, slip: ca.SX) -> ca.SX:
+    """Rate of change of a sliding velocity, in the accelerations of `eq`."""
+    change = ca.jtimes(slip, eq.q, eq.qd) + ca.jtimes(slip, eq.qd, eq.a)
+    return change + ca.jacobian(slip, eq.kin.t)
+
+
+def switches_at(
+    law: Law | SpatialSlip, v: ca.SX, N: ca.SX, z: ca.SX, F_e: ca.SX
+) -> tuple[Switch, ...]:
+    """Changes of mode of a law that may ask for F_e; others of its inputs are no matter to them."""
+    inputs = {i.name: F_e if i.name == FORCE else ca.SX(0.0) for i in law.inputs}
+    return law.switches(v, N, z, **inputs)
+
+
+def some_switches(law: Law | SpatialSlip) -> tuple[Switch, ...]:
+    """The changes of mode of a law, in no matter what numbers."""
+    one = ca.SX(1.0)
+    return switches_at(law, one, one, ca.SX.ones(len(law.states)), one)
+
+
+def static_level(law: Law | SpatialSlip, N: ca.SX) -> ca.SX:
+    """What a contact can hold [N]; what presses it where no mode tells."""
+    at_rest = ca.SX.zeros(len(law.states))
+    for switch in switches_at(law, ca.SX(0.0), N, at_rest, ca.SX(0.0)):
+        if switch.at_start:
+            return -ca.SX(switch.expression)
+    return N
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """Coordinates that constraints couple: their numbers, and those of the constraints."""
+
+    columns: tuple[int, ...]
+    rows: tuple[int, ...]
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom."""
+        return len(self.columns) - len(self.rows)
+
+
+def loops_of(eq: Equations) -> list[Loop]:
+    """Coordinates in groups that no constraint couples to each other; those that some couples."""
+    pattern = ca.DM(eq.Phi_q.sparsity(), 1).full() != 0
+    left, found = set(range(eq.m)), list[Loop]()
+    while left:
+        rows, columns = {left.pop()}, set[int]()
+        while True:
+            columns |= {int(k) for row in rows for k in np.flatnonzero(pattern[row])}
+            more = {row for row in left if pattern[row][sorted(columns)].any()}
+            if not more:
+                break
+            rows |= more
+            left -= more
+        found.append(Loop(tuple(sorted(columns)), tuple(sorted(rows))))
+    return found
+
+
+@final
+class _Maker:
+    """Makes the groups of contacts that rest together, of one mechanism at its start."""
+
+    def __init__(
+        self, where: str, eq: Equations, start: tuple[Variables, Variables, Array], p: Variables
+    ) -> None:
+        self.where, self.eq = where, eq
+        self.q, self.qd, self.a0 = start
+        self.p = p
+
+    def numbers(self, expression: ca.SX) -> Array:
+        """An expression at the start, without friction."""
+        symbols = ca.vertcat(symbols_of(self.q), symbols_of(self.qd), self.eq.a, self.eq.kin.t)
+        values = ca.vertcat(starts_of(self.q), starts_of(self.qd), ca.SX(self.a0), 0.0)
+        return at_start(ca.substitute(ca.SX(expression), symbols, values), self.p).full()
+
+    def refuse(self, contacts: Sequence[Contact], expected: str, advice: str) -> ValueError:
+        """The error for contacts whose laws cannot rest here."""
+        law = type(contacts[0].friction.law).__name__
+        joints = ", ".join(dict.fromkeys(f"'{c.joint}'" for c in contacts))
+        return ValueError(
+            f"{self.where} > joint {joints} > friction > law: expected {expected}, got {law}, "
+            f"which asks for the force of rest; {advice}"
         )
 
+    def made(
+        self, name: str, members: Sequence[int], along: Sequence[ca.SX], rate: ca.SX,
+        change: ca.SX, G: ca.SX, columns: Sequence[int],
+    ) -> Rest:  # fmt: skip
+        """One group; `G` are the derivatives of its rate by the joint rates."""
+        contacts = [self.eq.contacts[i] for i in members]
+        W, loose = mobility(self.eq, G)
+        here, free = (float(self.numbers(x)[0, 0]) for x in (W, loose))
+        if not here > IMMOVABLE * free:
+            raise self.refuse(
+                contacts,
+                "one that needs v and N alone where constraints prescribe the sliding",
+                "start elsewhere if this is a dead centre",
+            )
+        modes = {bool(some_switches(c.law)) for c in contacts}
+        if len(modes) > 1:
+            raise self.refuse(
+                contacts, "laws that all rest by modes, or none, in one loop", "give all one form"
+            )
+        by_modes, single = modes == {True}, columns == ()
+        start = float(self.numbers(change)[0, 0]) / here
+        own = {f"{contacts[0].name}_rate"} if single else {self.qd[k].name for k in columns}
+        direction: Variables = ()
+        if by_modes and not single:
+            begin = ca.SX(smooth.sign(rate, 0.0))
+            doc = "sense in which the loop moves, 0 at rest"
+            variable = Variable(
+                f"{name}_direction", "1", start=begin, doc=doc, kind=kinds.FRICTION_STATE
+            )
+            direction = (variable,)
+        unit = contacts[0].unit("N") if single else ""
+        doc = f"friction force of no sliding acceleration of {name}"
+        force = Variable(
+            f"{name}_{FORCE}", unit, start=start, nominal=max(1.0, abs(start)), doc=doc
+        )
+        return Rest(
+            name, tuple(members), tuple(along), rate, change, force,
+            ca.SX(1 / here) if by_modes else 1 / W[0], by_modes, direction,
+            tuple(v.name for v in self.qd if v.name in own),
+        )  # fmt: skip
 
-def carried(eq: Equations, contact: Contact) -> Carried:
-    """What the law of `contact` asks for, in terms of the accelerations of `eq`."""
-    slip, asked = contact.slip, [i.name for i in contact.law.inputs]
-    if not asked:
-        return Carried(contact, (), {}, ca.SX(0, 1))
-    change = ca.jtimes(slip, eq.q, eq.qd) + ca.jtimes(slip, eq.qd, eq.a)
-    change += ca.jacobian(slip, eq.kin.t)
-    unknown: Variables = ()
-    if "F_e" in asked:
-        doc = f"friction force of no sliding acceleration in joint '{contact.joint}'"
-        unknown = (Variable(f"{contact.name}_F_e", contact.unit("N"), doc=doc),)
-    known = (change, *(v.symbol for v in unknown))
-    every: dict[str, ca.SX] = dict(zip(("dv", "F_e"), known, strict=False))
-    return Carried(contact, unknown, {name: every[name] for name in asked}, change)
+    def single(self, i: int) -> Rest:
+        """A contact by itself."""
+        contact = self.eq.contacts[i]
+        change = sliding_change(self.eq, contact.slip)
+        G = ca.jacobian(contact.slip, self.eq.qd)
+        return self.made(contact.name, [i], [ca.SX(1)], contact.slip, change, G, ())
+
+    def loop(self, loop: Loop, members: Sequence[int]) -> Rest:
+        """All contacts of a loop of one degree of freedom."""
+        eq, columns = self.eq, list(loop.columns)
+        contacts = [eq.contacts[i] for i in members]
+        J = eq.Phi_q[list(loop.rows), columns]
+        if ca.depends_on(eq.phi[list(loop.rows), 0], eq.kin.t):
+            raise self.refuse(
+                contacts, "one that needs v and N alone in a loop that moves with time",
+                "a smooth law goes on",
+            )  # fmt: skip
+        if len(columns) > MINORS:
+            raise self.refuse(
+                contacts, f"a loop of at most {MINORS} coordinates", "build joint coordinates"
+            )
+        if {s.name for c in contacts for s in some_switches(c.law)} - {"stick", "slip"}:
+            raise self.refuse(
+                contacts, "one that stops at v = 0 alone in a loop", "ExactCoulomb does"
+            )
+        Z = ca.SX(eq.n, 1)
+        Z[columns] = null_direction(J)
+        along = [ca.jacobian(c.slip, eq.qd) @ Z for c in contacts]
+        name = f"{contacts[0].name}_loop"
+        return self.made(name, members, along, ca.dot(Z, eq.qd), ca.dot(Z, eq.a), Z.T, loop.columns)
 
 
-def inertias(
-    where: str, eq: Equations, contacts: Sequence[Carried], q: Variables, p: Variables
-) -> list[ca.SX]:
-    """1 / W [kg] of each contact; zero where nobody asks.
+def rests(
+    where: str, eq: Equations, start: tuple[Variables, Variables, Array], p: Variables
+) -> tuple[Rest, ...]:
+    """Contacts whose laws ask for F_e, in groups that rest together.
 
     Args:
         where: for messages.
         eq: the equations of motion.
-        contacts: all of them.
-        q, p: coordinates and parameters, at whose start values laws by modes take it.
+        start: coordinates, rates, and the accelerations without friction at the start.
+        p: parameters.
 
     Raises:
-        ValueError: constraints hold a contact, whatever friction does.
+        ValueError: constraints hold a contact, or leave open what contacts at rest carry.
     """
-    asking = [c for c in contacts if c.unknown]
-    found = dict[str, ca.SX]()
-    if asking:
-        for c in asking:
-            if (c.by_rates(eq) @ eq.Phi_q.T).nnz():
-                raise ValueError(
-                    f"{where} > joint '{c.contact.joint}' > friction > law: expected one that "
-                    f"needs v and N alone in a loop, got {type(c.contact.friction.law).__name__}"
-                )
-        W, loose = mobility(eq, ca.vertcat(*(c.by_rates(eq) for c in asking)))
-        at_first = ca.substitute(ca.horzcat(W, loose), ca.vertcat(symbols_of(q), eq.kin.t),
-                                 ca.vertcat(starts_of(q), 0.0))  # fmt: skip
-        values = at_start(at_first, p).full()
-        for k, c in enumerate(asking):
-            if not values[k, 0] > IMMOVABLE * values[k, 1]:
-                raise ValueError(
-                    f"{where} > joint '{c.contact.joint}' > friction > law: expected one that "
-                    "needs v and N alone where constraints prescribe the sliding, got "
-                    f"{type(c.contact.friction.law).__name__}, which asks for the force of rest; "
-                    "start elsewhere if this is a dead centre"
-                )
-            found[c.contact.name] = ca.SX(1 / values[k, 0]) if c.by_modes else 1 / W[k]
-    return [found.get(c.contact.name, ca.SX(0.0)) for c in contacts]
+    asking = [i for i, c in enumerate(eq.contacts) if FORCE in [x.name for x in c.law.inputs]]
+    if not asking:
+        return ()
+    make, found = _Maker(where, eq, start, p), list[Rest]()
+    alone, of_loop = list[int](), dict[int, list[int]]()
+    loops = loops_of(eq)
+    for i in asking:
+        moves = set(ca.jacobian(eq.contacts[i].slip, eq.qd).sparsity().get_col())
+        touched = [k for k, loop in enumerate(loops) if moves & {*loop.columns}]
+        inside = len(touched) == 1 and moves <= {*loops[touched[0]].columns}
+        if inside and loops[touched[0]].freedom == 1:
+            of_loop.setdefault(touched[0], []).append(i)
+        else:
+            alone.append(i)
+    found += [make.loop(loops[k], members) for k, members in of_loop.items()]
+    found += [make.single(i) for i in alone]
+    rows = ca.vertcat(eq.Phi_q, *(ca.jacobian(eq.contacts[i].slip, eq.qd) for i in alone))
+    if eq.m and alone and np.linalg.matrix_rank(make.numbers(ca.densify(rows))) < rows.size1():
+        raise make.refuse(
+            [eq.contacts[i] for i in alone],
+            "no more of them in a loop than it has degrees of freedom",
+            "how they share what they hold is open; a smooth law in the others goes on",
+        )
+    return tuple(sorted(found, key=lambda rest: rest.members))
+
+
+def applied_forces(
+    groups: Sequence[Rest], levels: Sequence[ca.SX], floors: Sequence[float]
+) -> dict[int, ca.SX]:
+    """Number of a contact -> its F_e, given what every contact can hold [N] and floors of that."""
+    pairs = (
+        zip(
+            rest.members,
+            rest.shares([levels[i] for i in rest.members], [floors[i] for i in rest.members]),
+            strict=True,
+        )
+        for rest in groups
+    )
+    return dict(chain.from_iterable(pairs))

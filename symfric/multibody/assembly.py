@@ -11,9 +11,7 @@ reactions are algebraic variables.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import final
 
 import casadi as ca
 import numpy as np
@@ -21,45 +19,19 @@ import numpy as np
 from symfric.foundation.numeric import is_symbolic
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import at_start, stacked, symbols_of
-from symfric.laws import Law
 from symfric.laws.composed.isotropic import SpatialSlip
-from symfric.model import Event, Model, Monitor, Output, Variables, kinds
+from symfric.model import Model, Monitor, Output, Variables, kinds
 from symfric.model.holonomic import Holonomic, Inner
 from symfric.model.sketch import Sketch
-from symfric.multibody.applied import Carried, carried, inertias
+from symfric.multibody.applied import rests
 from symfric.multibody.equations import Equations
-from symfric.multibody.friction import Contact
 from symfric.multibody.mass import solve_mass
 from symfric.multibody.results import Put
+from symfric.multibody.slips import Slip, events, keeps_deflection, slips
 from symfric.multibody.topology import Topology
 
 Details = Callable[[ca.SX, Put], Mapping[str, Output]]
 Drawn = Callable[[Mapping[str, float]], Sketch]
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Slip:
-    """A contact as the model sees it.
-
-    Attributes:
-        unknown: its normal force as algebraic variable, where it depends on the reactions and the
-            law depends on it.
-        N: normal force as the law gets it.
-        normal: the expression of it in terms of accelerations and multipliers.
-        states, rate: of the law.
-        force: friction force [N], of a ball a vector.
-        carried: what a law that asks for it gets besides v and N.
-    """
-
-    contact: Contact
-    unknown: Variables
-    N: ca.SX
-    normal: ca.SX
-    states: Variables
-    rate: ca.SX
-    force: ca.SX
-    carried: Carried
 
 
 def coordinates(topology: Topology) -> tuple[Variables, Variables]:
@@ -80,62 +52,6 @@ def coordinates(topology: Topology) -> tuple[Variables, Variables]:
     return tuple(q), tuple(qd)
 
 
-def depends_on_load(law: Law) -> bool:
-    """Whether friction force or states of `law` depend on the normal force."""
-    N, z = ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
-    v = ca.SX.sym("v")
-    return ca.depends_on(ca.vertcat(law.force(v, N, z), law.rate(v, N, z)), N)
-
-
-def keeps_deflection(law: Law) -> bool:
-    """Whether bristles deflect with the load, and the force at given deflection varies with it."""
-    N, z, v = ca.SX.sym("N"), ca.SX.sym("z", len(law.states)), ca.SX.sym("v")
-    slope = ca.jacobian(ca.SX(law.force(v, N, z)), N)
-    return ca.depends_on(slope, z) and ca.depends_on(ca.SX(law.steady_state(v, N)), N)
-
-
-def slips(eq: Equations, normal_at_start: Sequence[float]) -> tuple[Slip, ...]:
-    """Friction laws at work in all contacts."""
-    found: list[Slip] = []
-    unknowns: dict[str, Variable] = {}
-    for contact, normal, start in zip(eq.contacts, eq.normals, normal_at_start, strict=True):
-        law, pressed = contact.law, contact.pressed
-        unknown: Variables = ()
-        pressing = normal
-        if ca.depends_on(normal, ca.vertcat(eq.a, eq.lam, eq.F)) and depends_on_load(
-            contact.friction.law
-        ):
-            if pressed not in unknowns:
-                scale = max(1.0, abs(start))
-                kind = type(contact.friction.law).__name__
-                doc = f"normal force of joint '{contact.joint}' with {kind}"
-                made = Variable(
-                    f"{pressed}_N", "N", start=start, nominal=scale, doc=doc,
-                    kind=kinds.NORMAL_FORCE,
-                )  # fmt: skip
-                unknowns[pressed], unknown = made, (made,)
-            pressing = unknowns[pressed].symbol
-        begin = ca.SX(law.steady_state(contact.slip, start))
-        states = tuple(
-            Variable(
-                f"{contact.name}_{s.name}",
-                contact.unit(s.unit),
-                start=begin[i],
-                nominal=s.nominal,
-                kind=kinds.FRICTION_STATE,
-            )
-            for i, s in enumerate(law.states)
-        )
-        z, asked = symbols_of(states), carried(eq, contact)
-        # a ball may turn about some axes only; what is put for the symbols of F must be dense
-        rate, force = (
-            ca.densify(ca.SX(of(contact.slip, pressing, z, **asked.inputs)))
-            for of in (law.rate, law.force)
-        )
-        found.append(Slip(contact, unknown, pressing, normal, states, rate, force, asked))
-    return tuple(found)
-
-
 def assemble(
     name: str,
     eq: Equations,
@@ -154,13 +70,14 @@ def assemble(
     Args:
         eq: its equations, in the symbols of q and qd.
         labels: names of the multipliers.
-        guess: multipliers "lam" and normal forces "N" without friction, at the start.
+        guess: accelerations "a", multipliers "lam" and normal forces "N" without friction, at the
+            start.
         more: what writes further results and the sketch.
         index: 0 or 1, see `Holonomic`.
         cut: the equations of a long chain once more, with cuts.
     """
-    contacts = slips(eq, guess["N"].tolist())
-    inertia = inertias(f"mechanism '{name}'", eq, [s.carried for s in contacts], q, p)
+    groups = rests(f"mechanism '{name}'", eq, (q, qd, guess["a"]), p)
+    contacts = slips(eq, guess["N"].tolist(), groups)
     units = {label: part.unit for part in eq.held for label in part.labels}
     multipliers = tuple(
         Variable(
@@ -172,13 +89,12 @@ def assemble(
         )
         for label, x in zip(labels, guess["lam"], strict=True)
     )
-    pressed = [s for s in contacts if s.unknown]
+    pressed, loops = [s for s in contacts if s.unknown], [v for r in groups for v in r.direction]
     forces = stacked(s.force for s in contacts)
     symbols = symbols_of(multipliers)
     before, after = ca.vertcat(eq.lam, eq.F), ca.vertcat(symbols, forces)
     p_column = symbols_of(p)
-    applied = [v for s in contacts for v in s.carried.unknown]
-    needed = stacked(s.carried.needed(s.force, m) for s, m in zip(contacts, inertia, strict=True))
+    needed = stacked(rest.needed([contacts[i].force for i in rest.members]) for rest in groups)
     balance, normals, phi_ddot = ca.substitute(
         [eq.balance, stacked(s.normal - s.N for s in pressed), eq.phi_ddot],
         [before],
@@ -189,13 +105,13 @@ def assemble(
         eq.phi,
         eq.a,
         ca.vertcat(balance, phi_ddot, needed, normals),
-        stacked((*(t.rate for t in eq.turns), *(s.rate for s in contacts))),
+        stacked((*(t.rate for t in eq.turns), *(s.rate for s in contacts), *(0.0 for _ in loops))),
         partial(solve_mass, eq),
         eq.norms,
         index,
         None if cut is None else _inner(cut, eq, contacts, forces),
         *_pressing(contacts, ca.vertcat(eq.a, before)),
-        applied=len(applied),
+        applied=len(groups),
     )
 
     def put(expressions: Sequence[ca.SX]) -> list[ca.SX]:
@@ -206,13 +122,13 @@ def assemble(
     names = {s.contact.name: x for s, x in scales}
     return Model(
         name=name,
-        x=(*q, *qd, *(t.angle for t in eq.turns), *(v for s in contacts for v in s.states)),
-        z=(*multipliers, *applied, *(v for s in contacts for v in s.unknown)),
+        x=(*q, *qd, *(t.angle for t in eq.turns), *(v for s in contacts for v in s.states), *loops),
+        z=(*multipliers, *(r.force for r in groups), *(v for s in contacts for v in s.unknown)),
         u=u,
         p=p,
         outputs=_outputs(eq, contacts, put),
         monitors=tuple(m for s, _ in scales for m in _watched(s)),
-        events=tuple(e for s in contacts for e in _switches(s, qd)),
+        events=events(contacts, groups, qd),
         t=eq.kin.t,
         details=lambda: more[0](p_column, put),
         sketch=lambda: more[1](names),
@@ -277,25 +193,6 @@ def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[s
                 "whose deflection does not depend on the load, goes on (so do dahl and sigma_1 = 0)"
             )
     return stacked(values), tuple(words), "; ".join(dict.fromkeys(advice))
-
-
-def _switches(slip: Slip, qd: Variables) -> tuple[Event, ...]:
-    """Mode changes of the law, with its states under their names in the model."""
-    contact = slip.contact
-    z = symbols_of(slip.states)
-    rest = {v.name: 0.0 for v in qd if v.name == f"{contact.name}_rate"}
-    return tuple(
-        Event(
-            f"{contact.name}_{s.name}",
-            s.expression,
-            s.direction,
-            reset={f"{contact.name}_{state}": value for state, value in s.reset.items()}
-            | (rest if s.halts else {}),
-            at_start=s.at_start,
-            rtol=s.rtol,
-        )
-        for s in slip.carried.switches(slip.N, z)
-    )
 
 
 def _sizes(slip: Slip) -> tuple[ca.SX, ca.SX]:

@@ -61,3 +61,11 @@ def mobility(eq: Equations, G: ca.SX) -> tuple[ca.SX, ca.SX]:
     D, L, order = ca.ldl(mirrored(S))
     held = ca.ldl_solve(ca.densify(across), D, L, order)
     return loose - ca.sum1(across * held).T, loose
+
+
+def null_direction(J: ca.SX) -> ca.SX:
+    """The unit vector Z with J Z = 0 of a matrix (n - 1, n), of its minors: smooth at full rank."""
+    n = J.size2()
+    minors = [ca.det(ca.densify(J[:, [j for j in range(n) if j != k]])) for k in range(n)]
+    Z = ca.vertcat(*((-1) ** k * minor for k, minor in enumerate(minors)))
+    return Z / ca.sqrt(ca.sumsqr(Z))

@@ -159,7 +159,7 @@ def without_inertia(made: Prepared, p: ca.SX, values: ca.DM) -> Iterator[str]:
 
 
 def without_friction(made: Prepared, p: Variables, u: Variables) -> dict[str, Array]:
-    """Multipliers and normal forces at the start if there were no friction."""
+    """Accelerations, multipliers and normal forces at the start if there were no friction."""
     eq = made.eq
     unknowns = ca.vertcat(eq.a, eq.lam)
     rows = ca.vertcat(eq.balance, eq.phi_ddot)
@@ -177,7 +177,7 @@ def without_friction(made: Prepared, p: Variables, u: Variables) -> dict[str, Ar
     right, matrix, _ = solve(x, made.q0, made.qd0, values)
     x = -np.linalg.lstsq(matrix.full(), right.full()[:, 0], rcond=None)[0]
     loads = solve(x, made.q0, made.qd0, values)[2].full().ravel()
-    return {"lam": x[eq.n :], "N": loads}
+    return {"a": x[: eq.n], "lam": x[eq.n :], "N": loads}
 
 
 def _skew(a: ca.DM) -> Array:

@@ -1,0 +1,225 @@
+"""Friction laws at work in the contacts of a mechanism: their unknowns, states and events."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import final
+
+import casadi as ca
+
+from symfric.foundation.parameters import Variable
+from symfric.foundation.symbols import symbols_of
+from symfric.laws import Law
+from symfric.laws.base import smooth
+from symfric.laws.base.law import Switch, chosen
+from symfric.laws.base.sticking import FINEST, rests
+from symfric.model import Event, Variables, kinds
+from symfric.multibody.applied import (
+    FORCE,
+    Rest,
+    applied_forces,
+    forward,
+    sliding_change,
+    static_level,
+    switches_at,
+)
+from symfric.multibody.equations import Equations
+from symfric.multibody.friction import Contact
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Slip:
+    """A contact as the model sees it.
+
+    Attributes:
+        unknown: its normal force as algebraic variable, where it depends on the reactions and the
+            law depends on it.
+        N: normal force as the law gets it.
+        normal: the expression of it in terms of accelerations and multipliers.
+        states, rate: of the law.
+        force: friction force [N], of a ball a vector.
+        inputs: what a law that asks for it gets besides v and N.
+    """
+
+    contact: Contact
+    unknown: Variables
+    N: ca.SX
+    normal: ca.SX
+    states: Variables
+    rate: ca.SX
+    force: ca.SX
+    inputs: dict[str, ca.SX]
+
+
+def depends_on_load(law: Law) -> bool:
+    """Whether friction force or states of `law` depend on the normal force."""
+    N, z = ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
+    v = ca.SX.sym("v")
+    return ca.depends_on(ca.vertcat(law.force(v, N, z), law.rate(v, N, z)), N)
+
+
+def keeps_deflection(law: Law) -> bool:
+    """Whether bristles deflect with the load, and the force at given deflection varies with it."""
+    N, z, v = ca.SX.sym("N"), ca.SX.sym("z", len(law.states)), ca.SX.sym("v")
+    slope = ca.jacobian(ca.SX(law.force(v, N, z)), N)
+    return ca.depends_on(slope, z) and ca.depends_on(ca.SX(law.steady_state(v, N)), N)
+
+
+def slips(
+    eq: Equations, normal_at_start: Sequence[float], groups: Sequence[Rest] = ()
+) -> tuple[Slip, ...]:
+    """Friction laws at work in all contacts.
+
+    Args:
+        eq: the equations of motion.
+        normal_at_start: normal force of each contact [N].
+        groups: the contacts whose laws ask for the applied force.
+    """
+    unknowns, pressing = _pressing(eq, normal_at_start)
+    levels = [static_level(c.law, N) if groups else N
+              for c, N in zip(eq.contacts, pressing, strict=True)]  # fmt: skip
+    applied = applied_forces(groups, levels, [c.friction.eps for c in eq.contacts])
+    slides = _slides(eq, groups)
+    found: list[Slip] = []
+    for i, contact in enumerate(eq.contacts):
+        law = contact.law
+        states = _states(contact, ca.SX(law.steady_state(slides[i], normal_at_start[i])))
+        every = {"dv": sliding_change(eq, contact.slip)} if law.inputs else {}
+        every |= {FORCE: applied[i]} if i in applied else {}
+        z, inputs = symbols_of(states), chosen(law, every)
+        # a ball may turn about some axes only; what is put for the symbols of F must be dense
+        rate, force = (
+            ca.densify(ca.SX(of(contact.slip, pressing[i], z, **inputs)))
+            for of in (law.rate, law.force)
+        )
+        found.append(
+            Slip(contact, unknowns[i], pressing[i], eq.normals[i], states, rate, force, inputs)
+        )
+    return tuple(found)
+
+
+def _pressing(
+    eq: Equations, normal_at_start: Sequence[float]
+) -> tuple[list[Variables], list[ca.SX]]:
+    """Unknown normal force of each contact, where it is the first to have it; what presses it."""
+    found, every, values = dict[str, Variable](), list[Variables](), list[ca.SX]()
+    for contact, normal, start in zip(eq.contacts, eq.normals, normal_at_start, strict=True):
+        pressed, unknown, N = contact.pressed, (), normal
+        if ca.depends_on(normal, ca.vertcat(eq.a, eq.lam, eq.F)) and depends_on_load(
+            contact.friction.law
+        ):
+            if pressed not in found:
+                scale = max(1.0, abs(start))
+                kind = type(contact.friction.law).__name__
+                doc = f"normal force of joint '{contact.joint}' with {kind}"
+                made = Variable(
+                    f"{pressed}_N", "N", start=start, nominal=scale, doc=doc,
+                    kind=kinds.NORMAL_FORCE,
+                )  # fmt: skip
+                found[pressed], unknown = made, (made,)
+            N = found[pressed].symbol
+        every.append(unknown)
+        values.append(N)
+    return every, values
+
+
+def _states(contact: Contact, begin: ca.SX) -> Variables:
+    """States of a law under their names in the model."""
+    return tuple(
+        Variable(
+            f"{contact.name}_{s.name}",
+            contact.unit(s.unit),
+            start=begin[i],
+            nominal=s.nominal,
+            kind=kinds.FRICTION_STATE,
+        )
+        for i, s in enumerate(contact.law.states)
+    )
+
+
+def _slides(eq: Equations, groups: Sequence[Rest]) -> list[ca.SX]:
+    """Sliding velocities that tell the modes at the start; of a loop that moves none is zero."""
+    found = [c.slip for c in eq.contacts]
+    for rest in groups:
+        for i, g in zip(rest.members, rest.along, strict=True):
+            if rest.direction:
+                found[i] = forward(g) * smooth.sign(rest.rate, 0.0)
+    return found
+
+
+def events(contacts: Sequence[Slip], groups: Sequence[Rest], rates: Variables) -> tuple[Event, ...]:
+    """Mode changes of all laws, with their states under their names in the model."""
+    in_loops = {i for rest in groups if rest.direction for i in rest.members}
+    still = {rest.members[0]: rest.still for rest in groups if not rest.direction}
+    names = {v.name for v in rates}
+    found: list[Event] = []
+    for i, slip in enumerate(contacts):
+        if i not in in_loops:
+            own = f"{slip.contact.name}_rate"
+            halted = still.get(i, (own,) if own in names else ())
+            found += _of_contact(slip, dict.fromkeys(halted, 0.0))
+    for rest in groups:
+        if rest.direction:
+            found += _of_loop(rest, [contacts[i] for i in rest.members])
+    return tuple(found)
+
+
+def _of_contact(slip: Slip, rest: dict[str, float]) -> Iterator[Event]:
+    """Mode changes of a contact by itself, at whose stop the states in `rest` take their values.
+
+    What stops, rests first: whether it can is only known once the equations of rest are solved.
+    """
+    contact, z = slip.contact, symbols_of(slip.states)
+    found = contact.law.switches(contact.slip, slip.N, z, **slip.inputs)
+    if FORCE in slip.inputs:
+        idle = switches_at(contact.law, contact.slip, slip.N, z, ca.SX(0.0))
+        found = tuple(
+            replace(s, reset=at_rest.reset) if s.halts else s
+            for s, at_rest in zip(found, idle, strict=True)
+        )
+    for s in found:
+        reset = {f"{contact.name}_{state}": value for state, value in s.reset.items()}
+        yield _event(contact.name, s, reset | (rest if s.halts else {}))
+
+
+def _event(name: str, s: Switch, reset: dict[str, ca.SX]) -> Event:
+    return Event(
+        f"{name}_{s.name}", s.expression, s.direction, reset=reset, at_start=s.at_start, rtol=s.rtol
+    )
+
+
+def _of_loop(rest: Rest, contacts: Sequence[Slip]) -> Iterator[Event]:
+    """End of motion, break-away and dead centres of a loop of one degree of freedom."""
+    m, T, omega = rest.direction[0].symbol, rest.force.symbol, rest.rate
+    top = rest.capacity([static_level(s.contact.law, s.N) for s in contacts])
+    modes = [_modes(s) for s in contacts]
+    still, every = rests(m), [name for names in modes for name in names]
+    pull = m * T - top
+    ahead = smooth.choose(m * omega > pull, m * omega, pull)
+    onward = forward(T)
+    away = {
+        name: forward(g) * onward
+        for g, names in zip(rest.along, modes, strict=True) for name in names
+    }  # fmt: skip
+    own = rest.direction[0].name
+    halt = dict.fromkeys([*every, own, *rest.still], 0.0)
+    yield Event(f"{rest.name}_stick", smooth.choose(still, 1.0, ahead), -1, reset=halt)
+    yield Event(
+        f"{rest.name}_slip", smooth.choose(still, smooth.magnitude(T, 0.0) - top, -1.0), 1,
+        reset=away | {own: onward}, at_start=True, rtol=FINEST,
+    )  # fmt: skip
+    for slip, g, names in zip(contacts, rest.along, modes, strict=True):
+        symbols = {v.name: v.symbol for v in slip.states}
+        if not g.is_constant():
+            ahead = symbols[names[0]] * m * g
+            turn = {name: -symbols[name] for name in names}
+            yield Event(
+                f"{slip.contact.name}_turn", smooth.choose(still, 1.0, ahead), -1, reset=turn
+            )
+
+
+def _modes(slip: Slip) -> list[str]:
+    """Names of the states of a contact that are its mode."""
+    z = symbols_of(slip.states)
+    found = switches_at(slip.contact.law, slip.contact.slip, slip.N, z, ca.SX(0.0))
+    return [f"{slip.contact.name}_{state}" for s in found if s.halts for state in s.reset]
