@@ -14,7 +14,7 @@ from math import cos, sin
 import numpy as np
 from mechanics import newton, size
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
+from scipy.integrate import OdeSolution, solve_ivp
 
 Array = NDArray[np.float64]
 Modes = tuple[int, ...]
@@ -29,7 +29,7 @@ class DryMotion:
     solve: Solve
     mu_s: float
     happened: list[tuple[float, Modes]] = field(default_factory=list)
-    pieces: list = field(default_factory=list)
+    pieces: list[OdeSolution] = field(default_factory=list)
 
     def run(self, y: Array, t_end: float) -> "DryMotion":
         """Integrate from y at t = 0, each stretch between two changes of mode on its own."""
@@ -37,9 +37,8 @@ class DryMotion:
         modes, broke = self.valid(y, np.sign(y[k:]).astype(int).tolist()), []
         while t < t_end:
             self.happened.append((t, modes))
-            moving = np.abs(modes)
             found = solve_ivp(
-                lambda t, y, m=modes, on=moving: [*y[k:], *(on * self.solve(y, m)[0])],
+                self._rates(modes),
                 (t, t_end), y, "DOP853", events=[self._watch(i, modes) for i in range(k)],
                 dense_output=True, rtol=1e-12, atol=1e-14, max_step=0.02,
             )  # fmt: skip
@@ -53,6 +52,10 @@ class DryMotion:
             y[k:] *= np.abs(fixed)
             modes = self.valid(y, fixed, broke)
         return self
+
+    def _rates(self, modes: Modes) -> Callable[[float, Array], Array]:
+        moving = np.abs(modes)
+        return lambda t, y: np.concatenate([y[y.size // 2 :], moving * self.solve(y, modes)[0]])
 
     def valid(self, y: Array, fixed: Sequence[int], broke: Sequence[int] = ()) -> Modes:
         """The modes that satisfy all conditions where those of moving contacts are `fixed`."""

@@ -6,6 +6,7 @@ from symfric.laws import (
     BlimanSorine,
     Bristle2D,
     ElastoPlastic,
+    ExactCoulomb,
     HaessigFriedland,
     Karnopp,
     Lagged,
@@ -28,6 +29,7 @@ DYNAMIC: dict[str, Law] = {
     "lagged(stribeck)": Lagged(Stribeck(sigma_2=0.4)),
     "temperature_dependent(lugre)": TemperatureDependent(LuGre(sigma_2=0.4), T=303.15, k_dry=0.01),
     "karnopp, event": Karnopp(sigma_2=0.4, form="event"),
+    "exact_coulomb, stribeck": ExactCoulomb(sigma_2=0.4, form="stribeck"),
     "leine_switch, event": LeineSwitch(form="event"),
     "rate_and_state, slip": RateAndState(evolution="slip"),
 }

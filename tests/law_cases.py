@@ -77,7 +77,7 @@ def state_symbols(law: Law) -> ca.SX:
 
 NO_STEP = {
     *("leuven", "gms", "armstrong"),
-    *("exact_coulomb", "karnopp, event", "leine_switch, event"),
+    *("exact_coulomb", "exact_coulomb, stribeck", "karnopp, event", "leine_switch, event"),
 }
 """Cases that cannot be C, see the tests of `law_block`."""
 

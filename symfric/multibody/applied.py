@@ -52,6 +52,8 @@ IMMOVABLE = 1e-10
 """Share of W that constraints leave of what it is without them, below which they hold a contact."""
 MINORS = 8
 """Coordinates of a loop of one degree of freedom at most; its tangent is made of their minors."""
+UNLOADED = 1e-12
+"""Force [N] that keeps shares finite where nothing presses; at break-away it must not show."""
 FORCE = "F_e"
 
 
@@ -84,14 +86,11 @@ class Rest:
     direction: Variables
     still: tuple[str, ...]
 
-    def shares(self, levels: Sequence[ca.SX], floors: Sequence[float]) -> list[ca.SX]:
-        """F_e of each member, of which `levels` [N] are what they can hold.
-
-        A floor [N] keeps the quotient finite where nothing presses at all.
-        """
+    def shares(self, levels: Sequence[ca.SX]) -> list[ca.SX]:
+        """F_e of each member, of which `levels` [N] are what they can hold."""
         if not self.is_loop:
             return [self.force.symbol]
-        above = [S + floor for S, floor in zip(levels, floors, strict=True)]
+        above = [S + UNLOADED for S in levels]
         signs = [forward(g) if self.by_modes else g for g in self.along]
         weights = [sign * S for sign, S in zip(signs, above, strict=True)]
         total = sum((g * w for g, w in zip(self.along, weights, strict=True)), start=ca.SX(0))
@@ -317,14 +316,12 @@ def rests(
     return tuple(sorted(found, key=lambda rest: rest.members))
 
 
-def applied_forces(
-    groups: Sequence[Rest], levels: Sequence[ca.SX], floors: Sequence[float]
-) -> dict[int, ca.SX]:
-    """Number of a contact -> its F_e, given what every contact can hold [N] and floors of that."""
+def applied_forces(groups: Sequence[Rest], levels: Sequence[ca.SX]) -> dict[int, ca.SX]:
+    """Number of a contact -> its F_e, given what every contact can hold [N]."""
     pairs = (
         zip(
             rest.members,
-            rest.shares([levels[i] for i in rest.members], [floors[i] for i in rest.members]),
+            rest.shares([levels[i] for i in rest.members]),
             strict=True,
         )
         for rest in groups

@@ -1,16 +1,17 @@
 """Friction laws at work in the contacts of a mechanism: their unknowns, states and events."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import final
 
 import casadi as ca
 
+from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import symbols_of
 from symfric.laws import Law
 from symfric.laws.base import smooth
-from symfric.laws.base.law import Switch, chosen
+from symfric.laws.base.law import Switch
 from symfric.laws.base.sticking import FINEST, rests
 from symfric.model import Event, Variables, kinds
 from symfric.multibody.applied import (
@@ -78,7 +79,7 @@ def slips(
     unknowns, pressing = _pressing(eq, normal_at_start)
     levels = [static_level(c.law, N) if groups else N
               for c, N in zip(eq.contacts, pressing, strict=True)]  # fmt: skip
-    applied = applied_forces(groups, levels, [c.friction.eps for c in eq.contacts])
+    applied = applied_forces(groups, levels)
     slides = _slides(eq, groups)
     found: list[Slip] = []
     for i, contact in enumerate(eq.contacts):
@@ -86,7 +87,7 @@ def slips(
         states = _states(contact, ca.SX(law.steady_state(slides[i], normal_at_start[i])))
         every = {"dv": sliding_change(eq, contact.slip)} if law.inputs else {}
         every |= {FORCE: applied[i]} if i in applied else {}
-        z, inputs = symbols_of(states), chosen(law, every)
+        z, inputs = symbols_of(states), {x.name: every[x.name] for x in law.inputs}
         # a ball may turn about some axes only; what is put for the symbols of F must be dense
         rate, force = (
             ca.densify(ca.SX(of(contact.slip, pressing[i], z, **inputs)))
@@ -104,7 +105,7 @@ def _pressing(
     """Unknown normal force of each contact, where it is the first to have it; what presses it."""
     found, every, values = dict[str, Variable](), list[Variables](), list[ca.SX]()
     for contact, normal, start in zip(eq.contacts, eq.normals, normal_at_start, strict=True):
-        pressed, unknown, N = contact.pressed, (), normal
+        pressed, unknown, pressing = contact.pressed, (), normal
         if ca.depends_on(normal, ca.vertcat(eq.a, eq.lam, eq.F)) and depends_on_load(
             contact.friction.law
         ):
@@ -117,9 +118,9 @@ def _pressing(
                     kind=kinds.NORMAL_FORCE,
                 )  # fmt: skip
                 found[pressed], unknown = made, (made,)
-            N = found[pressed].symbol
+            pressing = found[pressed].symbol
         every.append(unknown)
-        values.append(N)
+        values.append(pressing)
     return every, values
 
 
@@ -182,7 +183,7 @@ def _of_contact(slip: Slip, rest: dict[str, float]) -> Iterator[Event]:
         yield _event(contact.name, s, reset | (rest if s.halts else {}))
 
 
-def _event(name: str, s: Switch, reset: dict[str, ca.SX]) -> Event:
+def _event(name: str, s: Switch, reset: Mapping[str, Scalar]) -> Event:
     return Event(
         f"{name}_{s.name}", s.expression, s.direction, reset=reset, at_start=s.at_start, rtol=s.rtol
     )

@@ -21,6 +21,8 @@ ASSEMBLED = 1e-12
 NEAR, CONVERGED = 1e-4, 1e-10
 """Relative Newton steps below which no damping is needed, and below which it is done."""
 
+MARQUARDT = 200
+"""Rounds of a descent over corners."""
 LAST_DIGITS = 1e-15
 """Relative change by which numbers are the same to rounding."""
 FLOOR = 10 * float(np.finfo(float).eps)
@@ -77,7 +79,14 @@ def consistent(system: System | Equations, where: str, y: Array, d: Array) -> Ar
     manifold = system.manifold
     if manifold is not None:
         y = _assembled(system, manifold, where, y, d)
-    y = _solved(system, where, y, d)
+    try:
+        y = _solved(system, where, y, d)
+    except ValueError:
+        if manifold is None or not manifold.applied:
+            raise
+        y = _descended(system, y, d)
+        if _residual(system, y, d) > _rounding(system, y, d):
+            y = _solved(system, where, y, d)
     if manifold is not None and manifold.charted:
         y = _charted(manifold, y, d)
     if manifold is not None and (cause := jammed(manifold, system.names, y, d)):
@@ -111,6 +120,30 @@ def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array
         f"{where}: expected consistent start values, found no solution of the algebraic "
         f"equations for {names} near their start values; give better ones"
     )
+
+
+def _descended(system: System | Equations, y: Array, d: Array) -> Array:
+    """`y` with algebraic unknowns that leave less over, by Levenberg's and Marquardt's method.
+
+    Where contacts begin to rest their loads change at once and by much, with corners in between at
+    which damped Newton stays.
+    """
+    (rows, along), y, damping = _moved(system), y.copy(), 1e-3
+    g, slope = evaluate_all(system.constraints, y, d)
+    for _ in range(MARQUARDT):
+        scale = np.linalg.norm(slope, axis=0)
+        bent = np.vstack([slope, np.sqrt(damping) * np.diag(scale + np.spacing(scale.max()))])
+        step = np.linalg.lstsq(bent, np.vstack([g, np.zeros_like(g)]))[0][:, 0]
+        new = y.copy()
+        new[rows] -= along @ step
+        g_new, slope_new = evaluate_all(system.constraints, new, d)
+        if np.linalg.norm(g_new) < np.linalg.norm(g):
+            y, g, slope, damping = new, g_new, slope_new, damping / 10
+        elif damping > 1 / LAST_DIGITS:
+            break
+        else:
+            damping *= 4
+    return y
 
 
 def _moved(system: System | Equations) -> tuple[NDArray[np.intp], Array]:

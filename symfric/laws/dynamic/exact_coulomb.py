@@ -5,7 +5,8 @@ from math import inf
 from typing import ClassVar, final
 
 from symfric.foundation.numeric import Scalar
-from symfric.foundation.parameters import param
+from symfric.foundation.parameters import option, param
+from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, Switch
 from symfric.laws.base.sticking import Sticking, carried, stick_and_slip
 
@@ -15,21 +16,24 @@ from symfric.laws.base.sticking import Sticking, carried, stick_and_slip
 class ExactCoulomb(Sticking):
     """Set-valued Coulomb friction with a static level, by modes (one state).
 
-        F = mu_d N mode    slip, mode = sign(v), until v passes through zero
-        F = F_e            stick, mode = 0, until |F_e| = mu_s N
+        F = mu N mode + sigma_2 v    slip, mode = sign(v), until v passes through zero
+        F = F_e                      stick, mode = 0, until |F_e| = mu_s N
+        mu = mu_d                                           form = "jump": it falls at once
+        mu = mu_d + (mu_s - mu_d) exp(-(v / v_s)^2)         form = "stribeck"
 
     F_e is the applied force: what the contact must carry for no acceleration. Sliding ends where
     v passes through zero; the contact sticks there if it can, or slides on to the other side. This
     is the truth that regularised laws are measured against; needs a scene with events. A load
-    beyond mu_s N from the very start breaks away there.
-    Limits: `Coulomb`, `Stribeck` and others tend to it as their width tends to zero. Between the
-    switches the mode is constant. A run has a relative tolerance of 1e-7 or less, whatever is
-    asked: then the block of `Rabinowicz` is exact to 1e-7 m over 20 s.
+    beyond mu_s N from the very start breaks away there. In joints of a mechanism F_e follows from
+    the constraints, see `JointFriction`.
+    Limits: `Coulomb`, `Stribeck` and others tend to it as their smoothing width tends to zero.
+    Between the switches the mode is constant. A run has a relative tolerance of 1e-7 or less,
+    whatever is asked: then the block of `Rabinowicz` is exact to 1e-7 m over 20 s.
     Source: Coulomb 1785; as a hybrid system Olsson et al., Eur. J. Control 4, 1998.
     """
 
     facts: ClassVar[Facts] = Facts(
-        phenomena=("D", "S"),
+        phenomena=("D", "S", "St", "V"),
         smoothness="set-valued at v = 0, exact by modes",
         confidence="two sources",
         source="Coulomb 1785; Olsson et al., Eur. J. Control 4, 1998",
@@ -39,6 +43,12 @@ class ExactCoulomb(Sticking):
     mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
 
+    v_s: Scalar = param(
+        1e-2, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
+    )
+    sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
+    form: str = option("jump", choices=("jump", "stribeck"), doc="fall at once, or over v_s")
+
     @property
     def has_mode(self) -> bool:
         """Always: stick and slip are modes."""
@@ -46,8 +56,8 @@ class ExactCoulomb(Sticking):
 
     @property
     def velocity_scale(self) -> Scalar:
-        """None: what happens at v = 0 is an event."""
-        return inf
+        """That of the fall [m/s]; what happens at v = 0 is an event."""
+        return self.v_s if self.form == "stribeck" else inf
 
     def static_level(self, N: Scalar) -> Scalar:
         """The force [N] of break-away."""
@@ -55,7 +65,10 @@ class ExactCoulomb(Sticking):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
         """Friction force [N]."""
-        return carried(z[0], F_e, self.mu_d * N * z[0])
+        mu = self.mu_d
+        if self.form == "stribeck":
+            mu = mu + (self.mu_s - self.mu_d) * smooth.stribeck(v, self.v_s, 2.0, 0.0)
+        return carried(z[0], F_e, mu * N * z[0] + self.sigma_2 * v)
 
     def switches(
         self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0

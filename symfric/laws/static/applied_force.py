@@ -1,13 +1,13 @@
 """Laws that see what the contact must carry: true sticking without an internal state."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, pi
 from typing import ClassVar, final
 
-from symfric.foundation.numeric import Scalar, atan, exp, is_number
+from symfric.foundation.numeric import Scalar, atan, column, exp, is_number
 from symfric.foundation.parameters import option, param
 from symfric.laws.base import smooth
-from symfric.laws.base.law import APPLIED_FORCE, Facts, Input, StaticLaw, Switch
+from symfric.laws.base.law import APPLIED_FORCE, Facts, Input, State, StaticLaw, Switch
 from symfric.laws.base.sticking import Sticking, carried, rests, stick_and_slip
 
 FORMS = ("smooth", "original")
@@ -25,9 +25,9 @@ class Karnopp(Sticking):
         w = S(|v| / D_v),   S(t) = t^3 (10 - 15t + 6t^2) for 0 <= t <= 1
 
     hold is the clip with corners rounded over +-F_eps; below them F(0) = F_e exactly.
-    form = "event" (one state, the mode) is the original in which the band counts as rest: a sliding
-    body that enters it stops, and one that is pulled by more than mu_s N leaves it, against mu_s N
-    up to |v| = D_v. It needs a scene with events.
+    form = "event" (two states, the mode and whether it is leaving the band) is the original in
+    which the band counts as rest: a sliding body that enters it stops, and one that is pulled by
+    more than mu_s N leaves it, against mu_s N up to |v| = D_v. It needs a scene with events.
     Limits: at rest dv/dt = 0 for |F_e| <= mu_s N - F_eps. In the smooth form a moving body comes to
     rest only asymptotically, v ~ t^(-1/2) inside the band; in the original one v stays where it
     entered the band unless the integrator sets it to zero; in the event form it stops at once,
@@ -62,6 +62,24 @@ class Karnopp(Sticking):
         return self.form == "event"
 
     @property
+    def states(self) -> tuple[State, ...]:
+        """The mode, and 1 on the way out of the band."""
+        return (*super().states, State("leaving", "1", 1.0, even=True)) if self.has_mode else ()
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
+        """That of the mode [1/s], and zero."""
+        own = super().rate(v, N, z, F_e=F_e)
+        return column(own[0], 0.0 * v) if self.has_mode else own
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """The direction of sliding; within the band, moving, it is leaving."""
+        own = super().steady_state(v, N)
+        if not self.has_mode:
+            return own
+        inside = smooth.choose(smooth.magnitude(v, 0.0) < self.D_v, 1.0, 0.0)
+        return column(own[0], inside * smooth.magnitude(own[0], 0.0))
+
+    @property
     def velocity_scale(self) -> Scalar:
         """The half width of the band [m/s]; none in the event form, where it is an event."""
         return inf if self.has_mode else self.D_v
@@ -74,8 +92,8 @@ class Karnopp(Sticking):
         """Friction force [N]."""
         if self.has_mode:
             level = self.mu_d * N + self.sigma_2 * z[0] * v
-            leaving = smooth.choose(z[0] * v < self.D_v, self.mu_s * N, level)
-            return carried(z[0], F_e, z[0] * leaving)
+            against = smooth.choose(z[1] > 0.5, self.mu_s * N, level)
+            return carried(z[0], F_e, z[0] * against)
         slip = self.mu_d * N * smooth.sign(v, 0.0) + self.sigma_2 * v
         speed, static = smooth.magnitude(v, 0.0), self.mu_s * N
         if self.form == "original":
@@ -90,11 +108,14 @@ class Karnopp(Sticking):
         if not self.has_mode:
             return ()
         edge = smooth.choose(rests(z[0]), -1.0, z[0] * v - self.D_v)
-        stuck = stick_and_slip(v, z[0], F_e, self.mu_s * N)
+        stuck = tuple(
+            replace(s, reset={**s.reset, "leaving": smooth.magnitude(s.reset["mode"], 0.0)})
+            for s in stick_and_slip(v, z[0], F_e, self.mu_s * N)
+        )
         return (
             *stuck,
             Switch("stop", edge, -1, stuck[0].reset, halts=True),
-            Switch("leave", edge, 1),
+            Switch("leave", edge, 1, {"leaving": 0.0}),
         )
 
 
