@@ -18,7 +18,7 @@ from tempfile import TemporaryDirectory
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
-sys.path.insert(0, str(HERE.parent))
+sys.path[0] = str(HERE.parent)  # where its folder is the package
 
 from mutants.mutant import Mutant  # noqa: E402  (a script finds its neighbours)
 from mutants.mutants import MUTANTS  # noqa: E402
