@@ -10,7 +10,7 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import closing, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from os import cpu_count
 from pathlib import Path
@@ -31,9 +31,9 @@ from symfric.integrator.arguments import (
     stopping,
     tolerances,
 )
-from symfric.integrator.equations.initial import first_guess, first_step
-from symfric.integrator.equations.inputs import Input, InputData, input_data
+from symfric.integrator.equations.initial import first_step
 from symfric.integrator.many.chunk import Chunk, Job, Solved, digest, solve_chunk
+from symfric.integrator.many.given import MemberInput, Members, members_of
 from symfric.integrator.many.one_by_one import solve_one_by_one
 from symfric.integrator.many.store import Store
 from symfric.integrator.running.built import built
@@ -53,14 +53,15 @@ class Ensemble:
 
     Attributes:
         scene: name of the model.
-        t: times [s], shape (k,).
-        signals: name -> values, shape (members, k); NaN after a member failed or met a terminal
-            event, and for members that were not reached. Memory-mapped where the results went to
-            a folder.
+        t: times [s], shape (k,); (members, 1) where each member has its own end and nothing else
+            was asked for.
+        signals: name -> values, shape (members, k); NaN after a member ended, failed or met a
+            terminal event, and for members that were not reached. Memory-mapped where the results
+            went to a folder.
         units: name -> unit.
         attempts: attempts of each member, shape (members,).
         reached: time [s] each member reached, shape (members,): that of a terminal event or of
-            its failure, else `t_end`; NaN for members that were not started.
+            its failure, else its end; NaN for members that were not started.
         failed: number of a failed member -> sentence.
         status: SUCCESS, or INTERRUPTED with the members that were finished.
     """
@@ -81,11 +82,11 @@ class Ensemble:
 
 def simulate_many(
     model: Model,
-    t_end: float,
+    t_end: float | ArrayLike,
     *,
     t_start: float = 0.0,
     x0: Mapping[str, ArrayLike] | None = None,
-    u: Mapping[str, Input] | None = None,
+    u: Mapping[str, MemberInput] | None = None,
     p: Mapping[str, ArrayLike] | None = None,
     t_eval: ArrayLike | None = None,
     rtol: float = 1e-6,
@@ -105,11 +106,14 @@ def simulate_many(
 
     Args:
         model: the equations.
-        t_end, t_start: span [s], common to all members.
-        x0: start values by name: numbers, or arrays with an entry per member.
-        u: inputs by name, common to all members.
-        p: parameters by name: numbers, or arrays with an entry per member.
-        t_eval: times of the results [s]; default only `t_end`.
+        t_end: last time [s], or an array with that of each member.
+        t_start: first time [s], common to all members.
+        x0, p: start values and parameters by name: numbers, or arrays with an entry per member.
+        u: inputs by name, as `simulate` takes them, for all members; or an array with a number per
+            member; or `Hold` or `Linear` with values of shape (members, n), a row per member at
+            common times.
+        t_eval: times of the results [s]; NaN behind the end of a member. Default `t_end`, of each
+            member its own.
         rtol, method, event_tolerance, max_steps, max_step, times: as in `simulate`; the absolute
             tolerance is 0.1 rtol nominal, for each member as `simulate` has it by default.
         backend: "compiled", "vm", or "auto": compiled where there is a compiler.
@@ -139,27 +143,30 @@ def simulate_many(
     """
     check_model("simulate_many", model)
     check_flags("simulate_many", progress)
-    t_start, t_end, rtol = check_span("simulate_many", model, t_start, t_end, rtol)
+    ends = _ends(t_end)
+    t_start, last, rtol = check_span("simulate_many", model, t_start, float(np.max(ends)), rtol)
+    _all_later(ends, t_start)
     formula = chosen("simulate_many", method, rtol)
     _check(model, backend, executor)
     workers = None if workers is None else checks.count("simulate_many: workers", workers)
     chunk = checks.count("simulate_many: chunk", chunk)
-    looks = check_times("simulate_many", t_start, t_end, [t_end] if t_eval is None else t_eval)
-    x0_of, p_of, members = _members(model, x0, p)
-    inputs = input_data(model, u, t_start, t_end)
-    inputs = stopping("simulate_many", inputs, times, t_start, t_end)
+    given = members_of(model, (t_start, ends), x0, u, p)
+    inputs = stopping("simulate_many", given.inputs, times, t_start, last)
+    given, members = replace(given, inputs=inputs), given.count
+    looks = np.zeros(0) if np.ndim(ends) else np.array([last])
+    if t_eval is not None:
+        looks = check_times("simulate_many", t_start, last, t_eval)
     integrator, _ = built(model, inputs, formula)
     nominal = integrator.system.nominal
     allowed = tolerances("simulate_many", rtol, None, nominal, event_tolerance, max_steps, max_step)
-    starts = partial(_starts, integrator, t_start, x0_of, p_of)
-    integrator = _suited(integrator, inputs, starts, members)
-    job = Job.of(integrator, inputs, looks, backend, max_steps)
+    integrator = _suited(integrator, given)
+    job = Job.of(integrator, inputs.breaks, looks, backend, max_steps)
     if model.events:
         solve = partial(solve_one_by_one, integrator, inputs, allowed, backend, looks)
-        prepare = starts
+        prepare = partial(_alone, integrator, given)
     else:
         solve = partial(solve_chunk, job)
-        prepare = partial(_chunk, inputs, allowed, starts)
+        prepare = partial(_chunk, integrator, given, allowed)
         if isinstance(executor, str):
             job.program.load()  # or every worker would compile it
     firsts = range(0, members, chunk)
@@ -167,8 +174,8 @@ def simulate_many(
     folder = None
     if out is not None:
         place = checks.path("simulate_many: out", out)
-        folder = place / _identity(job, integrator, allowed, starts, picks)
-    store = Store(folder, model.signals, members, looks.size)
+        folder = place / _identity(job, integrator, allowed, given, picks)
+    store = Store(folder, model.signals, members, max(1, looks.size))
     todo = {first: picks[first] for first in store.left(picks)}
     done, status = members - sum(_size(pick) for pick in todo.values()), Status.SUCCESS
     try:
@@ -185,7 +192,7 @@ def simulate_many(
         status = Status.INTERRUPTED
     return Ensemble(
         model.name,
-        looks,
+        looks if looks.size else given.ends[:, None],
         store.signals,
         dict(model.signals),
         store.attempts,
@@ -213,88 +220,66 @@ def _check(model: Model, backend: str, executor: object) -> None:
         )
 
 
-Values = dict[str, Array]
+def _ends(t_end: float | ArrayLike) -> float | Array:
+    """The end of all members, or of each one [s]."""
+    number = checks.as_number(t_end)
+    if number is not None or isinstance(t_end, str | type):
+        return checks.number("simulate_many: t_end", t_end, unit="s")
+    ends = checks.array("simulate_many: t_end", t_end)
+    if not ends.size:
+        raise ValueError("simulate_many: expected at least one member, got empty arrays")
+    return ends
 
 
-def _members(
-    model: Model,
-    x0_given: Mapping[str, ArrayLike] | None,
-    p_given: Mapping[str, ArrayLike] | None,
-) -> tuple[Values, Values, int]:
-    """Start values and parameters by name, an entry per member, and the number of members."""
-    where = "simulate_many"
-    x0, p = model.named("x0", x0_given), model.named("p", p_given)
-    given = {f"x0.{name}": x for name, x in x0.items()} | {f"p.{n}": x for n, x in p.items()}
-    arrays = {name: checks.array(f"{where}: {name}", x, ndim=None) for name, x in given.items()}
-    lengths = {name: value.size for name, value in arrays.items() if value.ndim}
-    if len(set(lengths.values())) > 1 or any(v.ndim > 1 for v in arrays.values()):
-        shapes = ", ".join(f"{name} of shape {arrays[name].shape}" for name in lengths)
-        raise ValueError(f"{where}: expected numbers or arrays of one length, got {shapes}")
-    members = next(iter(lengths.values()), 1)
-    if members < 1:
-        raise ValueError(f"{where}: expected at least one member, got empty arrays")
-    for v in model.p:
-        for end in (np.min, np.max) if v.name in p else ():
-            v.within(f"{where}: p.{v.name}", float(end(arrays[f"p.{v.name}"])))
-    every = {name: np.broadcast_to(value, (members,)) for name, value in arrays.items()}
-    return (
-        {name: every[f"x0.{name}"] for name in x0},
-        {name: every[f"p.{name}"] for name in p},
-        members,
-    )
+def _all_later(ends: float | Array, t_start: float) -> None:
+    if np.min(ends) <= t_start:
+        raise ValueError(
+            f"simulate_many: expected t_end > t_start = {t_start:g} s, got {np.min(ends):g} s for "
+            f"member {np.argmin(ends)}"
+        )
 
 
-def _starts(
-    integrator: Integrator, t_start: float, x0: Values, p: Values, pick: slice
-) -> tuple[Array, Array]:
-    """Start values of the unknowns (members, n), algebraic ones guessed, and parameters."""
-    model, system = integrator.model, integrator.system
-    x, values = model.initial_states(
-        {name: v[pick] for name, v in x0.items()},
-        {name: v[pick] for name, v in p.items()},
-        _size(pick),
-    )
-    return first_guess(system, model, x, t_start), values
-
-
-def _suited(
-    integrator: Integrator,
-    inputs: InputData,
-    starts: Callable[[slice], tuple[Array, Array]],
-    members: int,
-) -> Integrator:
+def _suited(integrator: Integrator, given: Members) -> Integrator:
     """The integrator with pivots that are sound for the first, the middle and the last member."""
     if integrator.system.manifold is not None or integrator.system.is_ode:
         return integrator
-    span, points = float(inputs.breaks[-1] - inputs.breaks[0]), list[tuple[Array, Array]]()
-    for m in sorted({0, members // 2, members - 1}):
-        y, p = (rows[0] for rows in starts(slice(m, m + 1)))
-        d = np.concatenate([p, inputs.values[:, 0]])
+    span = float(given.inputs.breaks[-1] - given.inputs.breaks[0])
+    points = list[tuple[Array, Array]]()
+    for m in sorted({0, given.count // 2, given.count - 1}):
+        y, p, data, _ = (rows[0] for rows in _alone(integrator, given, slice(m, m + 1)))
+        d = np.concatenate([p, data[:, 0]])
         with suppress(ValueError):  # no consistent start: that member is reported by its number
             points.append((integrator.start(y, d), d))
             integrator = integrator.suited(points, span)
     return integrator
 
 
-def _chunk(
-    inputs: InputData,
-    tolerances: Tolerances,
-    starts: Callable[[slice], tuple[Array, Array]],
-    pick: slice,
-) -> Chunk:
-    """Start columns and run data of members."""
-    y, p = starts(pick)
-    t_start, t_end = float(inputs.breaks[0]), float(inputs.breaks[-1])
-    h = min(first_step(t_end - t_start, t_start), tolerances.max_step)
-    data = np.tile(inputs.values[:, 0], (y.shape[0], 1))
-    return Chunk(State.at(t_start, h, y), tolerances.given(t_end, np.hstack([p, data])))
+def _alone(
+    integrator: Integrator, given: Members, pick: slice
+) -> tuple[Array, Array, Array, Array]:
+    """Start values, parameters, input data and ends of members."""
+    y, p = given.starts(integrator.system, pick)
+    return y, p, given.data(pick), given.ends[pick]
+
+
+def _chunk(integrator: Integrator, given: Members, tolerances: Tolerances, pick: slice) -> Chunk:
+    """Start columns and run data of members, and their inputs and ends."""
+    y, p, data, ends = _alone(integrator, given, pick)
+    t_start = float(given.inputs.breaks[0])
+    S = np.ascontiguousarray(State.at(t_start, 0.0, y))
+    first = [first_step(end - t_start, t_start) for end in ends.tolist()]
+    h = np.minimum(first, tolerances.max_step)
+    S[:, State.H] = S[:, State.H_OLD] = h
+    at_start = np.broadcast_to(data[:, :, 0], (y.shape[0], data.shape[1]))
+    R = tolerances.given(float(given.inputs.breaks[-1]), np.hstack([p, at_start]))
+    return Chunk(S, R, data, ends)
 
 
 def _identity(
     job: Job,
     integrator: Integrator,
     tolerances: Tolerances,
-    starts: Callable[[slice], tuple[Array, Array]],
+    given: Members,
     picks: dict[int, slice],
 ) -> str:
     """Hash of everything that the results depend on, and of how they are cut in chunks."""
@@ -306,7 +291,7 @@ def _identity(
         parts.append(str(integrator.crossings.jump.serialize()))
     parts.append(str(integrator.events.serialize()))
     for pick in picks.values():
-        parts.append(digest(*starts(pick)))
+        parts.append(digest(*_alone(integrator, given, pick)))
     return digest(*parts)[:16]
 
 

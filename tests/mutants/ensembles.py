@@ -13,8 +13,9 @@ ENSEMBLES = (
         'if str(saved["checksum"]) == self._checksum(first, attempts.size):', "if True:", T_STORE,
     ),
     Mutant(
-        "an ensemble of other inputs is taken over", "symfric/integrator/many/chunk.py",
-        "own = (self.breaks, self.data, self.times,", "own = (self.breaks, self.times,", T_STORE,
+        "an ensemble of other inputs is taken over", "symfric/integrator/ensemble.py",
+        "parts.append(digest(*_alone(integrator, given, pick)))",
+        "parts.append(digest(*_alone(integrator, given, pick)[:2]))", T_STORE,
     ),
     Mutant(
         "results wait for a member that is gone", LOOP,

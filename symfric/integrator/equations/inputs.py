@@ -28,7 +28,7 @@ class Sampled:
 
     Attributes:
         t: increasing sample times [s], shape (n,).
-        values: samples, shape (n,).
+        values: samples, shape (n,); (members, n) for an ensemble whose members have their own.
 
     Both are copied, and the copies cannot be written: what was checked stays as it is. Before the
     first and after the last sample the end value holds.
@@ -40,18 +40,26 @@ class Sampled:
     def __post_init__(self) -> None:
         where = type(self).__name__
         t = checks.times(f"{where}: t", self.t)
-        values = checks.array(f"{where}: values", self.values)
-        if t.size != values.size:
+        what = "a sequence of numbers, or a matrix with a row for each member"
+        values = checks.array(f"{where}: values", self.values, ndim=None, what=what)
+        if values.ndim not in (1, 2):
+            raise checks.refused(f"{where}: values", what, self.values)
+        if t.size != values.shape[-1]:
             raise ValueError(
                 f"{where}: expected a value for every time, got {t.size} times "
-                f"and {values.size} values"
+                f"and {values.shape[-1]} values"
             )
         for name, samples in (("t", t.copy()), ("values", values.copy())):
             samples.flags.writeable = False
             object.__setattr__(self, name, samples)
 
+    @property
+    def rows(self) -> int | None:
+        """For how many members it has samples; None for one signal."""
+        return np.shape(self.values)[0] if np.ndim(self.values) == 2 else None
+
     def coefficients(self, breaks: Array) -> Array:
-        """Value and slope at the start of each interval between `breaks`, shape (2, n - 1)."""
+        """Value and slope at the start of each interval between `breaks`, shape (2, ..., n - 1)."""
         raise NotImplementedError
 
 
@@ -65,7 +73,8 @@ class Hold(Sampled):
         t, values = np.asarray(self.t), np.asarray(self.values)
         middle = (breaks[:-1] + breaks[1:]) / 2
         index = np.clip(np.searchsorted(t, middle, side="right") - 1, 0, t.size - 1)
-        return np.vstack([values[index], np.zeros(index.size)])
+        held = values[..., index]
+        return np.stack([held, np.zeros_like(held)])
 
 
 @final
@@ -75,8 +84,10 @@ class Linear(Sampled):
 
     def coefficients(self, breaks: Array) -> Array:
         """Value and slope at the start of each interval."""
-        ends = np.interp(breaks, np.asarray(self.t), np.asarray(self.values))
-        return np.vstack([ends[:-1], np.diff(ends) / np.diff(breaks)])
+        t, values = np.asarray(self.t), np.asarray(self.values)
+        ends = np.array([np.interp(breaks, t, row) for row in np.atleast_2d(values)])
+        ends = ends if values.ndim == 2 else ends[0]
+        return np.stack([ends[..., :-1], np.diff(ends) / np.diff(breaks)])
 
 
 KINDS = "an input is a number, Hold or Linear samples, or a function of the symbolic time"
@@ -198,6 +209,11 @@ def _part(model: Model, variable: Variable, signal: Any, breaks: Array, begin: c
             return _Part(made, key, (data,), values, onsets(*look), pace(*look))
         # a number is data too: another value must not mean another integrator
         signal = Hold(breaks[:1], [checks.number(where, signal, hint=KINDS)])
+    if signal.rows is not None:
+        raise ValueError(
+            f"{where}: expected samples of one signal, got those of {signal.rows} members, which "
+            "are for simulate_many"
+        )
     c, slope = ca.SX.sym(f"{variable.name}_k"), ca.SX.sym(f"{variable.name}_dot")
     value, rise = signal.coefficients(breaks)
     if not rise.any():

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from symfric.foundation.compiler import find_compiler
 from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import consistent_many, smallest_step
-from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.many.members import Stretch
 from symfric.integrator.many.program import Program, program
 from symfric.integrator.running.engine import Stop
@@ -26,10 +25,23 @@ WHY = {Stop.ATTEMPTS: Status.MAX_STEPS, Stop.STEP_TOO_SMALL: Status.STEP_TOO_SMA
 @final
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """Start columns S (members, rows) and run data R (members, size)."""
+    """What members of their own have.
+
+    Attributes:
+        S: start columns (members, rows).
+        R: run data (members, size).
+        data: input data (members or 1, n_data, intervals).
+        ends: end times [s], shape (members,).
+    """
 
     S: Array
     R: Array
+    data: Array
+    ends: Array
+
+    def __getitem__(self, pick: Indices) -> "Chunk":
+        data = self.data if self.data.shape[0] == 1 else self.data[pick]
+        return Chunk(self.S[pick], self.R[pick], data, self.ends[pick])
 
 
 @final
@@ -57,47 +69,37 @@ class Job:
 
     Attributes:
         program: the equations.
-        breaks, data: input intervals and the data on them.
-        times: times of the results [s].
+        breaks: ends of the input intervals [s].
+        times: times of the results [s]; none for the end of each member alone.
         max_steps: attempts allowed for a member.
     """
 
     program: Program
     breaks: Array
-    data: Array
     times: Array
     max_steps: int
 
     @classmethod
     def of(
-        cls, integrator: Integrator, inputs: InputData, times: Array, backend: str, max_steps: int
+        cls, integrator: Integrator, breaks: Array, times: Array, backend: str, max_steps: int
     ) -> "Job":
         """The job of an integrator; "auto" is compiled where there is a compiler."""
         compiled = backend == "compiled" or (backend == "auto" and find_compiler() is not None)
-        return cls(program(integrator, compiled), inputs.breaks, inputs.values, times, max_steps)
+        return cls(program(integrator, compiled), breaks, times, max_steps)
 
     def digest(self) -> str:
         """Hash of everything in it."""
-        own = (self.breaks, self.data, self.times, self.max_steps)
+        own = (self.breaks, self.times, self.max_steps)
         return digest(*(getattr(self.program, f.name) for f in fields(self.program)), *own)
 
-    @property
-    def stretches(self) -> list[tuple[int, int]]:
-        """Input intervals that members go through without a stop."""
-        intervals = self.breaks.size - 1
-        return (
-            [(k, k + 1) for k in range(intervals)] if self.program.constraints else [(0, intervals)]
-        )
-
-    def stretch(self, first: int, last: int, members: int) -> tuple[Stretch, Indices]:
-        """The input intervals first ... last - 1, and which of the times belong to them."""
-        breaks = self.breaks[first : last + 1]
-        h_min = smallest_step(float(self.breaks[-1] - self.breaks[0]))
-        until = np.inf if last == self.breaks.size - 1 else breaks[-1]
-        inside = np.flatnonzero((self.times >= breaks[0]) & (self.times < until))
-        data, times = self.data[None, :, first:last], self.times[None, inside]
-        ends, h_min = np.full(members, breaks[-1]), np.full(members, h_min)
-        return Stretch(breaks, data, ends, h_min, times, self.max_steps), inside
+    def stretch(self, chunk: Chunk, first: int) -> tuple[Stretch, Indices]:
+        """All input intervals from `first` on, and which of the times belong to them."""
+        breaks, begin = self.breaks[first:], float(self.breaks[0])
+        h_min = np.array([smallest_step(end - begin) for end in chunk.ends.tolist()])
+        times = self.times[None] if self.times.size else chunk.ends[:, None]
+        inside = np.flatnonzero((times >= breaks[0]).any(axis=0))
+        data, times = chunk.data[:, :, first:], times[:, inside]
+        return Stretch(breaks, data, chunk.ends, h_min, times, self.max_steps), inside
 
 
 def digest(*parts: object) -> str:
@@ -126,9 +128,9 @@ def solve_chunk(job: Job, chunk: Chunk) -> Solved:
             break
         last = last[small]
         scale[last] = own[small]
-        R, atol = chunk.R[last], Given.atol(job.program.nx)
-        R[:, atol] *= scale[last] / job.program.nominal
-        again, size = _solved(job, Chunk(chunk.S[last], R))
+        those, atol = chunk[last], Given.atol(job.program.nx)
+        those.R[:, atol] *= scale[last] / job.program.nominal
+        again, size = _solved(job, those)
         better = np.array([m not in again.failed for m in range(last.size)])
         last, size = last[better], size[better]
         found.signals[last], found.attempts[last] = again.signals[better], again.attempts[better]
@@ -139,43 +141,47 @@ def solve_chunk(job: Job, chunk: Chunk) -> Solved:
 def _solved(job: Job, chunk: Chunk) -> tuple[Solved, Array]:
     """The members of a chunk, and the largest magnitudes of their states (members, nx).
 
-    Algebraic unknowns follow the jumps of inputs, so members with such unknowns stop together at
-    the ends of the input intervals.
+    They run through all their input intervals; where algebraic unknowns have to be searched for at
+    the beginning of one, they stop, and go on from there.
     """
-    runner, S, alive = job.program.load(), chunk.S.copy(), np.arange(chunk.S.shape[0])
-    shape = (alive.size, job.times.size, job.program.n_signals)
-    signals, attempts = np.full(shape, np.nan), np.zeros(alive.size, dtype=np.int64)
+    runner, S, count = job.program.load(), chunk.S.copy(), chunk.S.shape[0]
+    signals = np.full((count, max(1, job.times.size), job.program.n_signals), np.nan)
+    attempts, size = np.zeros(count, dtype=np.int64), np.zeros((count, job.program.nx))
     failed: dict[int, str] = {}
-    size = np.zeros((alive.size, job.program.nx))
-    for first, last in job.stretches:
-        if job.program.constraints:
-            alive = _follow(job, chunk, S, alive, first, failed)
-        stretch, inside = job.stretch(first, last, alive.size)
-        part, made = S[alive], attempts[alive]
-        found, reason, largest = runner.run(part, chunk.R[alive], made, stretch)
-        size[alive] = np.maximum(size[alive], largest[:, : job.program.nx])
-        S[alive], attempts[alive] = part, made
-        signals[np.ix_(alive, inside)] = found
-        for m, why, t in zip(
-            alive.tolist(), reason.tolist(), part[:, State.T].tolist(), strict=True
-        ):
+    waiting = {0: np.arange(count)}
+    while waiting:
+        first = min(waiting)
+        here = _consistent(job, chunk, S, waiting.pop(first), first, failed)
+        stretch, inside = job.stretch(chunk[here], first)
+        part, made = S[here], attempts[here]
+        found, reason, largest = runner.run(part, chunk.R[here], made, stretch)
+        size[here] = np.maximum(size[here], largest[:, : job.program.nx])
+        S[here], attempts[here], t = part, made, part[:, State.T]
+        signals[np.ix_(here, inside)] = found
+        for m, why, at in zip(here.tolist(), reason.tolist(), t.tolist(), strict=True):
             if why in WHY:
                 failed[m] = (
-                    f"{WHY[why].value} It stands at t = {t:g} s; simulate it alone for more."
+                    f"{WHY[why].value} It stands at t = {at:g} s; simulate it alone for more."
                 )
-        alive = alive[reason == Stop.END]
+        stuck = reason == Stop.SEARCH
+        interval = np.searchsorted(job.breaks, t[stuck])
+        for k in np.unique(interval).tolist():
+            waiting[k] = np.concatenate([waiting.get(k, here[:0]), here[stuck][interval == k]])
     return Solved(signals, attempts, S[:, State.T].copy(), failed), size
 
 
-def _follow(
-    job: Job, chunk: Chunk, S: Array, alive: Indices, interval: int, failed: dict[int, str]
+def _consistent(
+    job: Job, chunk: Chunk, S: Array, members: Indices, interval: int, failed: dict[int, str]
 ) -> Indices:
     """Let algebraic unknowns follow the input data of an interval; the members that can."""
+    if not job.program.constraints:
+        return members
     equations, together = job.program.equations()
-    d = chunk.R[alive, Given.d(job.program.nx)]
-    d[:, d.shape[1] - job.data.shape[0] :] = job.data[:, interval]
-    S[alive, State.Y], refused = consistent_many(
-        equations, together, job.program.where, S[alive, State.Y], d
+    d = chunk.R[members, Given.d(job.program.nx)]
+    data = chunk[members].data[:, :, interval]
+    d[:, d.shape[1] - data.shape[1] :] = data
+    S[members, State.Y], refused = consistent_many(
+        equations, together, job.program.where, S[members, State.Y], d
     )
-    failed |= {int(alive[m]): message for m, message in refused.items()}
-    return np.delete(alive, list(refused))
+    failed |= {int(members[m]): message for m, message in refused.items()}
+    return np.delete(members, list(refused))

@@ -3,10 +3,11 @@
    Before this: `lanes.h`, `symfric_step` (S, R -> S_next, D) and `symfric_values` (t, y, d ->
    signals) on vectors, WORK vectors for what they keep meanwhile, and the sizes of everything:
    N unknowns, MEMORY rows of S before them, T and H among these, SIZE_R rows of R, T_END among
-   them, N_D its last ones that are run data, ROWS of dense output, SIGNALS, FLOOR. */
+   them, N_D its last ones that are run data, ROWS of dense output, SIGNALS, FLOOR. Where FOLLOWS is 2, algebraic unknowns follow a jump of inputs by
+   `symfric_follow`; where that fails, or FOLLOWS is 1, the member stops there. */
 
 enum { S_ROWS = MEMORY + N };
-enum { ENDED = 0, OUT_OF_ATTEMPTS = 2, TOO_SMALL = 3 };
+enum { ENDED = 0, OUT_OF_ATTEMPTS = 2, TOO_SMALL = 3, SEARCH = 7 };
 
 /* What all members share, and where those of each one lie: member m's begin at m times _step. */
 typedef struct {
@@ -99,16 +100,32 @@ static void note_due(const Many *all, Lanes *x, int l)
   x->due[l] = x->next[l] < all->n_times ? times_of(all, x, l)[x->next[l]] : INFINITY;
 }
 
-/* Begin the input interval of lane l. */
-static void enter(const Many *all, Lanes *x, int l)
+/* Let the algebraic unknowns of lane l follow the run data; whether they could. */
+static int follow(Lanes *x, int l)
+{
+#if FOLLOWS == 2
+  double y[N], d[N_D + 1];
+  for (int i = 0; i < N; ++i) y[i] = x->S[MEMORY + i][l];
+  for (int i = 0; i < N_D; ++i) d[i] = x->R[SIZE_R - N_D + i][l];
+  if (symfric_follow(y, d)) return 0;
+  for (int i = 0; i < N; ++i) x->S[MEMORY + i][l] = y[i];
+#endif
+  (void)x, (void)l;
+  return FOLLOWS != 1;
+}
+
+/* Begin the input interval of lane l; whether it can. */
+static int enter(const Many *all, Lanes *x, int l)
 {
   const long long m = x->member[l], k = x->interval[l];
   const double *data = all->data + m * all->data_step;
   x->R[T_END][l] = is_last(all, x, l) ? all->ends[m] : all->breaks[k + 1];
   for (long long i = 0; i < all->n_data; ++i)
     x->R[SIZE_R - all->n_data + i][l] = data[i * all->intervals + k];
+  if (k && !follow(x, l)) return 0;
   while (has_due(all, x, l, x->S[T][l])) ask(all, x, l, 0.);
   note_due(all, x, l);
+  return 1;
 }
 
 /* Give lane l to the next member, or let it do what another lane does. */
@@ -167,7 +184,7 @@ static void settle(const Many *all, Lanes *x, int l)
         finish(all, x, l, ENDED);
       } else {
         ++x->interval[l];
-        enter(all, x, l);
+        if (!enter(all, x, l)) finish(all, x, l, SEARCH);
       }
     } else if (is_small(x, l)) {
       finish(all, x, l, TOO_SMALL);

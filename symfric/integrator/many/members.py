@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from symfric.integrator.compiled.columns import Columns, densified
 from symfric.integrator.compiled.compiler import load
+from symfric.integrator.equations.following import Following
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.many.vectors import c_text, lanes_header, vector_source
 from symfric.integrator.running.dense import from_records
@@ -49,6 +50,7 @@ class Stretch:
     max_steps: int
 
 
+Follow = tuple[str, float] | tuple[()]
 Advanced = tuple[Array, Counts, Array]
 
 
@@ -78,13 +80,17 @@ class VmMembers:
 
     engine: VmEngine
     signals: Columns
+    follow: Following | None
+    searches: bool
 
     @classmethod
-    def of(cls, step: str, signals: str) -> "VmMembers":
-        """From the serialised Functions of the step and of the signals."""
-        return cls(
-            VmEngine.of(ca.Function.deserialize(step)), Columns(ca.Function.deserialize(signals))
-        )
+    def of(cls, step: str, signals: str, follow: Follow) -> "VmMembers":
+        """From the serialised Functions of the step, of the signals and of what follows jumps."""
+        engine = VmEngine.of(ca.Function.deserialize(step))
+        how = None
+        if follow and follow[0]:
+            how = Following(ca.Function.deserialize(follow[0]), follow[1])
+        return cls(engine, Columns(ca.Function.deserialize(signals)), how, bool(follow))
 
     def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> Advanced:
         """Advance members over a stretch."""
@@ -118,6 +124,8 @@ class _Member:
             last = k + 2 == breaks.size or breaks[k + 1] >= self.end
             R[Given.T_END] = self.end if last else breaks[k + 1]
             R[R.size - n_data :] = self.data[:, k]
+            if k and not self.followed():
+                return Stop.SEARCH
             from_t, y0 = S[State.T], S[State.Y].copy()
             records, stop = self.attempts()
             ends = from_records(records, y0.size).y1
@@ -134,6 +142,17 @@ class _Member:
             if last or stop is not Stop.END:
                 break
         return stop
+
+    def followed(self) -> bool:
+        """Whether the algebraic unknowns could follow the data that jumped."""
+        members, y = self.members, self.S[State.Y]
+        if members.follow is None:
+            return not members.searches
+        n_d = members.signals.function.numel_in(2)
+        found = members.follow(y, self.R[self.R.size - n_d :])
+        if found is not None:
+            y[:] = found
+        return found is not None
 
     def attempts(self) -> tuple[Array, Stop]:
         """Advance over one interval; all records, why it stopped."""
@@ -213,10 +232,20 @@ class CompiledMembers:
         return found, reason, largest
 
 
-def many_source(step: ca.Function, signals: ca.Function, lanes: int = 0) -> str:
+def many_source(
+    step: ca.Function,
+    signals: ca.Function,
+    follows: bool = False,
+    follow: Following | None = None,
+    lanes: int = 0,
+) -> str:
     """C of the step and of the signals on vectors, with the loop over members.
 
-    The vectors have as many lanes as the processor takes, or `lanes`: the bits are the same.
+    Args:
+        step, signals: as an `Integrator` has them.
+        follows: whether there are algebraic unknowns, which follow jumps of inputs.
+        follow: how; where it is left out, members stop at each jump.
+        lanes: of the vectors; as many as the processor takes, else. The bits are the same.
     """
     n = step.numel_in(0) - State.MEMORY
     groups = 2 if step.n_instructions() < PAIRED else 1
@@ -230,5 +259,11 @@ def many_source(step: ca.Function, signals: ca.Function, lanes: int = 0) -> str:
         "SIGNALS": signals.numel_out(0), "FLOOR": repr(FLOOR), "WORK": max(work, more),
         "GROUPS": groups,
     }  # fmt: skip
+    sizes["FOLLOWS"] = 0 if not follows else 1 if follow is None else 2
+    jump = ""
+    if follow is not None:
+        generator = ca.CodeGenerator("symfric_round.c", {"static_aux": True})
+        generator.add(follow.round)
+        jump = generator.dump() + follow.c_source
     defined = "".join(f"#define {name} {value}\n" for name, value in sizes.items())
-    return f"{lanes_header(lanes)}\n{of_step}{of_values}{defined}{c_text('loop.h')}"
+    return f"{jump}{lanes_header(lanes)}\n{of_step}{of_values}{defined}{c_text('loop.h')}"

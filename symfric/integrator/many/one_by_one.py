@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from symfric.foundation.status import Status
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.many.chunk import Solved
+from symfric.integrator.many.given import input_of
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import Tolerances, integrate
 
@@ -18,24 +19,29 @@ def solve_one_by_one(
     tolerances: Tolerances,
     backend: str,
     times: Array,
-    starts: tuple[Array, Array],
+    given: tuple[Array, Array, Array, Array],
 ) -> Solved:
     """Integrate members as `simulate` does; signals are NaN after a terminal event.
 
     Args:
-        integrator, inputs, tolerances, backend, times: common to all members.
-        starts: start values of the unknowns (members, n) and parameters (members, n_p).
+        integrator, inputs, tolerances, backend: common to all members, but for their input data.
+        times: of the results [s]; none for the end of each member alone.
+        given: start values of the unknowns (members, n), parameters (members, n_p), input data
+            (members or 1, n_data, intervals) and ends (members,).
 
     Raises:
         KeyboardInterrupt: Ctrl-C; the members of the chunk are lost.
     """
-    y0, p = starts
+    y0, p, data, ends = given
     count, names = y0.shape[0], integrator.signals.numel_out(0)
-    signals, reached = np.full((count, times.size, names), np.nan), np.zeros(count)
-    attempts, failed = np.zeros(count, dtype=np.int64), dict[int, str]()
+    signals = np.full((count, max(1, times.size), names), np.nan)
+    attempts, reached = np.zeros(count, dtype=np.int64), np.zeros(count)
+    failed = dict[int, str]()
     for m in range(count):
+        own = input_of(inputs, data[m if data.shape[0] > 1 else 0], ends[m])
+        looks = times[times <= ends[m]] if times.size else ends[m : m + 1]
         try:
-            run = integrate(integrator, inputs, y0[m], p[m], tolerances, backend, None, times)
+            run = integrate(integrator, own, y0[m], p[m], tolerances, backend, None, looks)
         except ValueError as error:  # no consistent start
             failed[m], reached[m] = str(error), inputs.breaks[0]
             continue
@@ -45,7 +51,7 @@ def solve_one_by_one(
             failed[m] = run.message
         attempts[m], reached[m] = run.attempts, run.reached
         y = run.outputs.reached
-        at = times[: y.shape[1]]
-        d = np.hstack([np.tile(p[m], (at.size, 1)), inputs.values[:, inputs.interval(at)].T])
+        at = looks[: y.shape[1]]
+        d = np.hstack([np.tile(p[m], (at.size, 1)), own.values[:, own.interval(at)].T])
         (signals[m, : at.size],) = integrator.signal_columns([at, y.T, d])
     return Solved(signals, attempts, reached, failed)

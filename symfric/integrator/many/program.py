@@ -1,7 +1,7 @@
 """The equations of an ensemble as plain data: source code and serialised Functions."""
 
 from dataclasses import dataclass, fields
-from functools import lru_cache
+from functools import lru_cache, partial
 from threading import Lock
 from typing import Any, final
 from weakref import WeakKeyDictionary
@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.initial import Equations
 from symfric.integrator.equations.manifold import Manifold
-from symfric.integrator.many.members import CompiledMembers, Members, VmMembers, many_source
+from symfric.integrator.many.members import (
+    CompiledMembers,
+    Follow,
+    Members,
+    VmMembers,
+    many_source,
+)
 from symfric.integrator.running.integrator import Integrator
 
 Array = NDArray[np.float64]
@@ -37,6 +43,8 @@ class Program:
         manifold: the constraints of a mechanism, Functions serialised; () where it is none.
         names: of the unknowns.
         nominal: typical magnitudes of the differential states.
+        follow: how algebraic unknowns follow jumps of inputs in the virtual machine: the serialised
+            round and its contraction; ("", 0) where each is searched for, () where there are none.
     """
 
     where: str
@@ -49,6 +57,7 @@ class Program:
     manifold: Packed
     names: tuple[str, ...]
     nominal: Array
+    follow: Follow
 
     @property
     def nx(self) -> int:
@@ -59,7 +68,7 @@ class Program:
         """What runs the members; compiled once in a process."""
         if self.compiled:
             return _compiled(self.code, self.n_signals)
-        return _vm(self.code, self.signals)
+        return _vm(self.code, self.signals, self.follow)
 
     def equations(self) -> tuple[Equations, Columns]:
         """The algebraic equations, and their constraints for many columns."""
@@ -81,9 +90,14 @@ def program(integrator: Integrator, compiled: bool) -> Program:
 
 def _written(integrator: Integrator, compiled: bool) -> Program:
     s, step = integrator.system, integrator.step
+    follow = integrator.follow if integrator.follows and integrator.model.u else None
+    how: Follow = ("", 0.0) if integrator.follows else ()
+    if follow is not None:
+        how = (str(follow.round.serialize()), follow.contraction)
+    source = partial(many_source, step, integrator.signals, integrator.follows, follow)
     return Program(
         where=f"simulate_many of '{integrator.model.name}'",
-        code=many_source(step, integrator.signals) if compiled else str(step.serialize()),
+        code=source() if compiled else str(step.serialize()),
         compiled=compiled,
         signals=str(integrator.signals.serialize()),
         n_signals=integrator.signals.numel_out(0),
@@ -92,6 +106,7 @@ def _written(integrator: Integrator, compiled: bool) -> Program:
         manifold=_packed(s.manifold),
         names=s.names,
         nominal=s.nominal,
+        follow=how,
     )
 
 
@@ -130,5 +145,5 @@ def _compiled(code: str, signals: int) -> CompiledMembers:
 
 
 @lru_cache(16)
-def _vm(step: str, signals: str) -> VmMembers:
-    return VmMembers.of(step, signals)
+def _vm(step: str, signals: str, follow: Follow) -> VmMembers:
+    return VmMembers.of(step, signals, follow)

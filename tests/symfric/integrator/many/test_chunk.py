@@ -29,8 +29,8 @@ def task(
     p, atol = model.values("p"), 1e-7 * integrator.system.nominal
     S = State.at(0.0, 1e-8, start)
     R = Given.of(1.0, 1e-6, 1.0, atol, [*p, *inputs.values[:, 0]])
-    job = Job.of(integrator, inputs, times, backend, 10_000)
-    return job, Chunk(np.tile(S, (2, 1)), np.tile(R, (2, 1)))
+    job = Job.of(integrator, inputs.breaks, times, backend, 10_000)
+    return job, Chunk(np.tile(S, (2, 1)), np.tile(R, (2, 1)), inputs.values[None], np.full(2, 1.0))
 
 
 @pytest.mark.parametrize("backend", ["vm", "compiled"])
@@ -64,20 +64,6 @@ def test_chunk_is_not_changed_by_solving_it(backend: str) -> None:
         np.testing.assert_array_equal(chunk.S, S)
         np.testing.assert_array_equal(chunk.R, R)
         np.testing.assert_array_equal(first.signals, second.signals)
-
-
-def test_only_members_with_algebraic_unknowns_stop_at_every_input_interval() -> None:
-    u: dict[str, Input] = {"u": Hold([0.0, 0.25, 0.5], [1.0, -1.0, 2.0])}
-    assert task(oscillator(), [1.0, 0.0], u=u)[0].stretches == [(0, 3)]
-    assert task(switched(), [1.0, 0.0], u=u)[0].stretches == [(0, 1), (1, 2), (2, 3)]
-
-
-def test_time_at_which_an_interval_begins_belongs_to_it() -> None:
-    u: dict[str, Input] = {"u": Hold([0.0, 0.5], [1.0, -1.0])}
-    job, _ = task(switched(), [1.0, 0.0], u=u)
-    (first, of_first), (last, of_last) = (job.stretch(*s, 2) for s in job.stretches)
-    assert (first.times.tolist(), of_first.tolist()) == ([[0.0]], [0])
-    assert (last.times.tolist(), of_last.tolist()) == ([[0.5, 1.0]], [1, 2])
 
 
 def test_equal_jobs_have_one_digest_and_every_field_counts() -> None:

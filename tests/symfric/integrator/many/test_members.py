@@ -28,7 +28,7 @@ def compiled(integrator: Integrator) -> Members:
 
 
 def vm(integrator: Integrator) -> Members:
-    return VmMembers.of(integrator.step.serialize(), integrator.signals.serialize())
+    return VmMembers.of(integrator.step.serialize(), integrator.signals.serialize(), ())
 
 
 each_loop = pytest.mark.parametrize("make", [vm, compiled])

@@ -28,7 +28,9 @@ def solve(starts: list[list[float]]) -> Any:
     inputs = input_data(model, None, 0.0, 3.0)
     tolerances = Tolerances(1e-8, np.array([1e-9]), 1e-10, 10_000)
     integrator, times = Integrator(model, inputs, RODAS5P), np.array([1.0, 3.0])
-    rows = np.array(starts), np.zeros((len(starts), 0))
+    rows = (
+        np.array(starts), np.zeros((len(starts), 0)), inputs.values[None], np.full(len(starts), 3.0)
+    )  # fmt: skip
     return solve_one_by_one(integrator, inputs, tolerances, "vm", times, rows)
 
 

@@ -168,7 +168,7 @@ def run(model: Model, starts: np.ndarray, p: np.ndarray, ends: np.ndarray, lanes
     """Members over [0, ends]: all that comes out."""
     inputs = input_data(model, None, 0.0, float(ends.max()))
     integrator = Integrator(model, inputs, RODAS5P)
-    source = many_source(integrator.step, integrator.signals, lanes)
+    source = many_source(integrator.step, integrator.signals, lanes=lanes)
     members = CompiledMembers.of(source, integrator.signals.numel_out(0))
     S = State.at(0.0, 1e-8, starts)
     d = np.hstack([p, np.tile(inputs.values[:, 0], (starts.shape[0], 1))])
