@@ -296,7 +296,7 @@ CACHES = (
     ),
     Mutant(
         "one key for all functions of time", "symfric/integrator/equations/inputs.py",
-        "sha256(ca.SX.serialize(expression).encode()).hexdigest()", '"function"',
+        "sha256(ca.SX.serialize(made).encode()).hexdigest()", '"function"',
         ("tests/symfric/integrator/equations/test_inputs.py",),
     ),
     Mutant(
