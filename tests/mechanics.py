@@ -177,3 +177,62 @@ def rocker_angle(crank: float, coupler: float, rocker: float, base: float, theta
     b = -2 * sin(theta)
     c = k1 - (k2 + 1) * cos(theta) + k3
     return 2 * np.arctan2(-b - sqrt(b * b - 4 * a * c), 2 * a)
+
+
+def four_bar_with_friction(
+    lengths: tuple[float, float, float, float],
+    density: float,
+    radius: float,
+    mu: Callable[[float], float],
+    angles: tuple[float, float, float],
+    rates: tuple[float, float, float],
+    g: float,
+) -> tuple[Array, Array]:
+    """Forces in the four pins of a four-bar linkage [N] and angular accelerations of its links.
+
+    Newton and Euler for each link by itself, with both components of all pins as unknowns: 9
+    accelerations, 8 forces, and N = |force| in each pin by iteration.
+
+    Args:
+        lengths: crank, coupler, rocker, distance of the fixed pins.
+        mu: coefficient of friction at a sliding velocity.
+        angles, rates: of crank, coupler, rocker against x, turning x towards z.
+    """
+    ahead = [np.array([cos(a), sin(a)]) for a in angles]
+    # pins: place on the first link, on the second (None: the ground), as a part of their lengths
+    pins = ((0, 0.0, None, 0.0), (1, 0.0, 0, 1.0), (1, 1.0, 2, 1.0), (2, 0.0, None, 0.0))
+
+    def arm(link: int, part: float) -> Array:
+        return (part - 0.5) * lengths[link] * ahead[link]
+
+    def spin(link: int | None) -> float:
+        return 0.0 if link is None else rates[link]
+
+    N = np.zeros(4)
+    x = np.zeros(17)
+    for _ in range(200):
+        A, b = np.zeros((17, 17)), np.zeros(17)
+        for i in range(3):
+            m = density * lengths[i]
+            A[3 * i, 3 * i] = A[3 * i + 1, 3 * i + 1] = m
+            A[3 * i + 2, 3 * i + 2] = m * lengths[i] ** 2 / 12
+            b[3 * i + 1] = -m * g
+        for k, (one, part, other, far) in enumerate(pins):
+            slip = radius * (spin(one) - spin(other))
+            moment = -radius * mu(slip) * N[k]
+            for link, at, sign in ((one, part, 1.0), (other, far, -1.0)):
+                if link is None:
+                    continue
+                r, column = arm(link, at), 9 + 2 * k
+                A[3 * link, column] -= sign
+                A[3 * link + 1, column + 1] -= sign
+                A[3 * link + 2, column : column + 2] -= sign * np.array([-r[1], r[0]])
+                b[3 * link + 2] += sign * moment
+                # acceleration of the pin: a + alpha x r - w^2 r
+                row = 9 + 2 * k
+                A[row, 3 * link] = A[row + 1, 3 * link + 1] = sign
+                A[row : row + 2, 3 * link + 2] = sign * np.array([-r[1], r[0]])
+                b[row : row + 2] += sign * rates[link] ** 2 * r
+        x = np.linalg.solve(A, b)
+        N = np.array([size(*f) for f in x[9:].reshape(4, 2)])
+    return N, x[[2, 5, 8]]

@@ -2,6 +2,11 @@
 
 from symfric.multibody.body import GROUND as GROUND
 from symfric.multibody.body import Body as Body
+from symfric.multibody.closing import Distance as Distance
+from symfric.multibody.closing import PinInSlot as PinInSlot
+from symfric.multibody.closing import PlanarPrismatic as PlanarPrismatic
+from symfric.multibody.closing import PlanarRevolute as PlanarRevolute
+from symfric.multibody.closing import PointOnLine as PointOnLine
 from symfric.multibody.constraints import Constraint as Constraint
 from symfric.multibody.constraints import PrescribedMotion as PrescribedMotion
 from symfric.multibody.constraints import UserConstraint as UserConstraint
@@ -18,11 +23,9 @@ from symfric.multibody.functions import functions as functions
 from symfric.multibody.joint import Joint as Joint
 from symfric.multibody.joints import ALL_JOINTS as ALL_JOINTS
 from symfric.multibody.joints import Cylindrical as Cylindrical
-from symfric.multibody.joints import Distance as Distance
 from symfric.multibody.joints import Fixed as Fixed
 from symfric.multibody.joints import Floating as Floating
 from symfric.multibody.joints import Planar as Planar
-from symfric.multibody.joints import PointOnLine as PointOnLine
 from symfric.multibody.joints import Prismatic as Prismatic
 from symfric.multibody.joints import Revolute as Revolute
 from symfric.multibody.joints import Spherical as Spherical

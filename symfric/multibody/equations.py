@@ -148,6 +148,8 @@ def equations(
     phi = phi[list(kept), 0]
     phi_dot = ca.jtimes(phi, q, qd) + ca.jacobian(phi, t)
     reactions = {name: _without(world[name], name, kin, loads) for name in by_name}
+    own = {loop.joint.name: loop.reaction(every) for loop in closed if loop.joint.closes}
+    pressing = reactions | own
     return Equations(
         kin,
         closed,
@@ -164,7 +166,7 @@ def equations(
         ca.jtimes(phi, q, a) + ca.jtimes(phi_dot, q, qd) + ca.jacobian(phi_dot, t),
         ca.densify(rows),
         contacts,
-        tuple(_normal(kin, c, by_name[c.joint], reactions) for c in contacts),
+        tuple(_normal(kin, c, by_name[c.joint], pressing) for c in contacts),
         kinetic_energy(kin),
         sum((f.energy(kin, by_name) for f in forces), ca.SX(0)),
         power,
@@ -235,7 +237,7 @@ def _normal(kin: Kinematics, contact: Contact, joint: Joint, reactions: dict[str
     """Normal force of a contact [N]."""
     F, T = reactions[joint.name]
     if contact.direction not in ("x", "y"):
-        return contact.friction.normal_force(joint.rubs, F, T)
+        return joint.normal_force(contact.friction, F, T)
     R = joint.bearing(contact.direction, kin.rotation(joint))
     return contact.friction.normal_force(("turn",), R @ F, R @ T)
 

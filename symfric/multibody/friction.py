@@ -72,7 +72,7 @@ class JointFriction:
     def problems(self, rubs: Sequence[str]) -> Iterator[str]:
         """What is wrong for a joint in which friction acts in the directions `rubs`."""
         if not rubs:
-            yield "expected a revolute, prismatic, cylindrical, universal or spherical joint"
+            yield "expected a joint in which something rubs, such as a hinge, a guide or a ball"
         offered = () if "ball" in rubs else OFFERED
         if strange := [i.name for i in self.law.inputs if i.name not in offered]:
             yield (

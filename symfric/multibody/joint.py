@@ -57,6 +57,8 @@ class Joint(ABC):
     """Where forces and motions may be prescribed: "slide", "turn", ... -> joint coordinate."""
     quaternion: ClassVar[int | None] = None
     """Index of the first of four Euler parameters among the coordinates."""
+    plane: ClassVar[int | None] = None
+    """Axis of both frames that is normal to the plane of a planar joint."""
     transmits: ClassVar[tuple[str, ...]] = COMPONENTS
     """Components of force and moment that it can transmit, in the axes of the child's frame."""
     symbol: ClassVar[Symbol] = Symbol()
@@ -107,6 +109,13 @@ class Joint(ABC):
         if self.linear(direction):
             return p["xyz".index(direction) if direction in "xyz" else 2]
         return ca.atan2(R[1, 0], R[0, 0])
+
+    def normal_force(self, friction: JointFriction, F: ca.SX, T: ca.SX) -> ca.SX:
+        """What presses its bearing [N] under the reaction F, T on the child.
+
+        In the axes of the child's frame, of a joint that only closes loops in the parent's.
+        """
+        return friction.normal_force(self.rubs, F, T)
 
     @property
     def starts(self) -> tuple[Scalar, ...]:

@@ -3,14 +3,20 @@
 See `symfric.multibody.joint` for what these are.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, final
 
 import casadi as ca
 
-from symfric.foundation.numeric import Scalar, is_number, is_symbolic
 from symfric.model.sketch import Symbol
+from symfric.multibody.closing import (
+    Distance,
+    PinInSlot,
+    PlanarPrismatic,
+    PlanarRevolute,
+    PointOnLine,
+)
 from symfric.multibody.joint import FORCE, Joint, Pair, unit
 from symfric.multibody.spatial import (
     euler_g,
@@ -249,64 +255,7 @@ class Floating(Joint):
         return ca.SX(0, 1)
 
 
-@dataclass(frozen=True, eq=False)
-class Closing(Joint):
-    """A joint that only closes loops."""
-
-    closes: ClassVar[bool] = True
-
-    def pose(self, q: ca.SX) -> Pair:
-        """Not asked for: the joint always closes a loop and has no coordinates."""
-        raise NotImplementedError
-
-    def subspace(self, q: ca.SX) -> Pair:
-        """Not asked for: the joint always closes a loop and has no coordinates."""
-        raise NotImplementedError
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Distance(Closing):
-    """A massless rod with ball joints at both ends: (d'd - length^2) / 2 = 0; 1 constraint.
-
-    Its multiplier [N/m] times the length is the force in the rod, positive under tension.
-    """
-
-    constrains: ClassVar[int] = 1
-    transmits: ClassVar[tuple[str, ...]] = FORCE
-    symbol: ClassVar[Symbol] = Symbol(line="rod", anchored=True)
-
-    length: Scalar = 1.0
-
-    def problems(self) -> Iterator[str]:
-        """A length that is none."""
-        if not is_symbolic(self.length) and not (is_number(self.length) and self.length > 0):
-            yield f"length: expected > 0 m, got {self.length!r}"
-
-    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """(p'p - length^2)/2 = 0: the squared distance has a gradient everywhere."""
-        return (ca.dot(p, p) - self.length * self.length) / 2
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class PointOnLine(Closing):
-    """The origin of the child's frame stays on the parent's axis z; 2 constraints.
-
-    With z normal to the plane of a planar mechanism it is the pin that closes a loop without the
-    reactions out of the plane that a revolute joint there could not determine.
-    """
-
-    constrains: ClassVar[int] = 2
-    transmits: ClassVar[tuple[str, ...]] = FORCE
-    symbol: ClassVar[Symbol] = Symbol("o", axes=(("a", 2),), anchored=True)
-
-    def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """p_x = p_y = 0: the point is on the z axis of the line."""
-        return ca.vertcat(p[0], p[1])
-
-
 ALL_JOINTS: tuple[type[Joint], ...] = (
     Revolute, Prismatic, Cylindrical, Spherical, Universal, Planar, Fixed, Floating, Distance,
-    PointOnLine,
+    PointOnLine, PlanarRevolute, PlanarPrismatic, PinInSlot,
 )  # fmt: skip

@@ -308,7 +308,8 @@ def _left_open(made: Prepared) -> Iterator[str]:
         yield (
             f"joint '{name}' > friction: expected reactions that the motion determines, got a "
             f"normal force that the redundant constraints {', '.join(made.redundant)} leave open; "
-            "close the loop with a joint of fewer constraints (PointOnLine in a planar mechanism)"
+            "close the loop with a joint of fewer constraints: PlanarRevolute, PlanarPrismatic or "
+            "PinInSlot in a planar mechanism, a ball or a PointOnLine in space"
         )
     if made.singular:
         yield "start: expected independent constraints, got a singular position; start elsewhere"

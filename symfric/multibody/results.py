@@ -21,10 +21,10 @@ from symfric.foundation.symbols import stacked, strays
 from symfric.model import Output
 from symfric.model.kinds import WORK
 from symfric.multibody.body import GROUND
+from symfric.multibody.closing import Distance
 from symfric.multibody.equations import Equations
 from symfric.multibody.forces import Axial, Force
 from symfric.multibody.joint import COMPONENTS, FORCE, Joint
-from symfric.multibody.joints import Distance
 from symfric.multibody.turns import angles
 
 Put = Callable[[Sequence[ca.SX]], list[ca.SX]]

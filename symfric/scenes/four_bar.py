@@ -5,7 +5,7 @@ from typing import Any, ClassVar, final
 
 from symfric.foundation.numeric import Scalar, atan, cos, equals, sin
 from symfric.foundation.parameters import param
-from symfric.multibody import JointFriction, Mechanism, PointOnLine, Revolute
+from symfric.multibody import JointFriction, Mechanism, PlanarRevolute, Revolute
 from symfric.scenes.mechanism import MechanismScene, reach
 from symfric.scenes.pendulum import HINGE
 
@@ -16,8 +16,8 @@ class FourBar(MechanismScene):
     """Crank, coupler and rocker between two hinges of the ground, friction in three hinges.
 
     crank and rocker are angles against x, coupler the angle of the coupler against the crank. The
-    fourth pin closes the loop as a point on a line: a hinge would fix what the plane fixes
-    already, and leave the reactions out of the plane open. It has no friction.
+    fourth pin closes the loop as a `PlanarRevolute`: a hinge would fix what the plane fixes
+    already, and leave the reactions out of the plane open. It has no friction here; it can have.
 
     Defaults: a crank-rocker (0.1 + 0.4 < 0.3 + 0.35 m) that starts with 10 rad/s.
     """
@@ -90,5 +90,5 @@ class FourBar(MechanismScene):
         )  # fmt: skip
         for name, parent, child, start, rate in hinges:
             m.joint(Revolute(name, parent, child, start, rate, friction))
-        m.joint(PointOnLine("pin", "rocker_rod.far", "coupler_rod.far"))
+        m.joint(PlanarRevolute("pin", "rocker_rod.far", "coupler_rod.far"))
         return m

@@ -102,7 +102,7 @@ MISTAKES: dict[str, tuple[Callable[[Mechanism], object], str]] = {
             m.body("bob", 1.0, (1.0, 1.0, 1.0)),
             m.joint(Floating("pose", "rod", "bob", friction=JointFriction(LAW))),
         ),
-        "> joint 'pose' > friction: expected a revolute, prismatic, cylindrical, universal or",
+        "> joint 'pose' > friction: expected a joint in which something rubs",
     ),
     "start of another size": (
         lambda m: (

@@ -9,7 +9,7 @@ import pytest
 from symfric.model.sketch import Symbol
 from symfric.multibody import ALL_JOINTS, Joint, Mechanism
 from symfric.multibody.joint import COMPONENTS, Pair, unit
-from symfric.multibody.spatial import rotation_z, skew
+from symfric.multibody.spatial import rotation_y, rotation_z, skew
 from symfric.results.kinds import kinds
 
 MOVING = [kind for kind in ALL_JOINTS if not kind.closes]
@@ -94,6 +94,9 @@ def test_what_a_joint_transmits_is_what_its_constraints_hold(kind: type[Joint]) 
     q = ca.SX.sym("q", len(kind.coordinates))
     if kind.closes:
         R, p = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0], np.ones(3)
+        if kind.plane is not None:
+            R = {1: rotation_y, 2: rotation_z}[kind.plane](ca.SX(0.3))
+            R = ca.DM(R).full()
     else:
         pose = ca.Function("pose", [q], [ca.densify(x) for x in joint(kind).pose(q)])
         R, p = (m.full() for m in pose.call([coordinates(kind)]))

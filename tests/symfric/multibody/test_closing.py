@@ -1,0 +1,284 @@
+"""Friction in the joints that close loops: the same whichever joint it is, and as it must be."""
+
+from math import cos, sin
+
+import numpy as np
+import pytest
+from mechanics import brown_mcphee, four_bar_with_friction
+from scipy.integrate import solve_ivp
+
+from symfric import BrownMcPhee, LuGre, Trajectory, simulate
+from symfric.laws import Law
+from symfric.multibody import (
+    Cylindrical,
+    Distance,
+    Floating,
+    JointFriction,
+    Mechanism,
+    PinInSlot,
+    PlanarPrismatic,
+    PlanarRevolute,
+    PointOnLine,
+    PrescribedMotion,
+    Prismatic,
+    Revolute,
+)
+from symfric.scenes import FourBar
+
+pytestmark = pytest.mark.heavy
+
+LAW = BrownMcPhee(mu_s=0.3, mu_d=0.2, v_t=1e-2)
+COULOMB = BrownMcPhee(mu_s=0.2, mu_d=0.2, v_t=1e-5)
+"""0.2 N at any speed above 0.1 mm/s."""
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+HINGES = ("theta_crank", "theta_coupler", "pin", "theta_rocker")
+
+
+def four_bar(cut: str, law: Law = LAW) -> Mechanism:
+    """The scene with friction in all four hinges, one of which closes the loop."""
+    scene = FourBar(law)
+    m, friction = scene.mechanism(), JointFriction(law, radius=scene.R)
+    beta, gamma, beta_rate, gamma_rate = scene.closed()
+    starts = {
+        "theta_crank": (scene.angle, scene.omega),
+        "theta_coupler": (beta - scene.angle, beta_rate - scene.omega),
+        "theta_rocker": (gamma, gamma_rate),
+        "pin": (beta - gamma, beta_rate - gamma_rate),
+    }
+    m.joints = [
+        PlanarRevolute(j.name, j.parent, j.child, friction=friction)
+        if j.name == cut
+        else Revolute(j.name, j.parent, j.child, *starts[j.name], friction)
+        for j in m.joints
+    ]
+    return m
+
+
+@pytest.fixture(scope="module")
+def closed_by_the_pin() -> Trajectory:
+    return simulate(four_bar("pin").build(), 0.1, rtol=1e-8, backend="vm", samples=401)
+
+
+def same_as(one: Trajectory, cut: str, formulation: str = "joint") -> None:
+    """Whether the loop that is closed elsewhere moves, presses and rubs as `one`."""
+    model = four_bar(cut).build(formulation=formulation)
+    other = simulate(model, one.t[-1], rtol=1e-8, backend="vm", t_eval=one.t)
+    for name in ("coupler_rod_x", "coupler_rod_z", "rocker_rod_x"):
+        assert other[name] == pytest.approx(one[name], abs=1e-8)
+    for hinge in HINGES:
+        assert other[f"{hinge}_N"] == pytest.approx(one[f"{hinge}_N"], rel=1e-5)
+        assert other[f"{hinge}_power"] == pytest.approx(one[f"{hinge}_power"], abs=1e-6)
+
+
+def test_motion_does_not_depend_on_which_hinge_closes_the_loop(
+    closed_by_the_pin: Trajectory,
+) -> None:
+    same_as(closed_by_the_pin, "theta_coupler")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("cut", "formulation"),
+    [("theta_crank", "joint"), ("theta_rocker", "joint"), ("pin", "absolute")],
+)
+def test_nor_on_the_coordinates(cut: str, formulation: str, closed_by_the_pin: Trajectory) -> None:
+    same_as(closed_by_the_pin, cut, formulation)
+
+
+def test_forces_in_all_pins_are_those_of_newton_and_euler(closed_by_the_pin: Trajectory) -> None:
+    """Nine accelerations and eight pin forces at once, without a tree."""
+    scene = FourBar(LAW)
+    beta, gamma, beta_rate, gamma_rate = scene.closed()
+    N, _ = four_bar_with_friction(
+        (scene.crank, scene.coupler, scene.rocker, scene.base), scene.density, scene.R,
+        lambda v: brown_mcphee(v, 0.3, 0.2, 1e-2), (scene.angle, beta, gamma),
+        (scene.omega, beta_rate, gamma_rate), scene.g,
+    )  # fmt: skip
+    assert [closed_by_the_pin[f"{h}_N"][0] for h in HINGES] == pytest.approx(N, rel=1e-7)
+
+
+def test_energy_goes_where_friction_takes_it(closed_by_the_pin: Trajectory) -> None:
+    run = closed_by_the_pin
+    taken = np.trapezoid(sum(run[f"{h}_power"] for h in HINGES), run.t)
+    assert run["conserved"][0] - run["conserved"][-1] == pytest.approx(taken, rel=1e-5)
+    assert run["pin_power"].min() > 0.01
+
+
+@pytest.mark.slow
+def test_bristles_bend_in_the_joint_that_closes() -> None:
+    law = LuGre(mu_s=0.3, mu_d=0.2, sigma_0=1e4, sigma_1=0.0)
+    a, b = (
+        simulate(four_bar(cut, law).build(), 0.1, samples=11) for cut in ("pin", "theta_rocker")
+    )
+    for name in ("coupler_rod_x", "pin_z", "theta_rocker_z"):
+        assert a[name] == pytest.approx(b[name], rel=1e-3, abs=1e-7)
+
+
+def slider_crank(cut: str, length: float | None = None) -> Mechanism:
+    """Crank, rod and a slider on a level guide in the plane x, z; friction in all four joints.
+
+    Its guide or its small end closes the loop.
+    """
+    m = Mechanism("engine", gravity=(0.0, 0.0, -9.81))
+    r, rod, theta, omega = 0.1, 0.3, 0.7, 20.0
+    down = -np.arcsin(r * sin(theta) / rod)
+    down_rate = -r * omega * cos(theta) / (rod * cos(down))
+    at = r * cos(theta) + rod * cos(down)
+    rate = -r * omega * sin(theta) - rod * down_rate * sin(down)
+    hinge = {"z": (0.0, -1.0, 0.0), "x": X}
+    for name, size in (("crank", r), ("rod", rod)):
+        m.body(f"{name}_body", 1.0, (1e-3, 1e-3, 1e-3), com=(size / 2, 0.0, 0.0))
+        m.frame(f"{name}_body.near", **hinge)
+        m.frame(f"{name}_body.far", at=(size, 0.0, 0.0), **hinge)
+    m.body("slider_body", 2.0, (1e-2, 1e-2, 1e-2))
+    m.frame("slider_body.pin", **hinge)
+    m.frame("ground.bearing", **hinge)
+    for body in ("ground", "slider_body"):
+        m.frame(f"{body}.guide", z=X, x=Z)
+    friction, guide = JointFriction(LAW, radius=0.02), JointFriction(LAW, length=length)
+    for name, parent, child, start, speed in (
+        ("bearing", "ground.bearing", "crank_body.near", theta, omega),
+        ("big_end", "crank_body.far", "rod_body.near", down - theta, down_rate - omega),
+        ("small_end", "slider_body.pin", "rod_body.far", down, down_rate),
+    ):
+        if name == cut:
+            m.joint(PlanarRevolute(name, parent, child, friction=friction))
+        else:
+            m.joint(Revolute(name, parent, child, start, speed, friction))
+    ends = "ground.guide", "slider_body.guide"
+    if cut == "guide":
+        m.joint(PlanarPrismatic("guide", *ends, friction=guide))
+    else:
+        m.joint(Prismatic("guide", *ends, at, rate, guide))
+    return m
+
+
+def test_a_guide_that_closes_is_a_guide() -> None:
+    """Its moment presses at two stations, too: that of friction in the small end."""
+    one, other = (
+        simulate(slider_crank(cut, 0.05).build(), 0.05, rtol=1e-8, backend="vm", samples=11)
+        for cut in ("small_end", "guide")
+    )
+    for name in ("slider_body_x", "crank_body_z", "rod_body_x"):
+        assert other[name] == pytest.approx(one[name], abs=1e-7)
+    for name in ("guide", "bearing", "big_end", "small_end"):
+        assert other[f"{name}_N"] == pytest.approx(one[f"{name}_N"], rel=1e-5, abs=1e-4)
+        assert other[f"{name}_slip"] == pytest.approx(one[f"{name}_slip"], abs=1e-6)
+    assert np.abs(other["guide_friction"]).min() > 1.0
+
+
+def test_a_scotch_yoke_is_driven_by_the_moment_of_its_slot() -> None:
+    """x = r cos(theta): N = m r w^2 |cos|, the pin slides at r w cos in the slot."""
+    r, w, mass = 0.1, 10.0, 2.0
+    m = Mechanism("yoke", gravity=(0.0, 0.0, 0.0))
+    m.body("crank", 1.0, (1e-3, 1e-3, 1e-3))
+    m.body("yoke", mass, (1e-3, 1e-3, 1e-3))
+    m.frame("ground.bearing", z=(0.0, -1.0, 0.0), x=X)
+    m.frame("crank.bearing", z=(0.0, -1.0, 0.0), x=X)
+    m.frame("crank.pin", at=(r, 0.0, 0.0))
+    for body in ("ground", "yoke"):
+        m.frame(f"{body}.guide", z=X, x=Z)
+    m.frame("yoke.slot", z=Z, x=X)
+    m.joint(Revolute("theta", "ground.bearing", "crank.bearing", 0.2, w))
+    m.joint(Prismatic("x", "ground.guide", "yoke.guide", r * cos(0.2), -r * w * sin(0.2)))
+    m.joint(PinInSlot("slot", "yoke.slot", "crank.pin", friction=JointFriction(COULOMB)))
+    m.constraint(PrescribedMotion("motor", "theta", lambda t: 0.2 + w * t))
+    run = simulate(m.build(), 0.6, backend="vm", samples=31)
+    theta = 0.2 + w * run.t
+    apart = np.abs(np.cos(theta)) > 0.02  # where it turns back friction changes its sign
+    N, slip = mass * r * w * w * np.abs(np.cos(theta)), r * w * np.cos(theta)
+    assert run["slot_slip"] == pytest.approx(slip, abs=1e-8)
+    assert run["slot_N"] == pytest.approx(N, abs=2e-4)
+    inertia = mass * r * r * w * w * np.cos(theta) * np.sin(theta)
+    moment = inertia + 0.2 * N * np.abs(slip) / w
+    assert run["motor_moment"][apart] == pytest.approx(moment[apart], abs=1e-4)
+
+
+def test_a_bead_on_a_turning_wire_is_pressed_by_coriolis_and_weight() -> None:
+    """r'' = w^2 r - mu sqrt((2 w r')^2 + g^2), on a level wire; slip is that in its frame."""
+    w, g, r0, v0 = 3.0, 9.81, 0.2, 1.0
+    m = Mechanism("wire", gravity=(0.0, 0.0, -g))
+    m.body("hub", 1.0, (1.0, 1.0, 1.0))
+    m.body("bead", 0.1, (1e-6, 1e-6, 1e-6))
+    m.frame("hub.wire", z=X)
+    m.joint(Revolute("turn", "ground", "hub", 0.0, w))
+    start, rate = (r0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), (v0, r0 * w, 0.0, 0.0, 0.0, 0.0, 0.0)
+    m.joint(Floating("free", "ground", "bead", start, rate))
+    m.joint(PointOnLine("along", "hub.wire", "bead", friction=JointFriction(COULOMB, eps=1e-8)))
+    m.constraint(PrescribedMotion("motor", "turn", lambda t: w * t))
+    run = simulate(m.build(), 0.5, rtol=1e-8, backend="vm", samples=11)
+    rates = solve_ivp(
+        lambda _, y: [y[1], w * w * y[0] - 0.2 * np.hypot(2 * w * y[1], g)],
+        (0.0, 0.5), [r0, v0], t_eval=run.t, rtol=1e-10, atol=1e-12,
+    )  # fmt: skip
+    r, v = rates.y
+    assert np.hypot(run["bead_x"], run["bead_y"]) == pytest.approx(r, rel=1e-7)
+    assert run["along_slip"] == pytest.approx(v, rel=1e-7)
+    assert run["along_N"] == pytest.approx(0.1 * np.hypot(2 * w * v, g), rel=1e-6)
+
+
+def crank_in_space(block: str) -> Mechanism:
+    """The spatial slider-crank; its block slides on a shaft, or is a bead on a line."""
+    m = Mechanism("slider_crank", gravity=(0.0, 0.0, -9.8))
+    b, c, r, length = 0.1, 0.12, 0.08, 0.3
+    m.body("wheel", 0.5, (0.2, 0.2, 0.2))
+    m.body("block", 5.0, (0.2, 0.2, 0.2))
+    m.frame("ground.bearing", at=(0.0, b, c), z=X, x=Z)
+    m.frame("ground.guide", z=X, x=Z)
+    m.frame("wheel.bearing", z=X, x=Z)
+    m.frame("wheel.pin", at=(0.0, 0.0, r))
+    m.frame("block.guide", z=X, x=Z)
+    start = (length**2 - b**2 - (c + r) ** 2) ** 0.5
+    speed = b * r * 20.0 / start
+    m.joint(Revolute("crank", "ground.bearing", "wheel.bearing", 0.0, 20.0))
+    friction = JointFriction(LAW, radius=1e-6)
+    if block == "shaft":
+        ends = "ground.guide", "block.guide"
+        m.joint(Cylindrical("slider", *ends, (start, 0.0), (speed, 0.0), friction))
+    else:
+        at = (start, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+        m.joint(Floating("free", "ground", "block", at, (speed, *6 * (0.0,))))
+        m.joint(PointOnLine("slider", "ground.guide", "block.guide", friction=friction))
+    m.joint(Distance("rod", "wheel.pin", "block", length=length))
+    return m
+
+
+@pytest.mark.slow
+def test_a_block_on_a_line_is_a_block_on_a_shaft() -> None:
+    one, other = (
+        simulate(crank_in_space(block).build(), 0.3, rtol=1e-8, samples=21)
+        for block in ("shaft", "line")
+    )
+    assert other["block_x"] == pytest.approx(one["block_x"], abs=1e-7)
+    assert other["crank"] == pytest.approx(one["crank"], abs=1e-6)
+    assert other["slider_N"] == pytest.approx(one["slider_N"], rel=1e-5, abs=1e-4)
+    assert other["slider_friction"] == pytest.approx(one["slider_slide_friction"], abs=1e-4)
+
+
+def test_a_joint_that_closes_may_be_driven() -> None:
+    """A motor in the pin that closes the four-bar: the angle of the rocker against the coupler."""
+    m = four_bar("pin")
+    scene = FourBar(LAW)
+    beta, gamma, beta_rate, gamma_rate = scene.closed()
+    begin, speed = beta - gamma, beta_rate - gamma_rate
+    m.constraint(PrescribedMotion("motor", "pin", lambda t: begin + speed * t))
+    run = simulate(m.build(), 0.05, backend="vm", samples=6)
+    assert run["pin_slip"] == pytest.approx(scene.R * speed, rel=1e-6)
+    assert np.abs(run["motor_moment"]).min() > 0.0
+    work = run["drive_work_rate"]
+    assert work == pytest.approx(run["motor_moment"] * speed, rel=1e-6)
+
+
+@pytest.mark.parametrize("closing", [Revolute, PointOnLine])
+def test_what_is_open_is_refused_and_the_way_out_named(closing: type) -> None:
+    """A hinge fixes what the plane fixes; a line in the plane fixes the way out of it."""
+    m = four_bar("pin")
+    friction = JointFriction(LAW, radius=0.01)
+    if closing is Revolute:
+        m.joints[-1] = Revolute("pin", "rocker_rod.far", "coupler_rod.far", friction=friction)
+        m = m.assembled()
+    else:
+        m = slider_crank("guide")
+        m.joints[-1] = PointOnLine("guide", "ground.guide", "slider_body.guide", friction=friction)
+    with pytest.raises(ValueError, match="PlanarRevolute, PlanarPrismatic or PinInSlot in a plan"):
+        m.build()
