@@ -275,6 +275,8 @@ class Model:
         self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None
     ) -> NDArray[np.float64]:
         """Derivative of `initial_state` with respect to p, shape (nx, n_p)."""
+        if not self._start_follows:
+            return np.zeros((len(self.x), len(self.p)))
         return evaluate_all(self._start_slopes, *self._start_arguments(given, p))[0]
 
     def start_by_state(
@@ -312,6 +314,11 @@ class Model:
             values = ca.substitute(values, x, values)
         arguments = [known, chosen, self.vector("u"), self.vector("p")]
         return ca.Function("start", arguments, [values], ["known", "chosen", "u", "p"], ["x"])
+
+    @cached_property
+    def _start_follows(self) -> bool:
+        """Whether some start value is an expression in p."""
+        return bool(ca.depends_on(stacked(ca.SX(v.start) for v in self.x), self.vector("p")))
 
     @cached_property
     def _start_slopes(self) -> ca.Function:

@@ -4,7 +4,7 @@ import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
 from string import Template
-from typing import final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
@@ -55,10 +55,15 @@ class Rows:
             arrays.insert(0, np.ascontiguousarray(first, dtype=float).reshape(1, -1))
         results = [np.empty((count, size)) for size in out]
         # address of the first row, and how far the next one is
-        places = np.array([(a.ctypes.data, a.strides[0]) for a in (*arrays, *results)])
-        k = len(arrays)
-        self.library.symfric_rows(count, begin, places[:k].ctypes.data, places[k:].ctypes.data)
+        places = np.array([(_address(a), a.strides[0]) for a in (*arrays, *results)])
+        here = _address(places)
+        self.library.symfric_rows(count, begin, here, here + len(arrays) * places.strides[0])
         return results
+
+
+def _address(array: NDArray[Any]) -> int:
+    """Where an array begins; quicker than by its `ctypes`."""
+    return array.__array_interface__["data"][0]
 
 
 def _in_rows(array: Array, size: int) -> Array:
