@@ -17,6 +17,8 @@ INITIAL = "symfric/integrator/equations/initial.py"
 EMITTER = "symfric/codegen/emitter.py"
 TRANSCRIBE = "ocp/transcribe.py"
 
+LOOP = "symfric/integrator/running/loop.py"
+T_OUTPUTS = ("tests/symfric/integrator/running/test_outputs.py",)
 T_STEP = ("tests/symfric/integrator/step/test_attempt.py",)
 T_WATCH = ("tests/symfric/integrator/step/test_watch.py",)
 T_SIMULATE = ("tests/symfric/integrator/test_simulate.py",)
@@ -329,6 +331,32 @@ CACHES = (
     Mutant(
         "the compiler fuses operations", COMPILED, '"-ffp-contract=off",', "",
         ("tests/symfric/integrator/running/test_bits.py",),
+    ),
+    Mutant(
+        "outputs at a jump are those before it", "symfric/integrator/running/outputs.py",
+        'side="right" if last else "left"', 'side="right"', T_OUTPUTS,
+    ),
+    Mutant(
+        "the loop fills the end of a step, too", LOOP,
+        "(last && time == row[1])", "time == row[1]", T_OUTPUTS,
+    ),
+    Mutant(
+        "two runs share buffers", "symfric/integrator/running/integrator.py",
+        "return self._spare.pop()", "return self._spare[-1]", T_OUTPUTS,
+    ),
+    Mutant(
+        "a long run keeps its steps", "symfric/integrator/running/record.py",
+        "if self._held > self.most:", "if False:", T_OUTPUTS,
+    ),
+    Mutant(
+        "algebraic unknowns stay behind in compiled code", LOOP,
+        "if (symfric_follow(", "if (0 && symfric_follow(",
+        ("tests/symfric/integrator/running/test_bits.py::test_only_a_far_jump_is_searched_for",),
+    ),
+    Mutant(
+        "settings of another kind are taken as checked", "symfric/integrator/settings.py",
+        "key = (*asked, *map(type, asked))", "key = asked",
+        ("tests/symfric/integrator/test_settings.py",),
     ),
     Mutant(
         "the virtual machine ends with its batch", "symfric/integrator/running/engine.py",

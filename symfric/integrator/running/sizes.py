@@ -19,7 +19,9 @@ ROUNDS = 3
 
 def ample(end: Array, nominal: Array) -> bool:
     """Whether no state ends small: what most runs do, told without a look at all their steps."""
-    return bool((np.abs(end[: nominal.size]) >= SMALL * nominal).all())
+    # few numbers, seldom all: quicker than by NumPy
+    ends = zip(end.tolist(), nominal.tolist(), strict=False)
+    return all(abs(size) >= SMALL * typical for size, typical in ends)
 
 
 def own_scale(size: Array, nominal: Array) -> Array:

@@ -191,10 +191,8 @@ def test_every_law_gives_the_same_bits_by_both_engines() -> None:
 
 
 @needs_compiler
-def test_only_a_far_jump_is_searched_for_behind_the_compiled_loop(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Two jumps of three: the loop comes back for the far one alone."""
+def test_only_a_far_jump_is_searched_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two jumps: the compiled loop comes back for the far one alone."""
     searched = list[float]()
     search = _March.make_consistent
 
