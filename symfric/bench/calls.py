@@ -26,7 +26,7 @@ from symfric.integrator.equations.inputs import Hold, input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.peers.casadi_integrators import peer
 from symfric.integrator.running.run import Tolerances
-from symfric.integrator.simulate import simulate
+from symfric.integrator.simulate import FOR_DERIVATIVES, simulate
 from symfric.integrator.stepper import stepper
 from symfric.laws import GMS, BrownMcPhee, Law, LuGre, MaxwellSlip
 from symfric.laws.dynamic.gms import Element
@@ -213,27 +213,37 @@ def _gms(count: int, form: str) -> Law:
 
 
 def _gradient(quick: bool) -> Iterator[CallRow]:
-    """Of the mean square of a block's position at 401 times by four parameters."""
+    """Of the mean square of a block's position at 401 times by four parameters.
+
+    Errors are relative to the sum of the magnitudes of what is summed up.
+    """
     model, times = Rabinowicz(BrownMcPhee()).model(free=FREE), np.linspace(0.0, 20.0, 401)
 
-    def run(sensitivities: tuple[str, ...] = (), rtol: float = RTOL) -> Trajectory:
+    def run(rtol: float = RTOL, sensitivities: tuple[str, ...] = FREE) -> Trajectory:
         return simulate(
-            model, 20.0, rtol=rtol, t_eval=times, sensitivities=sensitivities, backend=_backend()
-        )
+            model, 20.0, rtol=rtol, t_eval=times, sensitivities=sensitivities, backend=_backend(),
+            method=FOR_DERIVATIVES,
+        )  # fmt: skip
 
-    plain = run(rtol=1e-11)["x"]
+    def slopes(rtol: float = RTOL) -> Array:
+        found = run(rtol).sensitivities
+        return np.array([found[name]["x"] for name in FREE])
 
-    def forward(rtol: float = RTOL) -> Array:
-        slopes = run(FREE, rtol).sensitivities
-        return np.array([plain @ slopes[name]["x"] for name in FREE])
+    weights = run(1e-11)["x"]
 
     def adjoint() -> Array:
-        return np.array(list(run(FREE).gradient({"x": plain}).values()))
+        return np.array(list(run().gradient({"x": weights}).values()))
 
-    ways = {"run": lambda: run()["x"], "forward": forward, "adjoint": adjoint}
-    exact = forward(1e-11)
+    exact = slopes(1e-11)
+    scale = np.abs(exact) @ np.abs(weights)
+    ways: dict[str, Callable[[], Array]] = {
+        "run": lambda: run(sensitivities=())["x"],
+        "forward": lambda: slopes() @ weights,
+        "adjoint": adjoint,
+    }
     errors = {"run": nan} | {
-        who: float(np.max(np.abs(ways[who]() / exact - 1))) for who in ("forward", "adjoint")
+        who: float(np.max(np.abs(ways[who]() - exact @ weights) / scale))
+        for who in ("forward", "adjoint")
     }
     yield from _rows("gradient, 4 parameters", "run", dict(ways), errors, 1, 2 if quick else 20)
 
