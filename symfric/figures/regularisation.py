@@ -15,6 +15,9 @@ The order q is a matter of what the motion does, not of the law alone:
     1/2    bristles that are turned: time to slide their deflection F/sigma_0 from rest
     > 1    a contact that only slides, 3 with Brown-McPhee, whose tail falls like (v_t/v)^3
 
+Where contacts rest as one their loads are not determined by dry friction: with mu_s > mu_d each
+smooth law tends to an instant of break-away of its own.
+
 Far from the limit there is no order at all: where rest is longer than motion, creep is everything.
 """
 
@@ -149,6 +152,7 @@ class Bed:
         of: which signals, or which numbers; None for the positions.
         free: whether the widths are parameters of one model and not numbers in each.
         u: inputs of the model.
+        backend: engine of the runs, see `simulate`.
     """
 
     name: str
@@ -157,6 +161,7 @@ class Bed:
     of: Measure | None = None
     free: bool = False
     u: Mapping[str, Input] | None = None
+    backend: str = "auto"
 
 
 @final
@@ -247,8 +252,9 @@ def sample(
         begin = process_time()
         p = values if bed.free else None
         run = simulate(
-            model, bed.t_end, rtol=rtol, samples=SAMPLES, p=p, u=bed.u, max_steps=max_steps
-        )
+            model, bed.t_end, rtol=rtol, samples=SAMPLES, p=p, u=bed.u, max_steps=max_steps,
+            backend=bed.backend,
+        )  # fmt: skip
         return process_time() - begin, run
 
     spent, run = min((timed() for _ in range(repeats)), key=lambda pair: pair[0])

@@ -11,7 +11,7 @@ from symfric.bench import RegularisationBenchmark, bench_regularisation
 from symfric.bench.regularisation import CASES, last_cycle, peak
 from symfric.scenes import Rabinowicz
 
-BELT, CRANK = CASES[0], CASES[3]
+BELT, CRANK = CASES[0], CASES[-1]
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +71,26 @@ def test_reference_that_is_extrapolated_says_its_own_error(
     exact, own = ([r for r in measured.rows if r.case == n] for n in (BELT.name, "own"))
     for a, b in zip(exact, own, strict=True):
         assert abs(a.error - b.error) == pytest.approx(b.uncertain, rel=0.3)
+
+
+@pytest.mark.parametrize(
+    ("name", "order"),
+    [
+        ("pendulum_box brown_mcphee", 1.0),
+        ("pendulum_box lugre_normalised", 0.5),
+        pytest.param("four_mass coulomb", 0.9, marks=pytest.mark.slow),
+        pytest.param("rabinowicz lugre", 0.57, marks=pytest.mark.slow),
+    ],
+)
+def test_laws_tend_to_friction_without_regularisation(name: str, order: float) -> None:
+    """Creep is of order v_t (with tanh times a logarithm), bristles turn in sigma_0^(-1/2)."""
+    (case,) = (c for c in CASES if c.name == name)
+    found = bench_regularisation(
+        quick=True, cases=(case,), factors=(1e-4, 0.0, 1e-5), rtols=(1e-8,)
+    )
+    assert found.rows[0].reference == "ExactCoulomb"
+    assert found.rows[1].order == pytest.approx(order, abs=0.03)
+    assert found.rows[1].error < 1e-3
 
 
 def test_where_nothing_creeps_the_tolerance_is_what_is_left(
