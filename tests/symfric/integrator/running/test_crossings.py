@@ -1,16 +1,20 @@
 """The search for events as a part of both engines: what it leaves, and what it costs."""
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 import pytest
 from hybrid import ball
 
-from symfric import Event, Model, Status, Variable, simulate
+from symfric import Event, Linear, MaxwellSlip, Model, Status, Variable, drive, simulate
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import ADAPTIVE
+from symfric.integrator.running.engine import CompiledEngine
 from symfric.integrator.running.events import Jumps
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.loop import loop_source
 from symfric.integrator.running.run import Tolerances, integrate
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
@@ -19,6 +23,10 @@ each_backend = pytest.mark.parametrize(
 )
 x, y = Variable("x", "m"), Variable("y", "m", start=2.0)
 X, Y = x.symbol, y.symbol
+
+
+def waves(t: ca.SX) -> ca.SX:
+    return 12 * ca.sin(3 * t)
 
 
 @each_backend
@@ -66,3 +74,52 @@ def test_a_ball_that_loses_little_comes_to_rest_too(backend: str) -> None:
     fall = np.sqrt(2 / 9.81)
     assert run.step_times[-1] == pytest.approx(fall * (1 + 2 * 0.97 / 0.03), rel=1e-6)
     assert len(run.happened) < 900
+
+
+def test_no_attempt_behind_an_event_is_made_in_vain() -> None:
+    """Two steps from tooth to tooth: a short one that tells the signs, and one up to the next.
+
+    There were 88 attempts an event.
+    """
+    tooth = Event("tooth", X - 1e-2, 1, reset={"x": 0.0})
+    run = simulate(Model("saw", x=(x,), ode=ca.SX(1), events=(tooth,)), 4.995)
+    assert run.statistics.events == 499
+    assert run.statistics.rejections == 0
+    assert run.statistics.steps < 2.1 * 499
+
+
+def test_exact_memory_takes_fewer_attempts_than_its_smooth_form() -> None:
+    """Elements that begin to slip one by one, and all stick at every turn."""
+    force = {"force": waves}
+    attempts: list[int] = []
+    for form in ("smooth", "event"):
+        run = simulate(drive(MaxwellSlip(form=form)), 4.0, u=force, backend="vm", samples=2)
+        attempts.append(run.statistics.steps + run.statistics.rejections)
+    assert len(run.happened) > 15
+    assert attempts[1] < 0.5 * attempts[0]
+
+
+def test_a_model_without_events_has_nothing_of_them_in_its_code() -> None:
+    for events, found in (((), False), ((Event("one", X - 1),), True)):
+        model = Model("clock", x=(x,), ode=ca.SX(1), events=events)
+        made = Integrator(model, input_data(model, None, 0.0, 1.0), ADAPTIVE["rodas5p"])
+        source = loop_source(made.step, ADAPTIVE["rodas5p"].H.shape[0], made.crossings)
+        assert ("symfric_search" in source) == found
+
+
+@needs_compiler
+def test_a_jump_of_an_input_does_not_leave_the_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor does an event: 100 samples and 40 events are one call."""
+    calls: list[int] = []
+    march = CompiledEngine.march
+
+    def counted(self: CompiledEngine, *arguments: Any) -> Any:
+        calls.append(1)
+        return march(self, *arguments)
+
+    monkeypatch.setattr(CompiledEngine, "march", counted)
+    t = np.arange(0, 4, 0.04)
+    force = {"force": Linear(t, 12 * np.sin(3 * t))}
+    run = simulate(drive(MaxwellSlip(form="event")), 4.0, u=force, backend="compiled")
+    assert run.statistics.events > 15
+    assert len(calls) == 1
