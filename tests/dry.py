@@ -15,6 +15,8 @@ import numpy as np
 from mechanics import newton, size
 from numpy.typing import NDArray
 from scipy.integrate import OdeSolution, solve_ivp
+from scipy.linalg import expm
+from scipy.optimize import brentq
 
 Array = NDArray[np.float64]
 Modes = tuple[int, ...]
@@ -116,3 +118,55 @@ def pendulum_box(mu_d: float) -> Solve:
         return u[:2], u[2:4], u[4:]
 
     return solve
+
+
+def blocks_on_belt(
+    K: Array, mu_s: Sequence[float], mu_d: Sequence[float], v_belt: float, t_end: float
+) -> tuple[list[tuple[float, int, str]], Array]:
+    """Blocks of 1 kg on a belt (g = 1), held by springs of the stiffness matrix K, from rest at 0.
+
+    Between two changes of mode x'' = -K x - F is linear with constant F for what slides and x' =
+    v_belt for what rests: a matrix exponential, and a root in time.
+
+    Returns:
+        (time, block, "stick" or "slip") of what happens, and x, x' at the end.
+    """
+    n, t, found = len(mu_s), 0.0, list[tuple[float, int, str]]()
+    y = np.zeros(2 * n)
+    modes = [-1 if v_belt > 0 else 1] * n
+    while True:
+        free = np.array([m != 0 for m in modes])
+        push = np.array([-m * mu for m, mu in zip(modes, mu_d, strict=True)]) * free
+        A = np.zeros((2 * n + 1, 2 * n + 1))
+        A[:n, n : 2 * n] = np.eye(n)
+        A[n : 2 * n, :n] = -K * free[:, None]
+        A[n : 2 * n, -1] = push
+        begin = np.append(y, 1.0)
+
+        def at(s: float, A: Array = A, begin: Array = begin) -> Array:
+            return (expm(A * s) @ begin)[: 2 * n]
+
+        def margin(s: float, i: int, modes: Sequence[int] = tuple(modes)) -> float:
+            state = at(s)
+            if modes[i]:
+                return modes[i] * (state[n + i] - v_belt)
+            return mu_s[i] - abs(float(K[i] @ state[:n]))
+
+        s, step = 1e-9, 0.01
+        while t + s < t_end:
+            ends = [i for i in range(n) if margin(s + step, i) < 0.0]
+            if ends:
+                s, i = min((brentq(margin, s, s + step, (i,), xtol=1e-14), i) for i in ends)
+                break
+            s += step
+        else:
+            return found, at(t_end - t)
+        t, y = t + s, at(s)
+        if modes[i]:
+            y[n + i] = v_belt
+            rests = abs(float(K[i] @ y[:n])) <= mu_s[i]
+            modes[i] = 0 if rests else -modes[i]
+            found.append((t, i, "stick"))
+        else:
+            modes[i] = -int(np.sign(K[i] @ y[:n]))
+            found.append((t, i, "slip"))

@@ -22,7 +22,7 @@ Laws without modes get g_i in place of sign(g_i), which does not jump there: the
 most carries most.
 
 A law by modes slides without asking for F_e; what it needs is the sign of |F_e| - mu_s N at rest.
-For it W is a constant, that of the start, and costs nothing.
+For it W is a constant, that of the start, and costs nothing, and F_e is that of rest only at rest.
 Limits: a loop of several degrees of freedom takes as many such contacts as are independent; a loop
 of one has no constraint that moves with time.
 """
@@ -54,6 +54,9 @@ MINORS = 8
 """Coordinates of a loop of one degree of freedom at most; its tangent is made of their minors."""
 UNLOADED = 1e-12
 """Force [N] that keeps shares finite where nothing presses; at break-away it must not show."""
+CALM = 0.1
+"""Time [s] in which a rest forgets a sliding velocity that rounding has left in it, so that none
+drifts; to laws by modes F_e matters at rest alone."""
 FORCE = "F_e"
 
 
@@ -109,7 +112,8 @@ class Rest:
     def needed(self, forces: Sequence[ca.SX]) -> ca.SX:
         """What is zero at the right force, shape (1, 1)."""
         held = sum((g * F for g, F in zip(self.along, forces, strict=True)), start=ca.SX(0))
-        return held + self.inertia * self.change - self.force.symbol
+        change = self.change + self.rate / CALM if self.by_modes else self.change
+        return held + self.inertia * change - self.force.symbol
 
 
 def forward(x: ca.SX) -> ca.SX:
