@@ -9,7 +9,7 @@ from symfric.cli import bench_tables, output
 from symfric.cli.options import JsonOption, PlotOption, check_outputs
 from symfric.foundation.parameters import check_names
 
-SUBJECTS = ("integrator", "calls", "multibody", "ivp", "jitter", "regularisation")
+SUBJECTS = ("integrator", "calls", "ensemble", "multibody", "ivp", "jitter", "regularisation")
 
 
 def bench(
@@ -31,7 +31,8 @@ def bench(
     """Measure symfric beside other integrators.
 
     Time, error and ratios at equal error. integrator: stick-slip of one mass, ensembles and
-    derivatives. calls: many short steps, events, gradients, signals, import. multibody: mechanisms,
+    derivatives. calls: many short steps, events, gradients, signals, import. ensemble: members side
+    by side beside the same one by one, on one core. multibody: mechanisms,
     the cost of their steps, what they do not need, reference numbers. ivp: correct digits on
     problems with published solutions (Test Set for IVP Solvers). jitter: total variation of
     accelerations against law, step and transition velocity. regularisation: error of smooth laws
@@ -49,6 +50,8 @@ def bench(
         _integrator(quick, plot, json)
     elif subject == "calls":
         _calls(quick, plot, json)
+    elif subject == "ensemble":
+        _ensemble(quick, plot, json)
     elif subject == "multibody":
         _multibody(quick, links, plot, csv, json)
     elif subject == "ivp":
@@ -82,6 +85,18 @@ def _calls(quick: bool, plot: Path | None, json: str | None) -> None:
     output.emit_json(result.to_dict(), json)
     if json != "-":
         bench_tables.calls(result)
+
+
+def _ensemble(quick: bool, plot: Path | None, json: str | None) -> None:
+    from symfric.bench import bench_lanes  # noqa: PLC0415  (only this command needs it)
+
+    if plot:
+        raise ValueError("bench ensemble: expected no --plot, got one; it is a table")
+    with output.progress("measuring") as tell:
+        result = bench_lanes(quick=quick, progress=lambda _, fraction: tell(fraction))
+    output.emit_json(result.to_dict(), json)
+    if json != "-":
+        bench_tables.ensemble(result)
 
 
 def _multibody(

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
         Benchmark,
         CallBenchmark,
         IvpBenchmark,
+        LaneBenchmark,
         MultibodyBenchmark,
         RegularisationBenchmark,
     )
@@ -64,6 +65,21 @@ def calls(result: "CallBenchmark") -> None:
             for r in result.rows
         ],
         "Processor time; ratio: over the first way of the task",
+    )  # fmt: skip
+
+
+def ensemble(result: "LaneBenchmark") -> None:
+    """Members side by side and one by one."""
+    output.show_table(
+        ["case", "members", "lanes", "us each", "alone", "ratio", "again [ms]", "attempts", "equal",
+         "differ"],
+        [
+            [r.case, r.members, r.lanes, round(r.member_us, 1), round(r.alone_us, 1),
+             round(r.ratio, 2), round(r.again_ms, 2), round(r.attempts), f"{r.equal:.0%}",
+             _short(r.difference)]
+            for r in result.rows
+        ],
+        "Processor time of a member on one core; ratio: alone over side by side",
     )  # fmt: skip
 
 

@@ -19,6 +19,8 @@ from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+BEFORE = -1
+"""In front of the first input interval."""
 WHY = {Stop.ATTEMPTS: Status.MAX_STEPS, Stop.STEP_TOO_SMALL: Status.STEP_TOO_SMALL}
 
 
@@ -92,14 +94,14 @@ class Job:
         own = (self.breaks, self.times, self.max_steps)
         return digest(*(getattr(self.program, f.name) for f in fields(self.program)), *own)
 
-    def stretch(self, chunk: Chunk, first: int) -> tuple[Stretch, Indices]:
+    def stretch(self, chunk: Chunk, first: int, follow: bool) -> tuple[Stretch, Indices]:
         """All input intervals from `first` on, and which of the times belong to them."""
         breaks, begin = self.breaks[first:], float(self.breaks[0])
         h_min = np.array([smallest_step(end - begin) for end in chunk.ends.tolist()])
         times = self.times[None] if self.times.size else chunk.ends[:, None]
         inside = np.flatnonzero((times >= breaks[0]).any(axis=0))
         data, times = chunk.data[:, :, first:], times[:, inside]
-        return Stretch(breaks, data, chunk.ends, h_min, times, self.max_steps), inside
+        return Stretch(breaks, data, chunk.ends, h_min, times, self.max_steps, follow), inside
 
 
 def digest(*parts: object) -> str:
@@ -142,17 +144,26 @@ def _solved(job: Job, chunk: Chunk) -> tuple[Solved, Array]:
     """The members of a chunk, and the largest magnitudes of their states (members, nx).
 
     They run through all their input intervals; where algebraic unknowns have to be searched for at
-    the beginning of one, they stop, and go on from there.
+    the beginning of one, they stop, and go on from there. Those of a mechanism that is put together
+    follow the first data as they follow others.
     """
     runner, S, count = job.program.load(), chunk.S.copy(), chunk.S.shape[0]
     signals = np.full((count, max(1, job.times.size), job.program.n_signals), np.nan)
     attempts, size = np.zeros(count, dtype=np.int64), np.zeros((count, job.program.nx))
     failed: dict[int, str] = {}
-    waiting = {0: np.arange(count)}
+    waiting, together = {BEFORE: np.arange(count)}, job.program.assembly()
     while waiting:
         first = min(waiting)
-        here = _consistent(job, chunk, S, waiting.pop(first), first, failed)
-        stretch, inside = job.stretch(chunk[here], first)
+        here, follow = waiting.pop(first), first == BEFORE and together is not None
+        first = max(first, 0)
+        if together is not None and follow:
+            d = _data(job, chunk, here, first)
+            S[here, State.Y], closed = together(S[here, State.Y], d)
+            waiting |= {first: here[~closed]} if not closed.all() else {}
+            here = here[closed]
+        else:
+            here = _consistent(job, chunk, S, here, first, failed)
+        stretch, inside = job.stretch(chunk[here], first, follow)
         part, made = S[here], attempts[here]
         found, reason, largest = runner.run(part, chunk.R[here], made, stretch)
         size[here] = np.maximum(size[here], largest[:, : job.program.nx])
@@ -177,11 +188,17 @@ def _consistent(
     if not job.program.constraints:
         return members
     equations, together = job.program.equations()
-    d = chunk.R[members, Given.d(job.program.nx)]
-    data = chunk[members].data[:, :, interval]
-    d[:, d.shape[1] - data.shape[1] :] = data
+    d = _data(job, chunk, members, interval)
     S[members, State.Y], refused = consistent_many(
         equations, together, job.program.where, S[members, State.Y], d
     )
     failed |= {int(members[m]): message for m, message in refused.items()}
     return np.delete(members, list(refused))
+
+
+def _data(job: Job, chunk: Chunk, members: Indices, interval: int) -> Array:
+    """Run data of members on an input interval."""
+    d = chunk.R[members, Given.d(job.program.nx)]
+    data = chunk[members].data[:, :, interval]
+    d[:, d.shape[1] - data.shape[1] :] = data
+    return d

@@ -22,6 +22,7 @@ typedef struct {
   const double *h_min;   /* smallest step of each member */
   const double *times;   /* of results; one at which an interval begins belongs to that interval */
   long long n_times, times_step, max_attempts;
+  long long follow;      /* whether algebraic unknowns follow the data at the start, too */
   double *out;           /* signals, NaN from where a member stopped */
   long long *reason, *made;
   double *largest;       /* magnitudes of the unknowns at the ends of steps, of the start given */
@@ -122,35 +123,10 @@ static int enter(const Many *all, Lanes *x, int l)
   x->R[T_END][l] = is_last(all, x, l) ? all->ends[m] : all->breaks[k + 1];
   for (long long i = 0; i < all->n_data; ++i)
     x->R[SIZE_R - all->n_data + i][l] = data[i * all->intervals + k];
-  if (k && !follow(x, l)) return 0;
+  if ((k || all->follow) && !follow(x, l)) return 0;
   while (has_due(all, x, l, x->S[T][l])) ask(all, x, l, 0.);
   note_due(all, x, l);
   return 1;
-}
-
-/* Give lane l to the next member, or let it do what another lane does. */
-static void fill(const Many *all, Lanes *x, int l)
-{
-  int other = 0;
-  if (x->common->waiting < all->members) {
-    const long long m = x->member[l] = x->common->waiting++;
-    for (int i = 0; i < S_ROWS; ++i) x->S[i][l] = all->S[m * S_ROWS + i];
-    for (int i = 0; i < SIZE_R; ++i) x->R[i][l] = all->R[m * SIZE_R + i];
-    for (int i = 0; i < N; ++i) x->largest[i][l] = all->largest[m * N + i];
-    x->h_min[l] = all->h_min[m];
-    x->left[l] = all->max_attempts - all->made[m];
-    x->interval[l] = x->next[l] = 0;
-    enter(all, x, l);
-    ++x->common->running;
-    return;
-  }
-  x->member[l] = -1;
-  while (other < LANES - 1 && x->member[other] < 0) ++other;
-  for (int i = 0; i < S_ROWS; ++i) x->S[i][l] = x->S[i][other];
-  for (int i = 0; i < SIZE_R; ++i) x->R[i][l] = x->R[i][other];
-  x->h_min[l] = x->h_min[other];
-  x->left[l] = x->left[other];
-  x->due[l] = INFINITY;
 }
 
 static void finish(const Many *all, Lanes *x, int l, int reason)
@@ -166,6 +142,31 @@ static void finish(const Many *all, Lanes *x, int l, int reason)
   --x->common->running;
 }
 
+/* Give lane l to the next member, or let it do what another lane does. */
+static void fill(const Many *all, Lanes *x, int l)
+{
+  int other = 0;
+  if (x->common->waiting < all->members) {
+    const long long m = x->member[l] = x->common->waiting++;
+    for (int i = 0; i < S_ROWS; ++i) x->S[i][l] = all->S[m * S_ROWS + i];
+    for (int i = 0; i < SIZE_R; ++i) x->R[i][l] = all->R[m * SIZE_R + i];
+    for (int i = 0; i < N; ++i) x->largest[i][l] = all->largest[m * N + i];
+    x->h_min[l] = all->h_min[m];
+    x->left[l] = all->max_attempts - all->made[m];
+    x->interval[l] = x->next[l] = 0;
+    ++x->common->running;
+    if (!enter(all, x, l)) finish(all, x, l, SEARCH);
+    return;
+  }
+  x->member[l] = -1;
+  while (other < LANES - 1 && x->member[other] < 0) ++other;
+  for (int i = 0; i < S_ROWS; ++i) x->S[i][l] = x->S[i][other];
+  for (int i = 0; i < SIZE_R; ++i) x->R[i][l] = x->R[i][other];
+  x->h_min[l] = x->h_min[other];
+  x->left[l] = x->left[other];
+  x->due[l] = INFINITY;
+}
+
 static int is_small(const Lanes *x, int l)
 {
   return !(x->S[H][l] >= x->h_min[l] && x->S[H][l] >= FLOOR * fabs(x->S[T][l]));
@@ -176,9 +177,11 @@ static void settle(const Many *all, Lanes *x, int l)
 {
   for (;;) {
     if (x->member[l] < 0) {
+      const int more = x->common->waiting < all->members;
       fill(all, x, l);
-      if (x->member[l] < 0) return;
+      if (!more) return;
     }
+    if (x->member[l] < 0) continue;
     if (!(x->S[T][l] < x->R[T_END][l])) {
       if (is_last(all, x, l)) {
         finish(all, x, l, ENDED);

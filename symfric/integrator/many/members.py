@@ -40,6 +40,7 @@ class Stretch:
         h_min: smallest step of each member [s], shape (members,).
         times: times of the results [s], shape (members or 1, n); NaN comes out behind the end.
         max_steps: attempts allowed, counting those made before.
+        follow: whether algebraic unknowns have to follow the data at the start, too.
     """
 
     breaks: Array
@@ -48,6 +49,7 @@ class Stretch:
     h_min: Array
     times: Array
     max_steps: int
+    follow: bool = False
 
 
 Follow = tuple[str, float] | tuple[()]
@@ -124,7 +126,7 @@ class _Member:
             last = k + 2 == breaks.size or breaks[k + 1] >= self.end
             R[Given.T_END] = self.end if last else breaks[k + 1]
             R[R.size - n_data :] = self.data[:, k]
-            if k and not self.followed():
+            if (k or self.stretch.follow) and not self.followed():
                 return Stop.SEARCH
             from_t, y0 = S[State.T], S[State.Y].copy()
             records, stop = self.attempts()
@@ -180,6 +182,7 @@ class _Many(ctypes.Structure):
         ("data", _POINTER), ("n_data", _COUNT), ("data_step", _COUNT),
         ("ends", _POINTER), ("h_min", _POINTER),
         ("times", _POINTER), ("n_times", _COUNT), ("times_step", _COUNT), ("max_attempts", _COUNT),
+        ("follow", _COUNT),
         ("out", _POINTER), ("reason", _POINTER), ("made", _POINTER), ("largest", _POINTER),
     )  # fmt: skip
 
@@ -224,7 +227,8 @@ class CompiledMembers:
             **{name: array.ctypes.data for name, array in arrays.items()},
             members=members, intervals=data.shape[2], n_data=data.shape[1],
             data_step=data[0].size if data.shape[0] > 1 else 0, n_times=times.shape[1],
-            times_step=times.shape[1] if times.shape[0] > 1 else 0, max_attempts=stretch.max_steps,
+            times_step=times.shape[1] if times.shape[0] > 1 else 0,
+            max_attempts=stretch.max_steps, follow=stretch.follow,
         )  # fmt: skip
         if not self.library.symfric_many(ctypes.byref(every)):
             raise MemoryError
@@ -248,6 +252,7 @@ def many_source(
         lanes: of the vectors; as many as the processor takes, else. The bits are the same.
     """
     n = step.numel_in(0) - State.MEMORY
+    step = step if step.is_a("SXFunction") else step.expand()
     groups = 2 if step.n_instructions() < PAIRED else 1
     (of_step, work), (of_values, more) = (
         vector_source("symfric_step", step, groups),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.initial import Equations
 from symfric.integrator.equations.manifold import Manifold
+from symfric.integrator.many.assembly import Assembly
 from symfric.integrator.many.members import (
     CompiledMembers,
     Follow,
@@ -74,6 +75,12 @@ class Program:
         """The algebraic equations, and their constraints for many columns."""
         return _equations(self.names, self.nx, self.free, self.constraints, self.manifold)
 
+    def assembly(self) -> Assembly | None:
+        """What puts a mechanism together whose algebraic unknowns follow; None where none do."""
+        if not self.manifold or not self.follow or not self.follow[0]:
+            return None
+        return _assembly(self.manifold, self.nx)
+
 
 _KNOWN: WeakKeyDictionary[Integrator, dict[bool, Program]] = WeakKeyDictionary()
 _LOCK = Lock()
@@ -90,7 +97,8 @@ def program(integrator: Integrator, compiled: bool) -> Program:
 
 def _written(integrator: Integrator, compiled: bool) -> Program:
     s, step = integrator.system, integrator.step
-    follow = integrator.follow if integrator.follows and integrator.model.u else None
+    jumps = integrator.model.u or s.manifold is not None
+    follow = integrator.follow if integrator.follows and jumps else None
     how: Follow = ("", 0.0) if integrator.follows else ()
     if follow is not None:
         how = (str(follow.round.serialize()), follow.contraction)
@@ -129,14 +137,23 @@ def _equations(
     constraints: str,
     manifold: Packed,
 ) -> tuple[Equations, Columns]:
-    function, mechanism = ca.Function.deserialize(constraints), None
-    if manifold:
-        values: dict[str, Any] = {
-            name: ca.Function.deserialize(value) if isinstance(value, str) else value
-            for name, value in manifold
-        }
-        mechanism = Manifold(**values)
+    function = ca.Function.deserialize(constraints)
+    mechanism = _manifold(manifold) if manifold else None
     return Equations(names, nx, np.array(free), function, mechanism), Columns(function)
+
+
+@lru_cache(16)
+def _manifold(manifold: Packed) -> Manifold:
+    values: dict[str, Any] = {
+        name: ca.Function.deserialize(value) if isinstance(value, str) else value
+        for name, value in manifold
+    }
+    return Manifold(**values)
+
+
+@lru_cache(16)
+def _assembly(manifold: Packed, nx: int) -> Assembly:
+    return Assembly.of(_manifold(manifold), nx)
 
 
 @lru_cache(16)

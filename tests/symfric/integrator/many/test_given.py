@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from differentiable import oscillator, switched
+from differentiable import oscillator, pendulum, switched
 
 from symfric import Hold, Linear, Model, Variable, simulate, simulate_many
 from symfric.integrator.many import chunk as chunk_module
@@ -106,3 +106,20 @@ def test_signals_of_members_are_for_ensembles() -> None:
         ValueError, match=r"input 'u': expected samples of one signal, got those of 2"
     ):
         simulate(oscillator(), 1.0, u={"u": u})
+
+
+@each_engine
+def test_mechanisms_start_together(backend: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """a055f62 put every member together alone, in Python: 0.4 ms each, 20 times its run."""
+
+    def alone(*arguments: Any) -> Any:
+        pytest.fail(f"a member was put together alone: {arguments[2]}")
+
+    monkeypatch.setattr(chunk_module, "consistent_many", alone)
+    model, x0 = pendulum(), np.array([0.6, 0.7, 0.65])
+    many = simulate_many(model, 0.5, x0={"x": x0}, t_eval=[0.0, 0.5], backend=backend)
+    assert not many.failed
+    for m, x in enumerate(x0):
+        run = simulate(model, 0.5, x0={"x": x}, t_eval=[0.0, 0.5], backend=backend)
+        for name in model.signals:
+            assert many[name][m] == pytest.approx(run[name], rel=1e-7, abs=1e-9), name
