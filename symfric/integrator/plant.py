@@ -142,7 +142,7 @@ class Plant:
         held = self.model.values("u")
         found: list[Array] = []
         for guess, own in zip(guesses, values, strict=True):
-            found.append(consistent(system, "stepper", guess, np.concatenate([own, held])))
+            found.append(self._integrator.consistent("stepper", guess, np.concatenate([own, held])))
         h = min(first_step(SAMPLES * self.dt, plants.begin[0]), float(plants.R[0, Given.H_MAX]))
         remembered = Memory.new(len(self.model.events), self._tolerance)
         for b, guess, own, y in zip(which, guesses, values, found, strict=True):
@@ -253,7 +253,7 @@ class Plant:
             d = plants.R[b, Given.d(system.nx)].copy()
             d[d.size - nu :] = plants.u[b]
             if system.free.any() and (d != plants.R[b, Given.d(system.nx)]).any():
-                plants.S[b, State.Y] = consistent(system, "stepper", guess, d)
+                plants.S[b, State.Y] = self._integrator.consistent("stepper", guess, d)
             plants.ready[b] = 1
         self._fresh.clear()
 

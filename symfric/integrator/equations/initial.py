@@ -1,5 +1,6 @@
 """Consistent start values: algebraic variables that satisfy their equations, a first step size."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import final
 
@@ -27,6 +28,10 @@ LAST_DIGITS = 1e-15
 """Relative change by which numbers are the same to rounding."""
 FLOOR = 10 * float(np.finfo(float).eps)
 """Smallest step relative to t: a few of the last digits of t itself."""
+
+
+Follow = Callable[[Array, Array], Array | None]
+"""(y, d) -> y with its algebraic unknowns; None where it takes a search."""
 
 
 @final
@@ -70,8 +75,16 @@ def first_guess(system: System, model: Model, x: Array, t: float = 0.0) -> Array
     return y
 
 
-def consistent(system: System | Equations, where: str, y: Array, d: Array) -> Array:
+def consistent(
+    system: System | Equations, where: str, y: Array, d: Array, follow: Follow | None = None
+) -> Array:
     """`y` with its algebraic unknowns solved for, by damped Newton from the given guess.
+
+    Args:
+        system: whose algebraic equations.
+        where: for messages.
+        y, d: guess and run data.
+        follow: a quick way for mechanisms, tried first (`symfric.integrator.equations.following`).
 
     Raises:
         ValueError: no solution near the guess.
@@ -79,19 +92,27 @@ def consistent(system: System | Equations, where: str, y: Array, d: Array) -> Ar
     manifold = system.manifold
     if manifold is not None:
         y = _assembled(system, manifold, where, y, d)
-    try:
-        y = _solved(system, where, y, d)
-    except ValueError:
-        if manifold is None or not manifold.applied:
-            raise
-        y = _descended(system, y, d)
-        if _residual(system, y, d) > _rounding(system, y, d):
-            y = _solved(system, where, y, d)
+    quick = None if follow is None else follow(y, d)
+    y = _searched(system, where, y, d) if quick is None else quick
     if manifold is not None and manifold.charted:
         y = _charted(manifold, y, d)
     if manifold is not None and (cause := jammed(manifold, system.names, y, d)):
         raise ValueError(f"{where}: {cause}")
     return y
+
+
+def _searched(system: System | Equations, where: str, y: Array, d: Array) -> Array:
+    """`y` with its algebraic unknowns solved for, by what it takes."""
+    manifold = system.manifold
+    try:
+        return _solved(system, where, y, d)
+    except ValueError:
+        if manifold is None or not manifold.applied:
+            raise
+        y = _descended(system, y, d)
+        return (
+            _solved(system, where, y, d) if _residual(system, y, d) > _rounding(system, y, d) else y
+        )
 
 
 def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array:

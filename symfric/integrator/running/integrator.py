@@ -193,9 +193,19 @@ class Integrator:
             return y
         key = (y.tobytes(), d.tobytes())
         if key not in self._starts:
-            found = consistent(self.system, f"model '{self.model.name}'", y, d)
-            self._starts = {key: found}
+            self._starts = {key: self.consistent(f"model '{self.model.name}'", y, d)}
         return self._starts[key]
+
+    def consistent(self, where: str, y: Array, d: Array) -> Array:
+        """`y` with consistent algebraic unknowns.
+
+        Raises:
+            ValueError: none near; `where` begins its sentence.
+        """
+        manifold = self.system.manifold
+        # normal forces are found from afar; what nothing drives seldom starts twice
+        quick = manifold is not None and not manifold.applied and bool(self.model.u)
+        return consistent(self.system, where, y, d, self.follow if quick else None)
 
     @cached_property
     def has_pivots(self) -> bool:

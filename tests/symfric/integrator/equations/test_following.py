@@ -65,8 +65,9 @@ def test_linear_equations_take_one_round() -> None:
     assert look.full().ravel() == pytest.approx([49.0, 0.0, 1.0])
 
 
-@pytest.mark.parametrize("machine", MACHINES)
-@pytest.mark.parametrize("inline", [True, False])
+@pytest.mark.parametrize(
+    ("machine", "inline"), [("joint", True), ("loop", True), ("chart", True), ("loop", False)]
+)
 def test_unknowns_are_those_of_the_damped_search(
     machine: str, inline: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:

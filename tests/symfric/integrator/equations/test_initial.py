@@ -4,6 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from closed_forms import assemble, smooth_dae
+from numpy.typing import NDArray
 
 from symfric import (
     BrownMcPhee,
@@ -18,7 +19,11 @@ from symfric import (
 )
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.compiled.columns import Columns
-from symfric.integrator.equations.initial import consistent, consistent_many
+from symfric.integrator.equations.following import following
+from symfric.integrator.equations.initial import consistent, consistent_many, first_guess
+from symfric.scenes import SliderCrank
+
+Array = NDArray[np.float64]
 
 x = Variable("x", "m", start=1.0)
 
@@ -196,3 +201,23 @@ def test_many_do_not_leap_to_a_far_solution() -> None:
     found, failed = consistent_many(system, Columns(system.constraints), "here", y, none)
     assert not failed
     assert found[:, 1] == pytest.approx([np.pi, np.pi, 0.0], abs=1e-12)
+
+
+def test_a_quick_way_is_taken_where_it_leads_there() -> None:
+    """The guess is put onto the constraints before; where it gives up, the search goes on."""
+    model = SliderCrank(BrownMcPhee()).model()
+    system, none = assemble(model), np.zeros(0)
+    follow = following(system)
+    guess = first_guess(system, model, model.initial_state())
+    searched, tried = consistent(system, "here", guess, none), list[bool]()
+
+    def quick(y: Array, d: Array) -> Array | None:
+        assert follow is not None
+        defect = system.manifold.defect(y, d).full()  # type: ignore[union-attr]
+        tried.append(bool(np.abs(defect).max() < 1e-9))
+        return follow(y, d) if len(tried) < 2 else None
+
+    for _ in range(2):
+        found = consistent(system, "here", guess, none, quick)
+        assert found == pytest.approx(searched, rel=1e-9, abs=1e-9 * np.abs(searched).max())
+    assert tried == [True, True]

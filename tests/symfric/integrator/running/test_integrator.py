@@ -15,9 +15,9 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """A line for every start that is solved for."""
     lines: list[str] = []
 
-    def counted(system: object, where: str, y: object, d: object) -> object:
+    def counted(system: object, where: str, *given: object) -> object:
         lines.append(where)
-        return consistent(system, where, y, d)  # type: ignore[arg-type]
+        return consistent(system, where, *given)  # type: ignore[arg-type]
 
     monkeypatch.setattr(module, "consistent", counted)
     return lines
