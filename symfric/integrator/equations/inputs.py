@@ -17,6 +17,8 @@ from symfric.integrator.equations.constants import lifted
 from symfric.integrator.equations.onsets import onsets, pace
 from symfric.model import Model
 
+REMEMBERED = 16
+"""Structures of inputs kept per model; the oldest goes first."""
 NO_ROWS = ca.SX(0, 1)
 """Made once: most calls need no more."""
 Array = NDArray[np.float64]
@@ -149,26 +151,43 @@ def input_data(
     if not model.u and not given:
         return _undriven(t_start, t_end)
     signals = model.named("u", given)
-    times = [np.asarray(s.t) for s in signals.values() if isinstance(s, Sampled)]
-    inner = np.concatenate([np.zeros(0), *times])
-    inner = inner[(inner > t_start) & (inner < t_end)]
-    breaks = np.unique(np.concatenate([[t_start], inner, [t_end]]))
-    begin = ca.SX.sym("t_k")
-    parts = [_part(model, v, signals.get(v.name, v.start), breaks, begin) for v in model.u]
-    expression = stacked(part.row for part in parts)
-    data = [symbol for part in parts for symbol in part.data]
+    breaks = np.array([t_start, t_end])
+    if times := [np.asarray(s.t) for s in signals.values() if isinstance(s, Sampled)]:
+        inner = np.concatenate(times)
+        breaks = np.unique(np.append(breaks, inner[(inner > t_start) & (inner < t_end)]))
+    parts = [_part(model, v, signals.get(v.name, v.start), breaks) for v in model.u]
+    expression, data = _written(model, parts)
     values = [row for part in parts for row in part.values]
-    if ca.depends_on(expression, begin):
-        data, values = [*data, begin], [*values, breaks[:-1]]
+    if any(part.ramps for part in parts):
+        values = [*values, breaks[:-1]]
     found = InputData(
         expression,
-        stacked(data),
+        data,
         breaks,
         np.vstack(values) if values else np.zeros((0, breaks.size - 1)),
         tuple(part.key for part in parts),
         min((part.pace for part in parts), default=np.inf),
     )
-    return found.stopping_at([t for part in parts for t in part.onsets])
+    onsets = [t for part in parts for t in part.onsets]
+    return found.stopping_at(onsets) if onsets else found
+
+
+def _written(model: Model, parts: "list[_Part]") -> tuple[ca.SX, ca.SX]:
+    """Expression and data of inputs of this structure, written once and kept with the model."""
+    known: dict[object, tuple[ca.SX, ca.SX]] = model.memory.setdefault("inputs", {})
+    key = tuple(part.key for part in parts)
+    found = known.get(key)
+    if found is None:
+        begin = ca.SX.sym("t_k")
+        rows = [part.write(begin) for part in parts]
+        data = [symbol for _, own in rows for symbol in own]
+        if any(part.ramps for part in parts):
+            data.append(begin)
+        found = stacked(row for row, _ in rows), stacked(data)
+        while len(known) >= REMEMBERED:
+            known.pop(next(iter(known)), None)
+        known[key] = found
+    return found
 
 
 @lru_cache
@@ -177,48 +196,62 @@ def _undriven(t_start: float, t_end: float) -> InputData:
     return InputData(NO_ROWS, NO_ROWS, np.array([t_start, t_end]), np.zeros((0, 1)), ())
 
 
+Written = tuple[ca.SX, tuple[ca.SX, ...]]
+"""An input in terms of time and data, and these data."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """One input: its expression, the data in it and their values on the intervals, structure.
+    """One input: how it is written, the values of its data on the intervals, its structure.
 
+    `write` takes the symbol for the start of an interval, from which `ramps` count their time.
     `onsets` are times at which a step has to end, or it could leap over a pulse; `pace` is the
     length [s] of its straight pieces.
     """
 
-    row: ca.SX
+    write: Callable[[ca.SX], Written]
     key: str
-    data: tuple[ca.SX, ...] = ()
-    values: tuple[Array, ...] = ()
+    values: tuple[Array, ...]
+    ramps: bool = False
     onsets: tuple[float, ...] = ()
     pace: float = np.inf
 
 
-def _part(model: Model, variable: Variable, signal: Any, breaks: Array, begin: ca.SX) -> _Part:
-    """The input `variable`; intervals of linear samples count their time from `begin`."""
-    where = f"input '{variable.name}'"
-    if not isinstance(signal, Sampled):
-        if callable(signal):
-            expression = _evaluated(where, signal, model)
-            look = _of_time(expression, model), float(breaks[0]), float(breaks[-1])
-            own = stacked([model.t, *(model.vector(letter) for letter in "xzp")])
-            made, data, numbers = lifted(expression, own, variable.name)
-            # the structure of the expression and not the function that wrote it: what that refers
-            # to may have changed since, and its numbers are data
-            key = sha256(ca.SX.serialize(made).encode()).hexdigest()
-            values = tuple(np.full(breaks.size - 1, number) for number in numbers)
-            return _Part(made, key, (data,), values, onsets(*look), pace(*look))
+def _part(model: Model, variable: Variable, signal: Any, breaks: Array) -> _Part:
+    """The input `variable`."""
+    where, name = f"input '{variable.name}'", variable.name
+
+    def held(_: ca.SX) -> Written:
+        c = ca.SX.sym(f"{name}_k")
+        return c, (c,)
+
+    def ramp(begin: ca.SX) -> Written:
+        c, slope = ca.SX.sym(f"{name}_k"), ca.SX.sym(f"{name}_dot")
+        return c + slope * (model.t - begin), (c, slope)
+
+    if isinstance(signal, Sampled):
+        if signal.rows is not None:
+            raise ValueError(
+                f"{where}: expected samples of one signal, got those of {signal.rows} members, "
+                "which are for simulate_many"
+            )
+        value, rise = signal.coefficients(breaks)
+        if rise.any():
+            return _Part(ramp, "linear", (value, rise), ramps=True)
+        return _Part(held, "hold", (value,))
+    if not callable(signal):
         # a number is data too: another value must not mean another integrator
-        signal = Hold(breaks[:1], [checks.number(where, signal, hint=KINDS)])
-    if signal.rows is not None:
-        raise ValueError(
-            f"{where}: expected samples of one signal, got those of {signal.rows} members, which "
-            "are for simulate_many"
-        )
-    c, slope = ca.SX.sym(f"{variable.name}_k"), ca.SX.sym(f"{variable.name}_dot")
-    value, rise = signal.coefficients(breaks)
-    if not rise.any():
-        return _Part(c, "hold", (c,), (value,))
-    return _Part(c + slope * (model.t - begin), "linear", (c, slope), (value, rise))
+        number = checks.number(where, signal, hint=KINDS)
+        return _Part(held, "hold", (np.full(breaks.size - 1, number),))
+    expression = _evaluated(where, signal, model)
+    look = _of_time(expression, model), float(breaks[0]), float(breaks[-1])
+    own = stacked([model.t, *(model.vector(letter) for letter in "xzp")])
+    made, data, numbers = lifted(expression, own, name)
+    # the structure of the expression and not the function that wrote it: what that refers to may
+    # have changed since, and its numbers are data
+    key = sha256(ca.SX.serialize(made).encode()).hexdigest()
+    values = tuple(np.full(breaks.size - 1, number) for number in numbers)
+    return _Part(lambda _: (made, (data,)), key, values, onsets=onsets(*look), pace=pace(*look))
 
 
 def _of_time(expression: ca.SX, model: Model) -> str:
