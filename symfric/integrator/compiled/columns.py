@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from symfric.foundation.compiler import CompileError
 from symfric.foundation.numeric import flat_view
 from symfric.integrator.compiled.background import Prospect
-from symfric.integrator.compiled.rows import NAME, Rows, rows_source
+from symfric.integrator.compiled.rows import NAME, Row, Rows, rows_source
 
 Array = NDArray[np.float64]
 CHAINED, SIDE_BY_SIDE = 16, 32
@@ -79,16 +79,18 @@ class Columns:
         return None
 
     def __call__(
-        self, rows: Sequence[Array], first: Array | None = None, backend: str = "vm"
+        self, rows: Sequence[Row], first: Array | None = None, backend: str = "vm"
     ) -> list[Array]:
         """Results of all rows, each of shape (count, size), matrices column by column.
 
         Args:
-            rows: an array (count, ...) for every argument, without the first one where `chained`.
+            rows: an array (count, ...) for every argument, without the first one where `chained`;
+                or a table and the numbers of its rows, shape (count,).
             first: where `chained`, the first argument of the first row.
             backend: "vm", "compiled" or "auto".
         """
-        count, most, began = rows[0].shape[0], self.size, perf_counter()
+        most, began = self.size, perf_counter()
+        count = next(a.shape[0] for a in rows if isinstance(a, np.ndarray))
         compiled = self._choose(backend, count)
         if compiled is not None:
             return compiled(rows, first)
@@ -107,7 +109,11 @@ class Columns:
         for begin in range(0, count, most):
             size = min(most, count - begin)
             for block, row in zip(blocks, rows, strict=True):
-                block[:size] = row[begin : begin + size].reshape(size, block.shape[1])
+                if isinstance(row, tuple):
+                    part = row[0][row[1][begin : begin + size]]
+                else:
+                    part = row[begin : begin + size]
+                block[:size] = part.reshape(size, block.shape[1])
                 block[size:] = block[size - 1]
             call()
             for whole, result in zip(found, results, strict=True):

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from symfric.integrator.compiled.compiler import load
 
 Array = NDArray[np.float64]
+Row = Array | tuple[Array, NDArray[np.intp]]
+"""Arguments, a row each; or a table with the number of a row for each of them."""
 NAME = "symfric_rows"
 NUMBER = np.dtype(np.float64).itemsize
 
@@ -46,16 +48,22 @@ class Rows:
         out = tuple(function.numel_out(i) for i in range(function.n_out()))
         return cls(library, (into, out), chained)
 
-    def __call__(self, rows: Sequence[Array], first: Array | None = None) -> list[Array]:
+    def __call__(self, rows: Sequence[Row], first: Array | None = None) -> list[Array]:
         """Results of all rows; see `Columns`."""
         into, out = self.sizes
-        count, begin = rows[0].shape[0], int(self.chained)
-        arrays = [_in_rows(a, size) for a, size in zip(rows, into[begin:], strict=True)]
+        begin = int(self.chained)
+        count = next(a.shape[0] for a in rows if isinstance(a, np.ndarray))
+        tables = [a[0] if isinstance(a, tuple) else a for a in rows]
+        arrays = [_in_rows(a, size) for a, size in zip(tables, into[begin:], strict=True)]
+        numbers = [np.ascontiguousarray(a[1]) if isinstance(a, tuple) else None for a in rows]
         if first is not None:
             arrays.insert(0, np.ascontiguousarray(first, dtype=float).reshape(1, -1))
+            numbers.insert(0, None)
         results = [np.empty((count, size)) for size in out]
-        # address of the first row, and how far the next one is
-        places = np.array([(_address(a), a.strides[0]) for a in (*arrays, *results)])
+        # address of the first row, how far the next one is, and of the numbers of rows
+        of = [0 if a is None else _address(a) for a in (*numbers, *(None for _ in results))]
+        every = zip((*arrays, *results), of, strict=True)
+        places = np.array([(_address(a), a.strides[0], numbers) for a, numbers in every])
         here = _address(places)
         self.library.symfric_rows(count, begin, here, here + len(arrays) * places.strides[0])
         return results
@@ -89,7 +97,7 @@ def rows_source(function: ca.Function) -> str:
 
 
 _LOOP = """
-typedef struct { char *at; long long apart; } symfric_place;
+typedef struct { char *at; long long apart; const long long *of; } symfric_place;
 
 /* Row after row of arguments and results; the first result goes on where they are chained. */
 void symfric_rows(long long count, int chained, const symfric_place *in, const symfric_place *out)
@@ -100,7 +108,8 @@ void symfric_rows(long long count, int chained, const symfric_place *in, const s
   long long k;
   int i;
   for (k = 0; k < count; ++k) {
-    for (i = 0; i < $arguments; ++i) arg[i] = (const double *)(in[i].at + k * in[i].apart);
+    for (i = 0; i < $arguments; ++i)
+      arg[i] = (const double *)(in[i].at + (in[i].of ? in[i].of[k] : k) * in[i].apart);
     if (chained) arg[0] = (const double *)(k ? out[0].at + (k - 1) * out[0].apart : in[0].at);
     for (i = 0; i < $results; ++i) res[i] = (double *)(out[i].at + k * out[i].apart);
     $name(arg, res, iw, w, 0);

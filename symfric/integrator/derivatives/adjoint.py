@@ -6,8 +6,9 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.integrator.derivatives.functions import derivatives, whole_step
-from symfric.integrator.derivatives.path import Jump, Path, Piece
+from symfric.integrator.derivatives.functions import derivatives
+from symfric.integrator.derivatives.links import Links, links
+from symfric.integrator.derivatives.path import Path
 from symfric.integrator.derivatives.saltation import passage
 from symfric.integrator.derivatives.seeds import Seeds
 
@@ -32,31 +33,26 @@ def gradient(
     rows = [times, path.unknowns(times), path.data_at(times), every]
     by_y, of_d = derivatives(path.integrator).weighted(used)(rows, backend=path.backend)
     looks, by_data = _Looks(path, times, by_y), of_d.sum(axis=0)
-    adjoint = np.zeros(s.n + 1)
-    for piece in reversed(path.pieces):
-        if piece.count:
-            adjoint, more = _swept_back(path, piece, looks, adjoint)
-            by_data += more
-        for jump in reversed(piece.opening):
-            move = passage(path, jump)
-            by_data += move.by_data.T @ adjoint
-            adjoint = move.by_state.T @ adjoint
-    found = adjoint[: s.nx] @ which.start + which.through(by_data)
+    start, more = _swept_back(path, looks)
+    found = start[: s.nx] @ which.start + which.through(by_data + more)
     return dict(zip(which.names, found.tolist(), strict=True))
 
 
-def _swept_back(path: Path, piece: Piece, looks: "_Looks", adjoint: Array) -> tuple[Array, Array]:
-    """Adjoints at the start of a piece, of y and of the time of that start, and of d."""
-    k, after, made = piece.steps, adjoint[:-1], derivatives(path.integrator)
-    if path.cuts(k.stop):
-        looks.add(k.stop - 1, float(path.dense.t1[k.stop - 1]), after)
-        after = np.zeros_like(after)
-    steps = [*(a[k][::-1] for a in path.steps), looks.weights(k)[::-1]]
-    before, of_data, *of_h = made.reverse(steps, after, path.backend)
-    moved = 0.0
-    if any(isinstance(jump, Jump) for jump in piece.opening):
-        moved = looks.ahead(k.start) - float(of_h[0][-1, 0])
-    return np.append(before[-1], moved), of_data.sum(axis=0)
+def _swept_back(path: Path, looks: "_Looks") -> tuple[Array, Array]:
+    """Adjoints of the start, before it is made consistent, and of d."""
+    n, made = path.integrator.system.n, derivatives(path.integrator)
+    steps = [a[::-1] for a in (*path.steps, looks.weights)]
+    if path.linked:
+        every = links(path)
+        first, behind = every.start, every.of[::-1]
+        tables = (every.share, every.fall, every.by_state, every.by_data)
+        flat = ((table.reshape(table.shape[0], -1), behind) for table in tables)
+        steps += [looks.ahead(every)[::-1], *flat]
+    else:
+        first = passage(path, None)
+    before, of_data = made.reverse(path.linked)(steps, np.zeros(n + path.linked), path.backend)
+    adjoint = before[-1] if path.linked else np.append(before[-1], 0.0)
+    return first.by_state.T @ adjoint, of_data.sum(axis=0) + first.by_data.T @ adjoint
 
 
 @final
@@ -65,48 +61,38 @@ class _Looks:
 
     Args:
         path: the run.
-        times: t_j [s], shape (m,).
+        times: t_j [s], increasing, shape (m,).
         by_y: weights of y there, shape (m, n).
+
+    Attributes:
+        weights: of start, end and dense output of each step, a row each.
     """
 
     def __init__(self, path: Path, times: Array, by_y: Array) -> None:
         t0, (steps, rows, n) = path.dense.t0, path.dense.D.shape
-        self.path, self.by_y = path, by_y
+        self.path, self.times, self.by_y = path, times, by_y
         self.step = np.searchsorted(t0[1:], times, side="right")
-        self.theta = (times - t0[self.step]) / path.size[self.step]
-        self.total = np.zeros((steps, rows + 2, n))
-        shares = self._basis(self.theta)[:, :, None] * by_y[:, None, :]
+        theta = (times - t0[self.step]) / path.size[self.step]
+        total = np.zeros((steps, rows + 2, n))
+        shares = path.shares(theta)[:, :, None] * by_y[:, None, :]
         if times.size > 1:
             first = np.append(0, np.flatnonzero(self.step[1:] != self.step[:-1]) + 1)
-            self.total[self.step[first]] = np.add.reduceat(shares, first)
+            total[self.step[first]] = np.add.reduceat(shares, first)
         else:
-            self.total[self.step] = shares
-        self.cut: tuple[int, float, Array] = (-1, 0.0, np.zeros(n))
+            total[self.step] = shares
+        self.weights = total.reshape(steps, -1)
 
-    def _basis(self, theta: Array) -> Array:
-        """Shares of start, end and dense output in a value, shape (m, rows + 2)."""
-        shares = np.empty((theta.size, self.total.shape[1]))
-        shares[:, 0], shares[:, 1] = 1 - theta, theta
-        for row in range(2, shares.shape[1]):
-            shares[:, row] = theta * (shares[:, row - 1] if row > 2 else shares[:, 0])
-        return shares
+    def ahead(self, every: Links) -> Array:
+        """What a later start of each step adds to the sum through the places of times in it.
 
-    def weights(self, steps: slice) -> Array:
-        """Of start, end and dense output of steps, a row each."""
-        return self.total[steps].reshape(self.total[steps].shape[0], -1)
-
-    def add(self, step: int, t: float, weight: Array) -> None:
-        """A weight of y at the time [s] of the event that cut a step."""
-        theta = (t - self.path.dense.t0[step]) / self.path.size[step]
-        self.total[step] += self._basis(np.array([theta]))[0, :, None] * weight
-        self.cut = (step, theta, weight)
-
-    def ahead(self, step: int) -> float:
-        """What a later start of a step adds to the sum through the places of times in it."""
-        inside = self.step == step
-        theta, by_y = self.theta[inside], self.by_y[inside]
-        if self.cut[0] == step:
-            theta, by_y = np.append(theta, self.cut[1]), np.vstack([by_y, self.cut[2]])
-        whole = whole_step(self.path, step)
-        slopes = whole.rates(np.zeros(theta.size, dtype=np.intp), theta)
-        return -float(((1 - theta)[:, None] * slopes * by_y).sum())
+        Of steps that jumps come before; others start at fixed times.
+        """
+        path, found = self.path, np.zeros(self.path.dense.t0.size)
+        moves = np.append(path.pieces[0].opening != (None,), every.of[:-1] > 0)
+        inside = np.flatnonzero(moves[self.step])
+        k = self.step[inside]
+        since = self.times[inside] - path.dense.t0[k]
+        slopes = path.dense.rates(k, since / (path.dense.t1 - path.dense.t0)[k])
+        falls = (1 - since / path.size[k]) * (slopes * self.by_y[inside]).sum(axis=1)
+        np.subtract.at(found, k, falls)
+        return found

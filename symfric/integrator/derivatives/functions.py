@@ -7,17 +7,17 @@ from weakref import WeakKeyDictionary
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from symfric.integrator.compiled.columns import Columns
-from symfric.integrator.derivatives.path import Path
 from symfric.integrator.derivatives.seeds import Seeds
 from symfric.integrator.equations.branches import branchless
 from symfric.integrator.equations.quotients import divided_once
 from symfric.integrator.equations.system import System
-from symfric.integrator.running.dense import Dense
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.attempt import build_dense_step
 
+Array = NDArray[np.float64]
 LARGE = 5000
 """Functions with more instructions stay as they are: reading them takes time."""
 
@@ -35,6 +35,8 @@ class Derivatives:
 
     def __post_init__(self) -> None:
         self._forward: dict[tuple[int, ...], Columns] = {}
+        self._reverse: dict[bool, Columns] = {}
+        self._many: dict[str, Columns] = {}
         self._weighted: dict[tuple[int, ...], Columns] = {}
         self._signals: dict[tuple[int, ...], Columns] = {}
 
@@ -43,47 +45,73 @@ class Derivatives:
         """Arguments y, h, d of the step."""
         return [ca.SX.sym(name, self.step.numel_in(i)) for i, name in enumerate("yhd")]
 
-    def forward(self, which: Seeds) -> Columns:
-        """(S, y, h, d, h') -> (S after the step, the same of each row of its dense output).
+    def forward(self, which: Seeds, linked: bool) -> Columns:
+        """(X, y, h, d) -> (X of the next step, Z of its end and of each row of its dense output).
 
-        S of shape (n, names); h' holds the derivatives of the size, and is no argument where
-        nothing jumps.
+        X holds the derivatives of the start, shape (n, names). Where steps are `linked`
+        (`links`), it has a row more, of the time of the start, and there are arguments share, fall,
+        by_state transposed, by_data d'.
         """
-        if which.parameters not in self._forward:
+        key = (linked, *which.parameters)
+        if key not in self._forward:
             n, names = self.system.n, len(which.names)
             y, h, d = self.symbols
-            S, of_d = ca.SX.sym("S", n, names), ca.DM(which.of_data(d.numel()))
-            of_h = [ca.SX.sym("of_h", 1, names)] if self.eventful else []
+            X, of_d = ca.SX.sym("X", n + linked, names), ca.DM(which.of_data(d.numel()))
+            of_h = -X[n, :] if linked else ca.SX(1, names)
             pushed = self.step.forward(names)(
-                y,
-                h,
-                d,
-                self.step(y, h, d),
-                S,
-                of_h[0] if of_h else ca.SX(1, names),
-                ca.SX(ca.sparsify(of_d)),
+                y, h, d, self.step(y, h, d), X[:n, :], of_h, ca.SX(ca.sparsify(of_d))
             )
-            inner = [ca.vec(part) for part in ca.vertsplit(pushed, n)[1:]]
-            results = [ca.densify(pushed[:n, :]), ca.densify(ca.vertcat(ca.SX(0, 1), *inner))]
-            function = fast("forward", [S, y, h, d, *of_h], results)
-            self._forward[which.parameters] = Columns(function, chained=True)
-        return self._forward[which.parameters]
+            parts, behind, more = ca.vertsplit(pushed, n), pushed[:n, :], list[ca.SX]()
+            if linked:
+                more = [*self._link(len(parts)), ca.SX.sym("by_data", n + 1, names)]
+                share, fall, by_state, by_data = more
+                F = sum((share[i + 1] * part for i, part in enumerate(parts)), share[0] * X[:n, :])
+                behind = by_state.T @ (F + fall @ X[n, :]) + by_data
+            column = ca.densify(ca.vertcat(*map(ca.vec, parts)))
+            function = fast("forward", [X, y, h, d, *more], [ca.densify(behind), column])
+            self._forward[key] = Columns(function, chained=True)
+        return self._forward[key]
 
-    @cached_property
-    def reverse(self) -> Columns:
-        """(adjoint of the end, y, h, d, weights) -> (adjoint of y, of d, of h).
+    def _link(self, parts: int) -> list[ca.SX]:
+        """Arguments share, fall, by_state transposed of a link behind a step with these results."""
+        n = self.system.n
+        share, fall = ca.SX.sym("share", parts + 1), ca.SX.sym("fall", n)
+        return [share, fall, ca.SX.sym("by_state", n, n + 1)]
 
-        `weights` are those of the start and of all results of the step, end first. The size h has
-        an adjoint where something jumps.
+    def reverse(self, linked: bool) -> Columns:
+        """(adjoint of the next X, y, h, d, weights) -> (adjoint of X, of d).
+
+        `weights` are those of the start and of all results of the step, end first. Where steps are
+        `linked`, there are arguments weight of the time of the start, share, fall, by_state and
+        by_data transposed.
         """
-        n, (y, h, d) = self.system.n, self.symbols
-        every = self.step(y, h, d)
-        after, weights = ca.SX.sym("after", n), ca.SX.sym("weights", n + every.numel())
-        inner = weights[n:] + ca.vertcat(after, ca.SX(every.numel() - n, 1))
-        by_y, by_h, by_d = self.step.reverse(1)(y, h, d, every, inner)
-        of_h = [ca.densify(by_h)] if self.eventful else []
-        results = [ca.densify(by_y + weights[:n]), ca.densify(by_d), *of_h]
-        return Columns(fast("reverse", [after, y, h, d, weights], results), chained=True)
+        if linked not in self._reverse:
+            n, (y, h, d) = self.system.n, self.symbols
+            every = self.step(y, h, d)
+            after, weights = ca.SX.sym("after", n + linked), ca.SX.sym("w", n + every.numel())
+            more, of_F = list[ca.SX](), after
+            if linked:
+                of_t, by_data = ca.SX.sym("of_t"), ca.SX.sym("by_data", d.numel(), n + 1)
+                share, fall, by_state = self._link(every.numel() // n)
+                more, of_F = [of_t, share, fall, by_state, by_data], by_state @ after
+                whole = weights + ca.vec(of_F @ share.T)
+                by_y, by_h, by_d = self.step.reverse(1)(y, h, d, every, whole[n:])
+                results = [ca.vertcat(by_y + whole[:n], of_t + ca.dot(fall, of_F) - by_h)]
+                results.append(by_d + by_data @ after)
+            else:
+                inner = weights[n:] + ca.vertcat(after, ca.SX(every.numel() - n, 1))
+                by_y, _, by_d = self.step.reverse(1)(y, h, d, every, inner)
+                results = [by_y + weights[:n], by_d]
+            arguments = [after, y, h, d, weights, *more]
+            function = fast("reverse", arguments, [ca.densify(result) for result in results])
+            self._reverse[linked] = Columns(function, chained=True)
+        return self._reverse[linked]
+
+    def many(self, function: ca.Function, rows: list[Array], backend: str) -> list[Array]:
+        """Results of one of the Functions here for the rows of arrays."""
+        if function.name() not in self._many:
+            self._many[function.name()] = Columns(function)
+        return self._many[function.name()](rows, backend=backend)
 
     @cached_property
     def algebraic(self) -> ca.Function:
@@ -123,11 +151,6 @@ class Derivatives:
     def of_resets(self) -> ca.Function:
         """Those of the values of all resets."""
         return _slopes("of_resets", self.resets)
-
-    @property
-    def eventful(self) -> bool:
-        """Whether something may jump."""
-        return self.events.numel_out(0) > 0
 
     def of_signals(self, which: Seeds) -> Columns:
         """Derivatives of all signals (t, y, d, S) -> (signals, names)."""
@@ -196,11 +219,3 @@ def derivatives(integrator: Integrator) -> Derivatives:
             integrator.resets,
         )
     return _MADE[integrator]
-
-
-def whole_step(path: Path, k: int) -> Dense:
-    """Step number k in full, also where an event cut it."""
-    y0, h, d = (a[k] for a in path.steps)
-    every = derivatives(path.integrator).step(y0, h, d).full().reshape(1, -1, y0.size)
-    t0 = path.dense.t0[k : k + 1]
-    return Dense(t0, t0 + h, y0[None], every[:, 0], every[:, 1:])

@@ -155,13 +155,13 @@ class Path:
         """Start y, size h and run data d of every step."""
         return [self.dense.y0, self.size, self.data(self.interval)]
 
-    def cuts(self, step: int) -> bool:
-        """Whether an event cut the step before number `step`."""
-        return step in self._cuts
-
-    @cached_property
-    def _cuts(self) -> set[int]:
-        return {jump.step for jump in self.jumps if jump.size}
+    def shares(self, theta: Array) -> Array:
+        """Shares of start, end and dense output of a step in its values, a row for each theta."""
+        found = np.empty((theta.size, self.dense.D.shape[1] + 2))
+        found[:, 0], found[:, 1] = 1 - theta, theta
+        for row in range(2, found.shape[1]):
+            found[:, row] = theta * (found[:, row - 1] if row > 2 else found[:, 0])
+        return found
 
     def place(self, jump: Jump) -> int:
         """Input interval in which events happened, at a break the one before unless at once."""
@@ -176,6 +176,11 @@ class Path:
             return []
         steps = np.flatnonzero(np.diff(self.interval)) + 1
         return [Break(int(k), float(self.dense.t0[k])) for k in steps]
+
+    @property
+    def linked(self) -> bool:
+        """Whether something jumps between its steps."""
+        return bool(self.happened) or len(self.pieces) > 1
 
     @cached_property
     def pieces(self) -> list[Piece]:

@@ -12,11 +12,12 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.integrator.derivatives.functions import derivatives, whole_step
-from symfric.integrator.derivatives.path import Jump, Path, Piece
+from symfric.integrator.derivatives.functions import derivatives
+from symfric.integrator.derivatives.links import Links, links
+from symfric.integrator.derivatives.path import Jump, Path
 from symfric.integrator.derivatives.saltation import passage
 from symfric.integrator.derivatives.seeds import Seeds
-from symfric.integrator.running.dense import Dense, join
+from symfric.integrator.running.dense import Dense
 
 Array = NDArray[np.float64]
 
@@ -38,68 +39,102 @@ class Slopes:
 
 def forward(path: Path, which: Seeds) -> Slopes:
     """Derivatives of the solution; all directions go along in one sweep over the steps."""
-    s, names = path.integrator.system, len(which.names)
-    of_d = which.of_data(s.d.numel())
-    state = np.zeros((s.n + 1, names))
-    state[: s.nx] = which.start
-    pieces, times = list[Dense](), list[Array]()
-    for piece in path.pieces:
-        for jump in piece.opening:
-            move = passage(path, jump)
-            state = move.by_state @ state + move.by_data @ of_d
-            if isinstance(jump, Jump):
-                times.append(state[-1])
-        if piece.count:
-            pieces.append(_swept(path, which, piece, state))
-            state = np.vstack([pieces[-1].y1[-1].reshape(names, s.n).T, np.zeros(names)])
-    return Slopes(join(pieces), np.array(times).reshape(-1, names))
+    n, names, made = path.integrator.system.n, len(which.names), derivatives(path.integrator)
+    state, of_d = np.zeros((n + 1, names)), which.of_data(path.steps[2].shape[1])
+    state[: which.start.shape[0]] = which.start
+    if not path.linked:
+        first = passage(path, None)
+        state = first.by_state @ state + first.by_data @ of_d
+        rows = [*path.steps]
+        found = made.forward(which, False)(rows, state[:n].T, path.backend)
+        return Slopes(_dense(path, state[:n], *found), np.zeros((0, names)))
+    every = links(path)
+    state = every.start.by_state @ state + every.start.by_data @ of_d
+    by_data = (every.by_data @ of_d).transpose(0, 2, 1)
+    tables = (every.share, every.fall, every.by_state, by_data)
+    rows = [*path.steps, *((table.reshape(table.shape[0], -1), every.of) for table in tables)]
+    behind, inner = made.forward(which, True)(rows, state.T, path.backend)
+    states = np.concatenate([state.T[None], behind.reshape(-1, names, n + 1)])
+    dense = _at_fixed_times(path, _dense(path, state[:n], states[1:, :, :n], inner), states)
+    return Slopes(dense, _times(path, every, dense, states, of_d))
 
 
-def _swept(path: Path, which: Seeds, piece: Piece, state: Array) -> Dense:
-    """Derivatives over a piece, from those at its start and of the time of its start."""
-    n, names, k = path.integrator.system.n, len(which.names), piece.steps
-    steps = [a[k] for a in path.steps]
-    if path.integrator.model.events:
-        of_h = np.zeros((piece.count, names))
-        of_h[0] = -state[-1]
-        steps.append(of_h)
-    after, inner = derivatives(path.integrator).forward(which)(steps, state[:n].T, path.backend)
-    begin = np.vstack([state[:n].T.reshape(1, -1), after[:-1]])
-    bent = inner.reshape(piece.count, path.dense.D.shape[1], names * n)
-    t0, t1 = path.dense.t0[k], path.dense.t1[k]
-    if state[-1].any():
-        ahead, bend = _ahead(whole_step(path, k.start))
-        begin[0] -= np.outer(state[-1], ahead).ravel()
-        bent[0] -= np.einsum("s,rn->rsn", state[-1], bend).reshape(bent.shape[1], -1)
-    found = Dense(t0, t1, begin, after, bent)
-    if not path.cuts(k.stop):
-        return found
-    end, bent[-1] = _cut(found, (t1[-1] - t0[-1]) / path.size[k][-1])
-    return Dense(t0, t1, begin, np.vstack([after[:-1], end]), bent)
+def _dense(path: Path, start: Array, behind: Array, inner: Array) -> Dense:
+    """Derivatives over all steps, from those of the start and what a sweep gives of each."""
+    steps, size = inner.shape[0], start.size
+    parts = inner.reshape(steps, -1, size)
+    begin = np.vstack([start.T.reshape(1, -1), behind[:-1].reshape(steps - 1, size)])
+    return Dense(path.dense.t0, path.dense.t1, begin, parts[:, 0], parts[:, 1:])
 
 
-def _cut(dense: Dense, theta: float) -> tuple[Array, Array]:
-    """End and D of the last piece up to theta, the same polynomial (`running.crossings`)."""
-    old, new = np.zeros(dense.y0.shape[1]), np.zeros(dense.y0.shape[1])
-    D = np.empty_like(dense.D[-1])
-    for k in reversed(range(D.shape[0])):
-        new = new + theta ** (k + 2) * (dense.D[-1, k] - old)
-        old, D[k] = dense.D[-1, k], new
-    return dense.piece(np.array([dense.t0.size - 1]), np.array([theta])), D
+def _at_fixed_times(path: Path, found: Dense, states: Array) -> Dense:
+    """Derivatives at fixed times, up to the events that cut steps.
 
-
-def _ahead(step: Dense) -> tuple[Array, Array]:
-    """(1 - theta) y'(theta) of one step in the form of `Dense`: its start and its D; it ends at 0.
-
-    That is by how much the solution at a fixed time falls behind where the step starts later and
-    ends at its time.
+    `found` holds them at fixed places in whole steps; `states` those of the starts of steps, those
+    of their times in the last column.
     """
-    D = step.D[0]
-    # y = sum_j c_j theta^j, of which (y_theta - y_theta(0)) / theta is D
-    start = step.y1[0] - step.y0[0] + D[0]
-    c = np.vstack([D[1:], np.zeros_like(D[:1])]) - D
-    h = step.t1[0] - step.t0[0]
-    return start / h, np.arange(2, len(c) + 2)[:, None] * c / h
+    cut = np.array([jump.step - 1 for jump in path.jumps if jump.size], dtype=np.intp)
+    theta = (path.dense.t1 - path.dense.t0) / path.size
+    begin, end, bend = found.y0, found.y1.copy(), found.D.copy()
+    end[cut], bend[cut] = _cut(found, cut, theta[cut])
+    late = np.flatnonzero(states[:-1, :, -1].any(axis=1))
+    of_t = states[late, :, -1]
+    for part, rest in zip((begin, end, bend), _ahead(path.dense, late, theta[late]), strict=True):
+        moved = np.einsum("ks,k...n->k...sn", of_t, rest)
+        part[late] -= moved.reshape(part[late].shape)
+    return Dense(found.t0, found.t1, begin, end, bend)
+
+
+def _cut(dense: Dense, k: NDArray[np.intp], theta: Array) -> tuple[Array, Array]:
+    """End and D of pieces up to theta, the same polynomials (`running.crossings`)."""
+    end, D = dense.piece(k, theta), np.empty_like(dense.D[k])
+    old, new = np.zeros_like(end), np.zeros_like(end)
+    for row in reversed(range(D.shape[1])):
+        new = new + theta[:, None] ** (row + 2) * (dense.D[k, row] - old)
+        old, D[:, row] = dense.D[k, row], new
+    return end, D
+
+
+def _ahead(dense: Dense, k: NDArray[np.intp], theta: Array) -> tuple[Array, Array, Array]:
+    """(1 - theta s) y'(s) of pieces in the form of `Dense`, s being the place in them.
+
+    That is by how much the solution at a fixed time falls behind where a step, of which a piece is
+    the part up to theta, starts later and ends at its time.
+    """
+    D, h = dense.D[k], (dense.t1 - dense.t0)[k, None]
+    rows = D.shape[1]
+    # y = sum_j c_j s^j, y' = sum_j p_j s^j, and their product q
+    c = np.zeros((rows + 2, *dense.y0[k].shape))
+    c[1] = dense.y1[k] - dense.y0[k]
+    c[1 : rows + 1] += D.transpose(1, 0, 2)
+    c[2:] -= D.transpose(1, 0, 2)
+    p = np.arange(1, rows + 2)[:, None, None] * c[1:] / h
+    q = np.concatenate([p, np.zeros_like(p[:1])])
+    q[1:] -= theta[:, None] * p
+    bend = np.empty_like(D)
+    for row in reversed(range(rows)):
+        bend[:, row] = (bend[:, row + 1] if row < rows - 1 else 0.0) - q[row + 2]
+    return q[0], q.sum(axis=0), bend
+
+
+def _times(path: Path, every: Links, dense: Dense, states: Array, of_d: Array) -> Array:
+    """Derivatives of the times of all jumps, shape (jumps, names)."""
+    found, own = list[Array](), iter(every.alone)
+    names = of_d.shape[1]
+    for piece in path.pieces:
+        marks = [mark for mark in piece.opening if isinstance(mark, Jump)]
+        if len(marks) == 1:
+            next(own)
+            found.append(states[piece.steps.start, :, -1])
+            continue
+        k = piece.steps.start - 1
+        before = dense.y1[k].reshape(names, -1).T if k >= 0 else states[0, :, :-1].T
+        state = np.vstack([before, np.zeros(names)])
+        for _ in marks:
+            move = next(own)
+            state = move.by_state @ state + move.by_data @ of_d
+            found.append(state[-1])
+    return np.array(found).reshape(-1, names)
 
 
 def of_signals(path: Path, which: Seeds, solution: Dense, times: Array) -> Array:

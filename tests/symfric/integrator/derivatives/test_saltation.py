@@ -1,15 +1,18 @@
 """Derivatives through events: closed forms, differences of tight runs, and what has none."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
 import pytest
+from differentiable import pendulum
 from numpy.typing import NDArray
 from stored import stored
 
 from symfric import (
     GMS,
+    BrownMcPhee,
     ExactCoulomb,
     Hold,
     Karnopp,
@@ -23,6 +26,12 @@ from symfric import (
     rabinowicz,
     simulate,
 )
+from symfric.integrator.derivatives import together as module
+from symfric.integrator.derivatives.functions import derivatives
+from symfric.integrator.derivatives.seeds import seeds
+from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.running.built import built
 from symfric.model import Event
 
 Array = NDArray[np.float64]
@@ -138,6 +147,66 @@ def test_laws_by_events_meet_differences_of_tight_runs(case: str) -> None:
     weights = {"x": np.cos(run.t), "v": np.ones(run.t.size)}
     by_hand = [weights["x"] @ found[2 * i] + found[2 * i + 1].sum() for i in range(len(names))]
     assert [*run.gradient(weights).values()] == pytest.approx(by_hand, rel=1e-9)
+
+
+def test_many_events_at_once_are_those_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = [v.name for v in CASES["gms_drive"][0].p]
+    together = run_of("gms_drive", {}, sensitivities=names)
+    monkeypatch.setattr(module, "_is_usual", lambda *_: False)  # pyright: ignore[reportUnknownLambdaType]
+    alone = run_of("gms_drive", {}, sensitivities=names)
+    for name in names:
+        assert together.sensitivities[name]["x"] == pytest.approx(
+            alone.sensitivities[name]["x"], rel=1e-12
+        )
+        assert together.event_sensitivities[name] == pytest.approx(
+            alone.event_sensitivities[name], rel=1e-11
+        )
+
+
+def struck() -> Model:
+    """A point on a circle, whose rate an event halves; its tension follows."""
+    model = pendulum()
+    x, _, vx, vy = (v.symbol for v in model.x)
+    stroke = Event("stroke", x - 0.3, -1, reset={"vx": vx / 2, "vy": vy / 2})
+    return replace(model, events=(stroke,))
+
+
+def test_mechanism_stays_on_its_constraints_behind_an_event() -> None:
+    """By the radius, which moves the start, the event and all behind it; by differences."""
+
+    def at(radius: float, **how: object) -> Trajectory:
+        return simulate(
+            struck(), 1.0, p={"l": radius}, t_eval=[0.2, 0.6, 1.0], event_tolerance=1e-13,
+            rtol=1e-10, **how,  # pyright: ignore[reportArgumentType]
+        )  # fmt: skip
+
+    run = at(1.0, sensitivities=["l", "x0.vx"])
+    assert run.statistics.events >= 1
+    above, below = at(1.0 + 1e-5), at(1.0 - 1e-5)
+    for signal in ("x", "y", "vx", "lam"):
+        quotient = (above[signal] - below[signal]) / 2e-5
+        assert run.sensitivities["l"][signal] == pytest.approx(quotient, rel=2e-5, abs=2e-5)
+    weights = {"x": [0.0, 1.0, 2.0], "lam": [1.0, 1.0, 0.0]}
+    by_hand = [
+        sum(float(np.array(w) @ run.sensitivities[n][s]) for s, w in weights.items())
+        for n in ("l", "x0.vx")
+    ]
+    assert [*run.gradient(weights).values()] == pytest.approx(by_hand, rel=1e-10)
+
+
+def test_sweeps_cost_what_they_are_written_for() -> None:
+    """Instructions of a step of Rabinowicz: itself, by four parameters, backwards, with jumps."""
+    model = rabinowicz(BrownMcPhee(), free=["mu_s", "mu_d", "k", "m"])
+    integrator, _ = built(model, input_data(model, None, 0.0, 1.0), METHODS["rodas5p"])
+    made = derivatives(integrator)
+    which = seeds(model, ["mu_s", "mu_d", "k", "m"], None, None)
+    count = [
+        made.step, made.forward(which, False).function, made.reverse(False).function,
+        made.forward(which, True).function, made.reverse(True).function,
+    ]  # fmt: skip
+    most = [580, 2900, 1400, 3320, 1540]
+    found = [f.n_instructions() for f in count]
+    assert all(f <= m for f, m in zip(found, most, strict=True)), found
 
 
 def counter(events: tuple[Event, ...], x: Variable, *others: Variable) -> Model:
