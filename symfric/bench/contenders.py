@@ -31,10 +31,9 @@ from symfric.integrator.equations.initial import (
 from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.peers.casadi_integrators import peer
-from symfric.integrator.running.dense import from_records
 from symfric.integrator.running.engine import Stop
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.loop import ROWS
+from symfric.integrator.running.outputs import Outputs
 from symfric.integrator.running.run import ATTEMPTS, Tolerances
 from symfric.integrator.simulate import simulate
 from symfric.integrator.step.layout import Given, State
@@ -77,19 +76,21 @@ def loop(model: Model, times: Array, watched: tuple[str, ...], rtol: float) -> C
         warnings.simplefilter("ignore")
         made = Integrator(model, inputs, chosen("bench", "auto", rtol))
     engine, end = made.compiled(), float(times[-1])
-    R = Given.of(end, rtol, end, 0.1 * rtol * whole.nominal, np.zeros(whole.d.numel()))
-    rows = [whole.names.index(name) for name in watched]
+    rows, work = [whole.names.index(name) for name in watched], made.borrow()
 
     def solve() -> tuple[Array, int]:
-        S, pieces = State.at(0.0, first_step(end), y0), list[Array]()
-        reason = Stop.FULL
+        State.begin(work.S, 0.0, first_step(end), y0)
+        Given.begin(work.R, rtol, end, 0.1 * rtol * whole.nominal, np.zeros(0))
+        outputs, steps, reason = Outputs.at(times, whole.n), 0, Stop.FULL
+        work.loop.h_min = smallest_step(end)
+        work.want(outputs, None)
+        work.over(inputs.breaks, inputs.values)
         while reason in (Stop.FULL, Stop.ATTEMPTS):
-            records, _, reason = engine.run(S, R, ROWS, ATTEMPTS["compiled"], smallest_step(end))
-            pieces.append(records)
+            records, _, reason = engine.march(work, ATTEMPTS["compiled"])
+            steps += records.shape[0]
         if reason is not Stop.END:
-            raise RuntimeError(f"the step became too small at t = {S[State.T]:g} s")
-        every = np.vstack(pieces)
-        return from_records(every, whole.n)(times)[rows], every.shape[0]
+            raise RuntimeError(f"the step became too small at t = {work.S[State.T]:g} s")
+        return outputs.values[rows], steps
 
     solve()
     return Contender(solve)
