@@ -134,14 +134,20 @@ class Run:
     @property
     def extent(self) -> Extent:
         """How long the steps are and how large the unknowns become."""
+        lengths = [p.t1 - p.t0 for p in self._pieces()]
+        shortest = [float(h.min()) for h in lengths]
+        longest = [float(h.max()) for h in lengths]
+        if self._before is not None:
+            shortest.append(self._before.shortest)
+            longest.append(self._before.longest)
+        return Extent(min(shortest), max(longest), self.largest)
+
+    @property
+    def largest(self) -> Array:
+        """Largest magnitudes of the unknowns at the start and at the ends of steps, shape (n,)."""
         found = self._pieces()
-        before = self._before or Extent(np.inf, 0.0, np.abs(found[0].y0[0]))
-        lengths = [p.t1 - p.t0 for p in found]
-        return Extent(
-            min(before.shortest, *(float(h.min()) for h in lengths)),
-            max(before.longest, *(float(h.max()) for h in lengths)),
-            np.max([before.largest, *(np.abs(p.y1).max(axis=0) for p in found)], axis=0),
-        )
+        first = np.abs(found[0].y0[0]) if self._before is None else self._before.largest
+        return np.max([first, *(np.abs(p.y1).max(axis=0) for p in found)], axis=0)
 
     def at(self, times: Array) -> Array:
         """Unknowns at `times` [s], shape (n, times), of a long run as outputs of another one."""

@@ -83,7 +83,7 @@ def integrate(
     scale, allowed = nominal, tolerances
     run = _integrated(integrator, inputs, y0, p, allowed, backend, progress, times)
     for _ in range(ROUNDS if tolerances.follow and not ample(run.end, nominal) else 0):
-        own = finer(scale, run.extent.largest[: nominal.size], nominal)
+        own = finer(scale, run.largest[: nominal.size], nominal)
         if own is None or not run.status.ok:
             break
         scale, allowed = own, replace(tolerances, atol=tolerances.atol * own / nominal)
