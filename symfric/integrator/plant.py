@@ -10,6 +10,7 @@ from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError, find_compiler
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.equations.initial import consistent, first_guess, first_step
+from symfric.integrator.many.plants import pays, side_by_side
 from symfric.integrator.running.crossings import Memory
 from symfric.integrator.running.diagnosis import explain
 from symfric.integrator.running.eventful_plants import with_events
@@ -86,7 +87,9 @@ class Plant:
         if integrator.crossings is not None:
             engine = integrator.vm() if vm else integrator.compiled()
             return with_events(integrator, plants, engine, self._tolerance)
-        return in_vm(integrator, plants) if vm else compiled(integrator, plants)
+        if vm:
+            return in_vm(integrator, plants)
+        return (side_by_side if pays(integrator, plants) else compiled)(integrator, plants)
 
     def __repr__(self) -> str:
         many = "" if self._batch is None else f" x {self._batch}"

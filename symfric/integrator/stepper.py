@@ -51,7 +51,9 @@ def stepper(
         t_start: time [s] of the start.
         x0, p: start values and parameters by name, as in `simulate`; with `batch` arrays, too.
         batch: number of plants that go together, all by one call; then inputs, states and signals
-            have a row for each plant.
+            have a row for each plant. Compiled, eight and more go side by side in vector lanes,
+            three to four times faster: the same as each alone but for rounding, and to the bit
+            whoever is beside it.
         rtol, atol, method, event_tolerance, max_step: as in `simulate`.
         backend: "compiled", "vm", or "auto": compiled (once, kept in the user's cache) where there
             is a compiler.

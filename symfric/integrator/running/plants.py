@@ -102,25 +102,29 @@ def compiled(integrator: Integrator, plants: Plants) -> Advance:
     Raises:
         CompileError: there is no compiler, or it failed.
     """
-    function = _library(integrator).symfric_plants
-    members = _Members.of(plants)
+    return loaded(integrator, plants, "plants", c_source)
+
+
+def loaded(
+    integrator: Integrator, plants: Plants, name: str, source: Callable[[Integrator], str]
+) -> Advance:
+    """The function `symfric_plants` of C, on arrays; the integrator keeps its library by `name`."""
+    kept = integrator.__dict__
+    if name not in kept:
+        library = load(source(integrator), "symfric_plants")
+        library.symfric_plants.restype = ctypes.c_longlong
+        library.symfric_plants.argtypes = [ctypes.c_void_p, ctypes.c_int]
+        kept[name] = library
+    function, members = kept[name].symfric_plants, _Members.of(plants)
     address = ctypes.addressof(members)
 
     def advance(begin: int, _alive: object = (members, plants)) -> int:
-        return int(function(address, begin))
+        short = int(function(address, begin))
+        if short < REFUSED:
+            raise MemoryError
+        return short
 
     return advance
-
-
-def _library(integrator: Integrator) -> ctypes.CDLL:
-    """The compiled loop, which the integrator keeps."""
-    kept = integrator.__dict__
-    if "plants" not in kept:
-        library = load(c_source(integrator), "symfric_plants")
-        library.symfric_plants.restype = ctypes.c_longlong
-        library.symfric_plants.argtypes = [ctypes.c_void_p, ctypes.c_int]
-        kept["plants"] = library
-    return cast(ctypes.CDLL, kept["plants"])
 
 
 def in_vm(integrator: Integrator, plants: Plants) -> Advance:
@@ -190,7 +194,7 @@ def c_source(integrator: Integrator) -> str:
     if follow is not None:
         generator.add(follow.round)
     own = _FOLLOWS_NOTHING if follow is None else follow.c_source
-    loop = Template(_MEMBERS + _LOOP).substitute(
+    loop = Template(MEMBERS + _LOOP).substitute(
         columns=step.numel_in(0), given=step.numel_in(1), nu=nu,
         memory=State.MEMORY, t=State.T, h=State.H, t_end=Given.T_END, floor=repr(FLOOR),
         data=Given.d(nx).start, held=Given.d(nx).start + n_d - nu,
@@ -204,7 +208,7 @@ _FOLLOWS_NOTHING = """
 static int symfric_follow(double *y, const double *d) { return 0; }
 """
 
-_MEMBERS = """
+MEMBERS = """
 typedef struct {
   long long members, attempts;
   double dt, h_min;
@@ -339,7 +343,7 @@ def look_source(integrator: Integrator) -> str:
     function, nx = integrator.signals, integrator.system.nx
     generator = ca.CodeGenerator("symfric_look.c", {"static_aux": True})
     generator.add(function)
-    loop = Template(_MEMBERS + _LOOK).substitute(
+    loop = Template(MEMBERS + _LOOK).substitute(
         columns=integrator.step.numel_in(0), given=integrator.step.numel_in(1),
         memory=State.MEMORY, t=State.T, data=Given.d(nx).start, rows=function.numel_out(0),
         arg=function.sz_arg(), res=function.sz_res(), name=function.name(),
