@@ -5,6 +5,7 @@ from typing import Any, ClassVar, final
 
 from symfric.foundation.numeric import Scalar, atan, cos, equals, sin
 from symfric.foundation.parameters import param
+from symfric.laws import Law
 from symfric.multibody import JointFriction, Mechanism, PlanarRevolute, Revolute
 from symfric.scenes.mechanism import MechanismScene, reach
 from symfric.scenes.pendulum import HINGE
@@ -13,17 +14,19 @@ from symfric.scenes.pendulum import HINGE
 @final
 @dataclass(frozen=True, eq=False)
 class FourBar(MechanismScene):
-    """Crank, coupler and rocker between two hinges of the ground, friction in three hinges.
+    """Crank, coupler and rocker between two hinges of the ground, friction in the hinges.
 
     crank and rocker are angles against x, coupler the angle of the coupler against the crank. The
-    fourth pin closes the loop as a `PlanarRevolute`: a hinge would fix what the plane fixes
-    already, and leave the reactions out of the plane open. It has no friction here; it can have.
+    fourth hinge, between coupler and rocker, closes the loop as a `PlanarRevolute`: a `Revolute`
+    would fix what the plane fixes already, and leave the reactions out of the plane open. `pin` is
+    the law of its friction, with its own parameters (endings _1 and _2); without it it has none.
 
     Defaults: a crank-rocker (0.1 + 0.4 < 0.3 + 0.35 m) that starts with 10 rad/s.
     """
 
     t_end: ClassVar[float] = 3.0
 
+    pin: Law | None = None
     crank: Scalar = param(0.1, unit="m", role="geometry", doc="length of the crank", lower=1e-12)
     coupler: Scalar = param(
         0.35, unit="m", role="geometry", doc="length of the coupler", lower=1e-12
@@ -90,5 +93,6 @@ class FourBar(MechanismScene):
         )  # fmt: skip
         for name, parent, child, start, rate in hinges:
             m.joint(Revolute(name, parent, child, start, rate, friction))
-        m.joint(PlanarRevolute("pin", "rocker_rod.far", "coupler_rod.far"))
+        closing = None if self.pin is None else JointFriction(self.pin, radius=self.R)
+        m.joint(PlanarRevolute("pin", "rocker_rod.far", "coupler_rod.far", friction=closing))
         return m

@@ -7,7 +7,7 @@ import pytest
 from mechanics import brown_mcphee, four_bar_with_friction
 from scipy.integrate import solve_ivp
 
-from symfric import BrownMcPhee, LuGre, Trajectory, simulate
+from symfric import BrownMcPhee, ExactCoulomb, LuGre, Trajectory, simulate
 from symfric.laws import Law
 from symfric.multibody import (
     Cylindrical,
@@ -56,7 +56,9 @@ def four_bar(cut: str, law: Law = LAW) -> Mechanism:
 
 @pytest.fixture(scope="module")
 def closed_by_the_pin() -> Trajectory:
-    return simulate(four_bar("pin").build(), 0.1, rtol=1e-8, backend="vm", samples=401)
+    """As the scene has it."""
+    model = FourBar(LAW, pin=LAW).model()
+    return simulate(model, 0.1, rtol=1e-8, backend="vm", samples=401)
 
 
 def same_as(one: Trajectory, cut: str, formulation: str = "joint") -> None:
@@ -102,6 +104,17 @@ def test_energy_goes_where_friction_takes_it(closed_by_the_pin: Trajectory) -> N
     taken = np.trapezoid(sum(run[f"{h}_power"] for h in HINGES), run.t)
     assert run["conserved"][0] - run["conserved"][-1] == pytest.approx(taken, rel=1e-5)
     assert run["pin_power"].min() > 0.01
+
+
+@pytest.mark.slow
+def test_rest_is_rest_whichever_hinge_closes_the_loop() -> None:
+    """Set-valued friction in all four hinges, which come to rest together."""
+    one, other = (
+        simulate(four_bar(cut, ExactCoulomb()).build(), 1.5, samples=31)
+        for cut in ("pin", "theta_rocker")
+    )
+    for name in ("coupler_rod_x", "coupler_rod_z", "pin_slip"):
+        assert other[name] == pytest.approx(one[name], abs=1e-6)
 
 
 @pytest.mark.slow
