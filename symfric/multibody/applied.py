@@ -40,7 +40,7 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import at_start, starts_of, symbols_of
 from symfric.laws import Law
 from symfric.laws.base import smooth
-from symfric.laws.base.law import Switch
+from symfric.laws.base.law import FORCE, Switch
 from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.model import Variables, kinds
 from symfric.multibody.equations import Equations
@@ -57,7 +57,6 @@ UNLOADED = 1e-12
 CALM = 0.1
 """Time [s] in which a rest forgets a sliding velocity that rounding has left in it, so that none
 drifts; to laws by modes F_e matters at rest alone."""
-FORCE = "F_e"
 
 
 @final
@@ -130,9 +129,8 @@ def sliding_change(eq: Equations, slip: ca.SX) -> ca.SX:
 def switches_at(
     law: Law | SpatialSlip, v: ca.SX, N: ca.SX, z: ca.SX, F_e: ca.SX
 ) -> tuple[Switch, ...]:
-    """Changes of mode of a law that may ask for F_e; others of its inputs are no matter to them."""
-    inputs = {i.name: F_e if i.name == FORCE else ca.SX(0.0) for i in law.inputs}
-    return law.switches(v, N, z, **inputs)
+    """Changes of mode of a law that may ask for F_e."""
+    return law.switches(v, N, z, **({FORCE: F_e} if law.inputs else {}))
 
 
 def some_switches(law: Law | SpatialSlip) -> tuple[Switch, ...]:
@@ -294,7 +292,7 @@ def rests(
     Raises:
         ValueError: constraints hold a contact, or leave open what contacts at rest carry.
     """
-    asking = [i for i, c in enumerate(eq.contacts) if FORCE in [x.name for x in c.law.inputs]]
+    asking = [i for i, c in enumerate(eq.contacts) if c.law.inputs]
     if not asking:
         return ()
     make, found = _Maker(where, eq, start, p), list[Rest]()

@@ -29,11 +29,11 @@ from symfric.foundation.checks import as_number
 from symfric.foundation.numeric import Scalar, is_symbolic
 from symfric.foundation.units import turned
 from symfric.laws import Law
-from symfric.laws.base.law import check_law
+from symfric.laws.base.law import FORCE, check_law
 from symfric.laws.composed.isotropic import SpatialSlip, anisotropy
 
-OFFERED = ("F_e", "dv")
-"""What a joint gives a law besides v and N: the applied force and the sliding acceleration."""
+OFFERED = (FORCE,)
+"""What a joint gives a law besides v and N, but in a ball."""
 
 
 @final
@@ -44,8 +44,23 @@ class JointFriction:
     A normal force that falls below zero, through an input, a parameter or a negative preload, is
     an error at its time, not friction that drives.
 
+    Laws with true rest (`ExactCoulomb`, `Karnopp`, `LeineSwitch`, `Awrejcewicz`) get the force F_e
+    that the contact must carry from the constraints, see `symfric.multibody.applied`. By modes,
+    what stops rests, and what rests breaks away where |F_e| passes the static level; after each
+    change of mode the whole mechanism is solved again, and what then cannot hold breaks away at
+    the same instant, what would slide the wrong way rests again. So several valid states of rest
+    and sliding, which mu_s > mu_d leaves, are told apart by what happened before; at the start
+    what is overloaded breaks away. The contacts of a loop of one degree of freedom rest and break
+    away together, where all of them are at their static levels; smooth laws with mu_s > mu_d break
+    away a little earlier there, as the contact that moves most passes its peak first, and tend to
+    the same motion where mu_s = mu_d.
+    Limits: not in a ball, nor where a drive prescribes the sliding; in a loop of several degrees of
+    freedom as many as are independent. Forms that jump without modes (`Karnopp`, `LeineSwitch` with
+    form = "original") end a run at the jump. What else a `Sum` has must vanish at rest.
+
     Attributes:
-        law: any friction law of v and N; in a spherical joint an isotropic one, `SpatialSlip`.
+        law: any friction law of v, N and F_e; in a spherical joint an isotropic one of v and N,
+            `SpatialSlip`.
         radius: of the bearing or ball [m], for friction about an axis or a point.
         length: distance a of the two bearing stations [m]; None: moments do not load the bearing.
         width: width b of a guide that takes the moment about z [m]; None: it does not load it.
@@ -76,13 +91,9 @@ class JointFriction:
         offered = () if "ball" in rubs else OFFERED
         if strange := [i.name for i in self.law.inputs if i.name not in offered]:
             yield (
-                f"law: expected one that needs no more than {', '.join(('v', 'N', *offered))} here,"
-                f" got {type(self.law).__name__}, which needs {', '.join(strange)}; "
-                + (
-                    "a ball slips in any direction"
-                    if "ball" in rubs
-                    else "a joint has no such input"
-                )
+                f"law: expected one that needs no more than {', '.join(('v', 'N', *offered))}, got "
+                f"{type(self.law).__name__}, which needs {', '.join(strange)}; "
+                f"a {'ball' if 'ball' in rubs else 'joint'} has no such input"
             )
         elif "ball" in rubs and (reason := anisotropy(self.law)):
             yield (

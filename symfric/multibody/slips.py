@@ -11,15 +11,13 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import symbols_of
 from symfric.laws import Law
 from symfric.laws.base import smooth
-from symfric.laws.base.law import Switch
+from symfric.laws.base.law import FORCE, Switch
 from symfric.laws.base.sticking import FINEST, rests
 from symfric.model import Event, Variables, kinds
 from symfric.multibody.applied import (
-    FORCE,
     Rest,
     applied_forces,
     forward,
-    sliding_change,
     static_level,
     switches_at,
 )
@@ -39,7 +37,7 @@ class Slip:
         normal: the expression of it in terms of accelerations and multipliers.
         states, rate: of the law.
         force: friction force [N], of a ball a vector.
-        inputs: what a law that asks for it gets besides v and N.
+        inputs: the applied force for a law that asks for it, by name.
     """
 
     contact: Contact
@@ -85,9 +83,7 @@ def slips(
     for i, contact in enumerate(eq.contacts):
         law = contact.law
         states = _states(contact, ca.SX(law.steady_state(slides[i], normal_at_start[i])))
-        every = {"dv": sliding_change(eq, contact.slip)} if law.inputs else {}
-        every |= {FORCE: applied[i]} if i in applied else {}
-        z, inputs = symbols_of(states), {x.name: every[x.name] for x in law.inputs}
+        z, inputs = symbols_of(states), {FORCE: applied[i]} if i in applied else {}
         # a ball may turn about some axes only; what is put for the symbols of F must be dense
         rate, force = (
             ca.densify(ca.SX(of(contact.slip, pressing[i], z, **inputs)))
@@ -172,7 +168,7 @@ def _of_contact(slip: Slip, rest: dict[str, float]) -> Iterator[Event]:
     """
     contact, z = slip.contact, symbols_of(slip.states)
     found = contact.law.switches(contact.slip, slip.N, z, **slip.inputs)
-    if FORCE in slip.inputs:
+    if slip.inputs:
         idle = switches_at(contact.law, contact.slip, slip.N, z, ca.SX(0.0))
         found = tuple(
             replace(s, reset=at_rest.reset) if s.halts else s

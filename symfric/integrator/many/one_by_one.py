@@ -32,7 +32,7 @@ def solve_one_by_one(
     Raises:
         KeyboardInterrupt: Ctrl-C; the members of the chunk are lost.
     """
-    y0, p, data, ends = given
+    y0, p, data, ends = (np.ascontiguousarray(numbers) for numbers in given)
     count, names = y0.shape[0], integrator.signals.numel_out(0)
     signals = np.full((count, max(1, times.size), names), np.nan)
     attempts, reached = np.zeros(count, dtype=np.int64), np.zeros(count)

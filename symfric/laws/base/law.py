@@ -75,7 +75,8 @@ class Input:
     steady: float = 0.0
 
 
-APPLIED_FORCE = Input("F_e", "N", "force that keeps the sliding velocity constant", steady=1.0)
+FORCE = "F_e"
+APPLIED_FORCE = Input(FORCE, "N", "force that keeps the sliding velocity constant", steady=1.0)
 """What the contact must carry for no acceleration: m dv/dt = F_e - F."""
 
 

@@ -11,7 +11,7 @@ import pytest
 from dry import DryMotion, blocks_on_belt, pendulum_box
 from stored import stored
 
-from symfric import Coulomb, Model, SolveError, Status, Variable, Viscous, simulate
+from symfric import Coulomb, Model, SolveError, Status, Variable, Viscous, simulate, simulate_many
 from symfric.laws import (
     Ambrosio,
     Awrejcewicz,
@@ -319,10 +319,24 @@ def test_where_rest_cannot_be_told_the_joint_is_named() -> None:
         pair(ExactCoulomb(), Karnopp())
 
 
-def test_levels_may_be_parameters() -> None:
+def test_members_of_an_ensemble_have_their_own_levels() -> None:
     mu = Variable("mu", "1", start=0.3)
-    m = PendulumBox(ExactCoulomb(mu_s=mu.symbol, mu_d=mu.symbol)).mechanism()
-    run = solve(m.build((mu,)), 1.0, p={"mu": 0.2})
-    fixed = PendulumBox(ExactCoulomb(mu_s=0.2, mu_d=0.2)).model()
-    fixed = solve(fixed, 1.0)
-    assert run.final["phi"] == pytest.approx(fixed.final["phi"], abs=1e-10)
+    model = PendulumBox(ExactCoulomb(mu_s=mu.symbol, mu_d=mu.symbol)).mechanism().build((mu,))
+    found = simulate_many(model, 0.3, p={"mu": np.array([0.1, 0.2])}, t_eval=[0.3])
+    alone = solve(model, 0.3, p={"mu": 0.2})
+    assert found["phi"][1, -1] == pytest.approx(alone.final["phi"], abs=1e-9)
+
+
+@pytest.mark.slow
+def test_gradients_go_through_stick_and_slip_of_a_loop() -> None:
+    """Through rest of three contacts at once and their break-away, against differences."""
+    mu_s, mu_d = (Variable(n, "1", start=x) for n, x in (("mu_s", 0.15), ("mu_d", 0.1)))
+    law = ExactCoulomb(mu_s=mu_s.symbol, mu_d=mu_d.symbol)
+    model = FourMass(law).mechanism().build((mu_s, mu_d))
+    run = solve(model, 3.0, rtol=1e-9, sensitivities=["mu_s", "mu_d"])
+    assert len(run.happened) > 2
+    for v in (mu_s, mu_d):
+        ends = [solve(model, 3.0, p={v.name: float(v.start) + h}, rtol=1e-11).final["x1"]
+                for h in (1e-6, -1e-6)]  # fmt: skip
+        slope = run.sensitivities[v.name]["x1"][-1]
+        assert slope == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-6)

@@ -94,7 +94,11 @@ def test_absent_reactions_leave_no_trace() -> None:
     ("friction", "rubs", "message"),
     [
         (JointFriction(LAW), TURN, "radius: expected the bearing's radius"),
-        (JointFriction(Karnopp(), radius=0.1), ("ball",), "got Karnopp, which needs F_e; a ball"),
+        (
+            JointFriction(Karnopp(), radius=0.1),
+            ("ball",),
+            "got Karnopp, which needs F_e; a ball has",
+        ),
         (
             JointFriction(QuarterCarGeneral()),
             SLIDE,
