@@ -11,6 +11,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.memory import remember
 from symfric.integrator.arguments import (
     check_span,
     chosen,
@@ -81,9 +82,7 @@ def settings(
         return found
     found = _checked(model, *asked)
     if found.times.size <= MOST_TIMES:
-        while len(known) >= REMEMBERED:
-            known.pop(next(iter(known)), None)
-        known[key] = found
+        remember(known, key, found, REMEMBERED)
     return found
 
 

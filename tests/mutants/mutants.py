@@ -284,6 +284,7 @@ DIFFERENTIAL_ALGEBRAIC = (
     ),
 )  # fmt: skip
 
+MEMORY = "symfric/foundation/memory.py"
 BUILT = "symfric/integrator/running/built.py"
 KEPT = "symfric/integrator/compiled/cache.py"
 COMPILED = "symfric/integrator/compiled/compiler.py"
@@ -303,7 +304,7 @@ CACHES = (
         ("tests/symfric/integrator/equations/test_inputs.py",),
     ),
     Mutant(
-        "integrators are never evicted", BUILT, "del known[next(iter(known))]", "pass", T_BUILT
+        "integrators are never evicted", MEMORY, "del known[next(iter(known))]", "pass", T_BUILT
     ),
     Mutant(
         "one integrator for all methods", BUILT,
@@ -366,7 +367,7 @@ CACHES = (
 
 LEFT_OUT = (
     Mutant(
-        "the newest integrator is forgotten", BUILT,
+        "the newest integrator is forgotten", MEMORY,
         "del known[next(iter(known))]", "del known[next(reversed(known))]", T_BUILT,
     ),
     Mutant(

@@ -1,6 +1,6 @@
 """Inputs of a model over time: constants, expressions, sampled signals."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import sha256
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
+from symfric.foundation.memory import remember
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import stacked, strays
 from symfric.integrator.equations.constants import lifted
@@ -174,7 +175,7 @@ def input_data(
 
 def _written(model: Model, parts: "list[_Part]") -> tuple[ca.SX, ca.SX]:
     """Expression and data of inputs of this structure, written once and kept with the model."""
-    known: dict[object, tuple[ca.SX, ca.SX]] = model.memory.setdefault("inputs", {})
+    known: dict[Hashable, tuple[ca.SX, ca.SX]] = model.memory.setdefault("inputs", {})
     key = tuple(part.key for part in parts)
     found = known.get(key)
     if found is None:
@@ -184,9 +185,7 @@ def _written(model: Model, parts: "list[_Part]") -> tuple[ca.SX, ca.SX]:
         if any(part.ramps for part in parts):
             data.append(begin)
         found = stacked(row for row, _ in rows), stacked(data)
-        while len(known) >= REMEMBERED:
-            known.pop(next(iter(known)), None)
-        known[key] = found
+        found = remember(known, key, found, REMEMBERED)
     return found
 
 

@@ -1,7 +1,8 @@
 """Integrators that were built before, kept with their model and for as long as it lives."""
 
-from threading import Lock
+from collections.abc import Hashable
 
+from symfric.foundation.memory import remember
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.methods.method import Method
 from symfric.integrator.running.integrator import Integrator
@@ -9,7 +10,6 @@ from symfric.model import Model
 
 REMEMBERED = 16
 """Integrators kept per model; the oldest goes first."""
-_LOCK = Lock()
 
 
 def built(model: Model, inputs: InputData, method: Method) -> tuple[Integrator, bool]:
@@ -18,13 +18,9 @@ def built(model: Model, inputs: InputData, method: Method) -> tuple[Integrator, 
     The model holds it, not a table of models: an integrator refers to its model, and a table would
     keep both alive for ever.
     """
-    known: dict[object, Integrator] = model.memory.setdefault("integrators", {})
+    known: dict[Hashable, Integrator] = model.memory.setdefault("integrators", {})
     key = (method.name, inputs.key)
-    with _LOCK:
-        if key in known:
-            return known[key], False
-    made = Integrator(model, inputs, method)
-    with _LOCK:
-        if key not in known and len(known) >= REMEMBERED:
-            del known[next(iter(known))]
-        return known.setdefault(key, made), True
+    found = known.get(key)
+    if found is not None:
+        return found, False
+    return remember(known, key, Integrator(model, inputs, method), REMEMBERED), True
