@@ -13,8 +13,9 @@ import casadi as ca
 
 from symfric.foundation.graph import LEAVES, SELECT, Graph, Node, graph
 
-PART = 2000
-"""Operations of one C function: compilers take more than twice as long for twice as many."""
+PART = 1000
+"""Operations of one C function; compilers take more than twice as long for twice as many, and keep
+less of them in registers."""
 
 MASKS = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
 LOGIC = {ca.OP_AND: "{} & {}", ca.OP_OR: "{} | {}", ca.OP_NOT: "~{}"}
