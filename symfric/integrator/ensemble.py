@@ -116,7 +116,10 @@ def simulate_many(
             member its own.
         rtol, method, event_tolerance, max_steps, max_step, times: as in `simulate`; the absolute
             tolerance is 0.1 rtol nominal, for each member as `simulate` has it by default.
-        backend: "compiled", "vm", or "auto": compiled where there is a compiler.
+        backend: "compiled", "vm", or "auto": compiled where there is a compiler. Compiled members
+            run side by side in the lanes of vector instructions; exp, sin, pow, ... of vectors may
+            have another last digit than those of "vm" and `simulate`, and steps that stick and slip
+            then be a few more or less, within the tolerance.
         executor: "serial", "threads" (the compiled loop holds no lock), "processes", or any
             `concurrent.futures.Executor`, such as a dask client's or mpi4py's: a task is plain
             data and the C source, so a worker needs nothing but this package and, for compiled
