@@ -5,6 +5,7 @@ Where the line of a mutant is rewritten, rewrite the mutant: `tests/test_mutants
 
 from mutants.ensembles import ENSEMBLES
 from mutants.mutant import Mutant
+from mutants.plants import PLANTS
 from mutants.regularisation import REGULARISATION
 
 STEP = "symfric/integrator/step/attempt.py"
@@ -395,5 +396,5 @@ LEFT_OUT = (
 
 MUTANTS = (
     *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
-    *CACHES, *ENSEMBLES, *LEFT_OUT, *REGULARISATION,
+    *CACHES, *ENSEMBLES, *LEFT_OUT, *PLANTS, *REGULARISATION,
 )  # fmt: skip

@@ -255,7 +255,7 @@ def _guard(system: System, lu: SymbolicLU, place: dict[int, int]) -> ca.Function
     manifold = system.manifold
     if manifold is None:
         return None
-    loop = [place[i] for i in system.algebraic[0][manifold.n + manifold.m :]]
+    loop = [place[i] for i in system.algebraic[0][manifold.loop :]]
     conditions = [manifold.pressing(system.y, system.d) + PULLING]
     if loop:
         conditions += [(-1) ** manifold.n * lu.sign(), lu.pivots(loop) - SHOCK]

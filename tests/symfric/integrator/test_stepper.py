@@ -80,6 +80,7 @@ def test_accurate_whatever_the_interval(backend: str) -> None:
         for held in (1.0, -2.0, 0.1):
             value = held + (value - held) * np.exp(-dt)
             assert plant.step(held) == pytest.approx([value], abs=1e-7)
+            assert [plant["x"]] == plant.x.tolist()
 
 
 @each_backend

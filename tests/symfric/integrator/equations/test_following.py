@@ -106,7 +106,7 @@ def test_mass_matrices_that_are_no_identity_follow_too() -> None:
 @pytest.mark.parametrize(
     ("alg", "start"),
     [
-        (ca.sin(z.symbol), 1.9),
+        (ca.sin(z.symbol), 1.75),
         (z.symbol**3 - z.symbol, 0.45),
         (z.symbol**2 + 1, 0.5),
         (z.symbol - ca.SX.nan(), 0.0),
