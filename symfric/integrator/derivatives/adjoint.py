@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from symfric.integrator.derivatives.functions import derivatives
 from symfric.integrator.derivatives.links import Links, links
 from symfric.integrator.derivatives.path import Path
-from symfric.integrator.derivatives.saltation import passage
+from symfric.integrator.derivatives.saltation import at_start
 from symfric.integrator.derivatives.seeds import Seeds
 
 Array = NDArray[np.float64]
@@ -49,7 +49,7 @@ def _swept_back(path: Path, looks: "_Looks") -> tuple[Array, Array]:
         flat = ((table.reshape(table.shape[0], -1), behind) for table in tables)
         steps += [looks.ahead(every)[::-1], *flat]
     else:
-        first = passage(path, None)
+        first = at_start(path)
     before, of_data = made.reverse(path.linked)(steps, np.zeros(n + path.linked), path.backend)
     adjoint = before[-1] if path.linked else np.append(before[-1], 0.0)
     return first.by_state.T @ adjoint, of_data.sum(axis=0) + first.by_data.T @ adjoint

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.derivatives.path import Break, Jump, Path
-from symfric.integrator.derivatives.saltation import Passage, passage
-from symfric.integrator.derivatives.together import passages
+from symfric.integrator.derivatives.saltation import Passage, at_start
+from symfric.integrator.derivatives.together import at_breaks, passages
 
 Array = NDArray[np.float64]
 
@@ -52,13 +52,13 @@ def links(path: Path) -> Links:
     Raises:
         ValueError: a motion without derivative, as `passage`.
     """
-    every = passages(path)
+    every, breaks = passages(path), path.breaks
     own = {id(jump): one for jump, one in zip(path.jumps, every, strict=True)}
+    if breaks:
+        own |= {id(mark): one for mark, one in zip(breaks, at_breaks(path, breaks), strict=True)}
 
     def through(opening: tuple[Jump | Break | None, ...]) -> Passage:
-        first, *others = (
-            own[id(jump)] if isinstance(jump, Jump) else passage(path, jump) for jump in opening
-        )
+        first, *others = (at_start(path) if mark is None else own[id(mark)] for mark in opening)
         for other in others:
             first = first.then(other)
         return first

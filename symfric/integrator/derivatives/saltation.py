@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.checks import listed
 from symfric.integrator.derivatives.functions import Derivatives, derivatives
-from symfric.integrator.derivatives.path import Break, Jump, Path
+from symfric.integrator.derivatives.path import Jump, Path
 from symfric.integrator.equations.initial import ASSEMBLED, ITERATIONS, consistent
 
 Array = NDArray[np.float64]
@@ -60,21 +60,21 @@ class Passage:
         return Passage(other.by_state @ self.by_state, through)
 
 
-def passage(path: Path, jump: Jump | Break | None) -> Passage:
-    """What a jump makes of derivatives, the start of the run for None.
+def at_start(path: Path) -> Passage:
+    """What consistent start values make of derivatives of those given."""
+    d = path.data(np.zeros(1, dtype=np.intp))[0]
+    return _followed(path, path.guess, path.dense.y0[0], d)
 
-    Those before are of y at the time of the jump; before an event that cut a step, at a fixed time.
+
+def passage(path: Path, jump: Jump) -> Passage:
+    """What events make of derivatives.
+
+    Those before are of y at the time of the events; where these cut a step, at a fixed time.
 
     Raises:
         ValueError: an event that only touches zero, events at one instant that do not commute, or
             one that comes with a jump of the inputs.
     """
-    if jump is None:
-        d = path.data(np.zeros(1, dtype=np.intp))[0]
-        return _followed(path, path.guess, path.dense.y0[0], d)
-    if isinstance(jump, Break):
-        y, d = path.dense.y0[jump.step], path.steps[2][jump.step]
-        return _followed(path, y, y, d)
     d = path.data(np.array([path.place(jump)]))[0]
     here = _Instant(path, derivatives(path.integrator), jump.t, d)
     if jump.at_once:

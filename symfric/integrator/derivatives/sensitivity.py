@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from symfric.integrator.derivatives.functions import derivatives
 from symfric.integrator.derivatives.links import Links, links
 from symfric.integrator.derivatives.path import Jump, Path
-from symfric.integrator.derivatives.saltation import passage
+from symfric.integrator.derivatives.saltation import at_start
 from symfric.integrator.derivatives.seeds import Seeds
 from symfric.integrator.running.dense import Dense
 
@@ -43,7 +43,7 @@ def forward(path: Path, which: Seeds) -> Slopes:
     state, of_d = np.zeros((n + 1, names)), which.of_data(path.steps[2].shape[1])
     state[: which.start.shape[0]] = which.start
     if not path.linked:
-        first = passage(path, None)
+        first = at_start(path)
         state = first.by_state @ state + first.by_data @ of_d
         rows = [*path.steps]
         found = made.forward(which, False)(rows, state[:n].T, path.backend)

@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.derivatives.functions import derivatives
-from symfric.integrator.derivatives.path import Jump, Path
+from symfric.integrator.derivatives.path import Break, Jump, Path
 from symfric.integrator.derivatives.saltation import GRAZING, Passage, passage
 
 Array = NDArray[np.float64]
 
 
 def passages(path: Path) -> list[Passage]:
-    """What every jump of a run makes of derivatives.
+    """What every event of a run makes of derivatives.
 
     Raises:
         ValueError: as `passage`.
@@ -21,6 +21,17 @@ def passages(path: Path) -> list[Passage]:
     usual = [jump for jump in path.jumps if _is_usual(path, jump)]
     found = dict(zip(map(id, usual), _crossed(path, usual), strict=True)) if usual else {}
     return [found.get(id(jump)) or passage(path, jump) for jump in path.jumps]
+
+
+def at_breaks(path: Path, breaks: Sequence[Break]) -> list[Passage]:
+    """What new input data make of derivatives; states stay, algebraic unknowns follow."""
+    n, m, k = path.integrator.system.n, len(breaks), np.array([mark.step for mark in breaks])
+    y, d = path.dense.y0[k], path.steps[2][k]
+    moved = np.zeros((m, n + 1, n + d.shape[1]))
+    moved[:, range(n), range(n)] = 1.0
+    _follow(path, moved, y, d)
+    by_state = np.concatenate([moved[:, :, :n], np.zeros((m, n + 1, 1))], axis=2)
+    return [Passage(by_state[i], moved[i, :, n:]) for i in range(m)]
 
 
 def _is_usual(path: Path, jump: Jump) -> bool:
