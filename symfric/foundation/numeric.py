@@ -4,6 +4,7 @@ CasADi's own functions turn an array into a DM column and NumPy's turn a DM into
 a law written with these keeps the type it was given.
 """
 
+import ctypes
 from collections.abc import Callable
 from math import erf as erf_of_float
 from numbers import Real
@@ -137,6 +138,13 @@ def evaluate_all(
                 place(i, flat_view(array))
     call()
     return [result.T for result in results]
+
+
+def address(array: NDArray[np.float64]) -> int:
+    """Where the numbers of a contiguous array begin, for compiled code."""
+    if array.flags.writeable and array.size:
+        return ctypes.addressof(ctypes.c_char.from_buffer(cast(Any, array)))  # a third of the time below
+    return array.ctypes.data
 
 
 def flat_view(array: NDArray[np.float64]) -> Any:

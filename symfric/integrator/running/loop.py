@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.numeric import address
 from symfric.integrator.equations.following import Following
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.running.crossings import Crossings
@@ -22,8 +23,8 @@ from symfric.integrator.running.search import search_source
 from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
-ROWS = 2048
-"""Accepted steps that a buffer holds."""
+MOST_ROWS, LEAST_ROWS, BYTES = 2048, 64, 2**20
+"""Accepted steps that a buffer holds, and its size in memory, which is kept between runs."""
 
 
 def width(n: int, dense_rows: int) -> int:
@@ -60,8 +61,10 @@ class Work:
         events: what is remembered of events; None of a model without any.
     """
 
-    def __init__(self, n: int, given: int, dense_rows: int, rows: int = ROWS) -> None:
+    def __init__(self, n: int, given: int, dense_rows: int, rows: int | None = None) -> None:
         self.n = n
+        if rows is None:
+            rows = max(LEAST_ROWS, min(MOST_ROWS, BYTES // (8 * width(n, dense_rows))))
         self.S, self.R = np.zeros(State.MEMORY + n), np.zeros(given)
         self.rows = np.empty((rows, width(n, dense_rows)))
         self.loop = Loop(
@@ -92,7 +95,7 @@ class Work:
         """Fill `outputs`, and carry out `events`."""
         loop, self.outputs, self.events = self.loop, outputs, events
         loop.n_times = outputs.times.size
-        loop.times, loop.out = outputs.times.ctypes.data, outputs.values.ctypes.data
+        loop.times, loop.out = address(outputs.times), address(outputs.values)
         if events is not None:
             loop.memory, loop.jumps, loop.max_jumps = events.pointers
 
