@@ -121,12 +121,12 @@ def recommended(
         error: wanted, relative to the size of the motion; between 0 and 1.
         t_end: end of the motion [s]; that of the scene.
         parameter: what is scaled, if it is not what the roles say (`regularisation`): stiffnesses
-            of bristles, else widths, else v_t. Several are scaled together, stiffnesses inversely.
+            of bristles, v_t, widths. Several are scaled together, stiffnesses inversely.
         exact: a law without regularisation, such as `ExactCoulomb`, to compare with instead of the
             limit of `law` itself. Then differences of their levels are errors that no width mends.
         of: what is compared: names of signals, or a function that takes numbers from a trajectory,
             such as the period of a cycle, where an error of phase would grow with time; by default
-            positions, or the states where nothing is called a position.
+            positions, which are the states of the machine that are no rates of others.
         u: inputs, as for `simulate`.
         rtol: relative tolerance that the law is going to be run with.
 
@@ -173,7 +173,12 @@ class _Search:
             self.give_up("the curve has not settled by then")
         try:
             self.runs.append(self.run(s, self.fine))
-        except (SolveError, ValueError) as problem:
+        except SolveError as problem:
+            if self.runs:
+                self.give_up(f"beyond: {problem}", problem)
+            given = f"recommended: {self.shown(s)}, where the search starts: {problem}"
+            raise SolveError(given, problem.status, problem.partial) from problem
+        except ValueError as problem:
             if not self.runs:
                 raise
             self.give_up(f"beyond: {problem}", problem)

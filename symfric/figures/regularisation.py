@@ -36,6 +36,7 @@ from symfric.integrator.equations.inputs import Input
 from symfric.integrator.simulate import simulate
 from symfric.laws import Law
 from symfric.laws.base.law import check_law
+from symfric.laws.base.sticking import Sticking
 from symfric.model import Model
 from symfric.model.kinds import POSITION
 from symfric.results.trajectory import Trajectory
@@ -61,8 +62,8 @@ class Regularisation:
     """The parameters that make `law` smooth, scaled together by a factor s; dry friction at s = 0.
 
     Attributes:
-        names: what is scaled: widths and velocities by s, stiffnesses and inverse velocities by
-            1/s, the damping of bristles by 1/sqrt(s), so that it stays the same part of critical.
+        names: what is scaled: widths, velocities and paths by s, stiffnesses and inverse
+            velocities by 1/s, the damping of bristles by 1/sqrt(s), the same part of critical.
     """
 
     law: Law
@@ -90,8 +91,8 @@ def regularisation(
 ) -> Regularisation:
     """What makes `law` smooth: `parameter`, or what its roles say.
 
-    Those are the stiffnesses of a law with bristles, and their damping; else its smoothing widths
-    [m/s]; else its transition velocity.
+    Those are the stiffnesses of bristles, their damping and the paths they remember, transition
+    velocities called v_t and smoothing widths [m/s]; of a law without these its only velocity.
 
     Raises:
         ValueError: no law, no such parameter, or several velocities that may be meant.
@@ -101,13 +102,19 @@ def regularisation(
     if parameter is not None:
         given = [parameter] if isinstance(parameter, str) else parameter
         return _numbers(where, law, checks.names(f"{where}: parameter", given, known))
+    if isinstance(law, Sticking) and law.has_mode:
+        raise ValueError(
+            f"{where}: law: expected a law that has to be made smooth, got {type(law).__name__}, "
+            "which rests exactly"
+        )
     scales = [n for n, p in known.items() if p.role == "velocity scale"]
     widths = [n for n, p in known.items() if p.role == "width" and p.unit in ("m/s", "rad/s")]
     widths = [n for n in widths if float(known[n].value) > NEGLIGIBLE]
     stiff = [n for n, p in known.items() if p.role == "stiffness"] if law.states else []
     stiff += [n for n, p in known.items() if stiff and p.role == "damping" and p.value != 0.0]
+    paths = [n for n, p in known.items() if p.role == "length"] if law.states else []
     named = [n for n in scales if known[n].field == "v_t"]
-    found = stiff or widths or named or scales
+    found = [*stiff, *paths, *named, *widths] or scales
     if not found:
         raise ValueError(
             f"{where}: law: expected a law with a width or a stiffness, got {type(law).__name__}, "
@@ -270,9 +277,12 @@ def _looked_at(bed: Bed, model: Model, run: Trajectory, law: Law) -> tuple[Array
         size = np.abs(rows)[:, 0]
         return rows, np.where(size > 0, size, 1.0)
     own = {state.name for state in law.states}
-    machine = [v.name for v in model.x if v.name not in own]
-    positions = [v.name for v in model.x if v.kind == POSITION]
-    names = bed.of or positions or machine
+    machine = [v for v in model.x if v.name not in own]
+    rates = {f"{v.unit}/s" for v in machine}
+    positions = [v.name for v in machine if v.kind == POSITION] or [
+        v.name for v in machine if v.unit not in rates
+    ]
+    names = bed.of or positions
     rows = np.array([run[name] for name in names])
     nominal = {v.name: v.nominal for v in model.x}
     least = STILL * np.array([nominal.get(name, 1.0) for name in names])
