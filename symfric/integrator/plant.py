@@ -100,17 +100,22 @@ class Plant:
 
         Args:
             u: inputs in the order of the model, shape (nu,) or (batch, nu); a number where there
-                is one input and one plant; or by name, with the others as they were. What was held
-                last by default; at first, that is where the model's inputs start.
+                is one input and one plant; or by name, where a number serves for all plants and the
+                others stay as they were. By default what was held last; at first, that is where the
+                model's inputs start.
 
         Raises:
             ValueError: unknown names, another shape, no finite numbers; nothing has happened.
             SolveError: a plant did not get to its sample; `failed` says which one and why, and
-                `partial` holds the states. `reset` it, or have it go on to that sample
-                from where it stands, with other inputs.
+                `partial` holds the states. `reset` it, or have it go on to that
+                sample from where it stands, with other inputs.
         """
         if u is not None:
-            self._take(u)
+            try:
+                self._take(u)
+            except ValueError:
+                self._hold_on()
+                raise
         if self._fresh:
             self._settle()
         self._seen = False
@@ -166,6 +171,9 @@ class Plant:
         other = Plant(self._integrator, plants, self._backend, self._batch, self._tolerance)
         other._fresh, other.failed = dict(self._fresh), dict(self.failed)
         return other
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Plant":
+        return self.copy()
 
     @property
     def t(self) -> Any:
@@ -231,20 +239,28 @@ class Plant:
         if isinstance(u, Mapping):
             for name, value in self.model.named("u", u).items():
                 i = next(k for k, v in enumerate(self.model.u) if v.name == name)
-                self._write(f"{where}: {name}", own[..., i : i + 1], value)
+                self._write(f"{where}: {name}", own[..., i : i + 1], value, common=True)
         else:
             self._write(where, own, u)
 
-    def _write(self, where: str, place: Array, value: Any) -> None:
-        shape = np.shape(value)
-        single = place.shape[-1] == 1 and shape == place.shape[:-1]
-        if shape != place.shape and not single:
+    def _write(self, where: str, place: Array, value: Any, common: bool = False) -> None:
+        """Write `value` to its `place`; `common` is a number for all plants."""
+        given = np.asarray(value)
+        single = place.shape[-1] == 1 and given.shape == place.shape[:-1]
+        if given.dtype.kind not in "fiub":
+            raise checks.refused(where, "numbers", value)
+        if given.shape == place.shape or (common and not given.ndim):
+            place[...] = given
+        elif single:
+            place[..., 0] = given
+        else:
             or_ = f" or {place.shape[:-1]}" if place.shape[-1] == 1 else ""
-            raise ValueError(f"{where}: expected shape {place.shape}{or_}, got {shape}")
-        try:
-            place[...] = np.reshape(value, place.shape) if single else value
-        except (TypeError, ValueError):
-            raise checks.refused(where, "numbers", value) from None
+            raise ValueError(f"{where}: expected shape {place.shape}{or_}, got {given.shape}")
+
+    def _hold_on(self) -> None:
+        """Forget what was to be held next."""
+        plants = self._plants
+        plants.u[:] = plants.R[:, plants.R.shape[1] - plants.u.shape[1] :]
 
     def _settle(self) -> None:
         """Let plants that have not moved yet start with the inputs that they are to hold."""
@@ -265,7 +281,7 @@ class Plant:
         plants = self._plants
         if short == REFUSED:
             given = self._u.tolist()
-            plants.u[:] = plants.R[:, plants.R.shape[1] - plants.u.shape[1] :]
+            self._hold_on()
             where = f"plant of '{self.model.name}': u"
             raise checks.refused(where, "finite numbers", given)
         lost: dict[int, tuple[Status, str]] = {}
@@ -322,7 +338,8 @@ class Plant:
         if members is None:
             return list(range(count))
         where = f"plant of '{self.model.name}': reset: members"
-        found = [checks.count(where, b, least=0, most=count - 1) for b in members]
+        every = checks.many(where, members, "numbers of plants")
+        found = [checks.count(where, b, least=0, most=count - 1) for b in every]
         if len(set(found)) < len(found):
             raise ValueError(f"{where}: expected different numbers, got {found}")
         return found

@@ -1,5 +1,6 @@
 """Plants from sample to sample: the bits of `simulate`, many at once, what stands in the way."""
 
+import copy
 import sys
 from typing import Any
 
@@ -137,7 +138,7 @@ def test_a_copy_goes_its_own_way() -> None:
     assert (one.x == at).all()
     assert apart[0] < at[0]
     assert (one.t, other.t) == pytest.approx((0.1, 0.2))
-    np.testing.assert_array_equal(one.copy().step(2.0), one.step(2.0))
+    np.testing.assert_array_equal(copy.deepcopy(one).step(2.0), one.step(2.0))
 
 
 def test_what_step_returns_is_not_written_again() -> None:
@@ -172,8 +173,12 @@ def test_inputs_come_by_name_as_numbers_and_as_arrays() -> None:
     assert plant.step({"a": 1.0}) == pytest.approx([11.0])
     assert plant.step([2.0, 0.0]) == pytest.approx([13.0])
     assert plant.step({"b": np.float32(1.0)}) == pytest.approx([25.0])
+    with pytest.raises(ValueError, match="u: b: expected numbers"):
+        plant.step({"a": 7.0, "b": "c"})
+    assert plant.step() == pytest.approx([37.0])
     many = stepper(model, 1.0, batch=2, backend="vm")
     assert many.step({"a": [1.0, 2.0]})[:, 0] == pytest.approx([6.0, 7.0])
+    assert many.step({"a": 1.0})[:, 0] == pytest.approx([12.0, 13.0])
     nothing = stepper(Model("decay", x=(x,), ode=-x.symbol), 1.0, x0={"x": 1.0}, backend="vm")
     assert nothing.step() == pytest.approx([np.exp(-1)], rel=1e-5)
 
@@ -236,6 +241,8 @@ def test_attempts_are_bounded(backend: str) -> None:
         ({"force": [1.0, 2.0]}, "u: force: expected shape"),
         (float("nan"), "u: expected finite numbers"),
         ("a", "u: expected numbers"),
+        (1j, "u: expected numbers"),
+        ([[1.0]], "u: expected shape"),
     ],
 )
 @each_backend
