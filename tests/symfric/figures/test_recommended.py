@@ -69,8 +69,8 @@ def test_curve_holds_the_runs_and_is_drawn(found: Recommendation, tmp_path: Path
 
 
 def test_a_law_that_is_too_dry_is_softened() -> None:
-    wide = recommended(BrownMcPhee(v_t=1e-7), Rabinowicz, 0.1, of=["x"])
-    assert 1e-5 < wide.values["v_t"] < 1e-3
+    wide = recommended(BrownMcPhee(v_t=1e-5), Rabinowicz, 0.1)
+    assert 3e-5 < wide.values["v_t"] < 1e-3
     assert wide.error <= 0.1
 
 
@@ -109,6 +109,7 @@ def test_another_law_as_the_truth_is_not_met_by_other_levels() -> None:
     assert told.error <= 0.01
 
 
+@pytest.mark.slow
 def test_what_the_integrator_adds_is_told_apart() -> None:
     with pytest.raises(SolveError, match=r"with rtol = 1e-05 the run at v_t = .*tighten rtol"):
         recommended(LAW, SliderCrank(LAW, omega=1.0), 1e-7, t_end=0.5, rtol=1e-5)
