@@ -98,7 +98,8 @@ def simulate(
             that is predicted to pay, and goes over to it, in this run or a later one, when it is
             there. So do signals. Both give the same bits. Integrators of others have a door of
             their own, `simulate_by_peer`.
-        event_tolerance: how sharply events are located [s].
+        event_tolerance: events this near [s] happen together; they are located to a thousandth of
+            it, or to rounding.
         max_steps: attempts allowed.
         max_step: longest step [s]; none by default. For what error control cannot see coming: a
             model with short events of its own, such as a function of time in its equations.

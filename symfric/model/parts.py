@@ -56,8 +56,8 @@ class Event:
 
     A jump counts, of an input or by the reset of another event, if it leads beyond zero. Error
     control does not look at the expression, and each step is looked at in quarters: one that
-    returns within a quarter of a step is not seen, unless the equations depend on it. Steps follow
-    the pace of expressions in time alone.
+    returns within a quarter of a step is not seen, unless the equations depend on it, nor is one
+    that was not finite before. Steps follow the pace of expressions in time alone.
 
     Attributes:
         expression: in t, x, z, u, p.
