@@ -243,7 +243,9 @@ class Model:
         A start value that is an expression (a bristle at steady state depends on the sliding
         velocity) is evaluated with the given values of the other states and parameters.
         """
-        if not given and not p:
+        if not given and not (p and self._start_by_p):
+            if p:
+                self.values("p", p)
             return self._default_state.copy()
         return self._checked(evaluate(self._start, *self._start_arguments(given, p)))
 
@@ -302,6 +304,11 @@ class Model:
     @cached_property
     def _default_state(self) -> NDArray[np.float64]:
         return self._checked(evaluate(self._start, *self._start_arguments(None, None)))
+
+    @cached_property
+    def _start_by_p(self) -> bool:
+        """Whether start values depend on parameters."""
+        return self._start.jac_sparsity(0, 3).nnz() > 0
 
     @cached_property
     def _start(self) -> ca.Function:
