@@ -25,7 +25,7 @@ from symfric.integrator.methods.suited import suited
 from symfric.integrator.running.crossings import Crossings, crossings
 from symfric.integrator.running.engine import BATCH, CompiledEngine, Engine, VmEngine
 from symfric.integrator.running.loop import Work, loop_source
-from symfric.integrator.step.attempt import build_step
+from symfric.integrator.step.written import written
 from symfric.model import Model
 
 Array = NDArray[np.float64]
@@ -75,10 +75,7 @@ class Integrator:
     def __post_init__(self) -> None:
         begin = perf_counter()
         self.system: System = self.whole or system(self.model, self.inputs)
-        self.step = build_step(self.system, self.tableau)
-        self.instructions = self.step.n_instructions()
-        if self.instructions > INLINE:
-            self.step = build_step(self.system, self.tableau, ca.MX)
+        self.step, self.instructions = written(self.system, self.tableau, INLINE)
         self.f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
         self.events = self._event_function()
         self.resets = self._reset_function()
