@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symfric import LuGre, drive, simulate
+from symfric import LuGre, Viscous, drive, simulate
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.compiled import compiler
 from symfric.integrator.equations import constants
@@ -84,7 +84,7 @@ def test_twenty_amplitudes_are_one_integrator_and_one_call_of_the_compiler(
         Integrator, "__post_init__", lambda self: builds.append(self.model.name) or build(self)
     )
     monkeypatch.setattr(compiler, "_made", lambda *a: compilations.append(a[1]) or make(*a))
-    backend, model = "vm" if find_compiler() is None else "compiled", drive(LuGre())
+    backend, model = "vm" if find_compiler() is None else "compiled", drive(Viscous())
     ends = set[float]()
     for k in range(20):
         given = driven(2.0 + k, 5.0 + k)

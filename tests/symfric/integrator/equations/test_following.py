@@ -16,7 +16,7 @@ from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.following import Following, following
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.system import System
-from symfric.scenes import FourMass, PendulumBox, SliderCrank
+from symfric.scenes import Pendulum, PendulumBox, SliderCrank
 
 Array = NDArray[np.float64]
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
@@ -26,7 +26,7 @@ x, z = Variable("x", "m", start=1.0), Variable("z", "1")
 MACHINES: dict[str, Callable[[], Model]] = {
     "joint": lambda: PendulumBox(LAW).model(),
     "loop": lambda: SliderCrank(LAW).model(),
-    "chart": lambda: FourMass(LAW).mechanism().build(formulation="absolute", index=0),
+    "chart": lambda: Pendulum(LAW).mechanism().build(formulation="absolute", index=0),
 }
 
 

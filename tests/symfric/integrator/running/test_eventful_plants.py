@@ -37,7 +37,7 @@ def ball(restitution: float = 0.5, terminal: bool = False) -> Model:
 def test_events_are_those_of_one_simulation(backend: str) -> None:
     """A block that is pushed beyond break-away, comes to rest, and breaks away again."""
     model, dt, rng = drive(ExactCoulomb()), 2e-3, np.random.default_rng(0)
-    held = np.cumsum(rng.normal(size=1000)) * 0.3
+    held = np.cumsum(rng.normal(size=400)) * 0.4
     t = np.arange(held.size + 1) * dt
     run = simulate(model, t[-1], u={"force": Hold(t[:-1], held)}, t_eval=t[1:], backend="auto")
     plant, found, happened = stepper(model, dt, backend=backend), [], []
