@@ -19,7 +19,6 @@ OWN: dict[str, tuple[Callable[[], Model], Callable[[Any], Any]]] = {
     "linear": (oscillator, lambda rows: Linear([0.0, 0.3, 0.7], rows)),
     "held, algebraic unknowns follow": (switched, lambda rows: Hold([0.0, 0.3, 0.7], rows)),
     "linear, algebraic unknowns follow": (switched, lambda rows: Linear([0.2, 0.3, 0.7], rows)),
-    "numbers, events": (lambda: kicked(), lambda rows: rows[:, 0]),
     "linear, events": (lambda: kicked(), lambda rows: Linear([0.0, 0.3, 0.7], rows)),
 }
 
