@@ -3,6 +3,7 @@
 Where the line of a mutant is rewritten, rewrite the mutant: `tests/test_mutants.py` says so.
 """
 
+from mutants.dry import DRY
 from mutants.ensembles import ENSEMBLES
 from mutants.mutant import Mutant
 from mutants.plants import PLANTS
@@ -396,5 +397,5 @@ LEFT_OUT = (
 
 MUTANTS = (
     *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
-    *CACHES, *ENSEMBLES, *LEFT_OUT, *PLANTS, *REGULARISATION,
+    *CACHES, *DRY, *ENSEMBLES, *LEFT_OUT, *PLANTS, *REGULARISATION,
 )  # fmt: skip

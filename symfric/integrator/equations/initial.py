@@ -34,6 +34,10 @@ Follow = Callable[[Array, Array], Array | None]
 """(y, d) -> y with its algebraic unknowns; None where it takes a search."""
 
 
+class JammedError(ValueError):
+    """Algebraic equations that friction leaves without a solution of the machine."""
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Equations:
@@ -97,7 +101,7 @@ def consistent(
     if manifold is not None and manifold.charted:
         y = _charted(manifold, y, d)
     if manifold is not None and (cause := jammed(manifold, system.names, y, d)):
-        raise ValueError(f"{where}: {cause}")
+        raise JammedError(f"{where}: {cause}")
     return y
 
 

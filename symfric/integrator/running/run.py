@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.status import Status
-from symfric.integrator.equations.initial import consistent, first_step, smallest_step
+from symfric.integrator.equations.initial import JammedError, consistent, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.onsets import pace
 from symfric.integrator.running.diagnosis import explain
@@ -302,4 +302,5 @@ class _March:
         try:
             self.y[:] = consistent(self.integrator.system, where, self.y, self.d)
         except ValueError as error:
-            self.run.stop(Status.SINGULAR, str(error))
+            jams = isinstance(error, JammedError)
+            self.run.stop(Status.JAMMED if jams else Status.SINGULAR, str(error))

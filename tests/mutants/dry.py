@@ -1,0 +1,37 @@
+"""Mutants of dry friction in mechanisms."""
+
+from mutants.mutant import Mutant
+
+APPLIED, SLIPS = "symfric/multibody/applied.py", "symfric/multibody/slips.py"
+INITIAL = "symfric/integrator/equations/initial.py"
+TESTS = ("tests/symfric/multibody/test_applied.py",)
+
+DRY = (
+    Mutant(
+        "rest keeps what rounding left of its velocity", APPLIED,
+        "change = self.change + self.rate / CALM if self.by_modes else self.change",
+        "change = self.change", TESTS,
+    ),
+    Mutant(
+        "what holds contacts without a load shows in their shares", APPLIED,
+        "UNLOADED = 1e-12", "UNLOADED = 1e-3", TESTS,
+    ),
+    Mutant(
+        "contacts of a loop share its load by how far they move", APPLIED,
+        "signs = [forward(g) if self.by_modes else g for g in self.along]",
+        "signs = [g for g in self.along]", TESTS,
+    ),
+    Mutant(
+        "a contact in its dead centre goes on as before", SLIPS,
+        "turn = {name: -symbols[name] for name in names}",
+        "turn = {name: symbols[name] for name in names}", TESTS,
+    ),
+    Mutant(
+        "a loop that breaks away slides one way only", SLIPS,
+        "onward = forward(T)", "onward = ca.SX(1.0)", TESTS,
+    ),
+    Mutant(
+        "rest is sought by damped Newton alone", INITIAL,
+        "if manifold is None or not manifold.applied:", "if True:", TESTS,
+    ),
+)  # fmt: skip
