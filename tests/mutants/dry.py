@@ -1,12 +1,14 @@
-"""Mutants of dry friction in mechanisms."""
+"""Mutants of smooth laws and of dry friction, in mechanisms above all."""
 
 from mutants.mutant import Mutant
+from mutants.regularisation import REGULARISATION
 
 APPLIED, SLIPS = "symfric/multibody/applied.py", "symfric/multibody/slips.py"
 INITIAL = "symfric/integrator/equations/initial.py"
 TESTS = ("tests/symfric/multibody/test_applied.py",)
 
 DRY = (
+    *REGULARISATION,
     Mutant(
         "rest keeps what rounding left of its velocity", APPLIED,
         "change = self.change + self.rate / CALM if self.by_modes else self.change",

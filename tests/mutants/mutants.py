@@ -7,7 +7,6 @@ from mutants.dry import DRY
 from mutants.ensembles import ENSEMBLES
 from mutants.mutant import Mutant
 from mutants.plants import PLANTS
-from mutants.regularisation import REGULARISATION
 
 STEP = "symfric/integrator/step/attempt.py"
 WATCH = "symfric/integrator/step/watch.py"
@@ -397,5 +396,5 @@ LEFT_OUT = (
 
 MUTANTS = (
     *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
-    *CACHES, *DRY, *ENSEMBLES, *LEFT_OUT, *PLANTS, *REGULARISATION,
+    *CACHES, *DRY, *ENSEMBLES, *LEFT_OUT, *PLANTS,
 )  # fmt: skip
