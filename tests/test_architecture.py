@@ -58,6 +58,7 @@ FLOORS: dict[str, set[str]] = {
         "symfric.integrator.step",
     },
     "symfric.integrator.derivatives": {
+        "symfric.integrator.many",
         "symfric.foundation",
         "symfric.model",
         "symfric.integrator.compiled",

@@ -1,6 +1,6 @@
 """A Function applied to many columns, or step after step, without Python in between."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
@@ -33,11 +33,13 @@ class Columns:
         function: of dense columns.
         chained: the first result of a column is the first argument of the next one.
         spent: time [s] in the virtual machine.
+        source: C of the function and the loop over rows, where it is not `rows_source`.
     """
 
     function: ca.Function
     chained: bool = False
     spent: float = 0.0
+    source: Callable[[], str] | None = None
 
     @property
     def size(self) -> int:
@@ -57,7 +59,7 @@ class Columns:
     @cached_property
     def _prospect(self) -> Prospect:
         n = self.function.n_instructions()
-        return Prospect(lambda: rows_source(self._dense), (NAME,), n)
+        return Prospect(self.source or (lambda: rows_source(self._dense)), (NAME,), n)
 
     @cached_property
     def _compiled(self) -> Rows:

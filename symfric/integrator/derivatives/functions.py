@@ -1,7 +1,7 @@
 """The Functions that differentiate the steps of an integrator, and what happens between them."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import final
 from weakref import WeakKeyDictionary
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.compiled.columns import Columns
+from symfric.integrator.derivatives.lanes import lanes_source
 from symfric.integrator.derivatives.seeds import Seeds
 from symfric.integrator.equations.branches import branchless
 from symfric.integrator.equations.quotients import divided_once
@@ -54,23 +55,40 @@ class Derivatives:
         """
         key = (linked, *which.parameters)
         if key not in self._forward:
-            n, names = self.system.n, len(which.names)
-            y, h, d = self.symbols
-            X, of_d = ca.SX.sym("X", n + linked, names), ca.DM(which.of_data(d.numel()))
-            of_h = -X[n, :] if linked else ca.SX(1, names)
-            pushed = self.step.forward(names)(
-                y, h, d, self.step(y, h, d), X[:n, :], of_h, ca.SX(ca.sparsify(of_d))
-            )
-            parts, behind, more = ca.vertsplit(pushed, n), pushed[:n, :], list[ca.SX]()
+            one, names = self._by_one(linked), len(which.names)
+            single, *steps = one.sx_in()
+            of_d = ca.DM(which.of_data(steps.pop(3).numel()))
+            X = ca.SX.sym("X", single.numel(), names)
             if linked:
-                more = [*self._link(len(parts)), ca.SX.sym("by_data", n + 1, names)]
-                share, fall, by_state, by_data = more
-                F = sum((share[i + 1] * part for i, part in enumerate(parts)), share[0] * X[:n, :])
-                behind = by_state.T @ (F + fall @ X[n, :]) + by_data
-            column = ca.densify(ca.vertcat(*map(ca.vec, parts)))
-            function = fast("forward", [X, y, h, d, *more], [ca.densify(behind), column])
-            self._forward[key] = Columns(function, chained=True)
+                steps[-1] = ca.SX.sym("by_data", single.numel(), names)
+            behind, columns = list[ca.SX](), list[ca.SX]()
+            for i in range(names):
+                own = [*steps[:-1], steps[-1][:, i]] if linked else steps
+                found = one(X[:, i], *own[:3], ca.SX(ca.sparsify(of_d[:, i])), *own[3:])
+                behind.append(found[0])
+                columns.append(ca.reshape(found[1], self.system.n, -1))
+            parts = zip(*map(ca.horzsplit, columns), strict=True)
+            column = ca.vertcat(*(part for every in parts for part in every))
+            results = ca.cse([ca.densify(ca.horzcat(*behind)), ca.densify(column)])
+            function = ca.Function("forward", [X, *steps], results)
+            source = partial(lanes_source, one, of_d.full()) if names > 1 else None
+            self._forward[key] = Columns(function, chained=True, source=source)
         return self._forward[key]
+
+    def _by_one(self, linked: bool) -> ca.Function:
+        """(X, y, h, d, d', ...) -> the same by one name, with the derivatives d' of d by it."""
+        n, (y, h, d) = self.system.n, self.symbols
+        X, of_d = ca.SX.sym("X", n + linked), ca.SX.sym("of_d", d.numel())
+        of_h = -X[n:] if linked else ca.SX(1, 1)
+        pushed = self.step.forward(1)(y, h, d, self.step(y, h, d), X[:n], of_h, of_d)
+        parts, behind, more = ca.vertsplit(pushed, n), pushed[:n], list[ca.SX]()
+        if linked:
+            more = [*self._link(len(parts)), ca.SX.sym("by_data", n + 1)]
+            share, fall, by_state, by_data = more
+            F = sum((share[i + 1] * part for i, part in enumerate(parts)), share[0] * X[:n])
+            behind = by_state.T @ (F + fall * X[n]) + by_data
+        results = [ca.densify(behind), ca.densify(pushed)]
+        return fast("one", [X, y, h, d, of_d, *more], results)
 
     def _link(self, parts: int) -> list[ca.SX]:
         """Arguments share, fall, by_state transposed of a link behind a step with these results."""
