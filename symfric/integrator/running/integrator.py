@@ -97,7 +97,7 @@ class Integrator:
     def _event_function(self) -> ca.Function:
         """Event expressions as a Function (t, y, d)."""
         values = stacked(ca.SX(e.expression) for e in self.model.events)
-        return self.of_time("events", values)
+        return self.of_time("events", ca.densify(values))
 
     def _reset_function(self) -> ca.Function:
         """Values of all resets, event after event, as a Function (t, y, d)."""

@@ -9,6 +9,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.numeric import evaluate
 from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import JammedError, consistent, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData
@@ -281,7 +282,7 @@ class _March:
             return
         events = self.integrator.model.events
         if any(event.at_start for event in events):
-            now = self.integrator.events(self.t, self.y, self.d).full().ravel()
+            now = evaluate(self.integrator.events, self.S[State.T : State.T + 1], self.y, self.d)
             signs = (-e.direction if e.at_start else x for e, x in zip(events, now, strict=True))
             self.events.jumped(np.array(list(signs)))
 
