@@ -149,6 +149,14 @@ class Run:
         first = np.abs(found[0].y0[0]) if self._before is None else self._before.largest
         return np.max([first, *(np.abs(p.y1).max(axis=0) for p in found)], axis=0)
 
+    def reaches(self, unknown: int, size: float) -> bool:
+        """Whether an unknown is that large at the start or at the end of a step."""
+        found = self._pieces()
+        first = np.abs(found[0].y0[0]) if self._before is None else self._before.largest
+        return bool(first[unknown] >= size) or any(
+            np.abs(p.y1[:, unknown]).max() >= size for p in found
+        )
+
     def at(self, times: Array) -> Array:
         """Unknowns at `times` [s], shape (n, times), of a long run as outputs of another one."""
         if self.again is None or "dense" in self.__dict__:

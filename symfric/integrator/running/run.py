@@ -83,7 +83,7 @@ def integrate(
         tolerances = replace(tolerances, max_step=min(tolerances.max_step, PACES * quickest))
     scale, allowed = nominal, tolerances
     run = _integrated(integrator, inputs, y0, p, allowed, backend, progress, times)
-    for _ in range(ROUNDS if tolerances.follow and not ample(run.end, nominal) else 0):
+    for _ in range(ROUNDS if tolerances.follow and not ample(run, nominal) else 0):
         own = finer(scale, run.largest[: nominal.size], nominal)
         if own is None or not run.status.ok:
             break

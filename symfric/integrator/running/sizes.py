@@ -8,6 +8,8 @@ nanometre not at all. So a run that turns out to be that small is run again on i
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.integrator.running.record import Run
+
 Array = NDArray[np.float64]
 SMALL, REST = 1e-3, 1e-12
 """Sizes, in nominal values, below which a motion has a scale of its own and is none any more: what
@@ -17,11 +19,14 @@ ROUNDS = 3
 """How often: a motion that was not resolved at all may have been taken for a larger one."""
 
 
-def ample(end: Array, nominal: Array) -> bool:
-    """Whether no state ends small: what most runs do, told without a look at all their steps."""
-    # few numbers, seldom all: quicker than by NumPy
-    ends = zip(end.tolist(), nominal.tolist(), strict=False)
-    return all(abs(size) >= SMALL * typical for size, typical in ends)
+def ample(run: Run, nominal: Array) -> bool:
+    """Whether no state of a run is small all the time: most do not even end small."""
+    # few numbers: quicker than by NumPy
+    ends = zip(run.end.tolist(), nominal.tolist(), strict=False)
+    return all(
+        abs(end) >= SMALL * typical or run.reaches(i, SMALL * typical)
+        for i, (end, typical) in enumerate(ends)
+    )
 
 
 def own_scale(size: Array, nominal: Array) -> Array:
