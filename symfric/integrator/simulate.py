@@ -91,8 +91,9 @@ def simulate(
             within a step, so that no slip is lost even at rtol = 1e-3; error a tenth of rtol, for
             1.5 to 2 times the steps. Between steps of order 4.
             "dopri5": order 5, explicit, for ODEs that are not stiff: orbits, pendulums, contacts
-            that only slide. Bristles and sticking cost it 20 to 100 times the steps. No cheap
-            criterion proves an equation not to be stiff, so it is never chosen by itself.
+            that only slide, and mechanisms without friction from reactions, of which multipliers
+            have no error estimate. Bristles and sticking cost it 20 to 100 times the steps. No
+            cheap criterion proves an equation not to be stiff, so it is never chosen by itself.
         backend: the engine: "vm" needs no compiler; "compiled" compiles the step once and keeps
             it in the user's cache; "auto" starts in the former, has the step compiled beside when
             that is predicted to pay, and goes over to it, in this run or a later one, when it is

@@ -6,6 +6,7 @@ from typing import Any, ClassVar, final
 import casadi as ca
 import numpy as np
 
+from symfric.integrator.equations.eliminated import Eliminated, eliminated
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import Array, Method, Trial, Trials, combination, need_ode
 
@@ -17,7 +18,9 @@ class Explicit(Method):
 
         k_i = h f(y_0 + sum_j a_ij k_j),      i = 1 ... s
 
-    y_1 is the last stage's argument, sum_j e_j k_j the error estimate.
+    y_1 is the last stage's argument, sum_j e_j k_j the error estimate. Accelerations and
+    multipliers of mechanisms without friction from reactions are solved for at each stage
+    (`eliminated`): they have no error estimate, and are interpolated linearly between steps.
 
     Attributes:
         A: strictly lower triangular, shape (s, s).
@@ -39,14 +42,18 @@ class Explicit(Method):
 
     def work(self, system: System) -> tuple[int, int, int]:
         """Right-hand sides, Jacobians and factorisations of a step."""
-        return self.stages, 0, 0
+        return self.stages, 0, 0 if system.is_ode else self.stages
 
     def trials(self, system: System) -> Trials:
         """Its steps on a system.
 
         Raises:
-            ValueError: algebraic unknowns, or a mass matrix other than the identity.
+            ValueError: algebraic unknowns other than those of a mechanism in which they are
+                linear, or a mass matrix.
         """
+        linear = None if system.is_ode else eliminated(system)
+        if linear is not None:
+            return self._eliminating(linear)
         need_ode(system, self.name)
         f = system.in_steps(ca.Function("f", [system.y, system.d], [system.f], {"cse": True}))
 
@@ -56,6 +63,20 @@ class Explicit(Method):
             for i in range(self.stages):
                 argument = y + combination(self.A[i, :i], k, type(y))
                 k.append(h * f(argument, d))
+            dense = tuple(combination(row, k, type(y)) for row in self.H)
+            return Trial(argument, combination(self.E, k, type(y)), dense)
+
+        return trial
+
+    def _eliminating(self, linear: Eliminated) -> Trials:
+        """Its steps on states, with algebraic unknowns solved for at each stage."""
+
+        def trial(y: Any, h: Any, d: Any) -> Trial:
+            k: list[Any] = []
+            argument = y
+            for i in range(self.stages):
+                argument = linear.settle(y + combination(self.A[i, :i], k, type(y)), d)
+                k.append(h * linear.rates(argument, d))
             dense = tuple(combination(row, k, type(y)) for row in self.H)
             return Trial(argument, combination(self.E, k, type(y)), dense)
 

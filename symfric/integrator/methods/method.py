@@ -113,5 +113,5 @@ def need_ode(system: System, method: str) -> None:
     found = f"the algebraic unknowns {unknown}" if unknown else "a mass matrix"
     raise ValueError(
         f"method {method}: expected an ODE x' = f(x), got {found}; use an implicit method such as "
-        "rodas5p"
+        "rodas5p, also for mechanisms with friction from reactions"
     )
