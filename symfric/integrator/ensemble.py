@@ -228,7 +228,8 @@ def _ends(t_end: float | ArrayLike) -> float | Array:
     number = checks.as_number(t_end)
     if number is not None or isinstance(t_end, str | type):
         return checks.number("simulate_many: t_end", t_end, unit="s")
-    ends = checks.array("simulate_many: t_end", t_end)
+    what = "a number of seconds, or a sequence with that of each member"
+    ends = checks.array("simulate_many: t_end", t_end, what=what)
     if not ends.size:
         raise ValueError("simulate_many: expected at least one member, got empty arrays")
     return ends

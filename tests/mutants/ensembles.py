@@ -5,6 +5,7 @@ from mutants.mutant import Mutant
 STORE = "symfric/integrator/many/store.py"
 LOOP, LANES = "symfric/integrator/many/loop.h", "symfric/integrator/many/lanes.h"
 T_LANES = ("tests/symfric/integrator/many/test_vectors.py",)
+T_GIVEN = ("tests/symfric/integrator/many/test_given.py",)
 T_STORE = ("tests/symfric/integrator/many/test_store.py",)
 
 ENSEMBLES = (
@@ -33,6 +34,16 @@ ENSEMBLES = (
     Mutant(
         "a value is lost between parts of vector code", "symfric/integrator/many/vectors.py",
         "if self.last.get(i, k) > k:", "if self.last.get(i, k) > k + 1:", T_LANES,
+    ),
+    Mutant(
+        "a member that ends early runs on to the next break", LOOP,
+        "return k >= all->intervals || all->breaks[k] >= all->ends[x->member[l]];",
+        "return k >= all->intervals;", T_GIVEN,
+    ),
+    Mutant(
+        "all members get the inputs of the first", LOOP,
+        "const double *data = all->data + m * all->data_step;",
+        "const double *data = all->data;", T_GIVEN,
     ),
     Mutant(
         "members go into the rows before theirs", STORE,

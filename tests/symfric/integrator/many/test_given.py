@@ -122,3 +122,4 @@ def test_mechanisms_start_together(backend: str, monkeypatch: pytest.MonkeyPatch
         run = simulate(model, 0.5, x0={"x": x}, t_eval=[0.0, 0.5], backend=backend)
         for name in model.signals:
             assert many[name][m] == pytest.approx(run[name], rel=1e-7, abs=1e-9), name
+        assert many.attempts[m] == run.statistics.steps + run.statistics.rejections
