@@ -232,6 +232,30 @@ def test_end_of_a_run_that_an_event_ends_has_a_derivative() -> None:
     assert run.sensitivities["p"]["x"] == pytest.approx(run.t)
 
 
+def test_event_in_the_very_step_that_another_one_began() -> None:
+    """x = p t reaches 1, and 2e-8 s later another mark; at both y' = y jumps by p x."""
+    x, y = Variable("x", "1"), Variable("y", "1")
+    p = Variable("p", "1/s", start=2.0)
+    gap = 4e-8
+    events = tuple(
+        Event(name, x.symbol - mark, reset={"y": y.symbol + x.symbol * p.symbol})
+        for name, mark in (("first", 1.0), ("second", 1.0 + gap))
+    )
+    model = Model("marks", x=(x, y), p=(p,), ode=ca.vertcat(p.symbol, y.symbol), events=events)
+    times = np.array([0.25, 0.5 + 1e-8, 0.75])
+    run = simulate(model, 1.0, t_eval=times, rtol=1e-9, sensitivities=["p", "x0.x"])
+    assert run.event_sensitivities["p"] == pytest.approx([-0.25, -0.25], rel=1e-6)
+    assert run.event_sensitivities["x0.x"] == pytest.approx([-0.5, -0.5], rel=1e-6)
+    assert run.sensitivities["p"]["x"] == pytest.approx(times)
+    assert run.sensitivities["x0.x"]["x"] == pytest.approx(1.0)
+    # y = p exp(t - 1/p) after the first one, twice that after the second one
+    growth = np.exp(times - 0.5)
+    by_p = np.array([0.0, 1.0, 2.0]) * (1 + 2 / 4) * growth
+    assert run.sensitivities["p"]["y"] == pytest.approx(by_p, rel=1e-6)
+    gradient = run.gradient({"x": np.ones(3), "y": np.ones(3)})
+    assert gradient["p"] == pytest.approx((times + by_p).sum(), rel=1e-6)
+
+
 def test_event_that_another_one_brings_about_moves_along() -> None:
     """x = 1 lets y jump over zero, which lets z take the value of t: z = 1/p."""
     t = ca.SX.sym("t")
