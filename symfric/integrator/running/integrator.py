@@ -189,9 +189,11 @@ class Integrator:
         if not self.follows:
             return y
         key = (y.tobytes(), d.tobytes())
-        if key not in self._starts:
-            self._starts = {key: self.consistent(f"model '{self.model.name}'", y, d)}
-        return self._starts[key]
+        found = self._starts.get(key)
+        if found is None:  # another thread may remember another one meanwhile
+            found = self.consistent(f"model '{self.model.name}'", y, d)
+            self._starts = {key: found}
+        return found
 
     def consistent(self, where: str, y: Array, d: Array) -> Array:
         """`y` with consistent algebraic unknowns.
@@ -228,7 +230,7 @@ class Integrator:
             whole = suited(self.system, self.tableau, consistent_at, span)
             found = self if whole is self.system else self._other(whole)
             while len(self._judged) >= JUDGED:
-                del self._judged[next(iter(self._judged))]
+                self._judged.pop(next(iter(self._judged)), None)
             self._judged[key] = found
         return found
 
