@@ -3,6 +3,7 @@
 Where the line of a mutant is rewritten, rewrite the mutant: `tests/test_mutants.py` says so.
 """
 
+from mutants.beside import BESIDE
 from mutants.derivatives import DERIVATIVES
 from mutants.dry import DRY
 from mutants.ensembles import ENSEMBLES
@@ -371,10 +372,8 @@ LEFT_OUT = (
         "code of a compiler that was replaced is loaded", COMPILED,
         "flags, binary.st_size, binary.st_mtime_ns)", "flags)", T_COMPILED,
     ),
-    Mutant(
-        "code compiled with other flags is loaded", COMPILED,
-        "(compiler.command, flags,", "(compiler.command,", T_COMPILED,
-    ),
+    Mutant("code compiled with other flags is loaded", COMPILED, "(compiler.command, flags,",
+        "(compiler.command,", T_COMPILED),
     Mutant(
         "gaps that grow again are a storm", EVENTS,
         "return b < a and c < b and", "return", T_EVENTS,
@@ -392,5 +391,5 @@ LEFT_OUT = (
 
 MUTANTS = (
     *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
-    *CACHES, *DRY, *ENSEMBLES, *LEFT_OUT, *DERIVATIVES, *PLANTS,
+    *BESIDE, *CACHES, *DRY, *ENSEMBLES, *LEFT_OUT, *DERIVATIVES, *PLANTS,
 )  # fmt: skip
