@@ -3,8 +3,8 @@
 The step-size controller takes no part (internal numerical differentiation), so the derivatives are
 those of the discrete solution and exact to rounding. An event moves with what is differentiated:
 the step that it cuts ends, and the next one begins, where the dense output has the event
-(`saltation`); all other steps end at fixed times. How fast the solution goes there is taken from the
-equations, from which dense output differs by its error, or more over a jump of the force.
+(`saltation`); all other steps end at fixed times. How fast the solution goes there is taken from
+the equations, from which dense output differs by its error, or more over a jump of the force.
 """
 
 from dataclasses import dataclass
