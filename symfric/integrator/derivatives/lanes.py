@@ -15,7 +15,8 @@ from symfric.integrator.compiled.rows import NAME
 from symfric.integrator.many.vectors import lanes_header, vector_source
 
 Array = NDArray[np.float64]
-LANES = 4
+FEW, MANY = 4, 8
+"""Lanes for up to as many names, and for more."""
 ONE = (
     "exp", "expm1", "log", "log1p", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh",
     "acosh", "atanh", "erf",
@@ -34,12 +35,13 @@ def lanes_source(one: ca.Function, of_d: Array) -> str:
     text, slots = vector_source("symfric_one", one)
     names, sizes = of_d.shape[1], [one.numel_in(i) for i in range(one.n_in())]
     own = {0, len(sizes) - 1} if len(sizes) > 5 else {0}
-    seeds = np.zeros((-(-names // LANES) * LANES, max(1, sizes[4])))
+    lanes = FEW if names <= FEW else MANY
+    seeds = np.zeros((-(-names // lanes) * lanes, max(1, sizes[4])))
     seeds[:names, : sizes[4]] = of_d.T
     places = [i if i < 4 else i - 1 for i in range(len(sizes))]
     common = [i for i in range(len(sizes)) if i not in own and i != 4]
     return (
-        lanes_header(LANES)
+        lanes_header(lanes)
         + "".join(f"#define v_{f}(x) ALL({f}((x)[0]))\n" for f in ONE)
         + "".join(f"#define v_{f}(x, y) ALL({f}((x)[0], (y)[0]))\n" for f in TWO)
         + _ANGLES

@@ -6,7 +6,7 @@ import pytest
 
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.compiled.columns import Columns
-from symfric.integrator.derivatives.lanes import LANES, lanes_source
+from symfric.integrator.derivatives.lanes import FEW, MANY, lanes_source
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
@@ -25,7 +25,9 @@ def pushed(linked: bool) -> ca.Function:
     return ca.Function("one", [X, y, h, d, of_d, *more], [ca.densify(behind), ca.densify(column)])
 
 
-@pytest.mark.parametrize(("names", "linked"), [(2, True), (LANES, False), (LANES + 3, True)])
+@pytest.mark.parametrize(
+    ("names", "linked"), [(2, True), (FEW, False), (FEW + 1, False), (MANY + 3, True)]
+)
 def test_sweep_in_lanes_has_the_bits_of_one_name_after_another(names: int, linked: bool) -> None:
     rng, one, steps = np.random.default_rng(names), pushed(linked), 7
     of_d = rng.normal(size=(3, names))
