@@ -56,7 +56,9 @@ def test_members_have_scales_of_their_own(backend: str) -> None:
         assert many["x"][:, 0] == pytest.approx(start * np.cos(10.0), rel=1e-5, abs=0.0)
         for m in (0, 1):
             alone = simulate(model, 10.0, x0={"x": start[m]}, t_eval=[10.0], backend=backend)
-            assert many["x"][m, 0] == alone.final["x"]
+            # lanes of compiled members have a power of their own in the step control
+            same = 0.0 if backend == "vm" or events else 1e-8
+            assert many["x"][m, 0] == pytest.approx(alone.final["x"], rel=same, abs=0.0)
 
 
 def test_a_decay_from_a_nanometre_follows_its_closed_form() -> None:
