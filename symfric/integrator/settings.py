@@ -24,6 +24,7 @@ from symfric.integrator.running.run import Tolerances
 from symfric.model import Model
 
 Array = NDArray[np.float64]
+PLAIN: frozenset[type] = frozenset((float, int, bool, str, type(None)))
 REMEMBERED, MOST_TIMES = 16, 10_000
 """Settings kept per model, the oldest goes first; and how many times of results one may have."""
 
@@ -73,10 +74,9 @@ def settings(
     known: dict[Hashable, Settings] = model.memory.setdefault("settings", {})
     # 1.0 and True are equal, and only one of them is a time
     key = (*asked, *map(type, asked))
-    try:
-        found = known.get(key)
-    except TypeError:  # an array of no dimension is a number, too, and no key
-        return _checked(model, *asked)
+    if not PLAIN.issuperset(key[len(asked) :]):
+        return _checked(model, *asked)  # arrays and expressions of a number are numbers, no keys
+    found = known.get(key)
     if found is not None:
         warn_of_loose("simulate", found.allowed.rtol, stacklevel=4)
         return found

@@ -113,13 +113,17 @@ class Trajectory:
         """Steps, evaluations, times."""
         return self.count()
 
-    @cached_property
+    @property
     def step_times(self) -> Array:
         """Ends of the accepted steps [s], shape (steps + 1,).
 
         A run whose steps would take much memory has not kept them, and is run again for them, as it
         is for values between the times `t`.
         """
+        return self._ends
+
+    @cached_property
+    def _ends(self) -> Array:
         return self.ends()
 
     @cached_property

@@ -18,6 +18,7 @@ from bad_values import (
     function,
     names,
     number,
+    parameter,
     path,
     refuses_all,
     thing,
@@ -106,6 +107,7 @@ def doors_of_simulation() -> Iterator[Door]:
         QUICK | {"model": model, "executor": "serial"},
         {
             **common,
+            "t_end": [bad for bad in parameter(-1.0) if not isinstance(bad, list)],  # of members
             "x0": members("v"),
             "p": members("mu_d"),
             "u": values("nothing"),
@@ -147,7 +149,8 @@ def doors_of_simulation() -> Iterator[Door]:
             {"t": [0.0], "values": [1.0]},
             {
                 "t": [*bad_rows, [], [0.0, 1.0]],
-                "values": [*bad_rows, [], [0.0, 1.0]],
+                # rows are of members of an ensemble
+                "values": [*(bad for bad in bad_rows if bad != [[0.0]]), [], [0.0, 1.0]],
             },
         )
         yield Door(

@@ -98,7 +98,7 @@ def test_everyone_is_given_the_loosest_tolerance_that_keeps_the_error() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["multibodies"], "expected one of integrator, calls, multibody, ivp, jitter"),
+        (["multibodies"], "expected one of integrator, calls, ensemble, multibody"),
         (["jitter", "--links", "2"], "expected no --links"),
         (["integrator", "--csv", "a.csv"], "expected no --csv"),
         (["multibody", "--links", "2,x"], "--links: expected positive whole numbers"),
