@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from symfric.integrator.plant import Plant as Plant
     from symfric.integrator.simulate import simulate as simulate
     from symfric.integrator.stepper import stepper as stepper
-    from symfric.results.trajectory import Statistics as Statistics
+    from symfric.results.statistics import Statistics as Statistics
     from symfric.results.trajectory import Trajectory as Trajectory
 else:
     hand_out(
@@ -28,6 +28,7 @@ else:
             "symfric.integrator.simulate": "simulate",
             "symfric.integrator.plant": "Plant",
             "symfric.integrator.stepper": "stepper",
-            "symfric.results.trajectory": "Statistics Trajectory",
+            "symfric.results.statistics": "Statistics",
+            "symfric.results.trajectory": "Trajectory",
         },
     )

@@ -21,7 +21,8 @@ from symfric.integrator.outcome import trajectory_of
 from symfric.integrator.peers.casadi_integrators import PEERS, integrate_by_peer
 from symfric.integrator.running.built import built
 from symfric.model import Model
-from symfric.results.trajectory import Statistics, Trajectory
+from symfric.results.statistics import Statistics
+from symfric.results.trajectory import Trajectory
 
 
 def simulate_by_peer(

@@ -11,7 +11,8 @@ from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Run
-from symfric.results.trajectory import Statistics, Trajectory
+from symfric.results.statistics import Statistics
+from symfric.results.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 

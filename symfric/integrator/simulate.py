@@ -33,7 +33,8 @@ from symfric.integrator.running.run import Tolerances, integrate
 from symfric.integrator.running.sizes import own_scale
 from symfric.integrator.settings import settings
 from symfric.model import Model
-from symfric.results.trajectory import Statistics, Trajectory
+from symfric.results.statistics import Statistics
+from symfric.results.trajectory import Trajectory
 
 FOR_DERIVATIVES = "radau5"
 """At rtol 1e-6 derivatives of Rabinowicz's block err by 2e-4 with Rodas5P, by 6e-6 with Radau5."""

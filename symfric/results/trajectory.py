@@ -3,7 +3,7 @@
 import csv
 import json
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,47 +21,12 @@ from symfric.foundation.symbols import strays
 from symfric.model import Model
 from symfric.results.energy import EnergyBalance, energy_balance, integrals
 from symfric.results.extremes import extremes, looks
+from symfric.results.statistics import Statistics
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Statistics:
-    """What a simulation cost.
-
-    Attributes:
-        backend: what ran it.
-        method: integration method.
-        steps, rejections: accepted and rejected steps.
-        evaluations, jacobians, factorisations: calls of the right-hand side, of its Jacobian, and
-            LU factorisations.
-        events: events that happened.
-        smallest_step: smallest accepted step [s].
-        build_time, compile_time, run_time: wall time [s] for making the integrator (0 where it is
-            reused), compiling it, and running it.
-        error: measured error relative to each state's magnitude, the largest; NaN if not asked for.
-    """
-
-    backend: str
-    method: str
-    steps: int
-    rejections: int
-    evaluations: int
-    jacobians: int
-    factorisations: int
-    events: int
-    smallest_step: float
-    build_time: float
-    compile_time: float
-    run_time: float
-    error: float = float("nan")
-
-    def to_dict(self) -> dict[str, Any]:
-        """The fields by name; an error that was not measured is left out."""
-        return {k: v for k, v in asdict(self).items() if v == v}
 
 
 @dataclass(frozen=True, eq=False)
