@@ -6,7 +6,6 @@ take turns; ratios are over the first of each task, which is ours.
 
 import subprocess
 import sys
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -17,9 +16,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.bench.contenders import compiled
-from symfric.bench.peers import buffered
-from symfric.bench.timing import interleaved
+from symfric.bench.contenders import buffered, compiled
+from symfric.bench.timing import interleaved, unwarned
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.compiled.background import wait
 from symfric.integrator.equations.inputs import Hold, input_data
@@ -90,8 +88,7 @@ def bench_calls(
     for k, task in enumerate(tasks):
         if progress is not None:
             progress(task.__name__.strip("_"), k / len(tasks))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # loose tolerances are measured on purpose
+        with unwarned():
             rows += task(quick)
     return CallBenchmark(tuple(rows))
 

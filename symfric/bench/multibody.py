@@ -7,6 +7,7 @@ from functools import partial
 from importlib.util import find_spec
 from math import inf, nan
 from pathlib import Path
+from time import process_time
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -17,7 +18,7 @@ from symfric.bench.chains import SIZES, ChainRow, chain, exponent, scaling
 from symfric.bench.contenders import MAKERS, Contender
 from symfric.bench.counts import CompileRow, CountRow, compile_rows, counts
 from symfric.bench.facts import DRIFT_S, DriftRow, Fact, NormRow, drifts, facts, norms
-from symfric.bench.timing import best_time
+from symfric.bench.timing import best_time, unwarned
 from symfric.foundation.compiler import find_compiler
 from symfric.foundation.files import written
 from symfric.integrator.simulate import simulate
@@ -267,8 +268,9 @@ def _row(
 ) -> RunRow | None:
     """Time and error of one integrator at one setting; None where it fails, which is noted."""
     try:
-        contender = make()
-        time_s, (found, steps) = best_time(contender.solve, budget=0.2)
+        with unwarned():
+            contender = make()
+            time_s, (found, steps) = best_time(contender.solve, budget=0.2, clock=process_time)
     except RuntimeError as error:
         last = str(error).strip().splitlines()[-1]
         skipped[f"{case}: {name} at {setting:g}"] = last.rpartition(": ")[2]

@@ -1,16 +1,14 @@
 """Other integrators on the same model: CasADi's own, compiled or not, and SciPy's."""
 
-import warnings
 from collections.abc import Callable
 from functools import cache
-from typing import Any, cast
+from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.bench.contenders import FASTEST
-from symfric.foundation.numeric import flat_view
+from symfric.bench.contenders import FASTEST, buffered
 from symfric.integrator.compiled.compiler import library
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
@@ -26,19 +24,12 @@ Solve = Callable[[float], tuple[Array, int]]
 
 def ours(model: Model, times: Array, rtol: float, backend: str, method: str) -> Solve:
     """`simulate`, with everything a user pays for on a call."""
+    end = float(times[-1])
 
     def solve(v: float) -> tuple[Array, int]:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # loose tolerances are measured on purpose
-            result = simulate(
-                model,
-                float(times[-1]),
-                x0={"v": v},
-                rtol=rtol,
-                t_eval=times,
-                backend=backend,
-                method=method,
-            )
+        result = simulate(
+            model, end, x0={"v": v}, rtol=rtol, t_eval=times, backend=backend, method=method
+        )
         return result["x"], result.statistics.steps
 
     return solve
@@ -131,21 +122,3 @@ def scipy(model: Model, times: Array, rtol: float, method: str) -> Solve:
         return found.y[0], int(found.nfev)
 
     return solve
-
-
-def buffered(
-    function: ca.Function, argument: str | int = 0, result: str | int = 0
-) -> tuple[Array, Callable[[], None], Array]:
-    """One argument, call and one result of a Function, without conversions; all others are zero."""
-    a = function.index_in(argument) if isinstance(argument, str) else argument
-    r = function.index_out(result) if isinstance(result, str) else result
-    given, found = np.zeros(function.numel_in(a)), np.zeros(function.numel_out(r))
-    buffer, call = cast(tuple[Any, Any], function.buffer())
-    buffer.set_arg(a, flat_view(given))
-    buffer.set_res(r, flat_view(found))
-
-    def evaluate(_: object = buffer) -> None:
-        # the raw call does not keep its buffer alive; the default argument does
-        call()
-
-    return given, evaluate, found

@@ -1,10 +1,20 @@
 """Honest timing of short calls."""
 
-from collections.abc import Callable, Mapping
+import warnings
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
 from time import perf_counter, process_time
 from typing import TypeVar
 
 T = TypeVar("T")
+
+
+@contextmanager
+def unwarned() -> Generator[None]:
+    """Loose tolerances are measured on purpose, and what stands around a call is not measured."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
 
 
 def best_time(

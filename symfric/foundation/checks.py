@@ -281,17 +281,16 @@ def array(
 def times(where: str, value: object, first: float = -inf, last: float = inf) -> Array:
     """`value` as an array of increasing times [s] in [first, last], at least one."""
     bounded = isfinite(first) or isfinite(last)
-    what = f"increasing times in [{first:g}, {last:g}] s" if bounded else "increasing times [s]"
-    found = array(where, value, what=what)
-    if not found.size:
-        raise ValueError(f"{where}: expected {what}, got none")
-    falls = np.flatnonzero(np.diff(found) <= 0)
-    if falls.size:
-        before, after = found[falls[0] : falls[0] + 2]
-        raise ValueError(f"{where}: expected {what}, got {after:g} after {before:g} s")
-    if found[0] < first or found[-1] > last:
-        raise ValueError(f"{where}: expected {what}, got {found[0]:g} ... {found[-1]:g} s")
-    return found
+    what = "increasing times in [{:g}, {:g}] s" if bounded else "increasing times [s]"
+    found = array(where, value, what=what.format(first, last))
+    rising = found[1:] > found[:-1]
+    if found.size and first <= found[0] and found[-1] <= last and rising.all():
+        return found
+    got = "none" if not found.size else f"{found[0]:g} ... {found[-1]:g} s"
+    if not rising.all():
+        k = int(np.argmin(rising))
+        got = f"{found[k + 1]:g} after {found[k]:g} s"
+    raise ValueError(f"{where}: expected {what.format(first, last)}, got {got}")
 
 
 def path(where: str, value: object) -> Path:

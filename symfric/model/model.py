@@ -247,6 +247,13 @@ class Model:
             if p:
                 self.values("p", p)
             return self._default_state.copy()
+        if self._starts_alone:
+            state, places = self._default_state.copy(), self._places
+            for name, x in self.named("x0", given).items():
+                state[places[name]] = checks.number(f"{self.name}.{name}", x)
+            if p:
+                self.values("p", p)
+            return state
         return self._checked(evaluate(self._start, *self._start_arguments(given, p)))
 
     def _checked(self, start: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -304,6 +311,15 @@ class Model:
     @cached_property
     def _default_state(self) -> NDArray[np.float64]:
         return self._checked(evaluate(self._start, *self._start_arguments(None, None)))
+
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {v.name: i for i, v in enumerate(self.x)}
+
+    @cached_property
+    def _starts_alone(self) -> bool:
+        """Whether each state starts at a number, whatever the others and the parameters are."""
+        return all(ca.SX(v.start).is_constant() for v in self.x)
 
     @cached_property
     def _start_by_p(self) -> bool:
