@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
+from symfric.foundation.compiler import CompileError
 from symfric.foundation.status import Status
 from symfric.integrator.arguments import (
     BACKENDS,
@@ -171,7 +172,13 @@ def simulate_many(
         solve = partial(solve_chunk, job)
         prepare = partial(_chunk, integrator, given, allowed)
         if isinstance(executor, str):
-            job.program.load()  # or every worker would compile it
+            try:
+                job.program.load()  # or every worker would compile it
+            except CompileError:
+                if backend == "compiled":
+                    raise
+                job = Job.of(integrator, inputs.breaks, looks, "vm", max_steps)
+                solve = partial(solve_chunk, job)  # a broken compiler is no reason not to go on
     firsts = range(0, members, chunk)
     picks = {first: slice(first, min(first + chunk, members)) for first in firsts}
     folder = None

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError, find_compiler
 from symfric.foundation.status import SolveError, Status
-from symfric.integrator.equations.initial import consistent, first_guess, first_step
+from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.many.plants import pays, side_by_side
 from symfric.integrator.running.crossings import Memory
 from symfric.integrator.running.diagnosis import explain
@@ -21,6 +21,7 @@ from symfric.integrator.running.plants import (
     END,
     OVER,
     REFUSED,
+    SAMPLES,
     SEARCH,
     STORM,
     Advance,
@@ -34,8 +35,6 @@ from symfric.integrator.step.layout import Given, State
 
 Array = NDArray[np.float64]
 Numbers = Mapping[str, ArrayLike]
-SAMPLES = 1000
-"""A plant begins with the first step of a run of so many samples."""
 
 
 @final
@@ -84,6 +83,7 @@ class Plant:
     def _loop(self, integrator: Integrator) -> Advance:
         """What makes the plants go on."""
         vm, plants = self._backend == "vm", self._plants
+        self._in_python = vm or integrator.crossings is not None
         if integrator.crossings is not None:
             engine = integrator.vm() if vm else integrator.compiled()
             return with_events(integrator, plants, engine, self._tolerance)
@@ -99,17 +99,29 @@ class Plant:
         """Hold inputs for `dt` and return the states at the end, shape (nx,) or (batch, nx).
 
         Args:
-            u: inputs in the order of the model, shape (nu,) or (batch, nu); a number where there
-                is one input and one plant; or by name, where a number serves for all plants and the
-                others stay as they were. By default what was held last; at first, that is where the
-                model's inputs start.
+            u: inputs in the order of the model, shape (nu,) or (batch, nu); a number where there is
+                one input and one plant; or by name, where a number serves for all plants and others
+                stay as they were. By default what was held last; at first, where those of the model
+                start.
 
         Raises:
             ValueError: unknown names, another shape, no finite numbers; nothing has happened.
             SolveError: a plant did not get to its sample; `failed` says which one and why, and
-                `partial` holds the states. `reset` it, or have it go on to that
-                sample from where it stands, with other inputs.
+                `partial` holds the states. `reset` it, or have it go on to that sample from where
+                it stands, with other inputs.
+            KeyboardInterrupt: Ctrl-C, before anything has happened; compiled code goes on first.
         """
+        if not self._in_python:
+            return self._go(u)
+        before, fresh = self._plants.copy(), dict(self._fresh)
+        try:
+            return self._go(u)
+        except KeyboardInterrupt:
+            self._plants.back_to(before)
+            self._fresh, self._seen = fresh, False
+            raise
+
+    def _go(self, u: ArrayLike | Numbers | None) -> Array:
         if u is not None:
             try:
                 self._take(u)
@@ -121,6 +133,8 @@ class Plant:
         self._seen = False
         if short := self._advance(1):
             self._mend(short)
+        elif self.failed:
+            self.failed = {}
         return self._x.copy()
 
     def reset(
@@ -151,7 +165,7 @@ class Plant:
         found: list[Array] = []
         for guess, own in zip(guesses, values, strict=True):
             found.append(self._integrator.consistent("stepper", guess, np.concatenate([own, held])))
-        h = min(first_step(SAMPLES * self.dt, plants.begin[0]), float(plants.R[0, Given.H_MAX]))
+        h = plants.first_step()
         remembered = Memory.new(len(self.model.events), self._tolerance)
         for b, guess, own, y in zip(which, guesses, values, found, strict=True):
             plants.S[b] = State.at(plants.begin[b], h, y)
@@ -170,6 +184,7 @@ class Plant:
         plants = self._plants.copy()
         other = Plant(self._integrator, plants, self._backend, self._batch, self._tolerance)
         other._fresh, other.failed = dict(self._fresh), dict(self.failed)
+        other._own, other._places = self._own, list(self._places)
         return other
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Plant":
@@ -294,7 +309,7 @@ class Plant:
             if len(lost) == np.count_nonzero(plants.why > 0):
                 break
             self._advance(0)
-        self.failed |= lost
+        self.failed = lost
         if lost:
             b, (status, message) = next(iter(lost.items()))
             which = "" if self._batch is None else f"plant {b}: "
@@ -317,6 +332,7 @@ class Plant:
                 return Status.SINGULAR, str(error)
         elif not self._found_pivots(y.copy(), d.copy()):
             status, message = explain(self._integrator, t, y, d, float(plants.S[b, State.H]))
+            plants.S[b] = State.at(t, plants.first_step(), y.copy())  # other inputs may let it go on
             return status, message.replace("simulate", "stepper", 1)
         plants.why[b] = AGAIN
         return None

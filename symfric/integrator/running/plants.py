@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from symfric.foundation.compiler import find_compiler
 from symfric.foundation.numeric import flat_view
 from symfric.integrator.compiled.compiler import load
-from symfric.integrator.equations.initial import FLOOR
+from symfric.integrator.equations.initial import FLOOR, first_step
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.layout import Given, State
 
@@ -28,6 +28,8 @@ END, ATTEMPTS, STEP_TOO_SMALL, SEARCH, AGAIN, STORM, OVER = 0, 2, 3, 4, 5, 6, -1
 """Why a plant stands: at its sample, out of attempts, steps fell to nothing, its algebraic unknowns
 are too far from the last ones to follow (`symfric.integrator.equations.following`), it stands no
 more because somebody has helped it, events pile up, a terminal event has ended its run."""
+SAMPLES = 1000
+"""A plant begins with the first step of a run of so many samples."""
 REFUSED = -1
 """What `Advance` returns where an input is no finite number, and nothing has happened."""
 
@@ -70,10 +72,19 @@ class Plants:
     memory: Array
     happened: list[tuple[int, float, str]] = field(default_factory=list[tuple[int, float, str]])
 
+    def first_step(self) -> float:
+        """Step [s] that a start tries: that of a run of `SAMPLES` samples."""
+        return min(first_step(SAMPLES * self.dt, self.begin[0]), float(self.R[0, Given.H_MAX]))
+
     def copy(self) -> "Plants":
         """The same, in memory of its own."""
         own = {name: getattr(self, name).copy() for name in (*SHARED, "memory", "happened")}
         return replace(self, **own)
+
+    def back_to(self, before: "Plants") -> None:
+        """Stand as `before`, a copy, in the same memory."""
+        for name in (*SHARED, "memory", "happened"):
+            getattr(self, name)[:] = getattr(before, name)
 
 
 SHARED = ("S", "R", "u", "begin", "count", "ready", "why", "made")

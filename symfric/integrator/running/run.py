@@ -120,7 +120,7 @@ def _integrated(
     try:
         march.whole()
     except KeyboardInterrupt:
-        reached = f"{Status.INTERRUPTED.value} It reaches t = {march.t:g} s."
+        reached = f"{Status.INTERRUPTED.value} It reaches t = {run.reached:g} s."
         run.stop(Status.INTERRUPTED, reached)
         run.outputs.back_to(run.reached)
     march.finish()

@@ -25,7 +25,9 @@ from symfric import (
     simulate,
     simulate_many,
 )
+from symfric.foundation.compiler import CompileError
 from symfric.integrator.many import chunk as chunk_module
+from symfric.integrator.many import program as program_module
 from symfric.model import Event
 
 VELOCITIES = np.linspace(-0.1, 0.1, 7)
@@ -308,6 +310,19 @@ def test_without_a_compiler_the_virtual_machine_takes_over(
     expected = simulate_many(oscillator(), 1.0, backend="vm")
     monkeypatch.setattr(chunk_module, "find_compiler", lambda: None)
     assert_same(simulate_many(oscillator(), 1.0), expected)
+
+
+def test_with_a_broken_compiler_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = oscillator()
+    expected = simulate_many(model, 1.0, backend="vm")
+
+    def broken(code: str, signals: int) -> None:
+        raise CompileError("broken")
+
+    monkeypatch.setattr(program_module, "_compiled", broken)
+    assert_same(simulate_many(model, 1.0), expected)
+    with pytest.raises(CompileError, match="broken"):
+        simulate_many(model, 1.0, backend="compiled")
 
 
 def test_loose_tolerance_warns() -> None:

@@ -23,8 +23,8 @@ from symfric import (
     stepper,
 )
 from symfric.foundation.compiler import find_compiler
-from symfric.integrator.plant import SAMPLES
 from symfric.integrator.running import plants
+from symfric.integrator.running.plants import SAMPLES
 from symfric.scenes import SliderCrank
 
 Array = NDArray[np.float64]
@@ -211,6 +211,18 @@ def test_a_failure_says_when_and_keeps_the_others(backend: str) -> None:
 
 
 @each_backend
+def test_a_failed_plant_goes_on_with_other_inputs(backend: str) -> None:
+    """x' = u / (1 - x): (1 - x)^2 = 1 - 2 t for u = 1, until t = 1/2; 2 t - 1 for u = -1."""
+    model = Model("wall", x=(x,), u=(u,), ode=u.symbol / (1 - x.symbol))
+    plant = stepper(model, 1.0, backend=backend)
+    with pytest.raises(SolveError, match=r"t = 0\.50"):
+        plant.step(1.0)
+    assert (1 - plant.step(-1.0)) ** 2 == pytest.approx([1.0], abs=1e-3)
+    assert not plant.failed
+    assert plant.t == 1.0
+
+
+@each_backend
 def test_unknowns_without_a_solution_fail_and_may_go_on(backend: str) -> None:
     w, held = Variable("z", "1", start=1.0), Variable("u", "N", start=1.0)
     root = w.symbol**2 - held.symbol
@@ -257,6 +269,27 @@ def test_bad_inputs_are_refused_and_nothing_has_happened(
     assert (plant.x == at).all()
     assert plant.t == 1e-2
     assert (plant.copy().step(1.0) == plant.step()).all()
+
+
+def test_an_interrupted_step_has_not_happened(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two of three plants were at their sample; then all of them are where they were."""
+    plant = stepper(followed(), 0.1, batch=3, backend="vm")
+    alone, before = plant.copy(), plant.copy()
+    before.step([1.0, 2.0, 3.0])
+    large, left = plants._large, iter(range(before.attempts - 1))
+
+    def interrupting(S: Array, h_min: float) -> bool:
+        if next(left, None) is None:
+            raise KeyboardInterrupt
+        return large(S, h_min)
+
+    monkeypatch.setattr(plants, "_large", interrupting)
+    with pytest.raises(KeyboardInterrupt):
+        plant.step([1.0, 2.0, 3.0])
+    monkeypatch.undo()
+    assert plant.t.tolist() == [0.0] * 3
+    assert not plant.u.any()
+    assert (plant.step([3.0, 2.0, 1.0]) == alone.step([3.0, 2.0, 1.0])).all()
 
 
 def test_bad_arguments_are_refused() -> None:

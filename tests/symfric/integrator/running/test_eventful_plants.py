@@ -16,6 +16,7 @@ from symfric import (
     stepper,
 )
 from symfric.foundation.compiler import find_compiler
+from symfric.integrator.running.engine import VmEngine
 from symfric.model import Event
 
 x, v = Variable("x", "m", start=1.0), Variable("v", "m/s")
@@ -99,3 +100,17 @@ def test_unknowns_follow_events_that_set_states(backend: str) -> None:
         assert plant.step(held) == pytest.approx([0.7 * k % 1], abs=1e-7)
         root = plant["z"]
         assert root + root**3 == pytest.approx(held - 0.7 * k % 1, rel=1e-7)
+
+
+def test_an_interrupted_step_skips_no_sample(monkeypatch: pytest.MonkeyPatch) -> None:
+    plant = stepper(ball(), 0.5, batch=2, backend="vm")
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(VmEngine, "march", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        plant.step()
+    monkeypatch.undo()
+    assert plant.step() == pytest.approx(np.array([[0.75, -1.0]] * 2))
+    assert plant.t.tolist() == [0.5, 0.5]
