@@ -332,7 +332,7 @@ class Plant:
                 return Status.SINGULAR, str(error)
         elif not self._found_pivots(y.copy(), d.copy()):
             status, message = explain(self._integrator, t, y, d, float(plants.S[b, State.H]))
-            plants.S[b] = State.at(t, plants.first_step(), y.copy())  # other inputs may let it go on
+            plants.S[b] = State.at(t, plants.first_step(), y.copy())  # other inputs may help
             return status, message.replace("simulate", "stepper", 1)
         plants.why[b] = AGAIN
         return None

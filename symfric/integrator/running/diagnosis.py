@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from symfric.foundation.checks import listed
 from symfric.foundation.status import Status
 from symfric.integrator.equations.blocks import blocks
-from symfric.integrator.equations.initial import consistent
+from symfric.integrator.equations.initial import FLOOR, consistent
 from symfric.integrator.equations.manifold import grows, pulls, singular
 from symfric.integrator.equations.pivots import regular
 from symfric.integrator.equations.system import System
@@ -16,6 +16,10 @@ from symfric.integrator.running.integrator import Integrator
 Array = NDArray[np.float64]
 NEARLY = 0.1
 """A step that shrinks to nothing with this little left of det(I - dN/dN) has jammed."""
+
+
+COARSE = 1e-10
+"""Where rounding of t allows no steps [s] shorter than this, that may be why one fails."""
 
 
 def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> tuple[Status, str]:
@@ -39,8 +43,16 @@ def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> t
     return (
         Status.STEP_TOO_SMALL,
         f"{where}: the step fell to {h:.1e} s, fastest equation {fastest}; a discontinuity is "
-        "near, give the law a smooth form or the model an event there" + _advice(integrator),
+        f"near, give the law a smooth form or the model an event there{_coarse(t)}"
+        + _advice(integrator),
     )
+
+
+def _coarse(t: float) -> str:
+    """Where t itself has too few digits for short steps."""
+    if FLOOR * abs(t) < COARSE:
+        return ""
+    return f"; so far from t = 0 no step below {FLOOR * abs(t):.1e} s can be told: begin nearer"
 
 
 def _advice(integrator: Integrator) -> str:

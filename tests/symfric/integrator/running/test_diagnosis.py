@@ -138,7 +138,9 @@ def test_discontinuity_that_stops_the_step_is_called_one() -> None:
     assert status is Status.STEP_TOO_SMALL
     assert "fastest equation x; a discontinuity is near" in message
     assert "smooth form or the model an event" in message
+    assert "begin nearer" not in message
     assert partial.step_times[-1] == pytest.approx(0.5, abs=1e-6)
+    assert "no step below 2.2e-09 s can be told" in failure(model, 1e6 + 2.0, t_start=1e6)[1]
 
 
 @each_backend
