@@ -5,8 +5,12 @@ import tempfile
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from threading import Lock
 
 from symfric.foundation import checks
+
+_ASKING = Lock()
+"""To ask for the mask of the process is to change it for a moment: one thread at a time."""
 
 
 @contextmanager
@@ -33,8 +37,9 @@ def written(path: str | Path) -> Generator[Path, None, None]:
     temporary = Path(name)
     try:
         yield temporary
-        mask = os.umask(0)
-        os.umask(mask)
+        with _ASKING:
+            mask = os.umask(0)
+            os.umask(mask)
         temporary.chmod(0o666 & ~mask)
         temporary.replace(target)
     finally:

@@ -164,21 +164,14 @@ def simulate_many(
     nominal = integrator.system.nominal
     allowed = tolerances("simulate_many", rtol, None, nominal, event_tolerance, max_steps, max_step)
     integrator = _suited(integrator, given)
-    job = Job.of(integrator, inputs.breaks, looks, backend, max_steps)
+    here = isinstance(executor, str) and not model.events
+    job = _job(partial(Job.of, integrator, inputs.breaks, looks), backend, max_steps, here)
     if model.events:
         solve = partial(solve_one_by_one, integrator, inputs, allowed, backend, looks)
         prepare = partial(_alone, integrator, given)
     else:
         solve = partial(solve_chunk, job)
         prepare = partial(_chunk, integrator, given, allowed)
-        if isinstance(executor, str):
-            try:
-                job.program.load()  # or every worker would compile it
-            except CompileError:
-                if backend == "compiled":
-                    raise
-                job = Job.of(integrator, inputs.breaks, looks, "vm", max_steps)
-                solve = partial(solve_chunk, job)  # a broken compiler is no reason not to go on
     firsts = range(0, members, chunk)
     picks = {first: slice(first, min(first + chunk, members)) for first in firsts}
     folder = None
@@ -263,6 +256,19 @@ def _suited(integrator: Integrator, given: Members) -> Integrator:
             points.append((integrator.start(y, d), d))
             integrator = integrator.suited(points, span)
     return integrator
+
+
+def _job(make: Callable[[str, int], Job], backend: str, max_steps: int, here: bool) -> Job:
+    """What workers do; compiled before they begin if they are `here`, or each would do that."""
+    job = make(backend, max_steps)
+    if here:
+        try:
+            job.program.load()
+        except CompileError:
+            if backend == "compiled":
+                raise
+            job = make("vm", max_steps)  # a broken compiler is no reason not to simulate
+    return job
 
 
 def _alone(

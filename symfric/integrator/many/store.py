@@ -1,8 +1,10 @@
 """Results of an ensemble, in memory or in a folder that fills chunk by chunk."""
 
+import os
 import stat
 import warnings
 from collections.abc import Collection, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
@@ -141,6 +143,20 @@ class Store:
         self.failed |= {first + m: why for m, why in failed.items()}
 
 
+def _claim(temporary: Path, path: Path) -> None:
+    """Give a file its name, unless there is one of that name.
+
+    Raises:
+        FileExistsError: there is.
+    """
+    try:
+        os.link(temporary, path)
+    except FileExistsError:
+        raise
+    except OSError:  # no links here: the last one to come has its name
+        pass
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class _ArrayFile:
@@ -153,16 +169,23 @@ class _ArrayFile:
     shape: tuple[int, int]
 
     def make(self) -> None:
-        """A file full of NaN, its room taken at once, unless there is one that is whole."""
-        if self._is_whole():
+        """A file full of NaN, its room taken at once, unless there is one that is whole.
+
+        Where another call makes it at the same time, both go on with the file of one of them.
+        """
+        missing = not os.path.lexists(self.path)
+        if not missing and self._is_whole():
             return
         row = np.full(self.shape[1:], np.nan).tobytes()
         rows = max(1, BLOCK // max(1, len(row)))
         try:
-            with written(self.path) as temporary, temporary.open("wb") as file:
-                np.lib.format.write_array_header_1_0(file, self._header)
-                for first in range(0, self.shape[0], rows):
-                    file.write(row * min(rows, self.shape[0] - first))
+            with suppress(FileExistsError), written(self.path) as temporary:
+                with temporary.open("wb") as file:
+                    np.lib.format.write_array_header_1_0(file, self._header)
+                    for first in range(0, self.shape[0], rows):
+                        file.write(row * min(rows, self.shape[0] - first))
+                if missing:
+                    _claim(temporary, self.path)
         except OSError as error:
             raise ValueError(
                 f"simulate_many: out: expected {8e-6 * prod(self.shape):.3g} MB of room for "

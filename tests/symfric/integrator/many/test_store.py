@@ -59,6 +59,23 @@ def test_folder_tells_a_later_store_what_is_complete(tmp_path: Path) -> None:
     assert later.failed == {3: "member 3 failed at 2³ °C"}
 
 
+def test_two_calls_at_once_share_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The other makes its files while this one makes its own; both see what either writes."""
+    header, others = np.lib.format.write_array_header_1_0, list[Store]()
+
+    def meanwhile(file: Any, content: dict[str, Any]) -> None:
+        monkeypatch.undo()
+        others.append(Store(tmp_path, ["a", "b"], 4, 3))
+        header(file, content)
+
+    monkeypatch.setattr(np.lib.format, "write_array_header_1_0", meanwhile)
+    store = Store(tmp_path, ["a", "b"], 4, 3)
+    store.put(0, solved(0))
+    assert others[0].has(0)
+    np.testing.assert_array_equal(store.signals["a"], others[0].signals["a"])
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.npy", "b.npy", "chunk-0.npz"]
+
+
 def test_memory_remembers_nothing() -> None:
     store = Store(None, ["a", "b"], 4, 3)
     store.put(2, solved(2))
