@@ -28,6 +28,8 @@ LAST_DIGITS = 1e-15
 """Relative change by which numbers are the same to rounding."""
 FLOOR = 10 * float(np.finfo(float).eps)
 """Smallest step relative to t: a few of the last digits of t itself."""
+SURE = 10 * FLOOR
+"""A step to begin with, relative to t: it may fail and be cut once or twice."""
 
 
 Follow = Callable[[Array, Array], Array | None]
@@ -306,7 +308,7 @@ LONGEST_FIRST = 1e-5
 
 def first_step(span: float, t_start: float = 0.0) -> float:
     """A first step [s] so small that the controller decides: it grows eightfold per step."""
-    return max(min(1e-8 * span, LONGEST_FIRST), 10 * FLOOR * abs(t_start))
+    return max(min(1e-8 * span, LONGEST_FIRST), SURE * abs(t_start))
 
 
 def smallest_step(span: float) -> float:

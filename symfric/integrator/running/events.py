@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.numeric import flat_view
+from symfric.integrator.equations.initial import SURE
 from symfric.integrator.running.crossings import (
     ALIKE,
     KEPT,
@@ -190,7 +191,8 @@ class Search:
         self.eventful.rows[self.eventful.count] = [steps, t, size, *before, *after, *which]
         self.eventful.count += 1
         # steps beyond the event say nothing; its own is a guess only, what follows may be faster
-        S[:] = State.at(t, max(min(h, RESTART * self.tolerance), LEAST * h), after)
+        again = max(min(h, RESTART * self.tolerance), LEAST * h, SURE * abs(t))
+        S[:] = State.at(t, again, after)
         return (Change.CUT if kept else Change.DROPPED), self._asked(t, which)
 
     def _resume(self, S: Array, h_max: float) -> Change:

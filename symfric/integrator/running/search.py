@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from string import Template
 
+from symfric.integrator.equations.initial import SURE
 from symfric.integrator.running.crossings import (
     ALIKE,
     KEPT,
@@ -43,6 +44,7 @@ def search_source(crossings: Crossings | None, given: int) -> str:
         soon=repr(SOON),
         restart=repr(RESTART),
         least=repr(LEAST),
+        sure=repr(SURE),
         growth=repr(GROWTH_MEMORY),
         memory=State.MEMORY,
         d=given - crossings.data,
@@ -237,6 +239,7 @@ static int symfric_search(double *row, double *S, const double *R, double *M, do
   least = $least * h;
   if ($restart * M[TOLERANCE] < h) h = $restart * M[TOLERANCE];
   if (h < least) h = least;
+  if (h < $sure * fabs(cut[1])) h = $sure * fabs(cut[1]);
   S[0] = cut[1];
   S[1] = h;
   S[2] = h;

@@ -262,6 +262,15 @@ def test_event_of_an_input(backend: str, signal: Input, times: list[float]) -> N
     assert [time for time, _ in run.happened] == pytest.approx(times, abs=1e-9)
 
 
+@each_backend
+def test_event_a_rounding_error_before_the_end_of_a_step(backend: str) -> None:
+    """A sample at 0.3 s, and a time of 3 * 0.1 s, as two grids have them."""
+    signal = Hold([0, 0.3], [0, 1])
+    run = simulate(driven(ON), 1.0, u={"u": signal}, times=[3 * 0.1], backend=backend)
+    assert run.happened == ((0.3, "on"),)
+    assert run.t[-1] == 1.0
+
+
 def test_jump_of_an_input_against_the_direction_is_no_event() -> None:
     signal = Hold([0, 1, 2], [1, 0, 0.2])
     assert simulate(driven(ON), 3.0, u={"u": signal}).happened == ()
