@@ -24,7 +24,10 @@ class Dahl(Law):
     Limits: steady state mu_d N sign(v); rate-independent; drifts under vibration; n = 1 has the
     virgin curve F = mu_d N (1 - exp(-sigma_0 x / (mu_d N))). |v| and sign(v) are smooth over
     v_eps, to be kept ten times below the slowest motion of interest (see `LuGre`); v_eps = 0 is
-    the original with a kink at v = 0. Not valid for N = 0.
+    the original with a kink at v = 0. n < 1 reaches the level within a finite distance, with a
+    corner that rho_eps rounds to a layer of z as wide as rho_eps^(1-n) of its level: keep that
+    ten times above rtol, or the element is so stiff there that a step leaps over a reversal of
+    slip and no error is estimated (n = 0.1 with the default at rtol 1e-3). Not valid for N = 0.
     Source: Dahl, Aerospace Corp. TOR-0158(3107-18)-1, 1968; exponent: Dahl, AIAA J. 14, 1976.
     """
 
@@ -44,7 +47,7 @@ class Dahl(Law):
         1e-15, unit="m/s", role="width", doc="smoothing velocity of |v|", lower=0.0
     )
     rho_eps: Scalar = param(
-        1e-6, unit="1", role="width", doc="smoothing of |rho|, for n != 1", lower=1e-12
+        1e-3, unit="1", role="width", doc="smoothing of |rho|, for n != 1", lower=1e-12
     )
 
     @property

@@ -7,7 +7,15 @@ import pytest
 
 from symfric.foundation.status import SolveError, Status
 from symfric.stress.cases import Case, Signal
-from symfric.stress.judge import amplification, at_steps, distance, judge, tolerances
+from symfric.stress.judge import (
+    RIGHT,
+    amplification,
+    at_steps,
+    distance,
+    judge,
+    tolerances,
+    worst_step,
+)
 from symfric.stress.peer import by_scipy
 from symfric.stress.problem import Problem, problem
 
@@ -115,3 +123,18 @@ def test_what_is_off_between_right_ends_of_steps_is_told_apart() -> None:
     assert distance(ready, replace(run, states=bent), run) > 100
     assert at_steps(ready, replace(run, states=bent), run) == 0.0
     assert at_steps(ready, replace(run, states=lambda t: bent(t - 1e-9)), run) > 100
+
+
+def test_a_step_that_leaps_is_found_and_steps_that_add_up_are_not_blamed() -> None:
+    ready = problem(EASY)
+    fine = ready.run(1e-8, "radau5", max_steps=10_000)
+    run = ready.run(1e-6, "rodas5p", max_steps=10_000)
+    assert worst_step(ready, run, fine, 10_000) <= RIGHT
+    late = run.step_times[run.step_times.size // 2]
+
+    def shifted(t: np.ndarray) -> dict[str, np.ndarray]:
+        return {name: y + np.where(t > late, 1e-4, 0.0) for name, y in run.states(t).items()}
+
+    size = tolerances(ready, np.stack([fine["x"], fine["v"]])).min()
+    found = worst_step(ready, replace(run, states=shifted), fine, 10_000)
+    assert found == pytest.approx(1e-4 / size, rel=0.1)

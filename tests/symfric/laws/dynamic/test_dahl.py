@@ -6,7 +6,7 @@ import pytest
 from oracles import dahl_virgin
 from rigs import prescribed_motion
 
-from symfric import Dahl, simulate
+from symfric import Dahl, drive, simulate
 
 N, LEVEL = 7.848, 0.7848
 
@@ -69,3 +69,14 @@ def test_original_with_exponent_has_no_smoothing() -> None:
     law = Dahl(n=2.0, v_eps=0.0)
     assert law.rate(1e-15, N, np.array([0.0]))[0] == pytest.approx(1e-15, rel=1e-9)
     assert law.steady_state(-1e-15, N)[0] == pytest.approx(-LEVEL / 1e5)
+
+
+@pytest.mark.parametrize("n", [0.0, 0.1])
+def test_no_step_leaps_over_a_reversal_at_the_level(n: float) -> None:
+    """A block that slides, is stopped and driven back: its bristle ends at the other level."""
+    model = drive(Dahl(n=n))
+    for rtol in (1e-5, 1e-6):
+        run = simulate(model, 0.6, x0={"v": 1.0}, u={"force": -20.0}, rtol=rtol, method="rodas5p")
+        start, end = run["z"].max(), run.final["z"]
+        assert run.final["v"] < 0
+        assert end == pytest.approx(-start, rel=10 * rtol)
