@@ -92,7 +92,7 @@ def main() -> None:
         axes.legend()
         axes.grid(visible=True, alpha=0.3)
     figure.savefig(out / "press.png", dpi=150)
-    real.animate(out / "press.gif", fps=10)
+    real.animate(out / "press.gif", fps=10, speed=0.5)
 
 
 if __name__ == "__main__":

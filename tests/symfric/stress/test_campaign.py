@@ -13,15 +13,16 @@ COSTLY = {"arm": 10, "four_bar": 10, "double_pendulum": 2}
 """Scenes of which the suite takes one case in so many."""
 
 
-def test_of_five_hundred_random_cases_none_is_silently_wrong_or_ends_badly() -> None:
-    """The suite's share of `symfric stress`, with a tenth of its work; 40 s of one core."""
-    numbers = [n for n in range(700) if n % COSTLY.get(draw(1, n).scene, 1) == 0][:500]
+@pytest.mark.parametrize("count", [200, pytest.param(500, marks=pytest.mark.slow)])
+def test_of_random_cases_none_is_silently_wrong_or_ends_badly(count: int) -> None:
+    """The suite's share of `symfric stress`, with a tenth of its work; 18 s of one core."""
+    numbers = [n for n in range(700) if n % COSTLY.get(draw(1, n).scene, 1) == 0][:count]
     report = campaign(numbers, work=12_000)
     failing = {n: v.reason for n, v in report.verdicts.items() if v.kind in FAILING}
     assert not failing
-    assert report.classes["right"] > 320
-    assert report.classes["undecided"] < 90
-    assert len(report.verdicts) == 500
+    assert report.classes["right"] > 0.64 * count
+    assert report.classes["undecided"] < 0.18 * count
+    assert len(report.verdicts) == count
 
 
 def test_workers_do_not_change_what_is_found() -> None:
