@@ -4,6 +4,8 @@
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
+# Workers share the cores: threads of BLAS would only wait for each other.
+ONE_THREAD := OPENBLAS_NUM_THREADS=1
 BIN := $(VENV)/bin
 
 .PHONY: demo test newest check stress mutants clean
@@ -12,7 +14,7 @@ demo: $(VENV)/.runtime
 	$(BIN)/symfric demo --out out
 
 test: $(VENV)/.test
-	$(BIN)/python -m pytest -n auto --dist loadfile
+	$(ONE_THREAD) $(BIN)/python -m pytest -n auto --dist loadfile
 
 newest:
 	@newest="$$(sh .ci/newest-python "$(PYTHON)")"; \
