@@ -50,4 +50,8 @@ ENSEMBLES = (
         "+ 8 * first * self.shape[1])", "+ 8 * max(0, first - 1) * self.shape[1])", T_STORE,
     ),
     Mutant("a file cut short is taken", STORE, "and status.st_size == size", "", T_STORE),
+    Mutant(
+        "who comes last has the file", STORE,
+        "                if missing:", "                if False:", T_STORE,
+    ),
 )  # fmt: skip

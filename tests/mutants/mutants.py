@@ -79,6 +79,9 @@ EVENT = (
         T_EVENTS,
     ),
     Mutant(
+        "a step behind an event may be lost in t", EVENTS, ", SURE * abs(t))", ")", T_EVENTS,
+    ),
+    Mutant(
         "a step is looked at at its ends only", CROSSINGS,
         "LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)", "LOOKS = (0.0, 1.0)", T_EVENTS,
     ),

@@ -65,4 +65,12 @@ PLANTS = (
         "if (begin) m->why[b] = symfric_takes_over(m, b) ? AGAIN : SEARCHED;",
         "if (begin) { symfric_takes_over(m, b); m->why[b] = AGAIN; }", T_LANES,
     ),
+    Mutant(
+        "plant: an interrupted step has half happened", PLANT,
+        "self._plants.back_to(before)", "pass", T_STEPPER + T_EVENTFUL,
+    ),
+    Mutant(
+        "plant: a failed one stands for ever", PLANT,
+        "plants.S[b] = State.at(t, plants.first_step(), y.copy())", "pass", T_STEPPER,
+    ),
 )  # fmt: skip
