@@ -247,7 +247,7 @@ def _gradient(quick: bool) -> Iterator[CallRow]:
 
 # ---- signals ----
 
-OFTEN = 20
+OFTEN = 60
 """Calls after which signals are compiled, in the background."""
 
 

@@ -18,19 +18,19 @@ from symfric.integrator.simulate import simulate
 from symfric.model import Model
 
 Array = NDArray[np.float64]
-Solve = Callable[[float], tuple[Array, int]]
-"""Start velocity [m/s] -> position at the times [m], steps."""
+Solve = Callable[[float], tuple[Array, Callable[[], int]]]
+"""Start velocity [m/s] -> position at the times [m], and what counts the steps when asked."""
 
 
 def ours(model: Model, times: Array, rtol: float, backend: str, method: str) -> Solve:
     """`simulate`, with everything a user pays for on a call."""
     end = float(times[-1])
 
-    def solve(v: float) -> tuple[Array, int]:
+    def solve(v: float) -> tuple[Array, Callable[[], int]]:
         result = simulate(
             model, end, x0={"v": v}, rtol=rtol, t_eval=times, backend=backend, method=method
         )
-        return result["x"], result.statistics.steps
+        return result["x"], lambda: result.statistics.steps
 
     return solve
 
@@ -50,12 +50,12 @@ def casadi(model: Model, times: Array, rtol: float, plugin: str, compiled: bool)
         return _buffered_peer(model, _external(solver, name), whole.nominal)
     run = solver
 
-    def solve(v: float) -> tuple[Array, int]:
+    def solve(v: float) -> tuple[Array, Callable[[], int]]:
         x0 = model.initial_state({"v": v})
         states = run(x0=x0 / whole.nominal)["xf"]
         x = states[0, :].full().ravel() * whole.nominal[0]
         stats = solver.stats()
-        return x, int(stats.get("n_steps", stats.get("nsteps", 0)))
+        return x, lambda: int(stats.get("n_steps", stats.get("nsteps", 0)))
 
     return solve
 
@@ -69,10 +69,10 @@ def _buffered_peer(model: Model, run: ca.Function, nominal: Array) -> Solve:
     def scaled(v: float) -> Array:
         return model.initial_state({"v": v}) / nominal
 
-    def solve(v: float) -> tuple[Array, int]:
+    def solve(v: float) -> tuple[Array, Callable[[], int]]:
         start[:] = scaled(v)
         call()
-        return positions * nominal[0], 0
+        return positions * nominal[0], int
 
     return solve
 
@@ -108,7 +108,7 @@ def scipy(model: Model, times: Array, rtol: float, method: str) -> Solve:
         j_call()
         return matrix.reshape(n, n).T.copy()
 
-    def solve(v: float) -> tuple[Array, int]:
+    def solve(v: float) -> tuple[Array, Callable[[], int]]:
         found = solve_ivp(
             right,
             (0.0, float(times[-1])),
@@ -119,6 +119,6 @@ def scipy(model: Model, times: Array, rtol: float, method: str) -> Solve:
             t_eval=times,
             jac=derivative,
         )
-        return found.y[0], int(found.nfev)
+        return found.y[0], lambda: int(found.nfev)
 
     return solve
