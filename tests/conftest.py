@@ -1,5 +1,8 @@
 """Settings of the whole test suite."""
 
+import sys
+from collections.abc import Iterator
+
 import matplotlib as mpl
 import pytest
 import stored
@@ -23,3 +26,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     stored.chosen["update"] = config.getoption("--update-golden")
     stored.chosen["recompute"] = config.getoption("--recompute")
+
+
+@pytest.fixture(autouse=True)
+def pictures_are_closed() -> Iterator[None]:
+    """Whatever a test has drawn: Matplotlib keeps it, and warns at the twenty-first."""
+    yield
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")
