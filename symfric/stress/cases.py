@@ -19,8 +19,10 @@ from symfric.stress.dice import Dice, rounded
 SCENES = ("rabinowicz",) * 6 + ("drive",) * 6 + ("quarter_car",) * 2 + tuple(MECHANISMS)
 """Scenes as often as they are drawn: those of one contact find most for their cost."""
 
-OFFERED = {"quarter_car": {"F_e", "x_rel", "v_rel"}}
-OFFERED |= {scene: {"F_e"} for scene in ("rabinowicz", "drive", *MECHANISMS)}
+OFFERED: dict[str, set[str]] = {
+    "quarter_car": {"F_e", "x_rel", "v_rel"},
+    **{scene: {"F_e"} for scene in ("rabinowicz", "drive", *MECHANISMS)},
+}
 """What scenes offer to laws besides v and N."""
 
 WRAPPED = ("{}+viscous", "asymmetric({})", "lagged({})", "load_dependent({})",
