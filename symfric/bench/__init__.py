@@ -10,7 +10,7 @@ from symfric.bench.ivp import IvpBenchmark as IvpBenchmark
 from symfric.bench.ivp import bench_ivp as bench_ivp
 from symfric.bench.jitter import jitter as jitter
 from symfric.bench.lanes import LaneBenchmark as LaneBenchmark
-from symfric.bench.lanes import bench_lanes as bench_lanes
+from symfric.bench.lanes import bench_ensemble as bench_ensemble
 from symfric.bench.multibody import MultibodyBenchmark as MultibodyBenchmark
 from symfric.bench.multibody import bench_multibody as bench_multibody
 from symfric.bench.regularisation import RegularisationBenchmark as RegularisationBenchmark

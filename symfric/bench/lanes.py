@@ -81,7 +81,7 @@ CASES: tuple[Case, ...] = (
 and by how much there are fewer members."""
 
 
-def bench_lanes(
+def bench_ensemble(
     *, quick: bool = False, progress: Callable[[str, float], None] | None = None
 ) -> LaneBenchmark:
     """Measure all cases; `quick`: two, with few members."""

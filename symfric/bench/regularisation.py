@@ -210,7 +210,7 @@ def bench_regularisation(
     for number, case in enumerate(cases):
         if progress is not None:
             progress(case.name, number / len(cases))
-        rows += _measured(case, factors, rtols, 1 if quick else ROUNDS, backend)
+        rows += _measured(case, factors, rtols, 2 if quick else ROUNDS, backend)
     return RegularisationBenchmark(tuple(rows))
 
 

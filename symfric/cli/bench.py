@@ -10,6 +10,8 @@ from symfric.cli.options import JsonOption, PlotOption, check_outputs
 from symfric.foundation.parameters import check_names
 
 SUBJECTS = ("integrator", "calls", "ensemble", "multibody", "ivp", "jitter", "regularisation")
+TABLES = ("calls", "ensemble")
+"""Subjects without a picture."""
 
 
 def bench(
@@ -41,94 +43,47 @@ def bench(
     Example: symfric bench multibody --plot bench.png --csv runs.csv
     """
     check_names("bench", [subject], SUBJECTS)
-    only = (("--links", links, ("multibody",)), ("--csv", csv, ("multibody", "regularisation")))
+    drawn = tuple(name for name in SUBJECTS if name not in TABLES)
+    only = (
+        ("--links", links, ("multibody",)),
+        ("--csv", csv, ("multibody", "regularisation")),
+        ("--plot", plot, drawn),
+    )
     given = [o for o, value, where in only if value is not None and subject not in where]
     if given:
         raise ValueError(f"bench {subject}: expected no {', '.join(given)}, got one")
     check_outputs(json, csv, picture=plot)
-    if subject == "integrator":
-        _integrator(quick, plot, json)
-    elif subject == "calls":
-        _calls(quick, plot, json)
-    elif subject == "ensemble":
-        _ensemble(quick, plot, json)
-    elif subject == "multibody":
-        _multibody(quick, links, plot, csv, json)
-    elif subject == "ivp":
-        _ivp(quick, plot, json)
-    elif subject == "regularisation":
-        _regularisation(quick, plot, csv, json)
-    else:
+    if subject == "jitter":
         _jitter(quick, plot, json)
+    else:
+        _measure(subject, quick, links, plot, csv, json)
     output.say_written(plot, csv, json)
 
 
-def _integrator(quick: bool, plot: Path | None, json: str | None) -> None:
-    from symfric.bench import bench_integrator  # noqa: PLC0415  (only this command needs it)
-
-    with output.progress("measuring") as tell:
-        result = bench_integrator(quick=quick, progress=lambda _, fraction: tell(fraction))
-    if plot:
-        result.plot(plot)
-    output.emit_json(result.to_dict(), json)
-    if json != "-":
-        bench_tables.integrator(result)
-
-
-def _calls(quick: bool, plot: Path | None, json: str | None) -> None:
-    from symfric.bench import bench_calls  # noqa: PLC0415  (only this command needs it)
-
-    if plot:
-        raise ValueError("bench calls: expected no --plot, got one; it is a table")
-    with output.progress("measuring") as tell:
-        result = bench_calls(quick=quick, progress=lambda _, fraction: tell(fraction))
-    output.emit_json(result.to_dict(), json)
-    if json != "-":
-        bench_tables.calls(result)
-
-
-def _ensemble(quick: bool, plot: Path | None, json: str | None) -> None:
-    from symfric.bench import bench_lanes  # noqa: PLC0415  (only this command needs it)
-
-    if plot:
-        raise ValueError("bench ensemble: expected no --plot, got one; it is a table")
-    with output.progress("measuring") as tell:
-        result = bench_lanes(quick=quick, progress=lambda _, fraction: tell(fraction))
-    output.emit_json(result.to_dict(), json)
-    if json != "-":
-        bench_tables.ensemble(result)
-
-
-def _multibody(
-    quick: bool, links: str | None, plot: Path | None, csv: Path | None, json: str | None
+def _measure(
+    subject: str,
+    quick: bool,
+    links: str | None,
+    plot: Path | None,
+    csv: Path | None,
+    json: str | None,
 ) -> None:
-    from symfric.bench import bench_multibody  # noqa: PLC0415  (only this command needs it)
-    from symfric.bench.chains import SIZES  # noqa: PLC0415
+    from symfric import bench as measures  # noqa: PLC0415  (only this command needs it)
 
-    sizes = lengths(links) if links else SIZES
+    sizes = {"links": lengths(links)} if links else {}
     with output.progress("measuring") as tell:
-        result = bench_multibody(
-            quick=quick, links=sizes, progress=lambda _, fraction: tell(fraction)
-        )
+
+        def told(_: str, fraction: float) -> None:
+            tell(fraction)
+
+        result = getattr(measures, f"bench_{subject}")(quick=quick, progress=told, **sizes)
     if plot:
         result.plot(plot)
     if csv:
         result.write_csv(csv)
     output.emit_json(result.to_dict(), json)
     if json != "-":
-        bench_tables.multibody(result)
-
-
-def _ivp(quick: bool, plot: Path | None, json: str | None) -> None:
-    from symfric.bench import bench_ivp  # noqa: PLC0415  (only this command needs it)
-
-    with output.progress("measuring") as tell:
-        result = bench_ivp(quick=quick, progress=lambda _, fraction: tell(fraction))
-    if plot:
-        result.plot(plot)
-    output.emit_json(result.to_dict(), json)
-    if json != "-":
-        bench_tables.ivp(result)
+        getattr(bench_tables, subject)(result)
 
 
 def _jitter(quick: bool, plot: Path | None, json: str | None) -> None:
@@ -142,20 +97,6 @@ def _jitter(quick: bool, plot: Path | None, json: str | None) -> None:
     output.emit_json(data.to_dict(), json)
     if json != "-":
         bench_tables.jitter(data)
-
-
-def _regularisation(quick: bool, plot: Path | None, csv: Path | None, json: str | None) -> None:
-    from symfric.bench import bench_regularisation  # noqa: PLC0415  (only this command needs it)
-
-    with output.progress("measuring") as tell:
-        result = bench_regularisation(quick=quick, progress=lambda _, fraction: tell(fraction))
-    if plot:
-        result.plot(plot)
-    if csv:
-        result.write_csv(csv)
-    output.emit_json(result.to_dict(), json)
-    if json != "-":
-        bench_tables.regularisation(result)
 
 
 def lengths(text: str) -> tuple[int, ...]:

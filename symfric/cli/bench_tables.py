@@ -71,16 +71,22 @@ def calls(result: "CallBenchmark") -> None:
 def ensemble(result: "LaneBenchmark") -> None:
     """Members side by side and one by one."""
     output.show_table(
-        ["case", "members", "lanes", "us each", "alone", "ratio", "again [ms]", "attempts", "equal",
-         "differ"],
+        ["case", "lanes", "us each", "alone", "ratio", "attempts"],
         [
-            [r.case, r.members, r.lanes, round(r.member_us, 1), round(r.alone_us, 1),
-             round(r.ratio, 2), round(r.again_ms, 2), round(r.attempts), f"{r.equal:.0%}",
-             _short(r.difference)]
+            [r.case, r.lanes, round(r.member_us, 1), round(r.alone_us, 1), round(r.ratio, 2),
+             round(r.attempts)]
             for r in result.rows
         ],
         "Processor time of a member on one core; ratio: alone over side by side",
     )  # fmt: skip
+    output.show_table(
+        ["case", "members", "again [ms]", "equal", "differ"],
+        [
+            [r.case, r.members, round(r.again_ms, 2), f"{r.equal:.0%}", _short(r.difference)]
+            for r in result.rows
+        ],
+        "again: another call of one member; equal: members with the same attempts; differ: at the end",
+    )
 
 
 def multibody(result: "MultibodyBenchmark") -> None:
