@@ -85,7 +85,7 @@ def ensemble(result: "LaneBenchmark") -> None:
             [r.case, r.members, round(r.again_ms, 2), f"{r.equal:.0%}", _short(r.difference)]
             for r in result.rows
         ],
-        "again: another call of one member; equal: members with the same attempts; differ: at the end",
+        "again: another call, one member; equal: with the same attempts; differ: at the end",
     )
 
 
