@@ -1,0 +1,1 @@
+"""What the model really does under an optimised control, and a mesh that follows from it."""

@@ -1,0 +1,1 @@
+"""Receding horizons: Gauss-Newton on implicit steps, in closed loop and as C."""

@@ -1,0 +1,1 @@
+"""The result of an optimal control problem: it plots, writes and stores itself."""

@@ -1,0 +1,1 @@
+"""Nonlinear programs to Ipopt, fatrop or an SQP method, and what their answers mean."""

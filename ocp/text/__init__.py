@@ -1,0 +1,1 @@
+"""What the user writes: phases, conditions, costs, and what they resolve to."""

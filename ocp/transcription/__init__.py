@@ -1,0 +1,1 @@
+"""From a problem to a nonlinear program made of blocks, and back to names."""
