@@ -43,8 +43,9 @@ ROLES = {
 
 
 def param(
-    default: float, *, unit: str, doc: str, role: str = "", lower: float = -inf, upper: float = inf
-) -> Any:
+    default: float, *, unit: str, doc: str, role: str = "", width: int = 0,
+    lower: float = -inf, upper: float = inf,
+) -> Any:  # fmt: skip
     """Declare a parameter field of a `Parametric` dataclass.
 
     Args:
@@ -53,6 +54,8 @@ def param(
         doc: what it is, in a few words.
         role: what it is for, one of `ROLES`, from which identification, temperature and the code
             generator tell alike parameters; "" says nothing.
+        width: of a parameter that smooths a jump, its exponent in the width of the layer: 1 for
+            the width itself, -1 for a steepness; 0 for any other.
         lower, upper: closed bounds; identification takes its box constraints from here.
 
     Raises:
@@ -60,7 +63,7 @@ def param(
     """
     if role and role not in ROLES:
         raise ValueError(f"param: role: expected one of {', '.join(ROLES)}, got {role!r}")
-    meta = {"unit": unit, "doc": doc, "role": role, "lower": lower, "upper": upper}
+    meta = {"unit": unit, "doc": doc, "role": role, "lower": lower, "upper": upper, "width": width}
     return field(default=default, metadata=meta)
 
 
@@ -80,6 +83,7 @@ class Parameter:
         name: flat name in the whole object, such as "mu_s_pos".
         field: name in the part that declares it, such as "mu_s".
         role: what it is for, one of `ROLES`, or "".
+        width: exponent in the width of a smoothed jump, see `param`.
     """
 
     name: str
@@ -91,6 +95,7 @@ class Parameter:
     doc: str
     role: str = ""
     field: str = ""
+    width: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,6 +280,7 @@ def parameters(obj: Parametric) -> dict[str, Parameter]:
                 meta["doc"],
                 meta["role"],
                 name,
+                meta["width"],
             )
         else:
             found[flat] = replace(children[child][name], name=flat)

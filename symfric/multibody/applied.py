@@ -139,13 +139,11 @@ def some_switches(law: Law | SpatialSlip) -> tuple[Switch, ...]:
     return switches_at(law, one, one, ca.SX.ones(len(law.states)), one)
 
 
-def static_level(law: Law | SpatialSlip, N: ca.SX) -> ca.SX:
-    """What a contact can hold [N]; what presses it where no mode tells."""
-    at_rest = ca.SX.zeros(len(law.states))
-    for switch in switches_at(law, ca.SX(0.0), N, at_rest, ca.SX(0.0)):
-        if switch.at_start:
-            return -ca.SX(switch.expression)
-    return N
+def capacity_of(law: Law | SpatialSlip, N: ca.SX) -> ca.SX:
+    """What a contact can hold [N] for its share in a loop; what presses it where no mode tells."""
+    if isinstance(law, SpatialSlip) or not some_switches(law):
+        return N
+    return ca.SX(law.static_level(N))
 
 
 @final

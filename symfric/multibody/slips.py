@@ -17,8 +17,8 @@ from symfric.model import Event, Variables, kinds
 from symfric.multibody.applied import (
     Rest,
     applied_forces,
+    capacity_of,
     forward,
-    static_level,
     switches_at,
 )
 from symfric.multibody.equations import Equations
@@ -75,7 +75,7 @@ def slips(
         groups: the contacts whose laws ask for the applied force.
     """
     unknowns, pressing = _pressing(eq, normal_at_start)
-    levels = [static_level(c.law, N) if groups else N
+    levels = [capacity_of(c.law, N) if groups else N
               for c, N in zip(eq.contacts, pressing, strict=True)]  # fmt: skip
     applied = applied_forces(groups, levels)
     slides = _slides(eq, groups)
@@ -188,7 +188,7 @@ def _event(name: str, s: Switch, reset: Mapping[str, Scalar]) -> Event:
 def _of_loop(rest: Rest, contacts: Sequence[Slip]) -> Iterator[Event]:
     """End of motion, break-away and dead centres of a loop of one degree of freedom."""
     m, T, omega = rest.direction[0].symbol, rest.force.symbol, rest.rate
-    top = rest.capacity([static_level(s.contact.law, s.N) for s in contacts])
+    top = rest.capacity([capacity_of(s.contact.law, s.N) for s in contacts])
     modes = [_modes(s) for s in contacts]
     still, every = rests(m), [name for names in modes for name in names]
     pull = m * T - top

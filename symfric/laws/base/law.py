@@ -7,8 +7,8 @@ from math import inf
 from typing import ClassVar
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import Scalar, empty
-from symfric.foundation.parameters import Parametric
+from symfric.foundation.numeric import Scalar, empty, equals
+from symfric.foundation.parameters import Parametric, parameters
 
 PHENOMENA = {
     "D": "dynamic (kinetic) friction",
@@ -138,6 +138,43 @@ class Law(Parametric, ABC):
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N] opposing the sliding velocity."""
 
+    @property
+    def widths(self) -> dict[str, int]:
+        """Parameters that smooth the jump at v = 0: name -> exponent of their unit in m/s.
+
+        Scaled by s^exponent, all of them, the layer of velocities in which the law differs from
+        `sliding` is s times as wide. Empty for laws that do not smooth: those with modes, and
+        bristles, whose stiffness is physics. A float 0 is no width.
+        """
+        known = parameters(self).items()
+        return {name: p.width for name, p in known if p.width and not equals(p.value, 0.0)}
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the `widths` vanish; of a dynamic law when steady.
+
+        With its one-sided derivatives at speed 0, and finite below it: what an odd law writes, and
+        `sliding` and `static_level` follow. All three take further inputs but F_e by keyword.
+
+        Raises:
+            ValueError: the law does not say, or has no such limit.
+        """
+        raise one_sided(self, "it does not say; write its method `outside(speed, N)`")
+
+    def sliding(self, v: Scalar, N: Scalar, side: int) -> Scalar:
+        """Sliding force [N] on one side of v = 0, `side` 1 or -1, as the `widths` vanish.
+
+        Smooth in v from v = 0 on, with the sign of `side`; a Stribeck curve with a velocity of its
+        own stays. Raises as `outside`.
+        """
+        return side * self.outside(side * v, N)
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """Largest force [N] that rest holds against being pulled to `side`, as the widths vanish.
+
+        The top of the curve at rest, unless the law says otherwise. Raises as `outside`.
+        """
+        return self.outside(0.0, N)
+
     @abstractmethod
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Time derivative of the internal states, shape (n, 1) or (n, ...)."""
@@ -163,6 +200,14 @@ class Law(Parametric, ABC):
     def warnings(self) -> tuple[str, ...]:
         """What the present numbers give away, such as passivity, one sentence each."""
         return ()
+
+
+def one_sided(law: Law, reason: str) -> ValueError:
+    """The error for a law whose force has no limit, or none known, on one side of rest."""
+    return ValueError(
+        f"{type(law).__name__}: expected a law with a sliding force on each side of v = 0 and a "
+        f"static level, got one without; {reason}"
+    )
 
 
 def chosen(law: Law, inputs: Mapping[str, Scalar]) -> dict[str, Scalar]:

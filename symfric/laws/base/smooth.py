@@ -11,6 +11,9 @@ import numpy as np
 from symfric.foundation.numeric import Scalar, equals, exp, expm1, is_casadi, is_number, sqrt, tanh
 from symfric.foundation.vector import ROUND, TINY, NotIsotropicError, Vector, Vectors, no_vector
 
+SHARE = 1e-6
+"""Share of the Stribeck velocity over which one side of its fall is rounded at rest."""
+
 
 def sign(x: Scalar, eps: Scalar) -> Scalar:
     """Smooth sign tanh(x / eps); within 1 % of +-1 beyond 2.65 eps.
@@ -139,6 +142,29 @@ def stribeck(v: Scalar, v_s: Scalar, delta: Scalar, eps: Scalar) -> Scalar:
     """
     width = 0.0 if equals(eps, 0.0) else eps / v_s
     return exp(-power(v / v_s, delta, width))
+
+
+def onward(x: Scalar) -> Scalar:
+    """`x` for x >= 0 and tanh(2 x) / 2 below, C2: what is written for speeds >= 0, seen past rest.
+
+    An iterate of a solver may be there; a fall that grows exponentially would throw it off.
+    """
+    return choose(x < 0, tanh(2 * x) / 2, x)
+
+
+def fall(speed: Scalar, v_s: Scalar, delta: Scalar) -> Scalar:
+    """The Stribeck weight exp(-(speed / v_s)^delta) on one side of rest, for speeds >= 0.
+
+    A float `delta` that is a whole number has all derivatives at rest. Others round the power over
+    `SHARE` of v_s: for delta < 2 it has no second derivative there. Bounded below zero, see
+    `onward`.
+    """
+    if equals(delta, 2.0):
+        return exp(-((speed / v_s) ** 2))
+    u = onward(speed / v_s)
+    if is_number(delta) and float(delta).is_integer():
+        return exp(-(u ** int(delta)))
+    return exp(-power(u, delta, SHARE))
 
 
 def phi1(x: Scalar) -> Scalar:

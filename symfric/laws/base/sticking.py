@@ -50,7 +50,7 @@ class Sticking(Law):
         return column(smooth.choose(rests(z[0]), share, 0.0 * v))
 
     @abstractmethod
-    def static_level(self, N: Scalar) -> Scalar:
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
         """The largest force [N] that rest holds."""
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:

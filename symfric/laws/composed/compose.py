@@ -72,6 +72,16 @@ class Sum(Law):
         first, *rest = [law.force(v, N, part, **chosen(law, inputs)) for law, part in self.terms(z)]
         return sum(rest, start=first)
 
+    def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
+        """Sliding forces [N] of all terms on one side."""
+        first, *rest = [law.sliding(v, N, side, **chosen(law, inputs)) for law in self.laws]
+        return sum(rest, start=first)
+
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Largest force [N] at rest: that of all terms together."""
+        first, *rest = [law.static_level(N, side, **chosen(law, inputs)) for law in self.laws]
+        return sum(rest, start=first)
+
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Rates of all states."""
         rates = [
@@ -128,7 +138,7 @@ class Asymmetric(Wrapper):
     positive: Law
     negative: Law
     v_blend: Scalar = param(
-        1e-4, unit="m/s", role="width", doc="blending velocity of the sides", lower=1e-12
+        1e-4, unit="m/s", role="width", width=1, doc="blending velocity of the sides", lower=1e-12
     )
 
     def __post_init__(self) -> None:
@@ -160,6 +170,10 @@ class Asymmetric(Wrapper):
             if _differ(pos.value, neg.value)
         }
         return with_values(self.positive, blended)
+
+    def inner_of(self, side: int) -> Law:
+        """The law of one side."""
+        return self.positive if side > 0 else self.negative
 
     @property
     def velocity_scale(self) -> Scalar:

@@ -25,6 +25,10 @@ class Wrapper(Law):
         """The law inside, with the numbers it has at the sliding velocity `v`."""
         return self.inner
 
+    def inner_of(self, side: int) -> Law:
+        """The law inside, with the numbers it has on one side of v = 0."""
+        return self.inner
+
     def load(self, N: Scalar) -> Scalar:
         """The normal force [N] that the law inside sees."""
         return N
@@ -47,6 +51,14 @@ class Wrapper(Law):
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Friction force [N]."""
         return self.inner_at(v).force(v, self.load(N), z, **inputs)
+
+    def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
+        """Sliding force [N] of the law inside on one side; of one that lags, when steady."""
+        return self.inner_of(side).sliding(v, self.load(N), side, **inputs)
+
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Largest force [N] at rest of the law inside, on its side."""
+        return self.inner_of(side).static_level(self.load(N), side, **inputs)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Rates of the states."""

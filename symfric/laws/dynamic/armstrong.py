@@ -90,6 +90,14 @@ class Armstrong(Law):
         excess = self.mu_a + (self.mu_inf - self.mu_a) * q
         return N * (self.mu_d + excess / (1 + (w / self.v_s) ** 2))
 
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0, above v_e, where no rest is remembered."""
+        return self.level(N, speed, 0.0) + self.sigma_2 * speed
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The force [N] of break-away after a long rest."""
+        return self.level(N, 0.0, 1.0)
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         return self.k_t * z[0] + self.sigma_2 * v

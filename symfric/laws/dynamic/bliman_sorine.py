@@ -69,6 +69,18 @@ class BlimanSorine(Law):
         """
         return self.s_f if self.order == "2" else inf
 
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0."""
+        return (self.mu_1 if self.order == "1" else self.mu_1 - self.mu_2) * N
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The height [N] of the peak at the path s_p, which the order 1 does not have."""
+        if self.order == "1":
+            return self.mu_1 * N
+        q = self.eta * self.mu_2 / self.mu_1  # exp(-s_p (1 - eta)/(eta s_f))
+        slow, fast = q ** (self.eta / (1 - self.eta)), q ** (1 / (1 - self.eta))
+        return N * (self.mu_1 * (1 - fast) - self.mu_2 * (1 - slow))
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         return z[0] if self.order == "1" else z[0] + z[1]

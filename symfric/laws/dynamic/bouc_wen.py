@@ -76,6 +76,11 @@ class BoucWen(Law):
         """None: the force depends on the path alone."""
         return inf
 
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0."""
+        share = (self.A / (self.beta + self.gamma)) ** (1 / self.n)
+        return self.mu_d * N * share
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         return self.mu_d * N * z[0]

@@ -53,6 +53,11 @@ class Bristle(Law):
         falling = smooth.stribeck(v, self.v_s, self.delta, self.v_eps)
         return N * (self.mu_d + (self.mu_s - self.mu_d) * falling)
 
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0."""
+        mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, self.delta)
+        return mu * N + self.sigma_2 * speed
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         return self.sigma_0 * z[0] + self.sigma_1 * self.rate(v, N, z)[0] + self.sigma_2 * v

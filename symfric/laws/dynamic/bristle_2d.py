@@ -67,6 +67,10 @@ class Bristle2D(Law):
         falling = exp(-((v / self.v_s) ** 2))
         return N * (self.mu_d + (self.mu_s - self.mu_d) * falling)
 
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0."""
+        return self._level(speed, N)
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         g = self._level(v, N)

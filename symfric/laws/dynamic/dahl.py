@@ -60,6 +60,10 @@ class Dahl(Law):
         """None: the force depends on the path alone."""
         return inf
 
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0."""
+        return self.mu_d * N
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         return self.sigma_0 * z[0]

@@ -59,9 +59,16 @@ class ExactCoulomb(Sticking):
         """That of the fall [m/s]; what happens at v = 0 is an event."""
         return self.v_s if self.form == "stribeck" else inf
 
-    def static_level(self, N: Scalar) -> Scalar:
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
         """The force [N] of break-away."""
         return self.mu_s * N
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0."""
+        mu = self.mu_d
+        if self.form == "stribeck":
+            mu = mu + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, 2.0)
+        return mu * N + self.sigma_2 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
         """Friction force [N]."""

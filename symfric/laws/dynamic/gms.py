@@ -119,6 +119,11 @@ class GMS(Law):
     def _begins(self, r: Scalar) -> Scalar:
         return smooth.step5((r - 1) / self.rho + 1)
 
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0."""
+        mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, self.delta)
+        return mu * N + self.sigma_2 * speed
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         return sum((z[i] for i in range(len(self.elements))), start=self.sigma_2 * v)

@@ -93,6 +93,10 @@ class Gonthier(Law):
         tau = fast + (self.tau_dw - fast) * dwelling
         return column(s * v + (1 - s) * pull, (s - z[1]) / tau)
 
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0, in its limit of small v_d."""
+        return self._level(N, self._sticking(speed)) + self.sigma_2 * speed
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         bristle = self.sigma_0 * z[0] + self.sigma_1 * self.rate(v, N, z)[0]

@@ -83,6 +83,14 @@ class HaessigFriedland(Law):
             return column((1 - z[1]) * v, 0.0 * v)
         return column(yielding(v, self._share(N, z), self.n, self.v_eps, self.r_eps))
 
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0."""
+        return self.mu_d * N
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The force [N] of break-away, mu_s N."""
+        return self.mu_s * N
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         if self.form == "event":

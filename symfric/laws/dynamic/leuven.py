@@ -103,6 +103,11 @@ class Leuven(Law):
         spent = smooth.signed_power(share, self.delta_l, self.r_eps)
         return v - smooth.magnitude(v, self.v_eps) * spent
 
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0."""
+        mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, self.delta)
+        return mu * N + self.sigma_2 * speed
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         damping = self.sigma_1 * self.stretching(v, N, z)

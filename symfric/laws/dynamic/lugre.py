@@ -84,6 +84,10 @@ class LuGreNormalised(Bristle):
         relaxation = self.sigma_0 * smooth.magnitude(v, self.v_eps) / self.level(v, 1.0)
         return column(v - relaxation * z[0])
 
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0."""
+        return N * super().outside(speed, 1.0)
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         damping = self.sigma_1 * self.rate(v, N, z)[0]

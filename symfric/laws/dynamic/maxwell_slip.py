@@ -83,6 +83,10 @@ class MaxwellSlip(Law):
         """None: the force depends on the path alone."""
         return float("inf")
 
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0."""
+        return N * sum((e.mu for e in self.elements[1:]), start=self.elements[0].mu)
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         return sum((z[i] for i in range(1, len(self.elements))), start=z[0])

@@ -6,7 +6,7 @@ from typing import ClassVar, final
 from symfric.foundation.numeric import Scalar, asinh, column, exp, is_number, log, sqrt
 from symfric.foundation.parameters import option, param
 from symfric.laws.base import smooth
-from symfric.laws.base.law import Facts, Law, State
+from symfric.laws.base.law import Facts, Law, State, one_sided
 
 
 @final
@@ -82,6 +82,10 @@ class RateAndState(Law):
 
     def _speed(self, v: Scalar) -> Scalar:
         return sqrt(v * v + self.v_eps * self.v_eps)
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Refused: the steady force follows ln v, and no load is held at rest."""
+        raise one_sided(self, "it creeps under any load, and ln v has no limit at rest")
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

@@ -78,6 +78,11 @@ class StickSlip(Law):
     def _slipping(self, v: Scalar) -> Scalar:
         return smooth.step5(smooth.magnitude(v, self.v_eps) / self.v_s)
 
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Steady sliding force [N] at a speed >= 0, the plateau mu_s N within v_s."""
+        fallen = smooth.step5((speed - self.v_s) / (self.v_d - self.v_s))
+        return N * (self.mu_s - (self.mu_s - self.mu_d) * fallen)
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         slip, speed = self._slipping(v), smooth.magnitude(v, self.v_eps)

@@ -7,7 +7,15 @@ from typing import ClassVar, final
 from symfric.foundation.numeric import Scalar, atan, column, exp, is_number
 from symfric.foundation.parameters import option, param
 from symfric.laws.base import smooth
-from symfric.laws.base.law import APPLIED_FORCE, Facts, Input, State, StaticLaw, Switch
+from symfric.laws.base.law import (
+    APPLIED_FORCE,
+    Facts,
+    Input,
+    State,
+    StaticLaw,
+    Switch,
+    one_sided,
+)
 from symfric.laws.base.sticking import Sticking, carried, rests, stick_and_slip
 
 FORMS = ("smooth", "original")
@@ -48,7 +56,12 @@ class Karnopp(Sticking):
     mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
     D_v: Scalar = param(
-        1e-3, unit="m/s", role="width", doc="half width of the band around rest", lower=1e-12
+        1e-3,
+        unit="m/s",
+        role="width",
+        width=1,
+        doc="half width of the band around rest",
+        lower=1e-12,
     )
     sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
     F_eps: Scalar = param(
@@ -84,9 +97,13 @@ class Karnopp(Sticking):
         """The half width of the band [m/s]; none in the event form, where it is an event."""
         return inf if self.has_mode else self.D_v
 
-    def static_level(self, N: Scalar) -> Scalar:
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
         """The force [N] of break-away."""
         return self.mu_s * N
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return self.mu_d * N + self.sigma_2 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
         """Friction force [N]."""
@@ -148,7 +165,7 @@ class Awrejcewicz(StaticLaw):
     mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
     epsilon: Scalar = param(
-        1e-3, unit="m/s", role="width", doc="half width of the window", lower=1e-12
+        1e-3, unit="m/s", role="width", width=1, doc="half width of the window", lower=1e-12
     )
     v_s: Scalar = param(
         1e-2, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
@@ -167,6 +184,10 @@ class Awrejcewicz(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The half width of the window [m/s]."""
         return self.epsilon
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return N * (self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, 2.0))
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
         """Friction force [N]."""
@@ -209,9 +230,11 @@ class LeineSwitch(Sticking):
     delta: Scalar = param(
         3.0, unit="s/m", role="velocity scale", doc="steepness of the fall", lower=0.0
     )
-    v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=1e-12)
+    v_eps: Scalar = param(
+        1e-4, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=1e-12
+    )
     eta: Scalar = param(
-        1e-6, unit="m/s", role="width", doc="half width of the band of rest", lower=1e-15
+        1e-6, unit="m/s", role="width", width=1, doc="half width of the band of rest", lower=1e-15
     )
     c: Scalar = param(
         10.0, unit="N s/m", role="damping", doc="pull to the middle, original form", lower=0.0
@@ -233,9 +256,13 @@ class LeineSwitch(Sticking):
         """The smoothing velocity, or the half width of the band [m/s]; none in the event form."""
         return {"smooth": self.v_eps, "original": self.eta, "event": inf}[self.form]
 
-    def static_level(self, N: Scalar) -> Scalar:
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
         """The force [N] of break-away."""
         return self.mu_s * N
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return self.mu_s * N / (1 + smooth.onward(self.delta * speed))
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
         """Friction force [N]."""
@@ -289,7 +316,9 @@ class Wojewoda(StaticLaw):
     a_2: Scalar = param(
         0.1, unit="m/s^2", role="shape", doc="acceleration of half the decay", lower=1e-12
     )
-    v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=1e-12)
+    v_eps: Scalar = param(
+        1e-4, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=1e-12
+    )
     a_eps: Scalar = param(
         1e-2, unit="m/s^2", role="width", doc="smoothing acceleration", lower=1e-12
     )
@@ -311,6 +340,10 @@ class Wojewoda(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The smoothing velocity [m/s]."""
         return self.v_eps
+
+    def outside(self, speed: Scalar, N: Scalar, *, dv: Scalar = 0.0) -> Scalar:
+        """Refused: the branch that a slide begins or ends on follows from dv."""
+        raise one_sided(self, "its branches change with the sign of v dv/dt")
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, dv: Scalar = 0.0) -> Scalar:
         """Friction force [N]."""

@@ -33,7 +33,7 @@ class BrownMcPhee(StaticLaw):
     mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
     v_t: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", doc="transition velocity", lower=1e-12
+        1e-3, unit="m/s", role="velocity scale", width=1, doc="transition velocity", lower=1e-12
     )
     mu_v: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
     N_t: Scalar = param(1.0, unit="N", role="load", doc="transition normal force", lower=1e-12)
@@ -42,6 +42,16 @@ class BrownMcPhee(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The transition velocity [m/s]."""
         return self.v_t
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        if equals(self.mu_v, 0.0):
+            return self.mu_d * N
+        return self.mu_d * N + self.mu_v * speed * tanh(4 * N / self.N_t)
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The force [N] of break-away, mu_s N."""
+        return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

@@ -57,13 +57,19 @@ class Coulomb(StaticLaw):
     )
 
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
-    v_eps: Scalar = param(1e-3, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
+    v_eps: Scalar = param(
+        1e-3, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=0.0
+    )
     shape: str = option("tanh", choices=tuple(SHAPES), doc="smooth sign")
 
     @property
     def velocity_scale(self) -> Scalar:
         """The smoothing velocity [m/s]; none without smoothing."""
         return inf if equals(self.v_eps, 0.0) else self.v_eps
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return self.mu_d * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -97,6 +103,10 @@ class Viscous(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """None: the force is linear."""
         return inf
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0; none at rest."""
+        return self.sigma_2 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -133,6 +143,10 @@ class PowerLawViscous(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The smoothing velocity [m/s]; none for the linear law."""
         return inf if equals(self.d, 1.0) else self.v_eps
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """The force itself [N]: it does not jump at rest."""
+        return self.force(speed, N)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

@@ -35,13 +35,20 @@ class Tustin(StaticLaw):
     v_s: Scalar = param(
         1e-3, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
     )
-    v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
+    v_eps: Scalar = param(
+        1e-4, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=0.0
+    )
     sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
         """The smoothing velocity [m/s], or the Stribeck velocity without smoothing."""
         return self.v_s if equals(self.v_eps, 0.0) else self.v_eps
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, 1.0)
+        return mu * N + self.sigma_2 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -75,12 +82,19 @@ class Benson(StaticLaw):
     d_c: Scalar = param(
         1e3, unit="s/m", role="velocity scale", doc="decay coefficient", lower=1e-12
     )
-    v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
+    v_eps: Scalar = param(
+        1e-4, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=0.0
+    )
 
     @property
     def velocity_scale(self) -> Scalar:
         """The smoothing velocity [m/s], or 1/d_c without smoothing."""
         return 1 / self.d_c if equals(self.v_eps, 0.0) else self.v_eps
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        falling = smooth.fall(speed, 1 / self.d_c, 1.0)
+        return (self.mu_d + (self.mu_s - self.mu_d) * falling) * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -116,13 +130,18 @@ class Berger(StaticLaw):
         1e-3, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
     )
     v_t: Scalar = param(
-        1e-4, unit="m/s", role="velocity scale", doc="transition velocity", lower=1e-12
+        1e-4, unit="m/s", role="velocity scale", width=1, doc="transition velocity", lower=1e-12
     )
 
     @property
     def velocity_scale(self) -> Scalar:
         """The transition velocity [m/s]."""
         return self.v_t
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, 1.0)
+        return mu * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -155,13 +174,18 @@ class DuanSingh(StaticLaw):
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
     c: Scalar = param(1e3, unit="s/m", role="velocity scale", doc="decay coefficient", lower=1e-12)
     sigma: Scalar = param(
-        1e4, unit="s/m", role="velocity scale", doc="conditioning factor", lower=1e-12
+        1e4, unit="s/m", role="velocity scale", width=-1, doc="conditioning factor", lower=1e-12
     )
 
     @property
     def velocity_scale(self) -> Scalar:
         """The velocity 1/sigma [m/s]."""
         return 1 / self.sigma
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        falling = smooth.fall(speed, 1 / self.c, 1.0)
+        return (self.mu_d + (self.mu_s - self.mu_d) * falling) * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -197,7 +221,7 @@ class Andersson(StaticLaw):
     )
     p: Scalar = param(2.0, unit="1", role="shape", doc="exponent", lower=0.1, upper=10.0)
     k_t: Scalar = param(
-        1e4, unit="s/m", role="velocity scale", doc="steepness at rest", lower=1e-12
+        1e4, unit="s/m", role="velocity scale", width=-1, doc="steepness at rest", lower=1e-12
     )
     sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
 
@@ -205,6 +229,11 @@ class Andersson(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The velocity 1/k_t [m/s]."""
         return 1 / self.k_t
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, self.p)
+        return mu * N + self.sigma_2 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -248,12 +277,19 @@ class SteadyStateLuGre(StaticLaw):
     delta: Scalar = param(
         2.0, unit="1", role="shape", doc="Stribeck exponent", lower=0.1, upper=10.0
     )
-    v_eps: Scalar = param(1e-5, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
+    v_eps: Scalar = param(
+        1e-5, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=0.0
+    )
 
     @property
     def velocity_scale(self) -> Scalar:
         """The smoothing velocity [m/s], or the Stribeck velocity without smoothing."""
         return self.v_s if equals(self.v_eps, 0.0) else self.v_eps
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        falling = smooth.fall(speed, self.v_s, self.delta)
+        return self.F_C + (self.F_S - self.F_C) * falling + self.sigma_2 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

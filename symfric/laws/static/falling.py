@@ -35,13 +35,21 @@ class Lorentzian(StaticLaw):
     v_s: Scalar = param(
         1e-3, unit="m/s", role="velocity scale", doc="Stribeck velocity", lower=1e-12
     )
-    v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
+    v_eps: Scalar = param(
+        1e-4, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=0.0
+    )
     sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
         """The smoothing velocity [m/s], or the Stribeck velocity without smoothing."""
         return self.v_s if equals(self.v_eps, 0.0) else self.v_eps
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        u = speed / self.v_s
+        mu = self.mu_d + (self.mu_s - self.mu_d) / (1 + u * u)
+        return mu * N + self.sigma_2 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -78,12 +86,20 @@ class PoppStelter(StaticLaw):
     kappa: Scalar = param(
         0.0, unit="N s^2/m^2", role="viscous", doc="quadratic coefficient", lower=0.0
     )
-    v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
+    v_eps: Scalar = param(
+        1e-4, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=0.0
+    )
 
     @property
     def velocity_scale(self) -> Scalar:
         """The smoothing velocity [m/s], or 1/d without smoothing."""
         return 1 / self.d if equals(self.v_eps, 0.0) else self.v_eps
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        fall = (1 - self.eta) / (1 + smooth.onward(self.d * speed)) + self.eta
+        level = self.mu_s * N * fall
+        return level if equals(self.kappa, 0.0) else level + self.kappa * speed * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

@@ -69,7 +69,9 @@ class Bittencourt(StaticLaw):
     delta: Scalar = param(
         1.3, unit="1", role="shape", doc="Stribeck exponent", lower=0.1, upper=10.0
     )
-    v_eps: Scalar = param(0.1, unit="rad/s", role="width", doc="smoothing velocity", lower=1e-12)
+    v_eps: Scalar = param(
+        0.1, unit="rad/s", role="width", width=1, doc="smoothing velocity", lower=1e-12
+    )
     F_eps: Scalar = param(1e-4, unit="N m", role="width", doc="smoothing of the maximum", lower=0.0)
 
     def __post_init__(self) -> None:
@@ -85,6 +87,15 @@ class Bittencourt(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The smoothing velocity [rad/s]."""
         return self.v_eps
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding torque [N m] at a speed >= 0 as the widths vanish."""
+        v_s = self.v_s0 + self.v_sT * self.T
+        loaded = self.F_sl * N * smooth.fall(speed, self.v_sl, self.delta)
+        static = smooth.positive(self.F_s0 + self.F_sT * self.T, self.F_eps)
+        level = self.F_c0 + self.F_cl * N + loaded
+        level += static * smooth.fall(speed, v_s, self.delta)
+        return level + (self.F_v0 + self.F_vT * exp(-self.T / self.T_v)) * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction torque [N m]."""
@@ -152,7 +163,9 @@ class BAM(StaticLaw):
         1.35, unit="1", role="shape", doc="Stribeck exponent", lower=0.1, upper=10.0
     )
     K_v: Scalar = param(0.1, unit="N m s/rad", role="viscous", doc="viscous coefficient", lower=0.0)
-    v_eps: Scalar = param(0.01, unit="rad/s", role="width", doc="smoothing velocity", lower=1e-12)
+    v_eps: Scalar = param(
+        0.01, unit="rad/s", role="width", width=1, doc="smoothing velocity", lower=1e-12
+    )
     tau_eps: Scalar = param(1e-3, unit="N m", role="width", doc="smoothing torque", lower=1e-12)
 
     @property
@@ -175,13 +188,34 @@ class BAM(StaticLaw):
         self, v: Scalar, N: Scalar, z: Scalar = (), *, tau_m: Scalar = 0.0, tau_e: Scalar = 0.0
     ) -> Scalar:
         """Friction torque [N m]."""
+        falling = smooth.stribeck(v, self.v_s, self.alpha, self.v_eps)
+        return self._level(falling, tau_m, tau_e) * smooth.sign(v, self.v_eps) + self.K_v * v
+
+    def outside(
+        self, speed: Scalar, N: Scalar, *, tau_m: Scalar = 0.0, tau_e: Scalar = 0.0
+    ) -> Scalar:
+        """Sliding torque [N m] at a speed >= 0 as the widths vanish."""
+        falling = smooth.fall(speed, self.v_s, self.alpha)
+        return self._level(falling, tau_m, tau_e) + self.K_v * speed
+
+    def sliding(
+        self, v: Scalar, N: Scalar, side: int, *, tau_m: Scalar = 0.0, tau_e: Scalar = 0.0
+    ) -> Scalar:
+        """Sliding torque [N m] on one side of v = 0."""
+        return side * self.outside(side * v, N, tau_m=tau_m, tau_e=tau_e)
+
+    def static_level(
+        self, N: Scalar, side: int = 1, *, tau_m: Scalar = 0.0, tau_e: Scalar = 0.0
+    ) -> Scalar:
+        """The torque [N m] of break-away."""
+        return self.outside(0.0, N, tau_m=tau_m, tau_e=tau_e)
+
+    def _level(self, falling: Scalar, tau_m: Scalar, tau_e: Scalar) -> Scalar:
         dynamic = smooth.magnitude(self.K_e * tau_e - self.K_m * tau_m, self.tau_eps)
         static = smooth.magnitude(self.K_es * tau_e - self.K_ms * tau_m, self.tau_eps)
         if not (equals(self.Q_e, 0.0) and equals(self.Q_m, 0.0)):
             static += self._quadratic(tau_m, tau_e)
-        falling = smooth.stribeck(v, self.v_s, self.alpha, self.v_eps)
-        level = self.K_b + dynamic + falling * (self.K_s + static)
-        return level * smooth.sign(v, self.v_eps) + self.K_v * v
+        return self.K_b + dynamic + falling * (self.K_s + static)
 
     def _quadratic(self, tau_m: Scalar, tau_e: Scalar) -> Scalar:
         width = self.tau_eps * self.tau_eps
@@ -218,12 +252,22 @@ class Capstan(StaticLaw):
     beta: Scalar = param(
         3.141592653589793, unit="rad", role="geometry", doc="wrap angle", lower=0.0
     )
-    v_eps: Scalar = param(1e-3, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
+    v_eps: Scalar = param(
+        1e-3, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=0.0
+    )
 
     @property
     def velocity_scale(self) -> Scalar:
         """The smoothing velocity [m/s]."""
         return self.v_eps
+
+    def sliding(self, v: Scalar, N: Scalar, side: int) -> Scalar:
+        """Sliding force [N] to one side as the widths vanish."""
+        return N * expm1(self.mu_d * self.beta * side)
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The force [N] of break-away: larger towards the tension T_1."""
+        return side * self.sliding(0.0, N, side)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

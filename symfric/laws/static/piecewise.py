@@ -36,7 +36,7 @@ class BengisuAkay(StaticLaw):
     mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
     v_0: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", doc="velocity of the peak", lower=1e-12
+        1e-3, unit="m/s", role="velocity scale", width=1, doc="velocity of the peak", lower=1e-12
     )
     xi: Scalar = param(
         1e3, unit="s/m", role="velocity scale", doc="steepness of the fall", lower=0.0
@@ -47,6 +47,12 @@ class BengisuAkay(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The velocity of the peak [m/s]."""
         return self.v_0
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        whole = 2.0 if self.form == "smooth" else 1.0
+        mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(self.xi * speed, 1.0, whole)
+        return mu * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -83,10 +89,20 @@ class VelocityBased(StaticLaw):
     mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
     v_s: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", doc="stiction transition velocity", lower=1e-12
+        1e-3,
+        unit="m/s",
+        role="velocity scale",
+        width=1,
+        doc="stiction transition velocity",
+        lower=1e-12,
     )
     v_d: Scalar = param(
-        1.5e-3, unit="m/s", role="velocity scale", doc="friction transition velocity", lower=1e-12
+        1.5e-3,
+        unit="m/s",
+        role="velocity scale",
+        width=1,
+        doc="friction transition velocity",
+        lower=1e-12,
     )
     form: str = option("smooth", choices=FORMS, doc="quintic or cubic steps")
 
@@ -94,6 +110,14 @@ class VelocityBased(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The stiction transition velocity [m/s]."""
         return self.v_s
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return self.mu_d * N
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The force [N] of break-away, mu_s N."""
+        return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -130,10 +154,20 @@ class Ambrosio(StaticLaw):
 
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
     v_0: Scalar = param(
-        2e-4, unit="m/s", role="velocity scale", doc="velocity below which nothing acts", lower=0.0
+        2e-4,
+        unit="m/s",
+        role="velocity scale",
+        width=1,
+        doc="velocity below which nothing acts",
+        lower=0.0,
     )
     v_1: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", doc="velocity of full friction", lower=1e-12
+        1e-3,
+        unit="m/s",
+        role="velocity scale",
+        width=1,
+        doc="velocity of full friction",
+        lower=1e-12,
     )
     form: str = option("smooth", choices=FORMS, doc="quintic step or ramp")
 
@@ -141,6 +175,10 @@ class Ambrosio(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The width of the ramp [m/s]."""
         return self.v_1 - self.v_0
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return self.mu_d * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -175,7 +213,7 @@ class Hollars(StaticLaw):
     mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
     v_t: Scalar = param(
-        1e-2, unit="m/s", role="velocity scale", doc="transition velocity", lower=1e-12
+        1e-2, unit="m/s", role="velocity scale", width=1, doc="transition velocity", lower=1e-12
     )
     mu_v: Scalar = param(
         0.0, unit="s/m", role="viscous", doc="viscous coefficient, load-dependent", lower=0.0
@@ -188,6 +226,14 @@ class Hollars(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The transition velocity [m/s]."""
         return self.v_t
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return N * (self.mu_d + self.mu_v * speed)
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The force [N] of break-away, mu_s N; rounding the peak takes 0.19 u_eps of it."""
+        return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -222,7 +268,12 @@ class Exudyn(StaticLaw):
     mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
     v_reg: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", doc="velocity of the ramp's end", lower=1e-12
+        1e-3,
+        unit="m/s",
+        role="velocity scale",
+        width=1,
+        doc="velocity of the ramp's end",
+        lower=1e-12,
     )
     v_exp: Scalar = param(
         1e-3, unit="m/s", role="velocity scale", doc="velocity of the fall", lower=1e-12
@@ -238,6 +289,15 @@ class Exudyn(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The velocity of the ramp's end [m/s]."""
         return self.v_reg
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_exp, 1.0)
+        return N * (mu + self.mu_v * speed)
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The force [N] of break-away, mu_s N; rounding the peak takes 0.19 u_eps of it."""
+        return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -273,7 +333,7 @@ class Step5(StaticLaw):
     mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
     v_t: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", doc="transition velocity", lower=1e-12
+        1e-3, unit="m/s", role="velocity scale", width=1, doc="transition velocity", lower=1e-12
     )
     mu_v: Scalar = param(
         0.0, unit="s/m", role="viscous", doc="viscous coefficient, load-dependent", lower=0.0
@@ -283,6 +343,14 @@ class Step5(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The transition velocity [m/s]."""
         return self.v_t
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return N * (self.mu_d + self.mu_v * speed)
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The force [N] of break-away, mu_s N."""
+        return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

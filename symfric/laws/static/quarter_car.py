@@ -7,7 +7,7 @@ from typing import ClassVar, final
 from symfric.foundation.numeric import Scalar, asin, cos, equals, exp, sin, sqrt, tan
 from symfric.foundation.parameters import option, param
 from symfric.laws.base import smooth
-from symfric.laws.base.law import Facts, Input, StaticLaw
+from symfric.laws.base.law import Facts, Input, StaticLaw, one_sided
 
 
 def tilt(x_rel: Scalar, theta: Scalar, L_d: Scalar) -> Scalar:
@@ -71,7 +71,7 @@ class QuarterCarGeneral(StaticLaw):
         1500.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0
     )
     v_eps: Scalar = param(
-        1e-3, unit="m/s", role="width", doc="half width of the stick window", lower=1e-12
+        1e-3, unit="m/s", role="width", width=1, doc="half width of the stick window", lower=1e-12
     )
     F_eps: Scalar = param(
         1.0, unit="N", role="width", doc="rounding of the break-away and of |f_sd|", lower=1e-12
@@ -91,13 +91,44 @@ class QuarterCarGeneral(StaticLaw):
         """The half width of the stick window [m/s]."""
         return self.v_eps
 
+    def outside(
+        self, speed: Scalar, N: Scalar, *, x_rel: Scalar = 0.0, v_rel: Scalar = 0.0
+    ) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish; not of the form as printed."""
+        self._refuse_as_printed()
+        f_sd = self.k_s * x_rel + self.b_d * v_rel
+        load = sqrt(f_sd * f_sd + self.F_eps * self.F_eps)
+        dry = self.C_e * smooth.fall(speed, self.e_1, 1.0)
+        return dry + self._leverage(x_rel) * load + self.sigma_v * speed
+
+    def sliding(
+        self, v: Scalar, N: Scalar, side: int, *, x_rel: Scalar = 0.0, v_rel: Scalar = 0.0
+    ) -> Scalar:
+        """Sliding force [N] on one side of v = 0."""
+        return side * self.outside(side * v, N, x_rel=x_rel, v_rel=v_rel)
+
+    def static_level(
+        self, N: Scalar, side: int = 1, *, x_rel: Scalar = 0.0, v_rel: Scalar = 0.0
+    ) -> Scalar:
+        """The force [N] of break-away."""
+        self._refuse_as_printed()
+        return self.F_brk
+
+    def _refuse_as_printed(self) -> None:
+        if self.form == "as_printed":
+            raise one_sided(self, "as printed, it holds any force at rest and may drive the body")
+
+    def _leverage(self, x_rel: Scalar) -> Scalar:
+        if equals(self.mu, 0.0):
+            return 0.0
+        return self.mu / tan(self.theta - tilt(x_rel, self.theta, self.L_d))
+
     def force(
         self, v: Scalar, N: Scalar, z: Scalar = (), *, x_rel: Scalar = 0.0, v_rel: Scalar = 0.0
     ) -> Scalar:
         """Friction force [N]."""
         f_sd = self.k_s * x_rel + self.b_d * v_rel
-        lean = self.theta - tilt(x_rel, self.theta, self.L_d)
-        leverage = 0.0 if equals(self.mu, 0.0) else self.mu / tan(lean)
+        leverage = self._leverage(x_rel)
         speed = smooth.magnitude(v, 0.0)
         dry = self.C_e * exp(-speed / self.e_1)
         if self.form == "as_printed":
@@ -139,12 +170,18 @@ class QuarterCarSimple(StaticLaw):
     sigma_v: Scalar = param(
         1500.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0
     )
-    v_eps: Scalar = param(1e-3, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
+    v_eps: Scalar = param(
+        1e-3, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=0.0
+    )
 
     @property
     def velocity_scale(self) -> Scalar:
         """The smoothing velocity [m/s], or that of the decay without smoothing."""
         return self.e_1 if equals(self.v_eps, 0.0) else self.v_eps
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return self.C_e * smooth.fall(speed, self.e_1, 1.0) + self.sigma_v * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

@@ -1,10 +1,12 @@
 """Rui-Wang static friction: a sine of an arctangent, without a normal force."""
 
 from dataclasses import dataclass
+from math import pi
 from typing import ClassVar, final
 
 from symfric.foundation.numeric import Scalar, atan, equals, sin
 from symfric.foundation.parameters import param
+from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, StaticLaw
 
 
@@ -35,7 +37,7 @@ class RuiWang(StaticLaw):
     D: Scalar = param(1.5, unit="N", role="level", doc="peak", lower=0.0)
     C: Scalar = param(1.5, unit="1", role="shape", doc="shape factor", lower=0.0, upper=2.0)
     B: Scalar = param(
-        1000.0, unit="s/m", role="velocity scale", doc="stiffness factor", lower=1e-12
+        1000.0, unit="s/m", role="velocity scale", width=-1, doc="stiffness factor", lower=1e-12
     )
     E: Scalar = param(0.0, unit="1", role="shape", doc="curvature factor", upper=0.999)
 
@@ -43,6 +45,14 @@ class RuiWang(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The velocity 1/B [m/s]."""
         return 1 / self.B
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return self.D * sin(self.C * pi / 2)
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The peak [N]; what a curve without one tends to."""
+        return self.D * sin(smooth.clip(self.C, 0.0, 1.0) * pi / 2)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

@@ -43,7 +43,7 @@ class SelfTuning(StaticLaw):
     )
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
     B: Scalar = param(
-        1000.0, unit="s/m", role="velocity scale", doc="stiffness factor", lower=1e-12
+        1000.0, unit="s/m", role="velocity scale", width=-1, doc="stiffness factor", lower=1e-12
     )
     E: Scalar = param(0.0, unit="1", role="shape", doc="curvature factor", upper=0.999)
 
@@ -56,6 +56,14 @@ class SelfTuning(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The velocity 1/B [m/s]."""
         return 1 / self.B
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return self.mu_d * N
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The force [N] of break-away, mu_s N."""
+        return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -117,12 +125,18 @@ class BrittleSelfTuning(StaticLaw):
     )
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
     B_0: Scalar = param(
-        100.0, unit="s/m", role="velocity scale", doc="stiffness factor without load", lower=1e-12
+        100.0,
+        unit="s/m",
+        role="velocity scale",
+        width=-1,
+        doc="stiffness factor without load",
+        lower=1e-12,
     )
     B_max: Scalar = param(
         1000.0,
         unit="s/m",
         role="velocity scale",
+        width=-1,
         doc="stiffness factor under heavy load",
         lower=1e-12,
     )
@@ -136,6 +150,14 @@ class BrittleSelfTuning(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The velocity 1/B_max [m/s]."""
         return 1 / self.B_max
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return self.mu_d * N
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The force [N] of break-away, mu_s N."""
+        return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

@@ -34,7 +34,7 @@ class SimscapeBreakaway(StaticLaw):
     mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
     v_brk: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", doc="breakaway velocity", lower=1e-12
+        1e-3, unit="m/s", role="velocity scale", width=1, doc="breakaway velocity", lower=1e-12
     )
     sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
 
@@ -42,6 +42,14 @@ class SimscapeBreakaway(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """A tenth of the breakaway velocity [m/s]."""
         return self.v_brk / 10
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return self.mu_d * N + self.sigma_2 * speed
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The force [N] of break-away, mu_s N."""
+        return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -75,10 +83,10 @@ class Specker(StaticLaw):
     mu_s: Scalar = param(0.15, unit="1", role="level", doc="static friction coefficient", lower=0.0)
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
     v_sp: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", doc="velocity of the peak", lower=1e-12
+        1e-3, unit="m/s", role="velocity scale", width=1, doc="velocity of the peak", lower=1e-12
     )
     v_t: Scalar = param(
-        1e-4, unit="m/s", role="velocity scale", doc="transition velocity", lower=1e-12
+        1e-4, unit="m/s", role="velocity scale", width=1, doc="transition velocity", lower=1e-12
     )
     sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
 
@@ -86,6 +94,14 @@ class Specker(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The transition velocity [m/s]."""
         return self.v_t
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return self.mu_d * N + self.sigma_2 * speed
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The force [N] of break-away, mu_s N."""
+        return self.mu_s * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -120,14 +136,19 @@ class MakkarDixon(StaticLaw):
 
     gamma_1: Scalar = param(0.5, unit="N", role="level", doc="static excess", lower=0.0)
     gamma_2: Scalar = param(
-        1e4, unit="s/m", role="velocity scale", doc="steepness of the rise", lower=1e-12
+        1e4, unit="s/m", role="velocity scale", width=-1, doc="steepness of the rise", lower=1e-12
     )
     gamma_3: Scalar = param(
         1e3, unit="s/m", role="velocity scale", doc="steepness of the fall", lower=1e-12
     )
     gamma_4: Scalar = param(1.0, unit="N", role="level", doc="dynamic level", lower=0.0)
     gamma_5: Scalar = param(
-        1e4, unit="s/m", role="velocity scale", doc="steepness of the dynamic part", lower=1e-12
+        1e4,
+        unit="s/m",
+        role="velocity scale",
+        width=-1,
+        doc="steepness of the dynamic part",
+        lower=1e-12,
     )
     gamma_6: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
 
@@ -135,6 +156,11 @@ class MakkarDixon(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The velocity 1/gamma_2 [m/s]."""
         return 1 / self.gamma_2
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        falling = 1 - tanh(self.gamma_3 * speed)
+        return self.gamma_1 * falling + self.gamma_4 + self.gamma_6 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

@@ -40,13 +40,20 @@ class Stribeck(StaticLaw):
     delta: Scalar = param(
         2.0, unit="1", role="shape", doc="Stribeck exponent", lower=0.1, upper=10.0
     )
-    v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=0.0)
+    v_eps: Scalar = param(
+        1e-4, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=0.0
+    )
     sigma_2: Scalar = param(0.0, unit="N s/m", role="viscous", doc="viscous coefficient", lower=0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
         """The smoothing velocity [m/s], or the Stribeck velocity without smoothing."""
         return self.v_s if equals(self.v_eps, 0.0) else self.v_eps
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        mu = self.mu_d + (self.mu_s - self.mu_d) * smooth.fall(speed, self.v_s, self.delta)
+        return mu * N + self.sigma_2 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

@@ -39,7 +39,9 @@ class Table(StaticLaw):
 
     speeds: tuple[float, ...]
     coefficients: tuple[float, ...]
-    v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=1e-12)
+    v_eps: Scalar = param(
+        1e-4, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=1e-12
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -60,16 +62,25 @@ class Table(StaticLaw):
         """The smoothing velocity [m/s]."""
         return self.v_eps
 
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return N * self.coefficient(speed)
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
-        speed, mu = smooth.magnitude(v, 0.0), self.coefficients[0]
+        mu = self.coefficient(smooth.magnitude(v, 0.0))
+        return N * mu * smooth.sign(v, self.v_eps)
+
+    def coefficient(self, speed: Scalar) -> Scalar:
+        """The coefficient mu at a speed >= 0."""
+        mu = self.coefficients[0]
         pieces = zip(pairwise(self.speeds), pairwise(self.coefficients), self._slopes, strict=True)
         for (a, b), (low, high), (left, right) in pieces:
             t = smooth.clip((speed - a) / (b - a), 0.0, 1.0)
             rise, left, right = high - low, left * (b - a), right * (b - a)
             bend = left + right - 2 * rise
             mu = mu + t * (left + t * (rise - left - bend + t * bend))
-        return N * mu * smooth.sign(v, self.v_eps)
+        return mu
 
     @cached_property
     def _slopes(self) -> list[tuple[float, float]]:

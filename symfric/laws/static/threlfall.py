@@ -42,7 +42,12 @@ class Threlfall(StaticLaw):
 
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
     v_r: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", doc="velocity of the transition", lower=1e-12
+        1e-3,
+        unit="m/s",
+        role="velocity scale",
+        width=1,
+        doc="velocity of the transition",
+        lower=1e-12,
     )
     form: str = option("smooth", choices=("smooth", "original"), doc="form of the rise")
 
@@ -50,6 +55,15 @@ class Threlfall(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The velocity v_r / 3 [m/s]."""
         return self.v_r / 3
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        reached = 1.0 if self.form == "smooth" else 0.95
+        return self.mu_d * N * reached
+
+    def static_level(self, N: Scalar, side: int = 1) -> Scalar:
+        """The largest force [N]: the original drops by 2e-4 mu_d N behind it."""
+        return self.mu_d * N * (1.0 if self.form == "smooth" else RISE)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
@@ -84,7 +98,12 @@ class ModifiedThrelfall(StaticLaw):
 
     mu_d: Scalar = param(0.1, unit="1", role="level", doc="dynamic friction coefficient", lower=0.0)
     v_r: Scalar = param(
-        1e-3, unit="m/s", role="velocity scale", doc="velocity of the transition", lower=1e-12
+        1e-3,
+        unit="m/s",
+        role="velocity scale",
+        width=1,
+        doc="velocity of the transition",
+        lower=1e-12,
     )
     form: str = option("smooth", choices=("smooth", "original"), doc="form of the rise")
 
@@ -92,6 +111,10 @@ class ModifiedThrelfall(StaticLaw):
     def velocity_scale(self) -> Scalar:
         """The velocity v_r / 3 [m/s]."""
         return self.v_r / 3
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Sliding force [N] at a speed >= 0 as the widths vanish."""
+        return self.mu_d * N
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
