@@ -87,7 +87,7 @@ class Cost:
     def residuals(self, model: Model) -> tuple[tuple[float, ca.SX], ...]:
         """(weight, residual) of the squares in the symbols of `model`."""
         signals = Signals(model)
-        return tuple((weight, value_of("cost", term, signals)) for weight, term in self.squares)
+        return tuple((weight, value_of(term, signals)) for weight, term in self.squares)
 
 
 def _checked(where: str, expression: Expression) -> Expression:
@@ -144,5 +144,5 @@ def worst(cost: Cost) -> Cost:
 def _total(terms: Terms, signals: Signals) -> ca.SX:
     total = ca.SX(0)
     for weight, term in terms:
-        total += weight * value_of("cost", term, signals)
+        total += weight * value_of(term, signals)
     return total

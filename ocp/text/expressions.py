@@ -1,4 +1,4 @@
-"""What a lambda makes of signals: one SX expression, or a message that helps."""
+"""What a function of the user makes of signals: one SX expression, or a message that helps."""
 
 from collections.abc import Callable, Iterator
 from math import isnan
@@ -8,38 +8,46 @@ import casadi as ca
 
 from symfric.foundation import checks
 
+EXPRESSION = "one expression of the signals, such as lambda s: s.x**2"
 MATH = "write casadi functions for those of math: ca.sin, ca.sqrt, ca.fmax"
-BRANCH = "casadi expressions have no truth value: no if, and, max or a <= x <= b in here"
+BRANCH = "expressions have no truth value: no if, and, max or a <= x <= b in here"
 
 
-def called(where: str, function: Callable[..., Any], *signals: Any, what: str) -> Any:
-    """What `function` returns; whatever else it raises becomes a `ValueError`.
+def called(function: Callable[..., Any], *signals: Any, what: str) -> Any:
+    """What `function` returns; what CasADi and Python refuse becomes a `ValueError`.
 
     Raises:
-        ValueError: what the function asks for does not exist or cannot be done.
+        ValueError: the function asks for what does not exist or cannot be done.
     """
     try:
         return function(*signals)
-    except (TypeError, ArithmeticError, RuntimeError, NotImplementedError, AttributeError) as error:
-        hint = BRANCH if "truth value" in str(error) else MATH
-        raise checks.refused(where, what, _short(error), hint) from error
+    except (TypeError, ArithmeticError, RuntimeError, NotImplementedError) as error:
+        text = str(error)
+        hint = BRANCH if "truth value" in text else "" if "argument" in text else MATH
+        raise ValueError(
+            f"expected {what}, got {type(error).__name__}: {_short(text)}"
+            + f"; {hint}" * bool(hint)
+        ) from error
 
 
-def value_of(where: str, function: Callable[..., Any], *signals: Any) -> ca.SX:
+def value_of(function: Callable[..., Any], *signals: Any) -> ca.SX:
     """The one expression that `function` makes of the signals, SX (1, 1).
 
     Raises:
         ValueError: no expression, several, or one that is not a number from the start (NaN).
     """
-    what = "a function of the signals that returns one expression, such as lambda s: s.x**2"
-    found = called(where, function, *signals, what=what)
+    found = called(function, *signals, what=EXPRESSION)
     if isinstance(found, float) and isnan(found):
-        raise checks.refused(where, what, found, MATH)
-    value = ca.SX(checks.expression(where, found))
+        raise _refused(found, MATH)
+    if isinstance(found, ca.MX) or (
+        checks.as_number(found) is None and not isinstance(found, ca.SX | ca.DM)
+    ):
+        raise _refused(found, "write it with casadi.SX" if isinstance(found, ca.MX) else "")
+    value = ca.SX(found)
     if value.numel() != 1:
-        raise checks.refused(where, what, found)
+        raise _refused(found)
     if any(map(isnan, constants(value))):
-        raise checks.refused(where, what, found, f"it holds a NaN; {MATH}")
+        raise _refused(found, f"it holds a NaN; {MATH}")
     return value
 
 
@@ -51,6 +59,12 @@ def constants(expression: ca.SX) -> Iterator[float]:
             yield float(f.instruction_constant(k))
 
 
-def _short(error: Exception) -> str:
-    """The last sentence of what CasADi or Python says."""
-    return str(error).strip().splitlines()[-1].split(".cpp:")[-1].split(": ", 1)[-1]
+def _refused(found: object, hint: str = "") -> ValueError:
+    text = f"expected {EXPRESSION}, got {checks.shown(found)}"
+    return ValueError(text + f"; {hint}" * bool(hint))
+
+
+def _short(text: str) -> str:
+    """The last line of what CasADi or Python says, without the place in its source."""
+    last = text.strip().splitlines()[-1].rstrip(".")
+    return last.split(": ", 1)[-1] if ".cpp:" in last else last

@@ -1,17 +1,18 @@
 """An optimal control problem: phases, what to keep, what to choose, what to minimise."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, final
 
 from ocp.text.choice import Choice, chosen_of
-from ocp.text.complaints import input_problems, kind_problems
+from ocp.text.complaints import input_problems
 from ocp.text.cost import Cost
+from ocp.text.kinds import kind_problems
 from ocp.text.phase import Chain, Phase
 from ocp.text.ranges import Free, Range
 from ocp.text.rates import rate_name
-from ocp.text.resolve import resolved, value_problems
+from ocp.text.resolve import function_problems, resolved, value_problems
 from ocp.text.settings import settings_of
 from ocp.text.span import Condition, Span
 
@@ -64,11 +65,15 @@ class Problem:
     durations: Sequence[Duration] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
-        for check in (kind_problems, input_problems, value_problems):
-            # Each asks only what the one before has left in order.
-            problems = [text for text in check(self) if text]
-            if problems:
-                raise ValueError(f"problem '{self.name}': " + "; ".join(dict.fromkeys(problems)))
+        # Each look asks only what the ones before have left in order.
+        self._refuse(kind_problems(self))
+        self._refuse((*input_problems(self), *function_problems(self)))
+        self._refuse(value_problems(self))
+
+    def _refuse(self, texts: Iterable[str]) -> None:
+        problems = [text for text in dict.fromkeys(texts) if text]
+        if problems:
+            raise ValueError(f"problem '{self.name}': " + "; ".join(problems))
 
     @property
     def name(self) -> str:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, TypeVar, final
 
 from ocp.text.cost import Cost
 from ocp.text.phase import Phase, Ranges
-from ocp.text.ranges import Range, as_box
-from ocp.text.rates import with_parameters, with_rates
+from ocp.text.ranges import Range, as_box, is_range
+from ocp.text.rates import rate_name, with_parameters, with_rates
 from symfric.model import Model
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Setting:
 
 
 def settings_of(problem: "Problem") -> tuple[Setting, ...]:
-    """The phases of `problem`, whose names and ranges are right."""
+    """The phases of `problem`; rates that cannot be are left out, for others to complain."""
     phases = problem.chain
     lone = len(phases) == 1 and not phases[0].name
     return tuple(
@@ -56,12 +56,14 @@ def labelled(number: int, phase: Phase) -> str:
 
 def _setting(problem: "Problem", number: int, phase: Phase, where: str) -> Setting:
     inputs = [v.name for v in phase.model.u]
-    rates = only(problem.rates, inputs) | dict(phase.rates)
+    rates = only(problem.rates, inputs) | only(phase.rates, inputs)
+    taken = {*phase.model.signals, *(v.name for v in phase.model.p)}
+    rates = {n: r for n, r in rates.items() if is_range(r) and rate_name(n) not in taken}
     costs = tuple(c for c in (problem.cost, phase.cost) if c is not None)
     scale = {v.name: v.nominal for v in phase.model.u}
     model = with_rates(phase.model, {n: _size(r, scale[n]) for n, r in rates.items()})
     model = with_parameters(model, dict.fromkeys(goals(phase.model, costs), ""))
-    ranges = {f"{name}_rate": value for name, value in rates.items()}
+    ranges = {rate_name(name): value for name, value in rates.items()}
     known = names_of(model, problem.bounds)
     return Setting(
         number,
