@@ -1,0 +1,359 @@
+"""Pieces put together: functions of a program with exact sparse derivatives.
+
+Values of all blocks at all places are columns of mapped Functions. Where they go in the rows, the
+gradient, the Jacobian and the Hessian is one constant sparse matrix each, made here with NumPy:
+nothing is differentiated again, and the graph does not grow with the mesh.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import final
+
+import casadi as ca
+import numpy as np
+
+from ocp.transcription.blocks import Array, Block, Entries, Indices, Piece, Selection
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Slot:
+    """Where the shares of one cost go.
+
+    Attributes:
+        weight: factor in the objective; 0 where a row bounds the cost instead.
+        piece: number of the piece whose only row that is; -1 where there is none.
+    """
+
+    weight: float = 1.0
+    piece: int = -1
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Assembled:
+    """Functions of a program (see `Program`); numbers of the rows of each piece, (m, places)."""
+
+    f: ca.MX
+    g: ca.MX
+    gradient: ca.Function
+    jacobian: ca.Function
+    hessian: ca.Function
+    at: tuple[Indices, ...]
+
+
+def row_numbers(pieces: Sequence[Piece]) -> tuple[Indices, ...]:
+    """Numbers of the rows of all pieces by their `order`, each of shape (m, places)."""
+    keys = np.concatenate([np.zeros(0, np.int64), *(np.repeat(p.order, p.m) for p in pieces)])
+    numbers = np.empty(keys.size, np.int64)
+    numbers[np.argsort(keys, kind="stable")] = np.arange(keys.size)
+    parts = np.split(numbers, np.cumsum([p.m * p.places for p in pieces])[:-1])
+    return tuple(part.reshape(p.places, p.m).T for part, p in zip(parts, pieces, strict=True))
+
+
+def assemble(
+    w: ca.MX, p: ca.MX, pieces: Sequence[Piece], slots: Sequence[Slot], c: Array
+) -> Assembled:
+    """Put pieces together.
+
+    Args:
+        w, p: unknowns and parameters of the program; `theta` of the pieces is written in p.
+        pieces: rows and costs.
+        slots: where the shares of each cost go.
+        c: linear part of the objective, shape (n,).
+    """
+    at = row_numbers(pieces)
+    n, m = w.numel(), sum(piece.m * piece.places for piece in pieces)
+    parts = [
+        _Part(piece, piece.block, piece.selection, rows, *_slot(slots[piece.slot], at), w)
+        for piece, rows in zip(pieces, at, strict=True)
+        if piece.block is not None and piece.selection is not None
+    ]
+    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", m)
+    constant = _linear(pieces, at)
+    f = ca.mtimes(ca.DM(c).T, w)
+    for part in parts:
+        if part.block.share is not None and part.weight:
+            f += part.weight * ca.sum2(part.mapped(part.block.share)[0])
+    g = _rows(parts, [part.rows_alone() for part in parts], constant, w, m)
+    gradient, jacobian, hessian = _Sum((n, 1)), _Sum((m, n)), _Sum((n, n))
+    gradient.constant(np.arange(n), np.zeros(n, np.int64), c)
+    jacobian.constant(*constant)
+    rows: list[ca.MX] = []
+    for part in parts:
+        if part.block.share is not None:
+            part.add_slopes(gradient, jacobian)
+        rows.append(part.add_jacobian(jacobian))
+        part.add_hessian(hessian, lam_f, lam_g)
+    J, H = jacobian.matrix(), hessian.matrix()
+    both = [_rows(parts, rows, constant, w, m), J]
+    return Assembled(
+        f,
+        g,
+        ca.Function(
+            "nlp_grad_f", [w, p], [f, ca.densify(gradient.matrix())], ["x", "p"], ["f", "grad_f_x"]
+        ),
+        ca.Function("nlp_jac_g", [w, p], both, ["x", "p"], ["g", "jac_g_x"]),
+        ca.Function(
+            "nlp_hess_l",
+            [w, p, lam_f, lam_g],
+            [H],
+            ["x", "p", "lam_f", "lam_g"],
+            ["triu_hess_gamma_x_x"],
+        ),
+        at,
+    )
+
+
+def _slot(slot: Slot, at: tuple[Indices, ...]) -> tuple[float, int]:
+    return slot.weight, -1 if slot.piece < 0 else int(at[slot.piece][0, 0])
+
+
+Triplets = tuple[Indices, Indices, Array]
+
+
+def _linear(pieces: Sequence[Piece], at: tuple[Indices, ...]) -> Triplets:
+    """Rows, columns and values of A."""
+    rows, columns, weights = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
+    for piece, numbers in zip(pieces, at, strict=True):
+        if piece.linear is not None:
+            rows.append(numbers[piece.linear.rows, piece.linear.places])
+            columns.append(piece.linear.columns)
+            weights.append(piece.linear.weights)
+    return np.concatenate(rows), np.concatenate(columns), np.concatenate(weights)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A piece with a block, at its rows (m, places); its share of the cost goes to the objective
+    with `weight`, and to row `bounded` of the program unless that is -1.
+    """
+
+    piece: Piece
+    block: Block
+    selection: Selection
+    rows: Indices
+    weight: float
+    bounded: int
+    w: ca.MX
+
+    @cached_property
+    def arguments(self) -> list[ca.MX]:
+        """Local unknowns and parameters at all places."""
+        places, theta = self.piece.places, self.piece.theta
+        if theta.shape[1] != places:
+            theta = ca.repmat(theta, 1, places)
+        return [self.local, theta]
+
+    @property
+    def local(self) -> ca.MX:
+        """Local unknowns at all places, MX (n, places)."""
+        s, places = self.selection, self.piece.places
+        if s.plain:
+            return ca.reshape(self.w[s.columns.ravel().tolist()], self.block.n, places)
+        rows = (s.local + self.block.n * np.arange(places)[:, None]).ravel()
+        shape = (self.block.n * places, self.w.numel())
+        S = _constant((rows, s.columns.ravel(), s.weights.ravel()), shape)
+        return ca.reshape(ca.densify(ca.mtimes(S, self.w)), self.block.n, places)
+
+    def mapped(self, function: ca.Function, *more: ca.MX) -> list[ca.MX]:
+        """The outputs of `function` at all places."""
+        return function.map(self.piece.places).call([*self.arguments, *more])
+
+    def rows_alone(self) -> ca.MX:
+        """Values of the rows at all places, and of the cost that is bounded by a row, MX (k, 1)."""
+        found = ca.vec(self.mapped(self.block.rows)[0])
+        return ca.vertcat(found, self.bounded_cost())
+
+    def bounded_cost(self) -> ca.MX:
+        """The share of a cost that a row bounds; no rows where none does."""
+        if self.bounded < 0 or self.block.share is None:
+            return ca.MX(0, 1)
+        return ca.sum2(self.mapped(self.block.share)[0])
+
+    @property
+    def numbers(self) -> Indices:
+        """Rows of the program that `rows_alone` belongs to."""
+        cost = self.bounded >= 0 and self.block.share is not None
+        return np.append(self.rows.ravel(order="F"), np.full(int(cost), self.bounded))
+
+    def add_slopes(self, gradient: "_Sum", jacobian: "_Sum") -> None:
+        """Derivative of the share of the cost."""
+        places = self.piece.places
+        (slopes,) = self.mapped(self.block.slopes)
+        if self.weight:
+            entries, s = self.block.of_slopes, self.selection
+            column = np.zeros((1, places), np.int64)
+            gradient.transposed(entries, column, s, slopes, self.weight)
+        if self.bounded >= 0:
+            row = np.full((1, places), self.bounded)
+            jacobian.add(self.block.of_slopes, row, self.selection, slopes)
+
+    def add_jacobian(self, jacobian: "_Sum") -> ca.MX:
+        """Derivative of the rows; returns their values as `rows_alone`."""
+        rows, entries = self.mapped(self.block.jacobian)
+        jacobian.add(self.block.of_jacobian, self.rows, self.selection, entries)
+        return ca.vertcat(ca.vec(rows), self.bounded_cost())
+
+    def add_hessian(self, hessian: "_Sum", lam_f: ca.MX, lam_g: ca.MX) -> None:
+        """Second derivative of the Lagrangian."""
+        places, m = self.piece.places, self.block.m
+        sigma = self.weight * lam_f + (lam_g[self.bounded] if self.bounded >= 0 else 0)
+        lam = ca.reshape(lam_g[self.rows.ravel(order="F").tolist()], m, places)
+        (entries,) = self.mapped(self.block.hessian, ca.repmat(sigma, 1, places), lam)
+        hessian.symmetric(self.block.of_hessian, self.selection, entries)
+
+
+def _rows(
+    parts: Sequence[_Part], values: Sequence[ca.MX], constant: Triplets, w: ca.MX, m: int
+) -> ca.MX:
+    """G = A w + what the blocks say."""
+    A = _constant(constant, (m, w.numel()))
+    g = ca.densify(ca.mtimes(A, w))
+    if not values:
+        return g
+    numbers = np.concatenate([part.numbers for part in parts])
+    every = np.arange(numbers.size)
+    if np.array_equal(np.sort(numbers), every) and numbers.size == m:
+        return g + ca.vertcat(*values)[np.argsort(numbers).tolist()]
+    P = _constant((numbers, every, np.ones(every.size)), (m, every.size))
+    return g + ca.densify(ca.mtimes(P, ca.vertcat(*values)))
+
+
+@final
+@dataclass(eq=False)
+class _Sum:
+    """A sparse matrix whose entries are constants plus weighted sums of values of blocks."""
+
+    shape: tuple[int, int]
+    rows: list[Indices] = field(default_factory=list[Indices])
+    columns: list[Indices] = field(default_factory=list[Indices])
+    sources: list[Indices] = field(default_factory=list[Indices])
+    weights: list[Array] = field(default_factory=list[Array])
+    values: list[ca.MX] = field(default_factory=list[ca.MX])
+    count: int = 0
+    fixed: list[Triplets] = field(default_factory=list[Triplets])
+
+    def constant(self, rows: Indices, columns: Indices, values: Array) -> None:
+        """Add constant entries."""
+        kept = values != 0.0
+        self.fixed.append((rows[kept], columns[kept], values[kept]))
+
+    def add(self, entries: Entries, rows: Indices, selection: Selection, values: ca.MX) -> None:
+        """Add a derivative by v: `rows` (m, places) of the matrix, `values` (nv, places)."""
+        source, columns, weights = _terms(selection, entries.columns)
+        at = rows[entries.rows[source]].T
+        self._put(entries, source, at, columns, weights, values)
+
+    def transposed(
+        self, entries: Entries, columns: Indices, selection: Selection, values: ca.MX, weight: float
+    ) -> None:
+        """Add the transpose of a derivative by v times `weight`."""
+        source, rows, weights = _terms(selection, entries.columns)
+        at = columns[entries.rows[source]].T
+        self._put(entries, source, rows, at, weight * weights, values)
+
+    def symmetric(self, entries: Entries, selection: Selection, values: ca.MX) -> None:
+        """Add the upper triangle of S' H S; `entries` are those of the upper triangle of H."""
+        first, left, by_left = _terms(selection, entries.rows)
+        second, right, by_right = _terms(selection, entries.columns)
+        a, b = _pairs(first, second, entries.rows.size)
+        source, left, right = first[a], left[:, a], right[:, b]
+        weights = by_left[:, a] * by_right[:, b]
+        beside = (entries.rows != entries.columns)[source]
+        # An entry beside the diagonal of H stands for two: both meet where its unknowns share one.
+        weights = weights * np.where(beside & (left == right), 2.0, 1.0)
+        weights = weights * (beside | (left <= right))
+        upper = np.minimum(left, right), np.maximum(left, right)
+        self._put(entries, source, *upper, weights, values)
+
+    def _put(
+        self,
+        entries: Entries,
+        source: Indices,
+        rows: Indices,
+        columns: Indices,
+        weights: Array,
+        values: ca.MX,
+    ) -> None:
+        """Entry `source` of the block, by terms (places, terms)."""
+        places, nv = weights.shape[0], entries.varying.size
+        position = np.full(entries.rows.size, -1)
+        position[entries.varying] = np.arange(nv)
+        number = np.zeros(entries.rows.size)
+        number[entries.still] = entries.constant
+        still = position[source] < 0
+        for part in (still, ~still):
+            kept = (weights != 0.0) & part
+            at, term = np.nonzero(kept)
+            triplet = rows[kept], columns[kept], weights[kept]
+            if part is still:
+                self.fixed.append((*triplet[:2], triplet[2] * number[source[term]]))
+                continue
+            self.rows.append(triplet[0])
+            self.columns.append(triplet[1])
+            self.weights.append(triplet[2])
+            self.sources.append(self.count + nv * at + position[source[term]])
+        self.values.append(ca.vec(values))
+        self.count += nv * places
+
+    def matrix(self) -> ca.MX:
+        """The matrix, with the entries that may be there."""
+        fixed = [np.concatenate(part) for part in zip(*self.fixed, strict=True)]
+        rows, columns, numbers = fixed if fixed else _none()
+        count = rows.size
+        rows, columns = np.concatenate([rows, *self.rows]), np.concatenate([columns, *self.columns])
+        keys, number = np.unique(columns * self.shape[0] + rows, return_inverse=True)
+        pattern = _sparsity(keys % self.shape[0], keys // self.shape[0], self.shape)
+        start = np.bincount(number[:count], numbers, keys.size)
+        sources, weights = np.concatenate([np.zeros(0, np.int64), *self.sources]), self.weights
+        if not sources.size:
+            return ca.MX(ca.DM(pattern, start))
+        weight, values = np.concatenate(weights), ca.vertcat(*self.values)
+        to = number[count:]
+        if not count and to.size == keys.size and (weight == 1.0).all():
+            return ca.MX(pattern, values[sources[np.argsort(to)].tolist()])
+        scatter = _constant((to, sources, weight), (keys.size, self.count))
+        return ca.MX(pattern, ca.DM(start) + ca.densify(ca.mtimes(scatter, values)))
+
+
+def _none() -> list[Indices]:
+    return [np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)]  # type: ignore[list-item]
+
+
+def _terms(selection: Selection, unknowns: Indices) -> tuple[Indices, Indices, Array]:
+    """For entries of the local `unknowns`: entry of each term, its columns and weights in w."""
+    first = np.searchsorted(selection.local, unknowns, side="left")
+    count = np.searchsorted(selection.local, unknowns, side="right") - first
+    entry = np.repeat(np.arange(unknowns.size), count)
+    inside = np.arange(entry.size) - np.repeat(np.cumsum(count) - count, count)
+    term = first[entry] + inside
+    return entry, selection.columns[:, term], selection.weights[:, term]
+
+
+def _pairs(first: Indices, second: Indices, entries: int) -> tuple[Indices, Indices]:
+    """Every term of `first` with every one of `second` that belongs to the same entry."""
+    counts = np.bincount(second, minlength=entries)
+    starts = np.cumsum(counts) - counts
+    a = np.repeat(np.arange(first.size), counts[first])
+    inside = np.arange(a.size) - np.repeat(np.cumsum(counts[first]) - counts[first], counts[first])
+    return a, starts[first[a]] + inside
+
+
+def _constant(triplets: Triplets, shape: tuple[int, int]) -> ca.DM:
+    """A sparse matrix; entries that stand in one place add up."""
+    rows, columns, values = triplets
+    keys, number = np.unique(columns * shape[0] + rows, return_inverse=True)
+    pattern = _sparsity(keys % shape[0], keys // shape[0], shape)
+    return ca.DM(pattern, np.bincount(number, values, keys.size))
+
+
+def _sparsity(rows: Indices, columns: Indices, shape: tuple[int, int]) -> ca.Sparsity:
+    """The pattern of entries in columnwise order."""
+    starts = np.concatenate([[0], np.cumsum(np.bincount(columns, minlength=shape[1]))])
+    return ca.Sparsity(*shape, starts.tolist(), rows.tolist())
+
+
+__all__: Iterable[str] = ("Assembled", "Slot", "assemble", "row_numbers")

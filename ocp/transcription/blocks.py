@@ -1,0 +1,242 @@
+"""A partially separable program: few functions of few unknowns, at many places.
+
+    f(w) = c'w + sum_i q(S_i w, theta_i),    g(w) = A w + rows r(S_i w, theta_i)
+
+A `Block` is r and q with exact derivatives, made once and mapped over its places i; the S_i are
+constant and sparse, so that derivatives of the program are sums of the block's at constant places:
+
+    dg/dw = A + sum_i P_i' (dr/dv) S_i,    H = sum_i S_i' (d^2 (sigma q + lam'r) / dv^2) S_i
+
+Source: Griewank and Toint, Numerische Mathematik 39, 1982, 119-137 (partial separability).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TypeVar, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Symbols = TypeVar("Symbols", ca.SX, ca.MX)
+
+OPTIONS = {"cse": True}
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Entries:
+    """Which entries of a derivative there are, and which of them never change.
+
+    Attributes:
+        rows, columns: of all structural nonzeros, columnwise, shape (nnz,).
+        varying: which of them the function returns, increasing, shape (nv,).
+        constant: values of the others, shape (nnz - nv,).
+    """
+
+    rows: Indices
+    columns: Indices
+    varying: Indices
+    constant: Array
+
+    @cached_property
+    def still(self) -> Indices:
+        """Which of them are constant, shape (nnz - nv,)."""
+        return np.setdiff1d(np.arange(self.rows.size), self.varying)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Rows r (m, 1) and a share q of the cost, functions of (v, theta), with derivatives.
+
+    Attributes:
+        n, m: numbers of local unknowns v and of rows.
+        rows: (v, theta) -> r.
+        share: (v, theta) -> q; None where there is none.
+        slopes: (v, theta) -> dq/dv, its varying nonzeros.
+        jacobian: (v, theta) -> r, varying nonzeros of dr/dv.
+        hessian: (v, theta, sigma, lam) -> varying nonzeros of the upper triangle of
+            d^2 (sigma q + lam'r) / dv^2.
+        of_slopes, of_jacobian, of_hessian: places of these nonzeros.
+    """
+
+    n: int
+    m: int
+    rows: ca.Function
+    share: ca.Function | None
+    slopes: ca.Function
+    jacobian: ca.Function
+    hessian: ca.Function
+    of_slopes: Entries
+    of_jacobian: Entries
+    of_hessian: Entries
+
+
+def block(name: str, v: Symbols, theta: Symbols, r: Symbols, q: Symbols | None = None) -> Block:
+    """Differentiate rows `r` and a share `q` of the cost by the symbols `v`."""
+    kind = type(v)
+    r = ca.densify(r)
+    sigma, lam = kind.sym("sigma"), kind.sym("lam", r.numel())
+    cost = kind(0) if q is None else q
+    J, gradient = ca.jacobian(r, v), ca.jacobian(cost, v)
+    H = ca.triu(ca.hessian(sigma * cost + ca.dot(lam, r), v)[0])
+    (of_J, nz_J), (of_q, nz_q), (of_H, nz_H) = (_entries(part) for part in (J, gradient, H))
+    arguments = [v, theta]
+
+    def function(what: str, inputs: Sequence[Symbols], *outputs: Symbols) -> ca.Function:
+        return ca.Function(f"{name}_{what}", list(inputs), list(outputs), OPTIONS)
+
+    return Block(
+        v.numel(),
+        r.numel(),
+        function("rows", arguments, r),
+        None if q is None else function("share", arguments, ca.densify(cost)),
+        function("slopes", arguments, nz_q),
+        function("jacobian", arguments, r, nz_J),
+        function("hessian", [*arguments, sigma, lam], nz_H),
+        of_q,
+        of_J,
+        of_H,
+    )
+
+
+def _entries(matrix: Symbols) -> tuple[Entries, Symbols]:
+    """Places of the nonzeros of a matrix, and those that are no plain numbers as a column."""
+    rows, columns = (np.array(part, dtype=np.int64) for part in matrix.sparsity().get_triplet())
+    if isinstance(matrix, ca.MX):
+        return Entries(rows, columns, np.arange(rows.size), np.zeros(0)), matrix.nz[:]
+    elements = matrix.nonzeros()
+    still = np.array([element.is_constant() for element in elements], dtype=bool)
+    numbers = [float(e) for e, constant in zip(elements, still, strict=True) if constant]
+    varying = np.flatnonzero(~still)
+    return (
+        Entries(rows, columns, varying, np.array(numbers, dtype=float)),
+        ca.vertcat(ca.SX(0, 1), *(elements[i] for i in varying)),
+    )
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Local unknowns v = S_i w at `places` places, given by terms of the same shape everywhere.
+
+    Attributes:
+        local: local unknown of each term, shape (terms,), increasing.
+        columns: the unknown of w in each term, shape (places, terms).
+        weights: its factor, shape (places, terms).
+    """
+
+    local: Indices
+    columns: Indices
+    weights: Array
+
+    @cached_property
+    def plain(self) -> bool:
+        """Whether each local unknown is one of w."""
+        return bool(
+            np.array_equal(self.local, np.arange(self.local.size)) and (self.weights == 1.0).all()
+        )
+
+
+def select(parts: Sequence[Indices | tuple[Indices, Array]], places: int) -> Selection:
+    """A selection from parts that follow each other.
+
+    Args:
+        parts: (k, places) columns of k local unknowns; or columns and weights, both
+            (k, terms, places), of k sums.
+    """
+    local: list[Indices] = []
+    columns: list[Indices] = []
+    weights: list[Array] = []
+    count = 0
+    for part in parts:
+        chosen, factor = part if isinstance(part, tuple) else (part[:, None, :], None)
+        k, terms, _ = chosen.shape
+        local.append(count + np.repeat(np.arange(k), terms))
+        columns.append(chosen.reshape(k * terms, places))
+        weights.append(
+            np.ones((k * terms, places)) if factor is None else factor.reshape(k * terms, places)
+        )
+        count += k
+    return Selection(
+        np.concatenate([np.zeros(0, np.int64), *local]),
+        np.concatenate([np.zeros((0, places), np.int64), *columns]).T,
+        np.concatenate([np.zeros((0, places)), *weights]).T,
+    )
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """Constant entries of the rows of a `Piece`: row `rows` of place `places` at `columns`."""
+
+    places: Indices
+    rows: Indices
+    columns: Indices
+    weights: Array
+
+    @staticmethod
+    def of(rows: Indices, columns: Indices, weights: Array) -> "Linear":
+        """The same rows (terms,) at every place, with columns and weights (terms, places)."""
+        terms, places = columns.shape
+        at = np.tile(np.arange(places), terms)
+        return Linear(at, np.repeat(rows, places), columns.ravel(), weights.ravel())
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Rows and costs of one kind at many places.
+
+    Attributes:
+        names: what each row of a place is about, m of them.
+        scale: SI value of a row divided by its value in the program, shape (m,).
+        lower, upper: bounds of the rows, scaled, shape (m,).
+        order: where the rows of each place stand among all rows: those with lower numbers first,
+            shape (places,); see `order_of`.
+        span: number of the span.
+        interval, offset: the place is `offset` of the way through an interval of the mesh, both of
+            shape (places,).
+        block: nonlinear part; None for linear rows.
+        selection: its local unknowns.
+        theta: its parameters, MX (k, places) or (k, 1).
+        linear: linear part of the rows.
+        slot: number of the cost that the shares go to.
+    """
+
+    names: tuple[str, ...]
+    scale: Array
+    lower: Array
+    upper: Array
+    order: Indices
+    span: int
+    interval: Indices
+    offset: Array
+    block: Block | None = None
+    selection: Selection | None = None
+    theta: ca.MX = field(default_factory=lambda: ca.MX(0, 1))
+    linear: Linear | None = None
+    slot: int = 0
+
+    @property
+    def m(self) -> int:
+        """Rows a place."""
+        return len(self.names)
+
+    @property
+    def places(self) -> int:
+        """How many there are."""
+        return self.order.size
+
+
+LAST = 63
+"""The last number inside of a stage; 0 is the gap to the next one."""
+
+
+def order_of(span: int, interval: Indices | int, inside: Indices | int) -> Indices:
+    """Order of rows by span, interval and number inside of the interval, at most `LAST`."""
+    return (np.int64(span) << 40) + (np.asarray(interval, np.int64) << 6) + inside

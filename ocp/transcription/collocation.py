@@ -1,0 +1,233 @@
+"""Equations at one collocation point, and how the points of an interval hang together.
+
+Of an explicit model with states x the rows are
+
+    0 = h f(t, x, z, u, p) - x'(s_j),   0 = alg(t, x, z, u, p),   path conditions
+
+Of a mechanism they are implicit: its accelerations are slopes a = v'(s_j) / h of the polynomial, so
+that no mass matrix is inverted, in the equations or in their derivatives:
+
+    0 = h v - q'(s_j),   0 = h (M(q) a + phi_q' lam - Q),   0 = phi_q a + ...,   0 = h y' - y'(s_j)
+
+Everything is divided by nominal values; slopes of the polynomials are linear in the unknowns.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+import numpy as np
+
+from ocp.text.span import Row, Span
+from ocp.transcription.blocks import Array, Block, Indices, Linear, Piece, block, order_of, select
+from ocp.transcription.local import Data, Local
+from ocp.transcription.points import Layout
+from ocp.transcription.schemes import Coefficients
+from symfric.foundation.symbols import stacked
+from symfric.model.holonomic import Holonomic
+
+LEAST, MOST = 1e-6, 1e6
+"""How far rows that have no nominal value are scaled by their derivatives."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PointEquations:
+    """The equations of one collocation point of a span.
+
+    Attributes:
+        local: its unknowns; behind them v knows the slopes of the velocities of a mechanism.
+        block: rows and share of the cost.
+        names: what the rows are about.
+        scale: SI values of the rows divided by theirs.
+        sloped: for each state the row from which its slope is subtracted; -1 where the slope is a
+            local unknown instead.
+        path: conditions among the rows, which are the last ones.
+    """
+
+    local: Local
+    block: Block
+    names: tuple[str, ...]
+    scale: Array
+    sloped: Indices
+    path: tuple[Row, ...]
+
+
+def point_equations(local: Local) -> PointEquations:
+    """Write the equations of a collocation point of a span."""
+    span, h = local.span, local.h
+    model = span.model
+    values, x_nominal = local.values, model.nominal("x")
+    mechanics = model.holonomic
+    conditions = stacked(row.expression for row in span.path)
+    path_scale = np.array([row.nominal for row in span.path])
+    slopes, sloped = ca.SX(0, 1), np.arange(len(model.x))
+    equations = [f"the equation of {v.name}" for v in model.x]
+    if mechanics is None:
+        rates, algebraic = _evaluated(span, [model.ode, model.alg], values)
+        rows = h * rates / ca.DM(x_nominal)
+        scale = x_nominal
+    else:
+        n = mechanics.n
+        slopes = ca.SX.sym("slopes", n)
+        sloped = np.concatenate([np.arange(n), np.full(n, -1), np.arange(2 * n, len(model.x))])
+        a = slopes * ca.DM(x_nominal[n : 2 * n]) / h
+        implicit, further = _evaluated(
+            span, [mechanics.implicit, mechanics.rates], values, (mechanics.a, a)
+        )
+        mass = _masses(span, mechanics) * x_nominal[n : 2 * n]
+        first, last = x_nominal[:n], x_nominal[2 * n :]
+        rows = ca.vertcat(
+            h * values[1][n : 2 * n] / ca.DM(first),
+            h * implicit[:n] / ca.DM(mass),
+            h * further / ca.DM(last),
+        )
+        scale, algebraic = np.concatenate([first, mass, last]), implicit[n:]
+    algebraic_scale = _row_sizes(span, mechanics)
+    (path,) = _evaluated(span, [conditions], values)
+    (running,) = _evaluated(span, [span.running], values)
+    share = None if span.running.is_zero() else local.weight * running
+    rows = ca.vertcat(rows, algebraic / ca.DM(algebraic_scale), path / ca.DM(path_scale))
+    names = [f"the algebraic equation {i + 1}" for i in range(len(model.z))]
+    return PointEquations(
+        local,
+        block("point", ca.vertcat(local.v, slopes), local.theta, rows, share),
+        (*equations, *names, *(row.name for row in span.path)),
+        np.concatenate([scale, algebraic_scale, path_scale]),
+        sloped,
+        span.path,
+    )
+
+
+def _evaluated(
+    span: Span,
+    expressions: Sequence[ca.SX | None],
+    values: Sequence[ca.SX],
+    accelerations: tuple[ca.SX, ca.SX] | None = None,
+) -> list[ca.SX]:
+    """Expressions in the symbols of the model at other values."""
+    symbols, values = list(span.symbols), list(values)
+    if accelerations is not None:
+        symbols.append(accelerations[0])
+        values.append(accelerations[1])
+    outputs = [ca.SX(0, 1) if e is None else ca.densify(ca.SX(e)) for e in expressions]
+    return ca.Function("evaluated", symbols, outputs).call(values)
+
+
+def _masses(span: Span, mechanics: Holonomic) -> Array:
+    """Diagonal of the mass matrix at the start of the model, shape (n,)."""
+    n = mechanics.n
+    M = ca.jacobian(mechanics.implicit[:n], mechanics.a)
+    return _positive(_at_start(span, ca.diag(M)))
+
+
+def _row_sizes(span: Span, mechanics: Holonomic | None) -> Array:
+    """Largest change of each algebraic row by a nominal change of an unknown, at the start."""
+    model = span.model
+    if not model.z:
+        return np.zeros(0)
+    rows, unknowns = model.alg, [model.vector(letter) for letter in "xzu"]
+    sizes = np.concatenate([model.nominal(letter) for letter in "xzu"])
+    if mechanics is not None:
+        rows = mechanics.implicit[mechanics.n :]
+        unknowns.append(mechanics.a)
+        sizes = np.append(sizes, model.nominal("x")[mechanics.n : 2 * mechanics.n])
+    J = ca.fabs(ca.jacobian(rows, ca.vertcat(*unknowns))) @ ca.diag(ca.DM(sizes))
+    largest = stacked(ca.mmax(J[i, :]) if J[i, :].nnz() else 1.0 for i in range(len(model.z)))
+    return _positive(_at_start(span, largest))
+
+
+def _at_start(span: Span, expression: ca.SX) -> Array:
+    """Numbers of an expression where the model starts, its accelerations zero."""
+    model, mechanics = span.model, span.model.holonomic
+    symbols = [*span.symbols, *([] if mechanics is None else [mechanics.a])]
+    z, u = (np.array([float(v.start) for v in group]) for group in (model.z, model.u))
+    numbers = [0.0, model.initial_state(), z, u, span.p]
+    numbers += [] if mechanics is None else [np.zeros(mechanics.n)]
+    function = ca.Function("at_start", symbols, [ca.densify(expression)])
+    return np.array(function.call([ca.DM(value) for value in numbers])[0]).ravel()
+
+
+def _positive(values: Array) -> Array:
+    """Sizes that are safe to divide by."""
+    sizes = np.abs(values)
+    return np.clip(np.where(np.isfinite(sizes) & (sizes > 0), sizes, 1.0), LEAST, MOST)
+
+
+def pieces_of_points(
+    number: int, equations: PointEquations, layout: Layout, scheme: Coefficients, data: Data
+) -> Piece:
+    """The equations at all collocation points of a span."""
+    local, span = equations.local, layout.spans[number]
+    d, N = scheme.degree, span.intervals
+    interval, j = np.repeat(np.arange(N), d), np.tile(np.arange(d), N)
+    carrying = _carrying(layout, number, interval)
+    parts = local.columns(layout, span.inner, span.z, span.u[:, interval], N * d)
+    velocities = np.flatnonzero(equations.sloped < 0)
+    slopes = scheme.slopes[:, j]
+    if velocities.size:
+        factors = np.broadcast_to(slopes, (velocities.size, *slopes.shape))
+        parts.append((carrying[velocities], factors))
+    known = np.flatnonzero(equations.sloped >= 0)
+    linear = Linear.of(
+        np.repeat(equations.sloped[known], d + 1),
+        carrying[known].reshape(-1, N * d),
+        -np.tile(slopes, (known.size, 1)),
+    )
+    zeros = np.zeros(equations.block.m - len(equations.path))
+    return Piece(
+        equations.names,
+        equations.scale,
+        np.concatenate([zeros, [row.lower / row.nominal for row in equations.path]]),
+        np.concatenate([zeros, [row.upper / row.nominal for row in equations.path]]),
+        order_of(number, interval, 2 + j),
+        number,
+        interval,
+        scheme.nodes[1 + j],
+        equations.block,
+        select(parts, N * d),
+        data.theta(interval, scheme.nodes[1 + j], scheme.weights[j]),
+        linear,
+    )
+
+
+def _carrying(layout: Layout, number: int, interval: Indices) -> Indices:
+    """Columns of the states that carry the polynomial of each `interval`, (nx, d + 1, places)."""
+    span = layout.spans[number]
+    d = span.degree
+    inner = span.inner.reshape(-1, span.intervals, d)[:, interval]
+    return np.concatenate([span.nodes[:, interval, None], inner], axis=2).transpose(0, 2, 1)
+
+
+def gaps(
+    number: int, span: Span, layout: Layout, scheme: Coefficients, kept: Sequence[int]
+) -> Piece:
+    """The polynomial of each interval ends at the next node: x_(k+1) = sum_r ends[r] x_r.
+
+    Args:
+        kept: the states it is written for.
+    """
+    own = layout.spans[number]
+    interval = np.arange(own.intervals)
+    carrying = _carrying(layout, number, interval)[list(kept)]
+    names = [span.model.x[i].name for i in kept]
+    ends = np.flatnonzero(scheme.ends)  # the others are exactly zero
+    columns = np.concatenate([own.nodes[list(kept), None, 1:], carrying[:, ends]], axis=1)
+    weights = np.concatenate([[1.0], -scheme.ends[ends]])
+    zeros = np.zeros(len(names))
+    return Piece(
+        tuple(f"the continuity of {name}" for name in names),
+        span.model.nominal("x")[list(kept)],
+        zeros,
+        zeros,
+        order_of(number, interval, 0),
+        number,
+        interval,
+        np.ones(own.intervals),
+        linear=Linear.of(
+            np.repeat(np.arange(len(names)), weights.size),
+            columns.reshape(-1, own.intervals),
+            np.tile(weights, len(names))[:, None] * np.ones(own.intervals),
+        ),
+    )

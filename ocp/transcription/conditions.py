@@ -1,0 +1,309 @@
+"""What holds at single nodes and between spans: ends, via points, links, joins, end costs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
+from typing import final
+
+import casadi as ca
+import numpy as np
+
+from ocp.text.problem import Problem
+from ocp.text.ranges import Box, Free
+from ocp.text.span import Join, Row, Span
+from ocp.transcription.blocks import (
+    LAST,
+    Array,
+    Block,
+    Indices,
+    Linear,
+    Piece,
+    block,
+    order_of,
+    select,
+)
+from ocp.transcription.local import Columns, Data, Local, time_scale
+from ocp.transcription.points import Layout
+from ocp.transcription.schemes import Coefficients
+from symfric.foundation.symbols import stacked
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class AtNode:
+    """Rows, or a share of the cost, at one node of a span.
+
+    Attributes:
+        local: their unknowns.
+        fraction: which node, as a fraction of T.
+        rows: the conditions; none for a cost.
+        block: rows and share.
+        inside: whether they know inputs or algebraic variables, which belong to an interval.
+    """
+
+    local: Local
+    fraction: float
+    rows: tuple[Row, ...]
+    block: Block
+    inside: bool
+
+    def piece(self, layout: Layout, scheme: Coefficients, data: Data, node: int) -> Piece:
+        """The piece of it at node number `node` of the mesh."""
+        number = self.local.number
+        interval, offset, parts = columns_at(self.local, layout, scheme, node, self.inside)
+        stage, inside = (interval, LAST - 1) if self.inside else (node, 1)
+        at = np.array([interval])
+        return Piece(
+            tuple(row.name for row in self.rows),
+            np.array([row.nominal for row in self.rows]),
+            np.array([row.lower / row.nominal for row in self.rows]),
+            np.array([row.upper / row.nominal for row in self.rows]),
+            order_of(number, np.array([stage]), inside),
+            number,
+            at,
+            np.array([offset]),
+            self.block,
+            select(parts, 1),
+            data.theta(at, np.array([offset]), np.zeros(1)),
+        )
+
+
+def columns_at(
+    local: Local, layout: Layout, scheme: Coefficients, node: int, inside: bool
+) -> tuple[int, float, list[Columns]]:
+    """Interval, place in it, and columns of the local unknowns at a node of the mesh.
+
+    Algebraic variables and inputs are those of the interval before; at node 0 those of the first
+    collocation point. With `inside` states are those of that interval, not the copy at the node.
+    """
+    span, d = layout.spans[local.number], scheme.degree
+    interval, offset = (0, 0.0) if node == 0 else (node - 1, 1.0)
+    x: Columns = span.nodes[:, [node]]
+    z: Columns = span.z[:, :1]
+    if node and d:
+        points = slice(interval * d, node * d)
+        z = _sum(span.z[:, points], scheme.inner_ends)
+        if inside:
+            x = _sum(span.points_of(interval), scheme.ends)
+    return interval, offset, local.columns(layout, x, z, span.u[:, [interval]], 1)
+
+
+def _sum(columns: Indices, weights: Array) -> Columns:
+    """Sums of `columns` (k, terms) with the same weights, at one place."""
+    kept = np.flatnonzero(weights)
+    factors = np.broadcast_to(weights[kept], (columns.shape[0], kept.size))
+    return columns[:, kept, None], factors[:, :, None]
+
+
+def at_nodes(local: Local) -> list[AtNode]:
+    """Conditions at the ends and at via points of a span, and its cost at the end."""
+    span = local.span
+    found: list[AtNode] = []
+    for fraction, rows in span.rows_at.items():
+        for inside in (False, True):
+            some = tuple(row for row in rows if _knows_inside(span, row.expression) == inside)
+            if some:
+                sizes = ca.DM([row.nominal for row in some])
+                expressions = stacked(row.expression for row in some) / sizes
+                made = _node_block(local, expressions, None)
+                found.append(AtNode(local, fraction, some, made, inside))
+    if not span.end.is_zero():
+        inside = _knows_inside(span, span.end)
+        made = _node_block(local, ca.SX(0, 1), span.end)
+        found.append(AtNode(local, 1.0, (), made, inside))
+    return found
+
+
+def _knows_inside(span: Span, expression: ca.SX) -> bool:
+    """Whether an expression holds algebraic variables or inputs."""
+    inside = ca.vertcat(span.model.vector("z"), span.model.vector("u"))
+    return bool(inside.numel()) and bool(ca.depends_on(expression, inside))
+
+
+def _node_block(local: Local, rows: ca.SX, share: ca.SX | None) -> Block:
+    outputs = [rows, ca.SX(0) if share is None else share]
+    r, q = ca.Function("at_node", local.span.symbols, outputs).call(local.values)
+    return block("node", local.v, local.theta, r, None if share is None else q)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Between:
+    """Rows between the end of one span and the start of the next one.
+
+    Attributes:
+        before, after: unknowns of both.
+        block: its rows, in the local unknowns of both.
+        names, scale, box: of the rows.
+        link: whether the rows say where states start; joins do not.
+    """
+
+    before: Local
+    after: Local
+    block: Block
+    names: tuple[str, ...]
+    scale: Array
+    boxes: tuple[Box, ...]
+    link: bool
+
+    def piece(self, layout: Layout, scheme: Coefficients, data: Sequence[Data]) -> Piece:
+        """The piece of it."""
+        a, b = self.before.number, self.after.number
+        N = layout.spans[a].intervals
+        zero, one, last = np.zeros(1, np.int64), np.ones(1), np.array([N - 1])
+        ends = columns_at(self.before, layout, scheme, N, False)[2]
+        starts = columns_at(self.after, layout, scheme, 0, False)[2]
+        theta = data[a].theta(last, one, 0 * one), data[b].theta(zero, 0 * one, 0 * one)
+        return Piece(
+            self.names,
+            self.scale,
+            np.array([low for low, _ in self.boxes]) / self.scale,
+            np.array([high for _, high in self.boxes]) / self.scale,
+            order_of(a, np.array([N]), 0 if self.link else LAST),
+            b,
+            zero,
+            0 * one,
+            self.block,
+            select([*ends, *starts], 1),
+            ca.vertcat(*theta),
+        )
+
+
+def between(before: Local, after: Local) -> list[Between]:
+    """Links that are expressions, and joins, of a span to the one before."""
+    span = after.span
+    v, theta = ca.vertcat(before.v, after.v), ca.vertcat(before.theta, after.theta)
+    found: list[Between] = []
+    states = [v.name for v in span.model.x]
+    links = [link for link in span.links if _same_state(before.span, link.expression) < 0]
+    if links:
+        sizes = span.model.nominal("x")[[states.index(link.state) for link in links]]
+        expressions = stacked(link.expression for link in links)
+        (ends,) = ca.Function("link", before.span.symbols, [expressions]).call(before.values)
+        starts = after.values[1][[states.index(link.state) for link in links]]
+        made = block("link", v, theta, (starts - ends) / ca.DM(sizes))
+        names = tuple(f"the start of {link.state}" for link in links)
+        found.append(Between(before, after, made, names, sizes, ((0.0, 0.0),) * len(links), True))
+    if span.joins:
+        sizes = np.array([_nominal(join) for join in span.joins])
+        rows = [join.function.call([*before.values, *after.values])[0] for join in span.joins]
+        made = block("join", v, theta, stacked(rows) / ca.DM(sizes))
+        names = tuple(join.name for join in span.joins)
+        boxes = tuple((join.lower, join.upper) for join in span.joins)
+        found.append(Between(before, after, made, names, sizes, boxes, False))
+    return found
+
+
+def _nominal(join: Join) -> float:
+    return Row(join.name, ca.SX(0), join.lower, join.upper).nominal
+
+
+def _same_state(before: Span, expression: ca.SX) -> int:
+    """Number of the state that the expression is; -1 where it is none."""
+    return next((i for i, v in enumerate(before.model.x) if ca.is_equal(expression, v.symbol)), -1)
+
+
+def plain_links(number: int, before: Span, span: Span, layout: Layout) -> list[Piece]:
+    """Continuity of states from span `number - 1`, `before`, to span `number`."""
+    a, b = layout.spans[number - 1], layout.spans[number]
+    states = [v.name for v in span.model.x]
+    pairs = [
+        (states.index(link.state), _same_state(before, link.expression)) for link in span.links
+    ]
+    pairs = [(to, origin) for to, origin in pairs if origin >= 0]
+    if not pairs:
+        return []
+    to, origin = (np.array(part) for part in zip(*pairs, strict=True))
+    sizes, old = span.model.nominal("x")[to], before.model.nominal("x")[origin]
+    rows = LinearRows(
+        tuple(f"the continuity of {states[i]}" for i in to), sizes, ((0.0, 0.0),) * len(pairs)
+    )
+    columns = np.column_stack([b.nodes[to, 0], a.nodes[origin, -1]])
+    weights = np.column_stack([np.ones(to.size), -old / sizes])
+    return [rows.piece(columns, weights, number, order_of(number - 1, a.intervals, 0))]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class LinearRows:
+    """Linear conditions that stand once: names, sizes and ranges in SI units."""
+
+    names: tuple[str, ...]
+    scale: Array
+    boxes: tuple[Box, ...]
+
+    def piece(self, columns: Indices, weights: Array, span: int, order: Indices) -> Piece:
+        """Row i is the sum of weights[i, j] w[columns[i, j]]."""
+        rows = np.repeat(np.arange(len(self.names)), columns.shape[1])
+        kept = weights.ravel() != 0.0
+        return Piece(
+            self.names,
+            self.scale,
+            np.array([low for low, _ in self.boxes]) / self.scale,
+            np.array([high for _, high in self.boxes]) / self.scale,
+            np.reshape(order, (1,)),
+            span,
+            np.zeros(1, np.int64),
+            np.zeros(1),
+            linear=Linear.of(rows[kept], columns.ravel()[kept, None], weights.ravel()[kept, None]),
+        )
+
+
+def whole(problem: Problem, layout: Layout) -> list[Piece]:
+    """Periodicity, shared starts and sums of durations."""
+    spans, phases = problem.spans, len(problem.chain)
+    end = order_of(len(spans), 0, 0)
+    found: list[Piece] = []
+    for first in range(0, len(spans), phases):
+        last = first + phases - 1
+        found += _equal_states(problem, layout, (last, -1), (first, 0), problem.periodic, end)
+        for phase, name in problem.shared_starts if first else ():
+            a, b = (phase, 0), (first + phase, 0)
+            found += _equal_states(problem, layout, a, b, (name,), end)
+    for numbers, total in problem.durations:
+        free = [(i, spans[i]) for i in numbers if isinstance(spans[i].T, Free)]
+        given = sum(float(spans[i].T) for i in numbers if not isinstance(spans[i].T, Free))
+        low, high = (total.lower, total.upper) if isinstance(total, Free) else (total, total)
+        size = np.array([high])
+        name = "the duration of phases " + ", ".join(str(i + 1) for i in numbers)
+        rows = LinearRows((name,), size, ((low - given, high - given),))
+        columns = np.array([[layout.spans[i].T for i, _ in free]])
+        weights = np.array([[time_scale(span) for _, span in free]]) / size
+        found.append(rows.piece(columns, weights, numbers[0], end))
+    return found
+
+
+def _equal_states(
+    problem: Problem,
+    layout: Layout,
+    a: tuple[int, int],
+    b: tuple[int, int],
+    names: Sequence[str],
+    order: Indices,
+) -> list[Piece]:
+    """States `names` at (span, node) a equal those at b."""
+    if not names:
+        return []
+    columns: list[Indices] = []
+    sizes: list[Array] = []
+    for span, node in (a, b):
+        model = problem.spans[span].model
+        at = [[v.name for v in model.x].index(name) for name in names]
+        columns.append(layout.spans[span].nodes[at, node])
+        sizes.append(model.nominal("x")[at])
+    what = "the period" if a[1] < 0 else "the start in all scenarios"
+    rows = LinearRows(
+        tuple(f"{what} of {name}" for name in names), sizes[1], ((0.0, 0.0),) * len(names)
+    )
+    weights = np.column_stack([sizes[0] / sizes[1], -np.ones(len(names))])
+    return [rows.piece(np.column_stack(columns), weights, a[0], order)]
+
+
+def largest(layout: Layout, scenarios: int, spans: int, name: str) -> list[Piece]:
+    """Rows whose linear part bounds the cost of each scenario: cost - largest <= 0."""
+    column = np.array([[layout.largest]])
+    rows = LinearRows((name,), np.ones(1), ((-inf, 0.0),))
+    return [
+        rows.piece(column, np.array([[-1.0]]), 0, order_of(spans + 1, i, 0))
+        for i in range(scenarios)
+    ]

@@ -1,0 +1,187 @@
+"""A problem on meshes: numbers to names and back."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.text.problem import Problem
+from ocp.text.ranges import Free
+from ocp.transcription.blocks import Array, Indices
+from ocp.transcription.grid import check_meshes
+from ocp.transcription.points import Layout, Points, SpanPoints
+from ocp.transcription.program import Places, Program
+from ocp.transcription.schemes import Scheme
+from ocp.transcription.skeleton import LARGEST, Skeleton, fixed_duration, numbers_of
+from symfric.foundation.parameters import check_names
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Transcription:
+    """A problem on meshes: the nonlinear program, and the way back to names.
+
+    Attributes:
+        problem, scheme: what was transcribed, and how.
+        meshes: of each span, fractions of T that bound the intervals.
+        skeleton: what meshes with the same numbers of intervals share.
+        program: what a solver gets.
+    """
+
+    problem: Problem
+    scheme: Scheme
+    meshes: tuple[Array, ...]
+    skeleton: Skeleton
+    program: Program = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "program", self._program())
+
+    @property
+    def layout(self) -> Layout:
+        """Where each unknown stands in w."""
+        return self.skeleton.layout
+
+    def pack(self, points: Points) -> Array:
+        """The vector w of `points`; of what several spans share, that of the first one."""
+        w = np.zeros(self.layout.size)
+        for span, own in zip(points.spans[::-1], self.layout.spans[::-1], strict=True):
+            w[own.nodes], w[own.inner] = span.nodes, span.inner
+            w[own.z], w[own.u] = span.z, span.u
+            if own.T >= 0:
+                w[own.T] = span.T
+        for column, choice in zip(self.layout.chosen, self.problem.chosen, strict=True):
+            w[column] = points.chosen.get(choice.name, choice.guess)
+        w /= self.skeleton.scale
+        if self.layout.largest >= 0:
+            rows = [i for i, place in enumerate(self.program.rows) if place.name == LARGEST]
+            g = np.asarray(self.program.jacobian(w, self.program.values)[0]).ravel()
+            w[self.layout.largest] = g[rows].max()
+        return w
+
+    def unpack(self, w: ArrayLike) -> Points:
+        """The points in SI units that the vector `w` stands for."""
+        values = np.asarray(w, dtype=float).ravel() * self.skeleton.scale
+        spans = tuple(
+            SpanPoints(
+                float(values[own.T]) if own.T >= 0 else float(fixed_duration(span)),
+                *(values[columns] for columns in (own.nodes, own.inner, own.z, own.u)),
+            )
+            for span, own in zip(self.problem.spans, self.layout.spans, strict=True)
+        )
+        names = [choice.name for choice in self.problem.chosen]
+        return Points(spans, dict(zip(names, values[self.layout.chosen].tolist(), strict=True)))
+
+    def duration(self, points: Points, span: int) -> float:
+        """T of a span [s], chosen or fixed."""
+        T = self.problem.spans[span].T
+        return points.spans[span].T if isinstance(T, Free) else float(T)
+
+    def inner_fractions(self, span: int) -> Array:
+        """Where the collocation points of a span are, as fractions of T, shape (N d,)."""
+        mesh, nodes = self.meshes[span], self.scheme.coefficients().nodes[1:]
+        inner = mesh[:-1, None] + np.diff(mesh)[:, None] * nodes
+        if nodes.size and nodes[-1] == 1.0:
+            inner[:, -1] = mesh[1:]
+        return inner.ravel()
+
+    def fractions(self, span: int) -> Array:
+        """Nodes and collocation points of a span as increasing fractions of T."""
+        return np.unique(np.concatenate([self.meshes[span], self.inner_fractions(span)]))
+
+    def values(
+        self,
+        p: Mapping[str, float] | None = None,
+        meshes: Sequence[Array] | None = None,
+    ) -> Array:
+        """Numbers of the parameters of the program.
+
+        Args:
+            p: parameters of the models by name, in all spans that have them, in place of those of
+                the problem; of scenarios too.
+            meshes: with as many intervals as those of this transcription.
+
+        Raises:
+            ValueError: a name that no span has, or other meshes.
+        """
+        given = self.meshes if meshes is None else check_meshes(self.problem, meshes)
+        if [mesh.size for mesh in given] != [mesh.size for mesh in self.meshes]:
+            raise ValueError("meshes: expected as many intervals as before; use Discretisation.on")
+        known = {v.name for span in self.problem.spans for v in span.model.p}
+        check_names("values", p or {}, sorted(known))
+        return numbers_of(self.problem, given, p or {})
+
+    def _program(self) -> Program:
+        made = self.skeleton.assembled
+        s = self.skeleton
+        return Program(
+            s.w,
+            s.p,
+            made.f,
+            made.g,
+            made.gradient,
+            made.jacobian,
+            made.hessian,
+            s.lower,
+            s.upper,
+            s.lower_g,
+            s.upper_g,
+            numbers_of(self.problem, self.meshes, {}),
+            Places(made.g.numel(), lambda: _row_places(s, self.meshes)),
+            Places(s.w.numel(), lambda: _unknown_places(self)),
+            s.scale,
+        )
+
+
+Columns = tuple[list[str], Indices, Indices, Array, Array]
+
+
+def _row_places(skeleton: Skeleton, meshes: Sequence[Array]) -> Columns:
+    """Names of rows, and of each row number of the name, span, fraction, scale."""
+    m = skeleton.assembled.g.numel()
+    names: list[str] = []
+    name, span = np.zeros(m, np.int64), np.zeros(m, np.int64)
+    fraction, scale = np.zeros(m), np.ones(m)
+    for piece, at in zip(skeleton.pieces, skeleton.assembled.at, strict=True):
+        mesh = meshes[piece.span]
+        name[at] = len(names) + np.arange(piece.m)[:, None]
+        names += piece.names
+        span[at] = piece.span
+        fraction[at] = mesh[piece.interval] + np.diff(mesh)[piece.interval] * piece.offset
+        scale[at] = piece.scale[:, None]
+    return names, name, span, fraction, scale
+
+
+def _unknown_places(transcription: Transcription) -> Columns:
+    """Names of unknowns, and of each number of the name, span, fraction, scale."""
+    layout, n = transcription.layout, transcription.layout.size
+    names: list[str] = []
+    name, owner = np.zeros(n, np.int64), np.zeros(n, np.int64)
+    fraction = np.full(n, np.nan)
+    for number in reversed(range(len(layout.spans))):
+        own, model = layout.spans[number], transcription.problem.spans[number].model
+        mesh, inner = transcription.meshes[number], transcription.inner_fractions(number)
+        groups = (
+            ([v.name for v in model.x], own.nodes, mesh),
+            ([v.name for v in model.x], own.inner, inner),
+            ([v.name for v in model.z], own.z, inner),
+            ([v.name for v in model.u], own.u, mesh[:-1]),
+            (
+                ["T"],
+                np.array([[own.T]])[:, : int(own.T >= 0)],
+                np.array([np.nan])[: int(own.T >= 0)],
+            ),
+        )
+        for labels, columns, at in groups:
+            name[columns] = len(names) + np.arange(len(labels))[:, None]
+            owner[columns], fraction[columns] = number, at
+            names += labels
+    for column, choice in zip(layout.chosen, transcription.problem.chosen, strict=True):
+        name[column] = len(names)
+        names.append(choice.name)
+    if layout.largest >= 0:
+        name[layout.largest] = len(names)
+        names.append(LARGEST)
+    return names, name, owner, fraction, transcription.skeleton.scale
