@@ -41,15 +41,15 @@ def chosen_of(
 
 def _choice(name: str, given: tuple[float | None, ...], settings: Sequence[Setting]) -> Choice:
     found = [(s, v) for s in settings for v in s.model.p if v.name == name]
-    low, high = as_box((given[0], given[1]))
+    wanted = as_box((given[0], given[1]))
+    low, high = wanted
     for _, v in found:
         low, high = max(low, v.lower), min(high, v.upper)
     setting, variable = found[0]
     value = float(setting.p.get(name, variable.start))
     guess = given[2] if len(given) == 3 else None
-    return Choice(
-        name, variable.unit, low, high, _guess((low, high), value) if guess is None else guess
-    )
+    guess = _guess(wanted, value) if guess is None else float(guess)
+    return Choice(name, variable.unit, low, high, min(max(guess, low), high))
 
 
 def _guess(box: Box, value: float) -> float:
