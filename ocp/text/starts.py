@@ -4,6 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import casadi as ca
 
+from ocp.text.loops import closed, following_loops, has_loops, loop_rows
 from ocp.text.ranges import FREE, Box, as_box, fixed, meet
 from ocp.text.rates import rate_name
 from ocp.text.settings import Setting
@@ -19,7 +20,8 @@ def start_of(
 
     A state that is not named starts where the model says: at a number, or, where that depends on
     parameters that are chosen, at an expression in these. Periodic states and inputs with bounded
-    rate start anywhere.
+    rate start anywhere. In a mechanism with loops, coordinates and rates that are not named follow
+    from those that are.
 
     Raises:
         ValueError: a start value that is not finite, or that depends on states in a range.
@@ -37,6 +39,12 @@ def start_of(
     numbers = {name: box[0] if fixed(box) else 0.0 for name, box in named.items()}
     values = dict(zip(named_of(model), model.initial_state(numbers, p).tolist(), strict=True))
     following = _following(span, named)
+    closing: tuple[Row, ...] = ()
+    if has_loops(model):
+        moving = following_loops(model, {*loose, *following}, values)
+        closing = loop_rows(model, moving)
+        values = closed(span, values, named) if not moving else values
+        named = {name: FREE for name in moving} | named
     boxes: dict[str, Box] = {}
     for name, value in values.items():
         wanted = FREE if name in following else named.get(name, (value, value))
@@ -49,7 +57,7 @@ def start_of(
         Row(f"the start of {name}", symbols[name] - ca.substitute(start, known, there), 0.0, 0.0)
         for name, start in following.items()
     ]
-    return boxes, tuple(rows)
+    return boxes, (*rows, *closing)
 
 
 def named_of(model: Model) -> list[str]:
