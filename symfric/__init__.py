@@ -100,6 +100,7 @@ if TYPE_CHECKING:
     from symfric.laws import any_from_text as any_from_text
     from symfric.laws import law_from_text as law_from_text
     from symfric.laws import law_name as law_name
+    from symfric.model import Contact as Contact
     from symfric.model import Event as Event
     from symfric.model import Model as Model
     from symfric.model import Monitor as Monitor
@@ -131,7 +132,7 @@ else:
                 StickSlip Stribeck Sum Table TemperatureDependent Threlfall Tustin
                 VelocityBased Viscous Wojewoda any_from_text law_from_text law_name
             """,
-            "symfric.model": "Event Model Monitor Output",
+            "symfric.model": "Contact Event Model Monitor Output",
             "symfric.scenes": "drive rabinowicz",
         },
     )

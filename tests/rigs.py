@@ -16,15 +16,15 @@ def prescribed_motion(law: Law, N: float, velocity: Callable[[ca.SX], ca.SX]) ->
     work = Variable("work", "J", nominal=1e-5)
     t = ca.SX.sym("t")
     v = velocity(t)
-    slip = contact(law, v, N, (), rest={})
+    slip = contact("slide", law, v, N, rest={})
     rest = law.steady_state(0.0, N)
     states = tuple(replace(s, start=float(rest[i])) for i, s in enumerate(slip.states))
     return Model(
         "rig",
         x=(path, work, *states),
-        ode=ca.vertcat(v, slip.force * v, slip.rate),
-        events=slip.events,
-        outputs={"friction": Output(slip.force, "N"), "v": Output(v, "m/s")},
+        ode=ca.vertcat(v, slip.friction * v, slip.rate),
+        events=slip.events(),
+        outputs={"friction": Output(slip.friction, "N"), "v": Output(v, "m/s")},
         t=t,
     )
 

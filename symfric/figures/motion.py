@@ -32,7 +32,7 @@ def prescribed(law: Law, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]) ->
     travel = Variable("travel", "m", nominal=1e-5)
     pace, t = Variable("pace", "1", start=1.0), ca.SX.sym("t")
     v = velocity(t, pace.symbol)
-    slip = contact(law, v, N, (), rest={}, dv=ca.jacobian(v, t))
+    slip = contact("slide", law, v, N, rest={}, dv=ca.jacobian(v, t))
     begin = float(ca.DM(ca.substitute(ca.SX(v), ca.vertcat(t, pace.symbol), ca.DM([0.0, 1.0]))))
     first = law.steady_state(begin, N)
     states = tuple(replace(s, start=float(first[i])) for i, s in enumerate(slip.states))
@@ -41,8 +41,8 @@ def prescribed(law: Law, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]) ->
         x=(travel, *states),
         p=(pace,),
         ode=ca.vertcat(v, slip.rate),
-        events=slip.events,
-        outputs={"slip_velocity": Output(v, "m/s"), "friction": Output(slip.force, "N")},
+        events=slip.events(),
+        outputs={"slip_velocity": Output(v, "m/s"), "friction": Output(slip.friction, "N")},
         t=t,
     )
 

@@ -1,5 +1,6 @@
 """The one interface between those who write equations and those who solve them."""
 
+from symfric.model.contact import Contact as Contact
 from symfric.model.holonomic import Holonomic as Holonomic
 from symfric.model.model import Model as Model
 from symfric.model.model import Variables as Variables

@@ -7,7 +7,7 @@ variables z, inputs u, parameters p.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import casadi as ca
@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import evaluate, evaluate_all
+from symfric.foundation.numeric import Scalar, evaluate, evaluate_all
 from symfric.foundation.parameters import Variable, check_names
 from symfric.foundation.symbols import stacked, symbols_of
+from symfric.model.contact import Contact, closed, opened, reopened, with_forces
 from symfric.model.holonomic import Holonomic
 from symfric.model.parts import Event, Monitor, Output
 from symfric.model.problems import GROUPS, equation_problems, kind_problems, naming_problems
@@ -54,6 +55,8 @@ class Model:
         details: writes further results, such as reactions, when somebody asks for one of them; to
             carry one along in derivatives and in C, put it into `outputs`.
         sketch: writes what is drawn of the machine, when somebody asks for a picture of it.
+        contacts: where friction acts; their laws close equations written with their forces.
+        opening: writes `open` of a model that is closed already.
 
     Raises:
         ValueError: all problems at once: repeated names, wrong row counts, undeclared symbols; an
@@ -76,6 +79,8 @@ class Model:
     holonomic: Holonomic | None = None
     details: Callable[[], Mapping[str, Output]] = dict[str, Output]
     sketch: Callable[[], Sketch] | None = None
+    contacts: tuple[Contact, ...] = ()
+    opening: "Callable[[], Model] | None" = None
 
     def __post_init__(self) -> None:
         self._refuse(kind_problems(self))
@@ -85,6 +90,8 @@ class Model:
             object.__setattr__(self, name, ca.SX(getattr(self, name)))
         if not self.x and self.residual.is_empty():  # algebraic equations alone are explicit
             object.__setattr__(self, "ode", ca.SX(0, 1))
+        if self.contacts and self.opening is None:
+            self._close()
         if self.holonomic is not None:
             self._take(self.holonomic)
         if self.ode is not None:
@@ -100,6 +107,27 @@ class Model:
     def _refuse(self, problems: list[str]) -> None:
         if problems:
             raise ValueError(f"model {self.name!r}: " + "; ".join(problems))
+
+    def _close(self) -> None:
+        """Put the laws of the contacts in the place of their forces, and remember what was."""
+        object.__setattr__(self, "opening", partial(opened, self.__getstate__(), Model))
+        for name, value in closed(self).items():
+            object.__setattr__(self, name, value)
+
+    @cached_property
+    def open(self) -> "Model":
+        """The same model with the forces of its `contacts` as inputs, "<name>_F".
+
+        Further widths (`Contact.widths`) are parameters; ValueError where variables were replaced.
+        """
+        return self if self.opening is None else reopened(self, self.opening())
+
+    def with_forces(
+        self, forces: Mapping[str, Scalar], p: Variables = (), z: Variables = (),
+        alg: Scalar | None = None, monitors: tuple[Monitor, ...] = (),
+    ) -> "Model":  # fmt: skip
+        """The same model with other friction forces than those of its laws: see `with_forces`."""
+        return with_forces(self, forces, p, z, alg, monitors)
 
     def _take(self, mechanics: Holonomic) -> None:
         """Make `ode` and `alg` of the equations of a mechanism."""

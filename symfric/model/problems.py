@@ -8,6 +8,7 @@ import casadi as ca
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import strays
+from symfric.model.contact import Contact
 from symfric.model.parts import Event, Monitor, Output
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ GROUPS: dict[str, tuple[type, str]] = {
     **dict.fromkeys("xzup", (Variable, "variables")),
     "monitors": (Monitor, "monitors"),
     "events": (Event, "events"),
+    "contacts": (Contact, "contacts"),
 }
 """Groups of a model: what they consist of."""
 
@@ -39,8 +41,8 @@ def _wrong_kinds(model: "Model") -> Iterator[str]:
     yield _said(_results, "outputs", model.outputs)
     if not (isinstance(model.t, ca.SX) and model.t.is_scalar() and model.t.is_symbolic()):  # pyright: ignore[reportUnnecessaryIsInstance]
         yield f"t: expected one SX symbol, got {checks.shown(model.t)}"
-    for name in ("details", "sketch"):
-        if name == "details" or model.sketch is not None:
+    for name in ("details", "sketch", "opening"):
+        if name == "details" or getattr(model, name) is not None:
             yield _said(checks.function, name, getattr(model, name), "a function")
 
 

@@ -11,23 +11,26 @@ reactions are algebraic variables.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
+from typing import final
 
 import casadi as ca
 import numpy as np
 
-from symfric.foundation.numeric import is_symbolic
+from symfric.foundation.numeric import Scalar, is_symbolic
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import at_start, stacked, symbols_of
 from symfric.laws.composed.isotropic import SpatialSlip
-from symfric.model import Model, Monitor, Output, Variables, kinds
+from symfric.model import Contact, Model, Monitor, Output, Variables, kinds
 from symfric.model.holonomic import Holonomic, Inner
 from symfric.model.sketch import Sketch
-from symfric.multibody.applied import rests
-from symfric.multibody.equations import Equations
+from symfric.multibody.applied import Rest, rests
+from symfric.multibody.equations import Equations, normals_with
+from symfric.multibody.friction import Contact as Rubbing
 from symfric.multibody.mass import solve_mass
 from symfric.multibody.results import Put
-from symfric.multibody.slips import Slip, events, keeps_deflection, slips
+from symfric.multibody.slips import Slip, depends_on_load, events, keeps_deflection, slips
 from symfric.multibody.topology import Topology
 
 Details = Callable[[ca.SX, Put], Mapping[str, Output]]
@@ -89,11 +92,39 @@ def assemble(
         )
         for label, x in zip(labels, guess["lam"], strict=True)
     )
+    machine = _Machine(name, eq, q, qd, multipliers, p, u, more, index)
+    inner = None if cut is None else _inner(cut, eq, contacts, stacked(s.force for s in contacts))
+    frictional = _frictional(contacts)
+    opening = partial(_open, machine, contacts, frictional)
+    return _model(machine, contacts, groups, inner, frictional, opening)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Machine:
+    """What a mechanism is, whatever its friction forces are."""
+
+    name: str
+    eq: Equations
+    q: Variables
+    qd: Variables
+    multipliers: Variables
+    p: Variables
+    u: Variables
+    more: tuple[Details, Drawn]
+    index: int
+
+
+def _model(
+    machine: _Machine, contacts: Sequence[Slip], groups: Sequence[Rest], inner: Inner | None,
+    frictional: tuple[Contact, ...], opening: Callable[[], Model] | None,
+) -> Model:  # fmt: skip
+    """The model of a machine whose contacts have the forces that `contacts` say."""
+    eq, p = machine.eq, machine.p
     pressed, loops = [s for s in contacts if s.unknown], [v for r in groups for v in r.direction]
     forces = stacked(s.force for s in contacts)
-    symbols = symbols_of(multipliers)
+    symbols = symbols_of(machine.multipliers)
     before, after = ca.vertcat(eq.lam, eq.F), ca.vertcat(symbols, forces)
-    p_column = symbols_of(p)
     needed = stacked(rest.needed([contacts[i].force for i in rest.members]) for rest in groups)
     balance, normals, phi_ddot = ca.substitute(
         [eq.balance, stacked(s.normal - s.N for s in pressed), eq.phi_ddot],
@@ -108,8 +139,8 @@ def assemble(
         stacked((*(t.rate for t in eq.turns), *(s.rate for s in contacts), *(0.0 for _ in loops))),
         partial(solve_mass, eq),
         eq.norms,
-        index,
-        None if cut is None else _inner(cut, eq, contacts, forces),
+        machine.index,
+        inner,
         *_pressing(contacts, ca.vertcat(eq.a, before)),
         applied=len(groups),
     )
@@ -121,19 +152,82 @@ def assemble(
     scales = [(s, x) for s in contacts if np.isfinite(x := _scale(s, p))]
     names = {s.contact.name: x for s, x in scales}
     return Model(
-        name=name,
-        x=(*q, *qd, *(t.angle for t in eq.turns), *(v for s in contacts for v in s.states), *loops),
-        z=(*multipliers, *(r.force for r in groups), *(v for s in contacts for v in s.unknown)),
-        u=u,
+        name=machine.name,
+        x=(
+            *machine.q,
+            *machine.qd,
+            *(t.angle for t in eq.turns),
+            *(v for s in contacts for v in s.states),
+            *loops,
+        ),
+        z=(
+            *machine.multipliers,
+            *(r.force for r in groups),
+            *(v for s in contacts for v in s.unknown),
+        ),
+        u=machine.u,
         p=p,
         outputs=_outputs(eq, contacts, put),
-        monitors=tuple(m for s, _ in scales for m in _watched(s)),
-        events=events(contacts, groups, qd),
+        monitors=tuple(m for s, _ in scales if s.force is not s.contact.F for m in _watched(s)),
+        events=events([s for s in contacts if s.force is not s.contact.F], groups, machine.qd),
         t=eq.kin.t,
-        details=lambda: more[0](p_column, put),
-        sketch=lambda: more[1](names),
+        details=lambda: machine.more[0](symbols_of(p), put),
+        sketch=lambda: machine.more[1](names),
         holonomic=mechanics,
+        contacts=frictional,
+        opening=opening,
     )
+
+
+def _frictional(contacts: Sequence[Slip]) -> tuple[Contact, ...]:
+    """The contacts of a model; not those of balls, whose slip is a vector without two sides."""
+    return tuple(
+        Contact(
+            s.contact.name,
+            s.contact.slip,
+            s.N if _pressed(s) else ca.SX(np.nan),
+            s.contact.friction.law,
+            given=s.inputs,
+            states=s.states,
+            force=s.contact.F,
+            turning=s.contact.friction.turning,
+            widths={"eps": _rounding(s.contact)} if s.N is not s.normal else {},
+        )
+        for s in contacts
+        if not isinstance(s.contact.law, SpatialSlip)
+    )
+
+
+def _pressed(slip: Slip) -> bool:
+    """Whether its normal force is written in the symbols of the model."""
+    return slip.N is not slip.normal or depends_on_load(slip.contact.friction.law)
+
+
+def _rounding(contact: Rubbing) -> Variable:
+    """The width of |f| in a normal force, as a parameter."""
+    eps = contact.friction.eps
+    return Variable(f"{contact.pressed}_eps", "N", start=eps, lower=0.0, doc="width of |f|")
+
+
+def _open(machine: _Machine, contacts: Sequence[Slip], frictional: tuple[Contact, ...]) -> Model:
+    """The model with friction forces as inputs; balls keep their laws."""
+    eps: dict[str, Scalar] = {s.contact.pressed: s.contact.friction.eps for s in contacts}
+    widths = {v.name: v for c in frictional for v in c.widths.values()}
+    eps |= {name: widths[f"{name}_eps"].symbol for name in eps if f"{name}_eps" in widths}
+    free = [
+        s if s.N is s.normal else replace(s, normal=normal)
+        for s, normal in zip(contacts, normals_with(machine.eq, eps), strict=True)
+    ]
+    names = {c.name for c in frictional}
+    free = [
+        replace(s, states=(), rate=ca.SX(0, 1), force=s.contact.F, inputs={})
+        if s.contact.name in names
+        else s
+        for s in free
+    ]
+    u = (*machine.u, *(c.variable for c in frictional))
+    p = (*machine.p, *widths.values())
+    return _model(replace(machine, u=u, p=p), free, (), None, (), None)
 
 
 def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip], forces: ca.SX) -> Inner | None:

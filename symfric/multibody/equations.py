@@ -1,11 +1,12 @@
 """All expressions of a mechanism in one choice of coordinates."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import final
 
 import casadi as ca
 
+from symfric.foundation.numeric import Scalar
 from symfric.foundation.symbols import stacked
 from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.multibody.constraints import Constraint, Held
@@ -46,6 +47,7 @@ class Equations:
         kinetic, potential: energies [J].
         power: power of all applied forces, of friction and of drives on the bodies [W].
         reactions: wrench on the child of each joint at its joint point, in the child's joint frame.
+        pressing: the wrenches that press bearings; of joints that only close loops, their own.
     """
 
     kin: Kinematics
@@ -68,6 +70,7 @@ class Equations:
     potential: ca.SX
     power: ca.SX
     reactions: dict[str, Wrench]
+    pressing: dict[str, Wrench]
 
     @property
     def n(self) -> int:
@@ -171,6 +174,22 @@ def equations(
         sum((f.energy(kin, by_name) for f in forces), ca.SX(0)),
         power,
         reactions,
+        pressing,
+    )
+
+
+def normals_with(eq: Equations, eps: Mapping[str, Scalar]) -> tuple[ca.SX, ...]:
+    """Normal force of each contact, rounded over the widths `eps` of what is `pressed`."""
+    joints = {link.joint.name: link.joint for link in eq.kin.topology.links}
+    joints |= {loop.joint.name: loop.joint for loop in eq.loops}
+    return tuple(
+        _normal(
+            eq.kin,
+            replace(c, friction=replace(c.friction, eps=eps[c.pressed])),
+            joints[c.joint],
+            eq.pressing,
+        )
+        for c in eq.contacts
     )
 
 

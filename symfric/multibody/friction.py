@@ -79,7 +79,7 @@ class JointFriction:
     width: Scalar | None = None
     preload: Scalar = 0.0
     normal: Scalar | None = None
-    eps: float = 1e-4
+    eps: Scalar = 1e-4
     turning: bool = False
 
     def __post_init__(self) -> None:

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from math import isfinite
+from functools import partial
 from typing import Any, ClassVar, final
 
 import casadi as ca
@@ -12,11 +12,11 @@ import numpy as np
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, is_number
 from symfric.foundation.parameters import Parametric, Variable, parameters, symbolise
-from symfric.foundation.symbols import at_start, symbols_of
+from symfric.foundation.symbols import symbols_of
 from symfric.foundation.units import turned
 from symfric.laws import Law
-from symfric.laws.base.law import check_law, chosen
-from symfric.model import Event, Model, Monitor, Variables
+from symfric.laws.base.law import check_law
+from symfric.model import Contact, Model, Variables
 
 
 @final
@@ -74,31 +74,13 @@ def _is_scalar(value: Scalar) -> bool:
     return is_number(value) or (isinstance(value, np.ndarray) and value.ndim == 0)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Contact:
-    """A friction law at work in a machine.
-
-    Attributes:
-        states: the internal states of the law as model variables.
-        force: friction force [N] opposing the sliding velocity.
-        rate: rates of the states, (n, 1).
-        monitors, events: what goes into the model beside them.
-    """
-
-    states: Variables
-    force: Scalar
-    rate: Scalar
-    monitors: tuple[Monitor, ...]
-    events: tuple[Event, ...]
-
-
 def contact(
-    law: Law, v: Scalar, N: Scalar, p: Variables, rest: Mapping[str, Scalar], **inputs: Scalar
+    name: str, law: Law, v: Scalar, N: Scalar, rest: Mapping[str, Scalar], **inputs: Scalar
 ) -> Contact:
-    """`law` between bodies that slide at `v` under `N`, in a model with parameters `p`.
+    """`law` between bodies that slide at `v` under `N`, the only contact of a machine.
 
     Args:
+        name: what is rubbed against.
         rest: state of the model -> its value at which `v` is exactly zero.
         inputs: what the machine offers to laws besides v and N.
 
@@ -109,7 +91,7 @@ def contact(
     if missing:
         raise ValueError(
             f"{type(law).__name__}: expected a law that needs no more than v, N"
-            f"{''.join(f', {name}' for name in inputs)} here, got one that needs "
+            f"{''.join(f', {offered}' for offered in inputs)} here, got one that needs "
             f"{', '.join(missing)}"
         )
     if is_number(N) and N == 0 and divides_by_load(law):
@@ -117,26 +99,7 @@ def contact(
             f"{type(law).__name__}: expected a normal force above 0 N, by which the law divides, "
             "got 0; lugre_normalised does not, and load_dependent(...) rounds it off"
         )
-    given = chosen(law, inputs)
-    states, z = friction_states(law, v, N)
-    events = tuple(
-        Event(
-            s.name,
-            s.expression,
-            s.direction,
-            reset=dict(s.reset) | (dict(rest) if s.halts else {}),
-            at_start=s.at_start,
-            rtol=s.rtol,
-        )
-        for s in law.switches(v, N, z, **given)
-    )
-    return Contact(
-        states,
-        law.force(v, N, z, **given),
-        law.rate(v, N, z, **given),
-        slip_monitor(law, v, p),
-        events,
-    )
+    return Contact(name, ca.SX(v), N, law, given=inputs, rest=rest, bare=True)
 
 
 def divides_by_load(law: Law) -> bool:
@@ -147,15 +110,6 @@ def divides_by_load(law: Law) -> bool:
     except (ValueError, ZeroDivisionError):
         return True
     return not found.is_regular()
-
-
-def slip_monitor(law: Law, v: Scalar, p: Variables) -> tuple[Monitor, ...]:
-    """What error control must watch of a contact: its sliding velocity `v`, on the law's scale.
-
-    The scale follows `p`; a law without one, at the start values of `p`, adds nothing.
-    """
-    scale = law.velocity_scale
-    return (Monitor(v, scale),) if isfinite(float(at_start(scale, p))) else ()
 
 
 def friction_states(law: Law, v: Scalar, N: Scalar) -> tuple[Variables, ca.SX]:
@@ -175,4 +129,10 @@ def in_turning(model: Model) -> Model:
         for letter in "xzup"
     }
     outputs = {name: replace(o, unit=turned(o.unit)) for name, o in model.outputs.items()}
-    return replace(model, **changed, outputs=outputs)
+    contacts = tuple(replace(c, turning=True) for c in model.contacts)
+    opening = partial(_turned_open, model) if contacts else None
+    return replace(model, **changed, outputs=outputs, contacts=contacts, opening=opening)
+
+
+def _turned_open(model: Model) -> Model:
+    return in_turning(model.open)

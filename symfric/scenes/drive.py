@@ -51,15 +51,14 @@ class Drive(Scene):
         v = Variable("v", "m/s", nominal=0.1, doc="velocity")
         force = Variable("force", "N", nominal=1.0, doc="driving force")
         applied = force.symbol - self.offset
-        slip = contact(self.law, v.symbol, self.N, p, rest={"v": 0.0}, F_e=applied)
+        slip = contact("guide", self.law, v.symbol, self.N, rest={"v": 0.0}, F_e=applied)
         model = Model(
             name="drive",
-            x=(x, v, *slip.states),
+            x=(x, v),
             u=(force,),
             p=p,
-            ode=ca.vertcat(v.symbol, (applied - slip.force) / self.m, slip.rate),
-            monitors=slip.monitors,
-            events=slip.events,
+            ode=ca.vertcat(v.symbol, (applied - slip.force) / self.m),
+            contacts=(slip,),
             outputs={
                 "friction": Output(slip.force, "N", "friction force opposing v"),
                 "power": Output(slip.force * v.symbol, "W", "power taken by friction"),

@@ -97,21 +97,21 @@ class QuarterCar(Scene):
         f_sd = self.k_s * x_rel + self.b_d * v_rel
         N = self.normal_force(f_sd, x_rel)
         given = {"x_rel": x_rel, "v_rel": v_rel, "F_e": f_sd}
-        slip = contact(self.law, v_b.symbol, N, p, rest={"v_b": 0.0}, **given)
+        slip = contact("guide", self.law, v_b.symbol, N, rest={"v_b": 0.0}, **given)
         # beyond the strut's reach N is not a number: a run must stop there under any law
         load = ca.SX.sym("N")
-        told = contact(self.law, v_b.symbol, load, p, rest={"v_b": 0.0}, **given)
-        loaded = ca.depends_on(ca.vertcat(told.force, told.rate), load)
+        told = contact("guide", self.law, v_b.symbol, load, rest={"v_b": 0.0}, **given)
+        loaded = ca.depends_on(ca.vertcat(told.friction, told.rate), load)
         reach = () if loaded else (Monitor(N, ANY),)
         a_b = (f_sd - slip.force) / self.M_b
         a_w = (-f_sd + self.k_t * x_tyre + self.b_t * v_tyre) / self.M_w
         return Model(
             name="quarter_car",
-            x=(X_b, X_w, v_b, v_w, *slip.states),
+            x=(X_b, X_w, v_b, v_w),
             p=p,
-            ode=ca.vertcat(v_b.symbol, v_w.symbol, a_b, a_w, slip.rate),
-            monitors=(*slip.monitors, *reach),
-            events=slip.events,
+            ode=ca.vertcat(v_b.symbol, v_w.symbol, a_b, a_w),
+            monitors=reach,
+            contacts=(slip,),
             t=t,
             outputs={
                 "X_r": Output(X_r, "m", "height of the road"),

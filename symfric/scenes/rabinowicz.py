@@ -41,14 +41,13 @@ class Rabinowicz(Scene):
         v = Variable("v", "m/s", nominal=0.1, doc="velocity of the block")
         N, v_rel = self.m * self.g, v.symbol - self.v_belt
         pull = -self.k * x.symbol
-        slip = contact(self.law, v_rel, N, p, rest={"v": self.v_belt}, F_e=pull)
+        slip = contact("belt", self.law, v_rel, N, rest={"v": self.v_belt}, F_e=pull)
         return Model(
             name="rabinowicz",
-            x=(x, v, *slip.states),
+            x=(x, v),
             p=p,
-            ode=ca.vertcat(v.symbol, (pull - slip.force) / self.m, slip.rate),
-            monitors=slip.monitors,
-            events=slip.events,
+            ode=ca.vertcat(v.symbol, (pull - slip.force) / self.m),
+            contacts=(slip,),
             outputs={
                 "v_rel": Output(v_rel, "m/s", "velocity of the block relative to the belt"),
                 "friction": Output(slip.force, "N", "friction force opposing v_rel"),

@@ -1,0 +1,185 @@
+"""Contacts of a model: closed by their laws, open with the forces as inputs, closed otherwise."""
+
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric import (
+    BrownMcPhee,
+    ExactCoulomb,
+    Karnopp,
+    Law,
+    LuGre,
+    Model,
+    Output,
+    Stribeck,
+    Variable,
+    drive,
+    simulate,
+)
+from symfric.laws import PlanarSlip, QuarterCarGeneral
+from symfric.model import Contact, Monitor
+from symfric.scenes import ALL_SCENES, Drive, QuarterCar
+
+LAWS: dict[str, Law] = {
+    "brown_mcphee": BrownMcPhee(), "lugre": LuGre(), "exact": ExactCoulomb(sigma_2=0.3),
+}  # fmt: skip
+
+
+def behind_spring(law: Law, **contact: Any) -> Model:
+    """A load on a guide, moved through a spring: the motor at x1, the load at x."""
+    x1, x = Variable("x1", "m"), Variable("x", "m")
+    v1, v = Variable("v1", "m/s"), Variable("v", "m/s")
+    force = Variable("force", "N", nominal=10.0)
+    K = 200.0 * (x1.symbol - x.symbol) + 2.0 * (v1.symbol - v.symbol)
+    guide = Contact("guide", v.symbol, 9.81, law, given={"F_e": K}, rest={"v": 0.0}, **contact)
+    return Model(
+        "behind_spring",
+        x=(x1, x, v1, v),
+        u=(force,),
+        ode=ca.vertcat(v1.symbol, v.symbol, (force.symbol - K) / 0.5, K - guide.force),
+        outputs={"friction": Output(guide.force, "N"), "spring": Output(K, "N")},
+        contacts=(guide,),
+    )
+
+
+def by_hand(law: Law, x: np.ndarray, u: float) -> np.ndarray:
+    """The right-hand side of the same, without a model."""
+    x1, at, v1, v = x[:4]
+    K = 200.0 * (x1 - at) + 2.0 * (v1 - v)
+    F_e = {"F_e": K} if law.inputs else {}
+    F = law.force(v, 9.81, x[4:], **F_e)
+    rates = np.ravel(law.rate(v, 9.81, x[4:], **F_e))
+    return np.array([v1, v, (u - K) / 0.5, K - float(F), *rates])
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_model_closes_itself_with_the_law_of_its_contact(name: str) -> None:
+    law, rng = LAWS[name], np.random.default_rng(0)
+    model = behind_spring(law)
+    assert [v.name for v in model.x[4:]] == [f"guide_{s.name}" for s in law.states]
+    f = model.function("ode")
+    for _ in range(5):
+        x = rng.standard_normal(4 + len(law.states)) * ([1e-3] * 4 + [1e-6] * len(law.states))
+        if name == "exact":
+            x[4] = rng.integers(-1, 2)
+        wanted = by_hand(law, x, 3.0)
+        np.testing.assert_allclose(f(0.0, x, [], 3.0, []).full()[:, 0], wanted, rtol=1e-13)
+    assert [m.nominal for m in model.monitors] == [1e-3] * (name != "exact")
+
+
+def test_modes_of_ones_own_model_stick_and_slip() -> None:
+    """Pulled slowly through its spring the load stands until the spring carries mu_s N."""
+    model = behind_spring(ExactCoulomb(mu_s=0.2, mu_d=0.1))
+    assert [e.name for e in model.events] == ["guide_stick", "guide_slip"]
+    run = simulate(model, 1.0, u={"force": lambda t: 4.0 * t})
+    broken = run.t[np.flatnonzero(run["v"] > 0)[0]]
+    before = run.t < broken
+    assert np.max(np.abs(run["x"][before])) == 0.0
+    assert np.interp(broken, run.t, run["spring"]) == pytest.approx(0.2 * 9.81, rel=1e-3)
+
+
+@pytest.mark.parametrize("scene", ALL_SCENES)
+@pytest.mark.parametrize("law", ["brown_mcphee", "stribeck"])
+def test_closing_an_open_model_by_the_same_law_gives_the_same_equations(
+    scene: str, law: str
+) -> None:
+    made = BrownMcPhee() if law == "brown_mcphee" else Stribeck(sigma_2=0.2)
+    model = ALL_SCENES[scene](made).model()
+    again = model.with_forces({c.name: c.friction for c in model.contacts})
+    rng = np.random.default_rng(2)
+    for letter in "xzup":
+        assert [v.name for v in getattr(again, letter)] == [v.name for v in getattr(model, letter)]
+    x = model.initial_state() + 0.05 * rng.standard_normal(len(model.x))
+    z, u = 1.0 + 0.1 * rng.random(len(model.z)), rng.standard_normal(len(model.u))
+    for what in ("ode", "alg", "signals"):
+        one, other = (m.function(what)(0.7, x, z, u, []).full() for m in (model, again))
+        np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-11)
+
+
+def test_the_open_model_takes_the_friction_force_as_an_input() -> None:
+    model = drive(LuGre())
+    assert [v.name for v in model.open.x] == ["x", "v"]
+    assert [v.name for v in model.open.u] == ["force", "guide_F"]
+    run = simulate(model.open, 1.0, u={"force": 2.0, "guide_F": 0.4})
+    assert run["v"][-1] == pytest.approx(1.6 / 0.8)
+    turning = Drive(BrownMcPhee(), turning=True).model()
+    assert [v.unit for v in turning.open.u] == ["N m", "N m"]
+    assert turning.contacts[0].turning
+
+
+def test_an_unknown_may_hold_the_contact() -> None:
+    """F with dv/dt = 0 is the force of the spring."""
+    model = behind_spring(BrownMcPhee())
+    F = Variable("reaction", "N")
+    held = model.with_forces({"guide": F.symbol}, z=(F,), alg=model.open.ode[3])
+    run = simulate(held, 0.5, u={"force": 3.0}, rtol=1e-9)
+    assert np.max(np.abs(run["x"])) < 1e-15
+    np.testing.assert_allclose(run["reaction"], run["spring"], atol=1e-9)
+    assert held.contacts == ()
+    assert held.open is held
+
+
+def test_further_parameters_and_monitors_come_with_the_forces() -> None:
+    model = drive(LuGre())
+    (contact,) = model.contacts
+    v_t = Variable("guide_v_t", "m/s", start=1e-2)
+    law = BrownMcPhee(v_t=v_t.symbol)
+    force = law.force(contact.slip, contact.N)
+    watched = (Monitor(contact.slip, v_t.symbol),)
+    smooth = model.with_forces({"guide": force}, p=(v_t,), monitors=watched)
+    assert [v.name for v in smooth.p] == ["guide_v_t"]
+    slow = simulate(smooth, 1.0, u={"force": 0.5}, p={"guide_v_t": 1e-4})["v"][-1]
+    fast = simulate(smooth, 1.0, u={"force": 0.5})["v"][-1]
+    assert fast == pytest.approx(100 * slow, rel=1e-3)
+
+
+def test_a_load_may_follow_from_the_friction_of_another_contact() -> None:
+    x, v = Variable("x", "m"), Variable("v", "m/s", start=1.0)
+    one = Contact("one", v.symbol, 10.0, Stribeck(sigma_2=0.1))
+    two = Contact("two", v.symbol, 5.0 + one.force, BrownMcPhee())
+    model = Model("two", x=(x, v), ode=ca.vertcat(v.symbol, -one.force - two.force),
+                  contacts=(one, two))  # fmt: skip
+    first = Stribeck(sigma_2=0.1).force(1.0, 10.0)
+    both = first + BrownMcPhee().force(1.0, 5.0 + first)
+    assert float(model.function("ode")(0.0, [0.0, 1.0], [], [], [])[1]) == pytest.approx(-both)
+    loop = replace(one, N=10.0 + two.force)
+    with pytest.raises(ValueError, match="contacts: expected friction forces that do not need"):
+        Model("loop", x=(x, v), ode=ca.vertcat(v.symbol, -one.force - two.force),
+              contacts=(loop, two))  # fmt: skip
+
+
+def test_what_is_given_besides_the_applied_force_reaches_both_sides() -> None:
+    model = QuarterCar(QuarterCarGeneral(mu=0.05)).model()
+    (contact,) = model.contacts
+    assert set(contact.further) == {"x_rel", "v_rel"}
+    slip = model.with_forces(
+        {"guide": contact.sliding(1)},
+    )
+    still = slip.function("ode")(0.0, [0.0, 1e-3, 0.0, 0.0], [], [], [])
+    f_sd = 28900.0 * 1e-3
+    pressed = 0.05 * np.hypot(f_sd, 1.0) / np.tan(np.pi / 4 - np.arcsin(
+        1e-3 * np.cos(np.pi / 4) / (0.4 - 1e-3 * np.sin(np.pi / 4))))  # fmt: skip
+    assert float(still[2]) == pytest.approx((f_sd - 180.0 - pressed) / 240.0)
+    assert float(contact.static_level()) == 193.8
+
+
+def test_contacts_and_forces_that_cannot_be_are_refused() -> None:
+    model = behind_spring(Karnopp())
+    v = ca.SX.sym("v")
+    cases: list[tuple[Any, str]] = [
+        (lambda: Contact("g", v, 1.0, "lugre"), "contact 'g': law: expected a law of a scalar"),
+        (lambda: Contact("g", v, 1.0, PlanarSlip(LuGre())), "contact 'g': law: expected a law"),
+        (lambda: Contact("g", ca.vertcat(v, v), 1.0, LuGre()), "contact 'g': slip: expected one"),
+        (lambda: Contact("g", v, 1.0, Karnopp()), "Karnopp needs besides v and N, got no F_e"),
+        (lambda: model.with_forces({"belt": 1.0}), "with_forces: expected .*guide.*got belt"),
+        (lambda: model.with_forces({}), "expected a force for each contact, got none for guide"),
+        (lambda: replace(model, contacts=(1,)), "contacts: expected contacts made by Contact"),
+        (lambda: replace(model, u=(*model.u, Variable("w", "1"))).open, "as they were made"),
+    ]  # fmt: skip
+    for call, message in cases:
+        with pytest.raises(ValueError, match=message):
+            call()
