@@ -33,6 +33,15 @@ class Status(Enum):
         "values, give a better guess or more time."
     )
     MAX_ITERATIONS = "The maximum number of iterations was reached; give a better guess."
+    TIME_LIMIT = (
+        "The time allowed was used up before the optimality conditions held; allow more of it or "
+        "start from what was found."
+    )
+    NO_STEP = (
+        "No step makes progress although the conditions do not hold: nearly dependent or badly "
+        "scaled constraints, or a derivative that jumps, are near this point."
+    )
+    UNBOUNDED = "The cost falls without bound; bound the inputs or the states, or check its sign."
     NO_DESCENT = (
         "No step fits better, although the derivatives say that one should: this is no minimum; "
         "start elsewhere or narrow the bounds."

@@ -1,0 +1,214 @@
+"""The motion of one scenario by name: signals at all points, joined over the phases."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ocp.text.span import Span
+from ocp.transcription.points import SpanPoints
+from ocp.transcription.schemes import Coefficients
+from symfric.foundation.parameters import check_names
+
+Array = NDArray[np.float64]
+
+SAME = 1e-6
+"""Multiples of the nominal value by which a state may differ at a joint that is continuous."""
+
+
+@final
+@dataclass(frozen=True)
+class Stretch:
+    """When a phase is.
+
+    Attributes:
+        name: of the phase.
+        begin: its start [s].
+        T: its duration [s].
+    """
+
+    name: str
+    begin: float
+    T: float
+
+    @property
+    def end(self) -> float:
+        """Its end [s]."""
+        return self.begin + self.T
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What moves in one scenario.
+
+    `motion["v"]` is a signal at the times `motion.t`.
+
+    Attributes:
+        name: of the scenario, empty where there is only one motion.
+        t: times [s], shape (n,): nodes of the mesh and collocation points. Where a state jumps
+            from one phase to the next, the time of the joint is there twice.
+        signals: name -> values, shape (n,): states, algebraic variables, inputs, outputs; NaN in
+            phases that do not have them. An input is the value from this time on.
+        units: name -> unit.
+        nodes: which of the times are nodes of the mesh.
+        t_control: start of each interval [s], shape (N,).
+        controls: input -> value held from there to the next one, shape (N,).
+        phases: when each of them is.
+        spans: their numbers among the spans of the problem.
+    """
+
+    name: str
+    t: Array
+    signals: dict[str, Array]
+    units: dict[str, str]
+    nodes: NDArray[np.bool_]
+    t_control: Array
+    controls: dict[str, Array]
+    phases: tuple[Stretch, ...]
+    spans: tuple[int, ...]
+
+    @property
+    def T(self) -> float:
+        """Duration of all phases [s]."""
+        return self.phases[-1].end - self.phases[0].begin
+
+    def __getitem__(self, name: str) -> Array:
+        if name == "t":
+            return self.t
+        check_names("solution", [name], self.signals)
+        return self.signals[name]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """Signals of one span."""
+
+    t: Array
+    nodes: NDArray[np.bool_]
+    values: dict[str, Array]
+    edges: Array
+    controls: dict[str, Array]
+    jumps: bool
+
+
+def motion_of(
+    name: str,
+    spans: Sequence[tuple[int, Span]],
+    points: Sequence[SpanPoints],
+    meshes: Sequence[Array],
+    scheme: Coefficients,
+    chosen: Mapping[str, float],
+) -> Motion:
+    """The motion of one scenario.
+
+    Args:
+        name: of the scenario.
+        spans: its spans with their numbers, in order.
+        points, meshes: of each of these spans.
+        scheme: where the collocation points are.
+        chosen: values of the parameters that were chosen.
+    """
+    pieces: list[_Piece] = []
+    phases: list[Stretch] = []
+    begin = 0.0
+    for k, (_, span) in enumerate(spans):
+        before = (spans[k - 1][1], points[k - 1]) if k else None
+        jumps = before is not None and _jumps(*before, span, points[k])
+        pieces.append(_piece(span, points[k], meshes[k], scheme, chosen, begin, jumps))
+        phases.append(Stretch(span.name, begin, points[k].T))
+        begin += points[k].T
+    units: dict[str, str] = {}
+    for _, span in spans:
+        units = span.model.signals | units  # the names of the first phase come first
+    ordered = list(dict.fromkeys(name for _, span in spans for name in span.model.signals))
+    inputs = list(dict.fromkeys(v.name for _, span in spans for v in span.model.u))
+    ends = [piece.t.size - int(k + 1 < len(pieces) and not pieces[k + 1].jumps)
+            for k, piece in enumerate(pieces)]  # fmt: skip
+    return Motion(
+        name,
+        np.concatenate([p.t[:n] for p, n in zip(pieces, ends, strict=True)]),
+        {
+            signal: np.concatenate(
+                [
+                    p.values.get(signal, np.full(p.t.size, np.nan))[:n]
+                    for p, n in zip(pieces, ends, strict=True)
+                ]
+            )
+            for signal in ordered
+        },
+        {signal: units[signal] for signal in ordered},
+        np.concatenate([p.nodes[:n] for p, n in zip(pieces, ends, strict=True)]),
+        np.concatenate([p.edges[:-1] for p in pieces]),
+        {
+            u: np.concatenate(
+                [p.controls.get(u, np.full(p.edges.size - 1, np.nan)) for p in pieces]
+            )
+            for u in inputs
+        },
+        tuple(phases),
+        tuple(number for number, _ in spans),
+    )
+
+
+def _jumps(before: Span, old: SpanPoints, after: Span, new: SpanPoints) -> bool:
+    """Whether a state jumps at the joint, or is not in both phases."""
+    there = {v.name: k for k, v in enumerate(before.model.x)}
+    if [*there] != [v.name for v in after.model.x]:
+        return True
+    gap = np.abs(new.nodes[:, 0] - old.nodes[:, -1])
+    return bool((gap > SAME * after.model.nominal("x")).any())
+
+
+def _piece(
+    span: Span,
+    points: SpanPoints,
+    mesh: Array,
+    scheme: Coefficients,
+    chosen: Mapping[str, float],
+    begin: float,
+    jumps: bool,
+) -> _Piece:
+    """Signals at the nodes and collocation points of one span."""
+    model, N = span.model, mesh.size - 1
+    inside = scheme.nodes[1:-1] if scheme.degree and scheme.meets_end else scheme.nodes[1:]
+    shown = inside.size
+    fractions = mesh[:-1, None] + np.diff(mesh)[:, None] * np.append(0.0, inside)
+    at = begin + points.T * np.append(fractions.ravel(), 1.0)
+    d = scheme.degree
+
+    def joined(nodes: Array, inner: Array) -> Array:
+        """Columns in the order of time."""
+        blocks = inner.reshape(nodes.shape[0], N, d)[:, :, :shown]
+        held = np.concatenate([nodes[:, :-1, None], blocks], axis=2)
+        return np.column_stack([held.reshape(nodes.shape[0], N * (shown + 1)), nodes[:, -1]])
+
+    x = joined(points.nodes, points.inner)
+    z = joined(_at_nodes(points.z, N, scheme), points.z)
+    held = points.u[:, np.minimum(np.arange(at.size) // (shown + 1), N - 1)]
+    p = np.array([chosen.get(v.name, number) for v, number in zip(model.p, span.p, strict=True)])
+    values = model.function("signals").map(at.size)(
+        at[None, :], x, z, held, np.tile(p[:, None], (1, at.size))
+    )
+    return _Piece(
+        at,
+        np.arange(at.size) % (shown + 1) == 0,
+        dict(zip(model.signals, values.full(), strict=True)),
+        begin + points.T * mesh,
+        {v.name: row for v, row in zip(model.u, points.u, strict=True)},
+        jumps,
+    )
+
+
+def _at_nodes(z: Array, intervals: int, scheme: Coefficients) -> Array:
+    """Algebraic variables at the nodes: at the end of the interval before, first value at 0.
+
+    Shooting does not know them: NaN.
+    """
+    if not scheme.degree:
+        return np.full((z.shape[0], intervals + 1), np.nan)
+    blocks = z.reshape(z.shape[0], intervals, scheme.degree)
+    return np.column_stack([blocks[:, 0, 0], blocks @ scheme.inner_ends])

@@ -1,0 +1,250 @@
+"""The result of an optimal control problem: named signals that plot, write and save themselves."""
+
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ocp.result.motion import Motion, Stretch
+from ocp.result.stored import Stored, stored_spans, structure_of
+from ocp.solvers.outcome import Iterate, SolverStatistics
+from ocp.text.problem import Problem
+from ocp.transcription.points import Points
+from ocp.transcription.schemes import Scheme
+from symfric.foundation.files import write_text, written
+from symfric.foundation.parameters import check_names
+from symfric.foundation.status import Status
+from symfric.results.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+
+class Verdict(Protocol):
+    """What a solution knows of its verification (`ocp.checking` makes it)."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing missed by more than the tolerance."""
+        ...
+
+    @property
+    def trajectories(self) -> Sequence[Trajectory]:
+        """The re-simulated motion of each span that was simulated, in order."""
+        ...
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as plain data."""
+        ...
+
+
+@final
+@dataclass(frozen=True)
+class Mode:
+    """What a contact does for a while.
+
+    Attributes:
+        kind: "slip+", "slip-" or "stick".
+        begin, end: when [s].
+    """
+
+    kind: str
+    begin: float
+    end: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Optimal motion, and what the model really does under its control.
+
+    `solution["v"]` is a signal at the times `solution.t`, nodes of the mesh and collocation points,
+    joined over the phases. With scenarios it is that of the first one;
+    `solution.scenarios["oiled"]["v"]` is that of another.
+
+    Attributes:
+        problem: what was solved.
+        status: how it ended; `message` says it in a sentence.
+        cost: J.
+        motions: what moves, for each scenario.
+        chosen: values of the parameters that were chosen.
+        statistics: size, iterations, times, of all solves together.
+        scheme, meshes, points, iterate: what a warm start needs.
+        modes: contact -> what it does when; empty where friction was not told apart by modes.
+        verification: what the re-simulation says, or None where it was not asked for.
+        cause: the exception in `progress` that stopped the solver, if any.
+    """
+
+    problem: Problem
+    status: Status
+    message: str
+    cost: float
+    motions: tuple[Motion, ...]
+    chosen: Mapping[str, float]
+    statistics: SolverStatistics
+    scheme: Scheme
+    meshes: tuple[Array, ...]
+    points: Points
+    iterate: Iterate
+    modes: Mapping[str, tuple[Mode, ...]] = field(default_factory=dict[str, tuple[Mode, ...]])
+    verification: Verdict | None = None
+    cause: BaseException | None = None
+
+    def __getitem__(self, name: str) -> Array:
+        if name != "t":
+            check_names(f"solution of '{self.problem.name}'", [name], self.signals)
+        return self.motions[0][name]
+
+    @property
+    def ok(self) -> bool:
+        """Whether it can be used as it is."""
+        return self.status.ok
+
+    @property
+    def verified(self) -> bool:
+        """Whether the model under this control does what was asked for, within the tolerance."""
+        return self.verification is not None and self.verification.ok
+
+    @property
+    def scenarios(self) -> dict[str, Motion]:
+        """The motions by the names of their scenarios; empty where there is only one."""
+        return {motion.name: motion for motion in self.motions if motion.name}
+
+    @property
+    def T(self) -> float:
+        """Duration of all phases [s]."""
+        return self.motions[0].T
+
+    @property
+    def t(self) -> Array:
+        """Times of the signals [s], shape (n,); see `Motion`."""
+        return self.motions[0].t
+
+    @property
+    def signals(self) -> dict[str, Array]:
+        """Name -> values, shape (n,); see `Motion`."""
+        return self.motions[0].signals
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Name -> unit."""
+        return self.motions[0].units
+
+    @property
+    def t_control(self) -> Array:
+        """Start of each interval [s], shape (N,)."""
+        return self.motions[0].t_control
+
+    @property
+    def controls(self) -> dict[str, Array]:
+        """Input -> value held over each interval, shape (N,)."""
+        return self.motions[0].controls
+
+    @property
+    def phases(self) -> tuple[Stretch, ...]:
+        """When each phase is."""
+        return self.motions[0].phases
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of the solver, of all solves together."""
+        return self.statistics.iterations
+
+    @property
+    def states(self) -> dict[str, Array]:
+        """The states among the signals."""
+        names = [v.name for i in self.motions[0].spans for v in self.problem.spans[i].model.x]
+        return {name: self.signals[name] for name in dict.fromkeys(names)}
+
+    @property
+    def inputs(self) -> dict[str, Array]:
+        """The inputs among the signals."""
+        return {name: self.signals[name] for name in self.controls}
+
+    @property
+    def stored(self) -> Stored:
+        """What a warm start needs of it, free of models."""
+        return Stored(
+            self.problem.name,
+            self.status.name,
+            self.message,
+            self.cost,
+            structure_of(self.problem, self.scheme),
+            stored_spans(self.problem, self.scheme, self.meshes, self.points),
+            self.chosen,
+            self.iterate,
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write it to a file from which `ocp.load` makes a start for any mesh or model.
+
+        The file is NumPy's `.npz`, whatever its ending. Models and costs are code and not in it.
+        """
+        self.stored.save(path)
+
+    def plot(self, *names: str, path: str | Path | None = None) -> "Figure":
+        """One panel per signal over time; optimised points against the re-simulated line.
+
+        Args:
+            names: signals to show; all of them if none is given.
+            path: image file, its format taken from the ending.
+        """
+        from ocp.result.picture import plot_solutions  # noqa: PLC0415  (matplotlib is slow)
+
+        return plot_solutions({self.problem.name: self}, names, path)
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write all signals as columns with units in the header, such as `v [m/s]`.
+
+        The inputs hold from each row to the next, so `Hold(t, force)` gives the control again.
+        With scenarios there is one more column in front, their name.
+        """
+        several = len(self.motions) > 1
+        header = ["t [s]", *(f"{name} [{self.units[name]}]" for name in self.signals)]
+        with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow([*(["scenario"] * several), *header])
+            for motion in self.motions:
+                rows = np.column_stack([motion.t, *motion.signals.values()]).tolist()
+                writer.writerows([*([motion.name] * several), *row] for row in rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as plain data; a number that is not finite is None."""
+        return {
+            "scene": self.problem.name,
+            "status": self.status.name,
+            "message": self.message,
+            "T": self.T,
+            "cost": self.cost if isfinite(self.cost) else None,
+            "chosen": dict(self.chosen),
+            "phases": [asdict(phase) for phase in self.phases],
+            "modes": {name: [asdict(m) for m in modes] for name, modes in self.modes.items()},
+            "verified": self.verified,
+            "verification": None if self.verification is None else self.verification.to_dict(),
+            "statistics": asdict(self.statistics),
+            "units": {"t": "s", **self.units},
+            "motions": [
+                {
+                    "scenario": motion.name,
+                    "t": motion.t.tolist(),
+                    "signals": {name: _plain(row) for name, row in motion.signals.items()},
+                }
+                for motion in self.motions
+            ],
+        }
+
+    def to_json(self, path: str | Path) -> None:
+        """Write `to_dict` as JSON."""
+        write_text(path, json.dumps(self.to_dict(), allow_nan=False))
+
+
+def _plain(values: Array) -> list[float | None]:
+    return [float(v) if isfinite(v) else None for v in values]

@@ -1,0 +1,273 @@
+"""A solver that holds a nonlinear program, ready to run from any start and with any parameters."""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ocp.solvers.answers import OVERDETERMINED, At, plainly, sentence
+from ocp.solvers.outcome import Iterate, Outcome, Report, SolverStatistics, outside, worst_of
+from ocp.solvers.watch import Halt, Hook, Seen, Watch, interrupts
+from ocp.transcription.program import Program
+from symfric.foundation import checks
+from symfric.foundation.status import Status
+
+Array = NDArray[np.float64]
+Option = str | float | int
+Built = tuple[ca.Function, Hook]
+
+PLUGINS = {"Ipopt": "ipopt", "Fatrop": "fatrop", "Sqp": "sqpmethod"}
+"""Solver -> what CasADi calls it."""
+
+LEAN: dict[str, Any] = {
+    "print_time": False,
+    "show_eval_warnings": False,
+    "calc_lam_p": False,
+    "no_nlp_grad": True,
+}
+"""Nothing is printed, and no derivatives are made that nobody asks for."""
+
+
+def checked_options(where: str, options: Mapping[str, Any]) -> dict[str, Option]:
+    """`options`, each a text or a number.
+
+    Raises:
+        ValueError: anything else.
+    """
+    for name, value in options.items():
+        if not isinstance(value, str | float | int):
+            raise checks.refused(f"{where}: option {name}", "a number or a text", value)
+    return dict(options)
+
+
+def checked_time(where: str, max_time: float | None) -> float | None:
+    """`max_time` [s], a number above zero, or None."""
+    if max_time is None:
+        return None
+    return checks.number(f"{where}: max_time", max_time, unit="s", above=0.0)
+
+
+def made(
+    solver: str, program: Program, options: Mapping[str, Option], common: Mapping[str, Any]
+) -> ca.Function:
+    """The CasADi solver of `program`; `options` are the user's and win over `common`, ours.
+
+    Raises:
+        ValueError: options that the solver refuses, with its name and its own words.
+    """
+    plugin = PLUGINS[solver]
+    nlp = {"x": program.w, "p": program.p, "f": program.f, "g": program.g}
+    prefix = "" if plugin == "sqpmethod" else f"{plugin}."
+    own = {f"{prefix}{name}": value for name, value in options.items()}
+    try:
+        return ca.nlpsol("solver", plugin, nlp, LEAN | dict(common) | own)
+    except (RuntimeError, NotImplementedError) as error:
+        if not options:
+            raise
+        raise refused_options(solver, options, reason_of(error)) from None
+
+
+def reason_of(error: Exception) -> str:
+    """The last line of an error of CasADi, without the place in its source."""
+    lines = [line for line in str(error).strip().splitlines() if line.strip()]
+    return re.sub(r"^\S*:\d+: ", "", lines[-1]).strip()
+
+
+def refused_options(solver: str, options: Mapping[str, Option], reason: str) -> ValueError:
+    """The error for options that a solver does not take."""
+    return ValueError(f"{solver}: expected options of {solver}, got {dict(options)!r}; {reason}")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A solver and a program; made by `solver.prepared(program)`.
+
+    Attributes:
+        program: what is solved.
+        solver: the name of the solver, for messages.
+        options: those of the user.
+        build: makes the CasADi solver and the hook through which it is watched; its argument says
+            whether the start comes with multipliers.
+        read: (statistics of CasADi) -> the solver's answer and what it means.
+        max_time: wall time [s] after which a run is stopped.
+    """
+
+    program: Program
+    solver: str
+    options: Mapping[str, Option]
+    build: Callable[[bool], Built]
+    read: Callable[[Mapping[str, Any]], tuple[str, Status]]
+    max_time: float | None = None
+    _built: dict[bool, Built] = field(default_factory=dict[bool, Built])
+
+    def run(
+        self,
+        start: Iterate,
+        values: ArrayLike | None = None,
+        progress: Report | None = None,
+        warm: bool = False,
+        at: At = plainly,
+    ) -> Outcome:
+        """Solve from `start`; a solve that fails is an outcome, not an exception.
+
+        Args:
+            start: unknowns and multipliers; the latter matter where `warm`.
+            values: numbers of the parameters of the program, `program.values` if none.
+            progress: called with a `Progress` after each iteration. Ctrl-C stops the solver after
+                the iteration, and so does an exception here; either way the outcome, with status
+                INTERRUPTED, holds the best iterate, and `cause` the exception.
+            warm: start close by, with the multipliers.
+            at: (w, place) -> words for the time of a place, for the sentence.
+
+        Raises:
+            ValueError: options that the solver does not know, or a start of the wrong size.
+        """
+        begin = perf_counter()
+        program = self.program
+        numbers = program.values if values is None else np.asarray(values, dtype=float).ravel()
+        w = np.clip(_start(start, program), program.lower_w, program.upper_w)
+        watch = Watch(program, progress, self.max_time)
+        result, answer, status = None, OVERDETERMINED, Status.INFEASIBLE
+        if _equations(program) > program.w.numel():
+            built = begin  # no solver takes it
+        else:
+            built_in = self._of(warm)
+            built = perf_counter()
+            arguments = {
+                "x0": w,
+                "p": numbers,
+                "lbx": program.lower_w,
+                "ubx": program.upper_w,
+                "lbg": program.lower_g,
+                "ubg": program.upper_g,
+                "lam_x0": start.lam_w,
+                "lam_g0": start.lam_g,
+            }
+            result, answer, status = self._called(*built_in, watch, arguments)
+        if watch.halt is not None:
+            status = Status.TIME_LIMIT if watch.halt is Halt.TIME else Status.INTERRUPTED
+        elif not status.ok and watch.last is not None and not watch.last.finite:
+            status = Status.NOT_FINITE
+        point = self._point(result, watch, status, w, numbers)
+        return self._outcome(
+            watch,
+            point,
+            status,
+            answer,
+            numbers,
+            at,
+            (built - begin, perf_counter() - built),
+        )
+
+    def _called(
+        self, function: ca.Function, hook: Hook, watch: Watch, arguments: Mapping[str, Array]
+    ) -> tuple[Mapping[str, ca.DM] | None, str, Status]:
+        """What the solver returns, its answer and what that means."""
+        hook.watch = watch
+        try:
+            with interrupts(watch):
+                result = function(**arguments)
+        except RuntimeError as error:  # some look at their options and structure only now
+            reason = reason_of(error)
+            if "option" in reason.lower():
+                raise refused_options(self.solver, self.options, reason) from None
+            return None, reason, Status.SOLVER_FAILED
+        finally:
+            hook.watch = None
+        if watch.error is not None and not isinstance(watch.error, Exception):
+            raise watch.error
+        answer, status = self.read(function.stats())
+        if answer == "Invalid_Option":
+            raise refused_options(
+                self.solver, self.options, "they do not go together, or need a missing library"
+            )
+        return result, answer, status
+
+    def _of(self, warm: bool) -> Built:
+        if warm not in self._built:
+            self._built[warm] = self.build(warm)
+        return self._built[warm]
+
+    def _point(
+        self,
+        result: Mapping[str, ca.DM] | None,
+        watch: Watch,
+        status: Status,
+        w: Array,
+        values: Array,
+    ) -> Seen:
+        """The solution, or else the best point that is known."""
+        program = self.program
+        if status.ok and result is not None:
+            names = ("x", "f", "g", "lam_x", "lam_g")
+            x, f, g, lam_x, lam_g = (result[n].full().ravel() for n in names)
+            return Seen(x, float(f[0]), g, lam_x, lam_g, worst_of(program, x, g))
+        if watch.best is not None:
+            return watch.best
+        # Nothing was seen, and after some errors the result is zero: what stands is the start.
+        f, g = program.gradient(w, values)[0], program.jacobian(w, values)[0].full().ravel()
+        lam_w, lam_g = np.zeros(w.size), np.zeros(g.size)
+        return Seen(w, float(f), g, lam_w, lam_g, worst_of(program, w, g))
+
+    def _outcome(
+        self,
+        watch: Watch,
+        point: Seen,
+        status: Status,
+        answer: str,
+        values: Array,
+        at: At,
+        times: tuple[float, float],
+    ) -> Outcome:
+        program = self.program
+        said = sentence(
+            program, watch, point, status, answer, self.solver, self.max_time, values, at
+        )
+        statistics = SolverStatistics(
+            unknowns=program.w.numel(),
+            constraints=program.g.numel(),
+            jacobian_nonzeros=program.jacobian.nnz_out(1),
+            hessian_nonzeros=program.hessian.nnz_out(0),
+            iterations=watch.iterations,
+            build_time=times[0],
+            solve_time=times[1],
+        )
+        return Outcome(
+            Iterate(point.w, point.lam_w, point.lam_g),
+            point.f,
+            outside(point.g, program.lower_g, program.upper_g),
+            outside(point.w, program.lower_w, program.upper_w),
+            status,
+            said,
+            answer,
+            not status.ok and watch.cycles,
+            statistics,
+            watch.error,
+        )
+
+
+def _equations(program: Program) -> int:
+    """Rows and unknowns whose two bounds are the same."""
+    rows = program.lower_g == program.upper_g
+    return int(rows.sum() + (program.lower_w == program.upper_w).sum())
+
+
+def _start(start: Iterate, program: Program) -> Array:
+    """The unknowns to start from."""
+    n, m = program.w.numel(), program.g.numel()
+    sizes = (start.w.size, start.lam_w.size, start.lam_g.size)
+    if sizes != (n, n, m):
+        raise ValueError(f"start: expected {n} unknowns and {n} + {m} multipliers, got {sizes}")
+    if not np.isfinite(start.w).all():
+        place = program.unknowns[int(np.argmin(np.isfinite(start.w)))]
+        raise ValueError(
+            f"start: expected finite numbers, got NaN or infinity for {place.name} "
+            f"{plainly(start.w, place)}"
+        )
+    return start.w

@@ -1,0 +1,227 @@
+"""Keeps the best iterate of a running solver, reports each one, and stops it when asked to."""
+
+import signal
+import threading
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import Enum
+from time import perf_counter
+from types import FrameType
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ocp.solvers.outcome import Progress, Report, worst_of
+from ocp.transcription.program import Program
+
+Array = NDArray[np.float64]
+
+FEASIBLE = 1e-6
+"""Largest scaled violation of an iterate that counts as feasible."""
+WINDOW = 30
+"""Iterations in which a Newton method that gets anywhere is seen to do so."""
+RESTING = 1e-6
+"""Steps of scaled unknowns below this are no motion."""
+
+
+class Halt(Enum):
+    """Who stopped the solver."""
+
+    USER = "the user"
+    TIME = "the time limit"
+    ERROR = "an exception in `progress`"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A point that the solver was at; multipliers are zero where it does not tell them."""
+
+    w: Array
+    f: float
+    g: Array
+    lam_w: Array
+    lam_g: Array
+    violation: float
+
+    @property
+    def finite(self) -> bool:
+        """Whether cost and rows are numbers."""
+        return bool(np.isfinite(self.f) and np.isfinite(self.violation))
+
+    def better_than(self, other: "Seen | None") -> bool:
+        """Feasible before not feasible, then the lower cost; among the rest the less violated."""
+        if other is None or not other.finite:
+            return True
+        if max(self.violation, other.violation) <= FEASIBLE:
+            return self.f < other.f
+        return self.violation < other.violation
+
+
+@final
+class Watch:
+    """One run of a solver as it is seen from outside."""
+
+    def __init__(self, program: Program, progress: Report | None, max_time: float | None) -> None:
+        self._program, self._progress = program, progress
+        self._deadline = None if max_time is None else perf_counter() + max_time
+        self.best: Seen | None = None
+        self.last: Seen | None = None
+        self.trace: list[tuple[float, float, float]] = []
+        self.halt: Halt | None = None
+        self.error: BaseException | None = None
+
+    @property
+    def iterations(self) -> int:
+        """Iterations seen, the start not counted."""
+        return max(0, len(self.trace) - 1)
+
+    def see(self, w: Array, f: float, g: Array, lam_w: Array, lam_g: Array) -> bool:
+        """Take note of an iterate; True asks the solver to stop."""
+        violation = worst_of(self._program, w, g)
+        step = np.inf if self.last is None else float(np.abs(w - self.last.w).max(initial=0.0))
+        self.last = Seen(w, f, g, lam_w, lam_g, violation)
+        if self.last.better_than(self.best):
+            self.best = self.last
+        self.trace.append((f, violation, step))
+        if self._deadline is not None and perf_counter() > self._deadline:
+            self.halt = self.halt or Halt.TIME
+        if self._progress is not None:
+            try:
+                self._progress(Progress(self.iterations, f, violation))
+            except KeyboardInterrupt:
+                self.halt = Halt.USER
+            # An exception must cross C++: it is kept here and raised again behind it.
+            except BaseException as error:  # noqa: BLE001
+                self.error, self.halt = error, Halt.ERROR
+        return self.halt is not None
+
+    @property
+    def cycles(self) -> bool:
+        """Whether the last iterations went round (see `goes_round`)."""
+        return goes_round(self.trace)
+
+
+def goes_round(trace: Sequence[tuple[float, float, float]]) -> bool:
+    """Whether neither cost nor violation got better in the last iterations, while w kept moving.
+
+    This is what a Newton method does at a kink that is smoothed over less than one step: it jumps
+    from one side to the other.
+
+    Args:
+        trace: cost, violation and largest step of a scaled unknown of each iterate.
+    """
+    if len(trace) <= 2 * WINDOW:
+        return False
+    halves = np.array(trace[-2 * WINDOW :]).reshape(2, WINDOW, 3)
+    costs, violations, steps = np.moveaxis(halves, 2, 0)
+    before, now = np.median(steps, axis=1)
+    moves = now > RESTING and now > 0.1 * before
+    far, near = violations.min(axis=1)
+    closer = near < 0.5 * far and far > FEASIBLE
+    dear, cheap = costs.min(axis=1)
+    feasible = max(far, near) <= FEASIBLE
+    cheaper = feasible and cheap < dear - 1e-4 * max(abs(dear), 1e-8)
+    return bool(moves and not closer and not cheaper)
+
+
+@final
+class IterationHook(ca.Callback):
+    """Shows every iterate of a solver that has a callback (Ipopt, SQP) to the current `watch`."""
+
+    def __init__(self, program: Program) -> None:
+        super().__init__()
+        n, m, k = program.w.numel(), program.g.numel(), program.p.numel()
+        self._rows = {"x": n, "lam_x": n, "g": m, "lam_g": m, "f": 1, "lam_p": k}
+        self.watch: Watch | None = None
+        self.construct("watch", {})
+
+    def get_n_in(self) -> int:  # noqa: D102
+        return ca.nlpsol_n_out()
+
+    def get_n_out(self) -> int:  # noqa: D102
+        return 1
+
+    def get_name_in(self, i: int) -> str:  # noqa: D102
+        return ca.nlpsol_out(i)
+
+    def get_sparsity_in(self, i: int) -> ca.Sparsity:  # noqa: D102
+        return ca.Sparsity.dense(self._rows[ca.nlpsol_out(i)], 1)
+
+    def eval(self, arg: Sequence[ca.DM]) -> list[float]:  # noqa: D102
+        if self.watch is None:
+            return [0.0]
+        at = {ca.nlpsol_out(i): value.full().ravel() for i, value in enumerate(arg)}
+        stop = self.watch.see(at["x"], float(at["f"][0]), at["g"], at["lam_x"], at["lam_g"])
+        return [float(stop)]
+
+
+@final
+class GradientHook(ca.Callback):
+    """The gradient of the cost, through which a solver without callback (fatrop) is watched.
+
+    It is asked for once an iteration, at the new iterate. To stop the solver, it returns NaN.
+    """
+
+    def __init__(self, program: Program, n: int) -> None:
+        super().__init__()
+        self._gradient = program.gradient
+        self._sizes = (n, program.p.numel())
+        self._values = ca.Function("values", [program.w, program.p], [program.f, program.g])
+        self.watch: Watch | None = None
+        self.construct("nlp_grad_f", {})
+
+    def get_n_in(self) -> int:  # noqa: D102
+        return 2
+
+    def get_n_out(self) -> int:  # noqa: D102
+        return 1
+
+    def get_name_in(self, i: int) -> str:  # noqa: D102
+        return ("x", "p")[i]
+
+    def get_name_out(self, i: int) -> str:  # noqa: D102
+        del i
+        return "grad_f_x"
+
+    def get_sparsity_in(self, i: int) -> ca.Sparsity:  # noqa: D102
+        return ca.Sparsity.dense(self._sizes[i], 1)
+
+    def get_sparsity_out(self, i: int) -> ca.Sparsity:  # noqa: D102
+        del i
+        return ca.Sparsity.dense(self._sizes[0], 1)
+
+    def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:  # noqa: D102
+        slope = ca.densify(self._gradient(*arg)[1])
+        if self.watch is not None:
+            f, g = (value.full().ravel() for value in self._values(*arg))
+            w = arg[0].full().ravel()
+            if self.watch.see(w, float(f[0]), g, np.zeros(w.size), np.zeros(g.size)):
+                slope = slope * np.nan
+        return [slope]
+
+
+Hook = IterationHook | GradientHook
+
+
+@contextmanager
+def interrupts(watch: Watch) -> Generator[None, None, None]:
+    """Turn the first Ctrl-C into a stop after the current iteration; the second ends as usual."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.getsignal(signal.SIGINT)
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        del number, frame
+        watch.halt = Halt.USER
+        signal.signal(signal.SIGINT, before)
+
+    signal.signal(signal.SIGINT, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

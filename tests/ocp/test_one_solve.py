@@ -1,0 +1,60 @@
+import numpy as np
+import pytest
+from phases import fastest_move, there_and_back, unit_move
+
+from ocp.one_solve import solve_on, solve_once
+from ocp.solvers.ipopt import Ipopt
+from ocp.text.ranges import FREE, Free
+from ocp.transcription.schemes import Legendre, Radau
+from ocp.transcription.transcribe import discretise
+
+
+def test_a_unit_move_costs_twelve() -> None:
+    """Piecewise constant a on N intervals: J = 12 N^2 / (N^2 - 1)."""
+    for N in (4, 10):
+        solution = solve_once(unit_move(), N)
+        assert solution.cost == pytest.approx(12 * N**2 / (N**2 - 1), rel=1e-8)
+        assert solution.message == "ocp 'double integrator': " + solution.status.value
+
+
+@pytest.mark.parametrize("scheme", [Radau(2), Radau(4), Legendre(2)])
+def test_schemes_give_the_same(scheme: Radau | Legendre) -> None:
+    """All are exact for a double integrator under constant input."""
+    assert solve_once(unit_move(), 10, scheme).cost == pytest.approx(1200 / 99, rel=1e-8)
+
+
+def test_a_program_is_solved_many_times_with_other_numbers() -> None:
+    discretised = discretise(fastest_move(), Radau())
+    meshes = [np.linspace(0.0, 1.0, 11)]
+    transcription = discretised.on(meshes)
+    prepared = Ipopt().prepared(transcription.program)
+    first = solve_on(transcription, prepared)
+    again = solve_on(transcription, prepared, first)
+    assert again.iterations < first.iterations / 2
+    cold = solve_on(transcription, prepared, first, warm=False)
+    assert cold.iterations > again.iterations
+    late = discretised.on([np.linspace(0.0, 1.0, 11) ** 1.2])
+    other = solve_on(late, prepared, values=late.program.values)
+    assert other.cost == pytest.approx(solve_on(late, Ipopt().prepared(late.program)).cost)
+    assert other.cost != first.cost
+
+
+def test_times_of_places_go_on_over_the_phases() -> None:
+    partial = solve_once(there_and_back(bounds={"a": (-3.0, 3.0)}), 10, solver=Ipopt(max_iter=60))
+    assert not partial.ok
+    words = partial.message.split("Most violated is ")[1]
+    name, rest = words.split(" at t = ")
+    t, phase = rest.split(" s in ")
+    assert (float(t) <= 1.0) == phase.startswith("out")
+    assert name
+
+
+def test_free_durations_and_scenarios() -> None:
+    quick = solve_once(unit_move(T=Free(0.5, 2.0), bounds={"a": (-16.0, 16.0)}), 20)
+    assert pytest.approx(2.0) == quick.T
+    several = unit_move(
+        start={"x": (-0.5, 0.0), "v": FREE}, scenarios={"a": {}, "b": {}}, shared=["a"]
+    )
+    solution = solve_once(several, 10)
+    assert list(solution.scenarios) == ["a", "b"]
+    np.testing.assert_allclose(solution.scenarios["a"]["a"], solution.scenarios["b"]["a"])
