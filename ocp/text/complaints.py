@@ -91,7 +91,8 @@ def range_problems(where: str, given: Mapping[str, Any]) -> Iterator[str]:
     """Values that are neither numbers nor ranges."""
     for name, value in given.items():
         if not is_range(value):
-            hint = "write a tuple: (lower, upper)" if isinstance(value, list) else ""
+            listed = isinstance(value, list) or getattr(value, "shape", None) == (2,)
+            hint = "write a tuple: (lower, upper)" if listed else ""
             yield str(checks.refused(where, f"{name} as {RANGE}", value, hint))
 
 

@@ -23,7 +23,8 @@ Terms = tuple[tuple[float, Expression], ...]
 class Cost:
     """Bolza cost J = integral of (L + sum_i w_i r_i^2) dt + E at the end.
 
-    Costs add up and take weights: `integral(lambda s: s.force**2) + 0.1 * TIME`. They know signals
+    Costs add up and take weights: `integral(lambda s: s.force**2) + 0.1 * TIME`; what is to be
+    large gets a negative one: `-at_end(lambda s: s.height)`. They know signals
     by name only, so one cost serves every model that has them.
 
     Attributes:
@@ -71,6 +72,21 @@ class Cost:
         )
 
     __rmul__ = __mul__
+
+    def __radd__(self, other: object) -> "Cost":
+        return self if other == 0 else NotImplemented  # where `sum` begins
+
+    def __neg__(self) -> "Cost":
+        return -1.0 * self
+
+    def __sub__(self, other: object) -> "Cost":
+        return self + (-other) if isinstance(other, Cost) else NotImplemented
+
+    def __truediv__(self, weight: float) -> "Cost":
+        weight = checks.number("cost: divisor", weight)
+        if weight == 0:
+            raise ValueError("cost: expected a divisor that is not zero, got 0")
+        return self * (1.0 / weight)
 
     def expressions(self, model: Model) -> tuple[ca.SX, ca.SX]:
         """Integrand, squares included, and end value in the symbols of `model`, (1, 1) each.

@@ -12,7 +12,7 @@ from ocp.text.kinds import kind_problems
 from ocp.text.phase import Chain, Phase
 from ocp.text.ranges import Free, Range
 from ocp.text.rates import rate_name
-from ocp.text.resolve import function_problems, resolved, value_problems
+from ocp.text.resolve import function_problems, resolved
 from ocp.text.settings import settings_of
 from ocp.text.span import Condition, Span
 
@@ -68,7 +68,7 @@ class Problem:
         # Each look asks only what the ones before have left in order.
         self._refuse(kind_problems(self))
         self._refuse((*input_problems(self), *function_problems(self)))
-        self._refuse(value_problems(self))
+        self._refuse(self._resolved[1])
 
     def _refuse(self, texts: Iterable[str]) -> None:
         problems = [text for text in dict.fromkeys(texts) if text]
@@ -90,7 +90,11 @@ class Problem:
     @cached_property
     def spans(self) -> tuple[Span, ...]:
         """The resolved phases, for one scenario after the other."""
-        return resolved(self)[0]
+        return self._resolved[0]
+
+    @cached_property
+    def _resolved(self) -> tuple[tuple[Span, ...], list[str]]:
+        return resolved(self)
 
     @property
     def scenario_names(self) -> tuple[str, ...]:

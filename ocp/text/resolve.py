@@ -27,11 +27,6 @@ def function_problems(problem: "Problem") -> list[str]:
     return tell
 
 
-def value_problems(problem: "Problem") -> list[str]:
-    """What is wrong with the numbers of a problem that has nothing else wrong with it."""
-    return resolved(problem)[1]
-
-
 def resolved(problem: "Problem") -> tuple[tuple[Span, ...], list[str]]:
     """The spans of `problem`, and what is wrong with them; with that they are not complete."""
     tell: list[str] = []

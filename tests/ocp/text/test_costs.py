@@ -23,6 +23,13 @@ def test_costs_add_up_and_take_weights() -> None:
     assert values(2 * cost, t=10.0, x=7.0, v=0.0, a=3.0) == [36.0, 52.0]
 
 
+def test_costs_are_taken_away_divided_and_summed() -> None:
+    cost = integral(lambda s: s.a) - at_end(lambda s: s.x) / 2
+    assert values(sum([cost, -TIME]), t=10.0, x=7.0, v=0.0, a=3.0) == [3.0, -13.5]
+    with pytest.raises(ValueError, match="expected a divisor that is not zero"):
+        _ = TIME / 0.0
+
+
 @pytest.mark.parametrize(
     ("reference", "there"),
     [(2.0, 2.0), ("v", -1.0), (lambda s: 0.1 * s.t, 1.0), (lambda s: ca.sin(s.v), -0.8414709848)],
