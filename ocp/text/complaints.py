@@ -40,6 +40,7 @@ def _phase(problem: "Problem", number: int, phase: Phase) -> Iterator[str]:
     model, first = phase.model, number == 0
     if model.ode is None:
         yield "expected an explicit model (ode), got an implicit one (residual)"
+    yield _event_problem(model)
     yield duration_problem(phase.T)
     inputs = [v.name for v in model.u]
     rated = [n for n in inputs if n in phase.rates or n in problem.rates]
@@ -68,6 +69,24 @@ def _phase(problem: "Problem", number: int, phase: Phase) -> Iterator[str]:
         what = "link" if phase.link else "joins"
         yield f"{what}: expected none in the first phase, which has none before it"
     yield from _links(phase, [*(v.name for v in model.x), *rated])
+
+
+def _event_problem(model: Model) -> str:
+    """Events that no optimiser sees, but for those of laws that know slip and stick apart."""
+    if not model.events:
+        return ""
+    for contact in model.contacts:
+        if text := said(contact.sliding, 1) or said(contact.static_level):
+            return f"expected contacts with known modes, got events of '{contact.name}': {text}"
+    try:
+        own = model.open.events if model.contacts else model.events
+    except ValueError:  # changed since it was closed: nobody knows whose they are
+        own = model.events
+    names = [event.name for event in own]
+    if not names:
+        return ""
+    hint = "derivatives do not see them; write phases that join at the event"
+    return f"expected a model without events, got {checks.listed(names)}; {hint}"
 
 
 def _links(phase: Phase, states: Collection[str]) -> Iterator[str]:

@@ -6,6 +6,7 @@ written for the one holds for the other. The same request to the same model give
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import casadi as ca
@@ -54,6 +55,8 @@ def _with_rates(model: Model, nominal: Mapping[str, float]) -> Model:
     inputs = tuple(rates.get(v.name, v) for v in model.u)
     added = symbols_of(rates[v.name] for v in states)
     changes: dict[str, Any] = {"x": (*model.x, *states), "u": inputs}
+    if model.contacts:
+        changes["opening"] = partial(_open_with_rates, model, nominal)
     if model.holonomic is None and model.ode is not None:
         changes["ode"] = ca.vertcat(ca.SX(model.ode), added)
     mechanics = model.holonomic
@@ -68,6 +71,10 @@ def _with_rates(model: Model, nominal: Mapping[str, float]) -> Model:
     return replace(model, **changes)
 
 
+def _open_with_rates(model: Model, nominal: Mapping[str, float]) -> Model:
+    return with_rates(model.open, nominal)
+
+
 def with_parameters(model: Model, units: Mapping[str, str]) -> Model:
     """`model` with further parameters (name -> unit) that none of its equations needs."""
     if not units:
@@ -79,5 +86,11 @@ def with_parameters(model: Model, units: Mapping[str, str]) -> Model:
         changes: dict[str, Any] = {"p": (*model.p, *added)}
         if model.holonomic is not None:
             changes |= {"ode": None, "alg": ca.SX(0, 1)}
+        if model.contacts:
+            changes["opening"] = partial(_open_with_parameters, model, units)
         kept[key] = replace(model, **changes)
     return kept[key]
+
+
+def _open_with_parameters(model: Model, units: Mapping[str, str]) -> Model:
+    return with_parameters(model.open, units)

@@ -10,7 +10,7 @@ from motions import double_integrator, stage
 from ocp.text.cost import TIME, at_end, integral, track, worst
 from ocp.text.phase import Phase
 from ocp.text.problem import Problem
-from symfric import Model, Variable
+from symfric import Event, ExactCoulomb, Model, Variable, drive
 
 MODEL = double_integrator()
 EFFORT = integral(lambda s: s.a**2)
@@ -206,6 +206,23 @@ def test_scenarios_give_values_that_exist_and_are_not_chosen() -> None:
         Problem(phase, cost, scenarios={"heavy": {"m": 2.0}}, choose={"m": (1.0, 3.0)})
     with pytest.raises(ValueError, match=r"scenario 'light': drive\.m: expected a number >= 1e-12"):
         Problem(phase, cost, scenarios={"heavy": {"m": 2.0}, "light": {"m": -2.0}})
+
+
+def test_events_are_refused_but_for_those_of_slip_and_stick() -> None:
+    effort = integral(lambda s: s.force**2)
+    stuck = drive(ExactCoulomb(mu_s=6.0, mu_d=4.0), m=1.0, N=1.0)
+    assert Problem(Phase(stuck, 1.0), effort).spans[0].model.events
+    stop = Event("stop", stuck.x[0].symbol - 1.0, terminal=True)
+    for model in (
+        replace(MODEL, events=(Event("stop", MODEL.x[0].symbol - 1.0, terminal=True),)),
+        replace(stuck, events=(*stuck.events, stop), opening=lambda: with_stop(stuck, stop)),
+    ):
+        with pytest.raises(ValueError, match="expected a model without events, got stop; deriv"):
+            Problem(Phase(model, 1.0), TIME)
+
+
+def with_stop(model: Model, stop: Event) -> Model:
+    return replace(model.open, events=(*model.open.events, stop))
 
 
 def test_rate_of_an_input_needs_a_name_of_its_own() -> None:

@@ -32,6 +32,17 @@ def test_ramp_of_an_input_is_a_constant_rate(model: Model, name: str) -> None:
         assert ramp[signal][-1] == pytest.approx(told[signal][-1], rel=1e-5, abs=1e-8)
 
 
+@pytest.mark.parametrize("model", [drive(BrownMcPhee()), crank()], ids=["drive", "crank"])
+def test_contacts_stay_with_the_model(model: Model) -> None:
+    """Another law can be put in the place of the one that was there."""
+    (name,) = (v.name for v in model.u)
+    for changed in (with_rates(model, {name: 1.0}), with_parameters(model, {"goal": "m"})):
+        (contact,) = changed.contacts
+        other = changed.with_forces({contact.name: 2.0 * contact.slip})
+        assert [v.name for v in (*other.x, *other.u)] == [v.name for v in (*changed.x, *changed.u)]
+        assert {v.name for v in other.p} == {v.name for v in changed.p}
+
+
 def test_same_request_gives_the_same_model() -> None:
     model = drive(LuGre())
     assert with_rates(model, {}) is with_parameters(model, {}) is model
