@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from phases import fastest_move, unit_move
 
-from ocp.one_solve import solve_once
 from ocp.result.solution import Solution
 from ocp.solvers.ipopt import ANSWERS, Ipopt
 from ocp.solvers.outcome import Progress, in_stage
+from ocp.solving.one_solve import solve_once
 from ocp.text.cost import integral
 from ocp.text.phase import Phase
 from ocp.text.problem import Problem

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from phases import fastest_move, there_and_back, unit_move
 
-from ocp.one_solve import solve_on, solve_once
 from ocp.solvers.ipopt import Ipopt
+from ocp.solving.one_solve import solve_on, solve_once
 from ocp.text.ranges import FREE, Free
 from ocp.transcription.schemes import Legendre, Radau
 from ocp.transcription.transcribe import discretise

@@ -16,7 +16,7 @@ from ocp.solvers.ipopt import Ipopt
 from ocp.solvers.outcome import Outcome, Report
 from ocp.solvers.prepared import Prepared
 from ocp.solvers.sqp import Sqp
-from ocp.starts import Start, start_of
+from ocp.solving.starts import Start, start_of
 from ocp.text.problem import Problem
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.points import Points
@@ -46,7 +46,7 @@ def solve_once(
             each phase.
         scheme: `Radau(3)` if none.
         solver: `Ipopt()` if none.
-        guess: see `ocp.starts`.
+        guess: see `ocp.solving.starts`.
         progress: called with a `Progress` after each iteration.
 
     Raises:

@@ -5,9 +5,9 @@ import pytest
 from motions import double_integrator
 from phases import UNIT, there_and_back, unit_move
 
-from ocp.one_solve import solve_once
-from ocp.perturbed import perturbed
-from ocp.starts import Guess, initial_points, resample, start_of
+from ocp.solving.one_solve import solve_once
+from ocp.solving.perturbed import perturbed
+from ocp.solving.starts import Guess, initial_points, resample, start_of
 from ocp.text.cost import integral
 from ocp.text.phase import Phase
 from ocp.text.problem import Problem

@@ -1,0 +1,1 @@
+"""One solve of a problem on meshes, and where it starts."""
