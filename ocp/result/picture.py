@@ -68,7 +68,9 @@ def plot_solutions(
             _modes(axis, first)
         axis.set_ylabel(f"{name} [{first.units[name]}]")
     _explain(axes[0], drawn, first if len(solutions) == 1 else None)
-    axes[-1].set_xlabel("t [s]   (circles: optimised, lines: simulated)")
+    runs = all(simulated(solution, motion) for _, solution, motion in drawn)
+    lines = "lines: simulated" if runs else "lines: optimised"
+    axes[-1].set_xlabel(f"t [s]   (circles: optimised nodes, {lines})")
     figure.align_ylabels(axes)
     return save(figure, path)
 

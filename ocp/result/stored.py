@@ -148,7 +148,7 @@ def load(path: str | Path) -> Stored:
     """
     place = checks.path("load", path)
     try:
-        opened = np.load(place, allow_pickle=False)
+        opened = np.load(BytesIO(place.read_bytes()), allow_pickle=False)
         if not isinstance(opened, np.lib.npyio.NpzFile):
             raise _foreign(path)
         with opened as file:

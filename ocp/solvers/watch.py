@@ -54,8 +54,8 @@ class Seen:
 
     def better_than(self, other: "Seen | None") -> bool:
         """Feasible before not feasible, then the lower cost; among the rest the less violated."""
-        if other is None or not other.finite:
-            return True
+        if other is None or not (self.finite and other.finite):
+            return other is None or self.finite
         if max(self.violation, other.violation) <= FEASIBLE:
             return self.f < other.f
         return self.violation < other.violation
