@@ -80,10 +80,10 @@ def point_equations(local: Local) -> PointEquations:
         first, last = x_nominal[:n], x_nominal[2 * n :]
         rows = ca.vertcat(
             h * values[1][n : 2 * n] / ca.DM(first),
-            h * implicit[:n] / ca.DM(mass),
+            h * implicit[:n, :] / ca.DM(mass),
             h * further / ca.DM(last),
         )
-        scale, algebraic = np.concatenate([first, mass, last]), implicit[n:]
+        scale, algebraic = np.concatenate([first, mass, last]), implicit[n:, :]
     algebraic_scale = _row_sizes(span, mechanics)
     (path,) = _evaluated(span, [conditions], values)
     (running,) = _evaluated(span, [span.running], values)
@@ -118,7 +118,7 @@ def _evaluated(
 def _masses(span: Span, mechanics: Holonomic) -> Array:
     """Diagonal of the mass matrix at the start of the model, shape (n,)."""
     n = mechanics.n
-    M = ca.jacobian(mechanics.implicit[:n], mechanics.a)
+    M = ca.jacobian(mechanics.implicit[:n, :], mechanics.a)
     return _positive(_at_start(span, ca.diag(M)))
 
 
@@ -130,7 +130,7 @@ def _row_sizes(span: Span, mechanics: Holonomic | None) -> Array:
     rows, unknowns = model.alg, [model.vector(letter) for letter in "xzu"]
     sizes = np.concatenate([model.nominal(letter) for letter in "xzu"])
     if mechanics is not None:
-        rows = mechanics.implicit[mechanics.n :]
+        rows = mechanics.implicit[mechanics.n :, :]
         unknowns.append(mechanics.a)
         sizes = np.append(sizes, model.nominal("x")[mechanics.n : 2 * mechanics.n])
     J = ca.fabs(ca.jacobian(rows, ca.vertcat(*unknowns))) @ ca.diag(ca.DM(sizes))
