@@ -13,7 +13,7 @@ Source: Griewank and Toint, Numerische Mathematik 39, 1982, 119-137 (partial sep
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TypeVar, final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-Symbols = TypeVar("Symbols", ca.SX, ca.MX)
+Symbols = Any
+"""SX or MX columns, all of one kind; CasADi's stubs know no name for either."""
 
 OPTIONS = {"cse": True}
 
@@ -109,7 +110,7 @@ def _entries(matrix: Symbols) -> tuple[Entries, Symbols]:
     rows, columns = (np.array(part, dtype=np.int64) for part in matrix.sparsity().get_triplet())
     if isinstance(matrix, ca.MX):
         return Entries(rows, columns, np.arange(rows.size), np.zeros(0)), matrix.nz[:]
-    elements = matrix.nonzeros()
+    elements: list[Any] = matrix.nonzeros()
     still = np.array([element.is_constant() for element in elements], dtype=bool)
     numbers = [float(e) for e, constant in zip(elements, still, strict=True) if constant]
     varying = np.flatnonzero(~still)

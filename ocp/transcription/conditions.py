@@ -262,7 +262,7 @@ def whole(problem: Problem, layout: Layout) -> list[Piece]:
             found += _equal_states(problem, layout, a, b, (name,), end)
     for numbers, total in problem.durations:
         free = [(i, spans[i]) for i in numbers if isinstance(spans[i].T, Free)]
-        given = sum(float(spans[i].T) for i in numbers if not isinstance(spans[i].T, Free))
+        given = sum(T for i in numbers if not isinstance(T := spans[i].T, Free))
         low, high = (total.lower, total.upper) if isinstance(total, Free) else (total, total)
         size = np.array([high])
         name = "the duration of phases " + ", ".join(str(i + 1) for i in numbers)

@@ -1,6 +1,7 @@
 """Meshes: fractions of the duration of a span that bound its intervals."""
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -62,7 +63,7 @@ def make_meshes(problem: Problem, intervals: int | ArrayLike | Sequence[ArrayLik
     return [make_mesh(span, given[span.phase]) for span in problem.spans]
 
 
-def _first(intervals: object) -> object:
+def _first(intervals: object) -> Any:
     return next(iter(intervals), 0.0) if isinstance(intervals, Iterable) else 0.0
 
 

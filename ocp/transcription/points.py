@@ -141,14 +141,14 @@ def lay_out(sizes: Sequence[Sizes], degree: int, chosen: int, largest: bool) -> 
         after = len(own) + degree * xz
         start = first + np.arange(s.nx)[:, None]
         first += s.nx + width * s.intervals
-        T = first if s.free_time else -1
+        duration = first if s.free_time else -1
         if s.like >= 0:
             u[list(s.shared)] = spans[s.like].u[list(s.shared)]
-            T = spans[s.like].T
+            duration = spans[s.like].T
         first += s.free_time and s.like < 0
         spans.append(
             SpanLayout(
-                T,
+                duration,
                 np.hstack([start, at(after + s.extra, s.nx)]),
                 at(0, s.nx, points),
                 at(s.nx, s.nz, points),
