@@ -8,8 +8,10 @@ from ocp.text.problem import Problem
 from ocp.text.ranges import Free
 from symfric import BrownMcPhee, Model, Output, Variable, drive
 from symfric.multibody import JointSpringDamper, Mechanism, Revolute
+from symfric.scenes import FourBar
 
 EFFORT = integral(lambda s: s.force**2)
+DRY = BrownMcPhee(mu_s=0.2, mu_d=0.15, v_t=0.02)
 
 
 def stage() -> Model:
@@ -100,6 +102,32 @@ def largest_of_scenarios() -> Problem:
     return Problem(phase, worst(EFFORT + TIME), scenarios=scenarios, periodic=["v"])
 
 
+def four_bar() -> Model:
+    """A crank-rocker with a motor, at rest at the start."""
+    M = FourBar(DRY, omega=0.0).mechanism()
+    tau = M.input("tau", "N m", nominal=1.0)
+    M.force(JointSpringDamper("motor", "theta_crank", actuator=tau))
+    return M.build()
+
+
+def angles(crank: float, rate: float = 0.0) -> tuple[dict[str, float], dict[str, float]]:
+    """Coordinates and rates of the four-bar by its closed form."""
+    beta, gamma, beta_rate, gamma_rate = FourBar(DRY, angle=crank, omega=rate).closed()
+    q = {"theta_crank": crank, "theta_coupler": beta - crank, "theta_rocker": gamma}
+    v = (rate, beta_rate - rate, gamma_rate)
+    return q, {f"{name}_rate": x for name, x in zip(q, v, strict=True)}
+
+
+def closed_loop() -> Problem:
+    """All coordinates and rates named at the end, two at a via point, a link in between."""
+    q, v = angles(2.0)
+    via = {k: x for k, x in angles(1.6)[0].items() if k != "theta_rocker"}
+    model = four_bar()
+    first = Phase(model, Free(0.2, 0.5), via={0.5: via})
+    second = Phase(model, 0.25, end=q | v)
+    return Problem(first >> second, integral(lambda s: s.tau**2))
+
+
 def mean_of_scenarios() -> Problem:
     model = stage()
     phases = Phase(model, Free(0.5, 2.0), end={"x": (0.9, 1.0)}) >> Phase(model, 1.0)
@@ -113,6 +141,7 @@ CASES = (
     all_at_once,
     mechanism,
     three_phases,
+    closed_loop,
     largest_of_scenarios,
     mean_of_scenarios,
 )

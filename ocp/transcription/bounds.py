@@ -31,18 +31,22 @@ def bounds_of(
     layout: Layout,
     scheme: Coefficients,
     nodes: Sequence[Mapping[float, int]],
+    released: Sequence[Mapping[float, Mapping[int, Box]]],
 ) -> tuple[Array, Array]:
     """Lower and upper bounds of w, scaled.
 
     Args:
         nodes: of each span, number of the node at each fraction with conditions.
+        released: of each span, states at these fractions that follow from others, and ranges of
+            them.
 
     Where the last collocation point is the end of its interval, the copy at the node alone is
     bounded: bounds on both would depend on each other.
     """
     lower, upper = np.full(layout.size, -np.inf), np.full(layout.size, np.inf)
-    for span, own, at in zip(problem.spans, layout.spans, nodes, strict=True):
-        _bound(span, own, scheme, at, (lower, upper))
+    every = zip(problem.spans, layout.spans, nodes, released, strict=True)
+    for span, own, at, loose in every:
+        _bound(span, own, scheme, (at, loose), (lower, upper))
     for column, choice in zip(layout.chosen, problem.chosen, strict=True):
         lower[column], upper[column] = choice.lower, choice.upper
     scale = scale_of(problem, layout)
@@ -53,7 +57,7 @@ def _bound(
     span: Span,
     own: SpanLayout,
     scheme: Coefficients,
-    at: Mapping[float, int],
+    conditions: tuple[Mapping[float, int], Mapping[float, Mapping[int, Box]]],
     sides: tuple[Array, Array],
 ) -> None:
     model, d = span.model, scheme.degree
@@ -75,7 +79,9 @@ def _bound(
         for fraction, column in ((0.0, 0), (1.0, -1)):
             u[:, column] = meet(u[:, column], of(inputs, span.inputs_at[fraction]))
         bound[own.u] = meet(u, bound[own.u])  # shared inputs may be bounded in each scenario
-        for fraction, node in at.items():
+        for fraction, node in conditions[0].items():
             bound[own.nodes[:, node]] = of(states, span.nodes[fraction])
+            for i, box in conditions[1].get(fraction, {}).items():
+                bound[own.nodes[i, node]] = box[side]
         if isinstance(span.T, Free):
             bound[own.T] = (span.T.lower, span.T.upper)[side]

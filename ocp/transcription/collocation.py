@@ -200,25 +200,18 @@ def _carrying(layout: Layout, number: int, interval: Indices) -> Indices:
     return np.concatenate([span.nodes[:, interval, None], inner], axis=2).transpose(0, 2, 1)
 
 
-def gaps(
-    number: int, span: Span, layout: Layout, scheme: Coefficients, kept: Sequence[int]
-) -> Piece:
-    """The polynomial of each interval ends at the next node: x_(k+1) = sum_r ends[r] x_r.
-
-    Args:
-        kept: the states it is written for.
-    """
+def gaps(number: int, span: Span, layout: Layout, scheme: Coefficients) -> Piece:
+    """The polynomial of each interval ends at the next node: x_(k+1) = sum_r ends[r] x_r."""
     own = layout.spans[number]
     interval = np.arange(own.intervals)
-    carrying = _carrying(layout, number, interval)[list(kept)]
-    names = [span.model.x[i].name for i in kept]
-    ends = np.flatnonzero(scheme.ends)  # the others are exactly zero
-    columns = np.concatenate([own.nodes[list(kept), None, 1:], carrying[:, ends]], axis=1)
-    weights = np.concatenate([[1.0], -scheme.ends[ends]])
+    names = [v.name for v in span.model.x]
+    carrying, weights = ends_of(number, layout, scheme)
+    columns = np.concatenate([own.nodes[:, None, 1:], carrying], axis=1)
+    weights = np.concatenate([np.ones((len(names), 1, own.intervals)), -weights], axis=1)
     zeros = np.zeros(len(names))
     return Piece(
         tuple(f"the continuity of {name}" for name in names),
-        span.model.nominal("x")[list(kept)],
+        span.model.nominal("x"),
         zeros,
         zeros,
         order_of(number, interval, 0),
@@ -226,8 +219,16 @@ def gaps(
         interval,
         np.ones(own.intervals),
         linear=Linear.of(
-            np.repeat(np.arange(len(names)), weights.size),
+            np.repeat(np.arange(len(names)), weights.shape[1]),
             columns.reshape(-1, own.intervals),
-            np.tile(weights, len(names))[:, None] * np.ones(own.intervals),
+            weights.reshape(-1, own.intervals),
         ),
     )
+
+
+def ends_of(number: int, layout: Layout, scheme: Coefficients) -> tuple[Indices, Array]:
+    """Columns and weights (nx, terms, N) of the states at the ends of all intervals of a span."""
+    carrying = _carrying(layout, number, np.arange(layout.spans[number].intervals))
+    ends = np.flatnonzero(scheme.ends)  # the others are exactly zero
+    columns = carrying[:, ends]
+    return columns, np.broadcast_to(scheme.ends[ends, None], columns.shape)

@@ -1,6 +1,6 @@
 """What holds at single nodes and between spans: ends, via points, links, joins, end costs."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import final
@@ -203,14 +203,20 @@ def _same_state(before: Span, expression: ca.SX) -> int:
     return next((i for i, v in enumerate(before.model.x) if ca.is_equal(expression, v.symbol)), -1)
 
 
-def plain_links(number: int, before: Span, span: Span, layout: Layout) -> list[Piece]:
-    """Continuity of states from span `number - 1`, `before`, to span `number`."""
+def plain_links(
+    number: int, before: Span, span: Span, layout: Layout, released: Collection[int]
+) -> list[Piece]:
+    """Continuity of states from span `number - 1`, `before`, to span `number`.
+
+    Args:
+        released: states of `span` whose start follows from that of others.
+    """
     a, b = layout.spans[number - 1], layout.spans[number]
     states = [v.name for v in span.model.x]
     pairs = [
         (states.index(link.state), _same_state(before, link.expression)) for link in span.links
     ]
-    pairs = [(to, origin) for to, origin in pairs if origin >= 0]
+    pairs = [(to, origin) for to, origin in pairs if origin >= 0 and to not in released]
     if not pairs:
         return []
     to, origin = (np.array(part) for part in zip(*pairs, strict=True))
@@ -249,14 +255,22 @@ class LinearRows:
         )
 
 
-def whole(problem: Problem, layout: Layout) -> list[Piece]:
-    """Periodicity, shared starts and sums of durations."""
+def whole(
+    problem: Problem, layout: Layout, released: Sequence[Mapping[float, Collection[int]]]
+) -> list[Piece]:
+    """Periodicity, shared starts and sums of durations.
+
+    Args:
+        released: of each span, states at fractions of T whose values follow from others.
+    """
     spans, phases = problem.spans, len(problem.chain)
     end = order_of(len(spans), 0, 0)
     found: list[Piece] = []
     for first in range(0, len(spans), phases):
         last = first + phases - 1
-        found += _equal_states(problem, layout, (last, -1), (first, 0), problem.periodic, end)
+        loose = [spans[first].model.x[i].name for i in released[first].get(0.0, ())]
+        kept = [name for name in problem.periodic if name not in loose]
+        found += _equal_states(problem, layout, (last, -1), (first, 0), kept, end)
         for phase, name in problem.shared_starts if first else ():
             a, b = (phase, 0), (first + phase, 0)
             found += _equal_states(problem, layout, a, b, (name,), end)

@@ -8,12 +8,13 @@ import casadi as ca
 import numpy as np
 
 from ocp.text.problem import Problem
-from ocp.text.ranges import Free
+from ocp.text.ranges import Box, Free
 from ocp.text.span import Span
 from ocp.transcription.assembly import Assembled, Slot, assemble
 from ocp.transcription.blocks import Array, Piece
 from ocp.transcription.bounds import bounds_of, scale_of
-from ocp.transcription.collocation import PointEquations, gaps, pieces_of_points
+from ocp.transcription.closed_loops import Closing
+from ocp.transcription.collocation import PointEquations, ends_of, gaps, pieces_of_points
 from ocp.transcription.conditions import AtNode, Between, largest, plain_links, whole
 from ocp.transcription.local import Data
 from ocp.transcription.points import Layout, Sizes, lay_out
@@ -28,6 +29,7 @@ class Equations:
     Attributes:
         problem, scheme: what was discretised, and how.
         spans: of each span the equations at its collocation points.
+        closing: of each span the constraints of its mechanism; None where it has none.
         nodes: conditions at single nodes.
         between: conditions between spans.
     """
@@ -35,8 +37,14 @@ class Equations:
     problem: Problem
     scheme: Scheme
     spans: tuple[PointEquations, ...]
+    closing: tuple[Closing | None, ...]
     nodes: tuple[AtNode, ...]
     between: tuple[Between, ...]
+
+    @property
+    def released(self) -> list[dict[float, dict[int, Box]]]:
+        """Of each span: fraction of T -> states that follow from others -> their range."""
+        return [{} if part is None else part.released for part in self.closing]
 
 
 @final
@@ -54,6 +62,7 @@ class Skeleton:
     upper: Array
     lower_g: Array
     upper_g: Array
+    closing: tuple[Closing | None, ...]
 
 
 LARGEST = "the largest cost"
@@ -95,7 +104,7 @@ def skeleton_of(
 ) -> Skeleton:
     """Put the equations on the numbers of intervals of `meshes`."""
     problem, scheme = made.problem, made.scheme.coefficients()
-    layout = _layout(problem, scheme, meshes)
+    layout = _layout(made, scheme, meshes)
     w = ca.MX.sym("w", layout.size)
     p = ca.MX.sym("p", numbers_of(problem, meshes, {}).size)
     data = _data(problem, p, meshes)
@@ -122,13 +131,15 @@ def skeleton_of(
         p,
         tuple(pieces),
         scale_of(problem, layout),
-        *bounds_of(problem, layout, scheme, nodes),
+        *bounds_of(problem, layout, scheme, nodes, made.released),
         lower_g,
         upper_g,
+        made.closing,
     )
 
 
-def _layout(problem: Problem, scheme: Coefficients, meshes: Sequence[Array]) -> Layout:
+def _layout(made: Equations, scheme: Coefficients, meshes: Sequence[Array]) -> Layout:
+    problem = made.problem
     phases = len(problem.chain)
     sizes: list[Sizes] = []
     for number, (span, mesh) in enumerate(zip(problem.spans, meshes, strict=True)):
@@ -141,7 +152,7 @@ def _layout(problem: Problem, scheme: Coefficients, meshes: Sequence[Array]) -> 
                 len(model.x),
                 len(model.z),
                 len(inputs),
-                0,
+                0 if (loops := made.closing[number]) is None else 2 * loops.m,
                 mesh.size - 1,
                 isinstance(span.T, Free),
                 like,
@@ -161,14 +172,20 @@ def _pieces(
     """Rows and costs of all spans."""
     spans, phases = made.problem.spans, len(made.problem.chain)
     for number, (span, equations) in enumerate(zip(spans, made.spans, strict=True)):
-        yield gaps(number, span, layout, scheme, range(len(span.model.x)))
+        gap, loops = gaps(number, span, layout, scheme), made.closing[number]
+        if loops is not None:
+            ends = ends_of(number, layout, scheme)
+            gap = replace(gap, **loops.corrections(layout, ends, scheme, data[number]))
+            yield from loops.pieces(layout, data[number], nodes[number])
+        yield gap
         yield pieces_of_points(number, equations, layout, scheme, data[number])
         if number % phases:
-            yield from plain_links(number, spans[number - 1], span, layout)
+            loose = made.released[number].get(0.0, ())
+            yield from plain_links(number, spans[number - 1], span, layout, loose)
     for condition in made.nodes:
         number = condition.local.number
         node = nodes[number][condition.fraction]
         yield condition.piece(layout, scheme, data[number], node)
     for condition in made.between:
         yield condition.piece(layout, scheme, data)
-    yield from whole(made.problem, layout)
+    yield from whole(made.problem, layout, made.released)

@@ -13,6 +13,7 @@ from typing import final
 
 from ocp.text.problem import Problem
 from ocp.transcription.blocks import Array
+from ocp.transcription.closed_loops import Closing, closing
 from ocp.transcription.collocation import PointEquations, point_equations
 from ocp.transcription.conditions import AtNode, Between, at_nodes, between
 from ocp.transcription.grid import check_meshes, nodes_of
@@ -78,6 +79,7 @@ def discretise(problem: Problem, scheme: Scheme) -> Discretisation:
     phases = len(problem.chain)
     made: dict[tuple[object, ...], PointEquations] = {}
     spans: list[PointEquations] = []
+    loops: list[Closing | None] = []
     nodes: list[AtNode] = []
     joined: list[Between] = []
     for number, span in enumerate(problem.spans):
@@ -89,8 +91,11 @@ def discretise(problem: Problem, scheme: Scheme) -> Discretisation:
         if key not in made:
             made[key] = point_equations(local)
         spans.append(replace(made[key], local=local))
+        ends = () if earlier else problem.periodic
+        named = problem.chain[span.phase].start
+        loops.append(closing(local, earlier[-1][1] if earlier else None, ends, named))
         nodes += at_nodes(local)
         if earlier:
             joined += between(spans[-2].local, local)
-    equations = Equations(problem, scheme, tuple(spans), tuple(nodes), tuple(joined))
+    equations = Equations(problem, scheme, tuple(spans), tuple(loops), tuple(nodes), tuple(joined))
     return Discretisation(equations)

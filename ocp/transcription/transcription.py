@@ -1,7 +1,7 @@
 """A problem on meshes: numbers to names and back."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import final
 
 import numpy as np
@@ -73,6 +73,16 @@ class Transcription:
         )
         names = [choice.name for choice in self.problem.chosen]
         return Points(spans, dict(zip(names, values[self.layout.chosen].tolist(), strict=True)))
+
+    def consistent(self, points: Points) -> Points:
+        """`points` with mechanisms on their constraints, which straight lines are not."""
+        spans = [
+            span if loops is None else loops.consistent(span, mesh, self.inner_fractions(number))
+            for number, (span, mesh, loops) in enumerate(
+                zip(points.spans, self.meshes, self.skeleton.closing, strict=True)
+            )
+        ]
+        return replace(points, spans=tuple(spans))
 
     def duration(self, points: Points, span: int) -> float:
         """T of a span [s], chosen or fixed."""

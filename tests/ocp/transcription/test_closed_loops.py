@@ -1,0 +1,133 @@
+import casadi as ca
+import numpy as np
+import pytest
+from discretised import angles, four_bar
+
+from ocp.text.cost import integral
+from ocp.text.phase import Phase
+from ocp.text.problem import Problem
+from ocp.transcription.grid import make_meshes
+from ocp.transcription.points import Points, SpanPoints
+from ocp.transcription.schemes import Legendre, Radau, Scheme
+from ocp.transcription.transcribe import discretise
+from ocp.transcription.transcription import Transcription
+
+EFFORT = integral(lambda s: s.tau**2)
+Q_END, V_END = angles(2.0)
+MODEL = four_bar()
+DRIVEN = {"theta_crank": 2.0, "theta_crank_rate": 0.0}
+
+
+def put(problem: Problem, scheme: Scheme, intervals: int = 10) -> Transcription:
+    return discretise(problem, scheme).on(make_meshes(problem, intervals))
+
+
+def at_rest(t: Transcription) -> Points:
+    """The crank turns evenly, the rest follows from the constraints."""
+    spans: list[SpanPoints] = []
+    for number, span in enumerate(t.problem.spans):
+        model, mesh, inner = span.model, t.meshes[number], t.inner_fractions(number)
+        x = model.initial_state()
+        nodes, points = (np.tile(x[:, None], (1, s.size)) for s in (mesh, inner))
+        for values, s in ((nodes, mesh), (points, inner)):
+            values[0] = 1.0 + s
+        z = np.tile([[float(v.start)] for v in model.z], (1, inner.size))
+        spans.append(SpanPoints(0.5, nodes, points, z, np.zeros((1, mesh.size - 1))))
+    return t.consistent(Points(tuple(spans)))
+
+
+def solved(t: Transcription) -> tuple[str, Points]:
+    p = t.program
+    quiet = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.max_iter": 50}
+    given = {"no_nlp_grad": True, "calc_lam_p": False}
+    solver = ca.nlpsol("solver", "ipopt", p.nlp, quiet | given | p.derivatives)
+    bounds = {"lbx": p.lower_w, "ubx": p.upper_w, "lbg": p.lower_g, "ubg": p.upper_g}
+    found = solver(x0=t.pack(at_rest(t)), p=p.values, **bounds)
+    return solver.stats()["return_status"], t.unpack(found["x"])
+
+
+def off(points: Points) -> float:
+    """By how much loops and their rates are open at the nodes."""
+    mechanics, x = MODEL.holonomic, MODEL.vector("x")
+    assert mechanics is not None
+    rate = ca.jtimes(mechanics.phi, x[:3], x[3:])
+    both = ca.Function("both", [x], [ca.vertcat(mechanics.phi, rate)])
+    nodes = points.spans[0].nodes
+    return float(np.abs(both.map(nodes.shape[1])(nodes).full()).max())
+
+
+@pytest.mark.parametrize("scheme", [Radau(3), Legendre(2)])
+@pytest.mark.parametrize("end", [DRIVEN, Q_END | {"theta_crank_rate": 0.0}, Q_END | V_END])
+def test_loops_stay_closed_whatever_coordinates_are_named(
+    scheme: Scheme, end: dict[str, float]
+) -> None:
+    status, points = solved(put(Problem(Phase(MODEL, 0.5, end=end), EFFORT), scheme))
+    assert status == "Solve_Succeeded"
+    assert off(points) < 1e-9
+    np.testing.assert_allclose(points.spans[0].nodes[:, -1], [2.0, *_rest(2.0)], atol=1e-8)
+
+
+def _rest(crank: float) -> list[float]:
+    q, _ = angles(crank)
+    return [q["theta_rocker"], q["theta_coupler"], 0.0, 0.0, 0.0]
+
+
+def test_redundant_values_leave_the_jacobian_of_full_rank() -> None:
+    for end in (DRIVEN, Q_END | V_END, {}):
+        t = put(Problem(Phase(MODEL, 0.5, end=end), EFFORT), Radau(2), 3)
+        p = t.program
+        J = p.jacobian(t.pack(at_rest(t)), p.values)[1].full()
+        J = J[:, p.lower_w < p.upper_w]  # a solver takes fixed unknowns out
+        values = np.linalg.svd(J, compute_uv=False)
+        assert values[-1] > 1e-4 * values[0]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        Q_END | {"theta_coupler": Q_END["theta_coupler"] + 1e-3},
+        {"theta_rocker": 0.0},  # beyond reach
+        Q_END | V_END | {"theta_coupler_rate": 1.0},
+    ],
+)
+def test_values_that_open_the_loops_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="end: expected values that satisfy the constraints"):
+        discretise(Problem(Phase(MODEL, 0.5, end=wrong), EFFORT), Radau(3))
+
+
+def test_named_start_moves_the_coordinates_that_follow() -> None:
+    start = {"theta_crank": 1.2}
+    status, points = solved(
+        put(Problem(Phase(MODEL, 0.5, start=start, end=DRIVEN), EFFORT), Radau(3))
+    )
+    q, _ = angles(1.2)
+    assert status == "Solve_Succeeded"
+    np.testing.assert_allclose(points.spans[0].nodes[1, 0], q["theta_rocker"], atol=1e-9)
+
+
+def test_constraints_are_written_once_where_phases_meet() -> None:
+    """Rows of loops: at every node but the first one of the second phase."""
+    both = Phase(MODEL, 0.25) >> Phase(MODEL, 0.25, end=DRIVEN)
+    names = [place.name for place in put(Problem(both, EFFORT), Radau(2), 4).program.rows]
+    loops = [name for name in names if name in ("the loop 1", "the loop 2")]
+    assert len(loops) == 2 * (5 + 4)
+    assert sum(name.startswith("the rate of loop") for name in names) == 2 * (5 + 4)
+
+
+def test_link_of_all_rates_of_a_loop_is_too_much() -> None:
+    link = {
+        f"theta_{n}_rate": lambda b, n=n: -0.5 * b[f"theta_{n}_rate"] for n in ("crank", "rocker")
+    }
+    both = Phase(MODEL, 0.25) >> Phase(MODEL, 0.25, link=link)
+    with pytest.raises(ValueError, match="link: expected at most 1 expressions for rates"):
+        discretise(Problem(both, EFFORT), Radau(2))
+
+
+def test_link_of_the_crank_takes_the_other_rates_along() -> None:
+    link = {"theta_crank_rate": lambda b: -0.5 * b.theta_crank_rate}
+    both = Phase(MODEL, 0.25) >> Phase(MODEL, 0.25, link=link)
+    names = [place.name for place in put(Problem(both, EFFORT), Radau(2), 2).program.rows]
+    assert "the start of theta_crank_rate" in names
+    assert "the continuity of theta_crank" in names
+    between = [n for n in names if n.endswith("continuity of theta_rocker_rate")]
+    assert len(between) == 4  # those of the gaps alone
