@@ -29,7 +29,7 @@ def comparisons(function: Callable[..., Any], *signals: Any) -> list[Comparison]
         raise ValueError(
             f"expected {COMPARISON}, got {found}: Python compared numbers; {MATH}; {BRANCH}"
         )
-    if not isinstance(found, ca.SX):
+    if not isinstance(found, ca.SX) or found.is_empty():
         raise ValueError(f"expected {COMPARISON}, got {checks.shown(found)}")
     return [row for each in ca.vertsplit(ca.vec(found)) for row in _rows(each)]
 

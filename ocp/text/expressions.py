@@ -1,7 +1,7 @@
 """What a function of the user makes of signals: one SX expression, or a message that helps."""
 
 from collections.abc import Callable, Iterator
-from math import isnan
+from math import isfinite, isnan
 from typing import Any
 
 import casadi as ca
@@ -21,9 +21,10 @@ def called(function: Callable[..., Any], *signals: Any, what: str) -> Any:
     """
     try:
         return function(*signals)
-    except (TypeError, ArithmeticError, RuntimeError, NotImplementedError) as error:
+    except (TypeError, ArithmeticError, AttributeError, RuntimeError) as error:
         text = str(error)
-        hint = BRANCH if "truth value" in text else "" if "argument" in text else MATH
+        plain = "argument" in text or isinstance(error, AttributeError)
+        hint = BRANCH if "truth value" in text else "" if plain else MATH
         raise ValueError(
             f"expected {what}, got {type(error).__name__}: {_short(text)}"
             + f"; {hint}" * bool(hint)
@@ -46,8 +47,9 @@ def value_of(function: Callable[..., Any], *signals: Any) -> ca.SX:
     value = ca.SX(found)
     if value.numel() != 1:
         raise _refused(found)
-    if any(map(isnan, constants(value))):
-        raise _refused(found, f"it holds a NaN; {MATH}")
+    odd = [number for number in constants(value) if not isfinite(number)]
+    if odd:
+        raise _refused(found, f"it holds {odd[0]}" + f"; {MATH}" * isnan(odd[0]))
     return value
 
 

@@ -32,7 +32,7 @@ def kind_problems(problem: "Problem") -> Iterator[str]:
         return
     yield said(_cost, "cost", problem.cost)
     for name in ("bounds", "rates", "choose", "p"):
-        yield said(checks.named, name, getattr(problem, name))
+        yield said(_named, name, getattr(problem, name))
     yield said(_conditions, "path", problem.path)
     yield from _scenarios(problem.scenarios)
     yield said(checks.names, "periodic", problem.periodic)
@@ -48,8 +48,8 @@ def labelled_phases(problem: "Problem") -> Iterator[tuple[str, Phase]]:
     """Phases with what is said before a message about them; nothing for a lone one."""
     phases = problem.chain
     for number, phase in enumerate(phases):
-        name = f" '{phase.name}'" * bool(phase.name)
-        yield (f"phase {number + 1}{name}: " if len(phases) > 1 or phase.name else "", phase)
+        name = f" '{phase.name}'" if isinstance(phase.name, str) and phase.name else ""  # pyright: ignore[reportUnnecessaryIsInstance]
+        yield (f"phase {number + 1}{name}: " if len(phases) > 1 or name else "", phase)
 
 
 def _no_phases(given: object) -> str:
@@ -63,7 +63,7 @@ def _no_phases(given: object) -> str:
 
 def _phase(phase: Phase) -> Iterator[str]:
     for name in ("start", "end", "bounds", "rates", "link", "p"):
-        yield said(checks.named, name, getattr(phase, name))
+        yield said(_named, name, getattr(phase, name))
     if not isinstance(phase.name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
         yield str(checks.refused("name", "a text", phase.name))
     yield said(_cost, "cost", phase.cost)
@@ -76,7 +76,13 @@ def _phase(phase: Phase) -> Iterator[str]:
     for fraction, values in phase.via.items():
         if not is_number(fraction):
             yield f"via: expected fractions of T, got {checks.shown(fraction)}"
-        yield said(checks.named, f"via {checks.shown(fraction)}", values)
+        yield said(_named, f"via {checks.shown(fraction)}", values)
+
+
+def _named(where: str, given: object) -> None:
+    if given is None:
+        raise checks.refused(where, "values by name, such as {'v': 0.1}", None, "leave it out")
+    checks.named(where, given)
 
 
 def _cost(where: str, cost: object) -> None:
@@ -94,11 +100,11 @@ def _conditions(where: str, conditions: object) -> None:
 
 
 def _scenarios(scenarios: object) -> Iterator[str]:
-    text = said(checks.named, "scenarios", scenarios)
+    text = said(_named, "scenarios", scenarios)
     yield text
     if not text and isinstance(scenarios, Mapping):
         for name, values in scenarios.items():
-            yield said(checks.named, f"scenario {checks.shown(name)}", values)
+            yield said(_named, f"scenario {checks.shown(name)}", values)
 
 
 def _durations(durations: object) -> None:

@@ -225,7 +225,7 @@ def named(where: str, value: object, known: Collection[str] | None = None) -> di
 
 def many(where: str, value: object, what: str) -> tuple[Any, ...]:
     """`value`, a sequence of `what`, as a tuple; a single text is not taken for its letters."""
-    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+    if isinstance(value, str | bytes | ca.SX | ca.MX) or not isinstance(value, Iterable):
         raise refused(where, f"a sequence of {what}", value)
     return tuple(value)  # pyright: ignore[reportUnknownArgumentType, reportUnknownVariableType]
 
