@@ -1,0 +1,273 @@
+"""Model predictive controllers made of problems."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from re import fullmatch
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ocp.mpc.closed_loop import ClosedLoop, Reference, run_closed_loop
+from ocp.mpc.design import Control, Design
+from ocp.mpc.gauss_newton import Settings
+from ocp.mpc.horizon import Horizon
+from ocp.mpc.reading import horizon_of
+from ocp.mpc.session import Session
+from ocp.mpc.source import timed
+from ocp.mpc.to_c import GeneratedController, write_c
+from ocp.text.problem import Problem
+from symfric.codegen.block import KEYWORDS
+from symfric.foundation import checks
+from symfric.model import Model
+
+Array = NDArray[np.float64]
+
+OWN = ("residual", "violation", "iterations", "program_iterations", "status", "converged")
+"""Members of what the C hands out, besides the controls."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Controller:
+    """A model predictive controller; made by `controller_of` or `problem.to_mpc`.
+
+    Every `step` seconds the states are measured, the problem is solved over the next T seconds from
+    there, and the inputs of the first interval are applied.
+
+    Attributes:
+        design: its horizon, and how it is solved.
+    """
+
+    design: Design
+
+    def __repr__(self) -> str:
+        h = self.design.horizon
+        return f"<controller '{self.design.name}', {h.count} intervals of {h.step:g} s>"
+
+    @property
+    def step(self) -> float:
+        """Time between cycles [s]."""
+        return self.design.horizon.step
+
+    @property
+    def intervals(self) -> int:
+        """Number of intervals of the horizon."""
+        return self.design.horizon.count
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """Names of the states that are measured."""
+        return self.design.measured_names
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """Names of what it follows."""
+        return self.design.horizon.references
+
+    @property
+    def bounds(self) -> dict[str, float]:
+        """Names of all bounds in C, and their numbers."""
+        return dict(zip(self.design.bound_names, self.design.bounds.tolist(), strict=True))
+
+    def start(self, backend: str = "auto") -> Session:
+        """The controller at work, without a plan yet.
+
+        Args:
+            backend: "compiled" (the C itself), "vm" (the same bits, some ten times slower), or
+                "auto": compiled where there is a compiler.
+
+        Raises:
+            CompileError: compiled code was asked for, and there is no compiler or it failed.
+        """
+        return Session(self.design, backend)
+
+    def simulate(
+        self,
+        plant: Model,
+        t_end: float,
+        references: Mapping[str, Reference] | None = None,
+        *,
+        x0: Mapping[str, float] | None = None,
+        p: Mapping[str, float] | None = None,
+        plant_p: Mapping[str, float] | None = None,
+        noise: Mapping[str, float] | None = None,
+        seed: int = 0,
+        check: bool = True,
+        backend: str = "auto",
+    ) -> ClosedLoop:
+        """The controller on a plant, whose equations may be others: simulated within tolerances.
+
+        The plant has the inputs that are controlled and the signals that are measured by the same
+        names; its other inputs stay where the model says.
+
+        Args:
+            plant: the model of the plant, with events or without.
+            t_end: [s], rounded to whole cycles.
+            references: name -> number, or function of times [s], which the controller knows ahead.
+            x0, plant_p: start values and parameters of the plant, by name.
+            p: parameters of the controller's model, by name.
+            noise: standard deviation of measured states, by name.
+            seed: of the noise.
+            check: whether a second opinion is asked on the residual of each cycle, at some
+                milliseconds each.
+            backend: as in `start`.
+
+        Raises:
+            ValueError: unknown names, bad numbers.
+            SolveError: the plant could not be simulated to the end.
+        """
+        return run_closed_loop(
+            self.design,
+            self.start(backend),
+            plant,
+            t_end,
+            references or {},
+            x0=x0,
+            p=p,
+            plant_p=plant_p,
+            noise=noise,
+            seed=seed,
+            check=check,
+        )
+
+    def to_c(self, folder: str | Path) -> GeneratedController:
+        """Write the controller as C99: `NAME.h` and `NAME.c`.
+
+        The C allocates nothing, needs math.h alone, and has no data but constants: memory is in the
+        caller's struct. Every loop is bounded, so a cycle has a longest time. Each cycle reports
+        the residual of what it hands out. In double it has the bits of `start("vm")`.
+
+        Raises:
+            ValueError: no folder, or an operation that C99 lacks.
+        """
+        return write_c(self.design, folder)
+
+
+def controller_of(
+    problem: Problem,
+    step: float = 0.01,
+    *,
+    method: str = "rodas5p",
+    steps: int = 4,
+    measured: Sequence[str] | None = None,
+    tolerance: float = 1e-4,
+    iterations: int = 10,
+    penalty: float = 1e3,
+    name: str | None = None,
+) -> Controller:
+    """A model predictive controller of a problem of one phase, whose duration T is the horizon.
+
+        min  sum_k h [sum_i w_i r_i^2 + L] + E(x_N)   s.t.  x_(k+1) = F(x_k, u_k),  bounds
+
+    by Gauss-Newton iterations from the shifted plan of the last cycle, over N = T / step intervals
+    with inputs held. Costs are `track`, `effort`, and convex quadratic `integral` and `at_end`;
+    what `track("x", "goal", 900.0)` refers to by name is a reference of the controller, whose
+    default stands in the `p` of the problem. The start of the phase is not
+    used: the state is measured. Bounds on inputs are hard; those on states and outputs, path
+    conditions and the end of the phase are soft, with an exact penalty.
+
+    Args:
+        problem: what to minimise.
+        step: time between cycles [s].
+        method, steps: of `flow`, for an interval. The steps should resolve the transition velocity
+            of friction: where v changes by much more than v_t in one, iterations converge slowly,
+            which the residual says. "exponential" for LuGre.
+        measured: names of measured states, by default all; the others, such as bristles, are those
+            of the plan. Inputs with a rate (`rates`) are never measured.
+        tolerance: residual (see `gauss_newton`) at which a plan is optimal.
+        iterations: quadratic programs in a cycle at most; 1 is the real-time iteration.
+        penalty: price of violating a soft bound by its unit, per largest curvature of the cost.
+        name: C identifier; by default that of the model with "_mpc".
+
+    Raises:
+        ValueError: what a controller cannot take: several phases, scenarios, chosen parameters, a
+            free duration, via points, algebraic variables, events, time in the equations, a cost
+            without curvature; names that C cannot have.
+
+    Limits: inputs are constant over an interval; unmeasured states are not estimated, only
+    predicted; Gauss-Newton converges linearly, the slower the more the equations bend.
+    """
+    where = f"to_mpc '{problem.name}'"
+    horizon = horizon_of(problem, step, method=method, steps=steps)
+    settings = Settings(
+        checks.number("to_mpc: tolerance", tolerance, above=0.0),
+        checks.count("to_mpc: iterations", iterations, most=1000),
+    )
+    own = problem.chain[0].model
+    rated = {v.name for v in own.u} - {v.name for v in horizon.model.u}
+    states = [v.name for v in horizon.model.x if v.name not in rated]
+    wanted = states if measured is None else checks.names("to_mpc: measured", measured, states)
+    span = problem.spans[0]
+    parameters = dict(zip((v.name for v in span.model.p), span.p.tolist(), strict=True))
+    inputs = horizon.model.values("u")
+    design = Design(
+        name or f"{own.name}_mpc",
+        horizon,
+        settings,
+        tuple(i for i, v in enumerate(horizon.model.x) if v.name in wanted),
+        _controls(own, horizon),
+        horizon.model.initial_state(p=parameters),
+        np.clip(inputs, *_boxes(horizon)),
+        np.array([parameters[name] for name in horizon.parameters]),
+        np.array([parameters[name] for name in horizon.references]),
+        checks.number("to_mpc: penalty", penalty, above=0.0),
+    )
+    _check_names(where, design)
+    return Controller(design)
+
+
+def _rows(horizon: Horizon, name: str) -> tuple[int | None, int | None]:
+    """Numbers of the bounds of a state or input."""
+    names = [limit.name for limit in horizon.limits]
+    sides = (f"{side} bound on {name}" for side in ("lower", "upper"))
+    lower, upper = (names.index(side) if side in names else None for side in sides)
+    return lower, upper
+
+
+def _boxes(horizon: Horizon) -> tuple[Array, Array]:
+    """Lower and upper bounds of the inputs."""
+    pairs = [_rows(horizon, v.name) for v in horizon.model.u]
+    lower = [-np.inf if low is None else horizon.limits[low].bound for low, _ in pairs]
+    upper = [np.inf if high is None else horizon.limits[high].bound for _, high in pairs]
+    return np.array(lower), np.array(upper)
+
+
+def _controls(own: Model, horizon: Horizon) -> tuple[Control, ...]:
+    inputs = [v.name for v in horizon.model.u]
+    states = [v.name for v in horizon.model.x]
+    return tuple(
+        Control(
+            v.name,
+            v.unit,
+            (inputs if v.name in inputs else states).index(v.name),
+            v.name not in inputs,
+            *_rows(horizon, v.name),
+        )
+        for v in own.u
+    )
+
+
+def _check_names(where: str, design: Design) -> None:
+    """Names become members of structs: identifiers of C, each once in its struct."""
+    h = design.horizon
+    constants = [v.name for v in h.model.p if v.name not in h.references]
+    structs = (
+        [*constants, *design.bound_names, "tolerance", "iterations"],
+        [*design.measured_names, *h.references, *["t"] * timed(design)],
+        [*(control.name for control in design.controls), *OWN],
+    )
+    problems = [
+        f"expected C identifiers, got {name!r}"
+        for name in (design.name, *(name for names in structs for name in names))
+        if not (name.isascii() and fullmatch(r"[A-Za-z]\w*", name)) or name in KEYWORDS
+    ]
+    for names in structs:
+        repeated = {name for name in names if names.count(name) > 1}
+        problems += [f"expected every name once, got {name!r} twice" for name in sorted(repeated)]
+    if not all(map(isfinite, (*design.x0, *design.u0, *design.p0, *design.r0))):
+        problems.append("expected finite start values")
+    if problems:
+        raise ValueError(f"{where}: " + "; ".join(problems))

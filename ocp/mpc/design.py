@@ -1,0 +1,126 @@
+"""All that makes a controller: its horizon, how it is solved, what goes in and what comes out."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ocp.mpc.gauss_newton import Settings
+from ocp.mpc.horizon import Horizon
+from ocp.mpc.interior_point import Prices
+from ocp.mpc.kernels import Kernels, kernels
+from ocp.mpc.sweeps import Sweeps
+
+Array = NDArray[np.float64]
+
+
+@final
+@dataclass(frozen=True)
+class Control:
+    """What a controller hands out: an input, or the mean over the interval of one with a rate.
+
+    Attributes:
+        name, unit: of the input.
+        place: number of the input, or of the state where `rated`.
+        lower, upper: numbers of its bounds among those of the horizon; None where there is none.
+    """
+
+    name: str
+    unit: str
+    place: int
+    rated: bool
+    lower: int | None
+    upper: int | None
+
+    def of(self, X: Array, U: Array, b: Array) -> float:
+        """Its value in a plan, within its bounds."""
+        value = 0.5 * (X[0, self.place] + X[1, self.place]) if self.rated else U[0, self.place]
+        if self.lower is not None and value < b[self.lower]:
+            value = b[self.lower]
+        if self.upper is not None and value > b[self.upper]:
+            value = b[self.upper]
+        return float(value)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A controller, apart from what it remembers.
+
+    Attributes:
+        name: C identifier.
+        horizon: what is minimised.
+        settings: limits of the work.
+        measured: numbers of the states that are measured; the others are those of the plan.
+        controls: what comes out.
+        x0, u0: states and inputs of the first plan.
+        p0, r0: default parameters and references.
+        penalty: price of violating a soft bound by its unit, per largest curvature of the cost.
+    """
+
+    name: str
+    horizon: Horizon
+    settings: Settings
+    measured: tuple[int, ...]
+    controls: tuple[Control, ...]
+    x0: Array
+    u0: Array
+    p0: Array
+    r0: Array
+    penalty: float
+
+    @cached_property
+    def kernels(self) -> Kernels:
+        """Functions of an interval."""
+        return kernels(self.horizon)
+
+    @cached_property
+    def sweeps(self) -> Sweeps:
+        """Loops over them in the virtual machine."""
+        return Sweeps(self.horizon, self.kernels)
+
+    @property
+    def bounds(self) -> Array:
+        """Bounds of rows of an interval and of the end."""
+        h = self.horizon
+        return np.array([limit.bound for limit in (*h.limits, *h.end_limits)], dtype=float)
+
+    @property
+    def row_prices(self) -> Prices:
+        """Prices of the rows of one interval and of the end."""
+        h = self.horizon
+        soft = np.array([limit.soft for limit in (*h.limits, *h.end_limits)], dtype=bool)
+        price = np.where(soft, self.penalty * h.weight, 0.0)
+        return Prices(price, price.copy(), soft)
+
+    @property
+    def measured_names(self) -> tuple[str, ...]:
+        """Names of the measured states."""
+        return tuple(self.horizon.model.x[i].name for i in self.measured)
+
+    @cached_property
+    def bound_names(self) -> tuple[str, ...]:
+        """C names of the bounds, each once."""
+        h, found = self.horizon, list[str]()
+        for limit in (*h.limits, *h.end_limits):
+            side, _, rest = limit.name.partition(" ")
+            words = "".join(c if c.isalnum() or c == "_" else " " for c in rest).split()
+            stem = "_".join([w for w in words if w not in ("the", "bound", "on")] + [side])
+            name, number = stem, 2
+            while name in found:
+                name, number = f"{stem}_{number}", number + 1
+            found.append(name)
+        return tuple(found)
+
+    @cached_property
+    def prices(self) -> Prices:
+        """Prices of all rows."""
+        one, h = self.row_prices, self.horizon
+        count = len(h.limits)
+
+        def every(values: NDArray[np.generic]) -> NDArray[np.generic]:
+            return np.append(np.tile(values[:count], h.count), values[count:])
+
+        return Prices(every(one.rho), every(one.sigma), every(one.soft))  # pyright: ignore[reportArgumentType]

@@ -1,0 +1,236 @@
+"""What is computed in one interval of the horizon, as SX Functions of columns.
+
+The quadratic program of an iteration, with d the change of the states and c = F(x, u) - after:
+
+    min  sum_k g_k'(d_k, du_k) + 1/2 (d_k, du_k)'H_k(d_k, du_k) + the same of d_(k+1)
+    s.t. d_(k+1) = A_k d_k + B_k du_k + c_k,   d_0 = 0,   v + D (d_k, du_k, d_(k+1)) >= 0
+
+is solved by Riccati's recursion, to which an interior point adds weights w and slopes e of the
+rows, H + D'w D and g + D'e. Loops over the intervals call these functions, in C and in Python
+alike, so that both give the same bits. What is constant in A, B, H and D is folded into the code.
+
+Source: Rao, Wright and Rawlings, Application of interior-point methods to model predictive control,
+    JOTA 99(3), 1998.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, final
+
+import casadi as ca
+
+from ocp.mpc.horizon import Horizon, Limit
+from symfric.foundation.symbols import stacked
+
+
+@final
+class Packed:
+    """Matrices as one column of the entries that vary."""
+
+    def __init__(self) -> None:
+        self.entries: list[ca.SX] = []
+        self._parts: dict[str, tuple[ca.SX, list[int]]] = {}
+
+    def add(self, name: str, matrix: ca.SX, *, all_of_it: bool = False) -> None:
+        """Append a matrix: its structural entries, constants left out unless `all_of_it`."""
+        matrix = ca.densify(ca.SX(matrix)) if all_of_it else ca.sparsify(ca.SX(matrix))
+        places: list[int] = []
+        entries: list[Any] = matrix.nonzeros()
+        for entry in map(ca.SX, entries):
+            varies = all_of_it or not entry.is_constant()
+            places.append(len(self.entries) if varies else -1)
+            if varies:
+                self.entries.append(entry)
+        self._parts[name] = matrix, places
+
+    def column(self) -> ca.SX:
+        """All that varies, (n, 1)."""
+        return stacked(self.entries)
+
+    def part(self, name: str, column: ca.SX) -> ca.SX:
+        """The matrix `name` with its entries taken from `column`."""
+        matrix, places = self._parts[name]
+        values = [
+            entry if place < 0 else column[place]
+            for entry, place in zip(matrix.nonzeros(), places, strict=True)
+        ]
+        return ca.SX(matrix.sparsity(), stacked(values))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Kernels:
+    """All Functions; those of the end are missing where nothing is asked for there.
+
+    Attributes:
+        linear: (x, u, after, r, r_after, p, t, b) -> L = (c, v, all that varies in the program).
+        value: the same arguments -> (c, v, cost).
+        matrix: (P, L, w) -> (P, G): one step of Riccati's recursion; G is what the others need.
+        vector: (q, L, G, e) -> (q, k): the linear part of the cost-to-go and of the control.
+        forward: (d, L, G, k) -> (d, M = (du, change of v, slope and curvature of the cost)).
+        adjoint: (lam, L, m) -> (lam, gradient in u), with multipliers m of the rows.
+        end_linear, end_value: (x, r, p, t, b) -> L = (v, ...), (v, cost).
+        end_matrix, end_vector, end_adjoint: (L, w | e | m) -> P | q | lam.
+        end_forward: (d, L) -> M = (change of v, slope and curvature of the cost).
+    """
+
+    linear: ca.Function
+    value: ca.Function
+    matrix: ca.Function
+    vector: ca.Function
+    forward: ca.Function
+    adjoint: ca.Function
+    end_linear: ca.Function | None
+    end_value: ca.Function | None
+    end_matrix: ca.Function | None
+    end_vector: ca.Function | None
+    end_forward: ca.Function | None
+    end_adjoint: ca.Function | None
+
+    @property
+    def all(self) -> list[ca.Function]:
+        """Those that there are."""
+        return [f for f in vars(self).values() if f is not None]
+
+
+def kernels(horizon: Horizon) -> Kernels:
+    """The Functions of a horizon."""
+    return Kernels(*_interval(horizon), *_end(horizon))
+
+
+def upper(matrix: ca.SX) -> ca.SX:
+    """The upper triangle of a symmetric matrix as a dense column."""
+    n = matrix.shape[0]
+    return stacked(matrix[i, j] for j in range(n) for i in range(j + 1))
+
+
+def symmetric(column: ca.SX, n: int) -> ca.SX:
+    """The symmetric (n, n) matrix of an upper triangle."""
+    found = ca.SX(ca.Sparsity.dense(n, n))
+    for j in range(n):
+        for i in range(j + 1):
+            found[i, j] = found[j, i] = column[j * (j + 1) // 2 + i]
+    return found
+
+
+def factored(matrix: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """L and 1/D of L D L' = matrix, which is positive definite; without pivoting."""
+    n = matrix.shape[0]
+    lower, inverse = ca.SX.eye(n), ca.SX(n, 1)
+    for j in range(n):
+        d = matrix[j, j] - sum((lower[j, k] ** 2 / inverse[k] for k in range(j)), ca.SX(0))
+        inverse[j] = 1 / d
+        for i in range(j + 1, n):
+            inner = sum((lower[i, k] * lower[j, k] / inverse[k] for k in range(j)), ca.SX(0))
+            lower[i, j] = (matrix[i, j] - inner) * inverse[j]
+    return lower, inverse
+
+
+def solved(lower: ca.SX, inverse: ca.SX, right: ca.SX) -> ca.SX:
+    """(L D L')^-1 right."""
+    n = lower.shape[0]
+    rows = [right[i, :] for i in range(n)]
+    for i in range(n):
+        for k in range(i):
+            rows[i] = rows[i] - lower[i, k] * rows[k]
+    rows = [row * inverse[i] for i, row in enumerate(rows)]
+    for i in reversed(range(n)):
+        for k in range(i + 1, n):
+            rows[i] = rows[i] - lower[k, i] * rows[k]
+    return ca.vertcat(*rows)
+
+
+def _value(limit: Limit, bound: ca.SX) -> ca.SX:
+    return limit.sign * (limit.expression - bound) / limit.unit
+
+
+def _function(name: str, arguments: Sequence[ca.SX], results: Sequence[ca.SX]) -> ca.Function:
+    dense = [ca.densify(ca.SX(r)) for r in results]
+    return ca.Function(name, list(arguments), dense, {"cse": True})
+
+
+def _interval(horizon: Horizon) -> list[ca.Function]:
+    h = horizon
+    nx, nu, rows = h.x.numel(), h.u.numel(), len(h.limits)
+    arguments = [h.x, h.u, h.after, h.r, h.r_after, h.p, h.t, h.b]
+    start = ca.vertcat(h.x, h.u)
+    c = h.following - h.after
+    v = stacked(_value(limit, h.b[i]) for i, limit in enumerate(h.limits))
+    pack = Packed()
+    pack.add("c", c, all_of_it=True)
+    pack.add("v", v, all_of_it=True)
+    pack.add("F", ca.jacobian(h.following, start))
+    for name, costs in (("early", h.early), ("late", h.late)):
+        pack.add(f"g {name}", costs.gradient)
+        pack.add(f"H {name}", costs.hessian)
+    pack.add("D early", ca.jacobian(v, start))
+    pack.add("D late", ca.jacobian(v, h.after))
+    value = ca.vertcat(c, v, h.early.value + h.late.value)
+    L = ca.SX.sym("L", len(pack.entries))
+    F, g, H, D, g_late, H_late, D_late = (
+        pack.part(name, L)
+        for name in ("F", "g early", "H early", "D early", "g late", "H late", "D late")
+    )
+    c = L[:nx]
+    size = nx * (nx + 1) // 2
+    P, q, w, e = (ca.SX.sym(n, k) for n, k in (("P", size), ("q", nx), ("w", rows), ("e", rows)))
+    # one step of the recursion
+    whole = symmetric(P, nx) + H_late + D_late.T @ ca.diag(w) @ D_late
+    Q = H + D.T @ ca.diag(w) @ D + F.T @ whole @ F
+    lower, inverse = factored(Q[nx:, nx:])
+    gain = -solved(lower, inverse, Q[nx:, :nx])
+    before = Q[:nx, :nx] + Q[:nx, nx:] @ gain
+    kept = Packed()
+    for name, part in (("K", gain), ("L", ca.tril(lower, False)), ("1/D", inverse)):
+        kept.add(name, part, all_of_it=name != "L")
+    kept.add("P", upper(whole), all_of_it=True)
+    G = ca.SX.sym("G", len(kept.entries))
+    K, P_whole = kept.part("K", G), symmetric(kept.part("P", G), nx)
+    slope = q + g_late + D_late.T @ e + P_whole @ c
+    both = g + D.T @ e + F.T @ slope
+    k = -solved(kept.part("L", G) + ca.SX.eye(nu), kept.part("1/D", G), both[nx:])
+    # forwards
+    d, feed = ca.SX.sym("d", nx), ca.SX.sym("k", nu)
+    du = K @ d + feed
+    now = ca.vertcat(d, du)
+    then = F @ now + c
+    moved = D @ now + D_late @ then
+    tilt = ca.dot(g, now) + ca.dot(g_late, then)
+    bend = ca.dot(now, H @ now) + ca.dot(then, H_late @ then)
+    # multipliers
+    lam, m = ca.SX.sym("lam", nx), ca.SX.sym("m", rows)
+    gradient = g - D.T @ m + F.T @ (lam + g_late - D_late.T @ m)
+    return [
+        _function("linear", arguments, [pack.column()]),
+        _function("value", arguments, [value]),
+        _function("matrix", [P, L, w], [upper(before), kept.column()]),
+        _function("vector", [q, L, G, e], [both[:nx] + K.T @ both[nx:], k]),
+        _function("forward", [d, L, G, feed], [then, ca.vertcat(du, moved, tilt, bend)]),
+        _function("adjoint", [lam, L, m], [gradient[:nx], gradient[nx:]]),
+    ]
+
+
+def _end(horizon: Horizon) -> list[ca.Function | None]:
+    h, nx = horizon, horizon.x.numel()
+    first, rows = len(h.limits), len(h.end_limits)
+    if not rows and not ca.depends_on(h.end.value, h.x):
+        return [None] * 6
+    arguments = [h.x, h.r, h.p, h.t, h.b]
+    v = stacked(_value(limit, h.b[first + i]) for i, limit in enumerate(h.end_limits))
+    pack = Packed()
+    pack.add("v", v, all_of_it=True)
+    pack.add("g", h.end.gradient)
+    pack.add("H", h.end.hessian)
+    pack.add("D", ca.jacobian(v, h.x))
+    L = ca.SX.sym("L", len(pack.entries))
+    g, H, D = (pack.part(name, L) for name in "gHD")
+    w, e, d = ca.SX.sym("w", rows), ca.SX.sym("e", rows), ca.SX.sym("d", nx)
+    tilt, bend = ca.dot(g, d), ca.dot(d, H @ d)
+    return [
+        _function("end_linear", arguments, [pack.column()]),
+        _function("end_value", arguments, [ca.vertcat(v, h.end.value)]),
+        _function("end_matrix", [L, w], [upper(H + D.T @ ca.diag(w) @ D)]),
+        _function("end_vector", [L, e], [g + D.T @ e]),
+        _function("end_forward", [d, L], [ca.vertcat(D @ d, tilt, bend)]),
+        _function("end_adjoint", [L, e], [g - D.T @ e]),
+    ]

@@ -1,0 +1,320 @@
+"""The loops of a controller in C up to its quadratic programs: those of `interior_point`.
+
+To the bit. One text for all controllers; sizes are macros, kernels are functions made by `source`.
+Every loop is bounded, nothing is allocated, all memory is in the caller's struct.
+"""
+
+PROGRAM = r"""
+static double larger(double a, double b) { return (b > a || b != b) ? b : a; }
+
+static void linearise(NAME_t *m)
+{
+    int k;
+    for (k = 0; k < N; k++) {
+        linear(m->x[k], m->u[k], m->x[k + 1], m->r[k], m->r[k + 1], m->p, &m->t[k], m->b, m->L[k]);
+    }
+#if END
+    end_linear(m->x[N], m->r[N], m->p, &m->t[N], m->b, m->L_end);
+#endif
+}
+
+#if ALL > 0
+static void take_rows(NAME_t *m)
+{
+    int k, i, j = 0;
+    for (k = 0; k < N; k++) {
+        for (i = 0; i < ROWS; i++) {
+            m->v[j++] = m->L[k][NX + i];
+        }
+    }
+    for (i = 0; i < END_ROWS; i++) {
+        m->v[j++] = m->L_end[i];
+    }
+}
+
+static double price(int j, double v)
+{
+    const double s = -v > 0.0 ? -v : 0.0;
+    return rho[ROW(j)] * s + 0.5 * (sigma[ROW(j)] * (s * s));
+}
+#endif
+
+static void matrices(NAME_t *m)
+{
+    int k;
+    double P[NP];
+#if END
+    end_matrix(m->L_end, m->w + N * ROWS, P);
+#else
+    for (k = 0; k < NP; k++) {
+        P[k] = 0.0;
+    }
+#endif
+    for (k = N - 1; k >= 0; k--) {
+        matrix(P, m->L[k], m->w + k * ROWS, P, m->G[k]);
+    }
+}
+
+/* The change that slopes e of the rows make. */
+static void change(NAME_t *m, move_t *to)
+{
+    int k;
+    double q[NX], step[STEP];
+#if END
+    end_vector(m->L_end, m->e + N * ROWS, q);
+#else
+    for (k = 0; k < NX; k++) {
+        q[k] = 0.0;
+    }
+#endif
+    for (k = N - 1; k >= 0; k--) {
+        vector(q, m->L[k], m->G[k], m->e + k * ROWS, q, m->k[k]);
+    }
+    for (k = 0; k < NX; k++) {
+        to->x[0][k] = 0.0;
+    }
+    to->slope = 0.0;
+    to->curvature = 0.0;
+    for (k = 0; k < N; k++) {
+        int i;
+        forward(to->x[k], m->L[k], m->G[k], m->k[k], to->x[k + 1], step);
+        for (i = 0; i < NU; i++) {
+            to->u[k][i] = step[i];
+        }
+#if ROWS > 0
+        for (i = 0; i < ROWS; i++) {
+            to->D[k * ROWS + i] = step[NU + i];
+        }
+#endif
+        to->slope += step[NU + ROWS];
+        to->curvature += step[NU + ROWS + 1];
+    }
+#if END
+    {
+        double last[END_ROWS + 2];
+        end_forward(to->x[N], m->L_end, last);
+#if END_ROWS > 0
+        for (k = 0; k < END_ROWS; k++) {
+            to->D[N * ROWS + k] = last[k];
+        }
+#endif
+        to->slope += last[END_ROWS];
+        to->curvature += last[END_ROWS + 1];
+    }
+#endif
+}
+
+/* The residual of the plan; the largest violation of a soft row. */
+static double residual_of(NAME_t *m, double *violation)
+{
+    int k, i;
+    double l[NX], gradient[NU], found = 0.0;
+    *violation = 0.0;
+#if END
+    end_adjoint(m->L_end, m->z + N * ROWS, l);
+#else
+    for (k = 0; k < NX; k++) {
+        l[k] = 0.0;
+    }
+#endif
+    for (k = N - 1; k >= 0; k--) {
+        adjoint(l, m->L[k], m->z + k * ROWS, l, gradient);
+        for (i = 0; i < NU; i++) {
+            found = larger(found, fabs(gradient[i] * nominal_u[i]) / CURVATURE);
+        }
+        for (i = 0; i < NX; i++) {
+            found = larger(found, fabs(m->L[k][i]) / nominal_x[i]);
+        }
+    }
+#if ALL > 0
+    take_rows(m);
+    for (k = 0; k < ALL; k++) {
+        const double v = m->v[k], below = -v > 0.0 ? -v : 0.0;
+        double owed = m->z[k];
+        if (soft[ROW(k)]) {
+            *violation = larger(*violation, below);
+            if (v < 0.0) {
+                owed = rho[ROW(k)] + sigma[ROW(k)] * below - owed;
+            }
+        } else {
+            found = larger(found, below);
+        }
+        found = larger(found, fabs(owed * v) / CURVATURE);
+    }
+#endif
+    return found;
+}
+
+#if ALL > 0
+static void direction(NAME_t *m)
+{
+    int j;
+    for (j = 0; j < ALL; j++) {
+        const int i = ROW(j);
+        double a = 0.0;
+        if (soft[i]) {
+            a = rho[i] + sigma[i] * m->s[j] - m->zn[j] - m->goal_s[j] / m->s[j];
+        }
+        m->a[j] = a;
+        m->o[j] = m->goal_t[j] / m->zn[j] - m->v[j] - m->s[j] + m->f[j] * a;
+        m->e[j] = -(m->zn[j] + m->w[j] * m->o[j]);
+    }
+    change(m, &m->aim);
+    for (j = 0; j < ALL; j++) {
+        const int i = ROW(j);
+        m->dz[j] = m->w[j] * (m->o[j] - m->aim.D[j]);
+        m->ds[j] = 0.0;
+        m->dy[j] = 0.0;
+        if (soft[i]) {
+            m->ds[j] = m->f[j] * (m->dz[j] - m->a[j]);
+            m->dy[j] = rho[i] + sigma[i] * m->s[j] + sigma[i] * m->ds[j] - (m->zn[j] + m->dz[j])
+                       - m->y[j];
+        }
+        m->dt[j] = m->v[j] + m->aim.D[j] + m->s[j] + m->ds[j] - m->ts[j];
+    }
+}
+
+static double within(double alpha, double a, double da)
+{
+    if (da < 0.0 && -a / da < alpha) {
+        alpha = -a / da;
+    }
+    return alpha;
+}
+
+static double reach(const NAME_t *m, double back)
+{
+    int j;
+    double alpha = 1.0 / back;
+    for (j = 0; j < ALL; j++) {
+        alpha = within(alpha, m->ts[j], m->dt[j]);
+        alpha = within(alpha, m->zn[j], m->dz[j]);
+        if (soft[ROW(j)]) {
+            alpha = within(alpha, m->s[j], m->ds[j]);
+            alpha = within(alpha, m->y[j], m->dy[j]);
+        }
+    }
+    alpha *= back;
+    return alpha < 1.0 ? alpha : 1.0;
+}
+
+static double gap(const NAME_t *m, double alpha)
+{
+    int j;
+    double sum = 0.0;
+    for (j = 0; j < ALL; j++) {
+        double pair = (m->ts[j] + alpha * m->dt[j]) * (m->zn[j] + alpha * m->dz[j]);
+        if (soft[ROW(j)]) {
+            pair += (m->s[j] + alpha * m->ds[j]) * (m->y[j] + alpha * m->dy[j]);
+        }
+        sum += pair;
+    }
+    return sum;
+}
+
+static void start_inside(NAME_t *m)
+{
+    int j;
+    for (j = 0; j < ALL; j++) {
+        const int i = ROW(j);
+        const double first = m->v[j] + m->go.D[j];
+        m->ts[j] = first > AWAY ? first : AWAY;
+        m->zn[j] = m->z[j] > CURVATURE ? m->z[j] : CURVATURE;
+        m->s[j] = 0.0;
+        m->y[j] = 0.0;
+        if (soft[i]) {
+            const double off = m->ts[j] - first;
+            m->s[j] = off > AWAY ? off : AWAY;
+            if (m->zn[j] > 0.5 * rho[i]) {
+                m->zn[j] = 0.5 * rho[i];
+            }
+            m->y[j] = rho[i] + sigma[i] * m->s[j] - m->zn[j];
+        }
+        m->dt[j] = 0.0;
+        m->dz[j] = 0.0;
+        m->ds[j] = 0.0;
+        m->dy[j] = 0.0;
+    }
+}
+
+static void interior_step(NAME_t *m, double mu)
+{
+    int j, k, i;
+    double alpha, ratio, centre;
+    for (j = 0; j < ALL; j++) {
+        m->f[j] = soft[ROW(j)] ? 1.0 / (sigma[ROW(j)] + m->y[j] / m->s[j]) : 0.0;
+        m->w[j] = 1.0 / (m->ts[j] / m->zn[j] + m->f[j]);
+        m->goal_t[j] = 0.0;
+        m->goal_s[j] = 0.0;
+    }
+    matrices(m);
+    direction(m);
+    alpha = reach(m, 1.0);
+    ratio = gap(m, alpha) / PAIRS / mu;
+    centre = ratio * ratio * ratio * mu;
+    for (j = 0; j < ALL; j++) {
+        m->goal_t[j] = centre - m->dt[j] * m->dz[j];
+        m->goal_s[j] = soft[ROW(j)] ? centre - m->ds[j] * m->dy[j] : 0.0;
+    }
+    direction(m);
+    alpha = reach(m, BACK);
+    for (j = 0; j < ALL; j++) {
+        m->ts[j] += alpha * m->dt[j];
+        m->zn[j] += alpha * m->dz[j];
+        m->s[j] += alpha * m->ds[j];
+        m->y[j] += alpha * m->dy[j];
+        m->go.D[j] += alpha * (m->aim.D[j] - m->go.D[j]);
+        m->dt[j] = 0.0;
+        m->dz[j] = 0.0;
+        m->ds[j] = 0.0;
+        m->dy[j] = 0.0;
+    }
+    for (k = 0; k <= N; k++) {
+        for (i = 0; i < NX; i++) {
+            m->go.x[k][i] += alpha * (m->aim.x[k][i] - m->go.x[k][i]);
+        }
+        for (i = 0; k < N && i < NU; i++) {
+            m->go.u[k][i] += alpha * (m->aim.u[k][i] - m->go.u[k][i]);
+        }
+    }
+    m->go.slope = m->aim.slope;
+    m->go.curvature = m->aim.curvature;
+}
+#endif
+
+/* The quadratic program; returns the iterations of the interior point. */
+static int program(NAME_t *m)
+{
+    int made = 0;
+#if ALL > 0
+    int j, inside = 1;
+    for (j = 0; j < ALL; j++) {
+        m->w[j] = 0.0;
+        m->e[j] = 0.0;
+        m->zn[j] = 0.0;
+    }
+#endif
+    matrices(m);
+    change(m, &m->go);
+#if ALL > 0
+    for (j = 0; j < ALL; j++) {
+        if (!(m->v[j] + m->go.D[j] >= 0.0)) {
+            inside = 0;
+        }
+    }
+    if (inside) {
+        return 0;
+    }
+    start_inside(m);
+    while (made < MOST) {
+        const double mu = gap(m, 0.0) / PAIRS;
+        if (mu <= CLOSE * CURVATURE) {
+            break;
+        }
+        made++;
+        interior_step(m, mu);
+    }
+#endif
+    return made;
+}
+"""

@@ -1,0 +1,158 @@
+"""The loops over all intervals in CasADi's virtual machine: mapped kernels on arrays.
+
+Rows of an array are intervals. A sweep from the end backwards takes and gives its rows in order of
+time, too.
+"""
+
+from dataclasses import dataclass
+from typing import Any, cast, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ocp.mpc.horizon import Horizon
+from ocp.mpc.kernels import Kernels
+from symfric.foundation.numeric import evaluate_all
+
+Array = NDArray[np.float64]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Given:
+    """What is known of the whole horizon in one cycle.
+
+    Attributes:
+        R: references, shape (N+1, number of them).
+        t: times [s], shape (N+1,).
+        p, b: parameters, and bounds of the rows of an interval and of the end.
+    """
+
+    R: Array
+    t: Array
+    p: Array
+    b: Array
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Move:
+    """A change of the whole horizon.
+
+    Attributes:
+        X, U: of states (N+1, nx) and inputs (N, nu).
+        D: of all rows.
+        costs: slope and curvature of the cost of intervals and end along it, shape (n, 2).
+    """
+
+    X: Array
+    U: Array
+    D: Array
+    costs: Array
+
+    def towards(self, aim: "Move", alpha: float) -> "Move":
+        """A share alpha of the way to `aim`, whose costs it takes."""
+        parts = ((self.X, aim.X), (self.U, aim.U), (self.D, aim.D))
+        X, U, D = (a + alpha * (b - a) for a, b in parts)
+        return Move(X, U, D, aim.costs)
+
+
+def called(function: ca.Function, *arguments: Array) -> list[Array]:
+    """All results, a row for each column of CasADi's."""
+    return [np.ascontiguousarray(r.T) for r in evaluate_all(function, *arguments)]
+
+
+def backwards(array: Array) -> Array:
+    """Rows in the opposite order."""
+    return np.ascontiguousarray(array[::-1])
+
+
+@final
+class Sweeps:
+    """Sweeps of a horizon; see `Kernels` for letters and shapes."""
+
+    def __init__(self, horizon: Horizon, kernels: Kernels) -> None:
+        n = horizon.count
+        self.horizon, self.kernels = horizon, kernels
+        self.nx, self.nu = horizon.x.numel(), horizon.u.numel()
+        self.rows, self.end_rows = len(horizon.limits), len(horizon.end_limits)
+        common = [argument in (5, 7) for argument in range(8)]  # p and b
+        linear, value = cast(Any, kernels.linear), cast(Any, kernels.value)
+        self._linear: ca.Function = linear.map(n, common, [False])
+        self._value: ca.Function = value.map(n, common, [False])
+        self._matrix = kernels.matrix.mapaccum("matrix", n)
+        self._vector = kernels.vector.mapaccum("vector", n)
+        self._forward = kernels.forward.mapaccum("forward", n)
+        self._adjoint = kernels.adjoint.mapaccum("adjoint", n)
+
+    def linear(self, X: Array, U: Array, given: Given) -> tuple[Array, Array]:
+        """L of all intervals, and of the end, at states X (N+1, nx) and inputs U (N, nu)."""
+        (L,) = called(self._linear, *self._arguments(X, U, given))
+        if self.kernels.end_linear is None:
+            return L, np.zeros(0)
+        return L, called(self.kernels.end_linear, *self._at_end(X, given))[0][0]
+
+    def value(self, X: Array, U: Array, given: Given) -> tuple[Array, Array, Array]:
+        """Defects (N, nx), all rows v, and the costs of intervals and end."""
+        (E,) = called(self._value, *self._arguments(X, U, given))
+        c, v, cost = E[:, : self.nx], E[:, self.nx : -1].ravel(), E[:, -1]
+        if self.kernels.end_value is None:
+            return c, v, cost
+        end = called(self.kernels.end_value, *self._at_end(X, given))[0][0]
+        return c, np.append(v, end[:-1]), np.append(cost, end[-1])
+
+    def _arguments(self, X: Array, U: Array, given: Given) -> tuple[Array, ...]:
+        R = given.R
+        return X[:-1], U, X[1:], R[:-1], R[1:], given.p, given.t[:-1], given.b
+
+    def _at_end(self, X: Array, given: Given) -> tuple[Array, ...]:
+        return X[-1], given.R[-1], given.p, given.t[-1:], given.b
+
+    def defects_of(self, L: Array) -> Array:
+        """C of all intervals, shape (N, nx)."""
+        return L[:, : self.nx]
+
+    def rows_of(self, L: Array, end: Array) -> Array:
+        """V of all rows."""
+        v = L[:, self.nx : self.nx + self.rows]
+        return np.append(v.ravel(), end[: self.end_rows])
+
+    def matrix(self, L: Array, end: Array, w: Array) -> Array:
+        """G of all intervals, for weights w of all rows."""
+        last_P, kernels = np.zeros(self.kernels.matrix.size1_in(0)), self.kernels
+        inner, last = self.split(w)
+        if kernels.end_matrix is not None:
+            last_P = called(kernels.end_matrix, end, last)[0][0]
+        return backwards(called(self._matrix, last_P, backwards(L), backwards(inner))[1])
+
+    def vector(self, L: Array, end: Array, G: Array, e: Array) -> Array:
+        """Feed-forward k of all intervals, for slopes e of all rows."""
+        q, kernels = np.zeros(self.nx), self.kernels
+        inner, last = self.split(e)
+        if kernels.end_vector is not None:
+            q = called(kernels.end_vector, end, last)[0][0]
+        arguments = (backwards(L), backwards(G), backwards(inner))
+        return backwards(called(self._vector, q, *arguments)[1])
+
+    def forward(self, L: Array, end: Array, G: Array, k: Array) -> Move:
+        """The change that gains and feed-forward make."""
+        d, M = called(self._forward, np.zeros(self.nx), L, G, k)
+        rows, costs = M[:, self.nu : self.nu + self.rows].ravel(), M[:, -2:]
+        if self.kernels.end_forward is not None:
+            last = called(self.kernels.end_forward, d[-1], end)[0][0]
+            rows, costs = np.append(rows, last[:-2]), np.vstack([costs, last[-2:]])
+        return Move(np.vstack([np.zeros((1, self.nx)), d]), M[:, : self.nu], rows, costs)
+
+    def adjoint(self, L: Array, end: Array, m: Array) -> Array:
+        """Gradients in the inputs, shape (N, nu), with multipliers m of all rows."""
+        lam, kernels = np.zeros(self.nx), self.kernels
+        inner, last = self.split(m)
+        if kernels.end_adjoint is not None:
+            lam = called(kernels.end_adjoint, end, last)[0][0]
+        return backwards(called(self._adjoint, lam, backwards(L), backwards(inner))[1])
+
+    def split(self, rows: Array) -> tuple[Array, Array]:
+        """Those of the intervals, shape (N, rows), and those of the end."""
+        count = self.horizon.count * self.rows
+        return rows[:count].reshape(self.horizon.count, self.rows), rows[count:]
