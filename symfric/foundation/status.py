@@ -54,6 +54,14 @@ class Status(Enum):
         "The optimiser met its conditions, but the re-simulated control misses the target; "
         "use more intervals."
     )
+    BOUND_MISS = (
+        "The optimiser met its conditions, but the re-simulated motion leaves a bound between "
+        "them; use more intervals, or a narrower bound."
+    )
+    UNSTABLE = (
+        "The motion is right from node to node, but it is unstable: the control alone, without "
+        "feedback, does not hold it; follow it by a controller."
+    )
 
     @property
     def ok(self) -> bool:

@@ -1,0 +1,160 @@
+"""What it costs to hold the inputs over each interval instead of letting them vary."""
+
+from collections.abc import Iterator
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ocp.transcription.blocks import Entries, Selection
+from ocp.transcription.points import SpanLayout
+from ocp.transcription.skeleton import LARGEST
+from ocp.transcription.transcription import Transcription
+
+Array = NDArray[np.float64]
+
+
+def holding_losses(transcription: Transcription, w: Array, lam_g: Array) -> tuple[Array, ...]:
+    """Estimate of how much lower J would be with inputs free to vary in each interval, (N,) a span.
+
+    With costates lam the minimum principle asks of the input at every time what an input that is
+    held can give on the average only. What is lost is, to second order in the length h,
+
+        E_k = sum_j w_j (H(u_k) - min_u H(u)),   H(u) = H + H_u (u - u_k) + H_uu (u - u_k)^2 / 2
+
+    over the collocation points, with H_u and H_uu from the multipliers of the equations at each of
+    them. The input stays in its bounds and between its values in the neighbouring intervals: on a
+    singular arc (H_u = H_uu = 0) and at a switch (H_uu = 0) that is how far it will go. For a
+    smooth input E_k = H_uu (u' h)^2 h / 24; at a switch it falls as h^2, too, in one interval.
+
+    Args:
+        transcription: what was solved.
+        w, lam_g: unknowns and multipliers of the rows at a solution.
+
+    Returns:
+        Of each span, in units of J; zeros where it has no collocation points (shooting) or no
+        inputs. Inputs that scenarios share are counted with the first of them.
+
+    Limits: an estimate where multipliers are those of a solution; of inputs in active path
+        conditions too large by a factor of up to 4.
+    """
+    losses: list[Array] = []
+    layout = transcription.layout
+    slopes = [_slopes(transcription, w, lam_g, i) for i in range(len(layout.spans))]
+    for number, own in enumerate(layout.spans):
+        loss = np.zeros(own.intervals)
+        for columns in own.u:
+            owners = list(_sharing(layout.spans, columns))
+            if not own.degree or owners[0][0] != number:
+                continue
+            H_u = sum(slopes[other][0][row] for other, row in owners)
+            H_uu = sum(slopes[other][1][row] for other, row in owners)
+            low, high = _reach(transcription, w, columns)
+            loss += _drop(np.asarray(H_u), np.asarray(H_uu), low, high)
+        losses.append(loss)
+    return tuple(losses)
+
+
+def _sharing(
+    spans: tuple[SpanLayout, ...], columns: NDArray[np.int64]
+) -> Iterator[tuple[int, int]]:
+    """(span, input) of all that stand in the same unknowns."""
+    for number, own in enumerate(spans):
+        for i, other in enumerate(own.u):
+            if np.array_equal(other, columns):
+                yield number, i
+
+
+def _drop(H_u: Array, H_uu: Array, low: Array, high: Array) -> Array:
+    """By how much H falls below its value at 0 in [low, high], summed over the points, (N,)."""
+    low, high = low[:, None], high[:, None]
+    downhill = np.where(H_u > 0, low, high)
+    curved = H_uu > 0
+    newton = np.clip(-H_u / np.where(curved, H_uu, 1.0), low, high)
+    step = np.where(curved, newton, downhill)
+    change = H_u * step + H_uu * step**2 / 2
+    return np.maximum(-change, 0.0).sum(axis=1)
+
+
+def _reach(
+    transcription: Transcription, w: Array, columns: NDArray[np.int64]
+) -> tuple[Array, Array]:
+    """How far an input may go from its value in each interval, scaled, (N,) each."""
+    u, program = w[columns], transcription.program
+    lower, upper = program.lower_w[columns], program.upper_w[columns]
+    if u.size < 2:
+        return lower - u, upper - u
+    beyond = np.concatenate([[2 * u[0] - u[1]], u, [2 * u[-1] - u[-2]]])
+    around = np.stack([beyond[:-2], u, beyond[2:]])
+    low, high = np.maximum(around.min(axis=0), lower), np.minimum(around.max(axis=0), upper)
+    return np.minimum(low - u, 0.0), np.maximum(high - u, 0.0)
+
+
+def _slopes(
+    transcription: Transcription, w: Array, lam_g: Array, number: int
+) -> tuple[Array, Array]:
+    """H_u and H_uu of each input at the collocation points of a span, (nu, N, d) each."""
+    own = transcription.layout.spans[number]
+    nu, N, d = *own.u.shape, own.degree
+    skeleton = transcription.skeleton
+    pieces = enumerate(skeleton.pieces)
+    at = next((i for i, piece in pieces if piece.span == number and piece.block is not None), -1)
+    piece = skeleton.pieces[at]
+    if not d or piece.block is None or piece.selection is None:
+        return np.zeros((nu, N, 0)), np.zeros((nu, N, 0))
+    block, lam = piece.block, lam_g[skeleton.assembled.at[at]]
+    inputs = own.nodes.shape[0] + own.z.shape[0] + np.arange(nu)
+    v = _local(piece.selection, block.n, w)
+    theta = ca.Function("theta", [skeleton.p], [piece.theta])(transcription.program.values)
+    sigma, places = _weight(transcription, lam_g, number), v.shape[1]
+    arguments = [ca.DM(v), ca.DM(theta)]
+    H_u = np.zeros((nu, places))
+    if block.share is not None:
+        (dq,) = _mapped(block.slopes, places, arguments)
+        for _, j, values in _columns(block.of_slopes, dq, inputs):
+            H_u[j] += sigma * values
+    _, dr = _mapped(block.jacobian, places, arguments)
+    for row, j, values in _columns(block.of_jacobian, dr, inputs):
+        H_u[j] += lam[row] * values
+    arguments += [ca.DM(np.full((1, places), sigma)), ca.DM(lam)]
+    (second,) = _mapped(block.hessian, places, arguments)
+    H_uu = np.zeros((nu, places))
+    for row, j, values in _columns(block.of_hessian, second, inputs):
+        if row == inputs[j]:
+            H_uu[j] += values
+    return H_u.reshape(nu, N, d), H_uu.reshape(nu, N, d)
+
+
+def _mapped(function: ca.Function, places: int, arguments: list[ca.DM]) -> list[Array]:
+    """The outputs of a function of the block at all places."""
+    return [np.array(part) for part in function.map(places).call(arguments)]
+
+
+def _columns(
+    entries: Entries, varying: Array, columns: NDArray[np.int64]
+) -> Iterator[tuple[int, int, Array]]:
+    """(row, which of the columns, values at all places) of the entries in some columns."""
+    values = np.empty((entries.rows.size, varying.shape[1]))
+    values[entries.varying] = varying
+    values[entries.still] = entries.constant[:, None]
+    for e in np.flatnonzero(np.isin(entries.columns, columns)):
+        yield int(entries.rows[e]), int(entries.columns[e] - columns[0]), values[e]
+
+
+def _local(selection: Selection, n: int, w: Array) -> Array:
+    """Local unknowns at all places, (n, places)."""
+    v = np.zeros((n, selection.columns.shape[0]))
+    np.add.at(v, selection.local, (selection.weights * w[selection.columns]).T)
+    return v
+
+
+def _weight(transcription: Transcription, lam_g: Array, number: int) -> float:
+    """Of the cost of a span in J: of the mean of scenarios, or the multiplier of the largest."""
+    problem = transcription.problem
+    phases = len(problem.chain)
+    if problem.kind == "mean":
+        return phases / len(problem.spans)
+    if problem.kind == "sum":
+        return 1.0
+    rows = [i for i, place in enumerate(transcription.program.rows) if place.name == LARGEST]
+    return float(lam_g[rows[number // phases]])

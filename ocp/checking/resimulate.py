@@ -1,0 +1,134 @@
+"""What the models really do under an optimised control: one run from the start to the end."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from ocp.checking.arcs import Arc
+from symfric.foundation.symbols import stacked
+from symfric.integrator import Hold, simulate
+from symfric.results.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+RTOL = 1e-9
+"""Relative tolerance of the re-simulation."""
+GAUSS_POINTS, GAUSS_WEIGHTS = legendre.leggauss(4)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Run:
+    """The simulated motion of an arc, or of a part of it.
+
+    Attributes:
+        arc: what was optimised.
+        trajectory: what the model does; it may have failed on its way.
+        end: up to where it counts [s].
+    """
+
+    arc: Arc
+    trajectory: Trajectory
+    end: float
+
+    @property
+    def begin(self) -> float:
+        """Its first time [s]."""
+        return self.trajectory.span[0]
+
+    @property
+    def ok(self) -> bool:
+        """Whether it came to its end."""
+        return self.trajectory.status.ok and self.trajectory.span[1] >= self.end
+
+    @property
+    def at_start(self) -> bool:
+        """Whether it begins where its arc does."""
+        return self.begin == self.arc.times[0]
+
+    @property
+    def at_end(self) -> bool:
+        """Whether it ends where its arc does."""
+        return self.end == self.arc.times[-1]
+
+    @property
+    def looks(self) -> Array:
+        """Times that show all of it [s]: every step, and both sides of every node."""
+        inside = self.arc.times[(self.arc.times > self.begin) & (self.arc.times <= self.end)]
+        every = np.concatenate([self.trajectory.looks, np.nextafter(inside, -np.inf), inside])
+        last = min(self.end, self.trajectory.span[1])
+        return np.unique(every[(every >= self.begin) & (every <= last)])
+
+    def of(self, column: ca.SX, times: Array | float) -> Array:
+        """Values of a column of expressions in the symbols of the model, shape (rows, n)."""
+        at = np.atleast_1d(times)
+        rows = column.numel()
+        if not rows:
+            return np.zeros((0, at.size))
+        return np.reshape(self.trajectory.of(ca.densify(column), at), (rows, at.size))
+
+    def integral(self, expression: ca.SX) -> float:
+        """Of an expression over the run, by Gauss quadrature over every accepted step."""
+        if ca.SX(expression).is_zero():
+            return 0.0
+        steps = self.trajectory.step_times
+        ends = np.unique(np.concatenate([steps[steps < self.end], [self.end]]))
+        half = np.diff(ends)[:, None] / 2
+        times = ends[:-1, None] + half * (1.0 + GAUSS_POINTS)
+        values = self.of(expression, times.ravel()).reshape(times.shape)
+        return float((half * GAUSS_WEIGHTS * values).sum())
+
+
+def resimulated(arcs: Sequence[Arc], rtol: float = RTOL) -> tuple[Run, ...]:
+    """Runs of the models under the controls that were optimised, held on each interval.
+
+    A phase starts where the one before it really ended, as its links say; states without a link
+    start where the optimiser put them. Behind a run that fails the rest of its scenario is left
+    out: there is no place where it could start.
+    """
+    runs: list[Run] = []
+    for arc in arcs:
+        before = runs[-1] if arc.span.phase and runs else None
+        if arc.span.phase and (before is None or not before.ok or _behind(before, arc)):
+            continue
+        runs.append(run_from(arc, 0, _start(arc, before), rtol))
+    return tuple(runs)
+
+
+def run_from(arc: Arc, node: int, start: Mapping[str, float], rtol: float = RTOL) -> Run:
+    """The motion from a node to the end of the arc."""
+    times = arc.times[node:]
+    u = {
+        v.name: Hold(times[:-1], row[node:]) for v, row in zip(arc.span.model.u, arc.u, strict=True)
+    }
+    trajectory = simulate(
+        arc.span.model,
+        float(times[-1]),
+        t_start=float(times[0]),
+        x0=dict(start),
+        u=u,
+        p=arc.parameters(),
+        rtol=rtol,
+        times=times[1:-1],
+        throw=False,
+    )
+    return Run(arc, trajectory, float(times[-1]))
+
+
+def _behind(run: Run, arc: Arc) -> bool:
+    """Whether `run` is not that of the phase before `arc`: its own was left out."""
+    return (run.arc.span.scenario, run.arc.span.phase) != (arc.span.scenario, arc.span.phase - 1)
+
+
+def _start(arc: Arc, before: Run | None) -> dict[str, float]:
+    """Where the model starts."""
+    start = arc.state(0)
+    if before is not None and arc.span.links:
+        ends = before.of(stacked(link.expression for link in arc.span.links), before.end)
+        start |= {link.state: float(x) for link, x in zip(arc.span.links, ends[:, 0], strict=True)}
+    return start
