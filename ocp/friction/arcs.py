@@ -1,0 +1,329 @@
+"""From a sequence of modes to a problem of mode models: one phase for each arc.
+
+What the user has written holds in all arcs of his phases, by name. To it come the conditions under
+which the arcs are a motion with exact Coulomb friction and stiction, for each contact:
+
+* it slips to the side of its mode: slip >= 0 or <= 0;
+* at rest the reaction is within the static level to both sides: |F| <= F_s;
+* where it changes its mode, slip = 0: at the end of slipping, and at the start of what follows;
+* what leaves rest, or turns round, breaks away: the force that would hold it at rest under the
+  control *after* that instant reaches the static level to that side. It may exceed it, since
+  controls jump, so that this is an inequality: equality would exclude such motions, and without it
+  a body could leave rest although friction can hold it, which costs less and is wrong.
+
+Conditions that depend on each other are written once, for solvers need independent ones: at rest
+slip stays zero by itself, so nothing is asked of it at the end of a rest.
+Source: Brogliato, Nonsmooth Mechanics, 3rd ed., 2016, ch. 5; Betts, Practical Methods for Optimal
+Control, 2nd ed., 2010, 2.8 and 3.7 (phases, linkage conditions).
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Any, TypeVar, final
+
+import casadi as ca
+
+from ocp.friction.mode_models import mode_model, with_outputs
+from ocp.friction.release import excess, rubbing
+from ocp.friction.sequence import Arc, Leg
+from ocp.text.phase import Chain, Phase, Start
+from ocp.text.problem import Duration, Problem
+from ocp.text.ranges import Free, Range, meet
+from symfric.foundation.symbols import stacked
+from symfric.model import Contact, Model, Output
+
+GRIP = 3e-3
+"""Share of the static level that a rest keeps away from it: a smooth law creeps over its peak a
+little below. Not on the side to which the contact leaves by a force that cannot jump."""
+
+PULL = 1e-3
+"""Share of the static level by which a control that jumps exceeds it: held exactly there, a smooth
+law of any width would stay on its peak."""
+
+SIGN = 1e-7
+"""Sliding velocity by which one that is no state may have the wrong sign: at the ends of slipping,
+where it is zero, two conditions would depend on each other."""
+
+Ranges = dict[str, Range]
+Value = TypeVar("Value")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Place:
+    """An arc among its neighbours.
+
+    Attributes:
+        number: of the arc.
+        model: the user's, with contacts.
+        leg: the leg it is in.
+        opens, closes: whether it is the first, the last one of the user's phase.
+        ends: whether it is the last one of its leg.
+        before, after: modes of the neighbours, where states are continuous; else empty.
+        leaves: resting contact -> the side to which it will leave, 0 where it does not.
+    """
+
+    number: int
+    model: Model
+    arc: Arc
+    leg: Leg
+    opens: bool
+    closes: bool
+    ends: bool
+    before: Mapping[str, int]
+    after: Mapping[str, int]
+    leaves: Mapping[str, int]
+
+
+def places_of(problem: Problem, legs: Sequence[Leg]) -> tuple[Place, ...]:
+    """All arcs among their neighbours."""
+    pairs = [(leg, k) for leg in legs for k in range(len(leg.arcs))]
+    arcs = [leg.arcs[k] for leg, k in pairs]
+    phases = [leg.phase for leg, _ in pairs]
+    broken = [
+        k > 0 and phases[k] != phases[k - 1] and bool(problem.chain[phases[k]].link)
+        for k in range(len(arcs))
+    ]
+    found: list[Place] = []
+    for i, (leg, k) in enumerate(pairs):
+        first, last = i == 0, i == len(arcs) - 1
+        leaves = {c: 0 for c, mode in arcs[i].modes.items() if not mode}
+        for c in leaves:
+            for later in arcs[i + 1 :]:
+                if later.modes.get(c) != 0:
+                    leaves[c] = later.modes.get(c, 0)
+                    break
+        found.append(
+            Place(
+                i,
+                problem.chain[leg.phase].model,
+                arcs[i],
+                leg,
+                first or phases[i - 1] != leg.phase,
+                last or phases[i + 1] != leg.phase,
+                k == len(leg.arcs) - 1,
+                {} if first or broken[i] else arcs[i - 1].modes,
+                {} if last or broken[i + 1] else arcs[i + 1].modes,
+                leaves,
+            )
+        )
+    return tuple(found)
+
+
+def in_arcs(
+    problem: Problem,
+    legs: Sequence[Leg],
+    sizes: Mapping[str, float],
+    at_rest: Sequence[str],
+    shortest: float,
+) -> Problem:
+    """The problem of mode models that follows the sequence `legs`, one phase for each arc.
+
+    Args:
+        problem: the user's.
+        legs: its arcs; their durations are where the solver starts.
+        sizes: contact -> typical static level [N], which scales conditions on forces.
+        at_rest: contacts that are at rest at the very start.
+        shortest: least duration of an arc [s].
+    """
+    places = places_of(problem, legs)
+    phases = [_phase(problem, place, sizes, at_rest, shortest) for place in places]
+    states = {v.name for v in phases[0].model.x}
+    signals = {name for phase in phases for name in (*phase.model.signals, *phase.model.further)}
+    parameters = {v.name for phase in phases for v in phase.model.p}
+    return replace(
+        problem,
+        phases=Chain(tuple(phases)),
+        bounds=_only(problem.bounds, signals),
+        p=_only(problem.p, parameters),
+        choose=_only(problem.choose, parameters),
+        durations=_durations(problem, legs),
+        periodic=tuple(name for name in problem.periodic if name in states),
+    )
+
+
+def carrier(model: Model, contact: Contact) -> tuple[str, int] | None:
+    """The state that is zero when `contact` rests, and the side to which it grows with the slip.
+
+    None where slip is not a multiple of one state.
+    """
+    x = model.vector("x")
+    slope = ca.SX(ca.jacobian(contact.slip, x))
+    if slope.nnz() != 1 or not slope.is_constant():
+        return None
+    factor, index = float(ca.sum1(ca.sum2(ca.DM(slope)))), slope.sparsity().get_crs()[1][0]
+    if not ca.is_equal(ca.simplify(contact.slip - factor * x[index]), ca.SX(0), 2):
+        return None
+    return model.x[index].name, 1 if factor > 0 else -1
+
+
+def arc_model(
+    model: Model, modes: Mapping[str, int], released: Sequence[str], sizes: Mapping[str, float]
+) -> Model:
+    """The mode model of `modes` with what the conditions of an arc are about as outputs.
+
+    "<contact>_slip"; and, as shares of the static level, "<contact>_up" and "<contact>_down", room
+    of a rest to both sides, and "<contact>_pull", excess of what is `released`.
+    """
+    kept: dict[Any, Model] = model.memory.setdefault("ocp arcs", {})
+    key = (*modes.items(), *released, *sizes.items())
+    if key not in kept:
+        made = mode_model(model, modes)
+        outputs: dict[str, ca.SX] = {}
+        for c in rubbing(model):
+            outputs[f"{c.name}_slip"] = c.slip
+            if not modes[c.name]:
+                for side in ("up", "down"):
+                    room = made.expression(f"{c.name}_grip_{side}")
+                    outputs[f"{c.name}_{side}"] = room / sizes[c.name]
+        for name in released:
+            outputs[f"{name}_pull"] = excess(model, modes, name) / sizes[name]
+        new = {name: Output(expression, "1") for name, expression in outputs.items()}
+        kept[key] = with_outputs(made, new)
+    return kept[key]
+
+
+def _phase(
+    problem: Problem,
+    place: Place,
+    sizes: Mapping[str, float],
+    at_rest: Sequence[str],
+    shortest: float,
+) -> Phase:
+    """The phase of one arc: what the user says of it, and the conditions of its modes."""
+    base, modes = problem.chain[place.leg.phase], place.arc.modes
+    released = [name for name in modes if _breaks_away(place, name, at_rest)]
+    model = arc_model(base.model, modes, released, sizes)
+    limited = {*problem.rates, *base.rates}
+    start: Ranges = dict(base.start) if place.opens else {}
+    link: dict[str, Start] = dict(base.link) if place.opens else {}
+    end = _end(base, place)
+    bounds: Ranges = dict(base.bounds)
+    for contact in rubbing(base.model):
+        zero = _starts_at_rest(place, contact, at_rest)
+        start |= zero
+        if place.number:
+            link |= dict.fromkeys(zero)
+        end = _end_of(place, contact, end)
+        bounds |= _inside(problem, place, contact, limited)
+        if contact.name in released:
+            jumps = _jumps(base.model, modes, contact.name, limited)
+            start[f"{contact.name}_pull"] = (PULL if jumps else 0.0, None)
+    signals = {*model.signals, *model.further}
+    return replace(
+        base,
+        model=model,
+        T=_duration(problem, place, shortest),
+        start=_only(start, signals),
+        end=_only(end, signals),
+        via={},
+        bounds=_only(bounds, signals),
+        link=_only(link, signals),
+        joins=base.joins if place.opens else (),
+        cost=base.cost if place.closes or base.cost is None else replace(base.cost, end=()),
+        p=_only(base.p, {v.name for v in model.p}),
+        name="",
+    )
+
+
+def _breaks_away(place: Place, name: str, at_rest: Sequence[str]) -> bool:
+    """Whether the contact slips from the start of this arc on, and did not slip that way before."""
+    mode = place.arc.modes[name]
+    if not mode:
+        return False
+    return place.before[name] != mode if name in place.before else (
+        not place.number and name in at_rest
+    )  # fmt: skip
+
+
+def _starts_at_rest(place: Place, contact: Contact, at_rest: Sequence[str]) -> Ranges:
+    """The state that carries the slip, zero at the start of a rest and where the mode changes."""
+    name, state = contact.name, _state(place, contact)
+    mode = place.arc.modes[name]
+    was = place.before.get(name)
+    begins = mode == 0 and (was is not None or (not place.number and name in at_rest))
+    changes = was is not None and was != mode
+    return {state: 0.0} if state and (begins or changes) else {}
+
+
+def _end(base: Phase, place: Place) -> Ranges:
+    """What the user asks for at the end of this arc: that of the phase, or of a via point."""
+    if place.closes:
+        return dict(base.end)
+    return dict(base.via[sorted(base.via)[place.leg.part]]) if place.ends else {}
+
+
+def _end_of(place: Place, contact: Contact, end: Ranges) -> Ranges:
+    """`end` with slip = 0 where slipping ends, and without it where rest implies it."""
+    name, state = contact.name, _state(place, contact)
+    mode, then = place.arc.modes[name], place.after.get(contact.name)
+    if mode and then is not None and then != mode:
+        return end | {state or f"{name}_slip": 0.0}
+    return end if mode else {n: r for n, r in end.items() if n != state}
+
+
+def _inside(problem: Problem, place: Place, contact: Contact, limited: Collection[str]) -> Ranges:
+    """The side of slipping, or the room of a rest, over the whole arc."""
+    name, mode = contact.name, place.arc.modes[contact.name]
+    if not mode:
+        side = place.leaves[name]
+        model = problem.chain[place.leg.phase].model
+        tight = side and not _jumps(model, {**place.arc.modes, name: side}, name, limited)
+        away = {1: f"{name}_up", -1: f"{name}_down"}
+        return {row: (0.0 if tight and sign == side else GRIP, None) for sign, row in away.items()}
+    found = carrier(problem.chain[place.leg.phase].model, contact)
+    if found is None:
+        return {f"{name}_slip": (-SIGN, None) if mode > 0 else (None, SIGN)}
+    state, factor = found
+    half = (0.0, inf) if mode * factor > 0 else (-inf, 0.0)
+    return {state: meet(problem.spans[place.leg.phase].box(state), half)}
+
+
+def _state(place: Place, contact: Contact) -> str | None:
+    """The state that carries the slip of a contact, if there is one."""
+    found = carrier(place.model, contact)
+    return None if found is None else found[0]
+
+
+def _jumps(model: Model, modes: Mapping[str, int], name: str, limited: Collection[str]) -> bool:
+    """Whether the force that holds a contact follows an input that may jump."""
+    inputs = stacked(v.symbol for v in model.u if v.name not in limited)
+    return ca.depends_on(excess(model, modes, name), inputs)
+
+
+def _duration(problem: Problem, place: Place, shortest: float) -> float | Free:
+    """A duration of its own; that of the phase where it is all of that."""
+    T = problem.chain[place.leg.phase].T
+    if place.opens and place.closes:
+        return T
+    most = T.upper if isinstance(T, Free) else T
+    guess = min(max(place.arc.duration, 2 * shortest), most)
+    return Free(shortest, most, guess)
+
+
+def _durations(problem: Problem, legs: Sequence[Leg]) -> tuple[Duration, ...]:
+    """What the durations of the arcs add up to: those of legs, and what the user asks for."""
+    first = 0
+    found: list[Duration] = []
+    of_phase: dict[int, list[int]] = {}
+    for leg in legs:
+        numbers = list(range(first, first + len(leg.arcs)))
+        first += len(leg.arcs)
+        of_phase.setdefault(leg.phase, []).extend(numbers)
+        phase = problem.chain[leg.phase]
+        if isinstance(phase.T, Free):
+            if len(numbers) > 1:
+                found.append((numbers, Free(phase.T.lower, phase.T.upper)))
+        elif len(numbers) > 1 or phase.via:
+            fractions = [0.0, *sorted(phase.via), 1.0]
+            share = fractions[leg.part + 1] - fractions[leg.part]
+            found.append((numbers, share * phase.T))
+    for phases, total in problem.durations:
+        found.append(([n for phase in phases for n in of_phase[phase]], total))
+    return tuple(found)
+
+
+def _only(given: Mapping[str, Value], names: Collection[str]) -> dict[str, Value]:
+    """What is `given` for these names."""
+    return {name: value for name, value in given.items() if name in names}

@@ -1,0 +1,253 @@
+"""Sequences of modes: who slips which way and who rests, and from when to when.
+
+A contact slips forwards (+1), rests (0) or slips backwards (-1). A `Run` is the time it spends in
+one of these, a `Track` its runs in order. Where several contacts meet, a motion is a row of
+`Arc`s between the instants at which any of them changes; instants that the user has set, ends
+of phases and via points, bound the `Leg`s, inside which durations are free.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SAME_INSTANT = 1e-9
+"""Part of the whole duration below which two instants are one."""
+
+
+@final
+@dataclass(frozen=True)
+class Run:
+    """A contact in one mode from `begin` to `end` [s]: +1 and -1 slip, 0 rest."""
+
+    mode: int
+    begin: float
+    end: float
+
+
+@final
+@dataclass(frozen=True)
+class Track:
+    """The runs of one contact, without gaps; the contact may exist for a part of the motion."""
+
+    contact: str
+    runs: tuple[Run, ...]
+
+    def at(self, t: float) -> int | None:
+        """The mode at a time; None where there is no such contact then."""
+        return next((run.mode for run in self.runs if run.begin <= t <= run.end), None)
+
+
+@final
+@dataclass(frozen=True)
+class Arc:
+    """All contacts keep their modes from `begin` to `end` [s]; modes by the name of the contact."""
+
+    modes: Mapping[str, int]
+    begin: float
+    end: float
+
+    @property
+    def duration(self) -> float:
+        """How long it lasts [s]."""
+        return self.end - self.begin
+
+
+@final
+@dataclass(frozen=True)
+class Leg:
+    """Arcs between two instants that the user has set.
+
+    Attributes:
+        phase: number of the user's phase.
+        part: how many of its via points lie before.
+        arcs: in order; their durations add up to that of the leg.
+    """
+
+    phase: int
+    part: int
+    arcs: tuple[Arc, ...]
+
+    @property
+    def duration(self) -> float:
+        """Sum of the durations [s]."""
+        return self.arcs[-1].end - self.arcs[0].begin
+
+
+def read(contact: str, t: Array, slip: Array, creep: float, shortest: float) -> Track:
+    """The track of one contact from its sliding velocities.
+
+    Args:
+        t, slip: times [s], and sliding velocities there, shape (n,).
+        creep: slower than this it rests: a smooth law creeps under load.
+        shortest: runs shorter than this [s] belong to their neighbours.
+    """
+    modes = np.where(np.abs(slip) < creep, 0, np.sign(slip)).astype(int)
+    first = np.flatnonzero(np.append(True, np.diff(modes) != 0))
+    last = np.append(first[1:] - 1, t.size - 1)
+    runs = [Run(int(modes[a]), float(t[a]), float(t[b])) for a, b in zip(first, last, strict=True)]
+    long = [run for run in runs if run.end - run.begin >= shortest]
+    kept = list(_merged(long or [max(runs, key=lambda run: run.end - run.begin)]))
+    middles = [(a.end + b.begin) / 2 for a, b in pairwise(kept)]
+    bounds = [float(t[0]), *middles, float(t[-1])]
+    return Track(
+        contact,
+        tuple(Run(run.mode, a, b) for run, (a, b) in zip(kept, pairwise(bounds), strict=True)),
+    )
+
+
+def with_rests(
+    track: Track,
+    can_rest: Callable[[float], bool],
+    width: float,
+    ends: tuple[bool, bool] = (True, True),
+) -> Track:
+    """`track` with a rest of about `width` [s] at every reversal, and where asked at its ends.
+
+    One that is not needed shrinks when the durations are chosen, and is pruned; one that is
+    missing cannot grow.
+
+    Args:
+        can_rest: whether some control can hold the contact at a time: a rest that nothing can hold
+            would leave the program without a solution.
+        ends: whether the contact is at rest at the start and at the end.
+    """
+    runs: list[Run] = []
+    for run in track.runs:
+        if runs and runs[-1].mode * run.mode < 0 and can_rest(run.begin):
+            half = min(width, run.end - run.begin, runs[-1].end - runs[-1].begin) / 2
+            runs[-1] = replace(runs[-1], end=run.begin - half)
+            runs.append(Run(0, run.begin - half, run.begin + half))
+            run = replace(run, begin=run.begin + half)
+        runs.append(run)
+    first, last = runs[0], runs[-1]
+    if ends[0] and first.mode and can_rest(first.begin):
+        after = first.begin + min(width, first.end - first.begin) / 2
+        runs[0:1] = [Run(0, first.begin, after), replace(first, begin=after)]
+    last = runs[-1]
+    if ends[1] and last.mode and can_rest(last.end):
+        before = last.end - min(width, last.end - last.begin) / 2
+        runs[-1:] = [replace(last, end=before), Run(0, before, last.end)]
+    return replace(track, runs=tuple(runs))
+
+
+def cut(tracks: Sequence[Track], leg: tuple[int, int], begin: float, end: float) -> Leg:
+    """The leg (phase, part) from `begin` to `end`: cut where any contact changes its mode."""
+    inside = {run.end for track in tracks for run in track.runs if begin < run.end < end}
+    near = SAME_INSTANT * (end - begin)
+    times = [begin]
+    times += [t for t in sorted(inside) if t - begin > near and end - t > near]
+    arcs: list[Arc] = []
+    for a, b in pairwise([*times, end]):
+        found = {track.contact: track.at((a + b) / 2) for track in tracks}
+        modes = {name: mode for name, mode in found.items() if mode is not None}
+        arcs.append(Arc(modes, a, b))
+    return Leg(*leg, tuple(arcs))
+
+
+def placed(legs: Sequence[Leg], durations: Sequence[float]) -> tuple[Leg, ...]:
+    """`legs` with other durations of their arcs, one after the other from the same start."""
+    times = iter(durations)
+    t = legs[0].arcs[0].begin
+    found: list[Leg] = []
+    for leg in legs:
+        arcs: list[Arc] = []
+        for arc in leg.arcs:
+            begin, t = t, t + next(times)
+            arcs.append(replace(arc, begin=begin, end=t))
+        found.append(replace(leg, arcs=tuple(arcs)))
+    return tuple(found)
+
+
+def pruned(legs: Sequence[Leg], shortest: float) -> tuple[Leg, ...]:
+    """`legs` without the arcs that are not longer than `shortest` [s].
+
+    Neighbours that now are alike become one; the last arc of a leg stays whatever it is.
+    """
+    return tuple(_without(leg, shortest) for leg in legs)
+
+
+def count(legs: Sequence[Leg]) -> int:
+    """Number of arcs."""
+    return sum(len(leg.arcs) for leg in legs)
+
+
+def flat(legs: Sequence[Leg]) -> tuple[Arc, ...]:
+    """All arcs in order."""
+    return tuple(arc for leg in legs for arc in leg.arcs)
+
+
+def inserted(
+    legs: Sequence[Leg], number: int, contact: str, mode: int, begin: float, end: float
+) -> tuple[Leg, ...]:
+    """`legs` with the `contact` in another mode from `begin` to `end` inside arc `number`."""
+    found: list[Leg] = []
+    seen = 0
+    for leg in legs:
+        arcs: list[Arc] = []
+        for arc in leg.arcs:
+            if seen == number:
+                a, b = max(begin, arc.begin), min(end, arc.end)
+                other = Arc({**arc.modes, contact: mode}, a, b)
+                parts = (replace(arc, end=a), other, replace(arc, begin=b))
+                arcs += [part for part in parts if part.end > part.begin]
+            else:
+                arcs.append(arc)
+            seen += 1
+        found.append(replace(leg, arcs=tuple(arcs)))
+    return tuple(found)
+
+
+def tracks_of(legs: Sequence[Leg]) -> dict[str, tuple[Run, ...]]:
+    """Contact -> its runs, over all legs."""
+    found: dict[str, list[Run]] = {}
+    for arc in flat(legs):
+        for contact, mode in arc.modes.items():
+            found.setdefault(contact, []).append(Run(mode, arc.begin, arc.end))
+    return {contact: tuple(_merged(runs)) for contact, runs in found.items()}
+
+
+def shown(legs: Sequence[Leg]) -> str:
+    """The sequence in short, such as "0+0- | -0": legs apart, contacts of a arc in brackets."""
+
+    def sign(modes: Mapping[str, int]) -> str:
+        signs = "".join("-0+"[mode + 1] for mode in modes.values())
+        return signs if len(modes) == 1 else f"({signs})"
+
+    return " | ".join("".join(sign(s.modes) for s in leg.arcs) for leg in legs)
+
+
+def _merged(runs: Sequence[Run]) -> Iterator[Run]:
+    """Runs of which no neighbours are alike."""
+    held: Run | None = None
+    for run in runs:
+        if held is not None and held.mode == run.mode:
+            held = replace(held, end=run.end)
+            continue
+        if held is not None:
+            yield held
+        held = run
+    if held is not None:
+        yield held
+
+
+def _without(leg: Leg, shortest: float) -> Leg:
+    begin, end = leg.arcs[0].begin, leg.arcs[-1].end
+    kept = [s for s in leg.arcs if s.duration > shortest]
+    kept = kept or [max(leg.arcs, key=lambda s: s.duration)]
+    merged: list[Arc] = []
+    for arc in kept:
+        if merged and merged[-1].modes == arc.modes:
+            merged[-1] = replace(merged[-1], end=arc.end)
+        else:
+            merged.append(arc)
+    starts = [begin, *(s.begin for s in merged[1:]), end]
+    fitted = [
+        replace(s, begin=a, end=b) for s, (a, b) in zip(merged, pairwise(starts), strict=True)
+    ]
+    return replace(leg, arcs=tuple(fitted))
