@@ -57,10 +57,7 @@ def sentence(
         named = (not_finite(program, seen.w, values, at) for seen in tried)
         return f"{said} {next(filter(None, named), TRIED)}"
     if watch.cycles:
-        said += (
-            " The last iterations go round without getting better, as they do at a kink: look for "
-            "one that is smoothed over a very small width."
-        )
+        said += " The last iterations go round without getting better, as they do at a kink."
     return f"{said} {worst(program, point, at)}"
 
 

@@ -41,18 +41,6 @@ def lagrangian(program: Program) -> ca.Function:
     )
 
 
-def hessian(program: Program) -> ca.Function:
-    """(x, p, lam_f, lam_g) -> whole Hessian of lam_f f + lam_g' g, for SQP."""
-    symbols = _symbols(program)
-    return ca.Function(
-        "nlp_hess_l",
-        symbols,
-        [symmetric(program.hessian(*symbols))],
-        list(MULTIPLIERS),
-        ["hess_gamma_x_x"],
-    )
-
-
 def both(program: Program) -> ca.Function:
     """(x, p) -> f, its gradient, g and its Jacobian, for SQP."""
     x, p = _symbols(program)[:2]

@@ -80,7 +80,7 @@ class Fatrop:
                 "nlp_hess_l": lagrangian(program),
             },
         }
-        return made("Fatrop", program, self.options, common), hook
+        return Built(made("Fatrop", program, self.options, common), hook)
 
 
 def _read(stats: Mapping[str, Any]) -> tuple[str, Status]:

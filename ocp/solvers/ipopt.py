@@ -83,7 +83,7 @@ class Ipopt:
             "iteration_callback": hook,
         }
         common |= {f"ipopt.{name}": value for name, value in own.items()}
-        return made("Ipopt", program, self.options, common), hook
+        return Built(made("Ipopt", program, self.options, common), hook)
 
 
 def _read(stats: Mapping[str, Any]) -> tuple[str, Status]:

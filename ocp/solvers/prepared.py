@@ -19,7 +19,21 @@ from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
 Option = str | float | int
-Built = tuple[ca.Function, Hook]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Built:
+    """A CasADi solver and the hook through which it is watched.
+
+    Attributes:
+        kept: callbacks that CasADi uses and does not keep alive itself.
+    """
+
+    function: ca.Function
+    hook: Hook
+    kept: tuple[ca.Callback, ...] = ()
+
 
 PLUGINS = {"Ipopt": "ipopt", "Fatrop": "fatrop", "Sqp": "sqpmethod"}
 """Solver -> what CasADi calls it."""
@@ -137,7 +151,7 @@ class Prepared:
         if _equations(program) > program.w.numel():
             built = begin  # no solver takes it
         else:
-            built_in = self._of(warm)
+            solver = self._of(warm)
             built = perf_counter()
             arguments = {
                 "x0": w,
@@ -149,7 +163,7 @@ class Prepared:
                 "lam_x0": start.lam_w,
                 "lam_g0": start.lam_g,
             }
-            result, answer, status = self._called(*built_in, watch, arguments)
+            result, answer, status = self._called(solver, watch, arguments)
         if watch.halt is not None:
             status = Status.TIME_LIMIT if watch.halt is Halt.TIME else Status.INTERRUPTED
         elif not status.ok and watch.last is not None and not watch.last.finite:
@@ -166,23 +180,23 @@ class Prepared:
         )
 
     def _called(
-        self, function: ca.Function, hook: Hook, watch: Watch, arguments: Mapping[str, Array]
+        self, solver: Built, watch: Watch, arguments: Mapping[str, Array]
     ) -> tuple[Mapping[str, ca.DM] | None, str, Status]:
         """What the solver returns, its answer and what that means."""
-        hook.watch = watch
+        solver.hook.watch = watch
         try:
             with interrupts(watch):
-                result = function(**arguments)
+                result = solver.function(**arguments)
         except RuntimeError as error:  # some look at their options and structure only now
             reason = reason_of(error)
             if "option" in reason.lower():
                 raise refused_options(self.solver, self.options, reason) from None
             return None, reason, Status.SOLVER_FAILED
         finally:
-            hook.watch = None
+            solver.hook.watch = None
         if watch.error is not None and not isinstance(watch.error, Exception):
             raise watch.error
-        answer, status = self.read(function.stats())
+        answer, status = self.read(solver.function.stats())
         if answer == "Invalid_Option":
             raise refused_options(
                 self.solver, self.options, "they do not go together, or need a missing library"

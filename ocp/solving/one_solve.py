@@ -16,6 +16,7 @@ from ocp.solvers.ipopt import Ipopt
 from ocp.solvers.outcome import Outcome, Report
 from ocp.solvers.prepared import Prepared
 from ocp.solvers.sqp import Sqp
+from ocp.solving.kinks import narrow_widths
 from ocp.solving.starts import Start, start_of
 from ocp.text.problem import Problem
 from ocp.transcription.grid import make_meshes
@@ -24,6 +25,7 @@ from ocp.transcription.program import Place
 from ocp.transcription.schemes import Radau, Scheme
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription
+from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
 
@@ -101,7 +103,7 @@ def solution_of(transcription: Transcription, outcome: Outcome) -> Solution:
     return Solution(
         problem=problem,
         status=outcome.status,
-        message=f"ocp '{problem.name}': {outcome.sentence}",
+        message=_message(transcription, outcome, points),
         cost=outcome.cost,
         motions=motions_of(transcription, points),
         chosen=dict(points.chosen),
@@ -112,6 +114,14 @@ def solution_of(transcription: Transcription, outcome: Outcome) -> Solution:
         iterate=outcome.iterate,
         cause=outcome.cause,
     )
+
+
+def _message(transcription: Transcription, outcome: Outcome, points: Points) -> str:
+    """The sentence of the solver, and the friction that may have stopped it."""
+    said = f"ocp '{transcription.problem.name}': {outcome.sentence}"
+    stuck = outcome.status in (Status.MAX_ITERATIONS, Status.NO_STEP) or outcome.cycles
+    kinks = narrow_widths(transcription, points) if stuck and not outcome.status.ok else ""
+    return f"{said} {kinks}".rstrip()
 
 
 def motions_of(transcription: Transcription, points: Points) -> tuple[Motion, ...]:
