@@ -88,21 +88,25 @@ class Cost:
             raise ValueError("cost: expected a divisor that is not zero, got 0")
         return self * (1.0 / weight)
 
-    def expressions(self, model: Model) -> tuple[ca.SX, ca.SX]:
+    def expressions(self, model: Model, signals: Signals | None = None) -> tuple[ca.SX, ca.SX]:
         """Integrand, squares included, and end value in the symbols of `model`, (1, 1) each.
+
+        `signals` are those of the model, where somebody wants to know what was asked of them.
 
         Raises:
             ValueError: a name the model does not have, or an expression that is not scalar.
         """
-        signals = Signals(model)
+        signals = Signals(model) if signals is None else signals
         running = _total(self.running, signals)
-        for weight, residual in self.residuals(model):
+        for weight, residual in self.residuals(model, signals):
             running += weight * residual**2
         return running, _total(self.end, signals)
 
-    def residuals(self, model: Model) -> tuple[tuple[float, ca.SX], ...]:
+    def residuals(
+        self, model: Model, signals: Signals | None = None
+    ) -> tuple[tuple[float, ca.SX], ...]:
         """(weight, residual) of the squares in the symbols of `model`."""
-        signals = Signals(model)
+        signals = Signals(model) if signals is None else signals
         return tuple((weight, value_of(term, signals)) for weight, term in self.squares)
 
 

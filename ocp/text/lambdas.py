@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True, eq=False)
 class Written:
-    """Everything of one phase that was written as a function; see `Span`."""
+    """Everything of one phase that was written as a function; see `Span`.
+
+    `details` are names of those results of a mechanism that costs and path conditions ask for.
+    """
 
     running: ca.SX
     end: ca.SX
@@ -30,6 +33,7 @@ class Written:
     path: tuple[Row, ...]
     links: tuple[Link, ...]
     joins: tuple[Join, ...]
+    details: tuple[str, ...]
 
 
 def written(
@@ -43,9 +47,10 @@ def written(
         if before is not None:
             links = tuple(_links(setting, before, tell))
             joins = tuple(_joins(setting, before, tell))
-        path = tuple(_path(problem, setting, tell))
-        costs = _costs(setting, last=setting is settings[-1], tell=tell)
-        found.append(Written(*costs, path, links, joins))
+        signals = Signals(setting.model)
+        path = tuple(_path(problem, setting, signals, tell))
+        costs = _costs(setting, signals, last=setting is settings[-1], tell=tell)
+        found.append(Written(*costs, path, links, joins, signals()))
         before = setting.model
     _missing_paths(problem.path, settings, tell)
     return tuple(found)
@@ -61,7 +66,7 @@ def gathered(tell: list[str], where: str) -> Generator[None]:
 
 
 def _costs(
-    setting: Setting, *, last: bool, tell: list[str]
+    setting: Setting, signals: Signals, *, last: bool, tell: list[str]
 ) -> tuple[ca.SX, ca.SX, tuple[tuple[float, ca.SX], ...]]:
     """Integrand, end value and squares of what the problem and the phase ask for."""
     running, end = ca.SX(0), ca.SX(0)
@@ -71,14 +76,14 @@ def _costs(
         kept = cost if own or last else replace(cost, end=())
         with gathered(tell, setting.where + "cost: "):
             try:
-                L, E = kept.expressions(setting.model)
+                L, E = kept.expressions(setting.model, signals)
             except MissingError as error:
                 alone = own or not setting.where
                 hint = "" if alone else "; phases that differ have costs of their own: cost=..."
                 raise ValueError(f"{error}{hint}") from None
             _known_only(ca.vertcat(L, E), setting.model)
             running, end = running + L, end + E
-            squares += kept.residuals(setting.model)
+            squares += kept.residuals(setting.model, signals)
     return running, end, tuple(squares)
 
 
@@ -92,7 +97,7 @@ def _symbols(model: Model) -> ca.SX:
     return ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
 
 
-def _path(problem: "Problem", setting: Setting, tell: list[str]) -> Iterator[Row]:
+def _path(problem: "Problem", setting: Setting, signals: Signals, tell: list[str]) -> Iterator[Row]:
     """Path conditions of the problem, where the names exist, and of the phase."""
     model, own = setting.model, tuple(setting.phase.path)
     changing = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
@@ -101,7 +106,7 @@ def _path(problem: "Problem", setting: Setting, tell: list[str]) -> Iterator[Row
             label = called_so("path condition", number, condition)
             with gathered(tell, f"{setting.where}{label}: "):
                 try:
-                    rows = comparisons(condition, Signals(model))
+                    rows = comparisons(condition, signals)
                 except MissingError:
                     if everywhere:
                         continue  # `_missing_paths` asks whether any phase has the names

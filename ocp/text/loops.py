@@ -5,8 +5,8 @@ from collections.abc import Collection, Mapping
 import casadi as ca
 import numpy as np
 
-from ocp.text.span import Array, Row, Span
-from symfric.model import Model, Variables
+from ocp.text.span import Array, Span
+from symfric.model import Model
 
 ROUNDS = 50
 CLOSED = 1e-11
@@ -21,9 +21,10 @@ def has_loops(model: Model) -> bool:
 def following_loops(
     model: Model, open_states: Collection[str], values: Mapping[str, float]
 ) -> tuple[str, ...]:
-    """Coordinates and rates that follow from loops by equations, as some start in a range.
+    """Coordinates and rates that are open at the start, as some of them start in a range.
 
-    Where coordinates do and all rates are zero, these close the loops as they are.
+    The constraints, which hold at every node, say where. Where only coordinates start in a range
+    and all rates are zero, these stay zero.
     """
     mechanics = model.holonomic
     n = 0 if mechanics is None else mechanics.n
@@ -33,26 +34,6 @@ def following_loops(
     resting = not set(qd) & set(open_states) and not any(values[name] for name in qd)
     timed = mechanics is not None and ca.depends_on(mechanics.phi, model.t)
     return tuple(q) if resting and not timed else (*q, *qd)
-
-
-def loop_rows(model: Model, moving: Collection[str]) -> tuple[Row, ...]:
-    """phi(q, t) = 0, and its rate, as conditions on those of the states that are `moving`."""
-    if not moving:
-        return ()
-    phi, phi_dot = _defects(model)
-    levels = [("positions", phi)]
-    if any(v.name in moving for v in _rates(model)):
-        levels.append(("velocities", phi_dot))
-    return tuple(
-        Row(f"constraint {i + 1} of the {what}", row, 0.0, 0.0)
-        for what, column in levels
-        for i, row in enumerate(ca.vertsplit(column))
-    )
-
-
-def _rates(model: Model) -> Variables:
-    n = 0 if model.holonomic is None else model.holonomic.n
-    return model.x[n : 2 * n]
 
 
 def _defects(model: Model) -> tuple[ca.SX, ca.SX]:

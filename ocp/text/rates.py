@@ -1,10 +1,10 @@
-"""Models whose inputs are states with a rate, and models with further parameters.
+"""Models whose inputs are states with a rate, and models with further parameters and outputs.
 
-Both are pure: Model -> Model, with the same symbols and names, so that a cost, a bound or an output
+All are pure: Model -> Model, with the same symbols and names, so that a cost, a bound or an output
 written for the one holds for the other. The same request to the same model gives the same object.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -13,7 +13,7 @@ import casadi as ca
 
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import symbols_of
-from symfric.model import Model
+from symfric.model import Model, Output
 
 
 def rate_name(name: str) -> str:
@@ -94,3 +94,31 @@ def with_parameters(model: Model, units: Mapping[str, str]) -> Model:
 
 def _open_with_parameters(model: Model, units: Mapping[str, str]) -> Model:
     return with_parameters(model.open, units)
+
+
+def with_outputs(model: Model, names: Iterable[str]) -> Model:
+    """`model` with some of its details as outputs, which solutions and simulations then show."""
+    asked = tuple(name for name in dict.fromkeys(names) if name not in model.signals)
+    if not asked:
+        return model
+    kept = model.memory.setdefault("ocp outputs", {})
+    if asked not in kept:
+        shown = {name: model.further[name] for name in asked}
+        changes: dict[str, Any] = {
+            "outputs": {**model.outputs, **shown},
+            "details": partial(_details_without, model, asked),
+        }
+        if model.contacts:
+            changes["opening"] = partial(_open_with_outputs, model, asked)
+        if model.holonomic is not None:
+            changes |= {"ode": None, "alg": ca.SX(0, 1)}
+        kept[asked] = replace(model, **changes)
+    return kept[asked]
+
+
+def _details_without(model: Model, names: Collection[str]) -> dict[str, Output]:
+    return {name: output for name, output in model.further.items() if name not in names}
+
+
+def _open_with_outputs(model: Model, names: Iterable[str]) -> Model:
+    return with_outputs(model.open, names)

@@ -11,6 +11,7 @@ import numpy as np
 from ocp.text.choice import Choice, chosen_of
 from ocp.text.lambdas import Written, gathered, written
 from ocp.text.ranges import FREE, Box, Free, as_box, fixed, meet
+from ocp.text.rates import with_outputs
 from ocp.text.settings import Setting, settings_of
 from ocp.text.span import Link, Row, Span
 from ocp.text.starts import start_of
@@ -77,12 +78,14 @@ def box_of(setting: Setting, name: str) -> Box:
 
 def _span(setting: Setting, text: Written, chosen: Sequence[Choice]) -> Span:
     """All of a span but what depends on numbers of parameters."""
-    model, phase = setting.model, setting.phase
+    phase = setting.phase
+    given = {0.0: phase.start, **{float(s): phase.via[s] for s in phase.via}, 1.0: phase.end}
+    given = dict(sorted(given.items()))
+    named = (*setting.bounds, *(name for at in given.values() for name in at))
+    model = with_outputs(setting.model, (*named, *text.details))
     boxes = {
         v.name: box_of(setting, v.name) for group in (model.x, model.z, model.u) for v in group
     }
-    given = {0.0: phase.start, **{float(s): phase.via[s] for s in phase.via}, 1.0: phase.end}
-    given = dict(sorted(given.items()))
     parameters = {v.name for v in model.p}
     return Span(
         name=phase.name or f"phase {setting.number + 1}",

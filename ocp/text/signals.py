@@ -1,6 +1,6 @@
 """What lambdas of a problem are given: the symbols of a model by name."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import final
 
 import casadi as ca
@@ -23,14 +23,24 @@ class Signals:
     outputs, and the details of a mechanism, which are written out when one is asked for.
     """
 
-    def __init__(self, model: Model, symbols: Mapping[str, ca.SX] | None = None) -> None:
+    def __init__(
+        self,
+        model: Model,
+        symbols: Mapping[str, ca.SX] | None = None,
+        put: Callable[[ca.SX], ca.SX] | None = None,
+    ) -> None:
+        """`symbols` are others than those of the model; `put` brings expressions into them."""
         self._model = model
         self._symbols = known_symbols(model) if symbols is None else symbols
+        self._put = put
+        self._details: dict[str, ca.SX] = {}
 
     def __getitem__(self, name: str) -> ca.SX:
         known = self._symbols
         if name not in known and name in self._model.further:
-            return ca.SX(self._model.further[name].expression)
+            expression = ca.SX(self._model.further[name].expression)
+            self._details[name] = expression if self._put is None else self._put(expression)
+            return self._details[name]
         try:
             check_names(f"signals of '{self._model.name}'", [name], known)
         except ValueError as error:
@@ -41,6 +51,10 @@ class Signals:
         if name.startswith("_"):
             raise AttributeError(name)
         return self[name]
+
+    def __call__(self) -> tuple[str, ...]:
+        """Names of the details that were asked for."""
+        return tuple(self._details)
 
 
 def known_symbols(model: Model) -> dict[str, ca.SX]:
@@ -57,4 +71,8 @@ def fresh_symbols(model: Model, mark: str) -> tuple[list[ca.SX], Signals]:
     known = known_symbols(model)
     values = ca.Function("signals", own, [stacked(known.values())])(*new)
     rows = ca.vertsplit(ca.SX(values))
-    return new, Signals(model, dict(zip(known, rows, strict=True)))
+
+    def put(expression: ca.SX) -> ca.SX:
+        return ca.substitute(expression, ca.vertcat(*own), ca.vertcat(*new))
+
+    return new, Signals(model, dict(zip(known, rows, strict=True)), put)

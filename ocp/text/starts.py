@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import casadi as ca
 
-from ocp.text.loops import closed, following_loops, has_loops, loop_rows
+from ocp.text.loops import closed, following_loops, has_loops
 from ocp.text.ranges import FREE, Box, as_box, fixed, meet
 from ocp.text.rates import rate_name
 from ocp.text.settings import Setting
@@ -39,10 +39,8 @@ def start_of(
     numbers = {name: box[0] if fixed(box) else 0.0 for name, box in named.items()}
     values = dict(zip(named_of(model), model.initial_state(numbers, p).tolist(), strict=True))
     following = _following(span, named)
-    closing: tuple[Row, ...] = ()
     if has_loops(model):
         moving = following_loops(model, {*loose, *following}, values)
-        closing = loop_rows(model, moving)
         values = closed(span, values, named) if not moving else values
         named = {name: FREE for name in moving} | named
     boxes: dict[str, Box] = {}
@@ -57,7 +55,7 @@ def start_of(
         Row(f"the start of {name}", symbols[name] - ca.substitute(start, known, there), 0.0, 0.0)
         for name, start in following.items()
     ]
-    return boxes, (*rows, *closing)
+    return boxes, tuple(rows)
 
 
 def named_of(model: Model) -> list[str]:

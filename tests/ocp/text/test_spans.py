@@ -1,3 +1,4 @@
+from dataclasses import replace
 from math import inf
 
 import casadi as ca
@@ -5,12 +6,14 @@ import numpy as np
 import pytest
 from motions import double_integrator, stage
 
-from ocp.text.cost import TIME, effort, integral
+from ocp.text.cost import TIME, at_end, effort, integral
 from ocp.text.phase import Phase
 from ocp.text.problem import Problem
 from ocp.text.ranges import FREE, Free
+from ocp.text.signals import Signals
 from ocp.text.span import Row, Span
-from symfric import LuGre, drive
+from symfric import BrownMcPhee, LuGre, drive
+from symfric.scenes import PendulumBox
 
 EFFORT = integral(lambda s: s.a**2)
 MODEL = double_integrator(a_max=2.0)
@@ -160,3 +163,29 @@ def test_scenarios_repeat_the_spans_with_their_numbers() -> None:
     )
     assert problem.kind == "mean"
     assert problem.shared_inputs == ("force",)
+
+
+def test_details_that_are_asked_for_are_outputs_of_the_span() -> None:
+    """Solutions and simulations then show them."""
+    model = PendulumBox(BrownMcPhee(), phi_0=0.0).model()
+    phase = Phase(
+        model,
+        1.0,
+        end={"pendulum_x": 0.1},
+        path=[lambda s: s.pendulum_z <= 0.0],
+        bounds={"box_vx": (-1.0, 1.0)},
+        cost=at_end(lambda s: s.box_x),
+    )
+    span, after = Problem(phase >> replace(phase, cost=None, joins=[rises])).spans
+    asked = {"pendulum_x", "pendulum_z", "box_vx", "box_x"}
+    assert asked <= span.model.outputs.keys()
+    assert not asked & (model.outputs.keys() | span.model.further.keys())
+    assert span.model.further
+    assert [row.name for row in span.rows_at[1.0]] == ["pendulum_x at the end"]
+    (join,) = after.joins
+    zero = [0.0, [0.0] * len(model.x), [0.0] * len(model.z), [], []]
+    assert float(join.function(*zero, *zero)) == 0.0
+
+
+def rises(before: Signals, after: Signals) -> object:
+    return after.pendulum_z >= before.pendulum_z
