@@ -41,6 +41,10 @@ PULL = 1e-3
 """Share of the static level by which a control that jumps exceeds it: held exactly there, a smooth
 law of any width would stay on its peak."""
 
+LEVEL = -1e-6
+"""What is allowed on that side: at its end the rest is at its level, which the condition of
+breaking away says already, and two conditions would depend on each other."""
+
 SIGN = 1e-7
 """Sliding velocity by which one that is no state may have the wrong sign: at the ends of slipping,
 where it is zero, two conditions would depend on each other."""
@@ -208,8 +212,7 @@ def _phase(
         end = _end_of(place, contact, end)
         bounds |= _inside(problem, place, contact, limited)
         if contact.name in released:
-            jumps = _jumps(base.model, modes, contact.name, limited)
-            start[f"{contact.name}_pull"] = (PULL if jumps else 0.0, None)
+            start[f"{contact.name}_pull"] = _pull(place, contact.name, limited)
     signals = {*model.signals, *model.further}
     return replace(
         base,
@@ -235,6 +238,18 @@ def _breaks_away(place: Place, name: str, at_rest: Sequence[str]) -> bool:
     return place.before[name] != mode if name in place.before else (
         not place.number and name in at_rest
     )  # fmt: skip
+
+
+def _pull(place: Place, name: str, limited: Collection[str]) -> Range:
+    """How far the force that would hold a contact exceeds its static level when it breaks away.
+
+    One that cannot jump was below it until then: it reaches the level exactly.
+    """
+    modes = place.arc.modes
+    if _jumps(place.model, modes, name, limited):
+        return (PULL, None)
+    alone = all(modes[other] == mode for other, mode in place.before.items() if other != name)
+    return 0.0 if alone and place.before.get(name) == 0 else (0.0, None)
 
 
 def _starts_at_rest(place: Place, contact: Contact, at_rest: Sequence[str]) -> Ranges:
@@ -271,7 +286,9 @@ def _inside(problem: Problem, place: Place, contact: Contact, limited: Collectio
         model = problem.chain[place.leg.phase].model
         tight = side and not _jumps(model, {**place.arc.modes, name: side}, name, limited)
         away = {1: f"{name}_up", -1: f"{name}_down"}
-        return {row: (0.0 if tight and sign == side else GRIP, None) for sign, row in away.items()}
+        return {
+            row: (LEVEL if tight and sign == side else GRIP, None) for sign, row in away.items()
+        }
     found = carrier(problem.chain[place.leg.phase].model, contact)
     if found is None:
         return {f"{name}_slip": (-SIGN, None) if mode > 0 else (None, SIGN)}

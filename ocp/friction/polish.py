@@ -9,36 +9,32 @@ unknowns, so that a solver finds them to its full precision, on few intervals:
 2. solve the problem of mode models with free durations (`ocp.friction.arcs`);
 3. prune arcs that have shrunk to nothing, repair the sequence where the motion presses against the
    bounds of its modes (`ocp.friction.repair`), and solve again from there;
-4. halve the intervals until controls that are constant on each are fine enough.
+4. refine the intervals until holding the controls on each of them costs next to nothing.
 
 The result holds for exact Coulomb friction with stiction, the limit of smooth laws.
 Source: Betts, Practical Methods for Optimal Control, 2nd ed., 2010, 3.7 (phases); Bryson and Ho,
 Applied Optimal Control, 1975, 3.7 (conditions at instants that are free).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import final
+from collections.abc import Callable, Iterator, Mapping
+from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ocp.friction.arcs import in_arcs
-from ocp.friction.carry import Known, points_in
+from ocp.checking.arcs import arcs_of
+from ocp.checking.local_errors import local_errors
+from ocp.checking.refine import MeshErrors, refined
+from ocp.friction.carry import Known
 from ocp.friction.reading import Reading, sequence_of, sizes_of, starts_at_rest
-from ocp.friction.sequence import Leg, flat, placed, pruned, shown
+from ocp.friction.repair import neighbours, rests_inside
+from ocp.friction.sequence import Leg, pruned, shown
+from ocp.friction.solved import Polisher, Solved
 from ocp.friction.whole import whole_solution
-from ocp.result.motion import motion_of
 from ocp.result.solution import Solution
 from ocp.solvers.ipopt import Ipopt
-from ocp.solvers.outcome import Iterate, Outcome, Report, in_stage
+from ocp.solvers.outcome import Report
 from ocp.text.problem import Problem
-from ocp.transcription.points import Points
 from ocp.transcription.schemes import Radau, Scheme
-from ocp.transcription.transcribe import discretise
-from ocp.transcription.transcription import Transcription
-
-Array = NDArray[np.float64]
 
 CREEP = (3.0, 1.0, 10.0)
 """Multiples of the width below which a contact counts as resting: the first that leads to a
@@ -53,97 +49,26 @@ GONE = 2.0
 ROUNDS = 4
 """How often the sequence may be changed."""
 
-CLOSE = {"constr_mult_init_max": 1e8}
-"""Options of a start that is nearly a solution: estimated multipliers are kept however large they
-are. Ipopt sets those above 1e3 to zero, and then loses the way from the solution on another mesh:
-cart and pendulum, twice as many intervals, 9 iterations instead of more than 100."""
+NEW_ARC = 5e-3
+"""Share of the whole duration that an arc has where it is tried."""
 
-FINE = 3e-4
-"""Share of the cost that halving all intervals may still gain."""
+WORTH = 1e-4
+"""Share of the cost by which another sequence must be better: more than the estimate of what
+holding the inputs costs on few intervals is wrong by."""
 
+FINE = 2e-4
+"""Share of the cost that holding the inputs over the intervals may cost."""
+
+LOCAL = 1e-7
+"""Largest local error of an interval, relative."""
+
+HALVED = 4.0
+"""Multiple of the largest local error that has an interval halved, of order 5."""
+
+LEAST_INTERVALS = 40
 MOST = 2000
-"""Intervals beyond which none is halved."""
 
-
-@final
-@dataclass(frozen=True, eq=False)
-class Solved:
-    """A sequence with the durations that were found for it."""
-
-    legs: tuple[Leg, ...]
-    transcription: Transcription
-    outcome: Outcome
-
-    @property
-    def points(self) -> Points:
-        """The motion of all arcs."""
-        return self.transcription.unpack(self.outcome.iterate.w)
-
-    @property
-    def known(self) -> Known:
-        """The motion, to start from."""
-        t, points = self.transcription, self.points
-        spans = list(enumerate(t.problem.spans))
-        scheme = t.scheme.coefficients()
-        motion = motion_of("", spans, points.spans, t.meshes, scheme, points.chosen)
-        p = {v.name: float(x) for s in t.problem.spans for v, x in zip(s.model.p, s.p, strict=True)}
-        return Known(motion, p | dict(points.chosen), points.chosen)
-
-    @property
-    def ok(self) -> bool:
-        """Whether this is a solution."""
-        return self.outcome.status.ok
-
-    @property
-    def intervals(self) -> int:
-        """Their number."""
-        return sum(mesh.size - 1 for mesh in self.transcription.meshes)
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Polisher:
-    """What all sequences of one problem share.
-
-    Attributes:
-        problem: the user's.
-        sizes: contact -> typical static level [N].
-        at_rest: contacts that are at rest at the start.
-        solver, scheme, progress: as in `polish`.
-        shortest: least duration of an arc [s].
-    """
-
-    problem: Problem
-    sizes: Mapping[str, float]
-    at_rest: Sequence[str]
-    solver: Ipopt
-    scheme: Scheme
-    shortest: float
-    progress: Report | None
-
-    def solve(self, legs: Sequence[Leg], known: Known, intervals: int, barrier: float) -> Solved:
-        """Find the durations and the motion of a sequence.
-
-        Args:
-            legs: the sequence, where to look for `known`.
-            known: a motion to start from.
-            intervals: about how many.
-            barrier: parameter of the interior-point method to start with: small from close by.
-        """
-        problem = in_arcs(self.problem, legs, self.sizes, self.at_rest, self.shortest)
-        whole = sum(leg.duration for leg in legs)
-        parts = [max(3, round(intervals * arc.duration / whole)) for arc in flat(legs)]
-        meshes = [np.linspace(0.0, 1.0, n + 1) for n in parts]
-        transcription = discretise(problem, self.scheme).on(meshes)
-        start = transcription.pack(points_in(transcription, flat(legs), known))
-        prepared = self.solver.with_options(mu_init=barrier, **CLOSE).prepared(
-            transcription.program
-        )
-        stage = in_stage(self.progress, f"modes {shown(legs)}")
-        rows = transcription.program.g.numel()
-        outcome = prepared.run(Iterate.cold(start, rows), progress=stage)
-        durations = [span.T for span in transcription.unpack(outcome.iterate.w).spans]
-        return Solved(placed(legs, durations), transcription, outcome)
+Keep = Callable[[Solved], Solved]
 
 
 def polish(
@@ -179,7 +104,22 @@ def polish(
     if reason := refusal(problem):
         raise ValueError(f"polish: {reason}")
     known = Known(smooth.motions[0], parameters_of(problem, smooth.chosen), smooth.chosen)
-    whole = smooth.motions[0].T
+    N = max(LEAST_INTERVALS, smooth.motions[0].t_control.size // 2)
+    return polished(problem, known, widths, N, solver=solver, scheme=scheme, progress=progress)
+
+
+def polished(
+    problem: Problem,
+    known: Known,
+    widths: Mapping[str, float],
+    intervals: int,
+    *,
+    solver: Ipopt | None = None,
+    scheme: Scheme | None = None,
+    progress: Report | None = None,
+) -> Solution:
+    """`polish` from a motion that may come from anywhere, on about so many intervals at first."""
+    whole = known.motion.T
     polisher = Polisher(
         problem,
         sizes_of(problem, known),
@@ -189,16 +129,21 @@ def polish(
         SHORTEST * whole,
         progress,
     )
-    N = max(40, smooth.motions[0].t_control.size // 2)
     tried: list[Solved] = []
-    for solved in _first(polisher, known, widths, N):
+
+    def keep(solved: Solved) -> Solved:
         tried.append(solved)
-        if solved.ok:
-            tried += _settled(polisher, solved, N)
-            tried += _fine(polisher, tried[-1])
+        return solved
+
+    best: Solved | None = None
+    for legs in _readings(problem, known, widths):
+        first = keep(polisher.solve(legs, known, intervals, 1e-2))
+        if first.ok:
+            best = _settled(polisher, first, keep)
+            best = _better(polisher, best, NEW_ARC * whole, keep)
+            best = _fine(polisher, best, keep)
             break
-    best = next((s for s in reversed(tried) if s.ok), tried[-1])
-    return whole_solution(problem, best, [s.outcome.statistics for s in tried])
+    return whole_solution(problem, best or tried[0], [s.outcome.statistics for s in tried])
 
 
 def refusal(problem: Problem) -> str:
@@ -223,46 +168,83 @@ def parameters_of(problem: Problem, chosen: Mapping[str, float]) -> dict[str, fl
     return found | dict(chosen)
 
 
-def _first(
-    polisher: Polisher, known: Known, widths: Mapping[str, float], intervals: int
-) -> Iterator[Solved]:
-    """Solutions for readings of the sharpened motion, the most likely one first."""
+def _readings(
+    problem: Problem, known: Known, widths: Mapping[str, float]
+) -> Iterator[tuple[Leg, ...]]:
+    """Sequences that the motion may be read as, the most likely one first."""
     seen: set[str] = set()
     for rests in (True, False):
         for factor in CREEP:
             creep = {name: factor * width for name, width in widths.items()}
-            legs = sequence_of(polisher.problem, known, Reading(creep, rests))
+            legs = sequence_of(problem, known, Reading(creep, rests))
             if shown(legs) not in seen:
                 seen.add(shown(legs))
-                yield polisher.solve(legs, known, intervals, 1e-2)
+                yield legs
 
 
-def _settled(polisher: Polisher, solved: Solved, intervals: int) -> list[Solved]:
-    """Solutions with superfluous arcs pruned, the best one last."""
-    tried: list[Solved] = []
+def _settled(polisher: Polisher, solved: Solved, keep: Keep) -> Solved:
+    """Without superfluous arcs, and with rests where contacts touch zero as they slip."""
+    seen = {shown(solved.legs)}
     for _ in range(ROUNDS):
         legs = pruned(solved.legs, GONE * polisher.shortest)
         if shown(legs) == shown(solved.legs):
+            legs = rests_inside(solved) or legs
+        if shown(legs) in seen:
             break
-        better = polisher.solve(legs, solved.known, intervals, 1e-3)
-        tried.append(better)
-        if not better.ok:
-            tried.append(solved)
+        seen.add(shown(legs))
+        changed = keep(polisher.solve(legs, solved.known, solved.intervals, 1e-3))
+        if not changed.ok:
             break
-        solved = better
-    return tried
+        solved = changed
+    return solved
 
 
-def _fine(polisher: Polisher, solved: Solved) -> list[Solved]:
-    """Solutions on halved intervals, until that gains little: controls held are of order two."""
-    tried: list[Solved] = []
-    while 2 * solved.intervals <= MOST:
-        finer = polisher.solve(solved.legs, solved.known, 2 * solved.intervals, 1e-4)
-        tried.append(finer)
+def _better(polisher: Polisher, solved: Solved, width: float, keep: Keep) -> Solved:
+    """The best of the sequence and of those next to it."""
+    seen = {shown(solved.legs)}
+    for _ in range(ROUNDS):
+        for legs in neighbours(solved.legs, width):
+            if shown(legs) in seen:
+                continue
+            seen.add(shown(legs))
+            other = keep(polisher.solve(legs, solved.known, solved.intervals, 1e-3))
+            left = pruned(other.legs, GONE * polisher.shortest)
+            if not other.ok or shown(left) in seen - {shown(legs)}:
+                continue
+            other = _settled(polisher, other, keep)
+            if other.ideal_cost < solved.ideal_cost - WORTH * abs(solved.ideal_cost):
+                solved = other
+                break
+        else:
+            break
+    return solved
+
+
+def _fine(polisher: Polisher, solved: Solved, keep: Keep) -> Solved:
+    """On intervals so short that holding the inputs costs next to nothing.
+
+    What that costs is estimated, well enough where two meshes agree on the cost without it. As long
+    as they do not, all intervals are halved.
+    """
+    before = inf
+    for _ in range(ROUNDS):
+        t, allowed = solved.transcription, FINE * abs(solved.outcome.cost)
+        local = local_errors(arcs_of(t.problem, t.meshes, solved.points))
+        agree = abs(solved.ideal_cost - before) <= allowed
+        exact = max(float(own.max()) for own in local) <= LOCAL
+        if agree and exact and solved.loss <= allowed:
+            break
+        least = 0.0 if agree else HALVED * LOCAL
+        errors = [
+            MeshErrors(np.maximum(own, least), loss)
+            for own, loss in zip(local, solved.losses, strict=True)
+        ]
+        meshes = refined(
+            t.meshes, errors, [()] * len(errors), local=LOCAL, loss=allowed / 2, most=MOST
+        )
+        finer = keep(polisher.on(solved.legs, solved.discretisation, meshes, solved.known, 1e-4))
         if not finer.ok:
             break
-        gain = (solved.outcome.cost - finer.outcome.cost) / 3
-        solved = finer
-        if abs(gain) <= FINE * abs(solved.outcome.cost):
-            break
-    return tried
+        before = solved.ideal_cost
+        solved = _settled(polisher, finer, keep)
+    return solved

@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ocp.friction.sequence import Leg, shown, tracks_of
+from ocp.friction.solved import Solved
 from ocp.result.motion import Motion, motion_of
 from ocp.result.solution import Mode, Solution
 from ocp.solvers.outcome import Iterate, SolverStatistics
@@ -16,16 +16,13 @@ from ocp.text.span import Span
 from ocp.transcription.points import Points, SpanPoints
 from symfric.foundation.parameters import Variable
 
-if TYPE_CHECKING:
-    from ocp.friction.polish import Solved
-
 Array = NDArray[np.float64]
 
 KINDS = {1: "slip+", 0: "stick", -1: "slip-"}
 
 
 def whole_solution(
-    problem: Problem, solved: "Solved", statistics: Sequence[SolverStatistics]
+    problem: Problem, solved: Solved, statistics: Sequence[SolverStatistics]
 ) -> Solution:
     """The solution of `problem` that the arcs of `solved` are.
 
@@ -64,7 +61,7 @@ def modes_of(legs: Sequence[Leg]) -> dict[str, tuple[Mode, ...]]:
     }
 
 
-def _joined(problem: Problem, solved: "Solved") -> tuple[Points, tuple[Array, ...]]:
+def _joined(problem: Problem, solved: Solved) -> tuple[Points, tuple[Array, ...]]:
     """Points and meshes of the user's phases."""
     t, points = solved.transcription, solved.points
     arcs = list(zip(t.problem.spans, points.spans, t.meshes, strict=True))

@@ -1,0 +1,141 @@
+"""A sequence of modes solved: its durations, its motion."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ocp.checking.holding import holding_losses
+from ocp.friction.arcs import in_arcs
+from ocp.friction.carry import Known, points_in
+from ocp.friction.sequence import Leg, flat, placed, shown
+from ocp.result.motion import motion_of
+from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.outcome import Iterate, Outcome, Report, in_stage
+from ocp.text.problem import Problem
+from ocp.transcription.points import Points
+from ocp.transcription.schemes import Scheme
+from ocp.transcription.transcribe import Discretisation, discretise
+from ocp.transcription.transcription import Transcription
+
+Array = NDArray[np.float64]
+
+LEAST = 3
+"""Intervals of the shortest arc."""
+
+CLOSE = {"constr_mult_init_max": 1e8}
+"""Options of a start that is nearly a solution: estimated multipliers are kept however large they
+are. Ipopt sets those above 1e3 to zero, and loses the way from the solution on another mesh:
+cart-pendulum, twice as many intervals, 9 iterations instead of more than 100."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A sequence with the durations that were found for it."""
+
+    legs: tuple[Leg, ...]
+    discretisation: Discretisation
+    transcription: Transcription
+    outcome: Outcome
+
+    @cached_property
+    def points(self) -> Points:
+        """The motion of all arcs."""
+        return self.transcription.unpack(self.outcome.iterate.w)
+
+    @cached_property
+    def known(self) -> Known:
+        """The motion, to start from."""
+        t, points = self.transcription, self.points
+        spans = list(enumerate(t.problem.spans))
+        scheme = t.scheme.coefficients()
+        motion = motion_of("", spans, points.spans, t.meshes, scheme, points.chosen)
+        p = {v.name: float(x) for s in t.problem.spans for v, x in zip(s.model.p, s.p, strict=True)}
+        return Known(motion, p | dict(points.chosen), points.chosen)
+
+    @cached_property
+    def losses(self) -> tuple[Array, ...]:
+        """What holding the inputs costs in each interval."""
+        iterate = self.outcome.iterate
+        return holding_losses(self.transcription, iterate.w, iterate.lam_g)
+
+    @property
+    def loss(self) -> float:
+        """The same over all intervals."""
+        return sum(float(loss.sum()) for loss in self.losses)
+
+    @property
+    def ideal_cost(self) -> float:
+        """J of inputs that need not be held: compares sequences on different meshes."""
+        return self.outcome.cost - self.loss
+
+    @property
+    def ok(self) -> bool:
+        """Whether this is a solution."""
+        return self.outcome.status.ok
+
+    @property
+    def intervals(self) -> int:
+        """Their number."""
+        return sum(mesh.size - 1 for mesh in self.transcription.meshes)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Polisher:
+    """What all sequences of one problem share.
+
+    Attributes:
+        problem: the user's.
+        sizes: contact -> typical static level [N].
+        at_rest: contacts that are at rest at the start.
+        solver, scheme, progress: as in `polish`.
+        shortest: least duration of an arc [s].
+    """
+
+    problem: Problem
+    sizes: Mapping[str, float]
+    at_rest: Sequence[str]
+    solver: Ipopt
+    scheme: Scheme
+    shortest: float
+    progress: Report | None
+
+    def solve(self, legs: Sequence[Leg], known: Known, intervals: int, barrier: float) -> Solved:
+        """Find the durations and the motion of a sequence.
+
+        Args:
+            legs: the sequence, where to look for `known`.
+            known: a motion to start from.
+            intervals: about how many, all of a length.
+            barrier: parameter of the interior-point method to start with: small from close by.
+        """
+        problem = in_arcs(self.problem, legs, self.sizes, self.at_rest, self.shortest)
+        whole = sum(leg.duration for leg in legs)
+        parts = [max(LEAST, round(intervals * arc.duration / whole)) for arc in flat(legs)]
+        meshes = [np.linspace(0.0, 1.0, n + 1) for n in parts]
+        return self.on(legs, discretise(problem, self.scheme), meshes, known, barrier)
+
+    def on(
+        self,
+        legs: Sequence[Leg],
+        discretisation: Discretisation,
+        meshes: Sequence[Array],
+        known: Known,
+        barrier: float,
+    ) -> Solved:
+        """The same on given meshes."""
+        transcription = discretisation.on(meshes)
+        start = transcription.pack(points_in(transcription, flat(legs), known))
+        prepared = self.solver.with_options(mu_init=barrier, **CLOSE).prepared(
+            transcription.program
+        )
+        stage = in_stage(self.progress, f"modes {shown(legs)}")
+        rows = transcription.program.g.numel()
+        outcome = prepared.run(Iterate.cold(start, rows), progress=stage)
+        durations = [span.T for span in transcription.unpack(outcome.iterate.w).spans]
+        return Solved(placed(legs, durations), discretisation, transcription, outcome)
