@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import casadi as ca
 
-from symfric import Law, Model, Output, Variable
+from symfric import Contact, Law, Model, Output, Variable
 from symfric.scenes.base import contact
 
 
@@ -40,3 +40,22 @@ def through(points: Sequence[float], leg: float) -> Callable[[ca.SX], ca.SX]:
         return v
 
     return velocity
+
+
+def blocks(law: Law) -> Model:
+    """Two blocks on the ground behind each other, coupled by a spring, the first one pushed."""
+    names = ("x1", "x2", "v1", "v2")
+    x1, x2, v1, v2 = (Variable(n, "m" if n[0] == "x" else "m/s") for n in names)
+    force = Variable("force", "N")
+    K = 50.0 * (x1.symbol - x2.symbol)
+    one = Contact("one", v1.symbol, 20.0, law, given={"F_e": force.symbol - K}, rest={"v1": 0.0})
+    two = Contact("two", v2.symbol, 10.0, law, given={"F_e": K}, rest={"v2": 0.0})
+    return Model(
+        "blocks",
+        x=(x1, x2, v1, v2),
+        u=(force,),
+        ode=ca.vertcat(
+            v1.symbol, v2.symbol, (force.symbol - K - one.force) / 2.0, K - two.force
+        ),
+        contacts=(one, two),
+    )  # fmt: skip

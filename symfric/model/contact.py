@@ -239,7 +239,8 @@ def with_forces(
         forces: contact -> force [N] opposing its slip, in the symbols of the model, of `p` and of
             `z`; those of other contacts may stand in it.
         p, z: what parameters and algebraic variables come with them. A width of a contact stays a
-            parameter if it is in `p`, else it is its number.
+            parameter if it is in `p`, else it is its number. In a mechanism `z` are forces that
+            hold it somehow, and stand next to its multipliers.
         alg: as many more algebraic equations as `z`; in a mechanism they may be written with the
             accelerations `holonomic.a`.
         monitors: what error control watches of these contacts.
@@ -262,11 +263,18 @@ def with_forces(
     inputs = {c.variable.name for c in contacts}
     own = {v.name for c in contacts for v in c.widths.values()}
     changes: dict[str, Any] = put.explicit(bare)
+    columns = (*bare.z, *z)
     if bare.holonomic is not None:
         mechanics = bare.holonomic
+        known = put(mechanics.implicit)
+        # forces that hold stand next to the multipliers, their equations next to the constraints
+        count = mechanics.phi.numel()
+        first = mechanics.n + count
+        columns = (*bare.z[:count], *z, *bare.z[count:])
         changes["holonomic"] = replace(
             mechanics,
-            implicit=ca.vertcat(put(mechanics.implicit), rows),
+            implicit=ca.vertcat(known[:first, 0], rows, known[first:, 0]),
+            applied=mechanics.applied + len(z),
             rates=put(mechanics.rates),
             pressing=put(mechanics.pressing),
         )
@@ -277,7 +285,7 @@ def with_forces(
         bare,
         u=tuple(v for v in bare.u if v.name not in inputs),
         p=(*(v for v in bare.p if v.name not in own), *p),
-        z=(*bare.z, *z),
+        z=columns,
         **{**changes, "monitors": (*changes["monitors"], *map(put.monitor, monitors))},
     )
 

@@ -2,10 +2,10 @@
 
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from rigs import blocks
 
 from ocp.friction.mode_models import WIDTH, mode_model, smooth_model, widths
 from symfric import (
@@ -28,25 +28,6 @@ from symfric.laws import Capstan, Coulomb, LeineSwitch
 from symfric.scenes import FourBar, Pendulum, PendulumBox, Rabinowicz, SliderCrank
 
 SHARP = BrownMcPhee(mu_s=0.3, mu_d=0.2, v_t=1e-6)
-
-
-def blocks(law: Law) -> Model:
-    """Two blocks on the ground behind each other, coupled by a spring, the first one pushed."""
-    names = ("x1", "x2", "v1", "v2")
-    x1, x2, v1, v2 = (Variable(n, "m" if n[0] == "x" else "m/s") for n in names)
-    force = Variable("force", "N")
-    K = 50.0 * (x1.symbol - x2.symbol)
-    one = Contact("one", v1.symbol, 20.0, law, given={"F_e": force.symbol - K}, rest={"v1": 0.0})
-    two = Contact("two", v2.symbol, 10.0, law, given={"F_e": K}, rest={"v2": 0.0})
-    return Model(
-        "blocks",
-        x=(x1, x2, v1, v2),
-        u=(force,),
-        ode=ca.vertcat(
-            v1.symbol, v2.symbol, (force.symbol - K - one.force) / 2.0, K - two.force
-        ),
-        contacts=(one, two),
-    )  # fmt: skip
 
 
 def test_sliding_of_a_drive_has_its_closed_form() -> None:

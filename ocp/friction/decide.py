@@ -1,0 +1,325 @@
+"""Which contacts rest and which slide at an instant: Coulomb friction as a set, decided by trying.
+
+A contact that stops, or rests already, rests if it can. With the modes of all contacts the
+equations are solved, and
+
+    who rests    must hold: its reaction within the static levels of both sides; else it slides
+                 to the side that is overloaded
+    who begins to slide, must move to that side: d slip/dt >= 0 there; else it rests
+
+until nobody objects: one at a time, the most overloaded first, and each change solves everything
+again, since normal forces and what others carry change with it. If that goes round in circles all
+modes of the contacts without velocity are tried; a single consistent choice is taken, and if there
+is none, or more than one, nobody can decide.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ocp.friction.mode_models import jumps, mode_model, slip_change
+from symfric.foundation.parameters import Variable
+from symfric.foundation.status import SolveError, Status
+from symfric.foundation.symbols import at_start
+from symfric.model import Contact, Event, Model
+
+Array = NDArray[np.float64]
+Modes = dict[str, int]
+OVERLOAD = 1e-9
+"""Share of the static level at the start by which a reaction passes it before it breaks away."""
+STILL = 1e-11
+"""Sliding velocity over that of its states that counts as none."""
+TURNING = 1e-8
+"""Sliding acceleration, over the largest one, that is taken for rounding."""
+LIFTED = 1e-9
+"""Share of its friction force below minus which a normal force is negative."""
+MANY = 8
+"""Contacts without velocity whose modes are tried in all combinations, at most."""
+NEWTON_STEPS, NEWTON_TOLERANCE = 60, 1e-11
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Instant:
+    """Where a model is when its modes are decided.
+
+    Attributes:
+        t: time [s].
+        x, u, p: numbers in the order of the mode models.
+        guess: algebraic unknowns and friction forces "<contact>_F" by name.
+    """
+
+    t: float
+    x: Array
+    u: Array
+    p: Array
+    guess: Mapping[str, float]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class InModes:
+    """A model in one mode of each contact, with its functions.
+
+    Attributes:
+        model: ends where a contact that slides stops, or one that rests is overloaded.
+        modes: of the contacts.
+        unknowns: (t, x, z, u, p) -> residual of the algebraic equations, and its slopes by z.
+        look: (t, x, z, u, p) -> for each contact room above, room below, d slip/dt, F, N.
+    """
+
+    model: Model
+    modes: Modes
+    unknowns: ca.Function
+    look: ca.Function
+
+
+@final
+class Machine:
+    """A model whose contacts are told apart by modes; one object for each choice of modes."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.contacts: tuple[Contact, ...] = tuple(c for c in model.contacts if jumps(model, c))
+        bare = model.open
+        if bare.events:
+            raise ValueError(
+                f"model '{model.name}': expected no events but those of contacts, got "
+                f"{', '.join(e.name for e in bare.events)}; their resets may set sliding off"
+            )
+        self._made: dict[tuple[int, ...], InModes] = {}
+        for c in self.contacts:
+            slip_change(model, c)  # refuses those that rest on an input
+        symbols = [bare.t, bare.vector("x"), model.vector("p")]
+        slips = ca.vertcat(ca.SX(0, 1), *(c.slip for c in self.contacts))
+        slopes = ca.densify(ca.jacobian(slips, bare.vector("x")))
+        self._slips = ca.Function("slips", symbols, [slips, slopes])
+        nominal = bare.nominal("x")
+        touched = ca.DM(slopes.sparsity(), 1).full() != 0
+        self.still = np.array([STILL * max(nominal[row], default=1.0) for row in touched])
+        """Sliding velocity of each contact [m/s] that counts as none."""
+
+    def within(self, modes: Modes) -> InModes:
+        """The model in these modes."""
+        key = tuple(modes[c.name] for c in self.contacts)
+        if key not in self._made:
+            self._made[key] = self._make(modes)
+        return self._made[key]
+
+    def _make(self, modes: Modes) -> InModes:
+        model = mode_model(self.model, modes)
+        symbols = [model.t, *(model.vector(letter) for letter in "xzup")]
+        x, z, rate = symbols[1], symbols[2], _rates(model)
+        rows, events, rooms = list[list[Any]](), list[Event](), dict[str, ca.SX]()
+        for c, still in zip(self.contacts, self.still, strict=True):
+            change = ca.jtimes(c.slip, x, rate) + ca.jacobian(c.slip, model.t)
+            mode = modes[c.name]
+            if mode:
+                rows.append([np.inf, np.inf, change, c.sliding(mode), c.N])
+                events.append(Event(f"{c.name}_stops", mode * c.slip + still, -1, terminal=True))
+                continue
+            F = next(v for v in model.z if v.name == f"{c.name}_reaction")
+            up, down = (model.expression(f"{c.name}_grip_{side}") for side in ("up", "down"))
+            rows.append([up, down, change, F.symbol, c.N])
+            for side, room in (("up", up), ("down", down)):
+                share = room / F.nominal
+                events.append(Event(f"{c.name}_slips_{side}", share + OVERLOAD, -1, terminal=True))
+                rooms[f"{c.name}_room_{side}"] = share
+        seen = ca.vertcat(*(ca.horzcat(*map(ca.SX, row)) for row in rows))
+        return InModes(
+            _ending(model, tuple(events), rooms),
+            dict(modes),
+            ca.Function("unknowns", symbols,
+                        [ca.densify(model.alg), ca.densify(ca.jacobian(model.alg, z))]),
+            ca.Function("look", symbols, [ca.densify(seen)]),
+        )  # fmt: skip
+
+    def slips(self, t: float, x: Array, p: Array) -> tuple[Array, Array]:
+        """Sliding velocities, shape (n,), and their slopes by the states, (n, nx)."""
+        values, slopes = self._slips(t, x, p)
+        return values.full()[:, 0], slopes.full()
+
+    def at_rest(self, t: float, x: Array, p: Array, modes: Modes) -> Array:
+        """The nearest states in which contacts at rest do not slide at all.
+
+        What rounding and the location of an event left is some 1e-11 of a velocity.
+        """
+        values, slopes = self.slips(t, x, p)
+        held = [i for i, c in enumerate(self.contacts) if not modes[c.name]]
+        if not held:
+            return x
+        return x - np.linalg.lstsq(slopes[held], values[held], rcond=None)[0]
+
+    def solved(self, modes: Modes, at: Instant) -> tuple[dict[str, float], Array]:
+        """Algebraic unknowns in these modes by name, and what `InModes.look` sees.
+
+        Raises:
+            SolveError: Newton's method does not find them.
+        """
+        made = self.within(modes)
+        names = [v.name for v in made.model.z]
+        z = np.array([_guessed(v.name, at.guess, v.start, made.model, at.p) for v in made.model.z])
+        residual, slope = (m.full() for m in made.unknowns(at.t, at.x, z, at.u, at.p))
+        size = np.maximum(np.abs(slope).max(axis=1, initial=1e-300), 1e-300)
+        scale = np.array(
+            [max(v.nominal, abs(value)) for v, value in zip(made.model.z, z, strict=True)]
+        )
+        for _ in range(NEWTON_STEPS):
+            worst = np.abs(residual[:, 0] / size).max(initial=0.0)
+            if worst <= NEWTON_TOLERANCE * max(1.0, float(np.max(scale, initial=0.0))):
+                return dict(zip(names, z, strict=True)), made.look(at.t, at.x, z, at.u, at.p).full()
+            step = np.linalg.lstsq(slope, residual[:, 0], rcond=None)[0]
+            for damping in (1.0, 0.5, 0.25, 0.1, 0.02):
+                tried = z - damping * step
+                residual, slope = (m.full() for m in made.unknowns(at.t, at.x, tried, at.u, at.p))
+                if np.abs(residual[:, 0] / size).max() < worst:
+                    break
+            z = tried
+            scale = np.maximum(scale, np.abs(z))
+        raise self.undecided(at.t, f"the reactions with modes {shown(modes)} are not found")
+
+    def room(self, modes: Modes, at: Instant) -> float:
+        """Least room of the contacts at rest over their nominal loads; below zero they slide."""
+        _, look = self.solved(modes, at)
+        sizes = {v.name: v.nominal for v in self.within(modes).model.z}
+        found = [
+            min(row[0], row[1]) / sizes[f"{c.name}_reaction"]
+            for c, row in zip(self.contacts, look, strict=True)
+            if not modes[c.name]
+        ]
+        return min(found, default=np.inf) + OVERLOAD
+
+    def undecided(self, t: float, why: str) -> SolveError:
+        """The error of one who cannot decide."""
+        return SolveError(
+            f"model '{self.model.name}' at t = {t:.9g} s: nobody can decide who rests: {why}",
+            Status.SOLVER_FAILED,
+        )
+
+
+def _ending(model: Model, events: tuple[Event, ...], rooms: Mapping[str, ca.SX]) -> Model:
+    """`model` with events, and the integrals of `rooms` as states.
+
+    Nothing depends on them. They are there for error control, which would else step over a short
+    overload of what rests: nothing moves there.
+    """
+    states = tuple(Variable(name, "s") for name in rooms)
+    changes: dict[str, Any] = {"events": events, "x": (*model.x, *states)}
+    rates = ca.vertcat(ca.SX(0, 1), *rooms.values())
+    if model.holonomic is None:
+        changes["ode"] = ca.vertcat(_rates(model), rates)
+    else:
+        mechanics = replace(model.holonomic, rates=ca.vertcat(model.holonomic.rates, rates))
+        changes |= {"holonomic": mechanics, "ode": None, "alg": ca.SX(0, 1)}
+    return replace(model, **changes)
+
+
+def _rates(model: Model) -> ca.SX:
+    return ca.SX(0, 1) if model.ode is None else model.ode
+
+
+def _guessed(name: str, guess: Mapping[str, float], start: Any, model: Model, p: Array) -> float:
+    if name in guess:
+        return guess[name]
+    if name.endswith("_reaction") and (F := f"{name.removesuffix('_reaction')}_F") in guess:
+        return guess[F]
+    return float(at_start(ca.substitute(ca.SX(start), model.vector("p"), ca.DM(p)), ()))
+
+
+def shown(modes: Modes) -> str:
+    """Modes in words."""
+    words = {1: "slip+", 0: "stick", -1: "slip-"}
+    return ", ".join(f"{name} {words[mode]}" for name, mode in modes.items())
+
+
+def decided(machine: Machine, at: Instant, modes: Modes) -> tuple[Modes, dict[str, float]]:
+    """The modes from this instant on, and unknowns and forces "<contact>_F" in them.
+
+    Args:
+        machine: the model.
+        at: the instant; contacts without velocity are told by its states.
+        modes: before it; those of contacts that stopped are 0.
+
+    Raises:
+        SolveError: nobody can decide.
+    """
+    slips = machine.slips(at.t, at.x, at.p)[0]
+    free = [c.name for c, v, still in zip(machine.contacts, slips, machine.still, strict=True)
+            if abs(v) <= still]  # fmt: skip
+    trial, seen = dict(modes), list[Modes]()
+    while trial not in seen:
+        seen.append(dict(trial))
+        found, look = machine.solved(trial, at)
+        objection = _objection(machine, trial, free, look)
+        if objection is None:
+            if lifted := _lifted(machine, look):
+                raise machine.undecided(at.t, f"with {shown(trial)} {lifted} lifts off")
+            return trial, found | _forces(machine, look)
+        name, mode = objection
+        trial[name] = mode
+    return _tried(machine, at, trial, free)
+
+
+def _forces(machine: Machine, look: Array) -> dict[str, float]:
+    return {f"{c.name}_F": float(row[3]) for c, row in zip(machine.contacts, look, strict=True)}
+
+
+def _lifted(machine: Machine, look: Array) -> str:
+    """The first contact whose normal force is negative; empty where there is none."""
+    pairs = zip(machine.contacts, look, strict=True)
+    return next((c.name for c, row in pairs if row[4] < -LIFTED * abs(row[3])), "")
+
+
+def _objection(
+    machine: Machine, modes: Modes, free: list[str], look: Array
+) -> tuple[str, int] | None:
+    """The contact whose mode cannot be, and the one it should have: the worst of them."""
+    largest = max(1e-300, float(np.abs(look[:, 2]).max(initial=0.0)))
+    found: list[tuple[float, str, int]] = []
+    for c, (up, down, change, *_) in zip(machine.contacts, look, strict=True):
+        mode = modes[c.name]
+        if not mode:
+            level = (up + down) / 2
+            slack = OVERLOAD * _size(machine, modes, c) / 2
+            excess = max(-up, -down)
+            if excess > slack:
+                found.append((2.0 + excess / max(level, slack), c.name, 1 if -up > -down else -1))
+        elif c.name in free and mode * change < -TURNING * largest:
+            found.append((-mode * change / largest, c.name, 0))
+    return max(found)[1:] if found else None
+
+
+def _size(machine: Machine, modes: Modes, contact: Contact) -> float:
+    z = machine.within(modes).model.z
+    return next(v.nominal for v in z if v.name == f"{contact.name}_reaction")
+
+
+def _tried(
+    machine: Machine, at: Instant, modes: Modes, free: list[str]
+) -> tuple[Modes, dict[str, float]]:
+    """All modes of the contacts without velocity."""
+    if len(free) > MANY:
+        raise machine.undecided(at.t, f"{len(free)} contacts without velocity change in circles")
+    fits = list(_consistent(machine, at, modes, free))
+    if len(fits) != 1:
+        what = "; ".join(shown(m) for m, _ in fits) if fits else "no choice of modes"
+        raise machine.undecided(at.t, f"{what} would do" if fits else f"{what} is consistent")
+    return fits[0]
+
+
+def _consistent(
+    machine: Machine, at: Instant, modes: Modes, free: list[str]
+) -> Iterator[tuple[Modes, dict[str, float]]]:
+    for choice in product((0, 1, -1), repeat=len(free)):
+        trial = modes | dict(zip(free, choice, strict=True))
+        try:
+            found, look = machine.solved(trial, at)
+        except SolveError:
+            continue
+        if _objection(machine, trial, free, look) is None and not _lifted(machine, look):
+            yield trial, found | _forces(machine, look)

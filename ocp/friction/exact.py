@@ -1,0 +1,358 @@
+"""The motion with exact Coulomb friction and stiction, by events: the referee of all that smooths.
+
+    slip    F = law.sliding(v, N, side)     until v = 0
+    stick   F with dv/dt = 0                until it reaches the static level of a side
+
+in pieces that end at changes of mode and where an input jumps. Each piece is a run of the model in
+its modes (`mode_models`), smooth from end to end, to a tolerance of its own; between the pieces
+`decide` says which contacts rest. No width, no penalty: what smooth laws tend to.
+
+Limits: what it cannot decide it does not (`SolveError`): several consistent motions, none (friction
+that jams), reactions without a solution. Contacts of a loop of one degree of freedom cannot rest
+together, see `mode_model`. Contacts in balls keep their laws.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ocp.friction.decide import Instant, Machine, Modes, decided
+from ocp.friction.inputs import Given, Inputs
+from ocp.result.solution import Mode
+from symfric import Trajectory, simulate
+from symfric.foundation import checks
+from symfric.foundation.status import SolveError, Status
+from symfric.foundation.symbols import symbols_of
+from symfric.integrator.equations.initial import JammedError
+from symfric.model import Model
+from symfric.model.model import check_model
+
+Array = NDArray[np.float64]
+KINDS = {1: "slip+", 0: "stick", -1: "slip-"}
+MOST = 10_000
+"""Changes of mode in a run."""
+PILED = 40
+"""Changes of mode without time between them."""
+APART = 1e-6
+"""Difference of an unknown, over its size, beyond which two solvers found two solutions."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A run in which no contact changes its mode and no input jumps."""
+
+    run: Trajectory
+    modes: Modes
+    begin: float
+    end: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class SetValued:
+    """A motion with exact Coulomb friction, as far as it was followed.
+
+    `motion["v"]` is a signal at the times `motion.t`; `motion.at(times)` has all of them anywhere:
+    what the model has but states of laws, and "<contact>_F", the friction force.
+
+    Attributes:
+        model: the user's model.
+        t: times of the result [s].
+        pieces: runs between changes of mode and of inputs.
+        status, message: how it ended.
+    """
+
+    model: Model
+    t: Array
+    pieces: tuple[Piece, ...]
+    status: Status = Status.SUCCESS
+    message: str = Status.SUCCESS.value
+    contacts: tuple[str, ...] = field(default=())
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First time and the last one reached [s]."""
+        return self.pieces[0].begin, self.pieces[-1].end
+
+    @cached_property
+    def modes(self) -> dict[str, tuple[Mode, ...]]:
+        """Contact -> what it does when."""
+        found: dict[str, tuple[Mode, ...]] = {}
+        for name in self.contacts:
+            merged: list[Mode] = []
+            for piece in self.pieces:
+                kind = KINDS[piece.modes[name]]
+                if merged and merged[-1].kind == kind:
+                    merged[-1] = Mode(kind, merged[-1].begin, piece.end)
+                else:
+                    merged.append(Mode(kind, piece.begin, piece.end))
+            found[name] = tuple(m for m in merged if m.end > m.begin)
+        return found
+
+    @cached_property
+    def last(self) -> Modes:
+        """The modes at the end, for a run that goes on from there."""
+        return dict(self.pieces[-1].modes)
+
+    @cached_property
+    def names(self) -> list[str]:
+        """Signals that all pieces have."""
+        of_laws = {v.name for c in self.model.contacts for v in c.states}
+        known = set.intersection(*(set(p.run.units) for p in self.pieces))
+        return [name for name in self.model.signals if name in known - of_laws]
+
+    @cached_property
+    def signals(self) -> dict[str, Array]:
+        """All signals at `t`."""
+        return self.at(self.t)
+
+    def __getitem__(self, name: str) -> Array:
+        if name == "t":
+            return self.t
+        checks.check_names(f"motion of '{self.model.name}'", [name], self.signals)
+        return self.signals[name]
+
+    def at(self, times: ArrayLike) -> dict[str, Array]:
+        """All signals at `times` [s]; at a change of mode those behind it."""
+        begin, end = self.span
+        at = np.atleast_1d(checks.array("at: times", times, ndim=None))
+        if at.ndim > 1 or not ((at >= begin) & (at <= end)).all():
+            raise checks.refused("at: times", f"times within {begin:g} ... {end:g} s", times)
+        found = {name: np.zeros(at.size) for name in self.names}
+        found |= {f"{name}_F": np.zeros(at.size) for name in self.contacts}
+        edges = np.array([p.begin for p in self.pieces[1:]])
+        which = np.searchsorted(edges, at, side="right")
+        for k in np.unique(which):
+            piece, here = self.pieces[k], which == k
+            values = piece.run.at(np.clip(at[here], piece.begin, piece.end))
+            for name in self.names:
+                found[name][here] = values[name]
+            for c in self.model.contacts:
+                if c.name in self.contacts:
+                    found[f"{c.name}_F"][here] = _force(piece, c.name, values, at[here], self.model)
+        return found
+
+    def final(self) -> dict[str, float]:
+        """States at the end by name, but those of laws."""
+        piece = self.pieces[-1]
+        found = piece.run.states(np.array([piece.end]))
+        return {v.name: float(found[v.name][-1]) for v in self.model.open.x}
+
+
+def _force(piece: Piece, name: str, values: Mapping[str, Array], at: Array, model: Model) -> Array:
+    mode = piece.modes[name]
+    if not mode:
+        return values[f"{name}_reaction"]
+    contact = next(c for c in model.contacts if c.name == name)
+    return piece.run.express(contact.sliding(mode), np.clip(at, piece.begin, piece.end))[0]
+
+
+def set_valued(
+    model: Model,
+    t_end: float,
+    *,
+    t_start: float = 0.0,
+    x0: Mapping[str, float] | None = None,
+    u: Mapping[str, Given] | None = None,
+    p: Mapping[str, float] | None = None,
+    modes: Mapping[str, int] | None = None,
+    rtol: float = 1e-9,
+    t_eval: ArrayLike | None = None,
+    samples: int = 2001,
+    throw: bool = True,
+) -> SetValued:
+    """The motion of `model` with the sliding forces and static levels of its laws, and no width.
+
+    Args:
+        model: with contacts; their laws say `sliding` and `static_level`.
+        t_end, t_start: span [s].
+        x0: start values of states by name; those of laws are not asked for.
+        u: inputs as for `simulate`; `Hold` and `Linear` end a piece at every sample.
+        p: values of the parameters.
+        modes: contact -> 1, 0 or -1 before the start, of contacts that do not move; they rest if
+            nobody says.
+        rtol: relative tolerance of the pieces.
+        t_eval: times of the result [s]; default `samples` equal intervals.
+        throw: raise on failure; with False what was found is returned.
+
+    Raises:
+        ValueError: bad input, a law without the two, events of the model itself.
+        SolveError: nobody can decide which contacts rest, or the engine failed; `partial` has
+            what was found.
+    """
+    check_model("set_valued", model)
+    begin = checks.number("set_valued: t_start", t_start)
+    end = checks.number("set_valued: t_end", t_end, above=begin)
+    wanted = (
+        np.linspace(begin, end, checks.count("set_valued: samples", samples, least=2))
+        if t_eval is None
+        else checks.times("set_valued: t_eval", t_eval, begin, end)
+    )
+    machine = Machine(model)
+    run = _Run(machine, Inputs(model, dict(u or {}), end), dict(p or {}), rtol)
+    state = run.start(begin, dict(x0 or {}), dict(modes or {}))
+    problem: SolveError | None = None
+    try:
+        run.go(state, end)
+    except SolveError as error:
+        problem = error
+    status, message = (
+        (problem.status, str(problem)) if problem else (Status.SUCCESS, Status.SUCCESS.value)
+    )
+    names = tuple(c.name for c in machine.contacts)
+    reached = run.pieces[-1].end if run.pieces else begin
+    made = SetValued(model, wanted[wanted <= reached], tuple(run.pieces), status, message, names)
+    if problem and throw:
+        raise SolveError(str(problem), problem.status, made if run.pieces else None)
+    return made
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _State:
+    t: float
+    x: Array
+    modes: Modes
+    guess: Mapping[str, float]
+
+
+@final
+class _Run:
+    """Piece by piece."""
+
+    def __init__(self, machine: Machine, inputs: Inputs, p: dict[str, float], rtol: float) -> None:
+        self.machine, self.inputs, self.p, self.rtol = machine, inputs, p, rtol
+        self.values = machine.model.values("p", p)
+        self.pieces: list[Piece] = []
+
+    def start(self, t: float, x0: dict[str, float], modes: dict[str, int]) -> _State:
+        """The state at the start; contacts without velocity rest if nobody says."""
+        machine, model = self.machine, self.machine.model
+        names = [c.name for c in machine.contacts]
+        checks.check_names("set_valued: modes", modes, names)
+        of_laws = {v.name for c in model.contacts for v in c.states}
+        own = {
+            v.name: float(x)
+            for v, x in zip(model.x, model.initial_state(x0, self.p), strict=True)
+            if v.name not in of_laws
+        }
+        x = np.array([own[v.name] for v in model.open.x])  # fmt: skip
+        slips = machine.slips(t, x, self.values)[0]
+        found: Modes = {}
+        for name, v, still in zip(names, slips, machine.still, strict=True):
+            found[name] = modes.get(name, 0) if abs(v) <= still else int(np.sign(v))
+        return _State(t, machine.at_rest(t, x, self.values, found), found, {})
+
+    def go(self, state: _State, end: float) -> None:
+        """All pieces up to `end`."""
+        piled = 0
+        for _ in range(MOST + self.inputs.knots.size):
+            before = state.t
+            state = self.piece(state, end)
+            if state.t >= end:
+                return
+            piled = piled + 1 if state.t - before <= 1e-12 * (end - before) else 0
+            if piled > PILED:
+                raise SolveError(
+                    f"at t = {state.t:.9g} s: {Status.EVENT_STORM.value}", Status.EVENT_STORM
+                )
+        raise SolveError(f"more than {MOST} changes of mode", Status.EVENT_STORM)
+
+    def piece(self, state: _State, end: float) -> _State:
+        """Decide, run to the next change, and see who stopped."""
+        t, machine = state.t, self.machine
+        at = Instant(t, state.x, self.inputs.at(t), self.values, state.guess)
+        modes, guess = decided(machine, at, state.modes)
+        made = machine.within(modes)
+        names = [v.name for v in machine.model.open.x]
+        x0 = dict(zip(names, state.x.tolist(), strict=True))
+        run = self._run(made.model, t, self.inputs.next(t, end), x0)
+        self._same_unknowns(run, made.model, guess, t)
+        reached = run.span[1]
+        if run.status is Status.TERMINATED:
+            reached = self._overloaded(run, modes, guess, reached)
+        self.pieces.append(Piece(run, modes, t, reached))
+        x = self._states(run, reached)
+        if made.model.z:
+            z = run.express(symbols_of(made.model.z), np.array([reached]))[:, 0]
+            guess |= dict(zip((v.name for v in made.model.z), z.tolist(), strict=True))
+        slips = machine.slips(reached, x, self.values)[0]
+        for c, v in zip(machine.contacts, slips, strict=True):
+            if modes[c.name] and modes[c.name] * v <= 0.0:
+                modes = modes | {c.name: 0}
+        return _State(reached, machine.at_rest(reached, x, self.values, modes), modes, guess)
+
+    def _run(self, model: Model, begin: float, end: float, x0: dict[str, float]) -> Trajectory:
+        try:
+            run = simulate(
+                model, end, t_start=begin, x0=x0, u=self.inputs.within(begin), p=self.p,
+                rtol=self.rtol, samples=2, throw=False,
+            )  # fmt: skip
+        except JammedError as error:
+            raise SolveError(f"at t = {begin:.9g} s: {error}", Status.JAMMED) from None
+        except ValueError as error:
+            if not self.pieces:
+                raise
+            raise SolveError(f"at t = {begin:.9g} s: {error}", Status.SOLVER_FAILED) from None
+        if not run.status.ok:
+            raise SolveError(run.message, run.status)
+        return run
+
+    def _states(self, run: Trajectory, t: float) -> Array:
+        found = run.states(np.array([t]))
+        return np.array([float(found[v.name][-1]) for v in self.machine.model.open.x])
+
+    def _overloaded(
+        self, run: Trajectory, modes: Modes, guess: Mapping[str, float], t: float
+    ) -> float:
+        """When a contact at rest reached its level [s], if that was before `t`, by regula falsi.
+
+        Between steps the engine's reactions are as smooth as its formula makes them; here the
+        algebraic equations are solved at each time.
+        """
+
+        def room(time: float) -> float:
+            x = self._states(run, time)
+            return self.machine.room(
+                modes,
+                Instant(time, x, self.inputs.within_piece(run.span[0], time), self.values, guess),
+            )
+
+        high, above = t, room(t)
+        if not above < 0.0:
+            return t
+        step = 1e-9 * (t - run.span[0])
+        low, below = t, above
+        while below < 0.0:
+            low = max(run.span[0], t - step)
+            below, step = room(low), 8.0 * step
+            if low == run.span[0] and below < 0.0:
+                return t
+        for _ in range(100):
+            middle = low + (high - low) * below / (below - above)
+            if not low < middle < high or high - low <= 1e-15 * max(1.0, abs(t)):
+                break
+            value = room(middle)
+            if value < 0.0:
+                high, above, below = middle, value, below / 2
+            else:
+                low, below, above = middle, value, above / 2
+        return high
+
+    def _same_unknowns(
+        self, run: Trajectory, model: Model, guess: Mapping[str, float], t: float
+    ) -> None:
+        """The engine solves the algebraic equations on its own: both have to find the same."""
+        if not model.z:
+            return
+        found = run.express(symbols_of(model.z), np.array([t]))[:, 0]
+        for v, value in zip(model.z, found, strict=True):
+            if abs(value - guess[v.name]) > APART * max(v.nominal, abs(value)):
+                raise self.machine.undecided(
+                    t, f"{v.name} is {guess[v.name]:.6g} or {value:.6g}: two solutions"
+                )

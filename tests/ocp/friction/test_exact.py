@@ -1,0 +1,219 @@
+"""The referee: exact Coulomb friction by modes, against the catalogue's own and closed forms."""
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from rigs import blocks
+
+from ocp.friction.exact import set_valued
+from symfric import (
+    GMS,
+    BrownMcPhee,
+    Contact,
+    ExactCoulomb,
+    Hold,
+    Linear,
+    LuGre,
+    Model,
+    Variable,
+    drive,
+    simulate,
+)
+from symfric.foundation.status import SolveError, Status
+from symfric.model import Event
+from symfric.scenes import FourBar, Pendulum, PendulumBox, Rabinowicz
+
+LAW = ExactCoulomb(mu_s=0.3, mu_d=0.2)
+
+
+def random_hold(seed: int, most: float, count: int = 16) -> Hold:
+    rng = np.random.default_rng(seed)
+    return Hold(np.linspace(0.0, 4.0, count, endpoint=False), rng.uniform(-most, most, count))
+
+
+def kinds(motion: Any, name: str) -> list[str]:
+    return [m.kind for m in motion.modes[name]]
+
+
+def same(model: Model, t_end: float, names: tuple[str, ...], **given: Any) -> Any:
+    """The motion by both, equal to 1e-8."""
+    motion = set_valued(model, t_end, rtol=1e-10, **given)
+    run = simulate(model, t_end, rtol=1e-10, atol=1e-11, **given)
+    for name in names:
+        assert_allclose(motion[name], run[name], atol=2e-8 * max(1.0, np.abs(run[name]).max()))
+    return motion
+
+
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 5))]
+)
+def test_drive_under_held_forces_moves_as_by_the_law_with_modes(seed: int) -> None:
+    law = ExactCoulomb(form="stribeck", mu_s=0.3, mu_d=0.15, v_s=0.05, sigma_2=0.2)
+    motion = same(drive(law), 4.0, ("x", "v"), u={"force": random_hold(seed, 4.0)})
+    assert "stick" in kinds(motion, "guide")
+    assert len(motion.modes["guide"]) > 6
+
+
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 8))]
+)
+def test_two_coupled_blocks_stick_and_slip_as_by_the_law_with_modes(seed: int) -> None:
+    motion = same(blocks(LAW), 4.0, ("x1", "x2", "v1", "v2"), u={"force": random_hold(seed, 15.0)})
+    assert {"slip+", "stick", "slip-"} <= {*kinds(motion, "one"), *kinds(motion, "two")}
+
+
+def test_functions_of_time_and_lines_reach_the_static_level_between_steps() -> None:
+    """Nothing moves before: the instant follows from the force alone."""
+    swing = set_valued(
+        drive(LAW, N=5.0, m=1.0), 0.5, u={"force": lambda t: 2.0 * ca.sin(ca.pi * t)}
+    )
+    first = swing.modes["guide"][0]
+    assert first.kind == "stick"
+    assert first.end == pytest.approx(np.arcsin(0.75) / np.pi, abs=1e-9)
+    line = set_valued(drive(LAW, N=5.0), 1.0, u={"force": Linear([0.0, 1.0], [0.0, -6.0])})
+    assert line.modes["guide"][0].end == pytest.approx(0.25, abs=1e-9)
+    assert kinds(line, "guide") == ["stick", "slip-"]
+
+
+def test_a_short_overload_breaks_a_contact_away() -> None:
+    """A pulse of a thousandth of the span."""
+    model = drive(LAW, N=5.0, m=1.0)
+    pulse = set_valued(model, 1.0, u={"force": lambda t: 3.0 * ca.exp(-(((t - 0.6) / 1e-3) ** 2))})
+    assert kinds(pulse, "guide") == ["stick", "slip+", "stick"]
+    half = 1e-3 * np.sqrt(np.log(2.0))
+    assert pulse.modes["guide"][0].end == pytest.approx(0.6 - half, abs=1e-9)
+
+
+def test_a_slide_ends_at_rest_after_its_way() -> None:
+    motion = set_valued(drive(LAW, N=10.0, m=2.0), 3.0, x0={"v": -1.5})
+    slide, rest = motion.modes["guide"]
+    assert (slide.kind, rest.kind) == ("slip-", "stick")
+    assert slide.end == pytest.approx(1.5, abs=1e-9)
+    assert motion["x"][-1] == pytest.approx(-1.125, rel=1e-9)
+    assert motion["v"][-1] == 0.0
+    assert motion["guide_F"][0] == -2.0
+    assert_allclose(motion["guide_F"][motion.t > 1.5], 0.0, atol=1e-12)
+
+
+def test_rest_holds_up_to_the_static_level_and_lets_go_where_the_control_jumps() -> None:
+    model = drive(LAW, N=10.0, m=1.0)
+    for top, kinds_of in ((3.0, ["stick"]), (3.0 + 1e-6, ["stick", "slip+"])):
+        u = {"force": Hold([0.0, 0.5], [2.9, top])}
+        assert kinds(set_valued(model, 1.0, u=u), "guide") == kinds_of
+
+
+def test_friction_from_reactions_moves_as_by_the_law_with_modes() -> None:
+    box = PendulumBox(LAW, phi_0=1.2, m_box=2.0).model()
+    motion = same(box, 0.6, ("x", "phi", "x_rate", "phi_rate"))
+    assert {"stick", "slip+"} <= {*kinds(motion, "x")}
+
+
+@pytest.mark.slow
+def test_a_pendulum_swings_as_by_the_law_with_modes() -> None:
+    same(Pendulum(ExactCoulomb(mu_s=0.6, mu_d=0.5)).model(), 5.0, ("phi", "phi_N"))
+
+
+def test_belt_carries_its_block_and_loses_it() -> None:
+    motion = same(Rabinowicz(LAW).model(), 15.0, ("x", "v"))
+    assert kinds(motion, "belt")[:3] == ["slip-", "stick", "slip-"]
+    assert motion.modes["belt"][1].end == pytest.approx(
+        motion.modes["belt"][1].begin
+        + (0.3 * 0.8 * 9.81 / 2.1 - float(motion.at(motion.modes["belt"][1].begin)["x"][0])) / 0.1,
+        abs=1e-6,
+    )
+
+
+@pytest.mark.parametrize("name", ["drive", "box"])
+def test_smooth_laws_tend_to_it_at_first_order(name: str) -> None:
+    """A tenth of v_t, a tenth of the distance; with a static level where nothing is on edge."""
+    law = BrownMcPhee(mu_s=0.25, mu_d=0.2)
+    if name == "drive":
+        model = drive(law, N=5.0, m=1.0, free=["v_t"])
+        given: dict[str, Any] = {"u": {"force": Hold([0.0, 0.6, 1.0], [3.0, -3.0, 0.5])}}
+        end, signal = 1.6, "x"
+    else:
+        model = PendulumBox(law, phi_0=1.2, m_box=2.0).model(free=["v_t"])
+        given, end, signal = {}, 0.5, "phi"
+    exact = set_valued(model, end, **given)[signal][-1]
+    far: list[float] = []
+    for v_t in (1e-4, 1e-5, 1e-6):
+        p = {v.name: v_t for v in model.p}
+        run = simulate(model, end, p=p, rtol=1e-10, atol=1e-12, **given)
+        far.append(abs(run[signal][-1] - exact))
+    assert_allclose(np.divide(far[:-1], far[1:]), 10.0, rtol=0.15)
+
+
+@pytest.mark.parametrize("law", [GMS(mu_s=0.3, mu_d=0.2, sigma_2=0.3), LuGre(mu_s=0.3, mu_d=0.2)])
+def test_dynamic_laws_are_judged_by_their_sliding_force_and_level(law: Any) -> None:
+    """A force far beyond: the same as the dynamic law itself, but for its pre-sliding."""
+    model = drive(law, N=10.0, m=1.0)
+    motion, run = (f(model, 1.0, u={"force": 8.0}) for f in (set_valued, simulate))
+    assert "guide_z" not in motion.signals
+    assert motion["v"][-1] == pytest.approx(run["v"][-1], rel=1e-3)
+
+
+def test_a_run_goes_on_from_where_another_ended() -> None:
+    model, u = blocks(LAW), {"force": random_hold(5, 15.0)}
+    whole = set_valued(model, 1.5, u=u)
+    first = set_valued(model, 0.7, u=u)
+    rest = set_valued(model, 1.5, t_start=0.7, x0=first.final(), modes=first.last, u=u)
+    assert_allclose(rest["x2"][-1], whole["x2"][-1], atol=1e-9)
+
+
+def test_results_by_name_and_at_any_time() -> None:
+    motion = set_valued(blocks(LAW), 1.0, u={"force": 9.0}, samples=11)
+    assert motion.t.size == 11
+    at = motion.at([0.0, 0.35])
+    assert_allclose(at["one_F"][0], 4.0)
+    assert_allclose(at["two_F"][0], 50.0 * at["x1"][0], atol=1e-9)
+    assert set(motion.signals) == {"x1", "x2", "v1", "v2", "force", "one_F", "two_F"}
+    assert motion.span == (0.0, 1.0)
+    with pytest.raises(ValueError, match=r"at: times: expected times within 0 ... 1 s, got 2"):
+        motion.at(2.0)
+    with pytest.raises(ValueError, match=r"motion of 'blocks'.*got x3"):
+        motion["x3"]
+
+
+def jamming(share: float) -> Model:
+    """A load that its own friction presses: N = 10 + share F."""
+    x, v, N = Variable("x", "m"), Variable("v", "m/s"), Variable("N", "N", start=10.0)
+    u = Variable("force", "N")
+    c = Contact("guide", v.symbol, N.symbol, ExactCoulomb(mu_s=0.5, mu_d=0.5),
+                given={"F_e": u.symbol}, rest={"v": 0.0})  # fmt: skip
+    return Model("jam", x=(x, v), z=(N,), u=(u,), ode=ca.vertcat(v.symbol, u.symbol - c.force),
+                 alg=N.symbol - 10.0 - share * c.force, contacts=(c,))  # fmt: skip
+
+
+def test_what_nobody_can_decide_is_said() -> None:
+    held = set_valued(jamming(1.0), 1.0, u={"force": 9.0})
+    assert kinds(held, "guide") == ["stick"]
+    assert held["N"][-1] == pytest.approx(19.0)
+    loose = set_valued(jamming(1.0), 1.0, u={"force": 11.0})
+    assert loose["v"][-1] == pytest.approx(1.0, rel=1e-6)
+    assert kinds(set_valued(jamming(3.0), 1.0, u={"force": 90.0}), "guide") == ["stick"]
+    with pytest.raises(SolveError, match=r"nobody can decide who rests: .* guide lifts off") as one:
+        set_valued(jamming(3.0), 1.0, x0={"v": 1.0})
+    assert one.value.status is Status.SOLVER_FAILED
+    partial = set_valued(jamming(3.0), 1.0, x0={"v": -1.0}, throw=False)
+    assert partial.status.ok
+
+
+def test_bad_questions_are_refused() -> None:
+    model = drive(LAW)
+    bar = FourBar(LAW).model()
+    watched = Model("own", x=model.x[:1], ode=ca.SX(0.0), events=(Event("e", model.x[0].symbol),))
+    cases: list[tuple[Any, str]] = [
+        (lambda: set_valued(model, 0.0), "set_valued: t_end: expected"),
+        (lambda: set_valued(model, 1.0, modes={"belt": 0}), "modes: expected .*got belt"),
+        (lambda: set_valued(model, 1.0, u={"push": 0.0}), "got push"),
+        (lambda: set_valued(model, 1.0, u={"force": "1"}), "u: force: expected a"),
+        (lambda: set_valued(watched, 1.0), "expected no events but those of contacts, got e"),
+        (lambda: set_valued(bar, 1.0), "at rest together"),
+        (lambda: set_valued(LAW, 1.0), "set_valued: expected a model"),  # type: ignore[arg-type]
+    ]
+    for call, message in cases:
+        with pytest.raises(ValueError, match=message):
+            call()
