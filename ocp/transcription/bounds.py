@@ -63,7 +63,7 @@ def _bound(
     model, d = span.model, scheme.degree
     states = [v.name for v in model.x]
     open_end = scheme.meets_end and d > 0
-    inner = own.inner.reshape(-1, own.intervals, d)[:, :, : d - 1 if open_end else d]
+    inner = own.inner.reshape(len(states), own.intervals, d)[:, :, : d - 1 if open_end else d]
     for side, bound in enumerate(sides):
 
         def of(names: Sequence[str], boxes: Mapping[str, Box], side: int = side) -> Array:

@@ -112,16 +112,24 @@ class Closing:
             "theta": data.theta(interval, one, zero),
         }
 
-    def pieces(self, layout: Layout, data: Data, nodes: Mapping[float, int]) -> list[Piece]:
-        """Constraints at the nodes, on both levels."""
+    def pieces(
+        self, layout: Layout, data: Data, nodes: Mapping[float, int], everywhere: bool
+    ) -> list[Piece]:
+        """Constraints at the nodes, on both levels; at the first one unless `everywhere`.
+
+        The steps of an integrator end on the constraints.
+        """
         number = self.local.number
         own = layout.spans[number]
         found: list[Piece] = []
         for level, what in enumerate(("loop", "rate of loop")):
             dropped = {nodes[at] for at, known in self.known.items() if not known[level].asked}
-            at = np.array([k for k in range(own.intervals + 1) if k not in dropped])
+            every = range(own.intervals + 1 if everywhere else 1)
+            at = np.array([k for k in every if k not in dropped], dtype=np.int64)
+            if not at.size:
+                continue
             interval, offset = np.maximum(at - 1, 0), np.minimum(at, 1).astype(float)
-            z = own.z[:, :1][:, np.zeros(at.size, np.int64)]
+            z = np.tile(own.z[:, :1], (1, at.size))  # not in the constraints
             parts = self.local.columns(layout, own.nodes[:, at], z, own.u[:, interval], at.size)
             zeros = np.zeros(self.m)
             found.append(

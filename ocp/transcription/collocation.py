@@ -196,7 +196,7 @@ def _carrying(layout: Layout, number: int, interval: Indices) -> Indices:
     """Columns of the states that carry the polynomial of each `interval`, (nx, d + 1, places)."""
     span = layout.spans[number]
     d = span.degree
-    inner = span.inner.reshape(-1, span.intervals, d)[:, interval]
+    inner = span.inner.reshape(span.inner.shape[0], span.intervals, d)[:, interval]
     return np.concatenate([span.nodes[:, interval, None], inner], axis=2).transpose(0, 2, 1)
 
 

@@ -79,7 +79,7 @@ def columns_at(
     span, d = layout.spans[local.number], scheme.degree
     interval, offset = (0, 0.0) if node == 0 else (node - 1, 1.0)
     x: Columns = span.nodes[:, [node]]
-    z: Columns = span.z[:, :1]
+    z: Columns = span.z[:, :1]  # under shooting nobody asks
     if node and d:
         points = slice(interval * d, node * d)
         z = _sum(span.z[:, points], scheme.inner_ends)

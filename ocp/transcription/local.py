@@ -37,12 +37,14 @@ class Local:
         span: what it is about.
         before: numbers and spans of the same scenario before it.
         choices: names of all parameters that are chosen in the problem, and their magnitudes.
+        inner: whether there are collocation points, and algebraic variables with them.
     """
 
     number: int
     span: Span
     before: tuple[tuple[int, Span], ...]
     choices: Mapping[str, float]
+    inner: bool = True
     x: ca.SX = field(init=False)
     z: ca.SX = field(init=False)
     u: ca.SX = field(init=False)
@@ -52,7 +54,8 @@ class Local:
     def __post_init__(self) -> None:
         model = self.span.model
         for letter in "xzu":
-            symbol = ca.SX.sym(letter, len(getattr(model, letter)))
+            count = len(getattr(model, letter)) if self.inner or letter != "z" else 0
+            symbol = ca.SX.sym(letter, count)
             object.__setattr__(self, letter, symbol)
         rest = self.free + bool(self.free_before) + len(self.span.chosen)
         object.__setattr__(self, "rest", ca.SX.sym("rest", rest))
@@ -110,14 +113,16 @@ class Local:
     def values(self) -> list[ca.SX]:
         """[t, x, z, u, p] in SI units: arguments of Functions of the model."""
         model = self.span.model
-        scaled = (getattr(self, letter) * ca.DM(model.nominal(letter)) for letter in "xzu")
-        return [self.t, *scaled, self.p]
+        x, z, u = (getattr(self, letter) for letter in "xzu")
+        x, u = x * ca.DM(model.nominal("x")), u * ca.DM(model.nominal("u"))
+        z = z * ca.DM(model.nominal("z")) if self.inner else ca.SX.zeros(len(model.z))
+        return [self.t, x, z, u, self.p]
 
     def columns(
         self, layout: Layout, x: Columns, z: Columns, u: Columns, places: int
     ) -> list[Columns]:
         """Parts of `blocks.select` for v, with the columns of x, z and u at `places` given."""
-        parts: list[Columns] = [x, z, u]
+        parts: list[Columns] = [x, z, u] if self.inner else [x, u]
         if self.free:
             parts.append(np.full((1, places), layout.spans[self.number].T))
         if self.free_before:

@@ -132,9 +132,9 @@ class Shooting:
         object.__setattr__(self, "steps", checks.count("Shooting: steps", self.steps))
 
     def coefficients(self) -> Coefficients:
-        """No point inside of an interval."""
+        """No point inside of an interval, whose end is none of a polynomial."""
         none = np.zeros(0)
-        return Coefficients(np.zeros(1), np.zeros((1, 0)), none, np.ones(1), none)
+        return Coefficients(np.zeros(1), np.zeros((1, 0)), none, np.zeros(1), none)
 
 
 Scheme = Radau | Legendre | Shooting

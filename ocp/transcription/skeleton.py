@@ -19,6 +19,7 @@ from ocp.transcription.conditions import AtNode, Between, largest, plain_links, 
 from ocp.transcription.local import Data
 from ocp.transcription.points import Layout, Sizes, lay_out
 from ocp.transcription.schemes import Coefficients, Scheme
+from ocp.transcription.shooting import Shot, pieces_of_intervals
 
 
 @final
@@ -28,7 +29,7 @@ class Equations:
 
     Attributes:
         problem, scheme: what was discretised, and how.
-        spans: of each span the equations at its collocation points.
+        spans: of each span the equations at its collocation points, or of its intervals.
         closing: of each span the constraints of its mechanism; None where it has none.
         nodes: conditions at single nodes.
         between: conditions between spans.
@@ -36,7 +37,7 @@ class Equations:
 
     problem: Problem
     scheme: Scheme
-    spans: tuple[PointEquations, ...]
+    spans: tuple[PointEquations | Shot, ...]
     closing: tuple[Closing | None, ...]
     nodes: tuple[AtNode, ...]
     between: tuple[Between, ...]
@@ -145,14 +146,14 @@ def _layout(made: Equations, scheme: Coefficients, meshes: Sequence[Array]) -> L
     for number, (span, mesh) in enumerate(zip(problem.spans, meshes, strict=True)):
         model = span.model
         like = number % phases if number >= phases else -1
-        inputs = [v.name for v in model.u]
+        inputs, loops = [v.name for v in model.u], made.closing[number]
         shared = [i for i, name in enumerate(inputs) if name in problem.shared_inputs]
         sizes.append(
             Sizes(
                 len(model.x),
                 len(model.z),
                 len(inputs),
-                0 if (loops := made.closing[number]) is None else 2 * loops.m,
+                0 if loops is None or not scheme.degree else 2 * loops.m,
                 mesh.size - 1,
                 isinstance(span.T, Free),
                 like,
@@ -174,11 +175,15 @@ def _pieces(
     for number, (span, equations) in enumerate(zip(spans, made.spans, strict=True)):
         gap, loops = gaps(number, span, layout, scheme), made.closing[number]
         if loops is not None:
+            yield from loops.pieces(layout, data[number], nodes[number], scheme.degree > 0)
+        if loops is not None and scheme.degree:
             ends = ends_of(number, layout, scheme)
             gap = replace(gap, **loops.corrections(layout, ends, scheme, data[number]))
-            yield from loops.pieces(layout, data[number], nodes[number])
-        yield gap
-        yield pieces_of_points(number, equations, layout, scheme, data[number])
+        if isinstance(equations, Shot):
+            yield from pieces_of_intervals(number, equations, layout, gap, data[number])
+        else:
+            yield gap
+            yield pieces_of_points(number, equations, layout, scheme, data[number])
         if number % phases:
             loose = made.released[number].get(0.0, ())
             yield from plain_links(number, spans[number - 1], span, layout, loose)

@@ -19,6 +19,7 @@ from ocp.transcription.conditions import AtNode, Between, at_nodes, between
 from ocp.transcription.grid import check_meshes, nodes_of
 from ocp.transcription.local import Local
 from ocp.transcription.schemes import Scheme, Shooting
+from ocp.transcription.shooting import Shot, shot
 from ocp.transcription.skeleton import Equations, Skeleton, skeleton_of
 from ocp.transcription.transcription import Transcription
 
@@ -73,23 +74,22 @@ class Discretisation:
 
 def discretise(problem: Problem, scheme: Scheme) -> Discretisation:
     """Write the equations of `problem` at points and nodes, and differentiate them."""
-    if isinstance(scheme, Shooting):
-        raise NotImplementedError
     choices = {choice.name: choice.nominal for choice in problem.chosen}
     phases = len(problem.chain)
-    made: dict[tuple[object, ...], PointEquations] = {}
-    spans: list[PointEquations] = []
+    made: dict[tuple[object, ...], PointEquations | Shot] = {}
+    spans: list[PointEquations | Shot] = []
     loops: list[Closing | None] = []
     nodes: list[AtNode] = []
     joined: list[Between] = []
     for number, span in enumerate(problem.spans):
         first = number - number % phases
         earlier = tuple((i, problem.spans[i]) for i in range(first, number))
-        local = Local(number, span, earlier, choices)
+        local = Local(number, span, earlier, choices, not isinstance(scheme, Shooting))
         # scenarios differ in numbers only, which are parameters of the equations
         key = (span.phase, id(span.model), id(span.running), id(span.path))
         if key not in made:
-            made[key] = point_equations(local)
+            shooting = isinstance(scheme, Shooting)
+            made[key] = shot(local, scheme) if shooting else point_equations(local)
         spans.append(replace(made[key], local=local))
         ends = () if earlier else problem.periodic
         named = problem.chain[span.phase].start

@@ -1,0 +1,197 @@
+"""Multiple shooting: an interval is a few steps of an integrator.
+
+    x_(k+1) = F(x_k, u_k, p, t_k, h),   share of the cost = c(h),   c' = L(t, x, z, u, p),  c(0) = 0
+
+F is `symfric.flow` of the model with its cost as one more state, so that derivatives are exact for
+the discrete map. Bounds and path conditions hold at the nodes.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+
+from ocp.text.span import Row, Span
+from ocp.transcription.blocks import LAST, Block, Piece, block, order_of, select
+from ocp.transcription.local import Data, Local
+from ocp.transcription.points import Layout
+from ocp.transcription.schemes import Shooting
+from symfric.foundation.parameters import Variable
+from symfric.foundation.symbols import stacked
+from symfric.integrator import flow
+from symfric.model import Model
+
+LARGEST = 20_000
+"""Operations of an interval up to which it is written out as one expression; of longer ones the
+steps stay calls, which are slower but differentiate in a moment."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """The equations of one interval of a span.
+
+    Attributes:
+        local: its unknowns; x and u are those at its start.
+        block: rows and share of the cost.
+        path: conditions at a node, with the input of the interval before (without inputs), and
+            with that of the interval behind; None where there are none.
+    """
+
+    local: Local
+    block: Block
+    path: tuple[tuple[tuple[Row, ...], Block | None], ...]
+
+
+def shot(local: Local, scheme: Shooting) -> Shot:
+    """Write the equations of an interval of a span.
+
+    Raises:
+        ValueError: conditions or costs at nodes that know algebraic variables, a bound on one, a
+            mechanism that is moved in time.
+    """
+    span = local.span
+    _check(span)
+    model, added = with_cost(span)
+    x, u, rest = (ca.MX.sym(name, getattr(local, name).numel()) for name in ("x", "u", "rest"))
+    theta = ca.MX.sym("theta", local.theta.numel())
+    outputs = [*local.values, local.h]
+    values = ca.Function("values", [local.x, local.u, local.rest, local.theta], outputs)
+    t, x_si, _, u_si, p, h = values(x, u, rest, theta)
+    F = flow(model, steps=scheme.steps, method=scheme.method)
+    ends = F(ca.vertcat(x_si, *([0.0] * added)), u_si, ca.vertcat(p, t), h)
+    nominal = ca.DM(span.model.nominal("x"))
+    v, n = ca.vertcat(x, u, rest), len(span.model.x)
+    rows, share = -ends[:n] / nominal, ends[n] if added else None
+    made = _written_out(v, theta, rows, share)
+    return Shot(local, made, tuple(_paths(local)))
+
+
+def _written_out(v: ca.MX, theta: ca.MX, rows: ca.MX, share: ca.MX | None) -> Block:
+    """The block as expressions of numbers where that is not too long, else as calls of steps."""
+    interval = ca.Function("interval", [v, theta], [rows, *([] if share is None else [share])])
+    try:
+        flat = interval.expand()
+    except RuntimeError:  # an equation is solved inside
+        flat = None
+    if flat is None or flat.n_instructions() > LARGEST:
+        symbols = [ca.MX.sym("v", v.numel()), ca.MX.sym("theta", theta.numel())]
+        outputs = interval.call(symbols)
+    else:
+        symbols = [ca.SX.sym("v", v.numel()), ca.SX.sym("theta", theta.numel())]
+        outputs = flat.call(symbols)
+    return block("interval", *symbols, *outputs)
+
+
+def with_cost(span: Span) -> tuple[Model, int]:
+    """The model with time as a parameter at the start, and its cost as a state if there is one."""
+    model = span.model
+    start = Variable("shooting_start", "s")
+    shifted = model.t + start.symbol
+    cost = () if span.running.is_zero() else (Variable("shooting_cost", "1"),)
+    rates = stacked([ca.substitute(span.running, model.t, shifted)] if cost else [])
+    changes: dict[str, Any] = {"x": (*model.x, *cost), "p": (*model.p, start)}
+    if model.holonomic is None:
+        ode, alg = ca.substitute(
+            [model.function("ode")(*span.symbols), model.alg], [model.t], [shifted]
+        )
+        changes |= {"ode": ca.vertcat(ode, rates), "alg": alg}
+    else:
+        mechanics = model.holonomic
+        inner = mechanics.inner
+        if inner is not None:
+            inner = replace(inner, groups=(*inner.groups, *(v.symbol for v in cost)))
+        together = replace(mechanics, rates=ca.vertcat(mechanics.rates, rates), inner=inner)
+        changes |= {"holonomic": together, "ode": None, "alg": ca.SX(0, 1)}
+    return replace(model, **changes), len(cost)
+
+
+def _check(span: Span) -> None:
+    """Refuse what shooting cannot see."""
+    model = span.model
+    problems: list[str] = []
+    inside = model.vector("z")
+    conditions = [*span.path, *(row for rows in span.rows_at.values() for row in rows)]
+    named = [(row.name, row.expression) for row in conditions] + [("the end cost", span.end)]
+    for name, expression in named:
+        if model.z and ca.depends_on(expression, inside):
+            problems.append(f"{name} knows algebraic variables")
+    problems += [
+        f"a bound on {v.name}, an algebraic variable"
+        for v in model.z
+        if np.isfinite(span.box(v.name)).any()
+    ]
+    mechanics = model.holonomic
+    if mechanics is not None:
+        parts = ca.vertcat(mechanics.implicit, mechanics.rates, mechanics.phi)
+        if ca.depends_on(parts, model.t):
+            problems.append("time in the equations of a mechanism")
+    if problems:
+        raise ValueError(
+            f"{span.name}: Shooting: expected conditions on states and inputs at nodes, got "
+            f"{'; '.join(problems)}; use Radau(3)"
+        )
+
+
+def _paths(local: Local) -> Iterator[tuple[tuple[Row, ...], Block | None]]:
+    """Path conditions without inputs, then those with inputs."""
+    span = local.span
+    u = span.model.vector("u")
+    knows = [bool(u.numel()) and bool(ca.depends_on(row.expression, u)) for row in span.path]
+    for wanted in (False, True):
+        rows = tuple(row for row, found in zip(span.path, knows, strict=True) if found == wanted)
+        expressions = stacked(row.expression for row in rows)
+        (r,) = ca.Function("path", span.symbols, [expressions]).call(local.values)
+        sizes = ca.DM([row.nominal for row in rows])
+        yield rows, block("path", local.v, local.theta, r / sizes) if rows else None
+
+
+def pieces_of_intervals(
+    number: int, made: Shot, layout: Layout, gap: Piece, data: Data
+) -> Iterator[Piece]:
+    """The flow over all intervals, whose linear part is in `gap`, and the path conditions."""
+    own = layout.spans[number]
+    N = own.intervals
+    interval, zero, one = np.arange(N), np.zeros(N), np.ones(N)
+    parts = made.local.columns(layout, own.nodes[:, :-1], own.z, own.u, N)
+    yield replace(
+        gap,
+        block=made.block,
+        selection=select(parts, N),
+        theta=data.theta(interval, zero, zero),
+    )
+    (free, without), (bound, with_inputs) = made.path
+    after = (interval, interval + 1, one)  # a start is given more often than chosen
+    ends = (np.append(interval, N - 1), np.arange(N + 1), np.append(zero, 1.0))
+    for rows, written, at in ((free, without, after), (bound, with_inputs, ends)):
+        if written is not None:
+            yield _path_piece(number, made.local, rows, written, at, layout, data)
+
+
+def _path_piece(
+    number: int,
+    local: Local,
+    rows: Sequence[Row],
+    written: Block,
+    at: tuple[Any, Any, Any],
+    layout: Layout,
+    data: Data,
+) -> Piece:
+    own = layout.spans[number]
+    interval, node, offset = at
+    parts = local.columns(layout, own.nodes[:, node], own.z, own.u[:, interval], node.size)
+    return Piece(
+        tuple(row.name for row in rows),
+        np.array([row.nominal for row in rows]),
+        np.array([row.lower / row.nominal for row in rows]),
+        np.array([row.upper / row.nominal for row in rows]),
+        order_of(number, node, LAST - 2),
+        number,
+        interval,
+        offset,
+        written,
+        select(parts, node.size),
+        data.theta(interval, offset, np.zeros(node.size)),
+    )
