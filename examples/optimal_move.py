@@ -4,7 +4,7 @@
 
 F is Brown-McPhee friction: 6 N to break away, 4 N while sliding. Effort is the integral of force^2;
 friction makes waiting expensive, so there is a best time for it. Every control is then simulated:
-the last column says by how much the mass really misses its target.
+the last column says by how much the mass really misses, relatively.
 
     python examples/optimal_move.py [OUT]
 """
@@ -16,31 +16,27 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from ocp import TIME, Free, Problem, Solution, integral, solve
-from ocp.picture import plot_solutions
+from ocp import TIME, Free, Phase, Problem, Solution, integral, solve
+from ocp.result.picture import plot_solutions
 from symfric import BrownMcPhee, drive
 
 
 def problems() -> dict[str, Problem]:
     """The moves by name."""
     friction = BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-3)  # with N = 1 N these are newtons
-    gentle = Problem(
-        drive(friction, m=1.0, N=1.0),
-        T=1.0,
-        cost=integral(lambda s: s.force**2),
-        final={"x": 1.0, "v": 0.0},
-        bounds={"force": (-20.0, 20.0)},
-    )
+    move = Phase(drive(friction, m=1.0, N=1.0), T=1.0, end={"x": 1.0, "v": 0.0})
+    free = replace(move, T=Free(0.1, 10.0, guess=1.0))
+    gentle = Problem(move, integral(lambda s: s.force**2), bounds={"force": (-20.0, 20.0)})
     return {
-        "fastest": replace(gentle, T=Free(0.1, 10.0, guess=1.0), cost=TIME),
+        "fastest": replace(gentle, phases=free, cost=TIME),
         "least effort, T given": gentle,
-        "least effort, T free": replace(gentle, T=Free(0.1, 10.0, guess=1.0)),
+        "least effort, T free": replace(gentle, phases=free),
     }
 
 
 def table(moves: dict[str, Solution]) -> Table:
     """A row a move."""
-    result = Table("move", "status", "iterations", "T [s]", "cost", "miss [mm]")
+    result = Table("move", "status", "iterations", "T [s]", "cost", "miss")
     for name, move in moves.items():
         result.add_row(
             name,
@@ -48,7 +44,7 @@ def table(moves: dict[str, Solution]) -> Table:
             str(move.iterations),
             f"{move.T:.4f}",
             f"{move.cost:.4f}",
-            f"{1e3 * move.terminal_miss['x']:+.2f}",
+            f"{move.miss:.1e}",
         )
     return result
 

@@ -1,17 +1,37 @@
-"""Optimal control of any explicit `Model`: Radau collocation, Ipopt, and a check by simulation."""
+"""Optimal control that lands where it says: phases, contact modes, verification, receding horizons.
 
-from ocp.cost import TIME as TIME
-from ocp.cost import Cost as Cost
-from ocp.cost import Signals as Signals
-from ocp.cost import at_end as at_end
-from ocp.cost import integral as integral
-from ocp.guess import Guess as Guess
-from ocp.ipopt import Progress as Progress
-from ocp.ipopt import SolverStatistics as SolverStatistics
-from ocp.moves import rest_to_rest as rest_to_rest
-from ocp.problem import FREE as FREE
-from ocp.problem import Free as Free
-from ocp.problem import Problem as Problem
-from ocp.problem import Range as Range
-from ocp.solution import Solution as Solution
+`solve(Problem(Phase(model, T=1.0, end=...), cost))` is the whole of it; see `solve` for what is
+done about friction.
+"""
+
+from ocp.checking.verification import Miss as Miss
+from ocp.checking.verification import Verification as Verification
+from ocp.checking.verify import verify as verify
+from ocp.result.solution import Mode as Mode
+from ocp.result.solution import Solution as Solution
+from ocp.result.stored import load as load
 from ocp.solve import solve as solve
+from ocp.solvers.fatrop import Fatrop as Fatrop
+from ocp.solvers.ipopt import Ipopt as Ipopt
+from ocp.solvers.outcome import Progress as Progress
+from ocp.solvers.outcome import SolverStatistics as SolverStatistics
+from ocp.solvers.sqp import Sqp as Sqp
+from ocp.solving.starts import Guess as Guess
+from ocp.text.cost import TIME as TIME
+from ocp.text.cost import Cost as Cost
+from ocp.text.cost import at_end as at_end
+from ocp.text.cost import effort as effort
+from ocp.text.cost import integral as integral
+from ocp.text.cost import track as track
+from ocp.text.cost import worst as worst
+from ocp.text.moves import rest_to_rest as rest_to_rest
+from ocp.text.phase import Chain as Chain
+from ocp.text.phase import Phase as Phase
+from ocp.text.problem import Problem as Problem
+from ocp.text.ranges import FREE as FREE
+from ocp.text.ranges import Free as Free
+from ocp.text.ranges import Range as Range
+from ocp.text.signals import Signals as Signals
+from ocp.transcription.schemes import Legendre as Legendre
+from ocp.transcription.schemes import Radau as Radau
+from ocp.transcription.schemes import Shooting as Shooting

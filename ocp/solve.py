@@ -1,152 +1,244 @@
-"""Solve a problem and check the result by simulation."""
+"""Solve a problem: as it is, or with friction by way of smooth layers and modes; then look."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
-from time import perf_counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, final, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ocp.collocation import radau
-from ocp.guess import Guess, initial_points, resample
-from ocp.ipopt import WARM, Iterate, Option, Outcome, Progress, optimise
-from ocp.problem import Problem
-from ocp.solution import Solution
-from ocp.transcribe import Transcription, make_mesh, transcribe
-from ocp.verify import verified
+from ocp.checking.verify import verified
+from ocp.friction.polish import polish, refusal
+from ocp.friction.scales import has_jumps, own_level, speeds_at
+from ocp.friction.sharpen import FINE, LAST, STARTS, Sharp, sharpened
+from ocp.refined import refined_solve
+from ocp.result.solution import Solution
+from ocp.solvers.fatrop import Fatrop
+from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.outcome import Report
+from ocp.solvers.sqp import Sqp
+from ocp.solving.clock import Clock
+from ocp.solving.one_solve import Solver
+from ocp.solving.starts import Start
+from ocp.text.problem import Problem
+from ocp.transcription.grid import make_meshes
+from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 
 Array = NDArray[np.float64]
+Friction = Literal["auto", "smooth", "sharpen", "modes"]
+INTERVALS = 50
+EARLY = 0.04
+"""Layers, in multiples of the speeds, from which on the modes of a motion may be read."""
+STOPPED = (Status.INTERRUPTED, Status.TIME_LIMIT)
+MISSED = (Status.TERMINAL_MISS, Status.BOUND_MISS)
 
 
 def solve(
     problem: Problem,
     *,
-    intervals: int | ArrayLike = 50,
-    degree: int = 3,
-    guess: Mapping[str, Guess] | Solution | None = None,
-    options: Mapping[str, Option] | None = None,
+    scheme: Scheme | None = None,
+    intervals: int | ArrayLike | Sequence[ArrayLike] | None = None,
+    solver: Solver | None = None,
+    guess: Start = None,
+    friction: Friction = "auto",
+    tolerance: float = 1e-3,
+    refine: bool = True,
     verify: bool = True,
-    tolerance: float = 0.01,
-    progress: Callable[[Progress], object] | None = None,
+    starts: int = STARTS,
+    progress: Report | None = None,
+    max_time: float | None = None,
     throw: bool = True,
 ) -> Solution:
-    """Solve `problem` by Radau collocation and Ipopt, then simulate the model under the control.
+    """Solve `problem`, and simulate its models under the control that was found.
 
-    "Solved" only says that the discretised problem is. Where a body sticks or reverses between
-    the nodes of the mesh, the model under that control ends somewhere else, and this is what the
-    re-simulation shows.
+    "Solved" only says that a discretised problem is. What the models do under the control, at the
+    ends, on the way and between the nodes, says the verification, which decides: a solution that
+    misses is none.
+
+    Where a contact holds at rest, one solve of the problem as it stands ends in the next of many
+    local optima and misses. `friction` says what is done:
+
+        "auto"     "modes" where the layer of the law is narrower than a hundredth of the speeds;
+                   else "sharpen" down to the law itself. Without contacts that hold, "smooth".
+        "modes"    layers from wide to narrow, then the modes of each contact, slip and stick, with
+                   the instants between them (`ocp.friction.polish`): for exact Coulomb friction
+                   with stiction, whatever smooths it. `solution.modes` tells them. A law with
+                   states (LuGre, GMS) is replaced by its steady sliding and its static level, and
+                   the result verified with the law itself.
+        "sharpen"  layers from wide to narrow, down to those of the law, or as far as it gets.
+        "smooth"   the models as they are, states of laws included.
 
     Args:
         problem: what to solve.
-        intervals: number of equal intervals, or fractions of T from 0 to 1. The inputs are
-            constant on each.
-        degree: Radau points of an interval; order 2 degree - 1.
-        guess: values by name to start from (see `ocp.guess`), or a solution: its multipliers are
-            used as well where mesh, degree and model are the same.
-        options: of Ipopt, by their own names: {"max_iter": 500, "print_level": 5}.
-        verify: re-simulate the control with rtol 1e-9.
-        tolerance: largest terminal miss of a state, in multiples of the largest magnitude it
-            has on the way (at least its nominal value).
+        scheme: `Radau(3)` if none; or `Legendre(d)`, `Shooting(method, steps)`.
+        intervals: their number for each phase, fractions of T, or a list of these; 50 if none, and
+            with friction so many that the whole motion has 60. Refinement changes them.
+        solver: `Ipopt()` if none; or `Fatrop()`, `Sqp()`.
+        guess: values by name (see `ocp.solving.starts`), a solution, or one that was saved. With
+            friction, further starts are made around it.
+        friction: see above.
+        tolerance: of the verification, relative to the largest magnitude of each state.
+        refine: make the mesh finer where intervals err; with False it stays, where no friction
+            is sharpened.
+        verify: simulate the models under the control.
+        starts: with friction, number of coarse solves of which the best goes on.
         progress: called with a `Progress` after each iteration. Ctrl-C, or an exception raised
             here, stops the solver.
+        max_time: wall time [s] for all; what was found by then is returned.
         throw: raise `SolveError` on failure; with False the solution is returned as it is.
 
     Raises:
         ValueError: bad input.
-        SolveError: not solved, interrupted, or missed the target; its `partial` is the solution
-            with the last iterate.
+        SolveError: not solved, stopped, or not verified; its `partial` is the best solution there
+            is, with its statistics and verification.
 
-    Limits: a local minimum. Where friction makes the body stick or reverse on the way, one solve
-    on an even mesh needs many intervals (1 m out and back in 2 s: 800 for a miss of 1 mm) and may
-    settle for a motion that is a third too expensive.
+    Limits: a local optimum. With friction it is the best of a few starts.
     """
-    checks.kind("solve", problem, Problem, "a problem, such as rest_to_rest(...)")
+    checks.kind("solve", problem, Problem, "a problem, such as Problem(Phase(model, T=1.0), cost)")
     tolerance = checks.number("solve: tolerance", tolerance, above=0.0)
-    for name, value in (("verify", verify), ("throw", throw)):
-        checks.flag(f"solve: {name}", value)
+    for name, flag in (("refine", refine), ("verify", verify), ("throw", throw)):
+        checks.flag(f"solve: {name}", flag)
+    starts = checks.count("solve: starts", starts)
     if progress is not None:
         checks.function("solve: progress", progress, "a function of the progress")
-    options = checks.named("solve: options", options)
-    if odd := [name for name, value in options.items() if not isinstance(value, str | float | int)]:
-        raise checks.refused(f"solve: option {odd[0]}", "a number or a text", options[odd[0]])
-    begin = perf_counter()
-    program = transcribe(problem, make_mesh(problem, intervals), radau(degree))
-    start, warm = _start(program, guess)
-    written = perf_counter() - begin
-    outcome = optimise(
-        program,
-        start,
-        problem.model.values("p", problem.p),
-        (WARM if warm else {}) | options,
-        progress,
-    )
-    statistics = replace(outcome.statistics, build_time=written + outcome.statistics.build_time)
-    solution = _solution(program, replace(outcome, statistics=statistics))
-    if verify and outcome.status.ok:
-        solution = verified(solution, tolerance)
+    if friction not in get_args(Friction):
+        raise checks.refused("solve: friction", f"one of {', '.join(get_args(Friction))}", friction)
+    if max_time is not None:
+        max_time = checks.number("solve: max_time", max_time, unit="s", above=0.0)
+    scheme = Radau() if scheme is None else scheme
+    if not isinstance(scheme, Radau | Legendre | Shooting):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise checks.refused("solve: scheme", "a scheme, such as Radau(3)", scheme)
+    solver = Ipopt() if solver is None else solver
+    if not isinstance(solver, Ipopt | Fatrop | Sqp):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise checks.refused("solve: solver", "a solver, such as Ipopt()", solver)
+    job = _Job(
+        problem, scheme, solver, intervals, guess, friction, tolerance, refine, verify, starts,
+        progress, Clock(max_time),
+    )  # fmt: skip
+    solution = job.solved()
     if throw and not solution.ok:
-        raise SolveError(solution.message, solution.status, solution)
+        raise SolveError(solution.message, solution.status, solution) from solution.cause
     return solution
 
 
-def _start(
-    program: Transcription, guess: Mapping[str, Guess] | Solution | None
-) -> tuple[Iterate, bool]:
-    """The first iterate, and whether it has multipliers."""
-    n, m = program.w.numel(), program.g.numel()
-    cold = Iterate(np.zeros(n), np.zeros(n), np.zeros(m))
-    if not isinstance(guess, Solution):
-        return replace(cold, w=program.pack(initial_points(program, guess))), False
-    old = guess.iterate
-    if np.array_equal(guess.mesh, program.mesh) and (old.w.size, old.lam_g.size) == (n, m):
-        return replace(old, w=program.pack(guess.points)), True
-    return replace(cold, w=program.pack(resample(program, guess))), False
+@final
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """One call of `solve`."""
+
+    problem: Problem
+    scheme: Scheme
+    solver: Solver
+    intervals: int | ArrayLike | Sequence[ArrayLike] | None
+    guess: Start
+    friction: Friction
+    tolerance: float
+    refine: bool
+    verify: bool
+    starts: int
+    progress: Report | None
+    clock: Clock
+
+    def solved(self) -> Solution:
+        """By the way that the problem needs."""
+        holding, shooting = has_jumps(self.problem), isinstance(self.scheme, Shooting)
+        if self.friction in ("sharpen", "modes") and (shooting or not holding):
+            what = "collocation, such as Radau(3)" if shooting else "a contact that holds at rest"
+            raise ValueError(f"solve: friction '{self.friction}': expected {what}, got none")
+        if self.friction == "smooth" or shooting or not holding:
+            return self.checked(self.plain(self.guess))
+        return self.sharp()
+
+    def plain(self, guess: Start, meshes: Sequence[Array] | None = None) -> Solution:
+        """The models as they are."""
+        if meshes is None:
+            wanted = INTERVALS if self.intervals is None else self.intervals
+            meshes = make_meshes(self.problem, wanted)
+        return refined_solve(
+            self.problem, self.scheme, self.solver, meshes, guess, self.clock, self.progress,
+            tolerance=self.tolerance, refine=self.refine,
+        )  # fmt: skip
+
+    def sharp(self) -> Solution:
+        """Layers from wide to narrow, and what comes then."""
+        reason = refusal(self.problem) if self.friction != "sharpen" else "not asked for"
+        if reason and self.friction == "modes":
+            raise ValueError(f"solve: friction 'modes': {reason}")
+        path = sharpened(
+            self.problem,
+            self.scheme,
+            self.solver,
+            self.guess,
+            intervals=self.intervals if isinstance(self.intervals, int) else FINE,
+            starts=self.starts,
+            last=0.0 if reason else LAST,
+            clock=self.clock,
+            progress=self.progress,
+        )
+        tried: list[Solution] = []
+        reached = next(path)
+        while reached.solution.ok:
+            own = own_level(self.problem, reached.scales)
+            if self.friction != "modes" and reached.level <= own * 1.001:
+                smooth = self.plain(reached.solution, reached.solution.meshes)
+                return self.checked(_after(reached.solution, smooth))
+            readable = reached.level <= LAST * 1.001 or (
+                reached.level <= EARLY and not reached.steady
+            )
+            if readable and not reason:
+                tried.append(self.polished(reached))
+                if tried[-1].ok or tried[-1].status in STOPPED:
+                    return tried[-1]
+            following = next(path, None)
+            if following is None:
+                break
+            reached = following
+        return max(tried, key=_worth) if tried else self.unpolished(reached)
+
+    def polished(self, sharp: Sharp) -> Solution:
+        """The exact motion next to a sharpened one, verified with the user's own laws."""
+        solver = self.solver if isinstance(self.solver, Ipopt) else None
+        speeds = speeds_at(self.problem, sharp.scales, sharp.level)
+        exact = polish(
+            sharp.solution, self.problem, speeds,
+            solver=solver, scheme=self.scheme, progress=self.progress,
+        )  # fmt: skip
+        exact = self.checked(_after(sharp.solution, exact))
+        if exact.status not in MISSED or self.clock.over:
+            return exact
+        return self.with_own_laws(exact)
+
+    def with_own_laws(self, exact: Solution) -> Solution:
+        """A motion by modes that misses with the layers of the user's laws, solved with these."""
+        own = self.checked(self.plain(exact, exact.meshes))
+        if not own.verified:
+            return _after(own, exact)
+        return _after(exact, replace(own, modes=exact.modes))
+
+    def unpolished(self, sharp: Sharp) -> Solution:
+        """What there is when modes were not found: the motion with layers that are left."""
+        found = sharp.solution
+        if found.status in STOPPED or not found.ok:
+            return found
+        widths = speeds_at(self.problem, sharp.scales, sharp.level)
+        told = ", ".join(f"{name} over {width:.2g}" for name, width in widths.items())
+        said = f"{found.message} Friction is still smooth: {told} (m/s or rad/s)."
+        return self.checked(replace(found, message=said))
+
+    def checked(self, solution: Solution) -> Solution:
+        """`solution` with its verification."""
+        if not self.verify or solution.status in STOPPED:
+            return solution
+        return verified(solution, self.tolerance)
 
 
-def _solution(program: Transcription, outcome: Outcome) -> Solution:
-    """The last iterate by name."""
-    problem, model = program.problem, program.problem.model
-    points = program.unpack(outcome.iterate.w)
-    T = program.duration(points)
-    t = program.fractions * T
-    interval = np.arange(t.size) // program.scheme.degree
-    held = points.u[:, np.minimum(interval, program.layout.intervals - 1)]
-    z = np.column_stack([points.z[:, :1], points.z])
-    p = np.tile(model.values("p", problem.p)[:, None], (1, t.size))
-    values = model.function("signals").map(t.size)(t[None, :], points.x, z, held, p).full()
-    return Solution(
-        problem=problem,
-        status=outcome.status,
-        message=_message(program, outcome, T),
-        T=T,
-        cost=outcome.cost,
-        t=t,
-        signals=dict(zip(model.signals, values, strict=True)),
-        units=dict(model.signals),
-        t_control=program.mesh[:-1] * T,
-        controls={v.name: row for v, row in zip(model.u, points.u, strict=True)},
-        trajectory=None,
-        terminal_miss={},
-        statistics=outcome.statistics,
-        mesh=program.mesh,
-        points=points,
-        iterate=outcome.iterate,
-    )
+def _after(first: Solution, later: Solution) -> Solution:
+    """`later` with what both have cost."""
+    return replace(later, statistics=first.statistics.then(later.statistics))
 
 
-def _message(program: Transcription, outcome: Outcome, T: float) -> str:
-    said, count = f"ocp '{program.problem.model.name}': ", outcome.statistics.iterations
-    if outcome.status is Status.INTERRUPTED:
-        said += f"Stopped by the user after {count} iterations; the result is the last iterate."
-    else:
-        said += outcome.status.value
-    if outcome.status.ok or not outcome.violations.any():
-        return said
-    worst = int(np.argmax(outcome.violations))
-    name, fraction = program.constraint_names()[worst]
-    return (
-        f"{said} (Ipopt after {count} iterations: {outcome.answer}.) Most violated is {name} at "
-        f"t = {fraction * T:.4g} s, by {outcome.violations[worst]:.3g} in scaled units."
-    )
+def _worth(solution: Solution) -> tuple[bool, bool, float]:
+    """Order of partial results: verified, solved, cheap."""
+    return solution.verified, solution.verification is not None, -solution.cost

@@ -37,6 +37,11 @@ class Verdict(Protocol):
         ...
 
     @property
+    def largest(self) -> float:
+        """The largest relative miss."""
+        ...
+
+    @property
     def trajectories(self) -> Sequence[Trajectory]:
         """The re-simulated motion of each span that was simulated, in order."""
         ...
@@ -112,6 +117,11 @@ class Solution:
     def verified(self) -> bool:
         """Whether the model under this control does what was asked for, within the tolerance."""
         return self.verification is not None and self.verification.ok
+
+    @property
+    def miss(self) -> float:
+        """The largest relative miss of the verification; NaN where there is none."""
+        return float("nan") if self.verification is None else self.verification.largest
 
     @property
     def scenarios(self) -> dict[str, Motion]:

@@ -159,7 +159,7 @@ def optimal_moves(folder: Path, found: Identification) -> Chapter:
 
     The speed is bounded by the largest one in the record: beyond it friction is a guess.
     """
-    from ocp.picture import plot_solutions  # noqa: PLC0415  (matplotlib is slow)
+    from ocp.result.picture import plot_solutions  # noqa: PLC0415  (matplotlib is slow)
 
     speed = float(abs(found.signals.v).max())
 
@@ -190,7 +190,7 @@ def optimal_moves(folder: Path, found: Identification) -> Chapter:
                 "status": solution.status.name,
                 "T": solution.T,
                 "cost": solution.cost,
-                "terminal_miss": solution.terminal_miss,
+                "miss": solution.miss,
                 "iterations": solution.iterations,
             }
             for name, solution in moves.items()
@@ -199,9 +199,9 @@ def optimal_moves(folder: Path, found: Identification) -> Chapter:
 
 
 def show_moves(moves: dict[str, Solution]) -> None:
-    """Print duration, effort and how far the simulated move misses its target."""
+    """Print duration, effort and by how much the simulated move misses, relatively."""
     output.show_table(
-        ["move", "status", "iterations", "T [s]", "peak [N]", "simulated miss [mm]"],
+        ["move", "status", "iterations", "T [s]", "peak [N]", "simulated miss"],
         [
             (
                 name,
@@ -209,7 +209,7 @@ def show_moves(moves: dict[str, Solution]) -> None:
                 move.iterations,
                 move.T,
                 float(abs(move["force"]).max()),
-                f"{1e3 * move.terminal_miss['x']:.2g}",
+                f"{move.miss:.1g}",
             )
             for name, move in moves.items()
         ],

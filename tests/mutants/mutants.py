@@ -18,7 +18,7 @@ CROSSINGS = "symfric/integrator/running/crossings.py"
 RUN = "symfric/integrator/running/run.py"
 INITIAL = "symfric/integrator/equations/initial.py"
 EMITTER = "symfric/codegen/emitter.py"
-TRANSCRIBE = "ocp/transcribe.py"
+COLLOCATION = "ocp/transcription/collocation.py"
 
 LOOP = "symfric/integrator/running/loop.py"
 T_OUTPUTS = ("tests/symfric/integrator/running/test_outputs.py",)
@@ -27,7 +27,8 @@ T_WATCH = ("tests/symfric/integrator/step/test_watch.py",)
 T_SIMULATE = ("tests/symfric/integrator/test_simulate.py",)
 T_EVENTS = ("tests/symfric/integrator/running/test_events.py",)
 T_EMITTER = ("tests/symfric/codegen/test_emitter.py",)
-T_TRANSCRIBE = ("tests/ocp/test_transcribe.py",)
+T_SOLVE = ("tests/ocp/test_solve.py",)
+T_SHARPEN = ("tests/ocp/friction/test_sharpen.py",)
 
 CONTROLLERS = (
     Mutant(
@@ -180,26 +181,26 @@ CONSISTENT = (
 
 TRANSCRIPTION = (
     Mutant(
-        "equations are taken at the point before", TRANSCRIBE,
-        "time = t + scheme.nodes[j + 1] * h", "time = t + scheme.nodes[j] * h", T_TRANSCRIBE,
+        "the integral cost has the weights of another point", COLLOCATION,
+        "scheme.nodes[1 + j], scheme.weights[j])", "scheme.nodes[1 + j], scheme.weights[j - 1])",
+        T_SOLVE,
     ),
     Mutant(
-        "the integral cost has the weights of another point", TRANSCRIBE,
-        "cost += h * scheme.weights[j] * running", "cost += h * scheme.weights[-j] * running",
-        T_TRANSCRIBE,
+        "what is asked for on the way is asked for at the start", "ocp/transcription/bounds.py",
+        "bound[own.nodes[:, node]] = of(states, span.nodes[fraction])",
+        "bound[own.nodes[:, node]] = of(states, span.nodes[0.0])", T_SOLVE,
     ),
     Mutant(
-        "points on the way are not bounds", TRANSCRIBE,
-        "for fraction in (0.0, *problem.via, 1.0):", "for fraction in (0.0, 1.0):", T_TRANSCRIBE,
+        "a miss counts as success", "ocp/checking/verify.py",
+        "if verification.ok or not solution.status.ok:", "if True:", T_SOLVE,
     ),
     Mutant(
-        "the cost at the end is left out", TRANSCRIBE,
-        "f += end_cost(problem, scheme)(T, blocks[:, -1], p)",
-        "f += 0 * end_cost(problem, scheme)(T, blocks[:, -1], p)", T_TRANSCRIBE,
+        "a jump to a motion that is worse is taken", "ocp/friction/sharpen.py",
+        "if not step.good or step.outcome.cost > limit:", "if not step.good:", T_SHARPEN,
     ),
     Mutant(
-        "intervals start where the one before starts", TRANSCRIBE,
-        "T * ca.DM(mesh[:-1]).T", "T * ca.DM(mesh[1:]).T", T_TRANSCRIBE,
+        "layers are no narrower than in the step before", "ocp/friction/sharpen.py",
+        "level = max(step.level / factor, last)", "level = max(0.9 * step.level, last)", T_SHARPEN,
     ),
 )  # fmt: skip
 

@@ -44,9 +44,13 @@ def doors_of_control() -> Iterator[Door]:
         "model": model,
         "T": 1.0,
         "cost": ocp.integral(lambda s: s.force**2),
-        "initial": {"x": 0.0, "v": 0.0},
-        "final": {"x": 0.1, "v": 0.0},
+        "start": {"x": 0.0, "v": 0.0},
+        "end": {"x": 0.1, "v": 0.0},
     }
+
+    def moved(model: sf.Model, T: float, cost: ocp.Cost, **more: Any) -> ocp.Problem:
+        return ocp.Problem(ocp.Phase(model, T, **more), cost)
+
     ranges = [
         3,
         "x",
@@ -70,7 +74,7 @@ def doors_of_control() -> Iterator[Door]:
     ]
     yield Door(
         "Problem",
-        ocp.Problem,
+        moved,
         good,
         {
             "model": thing(BrownMcPhee(), sf.Model),
@@ -92,8 +96,8 @@ def doors_of_control() -> Iterator[Door]:
                 ocp.integral(lambda s: ca.SX.sym("a")),
                 ocp.integral(lambda s: ca.MX.sym("a")),
             ],
-            "initial": ranges,
-            "final": ranges,
+            "start": ranges,
+            "end": ranges,
             "bounds": ranges,
             "via": [
                 3,
@@ -140,12 +144,13 @@ def doors_of_control() -> Iterator[Door]:
             "force": choice(),
         },
     )
-    problem = ocp.Problem(**good)
+    problem = moved(**good)
     fast = {
         "problem": problem,
         "intervals": 4,
+        "friction": "smooth",
         "verify": False,
-        "options": {"max_iter": 1},
+        "solver": ocp.Ipopt(max_iter=1),
         "throw": False,
     }
     yield Door(
@@ -155,7 +160,6 @@ def doors_of_control() -> Iterator[Door]:
         {
             "problem": thing(model, ocp.Problem),
             "intervals": [
-                None,
                 "4",
                 0,
                 -1,
@@ -169,11 +173,13 @@ def doors_of_control() -> Iterator[Door]:
                 [0.0, NAN, 1.0],
                 Thing(),
                 True,
-                [[0.0, 1.0]],
                 1j,
                 10**9,
             ],
-            "degree": [None, "3", 0, 10, 2.5, Thing(), [3], NAN, 1j],
+            "scheme": [3, "radau", Thing(), ocp.Radau],
+            "friction": choice(),
+            "starts": [0, 2.5, "a", None],
+            "max_time": number(0.0, -1.0, optional=True),
             "guess": [
                 3,
                 "x",
@@ -191,17 +197,7 @@ def doors_of_control() -> Iterator[Door]:
                 {3: 1.0},
                 True,
             ],
-            "options": [
-                3,
-                "max_iter",
-                {"nonsense": 1},
-                {"max_iter": "a"},
-                {3: 1},
-                Thing(),
-                ["a"],
-                {"max_iter": None},
-                {"max_iter": -1},
-            ],
+            "solver": [3, "ipopt", Thing(), ocp.Ipopt, ocp.Ipopt(nonsense=1)],
             "verify": flag(),
             "throw": flag(),
             "progress": function(),

@@ -1,0 +1,375 @@
+"""From friction smoothed over wide layers of velocities to sharp friction, step by step.
+
+A sharp law has many local optima and no usable derivatives where a body reverses. A law that is
+smooth over a third of the largest sliding velocity has few, and a motion that is optimal for it
+leads to a good one for the sharp law. So:
+
+1. Coarse solves with wide layers, from several starts; the best one goes on. Among local optima
+   the order of the costs there is that of the costs at the end, and such a solve takes a tenth of
+   a second.
+2. The layers become narrower, by a factor that adapts itself, while the mesh is refined where an
+   interval errs. A step is taken back, and made shorter, where it does not converge or where it
+   jumps to a motion that is worse: the Lagrangian with the multipliers of the step before,
+
+       J(widths + step) ~ L(w, lam, widths + step),
+
+   says what the cost should be, and costs one evaluation. A jump to something better is welcome.
+
+Widths and mesh fractions are parameters of the nonlinear program: a step builds nothing anew
+unless the number of intervals changes.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import reduce
+from math import sqrt
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ocp.checking.arcs import arcs_of
+from ocp.checking.local_errors import local_errors
+from ocp.friction.mode_models import smooth_model
+from ocp.friction.scales import Scale, Scales, same_size, scales_of, typical, widths_at
+from ocp.result.solution import Solution
+from ocp.result.stored import Stored, stored_spans
+from ocp.solvers.fatrop import Fatrop
+from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.outcome import Iterate, Outcome, Report, SolverStatistics, in_stage
+from ocp.solvers.prepared import Prepared
+from ocp.solvers.sqp import Sqp
+from ocp.solving.clock import Clock
+from ocp.solving.one_solve import solution_of
+from ocp.solving.perturbed import perturbed
+from ocp.solving.starts import Start, resample, start_of
+from ocp.text.phase import Chain
+from ocp.text.problem import Problem
+from ocp.text.ranges import Free
+from ocp.transcription.grid import make_meshes, split
+from ocp.transcription.points import Points
+from ocp.transcription.schemes import Scheme
+from ocp.transcription.transcribe import Discretisation, discretise
+from ocp.transcription.transcription import Transcription
+from symfric.foundation.status import Status
+
+Array = NDArray[np.float64]
+Meshes = Sequence[Array]
+Solver = Ipopt | Fatrop | Sqp
+
+FIRST = 0.3
+"""Width of the layers of the first solves, in multiples of the largest sliding velocity."""
+LAST = 1e-2
+"""Width at which the modes of a motion can be read from it."""
+FACTOR = 10**0.25
+"""Factor between one width and the next, while all goes well."""
+LEAST_FACTOR = 1.03
+"""Steps shorter than this get nowhere."""
+QUICK = 15
+"""Iterations below which the next step may be longer."""
+ABOVE = 0.01
+"""Share of J by which a step may cost more than predicted."""
+COARSE = 30
+"""Intervals of the whole motion in the first solves, and `FINE` afterwards."""
+FINE = 60
+MOST = 300
+"""More intervals are not made on the way."""
+TOLERANCE = 1e-3
+"""Local error of an interval, relative to the size of the states, that asks for no refinement."""
+PASSES = 4
+"""Refinements at one width."""
+STARTS = 6
+SPREAD = 0.3
+"""How far the further starts are from the given one; see `perturbed`."""
+RESCALED = 2
+"""How often the starts are made again because the speeds were guessed wrong."""
+SAME = 3.0
+"""Factor by which the speeds of the first motion may differ from those the widths were made for."""
+
+EARLY = {"tol": 1e-4, "max_iter": 100}
+LATER = {"tol": 1e-5, "max_iter": 60, "mu_init": 1e-3}
+ENDED = (Status.INTERRUPTED, Status.TIME_LIMIT)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Sharp:
+    """A solution with smooth friction, on the way to sharp friction.
+
+    Attributes:
+        solution: of the problem with smooth models, its widths among the values of `p`.
+        level: width of the layers, in multiples of the largest sliding velocity of each contact.
+        scales: of each contact.
+        steady: whether the step to it was a plain one; False where steps were taken back.
+        error: largest local error of an interval.
+    """
+
+    solution: Solution
+    level: float
+    scales: Scales
+    steady: bool
+    error: float
+
+
+def smoothed(problem: Problem) -> Problem:
+    """`problem` with smooth friction everywhere, its widths as parameters."""
+    made = {id(phase.model): smooth_model(phase.model) for phase in problem.chain}
+    phases = tuple(replace(phase, model=made[id(phase.model)]) for phase in problem.chain)
+    return replace(problem, phases=Chain(phases))
+
+
+def sharpened(
+    problem: Problem,
+    scheme: Scheme,
+    solver: Solver,
+    guess: Start = None,
+    *,
+    intervals: int = FINE,
+    tolerance: float = TOLERANCE,
+    starts: int = STARTS,
+    last: float = LAST,
+    clock: Clock | None = None,
+    progress: Report | None = None,
+) -> Iterator[Sharp]:
+    """Solutions with narrower and narrower layers; whoever asks for the next one pays for it.
+
+    The first has layers of `FIRST`, the last one of `last`, or as narrow as it got: where the
+    solver fails or is stopped, the solution says so.
+
+    Args:
+        problem: the user's, with contacts.
+        scheme, solver: as in `solve`; of Ipopt the user's options win.
+        guess: where to start; further starts are made around it.
+        intervals: of the whole motion, before refinement.
+        tolerance: local error of an interval.
+        starts: coarse solves from different starts, the best of which goes on.
+        last: width of the layers to stop at.
+        clock: when to stop.
+        progress: called after each iteration.
+    """
+    path = _Path(problem, smoothed(problem), scheme, solver, tolerance, clock or Clock(), progress)
+    step = path.first(guess, starts, intervals)
+    factor, steady = FACTOR, True
+    yield path.told(step, steady)
+    while step.good and step.level > last * 1.001:
+        level = max(step.level / factor, last)
+        limit = path.predicted(step, level)
+        following = path.settled(step, level, limit)
+        if following.ended:
+            yield path.told(following, False)
+            return
+        if following.good:
+            factor = min(1.5 * factor, FACTOR) if following.iterations <= QUICK else factor
+            step = following
+            yield path.told(step, steady)
+            steady = True
+            continue
+        factor, steady = sqrt(factor), False
+        if factor < LEAST_FACTOR:
+            return
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """One solve: what was solved, and what came out."""
+
+    transcription: Transcription
+    values: Array
+    outcome: Outcome
+    points: Points
+    level: float
+    accepted: bool = True
+    error: float = np.inf
+    errors: tuple[Array, ...] = ()
+
+    @property
+    def good(self) -> bool:
+        """Whether the path may go on from here."""
+        return self.accepted and self.outcome.status.ok
+
+    @property
+    def ended(self) -> bool:
+        """Whether the user or the clock has stopped the solver."""
+        return self.outcome.status in ENDED
+
+    @property
+    def iterations(self) -> int:
+        """Of the solver."""
+        return self.outcome.statistics.iterations
+
+    def better_than(self, other: "_Step") -> bool:
+        """Solved before not solved, then the lower cost, or the smaller violation."""
+        if self.outcome.status.ok != other.outcome.status.ok:
+            return self.outcome.status.ok
+        if self.outcome.status.ok:
+            return self.outcome.cost < other.outcome.cost
+        return self.outcome.violation < other.outcome.violation
+
+
+@final
+@dataclass
+class _Path:
+    """What the steps share."""
+
+    user: Problem
+    problem: Problem
+    scheme: Scheme
+    solver: Solver
+    tolerance: float
+    clock: Clock
+    progress: Report | None
+    scales: Scales = field(default_factory=dict[str, Scale])
+    solves: list[SolverStatistics] = field(default_factory=list[SolverStatistics])
+
+    def __post_init__(self) -> None:
+        self.discretisation: Discretisation = discretise(self.problem, self.scheme)
+        self.prepared: dict[tuple[int, str], Prepared] = {}
+
+    def first(self, guess: Start, starts: int, intervals: int) -> _Step:
+        """The best of several coarse solves with wide layers, on the mesh to go on with."""
+        coarse = self.discretisation.on(_meshes(self.problem, COARSE))
+        begin = coarse.unpack(start_of(coarse, guess)[0].w)
+        tries = [begin, *(perturbed(coarse, begin, SPREAD, k) for k in range(1, starts))]
+        self.scales = typical([scales_of(self.user, self.problem, points) for points in tries])
+        best = self.best_of(coarse, tries)
+        for _ in range(RESCALED):
+            if best.ended:
+                return best
+            found = scales_of(self.user, self.problem, best.points, self.scales)
+            alike, self.scales = same_size(found, self.scales, SAME), found
+            if alike:
+                break
+            best = self.best_of(coarse, tries)
+        fine = self.discretisation.on(_meshes(self.problem, intervals))
+        options = LATER if best.good else LATER | {"max_iter": 300}
+        step = self.solve(fine, self.moved(best, fine), FIRST, options, f"width {FIRST:.2g}")
+        self.scales = scales_of(self.user, self.problem, step.points, self.scales)
+        return self.refined(step, None) if step.good else step
+
+    def best_of(self, coarse: Transcription, tries: Sequence[Points]) -> _Step:
+        """The best of solves from several starts, or one that was stopped."""
+        best = self.solve(coarse, tries[0], FIRST, EARLY, "start 1")
+        for number, points in enumerate(tries[1:], 2):
+            if best.ended:
+                break
+            step = self.solve(coarse, points, FIRST, EARLY, f"start {number}")
+            best = step if step.ended or step.better_than(best) else best
+        return best
+
+    def settled(self, before: _Step, level: float, limit: float) -> _Step:
+        """The step to another width, on a mesh that is fine enough for it."""
+        step = self.solve(before.transcription, before.points, level, LATER, f"width {level:.2g}")
+        if not step.good or step.outcome.cost > limit:
+            return replace(step, accepted=False)
+        return self.refined(step, limit)
+
+    def refined(self, step: _Step, limit: float | None) -> _Step:
+        """`step` on finer and finer meshes, until its intervals are right or enough."""
+        step = self.judged(step)
+        for _ in range(PASSES - 1):
+            meshes = self.finer(step)
+            if meshes is None:
+                break
+            finer = self.discretisation.on(meshes)
+            name = f"width {step.level:.2g}"
+            again = self.solve(finer, self.moved(step, finer), step.level, LATER, name)
+            if again.ended:
+                return again
+            if not again.good or (limit is not None and again.outcome.cost > limit):
+                break
+            step = self.judged(again)
+        return step
+
+    def solve(
+        self,
+        transcription: Transcription,
+        points: Points,
+        level: float,
+        options: Mapping[str, float | int],
+        stage: str,
+    ) -> _Step:
+        """One solve with layers of `level`."""
+        widths = widths_at(self.user, self.scales, level)
+        values = transcription.values(widths)
+        key = (id(transcription.skeleton), str(options))
+        prepared = self.prepared.get(key)
+        if prepared is None:
+            solver = self.solver
+            if isinstance(solver, Ipopt):
+                solver = Ipopt(max_time=solver.max_time, **(dict(options) | dict(solver.options)))
+            prepared = self.prepared[key] = solver.prepared(transcription.program)
+        rows = transcription.program.g.numel()
+        start = Iterate.cold(transcription.pack(points), rows)
+        outcome = self.clock.within(prepared).run(start, values, in_stage(self.progress, stage))
+        self.solves.append(outcome.statistics)
+        found = transcription.unpack(outcome.iterate.w)
+        return _Step(transcription, values, outcome, found, level)
+
+    def moved(self, step: _Step, into: Transcription) -> Points:
+        """The motion of a step on other meshes."""
+        old = step.transcription
+        spans = stored_spans(self.problem, self.scheme, old.meshes, step.points)
+        iterate = step.outcome.iterate
+        return resample(into, Stored("", "", "", 0.0, "", spans, step.points.chosen, iterate))
+
+    def judged(self, step: _Step) -> _Step:
+        """`step` with the local errors of its intervals."""
+        widths = widths_at(self.user, self.scales, step.level)
+        arcs = [
+            replace(
+                arc,
+                p=np.array(
+                    [widths.get(v.name, x) for v, x in zip(arc.span.model.p, arc.p, strict=True)]
+                ),
+            )
+            for arc in arcs_of(self.problem, step.transcription.meshes, step.points)
+        ]
+        errors = local_errors(arcs, min(1e-6, 1e-2 * self.tolerance))
+        worst = max((float(e.max()) for e in errors), default=0.0)
+        return replace(step, error=worst, errors=errors)
+
+    def finer(self, step: _Step) -> list[Array] | None:
+        """Meshes with the intervals that err cut into pieces; None where there are none."""
+        meshes, phases = step.transcription.meshes, len(self.problem.chain)
+        if step.error <= self.tolerance or sum(m.size - 1 for m in meshes) > MOST:
+            return None
+        made: list[Array] = []
+        for number, mesh in enumerate(meshes):
+            same = range(number % phases, len(meshes), phases)  # scenarios share their meshes
+            error = np.max([step.errors[k] for k in same], axis=0)
+            error = np.where(np.isfinite(error), error, 1.0)
+            parts = np.clip(np.ceil((error / self.tolerance) ** (1 / 3)), 2, 4).astype(int)
+            made.append(split(mesh, np.where(error > self.tolerance, parts, 1).tolist()))
+        return made
+
+    def predicted(self, step: _Step, level: float) -> float:
+        """The largest cost at another width that belongs to the motion of `step`.
+
+        Its Lagrangian there, with a share of J more, and of what the step is to change.
+        """
+        program, iterate = step.transcription.program, step.outcome.iterate
+        values = step.transcription.values(widths_at(self.user, self.scales, level))
+        rows = [
+            np.asarray(program.jacobian(iterate.w, p)[0]).ravel() for p in (step.values, values)
+        ]
+        cost = float(program.gradient(iterate.w, values)[0])
+        cost += float(iterate.lam_g @ (rows[1] - rows[0]))
+        now = step.outcome.cost
+        return cost + ABOVE * abs(now) + 0.3 * max(0.0, now - cost)
+
+    def told(self, step: _Step, steady: bool) -> Sharp:
+        """A step as a solution of the problem with these widths."""
+        widths = widths_at(self.user, self.scales, step.level)
+        solution = solution_of(step.transcription, step.outcome)
+        problem = replace(self.problem, p=dict(self.problem.p) | widths)
+        statistics = reduce(SolverStatistics.then, self.solves)
+        solution = replace(solution, problem=problem, statistics=statistics)
+        return Sharp(solution, step.level, self.scales, steady, step.error)
+
+
+def _meshes(problem: Problem, intervals: int) -> list[Array]:
+    """Even meshes, so many intervals in all phases together."""
+    T = [phase.T.start if isinstance(phase.T, Free) else float(phase.T) for phase in problem.chain]
+    counts = [max(4, round(intervals * one / sum(T))) for one in T]
+    return make_meshes(problem, counts)
