@@ -150,7 +150,7 @@ def controller_of(
     problem: Problem,
     step: float = 0.01,
     *,
-    method: str = "rodas5p",
+    method: str = "rodas3",
     steps: int = 4,
     measured: Sequence[str] | None = None,
     tolerance: float = 1e-4,

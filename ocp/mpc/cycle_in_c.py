@@ -8,11 +8,17 @@ static double merit(const NAME_t *m, const double (*x)[NX], const double (*u)[NU
                     double *defects, double *prices)
 {
     int k, i;
-    double value_of[NX + ROWS + 1], cost = 0.0;
+    double to[NX], value_of[NX + ROWS + 1], cost = 0.0;
     *defects = 0.0;
     *prices = 0.0;
     for (k = 0; k < N; k++) {
-        value(x[k], u[k], x[k + 1], m->r[k], m->r[k + 1], m->p, &m->t[k], m->b, value_of);
+        for (i = 0; i < NX; i++) {
+            to[i] = x[k][i];
+        }
+        for (i = 0; i < SUBSTEPS; i++) {
+            advance(to, u[k], m->r[k], m->p, to);
+        }
+        value(x[k], u[k], x[k + 1], m->r[k], m->r[k + 1], m->p, &m->t[k], m->b, to, value_of);
         for (i = 0; i < NX; i++) {
             *defects += fabs(value_of[i]) / nominal_x[i];
         }
@@ -39,7 +45,7 @@ static double merit(const NAME_t *m, const double (*x)[NX], const double (*u)[NU
 }
 
 /* Take a step along the change; returns the weight of the defects. */
-static double advance(NAME_t *m, double nu)
+static double go_on(NAME_t *m, double nu)
 {
     int k, i, tries;
     double defects, prices, cost, slope, fall, before, alpha = 1.0;
@@ -138,7 +144,7 @@ static void improve(NAME_t *m, const NAME_param_t *param, NAME_out_t *out)
         }
         out->iterations++;
         out->program_iterations += program(m);
-        nu = advance(m, nu);
+        nu = go_on(m, nu);
     }
     out->converged = out->status == NAME_CONVERGED;
 }

@@ -70,7 +70,7 @@ class Horizon:
         x, u, after: states at the beginning, inputs, states at the end, SX columns.
         t, r, r_after, p, b: time at the beginning, references at beginning and end, the other
             parameters, bounds of `limits` and `end_limits`.
-        following: F(x, u).
+        advance: one of the `substeps` of an interval, (x, u, r, p) -> x; F are all of them.
         early, late: cost in (x, u), and in `after`; `end` in `x`: at the end of the horizon.
         limits: rows of an interval; those of states alone are about `after`.
         end_limits: rows about `x` at the end of the horizon.
@@ -91,7 +91,8 @@ class Horizon:
     r_after: ca.SX
     p: ca.SX
     b: ca.SX
-    following: ca.SX
+    advance: ca.Function
+    substeps: int
     early: Costs
     late: Costs
     end: Costs
@@ -141,20 +142,18 @@ class Places:
         return ca.Function("taken", symbols, [expression])(*values)
 
 
-def step_function(model: Model, method: str, steps: int) -> ca.Function:
-    """(x, u, p, h) -> x after h: `flow` as one SX Function.
+def step_function(model: Model, method: str) -> ca.Function:
+    """(x, u, p, h) -> x after h: one step of `flow` as an SX Function.
+
+    Accelerations of a mechanism are written out, and are no unknowns whose start must be found.
 
     Raises:
-        ValueError: see `flow`; algebraic variables whose start must be found by iteration.
+        ValueError: see `flow`.
     """
-    found = flow(model, steps=steps, method=method)
-    try:
-        return found.expand()
-    except RuntimeError:
-        raise ValueError(
-            f"to_mpc: expected a model without algebraic variables, got {len(model.z)} in "
-            f"'{model.name}'; eliminate them, or control with a model of fewer parts"
-        ) from None
+    if model.holonomic is not None:
+        x, u, p, ode = model.x, model.u, model.p, model.ode
+        model = Model(model.name, x, (), u, p, ode, events=model.events, t=model.t)
+    return flow(model, steps=1, method=method).expand()
 
 
 def squares(terms: Iterable[tuple[float, ca.SX]], v: ca.SX) -> Costs:

@@ -14,7 +14,7 @@ Source: Rao, Wright and Rawlings, Application of interior-point methods to model
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, final
 
 import casadi as ca
@@ -63,8 +63,12 @@ class Kernels:
     """All Functions; those of the end are missing where nothing is asked for there.
 
     Attributes:
-        linear: (x, u, after, r, r_after, p, t, b) -> L = (c, v, all that varies in the program).
-        value: the same arguments -> (c, v, cost).
+        advance: (x, u, r, p) -> x after a substep.
+        tangent: (x, S, u, r, p) -> (x, S) after a substep; S holds the structural entries of the
+            derivative with respect to (x, u) at the beginning of the interval.
+        linear: (x, u, after, r, r_after, p, t, b, to, S) -> L = (c, v, all that varies in the
+            program), where to = F(x, u).
+        value: the same arguments but S -> (c, v, cost).
         matrix: (P, L, w) -> (P, G): one step of Riccati's recursion; G is what the others need.
         vector: (q, L, G, e) -> (q, k): the linear part of the cost-to-go and of the control.
         forward: (d, L, G, k) -> (d, M = (du, change of v, slope and curvature of the cost)).
@@ -72,8 +76,11 @@ class Kernels:
         end_linear, end_value: (x, r, p, t, b) -> L = (v, ...), (v, cost).
         end_matrix, end_vector, end_adjoint: (L, w | e | m) -> P | q | lam.
         end_forward: (d, L) -> M = (change of v, slope and curvature of the cost).
+        identity: S at the beginning of an interval.
     """
 
+    advance: ca.Function
+    tangent: ca.Function
     linear: ca.Function
     value: ca.Function
     matrix: ca.Function
@@ -86,16 +93,21 @@ class Kernels:
     end_vector: ca.Function | None
     end_forward: ca.Function | None
     end_adjoint: ca.Function | None
+    identity: tuple[float, ...]
 
     @property
     def all(self) -> list[ca.Function]:
         """Those that there are."""
-        return [f for f in vars(self).values() if f is not None]
+        return [f for f in vars(self).values() if isinstance(f, ca.Function)]
 
 
 def kernels(horizon: Horizon) -> Kernels:
     """The Functions of a horizon."""
-    return Kernels(*_interval(horizon), *_end(horizon))
+    functions, start = _interval(horizon)
+    whole = [*functions, *_end(horizon)]
+    names = [field.name for field in fields(Kernels)]
+    found: dict[str, Any] = dict(zip(names[:-1], whole, strict=True))
+    return Kernels(**found, identity=start)
 
 
 def upper(matrix: ca.SX) -> ca.SX:
@@ -149,17 +161,20 @@ def _function(name: str, arguments: Sequence[ca.SX], results: Sequence[ca.SX]) -
     return ca.Function(name, list(arguments), dense, {"cse": True})
 
 
-def _interval(horizon: Horizon) -> list[ca.Function]:
+def _interval(horizon: Horizon) -> tuple[list[ca.Function], tuple[float, ...]]:
     h = horizon
     nx, nu, rows = h.x.numel(), h.u.numel(), len(h.limits)
     arguments = [h.x, h.u, h.after, h.r, h.r_after, h.p, h.t, h.b]
     start = ca.vertcat(h.x, h.u)
-    c = h.following - h.after
+    tangent, slopes = _tangent(horizon)
+    S = ca.vertcat(ca.SX(0, 1), slopes.nz[:])
+    to = ca.SX.sym("to", nx)
+    c = to - h.after
     v = stacked(_value(limit, h.b[i]) for i, limit in enumerate(h.limits))
     pack = Packed()
     pack.add("c", c, all_of_it=True)
     pack.add("v", v, all_of_it=True)
-    pack.add("F", ca.jacobian(h.following, start))
+    pack.add("F", slopes)
     for name, costs in (("early", h.early), ("late", h.late)):
         pack.add(f"g {name}", costs.gradient)
         pack.add(f"H {name}", costs.hessian)
@@ -200,14 +215,39 @@ def _interval(horizon: Horizon) -> list[ca.Function]:
     # multipliers
     lam, m = ca.SX.sym("lam", nx), ca.SX.sym("m", rows)
     gradient = g - D.T @ m + F.T @ (lam + g_late - D_late.T @ m)
-    return [
-        _function("linear", arguments, [pack.column()]),
-        _function("value", arguments, [value]),
+    identity = ca.project(ca.horzcat(ca.DM.eye(nx), ca.DM(nx, nu)), slopes.sparsity())
+    functions = [
+        h.advance,
+        tangent,
+        _function("linear", [*arguments, to, S], [pack.column()]),
+        _function("value", [*arguments, to], [value]),
         _function("matrix", [P, L, w], [upper(before), kept.column()]),
         _function("vector", [q, L, G, e], [both[:nx] + K.T @ both[nx:], k]),
         _function("forward", [d, L, G, feed], [then, ca.vertcat(du, moved, tilt, bend)]),
         _function("adjoint", [lam, L, m], [gradient[:nx], gradient[nx:]]),
     ]
+    return functions, tuple(map(float, ca.DM(identity).nonzeros()))
+
+
+def _tangent(horizon: Horizon) -> tuple[ca.Function, ca.SX]:
+    """The kernel `tangent`, and the derivative of F as a matrix of symbols."""
+    h, nx, nu = horizon, horizon.x.numel(), horizon.u.numel()
+    moved = h.advance(h.x, h.u, h.r, h.p)
+    by_x, by_u = ca.jacobian(moved, h.x), ca.jacobian(moved, h.u)
+    before = ca.Sparsity(nx, nx + nu)
+    pattern = ca.horzcat(ca.DM.eye(nx), ca.DM(nx, nu)).sparsity()
+    while pattern != before:
+        before = pattern
+        ones = ca.DM(by_x.sparsity(), 1) @ ca.DM(pattern, 1)
+        ones += ca.horzcat(ca.DM(nx, nx), ca.DM(by_u.sparsity(), 1))
+        pattern = ones.sparsity() + before
+    S = ca.SX.sym("S", pattern.nnz())
+    slopes = ca.SX(pattern, S)
+    after = by_x @ slopes + ca.horzcat(ca.SX(nx, nx), by_u)
+    kept = ca.project(after, pattern)
+    entries = ca.vertcat(ca.SX(0, 1), *ca.vertsplit(kept.nz[:]))
+    function = _function("tangent", [h.x, S, h.u, h.r, h.p], [moved, entries])
+    return function, slopes
 
 
 def _end(horizon: Horizon) -> list[ca.Function | None]:

@@ -37,7 +37,10 @@ class Optimality:
         first = len(h.limits)
         v = ca.vertcat(ca.SX(0, 1), *rows[:first])
         cost = h.early.value + h.late.value
-        interval = ca.Function("interval", symbols, [h.following - h.after, v, cost])
+        to = h.x
+        for _ in range(h.substeps):
+            to = h.advance(to, h.u, h.r, h.p)
+        interval = ca.Function("interval", symbols, [to - h.after, v, cost])
         last = ca.vertcat(ca.SX(0, 1), *rows[first:])
         end = ca.Function("end", [h.x, h.r, h.p, h.t, h.b], [last, h.end.value])
         c, v, q = interval.map(h.count, [False] * 5 + [True, False, True], [False] * 3)(

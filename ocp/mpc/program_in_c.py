@@ -9,9 +9,20 @@ static double larger(double a, double b) { return (b > a || b != b) ? b : a; }
 
 static void linearise(NAME_t *m)
 {
-    int k;
+    int k, i;
+    double to[NX], S[NS];
     for (k = 0; k < N; k++) {
-        linear(m->x[k], m->u[k], m->x[k + 1], m->r[k], m->r[k + 1], m->p, &m->t[k], m->b, m->L[k]);
+        for (i = 0; i < NX; i++) {
+            to[i] = m->x[k][i];
+        }
+        for (i = 0; i < NS; i++) {
+            S[i] = identity[i];
+        }
+        for (i = 0; i < SUBSTEPS; i++) {
+            tangent(to, S, m->u[k], m->r[k], m->p, to, S);
+        }
+        linear(m->x[k], m->u[k], m->x[k + 1], m->r[k], m->r[k + 1], m->p, &m->t[k], m->b, to, S,
+               m->L[k]);
     }
 #if END
     end_linear(m->x[N], m->r[N], m->p, &m->t[N], m->b, m->L_end);

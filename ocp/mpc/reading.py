@@ -88,12 +88,19 @@ def horizon_of(problem: Problem, step: float, *, method: str, steps: int) -> Hor
     return Horizon(
         model, count, step, references, at.x, at.u, at.after, at.t, at.r, at.r_after, at.p,
         ca.SX.sym("b", len(limits) + len(end_limits)),
-        step_function(model, method, steps)(at.x, at.u, at.parameters(at.r), step),
+        _advance(at, step_function(model, method), step / steps), steps,
         early, late, end,
         tuple(_placed(limit, at, inputs) for limit in limits),
         tuple(_placed(limit, at, None) for limit in end_limits),
         curvature, weight,
     )  # fmt: skip
+
+
+def _advance(at: Places, following: ca.Function, h: float) -> ca.Function:
+    """A step of h [s] with references and other parameters apart."""
+    arguments = [at.x, at.u, at.r, at.p]
+    found = following(at.x, at.u, at.parameters(at.r), h)
+    return ca.Function("advance", arguments, [ca.densify(found)], {"cse": True})
 
 
 def _both(terms: Sequence[tuple[float, ca.SX]], flags: Sequence[bool]) -> Any:

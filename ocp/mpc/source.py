@@ -152,6 +152,8 @@ def sizes(design: Design) -> dict[str, int]:
         "NL": k.linear.size1_out(0),
         "NL_END": 0 if end is None else end.size1_out(0),
         "NG": k.matrix.size1_out(1),
+        "NS": len(k.identity),
+        "SUBSTEPS": h.substeps,
         "NP": k.matrix.size1_in(0),
         "STEP": k.forward.size1_out(1),
         "MOST": design.settings.program,
@@ -223,6 +225,7 @@ def _constants_of(design: Design) -> str:
         "nominal_u": h.model.nominal("u").tolist(),
         "start_x": design.x0.tolist(),
         "start_u": design.u0.tolist(),
+        "identity": list(design.kernels.identity),
     }
     if prices.soft.size:
         tables |= {"rho": prices.rho.tolist(), "sigma": prices.sigma.tolist()}

@@ -63,6 +63,25 @@ def called(function: ca.Function, *arguments: Array) -> list[Array]:
     return [np.ascontiguousarray(r.T) for r in evaluate_all(function, *arguments)]
 
 
+def _over_substeps(horizon: Horizon, kernels: Kernels) -> tuple[ca.Function, ca.Function]:
+    """`linear` and `value` of all intervals, with the substeps of each before them."""
+    steps, n = horizon.substeps, horizon.count
+    symbols = [ca.MX.sym(f"a{i}", kernels.value.size1_in(i)) for i in range(8)]
+    x, u, _, r, _, p, _, _ = symbols
+    same = [ca.repmat(argument, 1, steps) for argument in (u, r, p)]
+    advance, tangent = cast(Any, kernels.advance), cast(Any, kernels.tangent)
+    to = advance.mapaccum("advance", steps)(x, *same)[:, -1]
+    there, slopes = tangent.mapaccum("tangent", steps, 2)(x, ca.DM(kernels.identity), *same)
+    results = {
+        "linear": kernels.linear(*symbols, there[:, -1], slopes[:, -1]),
+        "value": kernels.value(*symbols, to),
+    }
+    common = [argument in (5, 7) for argument in range(8)]  # p and b
+    made = [cast(Any, ca.Function(name, symbols, [r])) for name, r in results.items()]
+    linear, value = (function.map(n, common, [False]) for function in made)
+    return linear, value
+
+
 def backwards(array: Array) -> Array:
     """Rows in the opposite order."""
     return np.ascontiguousarray(array[::-1])
@@ -77,10 +96,7 @@ class Sweeps:
         self.horizon, self.kernels = horizon, kernels
         self.nx, self.nu = horizon.x.numel(), horizon.u.numel()
         self.rows, self.end_rows = len(horizon.limits), len(horizon.end_limits)
-        common = [argument in (5, 7) for argument in range(8)]  # p and b
-        linear, value = cast(Any, kernels.linear), cast(Any, kernels.value)
-        self._linear: ca.Function = linear.map(n, common, [False])
-        self._value: ca.Function = value.map(n, common, [False])
+        self._linear, self._value = _over_substeps(horizon, kernels)
         self._matrix = kernels.matrix.mapaccum("matrix", n)
         self._vector = kernels.vector.mapaccum("vector", n)
         self._forward = kernels.forward.mapaccum("forward", n)
