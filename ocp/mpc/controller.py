@@ -151,9 +151,9 @@ def controller_of(
     step: float = 0.01,
     *,
     method: str = "rodas3",
-    steps: int = 4,
+    steps: int = 8,
     measured: Sequence[str] | None = None,
-    tolerance: float = 1e-4,
+    tolerance: float = 1e-3,
     iterations: int = 10,
     penalty: float = 1e3,
     name: str | None = None,
@@ -173,8 +173,8 @@ def controller_of(
         problem: what to minimise.
         step: time between cycles [s].
         method, steps: of `flow`, for an interval. The steps should resolve the transition velocity
-            of friction: where v changes by much more than v_t in one, iterations converge slowly,
-            which the residual says. "exponential" for LuGre.
+            of friction: where v changes by much more than v_t in one, iterations converge slowly or
+            not, which the residual says. "exponential" for LuGre.
         measured: names of measured states, by default all; the others, such as bristles, are those
             of the plan. Inputs with a rate (`rates`) are never measured.
         tolerance: residual (see `gauss_newton`) at which a plan is optimal.

@@ -67,7 +67,7 @@ class Settings:
         halvings: of a step, at most.
     """
 
-    tolerance: float = 1e-4
+    tolerance: float = 1e-3
     iterations: int = 10
     program: int = 25
     halvings: int = 6

@@ -162,8 +162,9 @@ def _function(name: str, arguments: Sequence[ca.SX], results: Sequence[ca.SX]) -
 
 
 def _interval(horizon: Horizon) -> tuple[list[ca.Function], tuple[float, ...]]:
+    """The Functions of an interval, and S at its beginning."""
     h = horizon
-    nx, nu, rows = h.x.numel(), h.u.numel(), len(h.limits)
+    nx, nu = h.x.numel(), h.u.numel()
     arguments = [h.x, h.u, h.after, h.r, h.r_after, h.p, h.t, h.b]
     start = ca.vertcat(h.x, h.u)
     tangent, slopes = _tangent(horizon)
@@ -181,13 +182,25 @@ def _interval(horizon: Horizon) -> tuple[list[ca.Function], tuple[float, ...]]:
     pack.add("D early", ca.jacobian(v, start))
     pack.add("D late", ca.jacobian(v, h.after))
     value = ca.vertcat(c, v, h.early.value + h.late.value)
+    functions = [
+        h.advance,
+        tangent,
+        _function("linear", [*arguments, to, S], [pack.column()]),
+        _function("value", [*arguments, to], [value]),
+        *_recursion(pack, nx, nu, len(h.limits)),
+    ]
+    identity = ca.project(ca.horzcat(ca.DM.eye(nx), ca.DM(nx, nu)), slopes.sparsity())
+    return functions, tuple(map(float, ca.DM(identity).nonzeros()))
+
+
+def _recursion(pack: Packed, nx: int, nu: int, rows: int) -> list[ca.Function]:
+    """`matrix`, `vector`, `forward` and `adjoint`, for what was packed."""
     L = ca.SX.sym("L", len(pack.entries))
     F, g, H, D, g_late, H_late, D_late = (
         pack.part(name, L)
         for name in ("F", "g early", "H early", "D early", "g late", "H late", "D late")
     )
-    c = L[:nx]
-    size = nx * (nx + 1) // 2
+    c, size = L[:nx], nx * (nx + 1) // 2
     P, q, w, e = (ca.SX.sym(n, k) for n, k in (("P", size), ("q", nx), ("w", rows), ("e", rows)))
     # one step of the recursion
     whole = symmetric(P, nx) + H_late + D_late.T @ ca.diag(w) @ D_late
@@ -215,18 +228,12 @@ def _interval(horizon: Horizon) -> tuple[list[ca.Function], tuple[float, ...]]:
     # multipliers
     lam, m = ca.SX.sym("lam", nx), ca.SX.sym("m", rows)
     gradient = g - D.T @ m + F.T @ (lam + g_late - D_late.T @ m)
-    identity = ca.project(ca.horzcat(ca.DM.eye(nx), ca.DM(nx, nu)), slopes.sparsity())
-    functions = [
-        h.advance,
-        tangent,
-        _function("linear", [*arguments, to, S], [pack.column()]),
-        _function("value", [*arguments, to], [value]),
+    return [
         _function("matrix", [P, L, w], [upper(before), kept.column()]),
         _function("vector", [q, L, G, e], [both[:nx] + K.T @ both[nx:], k]),
         _function("forward", [d, L, G, feed], [then, ca.vertcat(du, moved, tilt, bend)]),
         _function("adjoint", [lam, L, m], [gradient[:nx], gradient[nx:]]),
     ]
-    return functions, tuple(map(float, ca.DM(identity).nonzeros()))
 
 
 def _tangent(horizon: Horizon) -> tuple[ca.Function, ca.SX]:

@@ -3,7 +3,8 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal, final
+from importlib import import_module
+from typing import Any, Literal, final
 
 from ocp.text.choice import Choice, chosen_of
 from ocp.text.complaints import input_problems
@@ -137,3 +138,10 @@ class Problem:
                 if span.scenario == 0 and rate_name(v.name) in self.shared_inputs and free:
                     found.append((span.phase, v.name))
         return tuple(found)
+
+    def to_mpc(self, step: float = 0.01, **options: Any) -> Any:
+        """A model predictive controller that solves this every `step` seconds over the next T.
+
+        See `controller_of` in `ocp.mpc` for the options, and `Controller` for what it does.
+        """
+        return import_module("ocp.mpc.controller").controller_of(self, step, **options)
