@@ -2,7 +2,8 @@
 
 The Hessian of a discretised motion is block diagonal but for the unknowns that belong to all of it:
 a free duration, parameters chosen with the motion. Each block, bordered by its share of these, is
-replaced by |A| = V |L| V' of its eigenvalues; a sum of semidefinite blocks is semidefinite.
+replaced by V max(L, 0) V' of its eigenvalues L; a sum of semidefinite blocks is semidefinite.
+|L| in their place takes twice the iterations on moves against friction.
 """
 
 from collections.abc import Sequence
@@ -76,17 +77,16 @@ class Convexified(ca.Callback):
         triangle = np.append(np.array(self._hessian(*arg).nonzeros()), 0.0)
         result = np.zeros(self._pattern.nnz())
         for size in self._sizes:
-            blocks = _reflected(triangle[size.source] * size.share)
+            blocks = _clipped(triangle[size.source] * size.share)
             np.add.at(result, size.target.ravel(), blocks.ravel())
         return [ca.DM(self._pattern, result)]
 
 
-def _reflected(blocks: Array) -> Array:
-    """V |L| V' of each symmetric block (k, n, n)."""
+def _clipped(blocks: Array) -> Array:
+    """V max(L, 0) V' of each symmetric block (k, n, n)."""
     if not np.isfinite(blocks).all():
         return blocks
     values, vectors = np.linalg.eigh(blocks)
-    values = np.abs(values)
     values = np.maximum(values, FLOOR * values.max(axis=1, keepdims=True, initial=0.0))
     return (vectors * values[:, None, :]) @ np.swapaxes(vectors, 1, 2)
 

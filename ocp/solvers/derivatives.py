@@ -5,8 +5,8 @@ import numpy as np
 
 from ocp.transcription.program import Program
 
-POINT = ("x", "p")
-MULTIPLIERS = ("x", "p", "lam_f", "lam_g")
+POINT = ["x", "p"]
+MULTIPLIERS = ["x", "p", "lam_f", "lam_g"]
 
 
 def symmetric(triangle: ca.MX) -> ca.MX:
@@ -36,9 +36,23 @@ def lagrangian(program: Program) -> ca.Function:
         "nlp_hess_l",
         [x, p, lam_f, lam_g],
         [ca.densify(slope), hessian],
-        list(MULTIPLIERS),
+        MULTIPLIERS,
         ["grad_gamma_x", "hess_gamma_x_x"],
     )
+
+
+def gradients(program: Program) -> ca.Function:
+    """(x, p, lam_f, lam_g) -> f, g and the gradients of lam_f f + lam_g' g in x and in p.
+
+    Those in p are zero: nobody asks for them, and CasADi wants a function that has them.
+    """
+    x, p, lam_f, lam_g = _symbols(program)
+    f, slope = program.gradient(x, p)
+    g, jacobian = program.jacobian(x, p)
+    total = ca.densify(lam_f * slope + jacobian.T @ lam_g)
+    names = ["f", "g", "grad_gamma_x", "grad_gamma_p"]
+    zero = ca.MX.zeros(p.numel())
+    return ca.Function("nlp_grad", [x, p, lam_f, lam_g], [f, g, total, zero], MULTIPLIERS, names)
 
 
 def both(program: Program) -> ca.Function:
@@ -47,4 +61,4 @@ def both(program: Program) -> ca.Function:
     outputs = [*program.gradient(x, p), *program.jacobian(x, p)]
     outputs[1] = ca.densify(outputs[1])
     names = ["f", "grad_f_x", "g", "jac_g_x"]
-    return ca.Function("nlp_jac_fg", [x, p], outputs, list(POINT), names)
+    return ca.Function("nlp_jac_fg", [x, p], outputs, POINT, names)

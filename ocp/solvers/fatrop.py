@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, final
 
-from ocp.solvers.derivatives import lagrangian
+from ocp.solvers.derivatives import gradients, lagrangian
 from ocp.solvers.prepared import Built, Option, Prepared, checked_options, checked_time, made
 from ocp.solvers.watch import GradientHook
 from ocp.transcription.program import Program, Stages
+from symfric.foundation import checks
 from symfric.foundation.status import Status
 
 ANSWERS: tuple[tuple[str, Status], ...] = (
@@ -42,6 +43,8 @@ class Fatrop:
     max_time: float | None
 
     def __init__(self, *, max_time: float | None = None, **options: Option) -> None:
+        for name, value in options.items():  # fatrop itself would silently take no notice
+            checks.number(f"Fatrop: option {name}", value)
         object.__setattr__(self, "options", checked_options("Fatrop", options))
         object.__setattr__(self, "max_time", checked_time("Fatrop", max_time))
 
@@ -74,7 +77,9 @@ class Fatrop:
             "nx": list(stages.nx),
             "nu": list(stages.nu),
             "ng": list(stages.ng),
+            "no_nlp_grad": False,
             "cache": {
+                "nlp_grad": gradients(program),
                 "nlp_grad_f": hook,
                 "nlp_jac_g": program.jacobian,
                 "nlp_hess_l": lagrangian(program),

@@ -196,7 +196,9 @@ class Prepared:
             solver.hook.watch = None
         if watch.error is not None and not isinstance(watch.error, Exception):
             raise watch.error
-        answer, status = self.read(solver.function.stats())
+        stats = solver.function.stats()
+        watch.counted = int(stats["iter_count"])
+        answer, status = self.read(stats)
         if answer == "Invalid_Option":
             raise refused_options(
                 self.solver, self.options, "they do not go together, or need a missing library"

@@ -63,7 +63,15 @@ class Seen:
 
 @final
 class Watch:
-    """One run of a solver as it is seen from outside."""
+    """One run of a solver as it is seen from outside.
+
+    Attributes:
+        best, last: iterates; None before the first one.
+        trace: cost, violation and largest step of each iterate.
+        counted: iterations as the solver has counted them, when it is back.
+        halt: who stopped it, if anybody did.
+        error: an exception in `progress`.
+    """
 
     def __init__(self, program: Program, progress: Report | None, max_time: float | None) -> None:
         self._program, self._progress = program, progress
@@ -71,13 +79,15 @@ class Watch:
         self.best: Seen | None = None
         self.last: Seen | None = None
         self.trace: list[tuple[float, float, float]] = []
+        self.counted: int | None = None
         self.halt: Halt | None = None
         self.error: BaseException | None = None
 
     @property
     def iterations(self) -> int:
-        """Iterations seen, the start not counted."""
-        return max(0, len(self.trace) - 1)
+        """Iterations seen, the start not counted; a restoration shows its first point twice."""
+        seen = max(0, len(self.trace) - 1)
+        return seen if self.counted is None else min(seen, self.counted)
 
     def see(self, w: Array, f: float, g: Array, lam_w: Array, lam_g: Array) -> bool:
         """Take note of an iterate; True asks the solver to stop."""

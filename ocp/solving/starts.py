@@ -85,7 +85,7 @@ def initial_points(into: Transcription, given: Mapping[str, Guess] | None = None
         begin = _begin(problem, durations, number)
         return _evaluate(name, guesses[name], begin + fractions * durations[number], total)
 
-    return _points(into, durations, value)
+    return into.consistent(_points(into, durations, value))
 
 
 def resample(into: Transcription, stored: Stored) -> Points:

@@ -15,6 +15,7 @@ from ocp.transcription.points import Layout, Points, SpanPoints
 from ocp.transcription.program import Places, Program
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.skeleton import LARGEST, Skeleton, fixed_duration, numbers_of
+from ocp.transcription.stages import stages_of
 from symfric.foundation.parameters import check_names
 
 
@@ -126,6 +127,8 @@ class Transcription:
     def _program(self) -> Program:
         made = self.skeleton.assembled
         s = self.skeleton
+        equality = s.lower_g == s.upper_g
+        stages, unstaged = stages_of(self.problem, s.layout, s.pieces, made, equality)
         return Program(
             s.w,
             s.p,
@@ -142,6 +145,8 @@ class Transcription:
             Places(made.g.numel(), lambda: _row_places(s, self.meshes)),
             Places(s.w.numel(), lambda: _unknown_places(self)),
             s.scale,
+            stages,
+            unstaged,
         )
 
 
@@ -178,6 +183,7 @@ def _unknown_places(transcription: Transcription) -> Columns:
             ([v.name for v in model.x], own.inner, inner),
             ([v.name for v in model.z], own.z, inner),
             ([v.name for v in model.u], own.u, mesh[:-1]),
+            ([f"correction {k + 1}" for k in range(len(own.extra))], own.extra, mesh[:-1]),
             (
                 ["T"],
                 np.array([[own.T]])[:, : int(own.T >= 0)],
