@@ -30,6 +30,7 @@ from ocp.friction.sequence import Arc, Leg
 from ocp.text.phase import Chain, Phase, Start
 from ocp.text.problem import Duration, Problem
 from ocp.text.ranges import Free, Range, meet
+from ocp.text.span import Span
 from symfric.foundation.symbols import stacked
 from symfric.model import Contact, Model, Output
 
@@ -37,9 +38,9 @@ GRIP = 3e-3
 """Share of the static level that a rest keeps away from it: a smooth law creeps over its peak a
 little below. Not on the side to which the contact leaves by a force that cannot jump."""
 
-PULL = 1e-3
+PULL = 1e-2
 """Share of the static level by which a control that jumps exceeds it: held exactly there, a smooth
-law of any width would stay on its peak."""
+law of any width would stay on its peak, and a little above it for long."""
 
 LEVEL = -1e-6
 """What is allowed on that side: at its end the rest is at its level, which the condition of
@@ -49,6 +50,7 @@ SIGN = 1e-7
 """Sliding velocity by which one that is no state may have the wrong sign: at the ends of slipping,
 where it is zero, two conditions would depend on each other."""
 
+PULLED = "_pull"
 Ranges = dict[str, Range]
 Value = TypeVar("Value")
 
@@ -147,6 +149,11 @@ def in_arcs(
     )
 
 
+def breaks_away(span: Span) -> bool:
+    """Whether some contact breaks away at the start of an arc."""
+    return any(name.endswith(PULLED) for name in span.model.outputs)
+
+
 def carrier(model: Model, contact: Contact) -> tuple[str, int] | None:
     """The state that is zero when `contact` rests, and the side to which it grows with the slip.
 
@@ -182,7 +189,7 @@ def arc_model(
                     room = made.expression(f"{c.name}_grip_{side}")
                     outputs[f"{c.name}_{side}"] = room / sizes[c.name]
         for name in released:
-            outputs[f"{name}_pull"] = excess(model, modes, name) / sizes[name]
+            outputs[f"{name}{PULLED}"] = excess(model, modes, name) / sizes[name]
         new = {name: Output(expression, "1") for name, expression in outputs.items()}
         kept[key] = with_outputs(made, new)
     return kept[key]
@@ -212,7 +219,7 @@ def _phase(
         end = _end_of(place, contact, end)
         bounds |= _inside(problem, place, contact, limited)
         if contact.name in released:
-            start[f"{contact.name}_pull"] = _pull(place, contact.name, limited)
+            start[f"{contact.name}{PULLED}"] = _pull(place, contact.name, limited)
     signals = {*model.signals, *model.further}
     return replace(
         base,

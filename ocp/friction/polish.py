@@ -43,6 +43,9 @@ solution. A smooth law is back at its dynamic level at a few widths."""
 SHORTEST = 5e-5
 """Least duration of an arc, as a share of the whole: what is needed is longer."""
 
+KICK = 2e-3
+"""Share of the whole duration that an interval has at least in which a contact breaks away."""
+
 GONE = 2.0
 """Arcs shorter than so many times the least duration are pruned."""
 
@@ -56,7 +59,7 @@ WORTH = 1e-4
 """Share of the cost by which another sequence must be better: more than the estimate of what
 holding the inputs costs on few intervals is wrong by."""
 
-FINE = 2e-4
+FINE = 3e-4
 """Share of the cost that holding the inputs over the intervals may cost."""
 
 LOCAL = 1e-7
@@ -66,7 +69,7 @@ HALVED = 4.0
 """Multiple of the largest local error that has an interval halved, of order 5."""
 
 LEAST_INTERVALS = 40
-MOST = 2000
+MOST = 800
 
 Keep = Callable[[Solved], Solved]
 
@@ -127,6 +130,7 @@ def polished(
         solver or Ipopt(max_iter=200),
         scheme or Radau(3),
         SHORTEST * whole,
+        KICK * whole,
         progress,
     )
     tried: list[Solved] = []

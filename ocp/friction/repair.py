@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.friction.sequence import Arc, Leg, flat, inserted
+from ocp.friction.sequence import Arc, Leg, flat, inserted, pruned
 from ocp.friction.solved import Solved
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ def rests_inside(solved: Solved) -> tuple[Leg, ...] | None:
                 shift += len(flat(legs)) - before
                 found = True
                 break
-    return legs if found else None
+    return pruned(legs, 0.0) if found else None
 
 
 def neighbours(legs: Sequence[Leg], width: float) -> Iterator[tuple[Leg, ...]]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.holding import holding_losses
-from ocp.friction.arcs import in_arcs
+from ocp.friction.arcs import breaks_away, in_arcs
 from ocp.friction.carry import Known, points_in
 from ocp.friction.sequence import Leg, flat, placed, shown
 from ocp.result.motion import motion_of
@@ -95,6 +95,7 @@ class Polisher:
         at_rest: contacts that are at rest at the start.
         solver, scheme, progress: as in `polish`.
         shortest: least duration of an arc [s].
+        kick: least length of the interval in which a contact breaks away [s].
     """
 
     problem: Problem
@@ -103,6 +104,7 @@ class Polisher:
     solver: Ipopt
     scheme: Scheme
     shortest: float
+    kick: float
     progress: Report | None
 
     def solve(self, legs: Sequence[Leg], known: Known, intervals: int, barrier: float) -> Solved:
@@ -129,6 +131,11 @@ class Polisher:
         barrier: float,
     ) -> Solved:
         """The same on given meshes."""
+        spans, arcs = discretisation.problem.spans, flat(legs)
+        meshes = [
+            _with_kick(mesh, self.kick / arc.duration) if breaks_away(span) else mesh
+            for mesh, span, arc in zip(meshes, spans, arcs, strict=True)
+        ]
         transcription = discretisation.on(meshes)
         start = transcription.pack(points_in(transcription, flat(legs), known))
         prepared = self.solver.with_options(mu_init=barrier, **CLOSE).prepared(
@@ -139,3 +146,13 @@ class Polisher:
         outcome = prepared.run(Iterate.cold(start, rows), progress=stage)
         durations = [span.T for span in transcription.unpack(outcome.iterate.w).spans]
         return Solved(placed(legs, durations), discretisation, transcription, outcome)
+
+
+def _with_kick(mesh: Array, kick: float) -> Array:
+    """`mesh` whose first interval is not shorter than `kick`, where two more remain.
+
+    A control may break a contact away by a kick and then go on with less than its static level. The
+    shorter the kick the less it costs, without end: its length has to be given.
+    """
+    kept = mesh[(mesh == 0.0) | (mesh >= kick)]
+    return kept if kept.size > LEAST else mesh
