@@ -219,7 +219,7 @@ def plain_links(
     pairs = [(to, origin) for to, origin in pairs if origin >= 0 and to not in released]
     if not pairs:
         return []
-    to, origin = (np.array(part) for part in zip(*pairs, strict=True))
+    to, origin = (np.array(part) for part in zip(*sorted(pairs), strict=True))
     sizes, old = span.model.nominal("x")[to], before.model.nominal("x")[origin]
     rows = LinearRows(
         tuple(f"the continuity of {states[i]}" for i in to), sizes, ((0.0, 0.0),) * len(pairs)

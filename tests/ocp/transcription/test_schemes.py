@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+
+from ocp.text.cost import at_end
+from ocp.text.phase import Phase
+from ocp.text.problem import Problem
+from ocp.transcription.grid import make_meshes
+from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
+from ocp.transcription.transcribe import discretise
+from symfric import Model, Variable
+
+EVERY = [kind(degree) for kind in (Radau, Legendre) for degree in (1, 2, 3, 5, 9)]
+
+
+@pytest.mark.parametrize("scheme", EVERY, ids=str)
+def test_coefficients_are_exact_for_their_polynomials(scheme: Radau | Legendre) -> None:
+    c, d = scheme.coefficients(), scheme.degree
+    rng = np.random.default_rng(d)
+    p = Polynomial(rng.standard_normal(d + 1))
+    np.testing.assert_allclose(c.slopes.T @ p(c.nodes), p.deriv()(c.nodes[1:]), atol=1e-9)
+    assert c.ends @ p(c.nodes) == pytest.approx(p(1.0), abs=1e-11)
+    r = Polynomial(rng.standard_normal(d))
+    assert c.inner_ends @ r(c.nodes[1:]) == pytest.approx(r(1.0), abs=1e-11)
+    q = Polynomial(rng.standard_normal(scheme.order))  # quadrature is exact to order - 1
+    assert c.weights @ q(c.nodes[1:]) == pytest.approx(q.integ()(1.0), abs=1e-12)
+
+
+def test_radau_meets_the_end_of_its_interval_exactly() -> None:
+    for degree in range(1, 10):
+        c = Radau(degree).coefficients()
+        assert c.meets_end
+        np.testing.assert_array_equal(c.ends, np.eye(degree + 1)[-1])
+    assert not Legendre(3).coefficients().meets_end
+
+
+@pytest.mark.parametrize("make", [Radau, Legendre])
+@pytest.mark.parametrize("degree", [0, 10, 2.5, True, "3"])
+def test_impossible_degrees_are_refused(make: type, degree: object) -> None:
+    with pytest.raises(ValueError, match=f"{make.__name__}: degree"):
+        make(degree)
+
+
+@pytest.mark.parametrize(("method", "steps"), [("rodas", 2), ("rodas5p", 0)])
+def test_impossible_shooting_is_refused(method: str, steps: int) -> None:
+    with pytest.raises(ValueError, match="Shooting: "):
+        Shooting(method, steps)
+
+
+def error(scheme: Scheme, intervals: int) -> float:
+    """Error at the end of x' = 1 + x^2, x = tan t over 1 s, solved by Newton's method."""
+    x, u = Variable("x", "1"), Variable("u", "1")
+    model = Model("tangent", x=(x,), u=(u,), ode=1 + x.symbol**2 + 0 * u.symbol)
+    problem = Problem(Phase(model, 1.0, start={"x": 0.0}), at_end(lambda s: s.x))
+    p = discretise(problem, scheme).on(make_meshes(problem, intervals)).program
+    w, free = np.zeros(p.w.numel()), p.lower_w < p.upper_w
+    free[[place.name == "u" for place in p.unknowns]] = False
+    for _ in range(12):
+        g, J = p.jacobian(w, p.values)
+        w[free] -= np.linalg.solve(J.full()[:, free], g.full().ravel())
+    last = max(i for i, place in enumerate(p.unknowns) if place.name == "x")
+    return abs(w[last] - np.tan(1.0))
+
+
+@pytest.mark.parametrize(
+    ("scheme", "intervals"),
+    [(Radau(1), 40), (Radau(2), 10), (Radau(3), 4), (Legendre(1), 20), (Legendre(2), 6),
+     (Legendre(3), 6)],
+)  # fmt: skip
+def test_order_at_the_nodes(scheme: Radau | Legendre, intervals: int) -> None:
+    rate = np.log2(error(scheme, intervals) / error(scheme, 2 * intervals))
+    assert rate == pytest.approx(scheme.order, abs=0.25)
