@@ -75,6 +75,11 @@ class Stages:
     equality: tuple[bool, ...]
 
 
+def no_structure() -> tuple[Stages | None, str]:
+    """Of a program that nobody has looked at."""
+    return None, "no known structure"
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Program:
@@ -91,8 +96,7 @@ class Program:
         values: numbers of p.
         rows, unknowns: what each row and each unknown is about.
         scale: SI values of the unknowns divided by w.
-        stages: structure for solvers that use it; None where there is none, and `unstaged` says
-            why.
+        structure: looks for stages when somebody asks.
     """
 
     w: ca.MX
@@ -110,8 +114,17 @@ class Program:
     rows: Sequence[Place]
     unknowns: Sequence[Place]
     scale: Array
-    stages: Stages | None = None
-    unstaged: str = ""
+    structure: Callable[[], tuple[Stages | None, str]] = no_structure
+
+    @property
+    def stages(self) -> Stages | None:
+        """Structure for solvers that use it; None where there is none, see `unstaged`."""
+        return self.structure()[0]
+
+    @property
+    def unstaged(self) -> str:
+        """Why there are no stages."""
+        return self.structure()[1]
 
     @property
     def nlp(self) -> dict[str, ca.MX]:

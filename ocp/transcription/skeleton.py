@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import final
 
 import casadi as ca
@@ -18,8 +19,10 @@ from ocp.transcription.collocation import PointEquations, ends_of, gaps, pieces_
 from ocp.transcription.conditions import AtNode, Between, largest, plain_links, whole
 from ocp.transcription.local import Data
 from ocp.transcription.points import Layout, Sizes, lay_out
+from ocp.transcription.program import Stages
 from ocp.transcription.schemes import Coefficients, Scheme
 from ocp.transcription.shooting import Shot, pieces_of_intervals
+from ocp.transcription.stages import stages_of
 
 
 @final
@@ -53,6 +56,7 @@ class Equations:
 class Skeleton:
     """What programs on all meshes of the same numbers of intervals share."""
 
+    problem: Problem
     layout: Layout
     assembled: Assembled
     w: ca.MX
@@ -64,6 +68,12 @@ class Skeleton:
     lower_g: Array
     upper_g: Array
     closing: tuple[Closing | None, ...]
+
+    @cached_property
+    def structure(self) -> tuple[Stages | None, str]:
+        """Stages, or why there are none."""
+        equality = self.lower_g == self.upper_g
+        return stages_of(self.problem, self.layout, self.pieces, self.assembled, equality)
 
 
 LARGEST = "the largest cost"
@@ -126,6 +136,7 @@ def skeleton_of(
     for piece, at in zip(pieces, assembled.at, strict=True):
         lower_g[at], upper_g[at] = piece.lower[:, None], piece.upper[:, None]
     return Skeleton(
+        problem,
         layout,
         assembled,
         w,

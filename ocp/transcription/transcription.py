@@ -15,7 +15,6 @@ from ocp.transcription.points import Layout, Points, SpanPoints
 from ocp.transcription.program import Places, Program
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.skeleton import LARGEST, Skeleton, fixed_duration, numbers_of
-from ocp.transcription.stages import stages_of
 from symfric.foundation.parameters import check_names
 
 
@@ -127,8 +126,6 @@ class Transcription:
     def _program(self) -> Program:
         made = self.skeleton.assembled
         s = self.skeleton
-        equality = s.lower_g == s.upper_g
-        stages, unstaged = stages_of(self.problem, s.layout, s.pieces, made, equality)
         return Program(
             s.w,
             s.p,
@@ -145,8 +142,7 @@ class Transcription:
             Places(made.g.numel(), lambda: _row_places(s, self.meshes)),
             Places(s.w.numel(), lambda: _unknown_places(self)),
             s.scale,
-            stages,
-            unstaged,
+            lambda: s.structure,
         )
 
 
