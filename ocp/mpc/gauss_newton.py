@@ -9,9 +9,10 @@ whose multipliers of the equations make the gradients in the states zero: the la
 
  * gradients in the inputs, per nominal and own curvature of the cost in an input: an input would
    move by no more than that share of its nominal;
- * defects of the equations per nominal of the state; violated hard rows, in units of the signal;
- * products of rows and multipliers, by that curvature, too; in a violated soft row z must be the
-   price.
+ * defects of the equations per nominal of the state;
+ * violations of rows in units of their signals; products of rows and multipliers, by the larger
+   of multiplier and that curvature. A soft row may be violated instead where its multiplier is the
+   price: what it is off, relative to the price, times the violation.
 
 Source of the merit's weight: Nocedal and Wright, Numerical Optimization, 2nd ed., (18.36).
 """
@@ -68,8 +69,8 @@ class Settings:
     """
 
     tolerance: float = 1e-3
-    iterations: int = 10
-    program: int = 25
+    iterations: int = 20
+    program: int = 40
     halvings: int = 6
 
 
@@ -127,8 +128,11 @@ def residual_of(
     gradients = np.abs(sweeps.adjoint(L, end, z) * model.nominal("u")) / unit
     defects = np.abs(sweeps.defects_of(L)) / model.nominal("x")
     below, soft = np.maximum(-v, 0.0), prices.soft
-    owed = np.where(soft & (v < 0.0), prices.rho + prices.sigma * below - z, z)
-    parts = (gradients, defects, np.abs(owed * v) / unit, np.where(soft, 0.0, below))
+    kept = np.maximum(below, np.abs(z * v) / np.maximum(z, unit))
+    owed = prices.rho + prices.sigma * below - z
+    paid = np.abs(owed * v) / np.where(soft, prices.rho, 1.0)
+    rows = np.where(soft & (v < 0.0), np.minimum(kept, paid), kept)
+    parts = (gradients, defects, rows)
     found = float(np.max([np.max(part, initial=0.0) for part in parts]))
     return found, float(np.max(np.where(soft, below, 0.0), initial=0.0))
 

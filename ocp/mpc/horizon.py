@@ -24,7 +24,7 @@ from symfric.model import Model
 
 Array = NDArray[np.float64]
 
-FLAT = 1e-8
+FLAT = 1e-6
 """Curvature of the cost in an input that has none of its own, relative to the largest one."""
 
 

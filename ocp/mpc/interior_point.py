@@ -31,7 +31,7 @@ BACK = 0.995
 CLOSE = 1e-7
 """mu, in units of the curvature, at which a program is solved."""
 AWAY = 0.1
-"""Distance from the bounds at which the interior point starts, in units of the signals."""
+"""Least distance from the bounds at which the interior point starts, in units of the signals."""
 
 
 @final
@@ -100,13 +100,10 @@ def solve_program(
     G = sweeps.matrix(L, end, none)
     move = sweeps.forward(L, end, G, sweeps.vector(L, end, G, none))
     first = v + move.D
-    if float(first.min(initial=np.inf)) >= 0.0:
+    worst = -float(first.min(initial=np.inf))
+    if worst <= 0.0:
         return move, none, 0
-    soft = prices.soft
-    t, z = np.maximum(first, AWAY), np.maximum(warm, unit)
-    s = np.where(soft, np.maximum(t - first, AWAY), 0.0)
-    z = np.where(soft, np.minimum(z, 0.5 * prices.rho), z)
-    point = Point(t, z, s, np.where(soft, prices.rho + prices.sigma * s - z, 0.0))
+    soft, point = prices.soft, _inside(prices, v, first, warm, unit * max(1.0, worst))
     pairs = float(v.size + int(soft.sum()))
     made = 0
     while made < most:
@@ -125,6 +122,27 @@ def solve_program(
         alpha = point.reach(change, BACK)
         point, move = point.on(alpha, change), move.towards(aim, alpha)
     return move, point.z, made
+
+
+def _inside(prices: Prices, v: Array, first: Array, warm: Array, product: float) -> Point:
+    """Where to begin, with all products about equal.
+
+    A soft row that is violated now (v < 0) is taken to remain so, with z at its price; the others
+    are kept off their bounds, `first` being their values at the free minimum, and z is no less than
+    what it was in the last program.
+    """
+    rho, soft = prices.rho, prices.soft
+    worst = -float(first.min())
+    t = np.maximum(first, max(AWAY, worst))
+    z = np.maximum(warm, product / t)
+    z = np.where(soft, np.minimum(z, 0.5 * rho), z)
+    s = np.where(soft, product / np.where(soft, rho, 1.0), 0.0)
+    y = np.where(soft, rho + prices.sigma * s - z, 0.0)
+    beyond = soft & (-v * rho > 2.0 * product)
+    below = np.where(beyond, -v, 1.0)
+    s, y = np.where(beyond, below, s), np.where(beyond, product / below, y)
+    z = np.where(beyond, rho + prices.sigma * s - y, z)
+    return Point(np.where(beyond, product / z, t), z, s, y)
 
 
 def _weights(prices: Prices, point: Point) -> tuple[Array, Array]:

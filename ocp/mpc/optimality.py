@@ -72,8 +72,9 @@ class Optimality:
         left = (gradient[n:, 0] + by_inputs.T @ multipliers) * np.tile(model.nominal("u"), h.count)
         defects = c[:, 0] / np.tile(model.nominal("x"), h.count)
         v, below = v[:, 0], np.maximum(-v[:, 0], 0.0)
-        price = prices.rho + prices.sigma * below
-        products = np.where(prices.soft & (v < 0.0), (price - plan.z) * v, plan.z * v)
-        parts = (left / h.curvature, defects, products / h.curvature)
-        worst = max(float(np.abs(part).max(initial=0.0)) for part in parts)
-        return max(worst, float(np.where(prices.soft, 0.0, below).max(initial=0.0)))
+        kept = np.maximum(below, np.abs(plan.z * v) / np.maximum(plan.z, h.curvature))
+        price = np.where(prices.soft, prices.rho, 1.0)
+        owed = (prices.rho + prices.sigma * below - plan.z) * v / price
+        rows = np.where(prices.soft & (v < 0.0), np.minimum(kept, np.abs(owed)), kept)
+        parts = (left / h.curvature, defects, rows)
+        return max(float(np.abs(part).max(initial=0.0)) for part in parts)

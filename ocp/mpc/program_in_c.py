@@ -141,16 +141,15 @@ static double residual_of(NAME_t *m, double *violation)
     take_rows(m);
     for (k = 0; k < ALL; k++) {
         const double v = m->v[k], below = -v > 0.0 ? -v : 0.0;
-        double owed = m->z[k];
+        const double kept = larger(below, fabs(m->z[k] * v) / larger(CURVATURE, m->z[k]));
+        double miss = kept;
         if (soft[ROW(k)]) {
+            const double owed = rho[ROW(k)] + sigma[ROW(k)] * below - m->z[k];
+            const double paid = fabs(owed * v) / rho[ROW(k)];
             *violation = larger(*violation, below);
-            if (v < 0.0) {
-                owed = rho[ROW(k)] + sigma[ROW(k)] * below - owed;
-            }
-        } else {
-            found = larger(found, below);
+            miss = v < 0.0 && paid < kept ? paid : kept;
         }
-        found = larger(found, fabs(owed * v) / CURVATURE);
+        found = larger(found, miss);
     }
 #endif
     return found;
@@ -223,19 +222,26 @@ static double gap(const NAME_t *m, double alpha)
     return sum;
 }
 
-static void start_inside(NAME_t *m)
+static void start_inside(NAME_t *m, double worst)
 {
     int j;
+    const double product = CURVATURE * (worst > 1.0 ? worst : 1.0);
+    const double away = worst > AWAY ? worst : AWAY;
     for (j = 0; j < ALL; j++) {
         const int i = ROW(j);
         const double first = m->v[j] + m->go.D[j];
-        m->ts[j] = first > AWAY ? first : AWAY;
-        m->zn[j] = m->z[j] > CURVATURE ? m->z[j] : CURVATURE;
+        m->ts[j] = first > away ? first : away;
+        m->zn[j] = product / m->ts[j];
+        m->zn[j] = m->z[j] > m->zn[j] ? m->z[j] : m->zn[j];
         m->s[j] = 0.0;
         m->y[j] = 0.0;
-        if (soft[i]) {
-            const double off = m->ts[j] - first;
-            m->s[j] = off > AWAY ? off : AWAY;
+        if (soft[i] && -m->v[j] * rho[i] > 2.0 * product) {
+            m->s[j] = -m->v[j];
+            m->y[j] = product / m->s[j];
+            m->zn[j] = rho[i] + sigma[i] * m->s[j] - m->y[j];
+            m->ts[j] = product / m->zn[j];
+        } else if (soft[i]) {
+            m->s[j] = product / rho[i];
             if (m->zn[j] > 0.5 * rho[i]) {
                 m->zn[j] = 0.5 * rho[i];
             }
@@ -298,7 +304,8 @@ static int program(NAME_t *m)
 {
     int made = 0;
 #if ALL > 0
-    int j, inside = 1;
+    int j;
+    double worst;
     for (j = 0; j < ALL; j++) {
         m->w[j] = 0.0;
         m->e[j] = 0.0;
@@ -308,15 +315,14 @@ static int program(NAME_t *m)
     matrices(m);
     change(m, &m->go);
 #if ALL > 0
-    for (j = 0; j < ALL; j++) {
-        if (!(m->v[j] + m->go.D[j] >= 0.0)) {
-            inside = 0;
-        }
+    worst = -(m->v[0] + m->go.D[0]);
+    for (j = 1; j < ALL; j++) {
+        worst = larger(worst, -(m->v[j] + m->go.D[j]));
     }
-    if (inside) {
+    if (worst <= 0.0) {
         return 0;
     }
-    start_inside(m);
+    start_inside(m, worst);
     while (made < MOST) {
         const double mu = gap(m, 0.0) / PAIRS;
         if (mu <= CLOSE * CURVATURE) {
