@@ -13,6 +13,8 @@ from symfric.bench.lanes import LaneBenchmark as LaneBenchmark
 from symfric.bench.lanes import bench_ensemble as bench_ensemble
 from symfric.bench.multibody import MultibodyBenchmark as MultibodyBenchmark
 from symfric.bench.multibody import bench_multibody as bench_multibody
+from symfric.bench.ocp import OcpBenchmark as OcpBenchmark
+from symfric.bench.ocp import bench_ocp as bench_ocp
 from symfric.bench.regularisation import RegularisationBenchmark as RegularisationBenchmark
 from symfric.bench.regularisation import bench_regularisation as bench_regularisation
 from symfric.bench.sensitivities import SensitivityRow as SensitivityRow

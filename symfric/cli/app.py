@@ -25,6 +25,7 @@ COMMANDS = {
     "run": "Simulate SCENE with a friction law.",
     "identify": "Identify mass, offset and friction of a drive.",
     "codegen": "Write a friction law or a plant as C99, and verify it.",
+    "ocp": "Solve an optimal control problem and check it.",
     "demo": "Simulate, identify, optimise and generate C.",
     "bench": "Measure symfric beside other integrators.",
     "stress": "Judge runs of random laws in random scenes.",

@@ -9,7 +9,16 @@ from symfric.cli import bench_tables, output
 from symfric.cli.options import JsonOption, PlotOption, check_outputs
 from symfric.foundation.parameters import check_names
 
-SUBJECTS = ("integrator", "calls", "ensemble", "multibody", "ivp", "jitter", "regularisation")
+SUBJECTS = (
+    "integrator",
+    "calls",
+    "ensemble",
+    "multibody",
+    "ivp",
+    "jitter",
+    "regularisation",
+    "ocp",
+)
 TABLES = ("calls", "ensemble")
 """Subjects without a picture."""
 
@@ -38,7 +47,8 @@ def bench(
     the cost of their steps, what they do not need, reference numbers. ivp: correct digits on
     problems with published solutions (Test Set for IVP Solvers). jitter: total variation of
     accelerations against law, step and transition velocity. regularisation: error of smooth laws
-    against dry friction, over their width or stiffness.
+    against dry friction, over their width or stiffness. ocp: optimal control from many starts,
+    whether it lands, large programs, controllers; beside CasADi's Opti and rockit.
 
     Example: symfric bench multibody --plot bench.png --csv runs.csv
     """

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
         IvpBenchmark,
         LaneBenchmark,
         MultibodyBenchmark,
+        OcpBenchmark,
         RegularisationBenchmark,
     )
 
@@ -225,6 +226,43 @@ def regularisation(result: "RegularisationBenchmark") -> None:
             f"{case}: error at each rtol against {first.reference}, good for "
             f"{first.uncertain:.1g}; order and cycle at the smallest rtol, cost at the largest",
         )  # fmt: skip
+
+
+def ocp(result: "OcpBenchmark") -> None:
+    """Problems by solvers, sizes of programs, controllers."""
+    output.show_table(
+        ["case", "solver", "starts", "landed", "best", "J", "off [%]", "miss", "exact", "it.",
+         "[s]"],
+        [
+            [r.case, r.solver, f"{r.count} {r.starts}", f"{r.landed:.0%}", f"{r.best:.0%}", r.cost,
+             _known(100 * r.off, 2), _known(r.miss, 2), _known(r.exact, 2), round(r.iterations),
+             _known(r.time_s, 2)]
+            for r in result.rows
+        ],
+        "Medians; landed: missed by no more than 1e-4; exact: with exact Coulomb friction",
+    )  # fmt: skip
+    if result.sizes:
+        output.show_table(
+            ["intervals", "unknowns", "nonzeros", "build [s]", "J [ms]", "H [ms]", "exponent"],
+            [
+                [r.intervals, r.unknowns, r.nonzeros, _short(r.build_s), _short(r.jacobian_ms),
+                 _short(r.hessian_ms), _known(r.exponent, 3)]
+                for r in result.sizes
+            ],
+            "Derivatives of a cart-pendulum's program in the virtual machine",
+        )  # fmt: skip
+    if result.mpc:
+        output.show_table(
+            ["plant", "cycles", "median [ms]", "worst", "cpu", "QPs", "failed", "hidden", "[mm]"],
+            [
+                [r.plant, r.cycles, _short(r.median_ms), _short(r.worst_ms),
+                 _short(r.worst_cpu_ms), r.iterations, r.unconverged, r.unreported,
+                 _short(r.off_mm)]
+                for r in result.mpc
+            ],
+            "Controller of a drive; hidden: failures that it did not report",
+        )  # fmt: skip
+    _skipped(result.skipped)
 
 
 def _known(value: float, digits: int) -> float | str:

@@ -1,0 +1,103 @@
+"""Model predictive control of a drive whose friction is not the one the controller believes."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ocp.problems.friction import guide
+from ocp.text.cost import at_end, effort, track
+from ocp.text.phase import Phase
+from ocp.text.problem import Problem
+from symfric.foundation.compiler import find_compiler
+from symfric.laws import BrownMcPhee, ExactCoulomb, LuGre
+from symfric.model import Model
+from symfric.scenes.drive import drive
+
+Array = NDArray[np.float64]
+STEP, HORIZON = 0.01, 20
+GOAL = 0.1
+LOOK = 0.75
+"""When it should be there [s]: it knows that it will go back at 1 s."""
+CYCLES = 1000
+
+
+@final
+@dataclass(frozen=True)
+class MpcRow:
+    """A controller on a plant.
+
+    Attributes:
+        plant: its friction.
+        cycles: number of control steps.
+        median_ms, worst_ms: of a cycle on the clock [ms].
+        worst_cpu_ms: of the processor [ms].
+        iterations: most quadratic programs in a cycle.
+        unconverged: cycles that say that they did not converge.
+        unreported: cycles that say they did, and did not.
+        off_mm: distance from the goal at 0.75 s [mm].
+        compiled: whether the controller ran as C.
+    """
+
+    plant: str
+    cycles: int
+    median_ms: float
+    worst_ms: float
+    worst_cpu_ms: float
+    iterations: int
+    unconverged: int
+    unreported: int
+    off_mm: float
+    compiled: bool
+
+
+def _drive(law: BrownMcPhee | LuGre | ExactCoulomb) -> Model:
+    return drive(law, m=1.0, N=1.0)
+
+
+PLANTS: dict[str, Callable[[], Model]] = {
+    "brown_mcphee 1e-2": lambda: _drive(BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-2)),
+    "brown_mcphee 1e-4": lambda: _drive(BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-4)),
+    "lugre 1e5 N/m": lambda: _drive(
+        LuGre(mu_s=6.0, mu_d=4.0, v_s=1e-2, sigma_0=1e5, sigma_1=300.0, sigma_2=0.0)
+    ),
+    "exact_coulomb": lambda: _drive(ExactCoulomb(mu_s=6.0, mu_d=4.0)),
+}
+
+
+def receding(v_t: float = 1e-2) -> Problem:
+    """A drive goes to a place and stays: 20 intervals of 10 ms."""
+    cost = track("x", "goal", 900.0) + track("v", 0.0, 1.0) + effort("force", 1e-3)
+    cost += at_end(lambda s: 100.0 * (s.x - s.goal) ** 2 + s.v**2)
+    stage = drive(guide(v_t), m=1.0, N=1.0)
+    return Problem(
+        Phase(stage, T=STEP * HORIZON), cost, bounds={"force": (-20.0, 20.0)}, p={"goal": 0.0}
+    )
+
+
+def mpc_rows(quick: bool) -> Iterator[MpcRow]:
+    """The controller on every plant, to and fro between two places."""
+    controller = receding().to_mpc(step=STEP)
+    cycles = CYCLES // 10 if quick else CYCLES
+    for name, plant in PLANTS.items():
+        found = controller.simulate(plant(), cycles * STEP, {"goal": _there_and_back})
+        moved = int(np.searchsorted(found.t, LOOK))
+        yield MpcRow(
+            name,
+            found.t.size,
+            1e3 * found.median,
+            1e3 * found.worst,
+            1e3 * found.worst_cpu,
+            int(found.iterations.max()),
+            found.unconverged,
+            found.unreported,
+            1e3 * abs(float(found["x"][min(moved, found.t.size - 1)]) - GOAL),
+            find_compiler() is not None,
+        )
+
+
+def _there_and_back(times: Array) -> Array:
+    """GOAL in every other second."""
+    return GOAL * (np.floor(times + 1e-9) % 2 == 0)

@@ -1,0 +1,206 @@
+"""`symfric ocp`: solve a ready optimal control problem, or one that a Python file holds."""
+
+import runpy
+import traceback
+from inspect import signature
+from pathlib import Path
+from typing import Annotated, Any, cast, get_args
+
+import typer
+
+from ocp import Problem, Solution, load, solve
+from ocp.problems.catalogue import READY
+from ocp.problems.ready import Ready
+from ocp.solve import Friction
+from ocp.solvers.fatrop import Fatrop
+from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.sqp import Sqp
+from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
+from symfric import SolveError
+from symfric.cli import output
+from symfric.cli.options import JsonOption, PlotOption, SetOption, check_outputs, numbers
+from symfric.foundation import checks
+from symfric.foundation.parameters import check_names
+
+SOLVERS = {"ipopt": Ipopt, "fatrop": Fatrop, "sqp": Sqp}
+DEFAULT_NAME = "problem"
+"""What a problem is called in a file that does not say otherwise."""
+
+
+def ocp(
+    problem: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[NAME|FILE.py[:NAME]]",
+            help="A ready problem, or a `Problem`, or a function that returns one, in a file.",
+        ),
+    ] = None,
+    settings: SetOption = None,
+    intervals: Annotated[
+        int | None, typer.Option("--intervals", help="Equal intervals to begin with.")
+    ] = None,
+    scheme: Annotated[
+        str,
+        typer.Option("--scheme", help="radau3, legendre4, shooting:rodas5p:2 (method, steps)."),
+    ] = "radau3",
+    solver: Annotated[str, typer.Option("--solver", help=f"{', '.join(SOLVERS)}.")] = "ipopt",
+    friction: Annotated[
+        str,
+        typer.Option("--friction", help=f"How friction is met: {', '.join(get_args(Friction))}."),
+    ] = "auto",
+    tolerance: Annotated[
+        float, typer.Option("--tolerance", help="Largest relative miss of what is asked for.")
+    ] = 1e-3,
+    max_time: Annotated[
+        float | None, typer.Option("--max-time", help="Time [s] after which to stop.")
+    ] = None,
+    guess: Annotated[
+        Path | None, typer.Option("--guess", metavar="FILE", help="Start from a saved solution.")
+    ] = None,
+    save: Annotated[
+        Path | None, typer.Option("--save", metavar="FILE", help="Save it for a warm start.")
+    ] = None,
+    csv: Annotated[
+        Path | None, typer.Option("--csv", metavar="FILE.csv", help="Write all signals.")
+    ] = None,
+    plot: PlotOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Solve an optimal control problem, and check it by simulation.
+
+    Without a name: the list of ready problems. --set takes their numbers, and those of the
+    function in a file.
+
+    Example: symfric ocp out_and_back --plot move.png
+
+    Example: symfric ocp crane.py:swing --set length=2 --csv swing.csv
+    """
+    if problem is None:
+        _list()
+        return
+    check_outputs(csv, save, json, picture=plot)
+    check_names("--solver", [solver], SOLVERS)
+    check_names("--friction", [friction], get_args(Friction))
+    values = numbers("--set", settings)
+    ready, asked = problem_of(problem, values)
+    how: dict[str, Any] = {} if intervals is None else {"intervals": intervals}
+    if max_time is not None:
+        how["max_time"] = checks.number("--max-time", max_time, unit="s", above=0.0)
+    if guess is not None:
+        how["guess"] = load(guess)
+    with output.progress(f"ocp {problem}") as tell:
+        found = solve(
+            asked,
+            scheme=scheme_of(scheme),
+            solver=SOLVERS[solver](),
+            friction=cast("Friction", friction),
+            tolerance=tolerance,
+            progress=lambda now: tell(min(1.0, now.iteration / 1000)),
+            throw=False,
+            **how,
+        )
+    if csv:
+        found.to_csv(csv)
+    if save:
+        found.save(save)
+    if plot:
+        found.plot(path=plot)
+    output.emit_json(found.to_dict(), json)
+    if json != "-":
+        show_solution(problem, found, None if values else ready)
+    output.say_written(csv, save, plot, json)
+    if not found.ok:
+        raise SolveError(found.message, found.status, found)
+
+
+def problem_of(text: str, values: dict[str, float]) -> tuple[Ready | None, Problem]:
+    """The problem that `text` names, and what is known about it.
+
+    Raises:
+        ValueError: no such problem or file, a file that fails, a name in it that is no problem.
+    """
+    path, _, name = text.partition(".py")
+    if not (name == "" and text.endswith(".py")) and not name.startswith(":"):
+        check_names("ocp", [text], READY)
+        return READY[text], made(text, READY[text].make, values)
+    file = Path(f"{path}.py")
+    if not file.is_file():
+        raise ValueError(f"ocp: expected a Python file, got '{file}', which does not exist")
+    name = name.removeprefix(":") or DEFAULT_NAME
+    try:
+        held = runpy.run_path(str(file))
+    except Exception as error:
+        line = next((f.lineno for f in reversed(traceback.extract_tb(error.__traceback__))
+                     if f.filename == str(file)), getattr(error, "lineno", None))  # fmt: skip
+        raise ValueError(
+            f"ocp: expected a file that runs, got {type(error).__name__} in line {line} of "
+            f"'{file}': {error}"
+        ) from error
+    if name not in held:
+        there = [n for n, value in held.items() if isinstance(value, Problem)]
+        hint = f"; it holds {', '.join(there)}" if there else "; name one after a colon"
+        raise ValueError(f"ocp: expected '{name}' in '{file}', got none{hint}")
+    found = held[name]
+    if callable(found):
+        found = made(text, found, values)
+    elif values:
+        raise ValueError(f"--set: expected none for '{name}', which is no function")
+    if not isinstance(found, Problem):
+        raise checks.refused(f"ocp '{text}'", "a Problem, or a function that returns one", found)
+    return None, found
+
+
+def made(text: str, make: Any, values: dict[str, float]) -> Problem:
+    """What a function makes of the numbers of --set."""
+    known = [p.name for p in signature(make).parameters.values()]
+    check_names(f"--set of {text}", values, known)
+    return make(**values)
+
+
+def scheme_of(text: str) -> Scheme:
+    """The scheme that `--scheme` names.
+
+    Raises:
+        ValueError: another form than radau3, legendre4 or shooting:METHOD:STEPS.
+    """
+    kinds = {"radau": Radau, "legendre": Legendre}
+    for kind, scheme in kinds.items():
+        degree = text.removeprefix(kind)
+        if degree != text and (degree == "" or degree.isdigit()):
+            return scheme(int(degree)) if degree else scheme()
+    name, *rest = text.split(":")
+    if name == "shooting" and len(rest) <= 2 and all(part.isdigit() for part in rest[1:]):
+        method = rest[:1] or ["rodas5p"]
+        return Shooting(method[0], *(int(part) for part in rest[1:]))
+    raise ValueError(f"--scheme: expected radau3, legendre4 or shooting:METHOD:STEPS, got '{text}'")
+
+
+def _list() -> None:
+    output.show_table(
+        ["problem", "J", "good to", "what"],
+        [[r.name, r.optimum, r.uncertain, r.title] for r in READY.values()],
+        "Ready problems and their best known costs",
+    )
+
+
+def show_solution(name: str, found: Solution, ready: Ready | None) -> None:
+    """Print what was found, how it was checked, and the modes of contacts."""
+    spent = sum(getattr(found.statistics, f"{what}_time") for what in ("build", "solve", "verify"))
+    known = [] if ready is None else [ready.optimum, (found.cost / ready.optimum - 1) * 100]
+    output.show_table(
+        ["T [s]", "J", *(["known", "off [%]"] if known else []), "verified", "iterations",
+         "time [s]"],
+        [[found.T, found.cost, *known, "yes" if found.verified else "no", found.iterations,
+          round(spent, 2)]],
+        name,
+    )  # fmt: skip
+    if found.modes:
+        output.show_table(
+            ["contact", "mode", "from [s]", "to [s]"],
+            [[contact, mode.kind, mode.begin, mode.end]
+             for contact, modes in found.modes.items() for mode in modes],
+            "Modes",
+        )  # fmt: skip
+    if found.chosen:
+        output.show_table(["chosen", "value"], [[*pair] for pair in found.chosen.items()])
+    output.show(f"\n{found.message}")
