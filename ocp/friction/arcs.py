@@ -20,23 +20,25 @@ Control, 2nd ed., 2010, 2.8 and 3.7 (phases, linkage conditions).
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Any, TypeVar, final
+from typing import TypeVar, final
 
 import casadi as ca
 
-from ocp.friction.mode_models import mode_model, with_outputs
+from ocp.friction.arc_models import LEFT, PULLED, SIDES, arc_model, carrier
 from ocp.friction.release import excess, rubbing
 from ocp.friction.sequence import Arc, Leg
 from ocp.text.phase import Chain, Phase, Start
 from ocp.text.problem import Duration, Problem
 from ocp.text.ranges import Free, Range, meet
-from ocp.text.span import Span
 from symfric.foundation.symbols import stacked
-from symfric.model import Contact, Model, Output
+from symfric.model import Contact, Model
 
 GRIP = 3e-3
 """Share of the static level that a rest keeps away from it: a smooth law creeps over its peak a
-little below. Not on the side to which the contact leaves by a force that cannot jump."""
+little below. Where it leaves by a force that cannot jump it gives that up at last."""
+
+FADE = 1e-3
+"""For how long before, as a share of the whole duration."""
 
 PULL = 1e-2
 """Share of the static level by which a control that jumps exceeds it: held exactly there, a smooth
@@ -50,7 +52,6 @@ SIGN = 1e-7
 """Sliding velocity by which one that is no state may have the wrong sign: at the ends of slipping,
 where it is zero, two conditions would depend on each other."""
 
-PULLED = "_pull"
 Ranges = dict[str, Range]
 Value = TypeVar("Value")
 
@@ -134,7 +135,8 @@ def in_arcs(
         shortest: least duration of an arc [s].
     """
     places = places_of(problem, legs)
-    phases = [_phase(problem, place, sizes, at_rest, shortest) for place in places]
+    whole = sum(leg.duration for leg in legs)
+    phases = [_phase(problem, place, sizes, at_rest, shortest, whole) for place in places]
     states = {v.name for v in phases[0].model.x}
     signals = {name for phase in phases for name in (*phase.model.signals, *phase.model.further)}
     parameters = {v.name for phase in phases for v in phase.model.p}
@@ -149,67 +151,27 @@ def in_arcs(
     )
 
 
-def breaks_away(span: Span) -> bool:
-    """Whether some contact breaks away at the start of an arc."""
-    return any(name.endswith(PULLED) for name in span.model.outputs)
-
-
-def carrier(model: Model, contact: Contact) -> tuple[str, int] | None:
-    """The state that is zero when `contact` rests, and the side to which it grows with the slip.
-
-    None where slip is not a multiple of one state.
-    """
-    x = model.vector("x")
-    slope = ca.SX(ca.jacobian(contact.slip, x))
-    if slope.nnz() != 1 or not slope.is_constant():
-        return None
-    factor, index = float(ca.sum1(ca.sum2(ca.DM(slope)))), slope.sparsity().get_crs()[1][0]
-    if not ca.is_equal(ca.simplify(contact.slip - factor * x[index]), ca.SX(0), 2):
-        return None
-    return model.x[index].name, 1 if factor > 0 else -1
-
-
-def arc_model(
-    model: Model, modes: Mapping[str, int], released: Sequence[str], sizes: Mapping[str, float]
-) -> Model:
-    """The mode model of `modes` with what the conditions of an arc are about as outputs.
-
-    "<contact>_slip"; and, as shares of the static level, "<contact>_up" and "<contact>_down", room
-    of a rest to both sides, and "<contact>_pull", excess of what is `released`.
-    """
-    kept: dict[Any, Model] = model.memory.setdefault("ocp arcs", {})
-    key = (*modes.items(), *released, *sizes.items())
-    if key not in kept:
-        made = mode_model(model, modes)
-        outputs: dict[str, ca.SX] = {}
-        for c in rubbing(model):
-            outputs[f"{c.name}_slip"] = c.slip
-            if not modes[c.name]:
-                for side in ("up", "down"):
-                    room = made.expression(f"{c.name}_grip_{side}")
-                    outputs[f"{c.name}_{side}"] = room / sizes[c.name]
-        for name in released:
-            outputs[f"{name}{PULLED}"] = excess(model, modes, name) / sizes[name]
-        new = {name: Output(expression, "1") for name, expression in outputs.items()}
-        kept[key] = with_outputs(made, new)
-    return kept[key]
-
-
 def _phase(
     problem: Problem,
     place: Place,
     sizes: Mapping[str, float],
     at_rest: Sequence[str],
     shortest: float,
+    whole: float,
 ) -> Phase:
     """The phase of one arc: what the user says of it, and the conditions of its modes."""
     base, modes = problem.chain[place.leg.phase], place.arc.modes
     released = [name for name in modes if _breaks_away(place, name, at_rest)]
-    model = arc_model(base.model, modes, released, sizes)
     limited = {*problem.rates, *base.rates}
+    tight = _tight(place, limited)
+    leaving = {name: side for name, side in tight.items() if place.after.get(name) == side}
+    model = arc_model(base.model, modes, released, leaving, sizes, (GRIP, FADE * whole))
     start: Ranges = dict(base.start) if place.opens else {}
     link: dict[str, Start] = dict(base.link) if place.opens else {}
     end = _end(base, place)
+    if leaving:
+        start, end = start | {LEFT: (0.0, None)}, end | {LEFT: 0.0}
+        link |= {LEFT: None} if place.number else {}
     bounds: Ranges = dict(base.bounds)
     for contact in rubbing(base.model):
         zero = _starts_at_rest(place, contact, at_rest)
@@ -217,7 +179,7 @@ def _phase(
         if place.number:
             link |= dict.fromkeys(zero)
         end = _end_of(place, contact, end)
-        bounds |= _inside(problem, place, contact, limited)
+        bounds |= _inside(problem, place, contact, tight)
         if contact.name in released:
             start[f"{contact.name}{PULLED}"] = _pull(place, contact.name, limited)
     signals = {*model.signals, *model.further}
@@ -285,16 +247,24 @@ def _end_of(place: Place, contact: Contact, end: Ranges) -> Ranges:
     return end if mode else {n: r for n, r in end.items() if n != state}
 
 
-def _inside(problem: Problem, place: Place, contact: Contact, limited: Collection[str]) -> Ranges:
+def _tight(place: Place, limited: Collection[str]) -> dict[str, int]:
+    """Resting contacts that will leave by a force that cannot jump, and to which side."""
+    modes = place.arc.modes
+    return {
+        name: side
+        for name, side in place.leaves.items()
+        if side and not _jumps(place.model, {**modes, name: side}, name, limited)
+    }
+
+
+def _inside(problem: Problem, place: Place, contact: Contact, tight: Mapping[str, int]) -> Ranges:
     """The side of slipping, or the room of a rest, over the whole arc."""
     name, mode = contact.name, place.arc.modes[contact.name]
     if not mode:
-        side = place.leaves[name]
-        model = problem.chain[place.leg.phase].model
-        tight = side and not _jumps(model, {**place.arc.modes, name: side}, name, limited)
-        away = {1: f"{name}_up", -1: f"{name}_down"}
+        open_side = tight.get(name)
         return {
-            row: (LEVEL if tight and sign == side else GRIP, None) for sign, row in away.items()
+            f"{name}_{row}": (LEVEL if side == open_side else GRIP, None)
+            for side, row in SIDES.items()
         }
     found = carrier(problem.chain[place.leg.phase].model, contact)
     if found is None:

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.friction.arc_models import LEFT
 from ocp.friction.sequence import Arc
 from ocp.result.motion import Motion
 from ocp.text.ranges import Free
@@ -80,7 +81,9 @@ def _in_span(into: Transcription, number: int, span: Span, arc: Arc, known: Know
 
     def states(fractions: Array) -> Array:
         t = arc.begin + fractions * arc.duration
-        rows = np.array([known.signal(v.name, t) for v in model.x]).reshape(-1, t.size)
+        left = {LEFT: arc.end - t}
+        rows = [left[v.name] if v.name in left else known.signal(v.name, t) for v in model.x]
+        rows = np.array(rows).reshape(-1, t.size)
         return np.clip(rows, boxes[:, 0], boxes[:, 1])
 
     inner, middles = into.inner_fractions(number), (mesh[:-1] + mesh[1:]) / 2

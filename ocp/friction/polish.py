@@ -62,11 +62,17 @@ holding the inputs costs on few intervals is wrong by."""
 FINE = 3e-4
 """Share of the cost that holding the inputs over the intervals may cost."""
 
+ZERO = 1e-8
+"""Costs that differ less are the same to a solver."""
+
 LOCAL = 1e-7
 """Largest local error of an interval, relative."""
 
 HALVED = 4.0
 """Multiple of the largest local error that has an interval halved, of order 5."""
+
+MOST_ITERATIONS = 100
+"""Of one solve: a sequence that needs more is a wrong one."""
 
 LEAST_INTERVALS = 40
 MOST = 800
@@ -127,7 +133,7 @@ def polished(
         problem,
         sizes_of(problem, known),
         starts_at_rest(problem, known, widths),
-        solver or Ipopt(max_iter=200),
+        _patient(solver or Ipopt()),
         scheme or Radau(3),
         SHORTEST * whole,
         KICK * whole,
@@ -170,6 +176,13 @@ def parameters_of(problem: Problem, chosen: Mapping[str, float]) -> dict[str, fl
     for span in problem.spans:
         found |= {v.name: float(x) for v, x in zip(span.model.p, span.p, strict=True)}
     return found | dict(chosen)
+
+
+def _patient(solver: Ipopt) -> Ipopt:
+    """`solver` with a limit of iterations, where the user has set none."""
+    if "max_iter" in solver.options:
+        return solver
+    return solver.with_options(max_iter=MOST_ITERATIONS)
 
 
 def _readings(
@@ -232,7 +245,7 @@ def _fine(polisher: Polisher, solved: Solved, keep: Keep) -> Solved:
     """
     before = inf
     for _ in range(ROUNDS):
-        t, allowed = solved.transcription, FINE * abs(solved.outcome.cost)
+        t, allowed = solved.transcription, FINE * abs(solved.outcome.cost) + ZERO
         local = local_errors(arcs_of(t.problem, t.meshes, solved.points))
         agree = abs(solved.ideal_cost - before) <= allowed
         exact = max(float(own.max()) for own in local) <= LOCAL

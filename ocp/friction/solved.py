@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.holding import holding_losses
-from ocp.friction.arcs import breaks_away, in_arcs
+from ocp.friction.arc_models import breaks_away
+from ocp.friction.arcs import in_arcs
 from ocp.friction.carry import Known, points_in
 from ocp.friction.sequence import Leg, flat, placed, shown
 from ocp.result.motion import motion_of

@@ -1,0 +1,101 @@
+"""Mode models with what the conditions of an arc are about as outputs and states."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+
+from ocp.friction.mode_models import mode_model, with_outputs
+from ocp.friction.release import excess, rubbing
+from ocp.text.span import Span
+from symfric.foundation.parameters import Variable
+from symfric.model import Contact, Model, Output
+
+PULLED = "_pull"
+LEFT = "rest_left"
+"""State of an arc at whose end a contact leaves rest: the time that is left of it [s]."""
+
+SIDES = {1: "up", -1: "down"}
+
+
+def breaks_away(span: Span) -> bool:
+    """Whether some contact breaks away at the start of an arc."""
+    return any(name.endswith(PULLED) for name in span.model.outputs)
+
+
+def carrier(model: Model, contact: Contact) -> tuple[str, int] | None:
+    """The state that is zero when `contact` rests, and the side to which it grows with the slip.
+
+    None where slip is not a multiple of one state.
+    """
+    x = model.vector("x")
+    slope = ca.SX(ca.jacobian(contact.slip, x))
+    if slope.nnz() != 1 or not slope.is_constant():
+        return None
+    factor, index = float(ca.sum1(ca.sum2(ca.DM(slope)))), slope.sparsity().get_crs()[1][0]
+    if not ca.is_equal(ca.simplify(contact.slip - factor * x[index]), ca.SX(0), 2):
+        return None
+    return model.x[index].name, 1 if factor > 0 else -1
+
+
+def arc_model(
+    model: Model,
+    modes: Mapping[str, int],
+    released: Sequence[str],
+    leaving: Mapping[str, int],
+    sizes: Mapping[str, float],
+    margin: tuple[float, float],
+) -> Model:
+    """The mode model of `modes` with what the conditions of an arc are about as outputs.
+
+    Args:
+        model: the user's.
+        modes: of all contacts that can rest.
+        released: contacts that break away at the start of the arc.
+        leaving: contacts that leave rest at its end by a force that cannot jump, and to which side.
+        sizes: contact -> typical static level [N].
+        margin: share of the level that a rest keeps away from it, and how long before the end of
+            the arc it begins to give that up where it leaves [s].
+
+    Returns:
+        One with "<contact>_slip"; as shares of the level "<contact>_up" and "<contact>_down", the
+        room of a rest to both sides, less margin times tanh (time left / that time)^2 where it
+        leaves; and "<contact>_pull", excess of what is released.
+    """
+    kept: dict[Any, Model] = model.memory.setdefault("ocp arcs", {})
+    key = (*modes.items(), *released, *leaving.items(), *sizes.items(), *margin)
+    if key not in kept:
+        made = mode_model(model, modes)
+        outputs: dict[str, ca.SX] = {}
+        fading = ca.SX(0)
+        if leaving:
+            made, left = _with_clock(made)
+            fading = margin[0] * ca.tanh((left / margin[1]) ** 2)
+        for c in rubbing(model):
+            outputs[f"{c.name}_slip"] = c.slip
+            for side, name in SIDES.items() if not modes[c.name] else ():
+                room = made.expression(f"{c.name}_grip_{name}") / sizes[c.name]
+                leaves = leaving.get(c.name) == side
+                outputs[f"{c.name}_{name}"] = room - fading if leaves else room
+        for name in released:
+            outputs[f"{name}{PULLED}"] = excess(model, modes, name) / sizes[name]
+        new = {name: Output(expression, "1") for name, expression in outputs.items()}
+        kept[key] = with_outputs(made, new)
+    return kept[key]
+
+
+def _with_clock(model: Model) -> tuple[Model, ca.SX]:
+    """`model` with the time that is left as a state, and its symbol."""
+    left = Variable(LEFT, "s", nominal=0.1)
+    rate, changes = ca.SX(-1.0), dict[str, Any](x=(*model.x, left))
+    mechanics = model.holonomic
+    if mechanics is None:
+        rates = ca.SX(0, 1) if model.ode is None else model.ode
+        return replace(model, **changes, ode=ca.vertcat(rates, rate)), left.symbol
+    inner = mechanics.inner
+    if inner is not None:
+        inner = replace(inner, groups=(*inner.groups, left.symbol))
+    mechanics = replace(mechanics, rates=ca.vertcat(mechanics.rates, rate), inner=inner)
+    changes |= {"ode": None, "alg": ca.SX(0, 1)}  # made of `holonomic` once more
+    return replace(model, **changes, holonomic=mechanics), left.symbol
