@@ -307,16 +307,38 @@ class _Sum:
         rows, columns = np.concatenate([rows, *self.rows]), np.concatenate([columns, *self.columns])
         keys, number = np.unique(columns * self.shape[0] + rows, return_inverse=True)
         pattern = _sparsity(keys % self.shape[0], keys // self.shape[0], self.shape)
-        start = np.bincount(number[:count], numbers, keys.size)
+        start = np.asarray(np.bincount(number[:count], numbers, keys.size), dtype=float)
         sources, weights = np.concatenate([np.zeros(0, np.int64), *self.sources]), self.weights
         if not sources.size:
             return ca.MX(ca.DM(pattern, start))
         weight, values = np.concatenate(weights), ca.vertcat(*self.values)
-        to = number[count:]
-        if not count and to.size == keys.size and (weight == 1.0).all():
-            return ca.MX(pattern, values[sources[np.argsort(to)].tolist()])
-        scatter = _constant((to, sources, weight), (keys.size, self.count))
-        return ca.MX(pattern, ca.DM(start) + ca.densify(ca.mtimes(scatter, values)))
+        return ca.MX(pattern, _gathered(values, (number[count:], sources, weight), start))
+
+
+def _gathered(values: ca.MX, sums: Triplets, start: Array) -> ca.MX:
+    """Entries start[i] plus sums of weighted `values`, as a column.
+
+    Most entries are one value or a constant: they are picked, and only the others added up.
+    """
+    to, sources, weights = sums
+    terms = np.bincount(to, minlength=start.size)
+    plain = (terms == 1) & (start == 0.0)
+    plain[to[weights != 1.0]] = False
+    constants, which = np.unique(start, return_inverse=True)
+    index = np.asarray(which, dtype=np.int64).ravel()  # of entries without values
+    one = plain[to]
+    index[to[one]] = constants.size + sources[one]
+    added = np.flatnonzero((terms > 0) & ~plain)
+    parts = [ca.MX(ca.DM(constants)), values]
+    if added.size:
+        index[added] = constants.size + values.numel() + np.arange(added.size)
+        row = np.zeros(start.size, np.int64)
+        row[added] = np.arange(added.size)
+        kept = ~one
+        triplets = row[to[kept]], sources[kept], weights[kept]
+        S = _constant(triplets, (added.size, values.numel()))
+        parts.append(ca.DM(start[added]) + ca.densify(ca.mtimes(S, values)))
+    return ca.vertcat(*parts)[index.tolist()]
 
 
 def _none() -> list[Indices]:
