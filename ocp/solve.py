@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ocp.checking.verify import verified
 from ocp.friction.polish import polish, refusal
+from ocp.friction.referee import verify_exactly
 from ocp.friction.scales import has_jumps, own_level, speeds_at
 from ocp.friction.sharpen import FINE, LAST, STARTS, Sharp, sharpened
 from ocp.refined import refined_solve
@@ -32,6 +33,8 @@ INTERVALS = 50
 EARLY = 0.04
 """Layers, in multiples of the speeds, from which on the modes of a motion may be read."""
 STOPPED = (Status.INTERRUPTED, Status.TIME_LIMIT)
+SHARPEST = 1e-4
+"""Layers, in multiples of the speeds, that are too narrow for one solve with them."""
 MISSED = (Status.TERMINAL_MISS, Status.BOUND_MISS)
 
 
@@ -208,13 +211,29 @@ class _Job:
         exact = self.checked(_after(sharp.solution, exact))
         if exact.status not in MISSED or self.clock.over:
             return exact
+        if own_level(self.problem, sharp.scales) < SHARPEST:
+            return self.explained(exact)
         return self.with_own_laws(exact)
+
+    def explained(self, exact: Solution) -> Solution:
+        """A motion by modes that misses with the user's law, with what exact friction says."""
+        if not exact.modes:
+            return exact
+        found = verify_exactly(exact, self.tolerance)
+        if not found.ok:
+            return exact
+        said = (
+            f"{exact.message} With exact Coulomb friction and stiction it misses by "
+            f"{found.largest:.1g} only: the layers of the law creep at rest and break away later; "
+            "make them narrower, or allow this miss by `tolerance`."
+        )
+        return replace(exact, message=said)
 
     def with_own_laws(self, exact: Solution) -> Solution:
         """A motion by modes that misses with the layers of the user's laws, solved with these."""
         own = self.checked(self.plain(exact, exact.meshes))
         if not own.verified:
-            return _after(own, exact)
+            return self.explained(_after(own, exact))
         return _after(exact, replace(own, modes=exact.modes))
 
     def unpolished(self, sharp: Sharp) -> Solution:

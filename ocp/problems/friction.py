@@ -1,7 +1,7 @@
 """Ready problems with friction: where bodies stick and reverse on the way, and sharply.
 
 All minimise the integral of the squared input. `v_t` is the width of the law [m/s or rad/s]: at
-1e-5 it is sharp, and the optimum is that of Coulomb's law with stiction.
+1e-6 it is sharp, and the optimum is that of Coulomb's law with stiction.
 """
 
 from math import nan, pi
@@ -25,7 +25,7 @@ from symfric.multibody import (
 )
 from symfric.scenes.drive import drive
 
-V_T = 1e-5
+V_T = 1e-6
 GRAVITY = 9.81
 FORCE = integral(lambda s: s.force**2)
 
