@@ -7,6 +7,8 @@ done about friction.
 from ocp.checking.verification import Miss as Miss
 from ocp.checking.verification import Verification as Verification
 from ocp.checking.verify import verify as verify
+from ocp.friction.exact import set_valued as set_valued
+from ocp.friction.referee import verify_exactly as verify_exactly
 from ocp.result.solution import Mode as Mode
 from ocp.result.solution import Solution as Solution
 from ocp.result.stored import load as load

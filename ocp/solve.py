@@ -7,12 +7,12 @@ from typing import Literal, final, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ocp.checking.refining import Goals, refined_solve
 from ocp.checking.verify import verified
 from ocp.friction.polish import polish, refusal
 from ocp.friction.referee import verify_exactly
 from ocp.friction.scales import has_jumps, own_level, speeds_at
 from ocp.friction.sharpen import FINE, LAST, STARTS, Sharp, sharpened
-from ocp.refined import refined_solve
 from ocp.result.solution import Solution
 from ocp.solvers.fatrop import Fatrop
 from ocp.solvers.ipopt import Ipopt
@@ -83,8 +83,8 @@ def solve(
             friction, further starts are made around it.
         friction: see above.
         tolerance: of the verification, relative to the largest magnitude of each state.
-        refine: make the mesh finer where intervals err; with False it stays, where no friction
-            is sharpened.
+        refine: make the mesh finer where intervals err or where it costs to hold the inputs over
+            them; with False it stays, where no friction is sharpened.
         verify: simulate the models under the control.
         starts: with friction, number of coarse solves of which the best goes on.
         progress: called with a `Progress` after each iteration. Ctrl-C, or an exception raised
@@ -159,9 +159,10 @@ class _Job:
         if meshes is None:
             wanted = INTERVALS if self.intervals is None else self.intervals
             meshes = make_meshes(self.problem, wanted)
+        goals = Goals.of(self.tolerance)
         return refined_solve(
-            self.problem, self.scheme, self.solver, meshes, guess, self.clock, self.progress,
-            tolerance=self.tolerance, refine=self.refine,
+            self.problem, meshes, self.scheme, self.solver, guess, self.progress,
+            goals=goals if self.refine else replace(goals, passes=1), limit=self.clock.within,
         )  # fmt: skip
 
     def sharp(self) -> Solution:

@@ -18,7 +18,7 @@ MOST_PARTS = 16.0
 """An interval is split in at most so many parts at once."""
 STEEPEST = 2.0
 """Neighbouring intervals differ in length by no more than about this factor."""
-SAME_NUMBER = 0.7
+SAME_NUMBER = 0.4
 """A mesh that needs no more intervals than it has keeps them down to this share: nothing that
 depends on their number is made again."""
 

@@ -13,8 +13,7 @@ together, see `mode_model`. Contacts in balls keep their laws.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 from typing import final
 
 import numpy as np
@@ -22,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ocp.friction.decide import Instant, Machine, Modes, decided
 from ocp.friction.inputs import Given, Inputs
-from ocp.result.solution import Mode
+from ocp.friction.pieces import Piece, SetValued
 from symfric import Trajectory, simulate
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
@@ -32,124 +31,12 @@ from symfric.model import Model
 from symfric.model.model import check_model
 
 Array = NDArray[np.float64]
-KINDS = {1: "slip+", 0: "stick", -1: "slip-"}
 MOST = 10_000
 """Changes of mode in a run."""
 PILED = 40
 """Changes of mode without time between them."""
 APART = 1e-6
 """Difference of an unknown, over its size, beyond which two solvers found two solutions."""
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A run in which no contact changes its mode and no input jumps."""
-
-    run: Trajectory
-    modes: Modes
-    begin: float
-    end: float
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class SetValued:
-    """A motion with exact Coulomb friction, as far as it was followed.
-
-    `motion["v"]` is a signal at the times `motion.t`; `motion.at(times)` has all of them anywhere:
-    what the model has but states of laws, and "<contact>_F", the friction force.
-
-    Attributes:
-        model: the user's model.
-        t: times of the result [s].
-        pieces: runs between changes of mode and of inputs.
-        status, message: how it ended.
-    """
-
-    model: Model
-    t: Array
-    pieces: tuple[Piece, ...]
-    status: Status = Status.SUCCESS
-    message: str = Status.SUCCESS.value
-    contacts: tuple[str, ...] = field(default=())
-
-    @property
-    def span(self) -> tuple[float, float]:
-        """First time and the last one reached [s]."""
-        return self.pieces[0].begin, self.pieces[-1].end
-
-    @cached_property
-    def modes(self) -> dict[str, tuple[Mode, ...]]:
-        """Contact -> what it does when."""
-        found: dict[str, tuple[Mode, ...]] = {}
-        for name in self.contacts:
-            merged: list[Mode] = []
-            for piece in self.pieces:
-                kind = KINDS[piece.modes[name]]
-                if merged and merged[-1].kind == kind:
-                    merged[-1] = Mode(kind, merged[-1].begin, piece.end)
-                else:
-                    merged.append(Mode(kind, piece.begin, piece.end))
-            found[name] = tuple(m for m in merged if m.end > m.begin)
-        return found
-
-    @cached_property
-    def last(self) -> Modes:
-        """The modes at the end, for a run that goes on from there."""
-        return dict(self.pieces[-1].modes)
-
-    @cached_property
-    def names(self) -> list[str]:
-        """Signals that all pieces have."""
-        of_laws = {v.name for c in self.model.contacts for v in c.states}
-        known = set.intersection(*(set(p.run.units) for p in self.pieces))
-        return [name for name in self.model.signals if name in known - of_laws]
-
-    @cached_property
-    def signals(self) -> dict[str, Array]:
-        """All signals at `t`."""
-        return self.at(self.t)
-
-    def __getitem__(self, name: str) -> Array:
-        if name == "t":
-            return self.t
-        checks.check_names(f"motion of '{self.model.name}'", [name], self.signals)
-        return self.signals[name]
-
-    def at(self, times: ArrayLike) -> dict[str, Array]:
-        """All signals at `times` [s]; at a change of mode those behind it."""
-        begin, end = self.span
-        at = np.atleast_1d(checks.array("at: times", times, ndim=None))
-        if at.ndim > 1 or not ((at >= begin) & (at <= end)).all():
-            raise checks.refused("at: times", f"times within {begin:g} ... {end:g} s", times)
-        found = {name: np.zeros(at.size) for name in self.names}
-        found |= {f"{name}_F": np.zeros(at.size) for name in self.contacts}
-        edges = np.array([p.begin for p in self.pieces[1:]])
-        which = np.searchsorted(edges, at, side="right")
-        for k in np.unique(which):
-            piece, here = self.pieces[k], which == k
-            values = piece.run.at(np.clip(at[here], piece.begin, piece.end))
-            for name in self.names:
-                found[name][here] = values[name]
-            for c in self.model.contacts:
-                if c.name in self.contacts:
-                    found[f"{c.name}_F"][here] = _force(piece, c.name, values, at[here], self.model)
-        return found
-
-    def final(self) -> dict[str, float]:
-        """States at the end by name, but those of laws."""
-        piece = self.pieces[-1]
-        found = piece.run.states(np.array([piece.end]))
-        return {v.name: float(found[v.name][-1]) for v in self.model.open.x}
-
-
-def _force(piece: Piece, name: str, values: Mapping[str, Array], at: Array, model: Model) -> Array:
-    mode = piece.modes[name]
-    if not mode:
-        return values[f"{name}_reaction"]
-    contact = next(c for c in model.contacts if c.name == name)
-    return piece.run.express(contact.sliding(mode), np.clip(at, piece.begin, piece.end))[0]
 
 
 def set_valued(

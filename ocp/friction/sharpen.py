@@ -21,7 +21,7 @@ unless the number of intervals changes.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import reduce
+from functools import partial, reduce
 from math import sqrt
 from typing import final
 
@@ -40,7 +40,7 @@ from ocp.solvers.outcome import Iterate, Outcome, Report, SolverStatistics, in_s
 from ocp.solvers.prepared import Prepared
 from ocp.solvers.sqp import Sqp
 from ocp.solving.clock import Clock
-from ocp.solving.one_solve import solution_of
+from ocp.solving.one_solve import solution_of, when
 from ocp.solving.perturbed import perturbed
 from ocp.solving.starts import Start, resample, start_of
 from ocp.text.phase import Chain
@@ -301,7 +301,9 @@ class _Path:
             prepared = self.prepared[key] = solver.prepared(transcription.program)
         rows = transcription.program.g.numel()
         start = Iterate.cold(transcription.pack(points), rows)
-        outcome = self.clock.within(prepared).run(start, values, in_stage(self.progress, stage))
+        outcome = self.clock.within(prepared).run(
+            start, values, in_stage(self.progress, stage), at=partial(when, transcription)
+        )
         self.solves.append(outcome.statistics)
         found = transcription.unpack(outcome.iterate.w)
         return _Step(transcription, values, outcome, found, level)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import final
 
 import numpy as np
@@ -16,6 +16,7 @@ from ocp.friction.sequence import Leg, flat, placed, shown
 from ocp.result.motion import motion_of
 from ocp.solvers.ipopt import Ipopt
 from ocp.solvers.outcome import Iterate, Outcome, Report, in_stage
+from ocp.solving.one_solve import when
 from ocp.text.problem import Problem
 from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
@@ -144,7 +145,9 @@ class Polisher:
         )
         stage = in_stage(self.progress, f"modes {shown(legs)}")
         rows = transcription.program.g.numel()
-        outcome = prepared.run(Iterate.cold(start, rows), progress=stage)
+        outcome = prepared.run(
+            Iterate.cold(start, rows), progress=stage, at=partial(when, transcription)
+        )
         durations = [span.T for span in transcription.unpack(outcome.iterate.w).spans]
         return Solved(placed(legs, durations), discretisation, transcription, outcome)
 

@@ -93,8 +93,9 @@ def reason_of(error: Exception) -> str:
 
 
 def refused_options(solver: str, options: Mapping[str, Option], reason: str) -> ValueError:
-    """The error for options that a solver does not take."""
-    return ValueError(f"{solver}: expected options of {solver}, got {dict(options)!r}; {reason}")
+    """The error for options that a solver does not take, of many those that the reason names."""
+    named = {name: value for name, value in options.items() if name in reason} or dict(options)
+    return ValueError(f"{solver}: expected options of {solver}, got {named!r}; {reason}")
 
 
 @final
@@ -110,6 +111,7 @@ class Prepared:
             whether the start comes with multipliers.
         read: (statistics of CasADi) -> the solver's answer and what it means.
         max_time: wall time [s] after which a run is stopped.
+        told_time: the limit that a message tells, where `max_time` is what is left of it.
     """
 
     program: Program
@@ -118,6 +120,7 @@ class Prepared:
     build: Callable[[bool], Built]
     read: Callable[[Mapping[str, Any]], tuple[str, Status]]
     max_time: float | None = None
+    told_time: float | None = None
     _built: dict[bool, Built] = field(default_factory=dict[bool, Built])
 
     def run(
@@ -243,8 +246,9 @@ class Prepared:
     ) -> Outcome:
         program = self.program
         said = sentence(
-            program, watch, point, status, answer, self.solver, self.max_time, values, at
-        )
+            program, watch, point, status, answer, self.solver, self.told_time or self.max_time,
+            values, at,
+        )  # fmt: skip
         statistics = SolverStatistics(
             unknowns=program.w.numel(),
             constraints=program.g.numel(),

@@ -36,5 +36,7 @@ class Clock:
 
     def within(self, prepared: Prepared) -> Prepared:
         """`prepared` with what is left as its limit, if that is less than its own."""
-        limits = [t for t in (prepared.max_time, self.left) if t is not None]
-        return replace(prepared, max_time=min(limits)) if limits else prepared
+        left = self.left
+        if left is None or (prepared.max_time is not None and prepared.max_time <= left):
+            return prepared
+        return replace(prepared, max_time=left, told_time=self.allowed)

@@ -9,6 +9,7 @@ from mutants.dry import DRY
 from mutants.ensembles import ENSEMBLES
 from mutants.mutant import Mutant
 from mutants.plants import PLANTS
+from mutants.solvers import RESULTS, SOLVERS
 
 STEP = "symfric/integrator/step/attempt.py"
 WATCH = "symfric/integrator/step/watch.py"
@@ -395,5 +396,5 @@ LEFT_OUT = (
 
 MUTANTS = (
     *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
-    *BESIDE, *CACHES, *DRY, *ENSEMBLES, *LEFT_OUT, *DERIVATIVES, *PLANTS,
+    *BESIDE, *CACHES, *DRY, *ENSEMBLES, *LEFT_OUT, *DERIVATIVES, *PLANTS, *RESULTS, *SOLVERS,
 )  # fmt: skip

@@ -151,7 +151,7 @@ def test_dynamic_laws_are_judged_by_their_sliding_force_and_level(law: Any) -> N
     """A force far beyond: the same as the dynamic law itself, but for its pre-sliding."""
     model = drive(law, N=10.0, m=1.0)
     motion, run = (f(model, 1.0, u={"force": 8.0}) for f in (set_valued, simulate))
-    assert "guide_z" not in motion.signals
+    assert "guide_z" not in motion.trajectory.units
     assert motion["v"][-1] == pytest.approx(run["v"][-1], rel=1e-3)
 
 
@@ -169,11 +169,16 @@ def test_results_by_name_and_at_any_time() -> None:
     at = motion.at([0.0, 0.35])
     assert_allclose(at["one_F"][0], 4.0)
     assert_allclose(at["two_F"][0], 50.0 * at["x1"][0], atol=1e-9)
-    assert set(motion.signals) == {"x1", "x2", "v1", "v2", "force", "one_F", "two_F"}
+    assert set(motion.trajectory.units) == {"x1", "x2", "v1", "v2", "force", "one_F", "two_F"}
     assert motion.span == (0.0, 1.0)
-    with pytest.raises(ValueError, match=r"at: times: expected times within 0 ... 1 s, got 2"):
+    run = motion.trajectory
+    one, two = run.model.contacts
+    assert_allclose(run.of(one.slip - two.slip), motion["v1"] - motion["v2"], atol=1e-12)
+    assert np.isnan(run.of(one.states[0].symbol)).all()
+    assert run.statistics.steps > 10
+    with pytest.raises(ValueError, match=r"trajectory of 'blocks': expected times in"):
         motion.at(2.0)
-    with pytest.raises(ValueError, match=r"motion of 'blocks'.*got x3"):
+    with pytest.raises(ValueError, match=r"trajectory of 'blocks'.*got x3"):
         motion["x3"]
 
 

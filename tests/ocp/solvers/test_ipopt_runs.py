@@ -104,6 +104,8 @@ def test_ctrl_c_stops_after_the_iteration_and_keeps_the_best_iterate() -> None:
     assert partial.cost == best.cost
     assert best is not seen[-1]
     assert signal.getsignal(signal.SIGINT) is before
+    solve_once(unit_move(), 5)
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_an_exception_in_progress_keeps_the_best_iterate() -> None:

@@ -13,7 +13,7 @@ from ocp.text.phase import Phase
 from ocp.text.problem import Problem
 from ocp.text.ranges import FREE, Free
 from ocp.transcription.grid import make_meshes
-from ocp.transcription.schemes import Radau, Scheme
+from ocp.transcription.schemes import Legendre, Radau, Scheme
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription
 
@@ -76,9 +76,9 @@ def test_inputs_are_zero_or_in_the_middle_of_their_bounds(
 
 def test_durations_with_a_fixed_sum_are_stretched_to_it() -> None:
     chain = Phase(UNIT, Free(0.1, 10.0)) >> Phase(UNIT, 1.0) >> Phase(UNIT, Free(0.4, 40.0))
-    problem = Problem(chain, EFFORT, durations=(((0, 1, 2), 6.0),))
+    problem = Problem(chain, EFFORT, durations=(((0, 1, 2), 11.0),))
     durations = [span.T for span in initial_points(on(problem)).spans]
-    np.testing.assert_allclose(durations, [1.0, 1.0, 4.0])
+    np.testing.assert_allclose(durations, [2.0, 1.0, 8.0])
 
 
 @pytest.mark.parametrize(
@@ -148,6 +148,7 @@ def test_multipliers_are_used_where_the_program_is_the_same() -> None:
         on(unit_move(), 11),
         on(unit_move(path=[lambda s: s.v <= 9.0]), 10),
         on(unit_move(), 10, Radau(2)),
+        on(unit_move(), 10, Legendre()),  # as many unknowns and rows
     ):
         start, warm = start_of(other, old)
         assert not warm

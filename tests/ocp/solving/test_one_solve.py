@@ -3,8 +3,10 @@ import pytest
 from phases import fastest_move, there_and_back, unit_move
 
 from ocp.solvers.ipopt import Ipopt
-from ocp.solving.one_solve import solve_on, solve_once
+from ocp.solving.one_solve import solve_on, solve_once, when
 from ocp.text.ranges import FREE, Free
+from ocp.transcription.grid import make_meshes
+from ocp.transcription.program import Place
 from ocp.transcription.schemes import Legendre, Radau
 from ocp.transcription.transcribe import discretise
 
@@ -40,13 +42,19 @@ def test_a_program_is_solved_many_times_with_other_numbers() -> None:
 
 
 def test_times_of_places_go_on_over_the_phases() -> None:
-    partial = solve_once(there_and_back(bounds={"a": (-3.0, 3.0)}), 10, solver=Ipopt(max_iter=60))
-    assert not partial.ok
-    words = partial.message.split("Most violated is ")[1]
-    name, rest = words.split(" at t = ")
-    t, phase = rest.split(" s in ")
-    assert (float(t) <= 1.0) == phase.startswith("out")
-    assert name
+    problem = there_and_back(scenarios={"dry": {}, "oiled": {}})
+    transcription = discretise(problem, Radau()).on(make_meshes(problem, 4))
+    w = np.zeros(transcription.program.w.numel())
+    said = [
+        when(transcription, w, Place("v", span, s))
+        for span, s in ((0, 0.25), (1, 0.25), (3, 1.0), (2, np.nan))
+    ]
+    assert said == [
+        "at t = 0.25 s in out of scenario dry",
+        "at t = 1.25 s in back of scenario dry",
+        "at t = 2 s in back of scenario oiled",
+        "in out of scenario oiled",
+    ]
 
 
 def test_free_durations_and_scenarios() -> None:

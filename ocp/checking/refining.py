@@ -1,0 +1,230 @@
+"""One problem on meshes that follow from its errors, until all intervals are right."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ocp.checking.arcs import Arc, arcs_of
+from ocp.checking.conditions import left_between
+from ocp.checking.holding import holding_losses
+from ocp.checking.local_errors import local_errors
+from ocp.checking.refine import MeshErrors, refined
+from ocp.checking.verify import TOLERANCE, near_runs
+from ocp.result.solution import Solution
+from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.outcome import Report, in_stage
+from ocp.solvers.prepared import Prepared
+from ocp.solving.one_solve import Solver, solve_on
+from ocp.solving.starts import Start
+from ocp.text.problem import Problem
+from ocp.transcription.schemes import Radau, Scheme, Shooting
+from ocp.transcription.transcribe import Discretisation, discretise
+from symfric.foundation.status import Status
+
+Array = NDArray[np.float64]
+Limit = Callable[[Prepared], Prepared]
+
+LATER = 1e-2
+"""Barrier parameter of Ipopt at the start of all passes but the first, which start close by."""
+STOPPED = (Status.INTERRUPTED, Status.TIME_LIMIT)
+CAP = 150
+"""Iterations on a mesh that will be refined: it is there to say where, and needs no more."""
+LEAST_TRUST = 0.2
+"""Where path conditions are active, estimates of losses are too large by a few times."""
+
+
+@final
+@dataclass(frozen=True)
+class Goals:
+    """When a mesh is fine enough.
+
+    Attributes:
+        local: largest relative local error of an interval.
+        loss: cost lost by holding the inputs, relative to |J|.
+        outside: how far a bound may be left between nodes, relative to its magnitude.
+        passes: solves at most.
+        most: intervals at most, of all phases together.
+    """
+
+    local: float
+    loss: float
+    outside: float
+    passes: int = 8
+    most: int = 1000
+
+    @staticmethod
+    def of(tolerance: float) -> "Goals":
+        """What a verification within `tolerance` asks for: four digits of J at 1e-3.
+
+        Local errors add up over the motion, by experience to no more than ten of the largest. A
+        cost that is off is no miss, but it is what was to be minimised.
+        """
+        return Goals(0.1 * tolerance, 0.02 * tolerance, 0.2 * tolerance)
+
+
+def refined_solve(
+    problem: Problem,
+    meshes: Sequence[Array],
+    scheme: Scheme | None = None,
+    solver: Solver | None = None,
+    guess: Start = None,
+    progress: Report | None = None,
+    *,
+    goals: Goals | None = None,
+    limit: Limit = lambda prepared: prepared,
+) -> Solution:
+    """Solve, and solve again from there on meshes that follow from the errors that are left.
+
+    A mesh is fine enough when the local error of every interval, the cost lost by holding the
+    inputs and the bounds between nodes reach the `goals`. Nodes move to where they are needed; as
+    long as their number stays the same, nothing is built again.
+
+    Args:
+        problem: what to solve.
+        meshes: to start with, `make_meshes(problem, 50)`.
+        scheme: `Radau(3)` if none.
+        solver: `Ipopt()` if none.
+        guess: see `ocp.solving.starts`.
+        progress: called with a `Progress` after each iteration.
+        goals: those of a verification within 1e-3 if none.
+        limit: what a solver is put through before each solve, such as a limit of time.
+
+    Returns:
+        The last solution that the solver calls solved, with the statistics of all passes; the first
+        one where that already fails, and with status INTERRUPTED or TIME_LIMIT the one before. A
+        mesh that did not become fine enough is no failure: what comes of it is said by the
+        verification.
+    """
+    goals = Goals.of(TOLERANCE) if goals is None else goals
+    solver = Ipopt() if solver is None else solver
+    begin = perf_counter()
+    made = discretise(problem, Radau() if scheme is None else scheme)
+
+    def on(meshes: Sequence[Array], guess: Start, number: int, capped: bool) -> Solution:
+        began = begin if number == 1 else perf_counter()
+        transcription = made.on(meshes)
+        prepared = limit(_later(solver, number, capped).prepared(transcription.program))
+        built = perf_counter() - began
+        new = solve_on(transcription, prepared, guess, in_stage(progress, f"mesh {number}"))
+        own = replace(new.statistics, build_time=new.statistics.build_time + built)
+        return replace(new, statistics=own)
+
+    new = found = on(meshes, guess, 1, capped=False)
+    statistics, state = found.statistics, Excess()
+    capped = False
+    for number in range(2, goals.passes + 1):
+        if not new.ok and not (capped and new.status is Status.MAX_ITERATIONS):
+            break
+        finer, state = finer_meshes(made, new, goals, state)
+        fine = not finer or (state.stuck and _full(new.meshes, goals))
+        if fine and new.ok:
+            break
+        capped = not fine and number < goals.passes
+        new = on(new.meshes if fine else finer, new, number, capped)
+        statistics = statistics.then(new.statistics)
+        if new.status in STOPPED:
+            said = f"{new.message} What there is is the solution on the mesh before."
+            found = replace(found, status=new.status, message=said, cause=new.cause)
+        found = new if new.ok else found
+    return replace(found, statistics=statistics)
+
+
+def _later(solver: Solver, number: int, capped: bool) -> Solver:
+    """The solver of a pass that starts close by; what the user says wins."""
+    if number == 1 or not isinstance(solver, Ipopt):
+        return solver
+    later: dict[str, float] = {"mu_init": LATER} | ({"max_iter": CAP} if capped else {})
+    return solver.with_options(**{k: v for k, v in later.items() if k not in solver.options})
+
+
+def _full(meshes: Sequence[Array], goals: Goals) -> bool:
+    """Whether there is no room for more intervals."""
+    return sum(mesh.size - 1 for mesh in meshes) >= 0.9 * goals.most
+
+
+@final
+@dataclass(frozen=True)
+class Excess:
+    """How far a mesh was from its goals.
+
+    Attributes:
+        local: largest local error in multiples of its goal.
+        lost: estimated cost lost by holding the inputs.
+        cost: J.
+        trust: share of an estimated loss that refinement really gains.
+        stuck: whether the last refinement has gained little.
+    """
+
+    local: float = np.inf
+    lost: float = np.inf
+    cost: float = np.inf
+    trust: float = 1.0
+    stuck: bool = False
+
+    def then(self, local: float, lost: float, cost: float, allowed: float) -> "Excess":
+        """After another pass; what it gained says how far its estimates are to be trusted."""
+        trust = self.trust
+        if max(self.local, local) <= 1.0 and np.isfinite(self.lost) and self.lost > 2 * lost:
+            gained = (self.cost - cost) / (self.lost - lost)
+            trust = float(np.clip(gained, LEAST_TRUST, 1.0))
+        whole = max(local, trust * lost / allowed if allowed > 0 else 0.0)
+        before = max(self.local, self.trust * self.lost / allowed if allowed > 0 else 0.0)
+        return Excess(local, lost, cost, trust, stuck=whole > 0.7 * before)
+
+
+def finer_meshes(
+    made: Discretisation, solution: Solution, goals: Goals, before: Excess | None = None
+) -> tuple[tuple[Array, ...], Excess]:
+    """Meshes for what is not right yet, none if all is; and how far it is from being right."""
+    problem, phases = made.problem, len(made.problem.chain)
+    arcs = arcs_of(problem, solution.meshes, solution.points)
+    local = local_errors(arcs, min(1e-6, 0.1 * goals.local))
+    losses = tuple(np.zeros(arc.intervals) for arc in arcs)
+    if not isinstance(made.scheme, Shooting):
+        iterate = solution.iterate
+        losses = holding_losses(made.on(solution.meshes), iterate.w, iterate.lam_g)
+    allowed = goals.loss * abs(solution.cost)
+    worst = max(float(e.max(initial=0.0)) for e in local) / goals.local
+    lost = sum(float(loss.sum()) for loss in losses)
+    now = (before or Excess()).then(worst, lost, solution.cost, allowed)
+    fine = worst <= 1.0 and (now.trust * lost <= allowed or not allowed)
+    outside = _outside(arcs, goals) if fine else None
+    if fine and not any(bool(o.any()) for o in outside or ()):
+        return (), now
+    errors: list[MeshErrors] = []
+    for phase in range(phases):  # all scenarios have the same mesh
+        of = range(phase, len(arcs), phases)
+        errors.append(
+            MeshErrors(
+                np.max([local[k] for k in of], axis=0),
+                now.trust * np.sum([losses[k] for k in of], axis=0),
+                np.any([outside[k] for k in of], axis=0) if outside else np.zeros(0, dtype=bool),
+            )
+        )
+    new = refined(
+        solution.meshes[:phases],
+        errors,
+        [tuple(span.nodes) for span in problem.spans[:phases]],
+        local=goals.local,
+        loss=0.8 * allowed,
+        order=_order(made.scheme),
+        most=goals.most,
+    )
+    return new * (len(arcs) // phases), now
+
+
+def _order(scheme: Scheme) -> int:
+    """Order of the scheme; of shooting that of most methods of `flow`."""
+    return 4 if isinstance(scheme, Shooting) else scheme.order
+
+
+def _outside(arcs: Sequence[Arc], goals: Goals) -> tuple[NDArray[np.bool_], ...]:
+    """Intervals between whose nodes a bound is left."""
+    found = [np.zeros(arc.intervals, dtype=bool) for arc in arcs]
+    for run in near_runs(arcs, 10 * goals.local):
+        found[run.arc.number] |= left_between(run, goals.outside)
+    return tuple(found)

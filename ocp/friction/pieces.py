@@ -1,0 +1,173 @@
+"""A motion in pieces, each in one mode of every contact, as one."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ocp.friction.decide import Modes
+from ocp.result.solution import Mode
+from symfric import Statistics, Trajectory
+from symfric.foundation.status import Status
+from symfric.model import Model
+
+Array = NDArray[np.float64]
+KINDS = {1: "slip+", 0: "stick", -1: "slip-"}
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A run in which no contact changes its mode and no input jumps."""
+
+    run: Trajectory
+    modes: Modes
+    begin: float
+    end: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class SetValued:
+    """A motion with exact Coulomb friction, as far as it was followed.
+
+    `motion["v"]` is a signal at the times `motion.t`; `motion.at(times)` has all of them anywhere:
+    what the model has but states of laws, and "<contact>_F", the friction force. See `trajectory`
+    for pictures, files and expressions.
+
+    Attributes:
+        model: the user's model.
+        t: times of the result [s].
+        pieces: runs between changes of mode and of inputs.
+        status, message: how it ended.
+    """
+
+    model: Model
+    t: Array
+    pieces: tuple[Piece, ...]
+    status: Status = Status.SUCCESS
+    message: str = Status.SUCCESS.value
+    contacts: tuple[str, ...] = ()
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First time and the last one reached [s]."""
+        return self.pieces[0].begin, self.pieces[-1].end
+
+    @cached_property
+    def modes(self) -> dict[str, tuple[Mode, ...]]:
+        """Contact -> what it does when."""
+        found: dict[str, tuple[Mode, ...]] = {}
+        for name in self.contacts:
+            merged: list[Mode] = []
+            for piece in self.pieces:
+                kind = KINDS[piece.modes[name]]
+                if merged and merged[-1].kind == kind:
+                    merged[-1] = Mode(kind, merged[-1].begin, piece.end)
+                else:
+                    merged.append(Mode(kind, piece.begin, piece.end))
+            found[name] = tuple(m for m in merged if m.end > m.begin)
+        return found
+
+    @cached_property
+    def last(self) -> Modes:
+        """The modes at the end, for a run that goes on from there."""
+        return dict(self.pieces[-1].modes)
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The motion as one of the user's model, with "<contact>_F" beside its signals.
+
+        It plots and writes itself. Expressions with states of laws, or with what other laws have as
+        unknowns, are NaN.
+        """
+        units = {n: u for n, u in self.model.signals.items() if n in self._known}
+        contacts = {c.name: c for c in self.model.contacts}
+        units |= {f"{name}_F": contacts[name].unit("N") for name in self.contacts}
+        changes = ((p.end, "change") for p in self.pieces[:-1])
+        return Trajectory(
+            self.model.name, self.t, units, self.status, self.message,
+            self._statistics, self.span, self._ends, self._states, self._evaluated,
+            self._expressed, self.model, tuple(changes),
+        )  # fmt: skip
+
+    @cached_property
+    def _known(self) -> set[str]:
+        """Signals that all pieces have, but states of laws."""
+        of_laws = {v.name for c in self.model.contacts for v in c.states}
+        return set.intersection(*(set(p.run.units) for p in self.pieces)) - of_laws
+
+    def _statistics(self) -> Statistics:
+        every = [p.run.statistics for p in self.pieces]
+        names = ("steps", "rejections", "evaluations", "jacobians", "factorisations", "run_time",
+                 "build_time", "compile_time")  # fmt: skip
+        total = {name: sum(getattr(s, name) for s in every) for name in names}
+        least = min(s.smallest_step for s in every)
+        return replace(every[0], **total, events=len(self.pieces) - 1, smallest_step=least)
+
+    def _ends(self) -> Array:
+        inner = [p.run.step_times[(p.run.step_times < p.end)] for p in self.pieces]
+        return np.unique(np.concatenate([*inner, [self.span[1]]]))
+
+    def _pieces_at(self, at: Array) -> Iterator[tuple[Piece, NDArray[np.bool_], Array]]:
+        """Each piece with the times that it holds; at a change of mode the later one."""
+        edges = np.array([p.begin for p in self.pieces[1:]])
+        which = np.searchsorted(edges, at, side="right")
+        for k in np.unique(which):
+            piece, here = self.pieces[k], which == k
+            yield piece, here, np.clip(at[here], piece.begin, piece.end)
+
+    def _states(self, at: Array) -> dict[str, Array]:
+        found = {v.name: np.zeros(at.size) for v in self.model.open.x}
+        for piece, here, times in self._pieces_at(at):
+            values = piece.run.states(times)
+            for name, row in found.items():
+                row[here] = values[name]
+        return found
+
+    def _evaluated(self, at: Array) -> dict[str, Array]:
+        found = {name: np.zeros(at.size) for name in self.trajectory.units}
+        for piece, here, times in self._pieces_at(at):
+            values = piece.run.at(times)
+            for name in self.contacts:
+                values[f"{name}_F"] = _force(piece, name, values, times, self.model)
+            for name, row in found.items():
+                row[here] = values[name]
+        return found
+
+    def _expressed(self, column: ca.SX, at: Array) -> Array:
+        found = np.full((column.numel(), at.size), np.nan)
+        for piece, here, times in self._pieces_at(at):
+            known = {
+                v.symbol.__hash__() for group in "xzup" for v in getattr(piece.run.model, group)
+            }
+            every = [v.symbol for group in "xz" for v in getattr(self.model, group)]
+            gone = ca.vertcat(ca.SX(0, 1), *(s for s in every if s.__hash__() not in known))
+            there = ca.substitute(column, gone, ca.SX(ca.DM(gone.numel(), 1) + np.nan))
+            found[:, here] = piece.run.express(ca.densify(there), times)
+        return found
+
+    def __getitem__(self, name: str) -> Array:
+        return self.t if name == "t" else self.trajectory[name]
+
+    def at(self, times: ArrayLike) -> dict[str, Array]:
+        """All signals at `times` [s]; at a change of mode those behind it."""
+        return self.trajectory.at(times)
+
+    def final(self) -> dict[str, float]:
+        """States at the end by name, but those of laws."""
+        piece = self.pieces[-1]
+        found = piece.run.states(np.array([piece.end]))
+        return {v.name: float(found[v.name][-1]) for v in self.model.open.x}
+
+
+def _force(piece: Piece, name: str, values: Mapping[str, Array], at: Array, model: Model) -> Array:
+    mode = piece.modes[name]
+    if not mode:
+        return values[f"{name}_reaction"]
+    contact = next(c for c in model.contacts if c.name == name)
+    return piece.run.express(contact.sliding(mode), at)[0]
