@@ -9,6 +9,10 @@ from ocp.checking.verification import Verification as Verification
 from ocp.checking.verify import verify as verify
 from ocp.friction.exact import set_valued as set_valued
 from ocp.friction.referee import verify_exactly as verify_exactly
+from ocp.mpc.closed_loop import ClosedLoop as ClosedLoop
+from ocp.mpc.closed_loop import plot_loops as plot_loops
+from ocp.mpc.controller import Controller as Controller
+from ocp.mpc.controller import controller_of as controller_of
 from ocp.result.solution import Mode as Mode
 from ocp.result.solution import Solution as Solution
 from ocp.result.stored import load as load

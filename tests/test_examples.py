@@ -34,7 +34,19 @@ def drive_has_learnt_to_stop(printed: str, folder: Path) -> None:
     assert float(after) < 0.5
 
 
+def drives_get_there_and_the_c_is_verified(printed: str, folder: Path) -> None:
+    """Errors below 2 mm under three laws, no failure hidden."""
+    rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in printed.splitlines()]
+    rows = [row for row in rows if row]
+    assert len(rows) == 3
+    assert all(float(row[1].removesuffix(" mm")) < 2.0 for row in rows)
+    assert all(row[-1] == "0" for row in rows)
+    assert "C: verified" in printed
+    assert {path.name for path in (folder / "c").iterdir()} == {"drive_mpc.c", "drive_mpc.h"}
+
+
 SAYS = {
+    "mpc_drive": drives_get_there_and_the_c_is_verified,
     "learn_drive": drive_has_learnt_to_stop,
     "rabinowicz": period_is_between_those_of_two_laws,
     "optimal_move": moves_are_solved_and_saved,

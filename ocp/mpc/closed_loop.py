@@ -1,7 +1,7 @@
 """A controller on a plant with equations of its own, and what became of it."""
 
 import csv
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
@@ -159,29 +159,50 @@ class ClosedLoop:
         """Signals, controls and cycle times over time, a panel each; shaded: not converged.
 
         Args:
-            names: signals and controls to show; by default those that the controller measures.
+            names: signals and controls to show, by default all.
             path: image file.
         """
-        known = [*self.signals, *self.controls]
-        checks.check_names(f"loop of '{self.plant}'", names, known)
-        shown = list(names) or known
-        figure, axes = panels(len(shown) + 1)
-        edges = np.append(self.t, self.t_end)
+        return plot_loops({f"{self.controller} on plant '{self.plant}'": self}, names, path)
+
+
+def plot_loops(
+    loops: Mapping[str, ClosedLoop], names: Sequence[str] = (), path: str | Path | None = None
+) -> "Figure":
+    """Signals and controls of closed loops over time, a panel each, and the time of their cycles.
+
+    Shaded is where a controller says that it did not converge.
+
+    Args:
+        loops: legend entry -> loop.
+        names: signals and controls to show; all those that the loops share if none is given.
+        path: image file.
+    """
+    first = next(iter(loops.values()))
+    known = [*first.signals, *first.controls]
+    shared = [n for n in known if all(n in {*one.signals, *one.controls} for one in loops.values())]
+    checks.check_names(f"loop of '{first.plant}'", names, shared)
+    shown = list(names) or shared
+    figure, axes = panels(len(shown) + 1)
+    for number, (label, one) in enumerate(loops.items()):
+        colour, edges = f"C{number}", np.append(one.t, one.t_end)
         for axis, name in zip(axes, shown, strict=False):
-            if name in self.controls:
-                axis.stairs(self.controls[name], edges, baseline=None, linewidth=1.2)
+            if name in one.controls:
+                axis.stairs(one.controls[name], edges, baseline=None, color=colour, label=label)
             else:
-                axis.plot(edges, self.signals[name], linewidth=1.2)
-            axis.set_ylabel(f"{name} [{self.units[name]}]")
-        axes[-1].semilogy(self.t, 1e3 * self.seconds, ".", ms=3)
-        axes[-1].set_ylabel("cycle [ms]")
-        axes[-1].set_xlabel("t [s]")
-        for k in np.flatnonzero(self.status != CycleStatus.CONVERGED).tolist():
+                axis.plot(edges, one.signals[name], color=colour, linewidth=1.2, label=label)
+            axis.set_ylabel(f"{name} [{one.units[name]}]")
+        axes[-1].semilogy(one.t, 1e3 * one.cpu, ".", ms=3, color=colour)
+        for k in np.flatnonzero(one.status != CycleStatus.CONVERGED).tolist():
             for axis in axes:
-                axis.axvspan(edges[k], edges[k + 1], color="0.85", zorder=0)
-        axes[0].set_title(f"{self.controller} on plant '{self.plant}'")
-        figure.align_ylabels(axes)
-        return save(figure, path)
+                axis.axvspan(edges[k], edges[k + 1], color=colour, alpha=0.15, linewidth=0)
+    axes[-1].set_ylabel("cycle [ms]")
+    axes[-1].set_xlabel("t [s]")
+    if len(loops) > 1:
+        axes[0].legend(fontsize="small")
+    else:
+        axes[0].set_title(next(iter(loops)))
+    figure.align_ylabels(axes)
+    return save(figure, path)
 
 
 def run_closed_loop(

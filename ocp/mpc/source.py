@@ -43,6 +43,12 @@ extern "C" {{
 #endif
 
 {statuses}
+/* A change of the plan. */
+typedef struct {{
+{_move(sizes(design))}\
+    double slope, curvature;
+}} {name}_move_t;
+
 /* Plan and work space; nothing in it needs to be read or written. */
 typedef struct {{
     int warm;                /* whether there is a plan */
@@ -173,30 +179,35 @@ def _members(rows: Iterable[tuple[str, str]]) -> str:
     )
 
 
+def _array(what: str, *shape: int) -> str:
+    """A member; no size is zero in C."""
+    return f"    double {what}{''.join(f'[{max(size, 1)}]' for size in shape)};\n"
+
+
+def _move(parts: dict[str, int]) -> str:
+    n, nx, nu = parts["N"], parts["NX"], parts["NU"]
+    return _array("x", n + 1, nx) + _array("u", n, nu) + _array("D", parts["ALL"])
+
+
 def _memory(name: str, parts: dict[str, int]) -> str:
     """Members of the plan and the work space."""
     n, every = parts["N"], max(parts["ALL"], 1)
 
-    def array(what: str, *shape: int) -> str:
-        return f"    double {what}{''.join(f'[{max(size, 1)}]' for size in shape)};\n"
-
     states, inputs = (n + 1, parts["NX"]), (n, parts["NU"])
-    lines = [array("x", *states), array("u", *inputs), array("z", every)]
-    lines += [array("r", n + 1, parts["NR"]), array("t", n + 1), array("p", parts["NPAR"])]
-    lines += [array("b", parts["NB"]), array("L", n, parts["NL"]), array("L_end", parts["NL_END"])]
-    lines += [array("G", n, parts["NG"]), array("k", *inputs)]
+    lines = [_array("x", *states), _array("u", *inputs), _array("z", every)]
+    lines += [_array("r", n + 1, parts["NR"]), _array("t", n + 1), _array("p", parts["NPAR"])]
+    lines += [
+        _array("b", parts["NB"]),
+        _array("L", n, parts["NL"]),
+        _array("L_end", parts["NL_END"]),
+    ]
+    lines += [_array("G", n, parts["NG"]), _array("k", *inputs)]
     rows = ["w", "e"]
     if parts["ALL"]:
         rows += ["v", "ts", "zn", "s", "y", "f", "a", "o", "goal_t", "goal_s"]
         rows += ["dt", "dz", "ds", "dy"]
-    lines += [array(row, every) for row in rows]
-    moves = array("x", *states) + array("u", *inputs) + array("D", every)
-    moves = "".join(f"    {line}\n" for line in moves.splitlines())
-    lines += [
-        f"    struct {name}_move {{\n"
-        + moves
-        + "        double slope, curvature;\n    } go, aim;\n"
-    ]
+    lines += [_array(row, every) for row in rows]
+    lines.append(f"    {name}_move_t go, aim;\n")
     return "".join(lines)
 
 
@@ -240,7 +251,7 @@ def _constants_of(design: Design) -> str:
     values = [*design.p0.tolist(), *design.bounds.tolist(), design.settings.tolerance]
     numbers = [*map(DOUBLE.literal, values), str(design.settings.iterations)]
     text += f"\nconst {name}_param_t {name}_default = {{\n    {', '.join(numbers)}\n}};\n"
-    return text + f"\ntypedef struct {name}_move {name}_move_t;\n\n"
+    return text + "\n"
 
 
 def _kernel(function: ca.Function) -> tuple[str, Counter[str]]:

@@ -48,3 +48,11 @@ def test_engines_agree_to_the_bit_in_a_cycle_with_active_bounds() -> None:
     assert first.controls == second.controls
     assert first.residual == second.residual
     np.testing.assert_equal(first.iterations, second.iterations)
+
+
+def test_c_is_c_plus_plus_too(tmp_path: Path) -> None:
+    files = controller().to_c(tmp_path).files
+    compiler = find_compiler()
+    assert compiler is not None
+    said = compiler.run("-x", "c++", "-Wall", "-Wextra", "-fsyntax-only", str(files[1]))
+    assert said == ""

@@ -1,0 +1,89 @@
+"""Position a drive with friction by model predictive control, and write the controller as C.
+
+    m v' = force - F(v),   m = 1 kg,   |force| <= 20 N,   F: 6 N to break away, 4 N while sliding
+
+Every 10 ms the states are measured, the motion of the next 0.2 s is optimised, and its first force
+is applied. The controller believes in friction that is smooth over 1 cm/s. The plants have other
+friction: a hundred times sharper, bristles, or none but the set-valued law of Coulomb.
+
+    python examples/mpc_drive.py [OUT]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from ocp import ClosedLoop, Controller, Phase, Problem, at_end, effort, plot_loops, track
+from symfric import BrownMcPhee, ExactCoulomb, Law, LuGre, drive
+from symfric.model import Model
+
+Array = NDArray[np.float64]
+
+
+def rubbing(law: Law) -> Model:
+    """A mass of 1 kg; with N = 1 N the coefficients of the law are newtons."""
+    return drive(law, m=1.0, N=1.0)
+
+
+def controller() -> Controller:
+    """20 intervals of 10 ms; "goal" is where to go."""
+    cost = track("x", "goal", 900.0) + track("v", 0.0, 1.0) + effort("force", 1e-3)
+    cost += at_end(lambda s: 100 * (s.x - s.goal) ** 2 + s.v**2)
+    model = rubbing(BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-2))
+    bounds = {"force": (-20.0, 20.0)}
+    return Problem(Phase(model, T=0.2), cost, bounds=bounds, p={"goal": 0.0}).to_mpc(0.01)
+
+
+def plants() -> dict[str, Model]:
+    """What is really there."""
+    bristles = LuGre(mu_s=6.0, mu_d=4.0, v_s=1e-2, sigma_0=1e5, sigma_1=300.0, sigma_2=0.0)
+    return {
+        "sharp": rubbing(BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-4)),
+        "bristles": rubbing(bristles),
+        "Coulomb": rubbing(ExactCoulomb(mu_s=6.0, mu_d=4.0)),
+    }
+
+
+def goal(t: Array) -> Array:
+    """10 cm forth and back, 1 s each."""
+    return np.where(np.mod(t, 2.0) < 1.0, 0.1, 0.0)
+
+
+def table(loops: dict[str, ClosedLoop]) -> Table:
+    """A row a plant; the controller knows the goal ahead, so the error is looked at in between."""
+    result = Table("plant", "error", "median [ms]", "worst [ms]", "not converged", "unreported")
+    for name, loop in loops.items():
+        k = np.flatnonzero(np.isclose(np.mod(loop.t, 1.0), 0.5))
+        error = float(np.abs(loop["x"][k] - goal(loop.t[k])).max())
+        result.add_row(
+            name,
+            f"{1e3 * error:.2f} mm",
+            f"{1e3 * loop.median:.3f}",
+            f"{1e3 * loop.worst_cpu:.3f}",
+            f"{loop.unconverged} of {loop.t.size}",
+            str(loop.unreported),
+        )
+    return result
+
+
+def main(out: Path) -> None:
+    """Close the loops, print, and write C, data and a picture into `out`."""
+    made = controller()
+    loops = {
+        name: made.simulate(plant, 4.0, {"goal": goal}, noise={"x": 1e-5, "v": 1e-3})
+        for name, plant in plants().items()
+    }
+    check = made.to_c(out / "c").verify()
+    console = Console()
+    console.print(table(loops))
+    console.print(f"C: {check.status}, {check.bytes} bytes of memory")
+    plot_loops(loops, ["x", "v", "force"], out / "mpc_drive.png")
+    loops["Coulomb"].to_csv(out / "mpc_drive.csv")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "out"))
