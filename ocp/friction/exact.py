@@ -229,7 +229,7 @@ class _Run:
                 high, above, below = middle, value, below / 2
             else:
                 low, below, above = middle, value, above / 2
-        return high
+        return float(high)
 
     def _same_unknowns(
         self, run: Trajectory, model: Model, guess: Mapping[str, float], t: float
