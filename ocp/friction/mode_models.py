@@ -200,6 +200,15 @@ def mode_model(model: Model, modes: Mapping[str, int]) -> Model:
     return kept[key]
 
 
+def restless(model: Model) -> str:
+    """Why the contacts of `model` cannot all rest as mode models would have it; mostly empty."""
+    try:
+        mode_model(model, dict.fromkeys((c.name for c in model.contacts), 0))
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
 def _in_modes(model: Model, modes: Mapping[str, int]) -> Model:
     held = [c for c in model.contacts if not modes[c.name]]
     reactions = {

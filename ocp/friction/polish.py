@@ -25,6 +25,7 @@ from ocp.checking.arcs import arcs_of
 from ocp.checking.local_errors import local_errors
 from ocp.checking.refine import MeshErrors, refined
 from ocp.friction.carry import Known
+from ocp.friction.mode_models import restless
 from ocp.friction.reading import Reading, sequence_of, sizes_of, starts_at_rest
 from ocp.friction.repair import neighbours, rests_inside
 from ocp.friction.sequence import Leg, pruned, shown
@@ -167,6 +168,8 @@ def refusal(problem: Problem) -> str:
         )
     if any(phase.via and not isinstance(phase.T, float | int) for phase in problem.chain):
         return "expected phases of fixed duration where there are via points; split them there"
+    if reasons := [text for phase in problem.chain if (text := restless(phase.model))]:
+        return reasons[0]
     return ""
 
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from rigs import blocks
 
-from ocp.friction.mode_models import WIDTH, mode_model, smooth_model, widths
+from ocp.friction.mode_models import WIDTH, mode_model, restless, smooth_model, widths
 from symfric import (
     BrownMcPhee,
     Contact,
@@ -196,4 +196,6 @@ def test_what_cannot_be_is_refused_by_name() -> None:
     rest = dict.fromkeys((c.name for c in bar.contacts), 0)
     with pytest.raises(ValueError, match=r"theta_crank, .* at rest together; in a loop of one"):
         mode_model(bar, rest)
+    assert "at rest together" in restless(bar)
+    assert restless(model) == ""
     assert mode_model(drive(Viscous()), {}).z == ()
