@@ -119,6 +119,8 @@ class Machine:
         for c, still in zip(self.contacts, self.still, strict=True):
             change = ca.jtimes(c.slip, x, rate) + ca.jacobian(c.slip, model.t)
             mode = modes[c.name]
+            if model.holonomic is None and not ca.SX(c.N).is_constant():
+                events.append(Event(f"{c.name}_lifts", c.N + OVERLOAD, -1, terminal=True))
             if mode:
                 rows.append([np.inf, np.inf, change, c.sliding(mode), c.N])
                 events.append(Event(f"{c.name}_stops", mode * c.slip + still, -1, terminal=True))

@@ -202,6 +202,13 @@ def test_what_nobody_can_decide_is_said() -> None:
     with pytest.raises(SolveError, match=r"nobody can decide who rests: .* guide lifts off") as one:
         set_valued(jamming(3.0), 1.0, x0={"v": 1.0})
     assert one.value.status is Status.SOLVER_FAILED
+    v, x = Variable("v", "m/s", start=1.0), Variable("x", "m")
+    hill = Contact("hill", v.symbol, 9.81 - v.symbol**2 - 30.0 * x.symbol, ExactCoulomb(),
+                   given={"F_e": 1.0}, rest={"v": 0.0})  # fmt: skip
+    flying = Model("flying", x=(x, v), ode=ca.vertcat(v.symbol, 1.0 - hill.force), contacts=(hill,))
+    with pytest.raises(SolveError, match=r"hill lifts off") as flight:
+        set_valued(flying, 1.0)
+    assert 0.2 < flight.value.partial.span[1] < 0.3
     partial = set_valued(jamming(3.0), 1.0, x0={"v": -1.0}, throw=False)
     assert partial.status.ok
 
