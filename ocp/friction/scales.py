@@ -66,14 +66,20 @@ def same_size(a: Scales, b: Scales, factor: float) -> bool:
     return all(max(pair) <= factor * min(pair) for pair in speeds)
 
 
-def typical(scales: Sequence[Scales]) -> Scales:
-    """The median of several."""
+def guessed(problem: Problem, scales: Sequence[Scales]) -> Scales:
+    """What to expect of a motion from those of several starts.
+
+    The largest median speed of all contacts that slide, or that turn: a body that stands still in
+    straight lines from end to end will move, and layers that are too wide do no harm.
+    """
+    turning = {c.name: c.turning for phase in problem.chain for c in phase.model.contacts}
+    speeds = {name: float(np.median([s[name].speed for s in scales])) for name in turning}
     return {
         name: Scale(
-            float(np.median([s[name].speed for s in scales])),
+            max(speeds[other] for other in turning if turning[other] == turning[name]),
             float(np.median([s[name].load for s in scales])),
         )
-        for name in scales[0]
+        for name in turning
     }
 
 

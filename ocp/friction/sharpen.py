@@ -30,8 +30,9 @@ from numpy.typing import NDArray
 
 from ocp.checking.arcs import arcs_of
 from ocp.checking.local_errors import local_errors
+from ocp.friction.many_starts import starts_around
 from ocp.friction.mode_models import smooth_model
-from ocp.friction.scales import Scale, Scales, same_size, scales_of, typical, widths_at
+from ocp.friction.scales import Scale, Scales, guessed, same_size, scales_of, widths_at
 from ocp.result.solution import Solution
 from ocp.result.stored import Stored, stored_spans
 from ocp.solvers.fatrop import Fatrop
@@ -41,7 +42,6 @@ from ocp.solvers.prepared import Prepared
 from ocp.solvers.sqp import Sqp
 from ocp.solving.clock import Clock
 from ocp.solving.one_solve import solution_of, when
-from ocp.solving.perturbed import perturbed
 from ocp.solving.starts import Start, resample, start_of
 from ocp.text.phase import Chain
 from ocp.text.problem import Problem
@@ -79,10 +79,10 @@ TOLERANCE = 1e-3
 PASSES = 4
 """Refinements at one width."""
 STARTS = 6
-SPREAD = 0.3
-"""How far the further starts are from the given one; see `perturbed`."""
-RESCALED = 2
-"""How often the starts are made again because the speeds were guessed wrong."""
+SPREAD = 0.5
+"""How far the further starts are from the given one; see `starts_around`."""
+FURTHER = 2
+"""Times that so many starts are made round straight lines when none has led to a solution."""
 SAME = 3.0
 """Factor by which the speeds of the first motion may differ from those the widths were made for."""
 
@@ -230,32 +230,38 @@ class _Path:
         """The best of several coarse solves with wide layers, on the mesh to go on with."""
         coarse = self.discretisation.on(_meshes(self.problem, COARSE))
         begin = coarse.unpack(start_of(coarse, guess)[0].w)
-        tries = [begin, *(perturbed(coarse, begin, SPREAD, k) for k in range(1, starts))]
-        self.scales = typical([scales_of(self.user, self.problem, points) for points in tries])
+        tries = starts_around(coarse, begin, range(starts), SPREAD)
+        found = [scales_of(self.user, self.problem, points) for points in tries]
+        self.scales = guessed(self.user, found)
         best = self.best_of(coarse, tries)
-        for _ in range(RESCALED):
-            if best.ended:
-                return best
-            found = scales_of(self.user, self.problem, best.points, self.scales)
-            alike, self.scales = same_size(found, self.scales, SAME), found
-            if alike:
+        for more in range(1, FURTHER + 1):
+            if best.ended or best.good:
                 break
-            best = self.best_of(coarse, tries)
+            straight = coarse.unpack(start_of(coarse, None)[0].w)
+            seeds = range(more * starts, (more + 1) * starts)
+            best = self.best_of(coarse, starts_around(coarse, straight, seeds, SPREAD), best)
+        if best.ended:
+            return best
+        now = scales_of(self.user, self.problem, best.points, self.scales)
+        alike, self.scales = same_size(now, self.scales, SAME), now
+        if not alike:
+            best = self.best_of(coarse, [best.points, *tries])
         fine = self.discretisation.on(_meshes(self.problem, intervals))
         options = LATER if best.good else LATER | {"max_iter": 300}
         step = self.solve(fine, self.moved(best, fine), FIRST, options, f"width {FIRST:.2g}")
         self.scales = scales_of(self.user, self.problem, step.points, self.scales)
         return self.refined(step, None) if step.good else step
 
-    def best_of(self, coarse: Transcription, tries: Sequence[Points]) -> _Step:
-        """The best of solves from several starts, or one that was stopped."""
-        best = self.solve(coarse, tries[0], FIRST, EARLY, "start 1")
-        for number, points in enumerate(tries[1:], 2):
-            if best.ended:
+    def best_of(
+        self, coarse: Transcription, tries: Sequence[Points], best: _Step | None = None
+    ) -> _Step:
+        """The best of solves from several starts and of `best`, or one that was stopped."""
+        for number, points in enumerate(tries, 1):
+            if best is not None and best.ended:
                 break
             step = self.solve(coarse, points, FIRST, EARLY, f"start {number}")
-            best = step if step.ended or step.better_than(best) else best
-        return best
+            best = step if best is None or step.ended or step.better_than(best) else best
+        return best or self.solve(coarse, tries[0], FIRST, EARLY, "start")
 
     def settled(self, before: _Step, level: float, limit: float) -> _Step:
         """The step to another width, on a mesh that is fine enough for it."""

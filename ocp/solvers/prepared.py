@@ -35,14 +35,6 @@ class Built:
     kept: tuple[ca.Callback, ...] = ()
 
 
-HALTED = {
-    Halt.USER: Status.INTERRUPTED,
-    Halt.ERROR: Status.INTERRUPTED,
-    Halt.TIME: Status.TIME_LIMIT,
-    Halt.FAR: Status.UNBOUNDED,
-}
-"""Who stopped the solver -> how the solve ended."""
-
 PLUGINS = {"Ipopt": "ipopt", "Fatrop": "fatrop", "Sqp": "sqpmethod"}
 """Solver -> what CasADi calls it."""
 
@@ -109,7 +101,7 @@ def refused_options(solver: str, options: Mapping[str, Option], reason: str) -> 
 @final
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A solver and a program; made by `solver.prepared(program)`. One run at a time.
+    """A solver and a program; made by `solver.prepared(program)`.
 
     Attributes:
         program: what is solved.
@@ -176,7 +168,7 @@ class Prepared:
             }
             result, answer, status = self._called(solver, watch, arguments)
         if watch.halt is not None:
-            status = HALTED[watch.halt]
+            status = Status.TIME_LIMIT if watch.halt is Halt.TIME else Status.INTERRUPTED
         elif not status.ok and watch.last is not None and not watch.last.finite:
             status = Status.NOT_FINITE
         point = self._point(result, watch, status, w, numbers)

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import isfinite
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -40,12 +39,8 @@ def start_of(into: Transcription, guess: Start) -> tuple[Iterate, bool]:
     """
     rows = into.program.g.numel()
     if isinstance(guess, Points):
-        _check_shapes(into, guess)
         return Iterate.cold(into.pack(guess), rows), False
     if not isinstance(guess, Solution | Stored):
-        if guess is not None and not isinstance(guess, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
-            hint = "a file is read by ocp.load(path)" if isinstance(guess, str | Path) else ""
-            raise checks.refused("guess", "values by name, a solution, or points", guess, hint)
         return Iterate.cold(into.pack(initial_points(into, guess)), rows), False
     stored = guess.stored if isinstance(guess, Solution) else guess
     w = into.pack(resample(into, stored))
@@ -58,24 +53,6 @@ def start_of(into: Transcription, guess: Start) -> tuple[Iterate, bool]:
         and stored.structure == structure_of(into.problem, into.scheme)
     )
     return (replace(old, w=w), True) if same else (Iterate.cold(w, rows), False)
-
-
-def _check_shapes(into: Transcription, points: Points) -> None:
-    """Points are of one mesh and one set of models."""
-    fitting = initial_points(into)
-    names = ("nodes", "inner", "z", "u")
-    for number, wanted in enumerate(fitting.spans):
-        given = points.spans[number] if number < len(points.spans) else None
-        shapes = [None if given is None else getattr(given, name).shape for name in names]
-        if len(points.spans) != len(fitting.spans) or shapes != [
-            getattr(wanted, name).shape for name in names
-        ]:
-            raise ValueError(
-                f"guess: expected points of {len(fitting.spans)} spans, that of "
-                f"{into.problem.spans[number].name} with states at the nodes of shape "
-                f"{wanted.nodes.shape}, got points of other meshes or models; give the solution "
-                "itself, which is carried over by name"
-            )
 
 
 def initial_points(into: Transcription, given: Mapping[str, Guess] | None = None) -> Points:
@@ -167,7 +144,7 @@ def _points(into: Transcription, durations: Sequence[float], value: Value) -> Po
             for v in span.model.x:
                 given = value(number, v.name, at)
                 x[v.name] = lines.of(number, v.name, at) if given is None else given
-            for rate, name in _rates(span.model).items():
+            for rate, name in rates_of(span.model).items():
                 if value(number, rate, at) is None:
                     x[rate] = np.gradient(x[name], at * durations[number])
             lines.keep(number, {name: float(row[-1]) for name, row in x.items()})
@@ -310,7 +287,7 @@ def _evaluate(name: str, guess: Guess, times: Array, T: float) -> Array:
     return np.interp(times, np.linspace(0.0, T, values.size), values)
 
 
-def _rates(model: Model) -> dict[str, str]:
+def rates_of(model: Model) -> dict[str, str]:
     """State -> the state whose time derivative it is."""
     ode = model.function("ode")(model.t, *(model.vector(letter) for letter in "xzup"))
     return {
