@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.transcription.blocks import Entries, Selection
+from ocp.transcription.blocks import Entries, Piece, Selection
 from ocp.transcription.points import SpanLayout
 from ocp.transcription.skeleton import LARGEST
 from ocp.transcription.transcription import Transcription
@@ -97,10 +97,10 @@ def _slopes(
     own = transcription.layout.spans[number]
     nu, N, d = *own.u.shape, own.degree
     skeleton = transcription.skeleton
-    pieces = enumerate(skeleton.pieces)
-    at = next((i for i, piece in pieces if piece.span == number and piece.block is not None), -1)
+    mine = (i for i, piece in enumerate(skeleton.pieces) if piece.span == number)
+    at = next((i for i in mine if _of_points(skeleton.pieces[i], N * d)), -1)
     piece = skeleton.pieces[at]
-    if not d or piece.block is None or piece.selection is None:
+    if at < 0 or piece.block is None or piece.selection is None:
         return np.zeros((nu, N, 0)), np.zeros((nu, N, 0))
     block, lam = piece.block, lam_g[skeleton.assembled.at[at]]
     inputs = own.nodes.shape[0] + own.z.shape[0] + np.arange(nu)
@@ -123,6 +123,12 @@ def _slopes(
         if row == inputs[j]:
             H_uu[j] += values
     return H_u.reshape(nu, N, d), H_uu.reshape(nu, N, d)
+
+
+def _of_points(piece: Piece, count: int) -> bool:
+    """Whether these are the equations at the collocation points; constraints of loops are not."""
+    equations = any(name.startswith("the equation of") for name in piece.names)
+    return piece.block is not None and piece.places == count and equations
 
 
 def _mapped(function: ca.Function, places: int, arguments: list[ca.DM]) -> list[Array]:

@@ -162,7 +162,9 @@ def load(path: str | Path) -> Stored:
                 )
             return _stored(head, {name: np.asarray(file[name]) for name in file.files})
     except OSError as error:
-        reason = error.strerror.lower() if error.strerror else "an unreadable file"
+        reason = "a folder" if isinstance(error, IsADirectoryError) else "an unreadable file"
+        if isinstance(error, FileNotFoundError):
+            reason = "no such file"
         raise ValueError(f"load '{path}': expected a saved solution, got {reason}") from None
     except (BadZipFile, KeyError, EOFError, json.JSONDecodeError):
         raise _foreign(path) from None

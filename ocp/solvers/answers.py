@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.solvers.outcome import outside
-from ocp.solvers.watch import FEASIBLE, Halt, Seen, Watch
+from ocp.solvers.watch import FAR, FEASIBLE, Halt, Seen, Watch
 from ocp.transcription.program import Place, Program
 from symfric.foundation.status import Status
 
@@ -73,6 +73,9 @@ def _reason(watch: Watch, status: Status, answer: str, solver: str, max_time: fl
             f"{limit} ended {solver} after {count} iterations; allow more time or go on from the "
             "result, which is the best iterate."
         )
+    if watch.halt is Halt.FAR:
+        size = f"{FAR:g} times their typical size"
+        return f"{status.value} Unknowns were {size} after {count} iterations."
     return HINTS.get(answer, status.value)
 
 

@@ -45,7 +45,7 @@ class Fatrop:
 
     def __init__(self, *, max_time: float | None = None, **options: Option) -> None:
         for name, value in options.items():  # fatrop itself would silently take no notice
-            checks.number(f"Fatrop: option {name}", value)
+            checks.number(f"Fatrop: option {name}", float(value) if value in (0, 1) else value)
         object.__setattr__(self, "options", checked_options("Fatrop", options))
         object.__setattr__(self, "max_time", checked_time("Fatrop", max_time))
 

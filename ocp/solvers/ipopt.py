@@ -47,6 +47,8 @@ WARM: dict[str, Option] = {
 class Ipopt:
     """Ipopt with its own options by name: `Ipopt(max_iter=500, print_level=5)`.
 
+    True and False stand for its "yes" and "no".
+
     Attributes:
         options: as Ipopt's documentation tells them.
         max_time: wall time [s] after which a solve ends with what it has, or None.
@@ -56,7 +58,9 @@ class Ipopt:
     max_time: float | None
 
     def __init__(self, *, max_time: float | None = None, **options: Option) -> None:
-        object.__setattr__(self, "options", checked_options("Ipopt", options))
+        words = {True: "yes", False: "no"}
+        given = {n: words[v] if isinstance(v, bool) else v for n, v in options.items()}
+        object.__setattr__(self, "options", checked_options("Ipopt", given))
         object.__setattr__(self, "max_time", checked_time("Ipopt", max_time))
 
     def with_options(self, **options: Option) -> "Ipopt":

@@ -35,6 +35,14 @@ class Built:
     kept: tuple[ca.Callback, ...] = ()
 
 
+HALTED = {
+    Halt.USER: Status.INTERRUPTED,
+    Halt.ERROR: Status.INTERRUPTED,
+    Halt.TIME: Status.TIME_LIMIT,
+    Halt.FAR: Status.UNBOUNDED,
+}
+"""Who stopped the solver -> how the solve ended."""
+
 PLUGINS = {"Ipopt": "ipopt", "Fatrop": "fatrop", "Sqp": "sqpmethod"}
 """Solver -> what CasADi calls it."""
 
@@ -101,7 +109,7 @@ def refused_options(solver: str, options: Mapping[str, Option], reason: str) -> 
 @final
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A solver and a program; made by `solver.prepared(program)`.
+    """A solver and a program; made by `solver.prepared(program)`. One run at a time.
 
     Attributes:
         program: what is solved.
@@ -168,7 +176,7 @@ class Prepared:
             }
             result, answer, status = self._called(solver, watch, arguments)
         if watch.halt is not None:
-            status = Status.TIME_LIMIT if watch.halt is Halt.TIME else Status.INTERRUPTED
+            status = HALTED[watch.halt]
         elif not status.ok and watch.last is not None and not watch.last.finite:
             status = Status.NOT_FINITE
         point = self._point(result, watch, status, w, numbers)

@@ -23,6 +23,8 @@ FEASIBLE = 1e-6
 """Largest scaled violation of an iterate that counts as feasible."""
 WINDOW = 30
 """Iterations in which a Newton method that gets anywhere is seen to do so."""
+FAR = 1e10
+"""Scaled unknowns beyond this are on their way to infinity."""
 RESTING = 1e-6
 """Steps of scaled unknowns below this are no motion."""
 
@@ -33,6 +35,7 @@ class Halt(Enum):
     USER = "the user"
     TIME = "the time limit"
     ERROR = "an exception in `progress`"
+    FAR = "unknowns that grow without bound"
 
 
 @final
@@ -99,6 +102,8 @@ class Watch:
         self.trace.append((f, violation, step))
         if self._deadline is not None and perf_counter() > self._deadline:
             self.halt = self.halt or Halt.TIME
+        if np.abs(w).max(initial=0.0) > FAR:
+            self.halt = self.halt or Halt.FAR
         if self._progress is not None:
             try:
                 self._progress(Progress(self.iterations, f, violation))

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import isfinite
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -39,8 +40,12 @@ def start_of(into: Transcription, guess: Start) -> tuple[Iterate, bool]:
     """
     rows = into.program.g.numel()
     if isinstance(guess, Points):
+        _check_shapes(into, guess)
         return Iterate.cold(into.pack(guess), rows), False
     if not isinstance(guess, Solution | Stored):
+        if guess is not None and not isinstance(guess, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
+            hint = "a file is read by ocp.load(path)" if isinstance(guess, str | Path) else ""
+            raise checks.refused("guess", "values by name, a solution, or points", guess, hint)
         return Iterate.cold(into.pack(initial_points(into, guess)), rows), False
     stored = guess.stored if isinstance(guess, Solution) else guess
     w = into.pack(resample(into, stored))
@@ -53,6 +58,24 @@ def start_of(into: Transcription, guess: Start) -> tuple[Iterate, bool]:
         and stored.structure == structure_of(into.problem, into.scheme)
     )
     return (replace(old, w=w), True) if same else (Iterate.cold(w, rows), False)
+
+
+def _check_shapes(into: Transcription, points: Points) -> None:
+    """Points are of one mesh and one set of models."""
+    fitting = initial_points(into)
+    names = ("nodes", "inner", "z", "u")
+    for number, wanted in enumerate(fitting.spans):
+        given = points.spans[number] if number < len(points.spans) else None
+        shapes = [None if given is None else getattr(given, name).shape for name in names]
+        if len(points.spans) != len(fitting.spans) or shapes != [
+            getattr(wanted, name).shape for name in names
+        ]:
+            raise ValueError(
+                f"guess: expected points of {len(fitting.spans)} spans, that of "
+                f"{into.problem.spans[number].name} with states at the nodes of shape "
+                f"{wanted.nodes.shape}, got points of other meshes or models; give the solution "
+                "itself, which is carried over by name"
+            )
 
 
 def initial_points(into: Transcription, given: Mapping[str, Guess] | None = None) -> Points:

@@ -20,7 +20,10 @@ from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Radau
 from ocp.transcription.transcribe import discretise
 from symfric.foundation.parameters import Variable
+from symfric.laws import BrownMcPhee
 from symfric.model import Model
+from symfric.multibody import JointSpringDamper
+from symfric.scenes import SliderCrank
 
 Array = NDArray[np.float64]
 
@@ -40,6 +43,16 @@ def double_integrator(
     x, v, a = Variable("x", "m"), Variable("v", "m/s"), Variable("a", "m/s^2")
     model = Model("cart", x=(x, v), u=(a,), ode=ca.vertcat(v.symbol, a.symbol))
     return Problem(Phase(model, T, end={"x": 1.0, "v": 0.0}), cost, bounds=bounds or {})
+
+
+def test_losses_of_a_mechanism_with_a_loop_are_those_of_its_points() -> None:
+    """Its constraints at the nodes are equations, too."""
+    m = SliderCrank(BrownMcPhee(mu_s=0.0, mu_d=0.0), omega=0.0).mechanism()
+    m.force(JointSpringDamper("motor", "crank", actuator=m.input("torque", "N m")))
+    cost = integral(lambda s: s.torque**2)
+    (losses,) = losses_of(Problem(Phase(m.build(), 0.5, end={"crank_rate": 6.0}), cost), 10)[1]
+    assert losses.shape == (10,)
+    assert (losses > 0).all()
 
 
 def test_loss_of_a_smooth_input_is_what_the_closed_form_says() -> None:

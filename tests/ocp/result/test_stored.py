@@ -71,6 +71,8 @@ def test_files_of_others_are_refused(tmp_path: Path) -> None:
             load(tmp_path / name)
     with pytest.raises(ValueError, match=r"load .*: expected a saved solution, got no such file"):
         load(tmp_path / "missing.npz")
+    with pytest.raises(ValueError, match=r"load .*: expected a saved solution, got a folder"):
+        load(tmp_path)
 
 
 def test_another_version_is_told(tmp_path: Path) -> None:

@@ -168,3 +168,20 @@ def test_more_equations_than_unknowns_are_told() -> None:
     partial = solve_once(unit_move(), 1)
     assert not partial.ok
     assert "There are more equations than unknowns" in partial.message
+
+
+def test_a_cost_that_falls_without_end_is_told() -> None:
+    downhill = unit_move(cost=integral(lambda s: -s.x), end={})
+    partial = solve_once(downhill, 5)
+    assert partial.status is Status.UNBOUNDED
+    assert "The cost falls without bound" in partial.message
+    assert partial.iterations < 100
+
+
+def test_true_and_false_are_its_yes_and_no() -> None:
+    solver = Ipopt(check_derivatives_for_naninf=True, honor_original_bounds=False)
+    assert dict(solver.options) == {
+        "check_derivatives_for_naninf": "yes",
+        "honor_original_bounds": "no",
+    }
+    assert solve_once(unit_move(), 5, solver=solver).ok

@@ -179,3 +179,16 @@ def test_points_are_a_guess() -> None:
     start, warm = start_of(into, moved)
     assert not warm
     np.testing.assert_array_equal(into.unpack(start.w).spans[0].u, 2.0)
+
+
+def test_points_of_another_mesh_and_what_is_no_guess_are_refused() -> None:
+    into = on(unit_move(), 6)
+    other = initial_points(on(unit_move(), 7))
+    with pytest.raises(ValueError, match=r"guess: expected points of 1 spans, .* shape \(2, 7\)"):
+        start_of(into, other)
+    with pytest.raises(ValueError, match=r"guess: .* got points of other meshes or models"):
+        start_of(into, initial_points(on(there_and_back(), 6)))
+    with pytest.raises(ValueError, match="guess: expected values by name, a solution, or points"):
+        start_of(into, 5)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"got 'move\.npz'; a file is read by ocp\.load\(path\)"):
+        start_of(into, "move.npz")  # type: ignore[arg-type]
