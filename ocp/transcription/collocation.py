@@ -21,6 +21,7 @@ import numpy as np
 
 from ocp.text.span import Row, Span
 from ocp.transcription.blocks import Array, Block, Indices, Linear, Piece, block, order_of, select
+from ocp.transcription.compiled import Engine
 from ocp.transcription.local import Data, Local
 from ocp.transcription.points import Layout
 from ocp.transcription.schemes import Coefficients
@@ -38,7 +39,7 @@ class PointEquations:
 
     Attributes:
         local: its unknowns; behind them v knows the slopes of the velocities of a mechanism.
-        block: rows and share of the cost.
+        engine: rows and share of the cost.
         names: what the rows are about.
         scale: SI values of the rows divided by theirs.
         sloped: for each state the row from which its slope is subtracted; -1 where the slope is a
@@ -47,11 +48,16 @@ class PointEquations:
     """
 
     local: Local
-    block: Block
+    engine: Engine
     names: tuple[str, ...]
     scale: Array
     sloped: Indices
     path: tuple[Row, ...]
+
+    @property
+    def block(self) -> Block:
+        """Rows and share of the cost, as they were made."""
+        return self.engine.block
 
 
 def point_equations(local: Local) -> PointEquations:
@@ -92,7 +98,7 @@ def point_equations(local: Local) -> PointEquations:
     names = [f"the algebraic equation {i + 1}" for i in range(len(model.z))]
     return PointEquations(
         local,
-        block("point", ca.vertcat(local.v, slopes), local.theta, rows, share),
+        Engine(block("point", ca.vertcat(local.v, slopes), local.theta, rows, share)),
         (*equations, *names, *(row.name for row in span.path)),
         np.concatenate([scale, algebraic_scale, path_scale]),
         sloped,
@@ -185,7 +191,7 @@ def pieces_of_points(
         number,
         interval,
         scheme.nodes[1 + j],
-        equations.block,
+        equations.engine.at(N * d),
         select(parts, N * d),
         data.theta(interval, scheme.nodes[1 + j], scheme.weights[j]),
         linear,
