@@ -40,7 +40,7 @@ class Stretch:
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Motion:
     """What moves in one scenario.
 
@@ -69,6 +69,10 @@ class Motion:
     controls: dict[str, Array]
     phases: tuple[Stretch, ...]
     spans: tuple[int, ...]
+
+    def __repr__(self) -> str:
+        named = f" of scenario '{self.name}'" if self.name else ""
+        return f"<Motion{named}: {', '.join(self.signals)} over {self.T:.6g} s>"
 
     @property
     def T(self) -> float:

@@ -67,7 +67,7 @@ class Mode:
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Solution:
     """Optimal motion, and what the model really does under its control.
 
@@ -102,6 +102,34 @@ class Solution:
     modes: Mapping[str, tuple[Mode, ...]] = field(default_factory=dict[str, tuple[Mode, ...]])
     verification: Verdict | None = None
     cause: BaseException | None = None
+
+    def __repr__(self) -> str:
+        checked = (
+            "" if self.verification is None else f", {'' if self.verified else 'not '}verified"
+        )
+        return (
+            f"<Solution of '{self.problem.name}': {self.status.name}, J = {self.cost:.6g}, "
+            f"T = {self.T:.6g} s{checked}>"
+        )
+
+    def __str__(self) -> str:
+        """What was found, in a few lines."""
+        phases = ", ".join(f"{phase.name} {phase.T:.4g} s" for phase in self.phases)
+        several = f" ({phases})" if len(self.phases) > 1 else ""
+        lines = [self.message, f"J = {self.cost:.6g}, T = {self.T:.6g} s{several}"]
+        if self.chosen:
+            lines.append("chosen: " + ", ".join(f"{n} = {v:.6g}" for n, v in self.chosen.items()))
+        for contact, modes in self.modes.items():
+            told = ", ".join(f"{m.kind} {m.begin:.4g} ... {m.end:.4g} s" for m in modes)
+            lines.append(f"{contact}: {told}")
+        if self.verification is not None:
+            lines.append(str(self.verification).splitlines()[0])
+        counts = self.statistics
+        lines.append(
+            f"{counts.iterations} iterations in {counts.solves} solves; "
+            f"{counts.build_time + counts.solve_time + counts.verify_time:.2g} s"
+        )
+        return "\n".join(lines)
 
     def __getitem__(self, name: str) -> Array:
         if name != "t":

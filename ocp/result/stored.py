@@ -87,7 +87,7 @@ class StoredSpan:
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Stored:
     """A solution as a start for others, on any mesh and for any model with some of its names.
 
@@ -109,6 +109,9 @@ class Stored:
     spans: tuple[StoredSpan, ...]
     chosen: Mapping[str, float]
     iterate: Iterate
+
+    def __repr__(self) -> str:
+        return f"<Stored solution of '{self.name}': {self.status}, J = {self.cost:.6g}>"
 
     def save(self, path: str | Path) -> None:
         """Write it to a file that `load` reads."""

@@ -157,3 +157,17 @@ def test_statistics_count_the_program(move: Solution) -> None:
     assert (counts.unknowns, counts.constraints) == (2 * 21 + 20 * 7 + 1, 20 * 6 + 20 * 2)
     assert counts.iterations == move.iterations > 0
     assert counts.solves == 1
+
+
+def test_it_tells_itself_in_a_few_lines(move: Solution) -> None:
+    told = replace(move, modes={"guide": (Mode("slip+", 0.0, 0.25), Mode("stick", 0.25, 0.5))})
+    assert repr(told).startswith("<Solution of 'drive': SOLVED, J = 0.4")
+    lines = str(told).splitlines()
+    assert lines[0] == told.message
+    assert lines[1] == f"J = {told.cost:.6g}, T = {told.T:.6g} s"
+    assert lines[2] == "guide: slip+ 0 ... 0.25 s, stick 0.25 ... 0.5 s"
+    assert lines[3].startswith(f"{told.iterations} iterations in 1 solves; ")
+    assert repr(told.motions[0]).startswith("<Motion: x, v, force, friction, power over 0.4")
+    assert repr(told.stored).startswith("<Stored solution of 'drive': SOLVED, J = 0.4")
+    phases = str(solve_once(there_and_back(), 4)).splitlines()[1]
+    assert phases.endswith("T = 2 s (out 1 s, back 1 s)")
