@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from math import ceil, sqrt
+from math import ceil, inf, sqrt
 from typing import final
 
 import numpy as np
@@ -48,6 +48,7 @@ def refined(
     loss: float,
     order: int = 5,
     most: int = 1000,
+    for_loss: float = inf,
 ) -> tuple[Array, ...]:
     """New meshes on which local errors are below `local`, and the lost cost below `loss`.
 
@@ -68,12 +69,13 @@ def refined(
         local, loss: what is allowed; `loss` for all spans together, in units of J.
         order: of the scheme.
         most: intervals of all spans together.
+        for_loss: intervals that are made for the sake of losses alone.
     """
     roots = [np.cbrt(e.losses) for e in errors]
     total = sum(float(root.sum()) for root in roots)
     share = sqrt(total / loss) if loss > 0 else 0.0
     intervals = sum(mesh.size - 1 for mesh in meshes)
-    lost = min(1.0, GROWTH * intervals / max(share * total, 1.0))
+    lost = min(1.0, min(GROWTH * intervals, for_loss) / max(share * total, 1.0))
     parts: list[Array] = []
     for mesh, own, root in zip(meshes, errors, roots, strict=True):
         excess = 2.0 * np.where(np.isfinite(own.local), own.local, 1e30 * local) / local

@@ -22,6 +22,7 @@ from ocp.solving.one_solve import Solver, solve_on
 from ocp.solving.starts import Start
 from ocp.text.problem import Problem
 from ocp.transcription.schemes import Radau, Scheme, Shooting
+from ocp.transcription.skeleton import Skeleton
 from ocp.transcription.transcribe import Discretisation, discretise
 from symfric.foundation.status import Status
 
@@ -33,6 +34,8 @@ LATER = 1e-2
 STOPPED = (Status.INTERRUPTED, Status.TIME_LIMIT)
 CAP = 150
 """Iterations on a mesh that will be refined: it is there to say where, and needs no more."""
+FULL = 0.9
+"""Share of the largest mesh from which on it counts as that."""
 LEAST_TRUST = 0.2
 """Where path conditions are active, estimates of losses are too large by a few times."""
 
@@ -48,6 +51,8 @@ class Goals:
         outside: how far a bound may be left between nodes, relative to its magnitude.
         passes: solves at most.
         most: intervals at most, of all phases together.
+        nonzeros: of Jacobian and Hessian of the program, up to which a mesh is made finer for the
+            sake of the cost alone: 1000 intervals of a small model, 70 of an arm with six joints.
     """
 
     local: float
@@ -55,6 +60,7 @@ class Goals:
     outside: float
     passes: int = 8
     most: int = 1000
+    nonzeros: int = 150_000
 
     @staticmethod
     def of(tolerance: float) -> "Goals":
@@ -104,12 +110,17 @@ def refined_solve(
     begin = perf_counter()
     made = discretise(problem, Radau() if scheme is None else scheme)
 
+    ready: dict[tuple[Skeleton, bool, bool], Prepared] = {}
+
     def on(meshes: Sequence[Array], guess: Start, number: int, capped: bool) -> Solution:
         began = begin if number == 1 else perf_counter()
         transcription = made.on(meshes)
-        prepared = limit(_later(solver, number, capped).prepared(transcription.program))
+        key = (transcription.skeleton, number == 1, capped)
+        if key not in ready:  # on as many intervals the program is the same
+            ready[key] = _later(solver, number, capped).prepared(transcription.program)
         built = perf_counter() - began
-        new = solve_on(transcription, prepared, guess, in_stage(progress, f"mesh {number}"))
+        stage = in_stage(progress, f"mesh {number}")
+        new = solve_on(transcription, limit(ready[key]), guess, stage)
         own = replace(new.statistics, build_time=new.statistics.build_time + built)
         return replace(new, statistics=own)
 
@@ -122,6 +133,7 @@ def refined_solve(
         finer, state = finer_meshes(made, new, goals, state)
         fine = not finer or (state.stuck and _full(new.meshes, goals))
         if fine and new.ok:
+            found = _told(found, state)
             break
         capped = not fine and number < goals.passes
         new = on(new.meshes if fine else finer, new, number, capped)
@@ -131,6 +143,15 @@ def refined_solve(
             found = replace(found, status=new.status, message=said, cause=new.cause)
         found = new if new.ok else found
     return replace(found, statistics=statistics)
+
+
+def _told(solution: Solution, state: "Excess") -> Solution:
+    """With what it costs to hold the inputs, where that is more than was allowed."""
+    if state.loss <= state.allowed:
+        return solution
+    share = state.loss / abs(solution.cost)
+    said = f"Inputs that vary within the intervals would cost about {100 * share:.1g} % less."
+    return replace(solution, message=f"{solution.message} {said}")
 
 
 def _later(solver: Solver, number: int, capped: bool) -> Solver:
@@ -143,7 +164,7 @@ def _later(solver: Solver, number: int, capped: bool) -> Solver:
 
 def _full(meshes: Sequence[Array], goals: Goals) -> bool:
     """Whether there is no room for more intervals."""
-    return sum(mesh.size - 1 for mesh in meshes) >= 0.9 * goals.most
+    return sum(mesh.size - 1 for mesh in meshes) >= FULL * goals.most
 
 
 @final
@@ -153,7 +174,7 @@ class Excess:
 
     Attributes:
         local: largest local error in multiples of its goal.
-        lost: estimated cost lost by holding the inputs.
+        lost: estimated cost lost by holding the inputs; `allowed` of it is.
         cost: J.
         trust: share of an estimated loss that refinement really gains.
         stuck: whether the last refinement has gained little.
@@ -162,8 +183,19 @@ class Excess:
     local: float = np.inf
     lost: float = np.inf
     cost: float = np.inf
+    allowed: float = 0.0
     trust: float = 1.0
     stuck: bool = False
+
+    @property
+    def loss(self) -> float:
+        """What holding the inputs is likely to cost."""
+        return self.trust * self.lost
+
+    @property
+    def whole(self) -> float:
+        """In multiples of the goals."""
+        return max(self.local, self.loss / self.allowed if self.allowed > 0 else 0.0)
 
     def then(self, local: float, lost: float, cost: float, allowed: float) -> "Excess":
         """After another pass; what it gained says how far its estimates are to be trusted."""
@@ -171,9 +203,8 @@ class Excess:
         if max(self.local, local) <= 1.0 and np.isfinite(self.lost) and self.lost > 2 * lost:
             gained = (self.cost - cost) / (self.lost - lost)
             trust = float(np.clip(gained, LEAST_TRUST, 1.0))
-        whole = max(local, trust * lost / allowed if allowed > 0 else 0.0)
-        before = max(self.local, self.trust * self.lost / allowed if allowed > 0 else 0.0)
-        return Excess(local, lost, cost, trust, stuck=whole > 0.7 * before)
+        now = Excess(local, lost, cost, allowed, trust)
+        return replace(now, stuck=now.whole > 0.7 * self.whole)
 
 
 def finer_meshes(
@@ -191,7 +222,10 @@ def finer_meshes(
     worst = max(float(e.max(initial=0.0)) for e in local) / goals.local
     lost = sum(float(loss.sum()) for loss in losses)
     now = (before or Excess()).then(worst, lost, solution.cost, allowed)
-    fine = worst <= 1.0 and (now.trust * lost <= allowed or not allowed)
+    intervals = sum(mesh.size - 1 for mesh in solution.meshes[:phases])
+    statistics = solution.statistics
+    room = goals.nonzeros / (statistics.jacobian_nonzeros + statistics.hessian_nonzeros)
+    fine = worst <= 1.0 and (now.loss <= allowed or not allowed or room < 1 / FULL)
     outside = _outside(arcs, goals) if fine else None
     if fine and not any(bool(o.any()) for o in outside or ()):
         return (), now
@@ -213,6 +247,7 @@ def finer_meshes(
         loss=0.8 * allowed,
         order=_order(made.scheme),
         most=goals.most,
+        for_loss=room * intervals,
     )
     return new * (len(arcs) // phases), now
 

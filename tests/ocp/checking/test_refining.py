@@ -111,6 +111,17 @@ def test_second_pass_on_as_many_intervals_builds_nothing() -> None:
     assert max(e.max() for e in verify(solution).local_errors) <= goals.local
 
 
+def test_large_program_is_not_refined_for_the_cost_alone_and_says_so() -> None:
+    problem = bryson_denham()
+    goals = replace(Goals.of(1e-3), nonzeros=5000)
+    solution = refined_solve(problem, make_meshes(problem, 20), goals=goals)
+    statistics = solution.statistics
+    assert 2500 < statistics.jacobian_nonzeros + statistics.hessian_nonzeros < 5500
+    share = (solution.cost - 4.0) / 4.0
+    assert share > goals.loss
+    assert f"would cost about {100 * share:.1g} % less" in solution.message
+
+
 def test_stop_on_a_later_mesh_gives_the_solution_before() -> None:
     def stop(progress: Progress) -> None:
         if progress.stage == "mesh 2":
