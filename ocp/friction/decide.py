@@ -22,7 +22,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.friction.mode_models import jumps, mode_model, slip_change
+from ocp.friction.loops import loops_of
+from ocp.friction.mode_models import jumps, mode_model, nominal_load, slip_change
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import SolveError, Status
 from symfric.foundation.symbols import at_start
@@ -93,6 +94,13 @@ class Machine:
                 f"{', '.join(e.name for e in bare.events)}; their resets may set sliding off"
             )
         self._made: dict[tuple[int, ...], InModes] = {}
+        self.sizes = {c.name: nominal_load(model, c) for c in self.contacts}
+        """Typical loads of the contacts at rest [N]."""
+        self.together = {c.name: (c.name,) for c in self.contacts}
+        """Contacts that rest with each one."""
+        for loop in loops_of(model, self.contacts):
+            names = tuple(c.name for c in loop.members)
+            self.together |= dict.fromkeys(names, names)
         for c in self.contacts:
             slip_change(model, c)  # refuses those that rest on an input
         symbols = [bare.t, bare.vector("x"), model.vector("p")]
@@ -125,11 +133,11 @@ class Machine:
                 rows.append([np.inf, np.inf, change, c.sliding(mode), c.N])
                 events.append(Event(f"{c.name}_stops", mode * c.slip + still, -1, terminal=True))
                 continue
-            F = next(v for v in model.z if v.name == f"{c.name}_reaction")
+            F, size = model.expression(f"{c.name}_reaction"), self.sizes[c.name]
             up, down = (model.expression(f"{c.name}_grip_{side}") for side in ("up", "down"))
-            rows.append([up, down, change, F.symbol, c.N])
+            rows.append([up, down, change, F, c.N])
             for side, room in (("up", up), ("down", down)):
-                share = room / F.nominal
+                share = room / size
                 events.append(Event(f"{c.name}_slips_{side}", share + OVERLOAD, -1, terminal=True))
                 rooms[f"{c.name}_room_{side}"] = share
         seen = ca.vertcat(*(ca.horzcat(*map(ca.SX, row)) for row in rows))
@@ -188,9 +196,8 @@ class Machine:
     def room(self, modes: Modes, at: Instant) -> float:
         """Least room of the contacts at rest over their nominal loads; below zero they slide."""
         _, look = self.solved(modes, at)
-        sizes = {v.name: v.nominal for v in self.within(modes).model.z}
         found = [
-            min(row[0], row[1]) / sizes[f"{c.name}_reaction"]
+            min(row[0], row[1]) / self.sizes[c.name]
             for c, row in zip(self.contacts, look, strict=True)
             if not modes[c.name]
         ]
@@ -262,8 +269,7 @@ def decided(machine: Machine, at: Instant, modes: Modes) -> tuple[Modes, dict[st
             if lifted := _lifted(machine, look):
                 raise machine.undecided(at.t, f"with {shown(trial)} {lifted} lifts off")
             return trial, found | _forces(machine, look)
-        name, mode = objection
-        trial[name] = mode
+        trial |= objection
     return _tried(machine, at, trial, free)
 
 
@@ -277,35 +283,33 @@ def _lifted(machine: Machine, look: Array) -> str:
     return next((c.name for c, row in pairs if row[4] < -LIFTED * abs(row[3])), "")
 
 
-def _objection(
-    machine: Machine, modes: Modes, free: list[str], look: Array
-) -> tuple[str, int] | None:
-    """The contact whose mode cannot be, and the one it should have: the worst of them."""
+def _objection(machine: Machine, modes: Modes, free: list[str], look: Array) -> Modes | None:
+    """Modes instead of those that cannot be: of the worst contact, with all that rest with it."""
     largest = max(1e-300, float(np.abs(look[:, 2]).max(initial=0.0)))
-    found: list[tuple[float, str, int]] = []
+    forces = _forces(machine, look)
+    found: list[tuple[float, str, Modes]] = []
     for c, (up, down, change, *_) in zip(machine.contacts, look, strict=True):
-        mode = modes[c.name]
+        mode, members = modes[c.name], machine.together[c.name]
         if not mode:
-            level = (up + down) / 2
-            slack = OVERLOAD * _size(machine, modes, c) / 2
+            slack = OVERLOAD * machine.sizes[c.name] / 2
             excess = max(-up, -down)
             if excess > slack:
-                found.append((2.0 + excess / max(level, slack), c.name, 1 if -up > -down else -1))
+                away = {c.name: 1 if -up > -down else -1}
+                if len(members) > 1:
+                    away = {name: 1 if forces[f"{name}_F"] > 0 else -1 for name in members}
+                found.append((2.0 + excess / max((up + down) / 2, slack), c.name, away))
         elif c.name in free and mode * change < -TURNING * largest:
-            found.append((-mode * change / largest, c.name, 0))
-    return max(found)[1:] if found else None
-
-
-def _size(machine: Machine, modes: Modes, contact: Contact) -> float:
-    z = machine.within(modes).model.z
-    return next(v.nominal for v in z if v.name == f"{contact.name}_reaction")
+            still = {*members} <= {*free}
+            rest = dict.fromkeys(members, 0) if still else {c.name: -mode}
+            found.append((-mode * change / largest, c.name, rest))
+    return max(found, key=lambda one: one[:2])[2] if found else None
 
 
 def _tried(
     machine: Machine, at: Instant, modes: Modes, free: list[str]
 ) -> tuple[Modes, dict[str, float]]:
     """All modes of the contacts without velocity."""
-    if len(free) > MANY:
+    if len(free) > MANY or any(len(machine.together[name]) > 1 for name in free):
         raise machine.undecided(at.t, f"{len(free)} contacts without velocity change in circles")
     fits = list(_consistent(machine, at, modes, free))
     if len(fits) != 1:

@@ -8,8 +8,8 @@ its modes (`mode_models`), smooth from end to end, to a tolerance of its own; be
 `decide` says which contacts rest. No width, no penalty: what smooth laws tend to.
 
 Limits: what it cannot decide it does not (`SolveError`): several consistent motions, none (friction
-that jams), reactions without a solution. Contacts of a loop of one degree of freedom cannot rest
-together, see `mode_model`. Contacts in balls keep their laws.
+that jams), reactions without a solution; contacts of a loop of several degrees of freedom are no
+more than these. Contacts in balls keep their laws.
 """
 
 from collections.abc import Mapping
@@ -35,6 +35,8 @@ MOST = 10_000
 """Changes of mode in a run."""
 PILED = 40
 """Changes of mode without time between them."""
+CREEP = 1e4
+"""Sliding velocity over what counts as none, beyond which a loop moves whose contact stops."""
 APART = 1e-6
 """Difference of an unknown, over its size, beyond which two solvers found two solutions."""
 
@@ -168,11 +170,20 @@ class _Run:
         if made.model.z:
             z = run.express(symbols_of(made.model.z), np.array([reached]))[:, 0]
             guess |= dict(zip((v.name for v in made.model.z), z.tolist(), strict=True))
-        slips = machine.slips(reached, x, self.values)[0]
-        for c, v in zip(machine.contacts, slips, strict=True):
-            if modes[c.name] and modes[c.name] * v <= 0.0:
-                modes = modes | {c.name: 0}
+        modes = modes | self._stopped(modes, machine.slips(reached, x, self.values)[0])
         return _State(reached, machine.at_rest(reached, x, self.values, modes), modes, guess)
+
+    def _stopped(self, modes: Modes, slips: Array) -> Modes:
+        """Modes of contacts that stopped: they rest, but turn in a dead centre of their loop."""
+        machine, found = self.machine, Modes()
+        pairs = list(zip(machine.contacts, slips, machine.still, strict=True))
+        moving = {c.name for c, v, still in pairs if abs(v) > CREEP * still}
+        for c, v, _ in pairs:
+            if modes[c.name] and modes[c.name] * v <= 0.0:
+                members = machine.together[c.name]
+                turns = any(name in moving for name in members)
+                found |= {c.name: -modes[c.name]} if turns else dict.fromkeys(members, 0)
+        return found
 
     def _run(self, model: Model, begin: float, end: float, x0: dict[str, float]) -> Trajectory:
         try:

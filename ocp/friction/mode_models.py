@@ -17,6 +17,7 @@ from typing import Any, final
 import casadi as ca
 import numpy as np
 
+from ocp.friction.loops import Loop, loops_of
 from symfric.foundation import checks
 from symfric.foundation.numeric import tanh
 from symfric.foundation.parameters import Parameter, Variable, parameters, with_values
@@ -177,7 +178,8 @@ def mode_model(model: Model, modes: Mapping[str, int]) -> Model:
     "<contact>_grip_up" and "<contact>_grip_down" are what the static level leaves of it to both
     sides; both are above zero while the contact holds. What started at rest stays so; a sliding
     velocity that is not zero at the start of rest is kept. Contacts without a level at rest may be
-    left out. The same modes of the same model give the same object.
+    left out. Contacts of a loop of one degree of freedom rest together, see `ocp.friction.loops`;
+    their reactions are outputs. The same modes of the same model give the same object.
 
     Raises:
         ValueError: names that are no contacts, contacts without a mode, modes that are none, and
@@ -201,7 +203,13 @@ def mode_model(model: Model, modes: Mapping[str, int]) -> Model:
 
 
 def restless(model: Model) -> str:
-    """Why the contacts of `model` cannot all rest as mode models would have it; mostly empty."""
+    """Why the contacts of `model` cannot rest one by one; mostly empty."""
+    contacts = [c for c in model.contacts if jumps(model, c)]
+    if loops := loops_of(model, contacts):
+        names = ", ".join(c.name for c in loops[0].members)
+        return (
+            f"expected contacts that rest one by one, got {names}, which do so together in a loop"
+        )
     try:
         mode_model(model, dict.fromkeys((c.name for c in model.contacts), 0))
     except ValueError as error:
@@ -211,27 +219,54 @@ def restless(model: Model) -> str:
 
 def _in_modes(model: Model, modes: Mapping[str, int]) -> Model:
     held = [c for c in model.contacts if not modes[c.name]]
-    reactions = {
-        c.name: Variable(f"{c.name}_reaction", c.unit("N"), nominal=_nominal(model, c),
-                         doc="friction force that holds the contact at rest")
-        for c in held
-    }  # fmt: skip
-    forces = {
-        c.name: c.sliding(modes[c.name]) if modes[c.name] else reactions[c.name].symbol
-        for c in model.contacts
-    }
-    changes = stacked(slip_change(model, c) for c in held)
-    made = model.with_forces(forces, z=tuple(reactions.values()), alg=changes)
+    together = _resting_loops(model, modes)
+    shared = {c.name for loop in together for c in loop.members}
+    alone = [c for c in held if c.name not in shared]
+    forces = {c.name: c.sliding(modes[c.name]) for c in model.contacts if modes[c.name]}
+    z, rows = list[Variable](), list[ca.SX]()
+    for c in alone:
+        z.append(_reaction(c.name, c.unit("N"), nominal_load(model, c)))
+        rows.append(slip_change(model, c))
+        forces[c.name] = z[-1].symbol
+    for loop in together:
+        loads = [nominal_load(model, c) for c in loop.members]
+        z.append(_reaction(loop.name, "", sum(loads)))
+        rows.append(loop.projected([slip_change(model, c) for c in loop.members]))
+        names = (c.name for c in loop.members)
+        forces |= dict(zip(names, loop.shares(z[-1].symbol), strict=True))
+    made = model.with_forces(forces, z=tuple(z), alg=stacked(rows))
     if held:
         _refuse_shared(model, made, held)
-    return with_outputs(made, dict(_grips(held, reactions)))
+    known = {v.name for v in z}
+    outputs = dict(_grips(held, forces))
+    reactions = {f"{c.name}_reaction": Output(forces[c.name], c.unit("N")) for c in held}
+    outputs |= {name: output for name, output in reactions.items() if name not in known}
+    return with_outputs(made, outputs)
 
 
-def _grips(
-    held: Sequence[Contact], reactions: Mapping[str, Variable]
-) -> Iterator[tuple[str, Output]]:
+def _reaction(name: str, unit: str, nominal: float) -> Variable:
+    doc = "friction force that holds at rest"
+    return Variable(f"{name}_reaction", unit, nominal=nominal, doc=doc)
+
+
+def _resting_loops(model: Model, modes: Mapping[str, int]) -> list[Loop]:
+    """Loops whose contacts rest: all of them, or none."""
+    found: list[Loop] = []
+    for loop in loops_of(model, [c for c in model.contacts if jumps(model, c)]):
+        resting = [c.name for c in loop.members if not modes[c.name]]
+        if resting and len(resting) < len(loop.members):
+            names = ", ".join(c.name for c in loop.members)
+            raise ValueError(
+                f"model '{model.name}': modes: expected all or none of {names} at rest, which move "
+                f"together in a loop of one degree of freedom, got {', '.join(resting)} at rest"
+            )
+        found += [loop] if resting else []
+    return found
+
+
+def _grips(held: Sequence[Contact], forces: Mapping[str, ca.SX]) -> Iterator[tuple[str, Output]]:
     for c in held:
-        F, unit = reactions[c.name].symbol, c.unit("N")
+        F, unit = forces[c.name], c.unit("N")
         yield f"{c.name}_grip_up", Output(c.static_level(1) - F, unit, "room below the level")
         yield f"{c.name}_grip_down", Output(c.static_level(-1) + F, unit, "room above minus that")
 
@@ -270,8 +305,8 @@ def slip_change(model: Model, contact: Contact) -> ca.SX:
     return ca.jtimes(slip, x, rate) + ca.jacobian(slip, bare.t)
 
 
-def _nominal(model: Model, contact: Contact) -> float:
-    """Typical size [N] of a reaction: the static level at the start, where it is a number there."""
+def nominal_load(model: Model, contact: Contact) -> float:
+    """Typical size [N] of what holds a contact: its static level at the start."""
     symbols = ca.vertcat(model.vector("x"), model.vector("z"), model.vector("u"), model.t)
     level = ca.SX(contact.static_level())
     starts = [v.start for group in (model.x, model.z, model.u) for v in group]
@@ -284,7 +319,7 @@ def _nominal(model: Model, contact: Contact) -> float:
 def _refuse_shared(model: Model, made: Model, held: Sequence[Contact]) -> None:
     """Refuse rest that the equations do not determine, in numbers at the start and near it.
 
-    Contacts of a loop of one degree of freedom rest together, and a drive may prescribe a sliding.
+    Loops may have fewer degrees of freedom than contacts, and a drive may prescribe a sliding.
     """
     z = made.vector("z")
     symbols = [made.t, *(made.vector(letter) for letter in "xzup")]
@@ -303,6 +338,6 @@ def _refuse_shared(model: Model, made: Model, held: Sequence[Contact]) -> None:
     names = ", ".join(c.name for c in held)
     raise ValueError(
         f"model '{model.name}': modes: expected contacts at rest whose forces the equations "
-        f"determine, got {names} at rest together; in a loop of one degree of freedom, or under a "
+        f"determine, got {names} at rest together; in a loop of few degrees of freedom, or under a "
         "prescribed motion, how they share what holds them is open: let friction act in one of them"
     )
