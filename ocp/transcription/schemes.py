@@ -118,7 +118,8 @@ class Shooting:
     "exponential" passes through stiff bristles, where collocation points do not converge.
 
     Limits: bounds and path conditions hold at the nodes of the mesh only, and they cannot name
-    algebraic variables: these are inside of the steps.
+    algebraic variables: these are inside of the steps. Second derivatives of steps that solve
+    equations are dear: of an arm with six joints fifty times those of collocation.
 
     Raises:
         ValueError: unknown method, fewer than one step.

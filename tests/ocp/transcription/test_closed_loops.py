@@ -11,6 +11,9 @@ from ocp.transcription.points import Points, SpanPoints
 from ocp.transcription.schemes import Legendre, Radau, Scheme
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription
+from symfric import BrownMcPhee
+from symfric.multibody import JointSpringDamper
+from symfric.scenes import SliderCrank
 
 EFFORT = integral(lambda s: s.tau**2)
 Q_END, V_END = angles(2.0)
@@ -36,13 +39,13 @@ def at_rest(t: Transcription) -> Points:
     return t.consistent(Points(tuple(spans)))
 
 
-def solved(t: Transcription) -> tuple[str, Points]:
+def solved(t: Transcription, start: Points | None = None) -> tuple[str, Points]:
     p = t.program
     quiet = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.max_iter": 50}
     given = {"no_nlp_grad": True, "calc_lam_p": False}
     solver = ca.nlpsol("solver", "ipopt", p.nlp, quiet | given | p.derivatives)
     bounds = {"lbx": p.lower_w, "ubx": p.upper_w, "lbg": p.lower_g, "ubg": p.upper_g}
-    found = solver(x0=t.pack(at_rest(t)), p=p.values, **bounds)
+    found = solver(x0=t.pack(start or at_rest(t)), p=p.values, **bounds)
     return solver.stats()["return_status"], t.unpack(found["x"])
 
 
@@ -70,6 +73,34 @@ def test_loops_stay_closed_whatever_coordinates_are_named(
 def _rest(crank: float) -> list[float]:
     q, _ = angles(crank)
     return [q["theta_rocker"], q["theta_coupler"], 0.0, 0.0, 0.0]
+
+
+def test_slider_crank_may_name_its_slider_its_crank_or_both() -> None:
+    scene = SliderCrank(BrownMcPhee(mu_s=0.2, mu_d=0.15, v_t=0.02), omega=0.0)
+    M = scene.mechanism()
+    M.force(JointSpringDamper("motor", "crank", actuator=M.input("tau", "N m", nominal=10.0)))
+    model = M.build()
+    ends: list[np.ndarray] = []
+    for names in (("crank",), ("slider",), ("crank", "slider")):
+        known = dict(zip(("crank", "slider"), ends[0][:2].tolist(), strict=True)) if ends else {}
+        end = {name: known.get(name, 1.0) for name in names} | {"crank_rate": 0.0}
+        t = put(Problem(Phase(model, 0.5, end=end), EFFORT), Legendre(2))
+        status, points = solved(t, Points((_level(t),)))
+        assert status == "Solve_Succeeded"
+        ends.append(points.spans[0].nodes[:, -1])
+    np.testing.assert_allclose(ends[1:], [ends[0]] * 2, atol=1e-7)
+
+
+def _level(t: Transcription) -> SpanPoints:
+    """All states as they start, on the way to where the crank is asked to be."""
+    span, mesh, inner = t.problem.spans[0], t.meshes[0], t.inner_fractions(0)
+    ends = [span.nodes[1.0][v.name][0] for v in span.model.x]
+    start = span.model.initial_state()
+    ends = np.where(np.isfinite(ends), ends, start)
+    nodes, points = (start[:, None] + s * (ends - start)[:, None] for s in (mesh, inner))
+    z = np.tile([[float(v.start)] for v in span.model.z], (1, inner.size))
+    guess = SpanPoints(0.5, nodes, points, z, np.zeros((1, mesh.size - 1)))
+    return t.consistent(Points((guess,))).spans[0]
 
 
 def test_redundant_values_leave_the_jacobian_of_full_rank() -> None:
