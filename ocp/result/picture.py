@@ -123,9 +123,7 @@ def _signal(axis: "Axes", solution: Solution, motion: Motion, name: str, colour:
 
 def simulated(solution: Solution, motion: Motion) -> list[Trajectory]:
     """The re-simulated spans of a motion; none where it was not verified."""
-    if solution.verification is None:
-        return []
-    runs = solution.verification.trajectories
+    runs = solution.trajectories
     return [runs[number] for number in motion.spans if number < len(runs)]
 
 

@@ -152,6 +152,11 @@ class Solution:
         return float("nan") if self.verification is None else self.verification.largest
 
     @property
+    def trajectories(self) -> tuple[Trajectory, ...]:
+        """The re-simulated motion of each span, in order; empty without verification."""
+        return () if self.verification is None else tuple(self.verification.trajectories)
+
+    @property
     def scenarios(self) -> dict[str, Motion]:
         """The motions by the names of their scenarios; empty where there is only one."""
         return {motion.name: motion for motion in self.motions if motion.name}

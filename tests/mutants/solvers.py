@@ -138,7 +138,7 @@ RESULTS = (
     ),
     Mutant(
         "velocities start at rest", STARTS,
-        "for rate, name in _rates(span.model).items():", "for rate, name in ():", T_POINTS,
+        "for rate, name in rates_of(span.model).items():", "for rate, name in ():", T_POINTS,
     ),
     Mutant(
         "durations do not add up", STARTS, "found[n] * rest / have", "found[n]", T_POINTS,

@@ -54,6 +54,7 @@ def test_simulated_lines_stand_where_there_are_some() -> None:
     model, control = plain.problem.spans[0].model, Hold(plain.t_control, plain.controls["a"])
     run = simulate(model, 1.0, u={"a": control}, rtol=1e-9)
     checked = replace(plain, verification=Verdict((run,)))
+    assert (plain.trajectories, checked.trajectories) == ((), (run,))
     figure = checked.plot("x")
     np.testing.assert_array_equal(curves(figure.axes[0])[1], run["x"])
     assert "lines: simulated" in figure.axes[-1].get_xlabel()
