@@ -7,16 +7,17 @@ from typing import Any
 import casadi as ca
 
 from ocp.friction.mode_models import mode_model, with_outputs
-from ocp.friction.release import excess, rubbing
+from ocp.friction.release import SIDES, holding, rubbing
 from ocp.text.span import Span
 from symfric.foundation.parameters import Variable
 from symfric.model import Contact, Model, Output
 
+CATCH = 0.05
+"""Share of the sliding force that catches a contact which has slipped back for an instant."""
+
 PULLED = "_pull"
 LEFT = "rest_left"
 """State of an arc at whose end a contact leaves rest: the time that is left of it [s]."""
-
-SIDES = {1: "up", -1: "down"}
 
 
 def breaks_away(span: Span) -> bool:
@@ -44,6 +45,7 @@ def arc_model(
     modes: Mapping[str, int],
     released: Sequence[str],
     leaving: Mapping[str, int],
+    caught: Mapping[str, int],
     sizes: Mapping[str, float],
     margin: tuple[float, float],
 ) -> Model:
@@ -54,6 +56,7 @@ def arc_model(
         modes: of all contacts that can rest.
         released: contacts that break away at the start of the arc.
         leaving: contacts that leave rest at its end by a force that cannot jump, and to which side.
+        caught: contacts that come to rest at its start, and to which side they slipped until then.
         sizes: contact -> typical static level [N].
         margin: share of the level that a rest keeps away from it, and how long before the end of
             the arc it begins to give that up where it leaves [s].
@@ -61,10 +64,12 @@ def arc_model(
     Returns:
         One with "<contact>_slip"; as shares of the level "<contact>_up" and "<contact>_down", the
         room of a rest to both sides, less margin times tanh (time left / that time)^2 where it
-        leaves; and "<contact>_pull", excess of what is released.
+        leaves; "<contact>_first_up" and "<contact>_first_down", the same for what states and inputs
+        at the start of an interval ask for; "<contact>_pull", excess of what is released; and
+        "<contact>_catch", room below the force of sliding back of what is caught.
     """
     kept: dict[Any, Model] = model.memory.setdefault("ocp arcs", {})
-    key = (*modes.items(), *released, *leaving.items(), *sizes.items(), *margin)
+    key = (*modes.items(), *released, *leaving.items(), *caught.items(), *sizes.items(), *margin)
     if key not in kept:
         made = mode_model(model, modes)
         outputs: dict[str, ca.SX] = {}
@@ -74,12 +79,20 @@ def arc_model(
             fading = margin[0] * ca.tanh((left / margin[1]) ** 2)
         for c in rubbing(model):
             outputs[f"{c.name}_slip"] = c.slip
-            for side, name in SIDES.items() if not modes[c.name] else ():
-                room = made.expression(f"{c.name}_grip_{name}") / sizes[c.name]
-                leaves = leaving.get(c.name) == side
-                outputs[f"{c.name}_{name}"] = room - fading if leaves else room
-        for name in released:
-            outputs[f"{name}{PULLED}"] = excess(model, modes, name) / sizes[name]
+            size, mode = sizes[c.name], modes[c.name]
+            if mode and c.name not in released:
+                continue
+            force, rooms = holding(model, modes, c.name)
+            if mode:
+                outputs[f"{c.name}{PULLED}"] = -rooms[mode] / size
+                continue
+            for side, name in SIDES.items():
+                less = fading if leaving.get(c.name) == side else 0.0
+                outputs[f"{c.name}_{name}"] = made.expression(f"{c.name}_grip_{name}") / size - less
+                outputs[f"{c.name}_first_{name}"] = rooms[side] / size
+            if side := caught.get(c.name, 0):
+                back = -side * c.sliding(-side)
+                outputs[f"{c.name}_catch"] = (side * force + (1.0 - CATCH) * back) / size
         new = {name: Output(expression, "1") for name, expression in outputs.items()}
         kept[key] = with_outputs(made, new)
     return kept[key]

@@ -11,6 +11,10 @@ which the arcs are a motion with exact Coulomb friction and stiction, for each c
   controls jump, so that this is an inequality: equality would exclude such motions, and without it
   a body could leave rest although friction can hold it, which costs less and is wrong.
 
+* what comes to rest as the control changes is caught: a moment early, and the control before would
+  turn it round. Then it slips back for this moment, and stops only if the force under the control
+  after is below that of sliding, not just below the static level.
+
 Conditions that depend on each other are written once, for solvers need independent ones: at rest
 slip stays zero by itself, so nothing is asked of it at the end of a rest.
 Source: Brogliato, Nonsmooth Mechanics, 3rd ed., 2016, ch. 5; Betts, Practical Methods for Optimal
@@ -24,8 +28,8 @@ from typing import TypeVar, final
 
 import casadi as ca
 
-from ocp.friction.arc_models import LEFT, PULLED, SIDES, arc_model, carrier
-from ocp.friction.release import excess, rubbing
+from ocp.friction.arc_models import LEFT, PULLED, arc_model, carrier
+from ocp.friction.release import SIDES, excess, rubbing
 from ocp.friction.sequence import Arc, Leg
 from ocp.text.phase import Chain, Phase, Start
 from ocp.text.problem import Duration, Problem
@@ -33,9 +37,10 @@ from ocp.text.ranges import Free, Range, meet
 from symfric.foundation.symbols import stacked
 from symfric.model import Contact, Model
 
-GRIP = 3e-3
+GRIP = 1e-2
 """Share of the static level that a rest keeps away from it: a smooth law creeps over its peak a
-little below. Where it leaves by a force that cannot jump it gives that up at last."""
+little below, and where the force follows its limit, controls that are held make a saw of it. Where
+the contact leaves by a force that cannot jump the rest gives that up at last."""
 
 FADE = 1e-3
 """For how long before, as a share of the whole duration."""
@@ -165,7 +170,9 @@ def _phase(
     limited = {*problem.rates, *base.rates}
     tight = _tight(place, limited)
     leaving = {name: side for name, side in tight.items() if place.after.get(name) == side}
-    model = arc_model(base.model, modes, released, leaving, sizes, (GRIP, FADE * whole))
+    caught = _caught(place, limited)
+    margin = (GRIP, FADE * whole)
+    model = arc_model(base.model, modes, released, leaving, caught, sizes, margin)
     start: Ranges = dict(base.start) if place.opens else {}
     link: dict[str, Start] = dict(base.link) if place.opens else {}
     end = _end(base, place)
@@ -179,7 +186,14 @@ def _phase(
         if place.number:
             link |= dict.fromkeys(zero)
         end = _end_of(place, contact, end)
-        bounds |= _inside(problem, place, contact, tight)
+        inside = _inside(problem, place, contact, tight)
+        bounds |= inside
+        if not modes[contact.name]:  # between the start and the first point, too
+            for side in SIDES.values():
+                row = inside[f"{contact.name}_{side}"]
+                start[f"{contact.name}_first_{side}"] = row
+            if contact.name in caught:
+                start[f"{contact.name}_catch"] = (0.0, None)
         if contact.name in released:
             start[f"{contact.name}{PULLED}"] = _pull(place, contact.name, limited)
     signals = {*model.signals, *model.further}
@@ -247,6 +261,16 @@ def _end_of(place: Place, contact: Contact, end: Ranges) -> Ranges:
     return end if mode else {n: r for n, r in end.items() if n != state}
 
 
+def _caught(place: Place, limited: Collection[str]) -> dict[str, int]:
+    """Contacts that come to rest under a control that may jump, and the side they slipped to."""
+    modes = place.arc.modes
+    return {
+        name: side
+        for name, side in place.before.items()
+        if side and modes.get(name) == 0 and _jumps(place.model, {**modes, name: 1}, name, limited)
+    }
+
+
 def _tight(place: Place, limited: Collection[str]) -> dict[str, int]:
     """Resting contacts that will leave by a force that cannot jump, and to which side."""
     modes = place.arc.modes
@@ -283,7 +307,7 @@ def _state(place: Place, contact: Contact) -> str | None:
 def _jumps(model: Model, modes: Mapping[str, int], name: str, limited: Collection[str]) -> bool:
     """Whether the force that holds a contact follows an input that may jump."""
     inputs = stacked(v.symbol for v in model.u if v.name not in limited)
-    return ca.depends_on(excess(model, modes, name), inputs)
+    return ca.depends_on(excess(model, modes, name, modes[name]), inputs)
 
 
 def _duration(problem: Problem, place: Place, shortest: float) -> float | Free:

@@ -44,6 +44,9 @@ solution. A smooth law is back at its dynamic level at a few widths."""
 SHORTEST = 5e-5
 """Least duration of an arc, as a share of the whole: what is needed is longer."""
 
+AGAIN = 0.1
+"""Barrier parameter where the sequence is another one: smaller ones lose the way at times."""
+
 KICK = 2e-3
 """Share of the whole duration that an interval has at least in which a contact breaks away."""
 
@@ -212,7 +215,7 @@ def _settled(polisher: Polisher, solved: Solved, keep: Keep) -> Solved:
         if shown(legs) in seen:
             break
         seen.add(shown(legs))
-        changed = keep(polisher.solve(legs, solved.known, solved.intervals, 1e-3))
+        changed = keep(polisher.solve(legs, solved.known, solved.intervals, AGAIN))
         if not changed.ok:
             break
         solved = changed
@@ -227,7 +230,7 @@ def _better(polisher: Polisher, solved: Solved, width: float, keep: Keep) -> Sol
             if shown(legs) in seen:
                 continue
             seen.add(shown(legs))
-            other = keep(polisher.solve(legs, solved.known, solved.intervals, 1e-3))
+            other = keep(polisher.solve(legs, solved.known, solved.intervals, AGAIN))
             left = pruned(other.legs, GONE * polisher.shortest)
             if not other.ok or shown(left) in seen - {shown(legs)}:
                 continue
@@ -252,12 +255,14 @@ def _fine(polisher: Polisher, solved: Solved, keep: Keep) -> Solved:
         local = local_errors(arcs_of(t.problem, t.meshes, solved.points))
         agree = abs(solved.ideal_cost - before) <= allowed
         exact = max(float(own.max()) for own in local) <= LOCAL
-        if agree and exact and solved.loss <= allowed:
+        outside = solved.overloaded
+        held = not any(own.any() for own in outside)
+        if agree and exact and held and solved.loss <= allowed:
             break
         least = 0.0 if agree else HALVED * LOCAL
         errors = [
-            MeshErrors(np.maximum(own, least), loss)
-            for own, loss in zip(local, solved.losses, strict=True)
+            MeshErrors(np.maximum(own, least), loss, over)
+            for own, loss, over in zip(local, solved.losses, outside, strict=True)
         ]
         meshes = refined(
             t.meshes, errors, [()] * len(errors), local=LOCAL, loss=allowed / 2, most=MOST

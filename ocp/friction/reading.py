@@ -151,7 +151,7 @@ def _holdable(
     for side in (1, -1):
         modes = {c.name: others.get(c.name, 0) for c in rubbing(model)} | {name: side}
         moving = mode_model(model, modes)
-        beyond = excess(model, modes, name)
+        beyond = excess(model, modes, name, side)
         slope = ca.jacobian(beyond, moving.vector("u")).T
         values = known.along(moving, ca.vertcat(beyond, slope), np.array([t]))[:, 0]
         least = values[0]

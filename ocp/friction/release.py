@@ -19,6 +19,9 @@ import casadi as ca
 from ocp.friction.mode_models import jumps, mode_model
 from symfric.model import Contact, Model
 
+SIDES = {1: "up", -1: "down"}
+"""Outputs of mode models: room of a contact at rest to both sides, "<contact>_grip_<side>"."""
+
 NEWTON_STEPS = 2
 """A normal force is the smoothed absolute value of reactions, affine but near zero."""
 
@@ -28,28 +31,36 @@ def rubbing(model: Model) -> tuple[Contact, ...]:
     return tuple(contact for contact in model.contacts if jumps(model, contact))
 
 
-def excess(model: Model, modes: Mapping[str, int], contact: str) -> ca.SX:
-    """By how much [N] the force that would hold `contact` at rest exceeds its static level.
+def holding(model: Model, modes: Mapping[str, int], contact: str) -> tuple[ca.SX, dict[int, ca.SX]]:
+    """The force [N] that holds `contact` at rest, or would, and what the static level leaves of it.
 
     Args:
         model: the model with contacts.
-        modes: +1, 0 or -1 of each contact; `contact` slips, and the pull is to its side.
+        modes: +1, 0 or -1 of each contact; `contact` may slip or rest.
         contact: name of the one in question.
 
     Returns:
-        SX (1, 1) in the symbols of the mode model of `modes`: negative where friction can hold.
+        The force, and side -> room to that side, negative where friction cannot hold; SX (1, 1) in
+        the symbols of the mode model of `modes`. They do not depend on algebraic variables where
+        the equations are affine in these: at the start of an interval they are what states and
+        inputs there ask for.
     """
     moving, held = mode_model(model, modes), mode_model(model, {**modes, contact: 0})
     symbols = [held.t, *(held.vector(letter) for letter in "xzup")]
     z = symbols[2]
     newton = z - ca.solve(ca.densify(ca.jacobian(held.alg, z)), held.alg)
     step = ca.Function("step", symbols, [newton])
-    side = "up" if modes[contact] > 0 else "down"
-    grip = held.expression(f"{contact}_grip_{side}")
-    room = ca.Function("room", symbols, [grip])
+    names = [f"{contact}_reaction", *(f"{contact}_grip_{side}" for side in SIDES.values())]
+    asked = ca.Function("asked", symbols, [held.expression(name) for name in names])
     t, x, u, p = moving.t, *(moving.vector(letter) for letter in "xup")
     known = {v.name for v in moving.z}
     found = ca.vertcat(*(v.symbol if v.name in known else ca.SX(0) for v in held.z))
     for _ in range(NEWTON_STEPS):
         found = step(t, x, found, u, p)
-    return -ca.SX(room(t, x, found, u, p))
+    force, *rooms = (ca.SX(value) for value in asked.call([t, x, found, u, p]))
+    return force, dict(zip(SIDES, rooms, strict=True))
+
+
+def excess(model: Model, modes: Mapping[str, int], contact: str, side: int) -> ca.SX:
+    """By how much [N] the force that would hold `contact` exceeds its static level to a side."""
+    return -holding(model, modes, contact)[1][side]

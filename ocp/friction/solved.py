@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import final
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +13,7 @@ from ocp.checking.holding import holding_losses
 from ocp.friction.arc_models import breaks_away
 from ocp.friction.arcs import in_arcs
 from ocp.friction.carry import Known, points_in
+from ocp.friction.release import SIDES
 from ocp.friction.sequence import Leg, flat, placed, shown
 from ocp.result.motion import motion_of
 from ocp.solvers.ipopt import Ipopt
@@ -22,6 +24,7 @@ from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Transcription
+from symfric.foundation.symbols import stacked
 
 Array = NDArray[np.float64]
 
@@ -74,6 +77,25 @@ class Solved:
     def ideal_cost(self) -> float:
         """J of inputs that need not be held: compares sequences on different meshes."""
         return self.outcome.cost - self.loss
+
+    @cached_property
+    def overloaded(self) -> tuple[NDArray[np.bool_], ...]:
+        """Intervals at whose start, before their first point, a rest asks for too much force."""
+        found: list[NDArray[np.bool_]] = []
+        spans, arcs = self.transcription.problem.spans, flat(self.legs)
+        for span, arc, points in zip(spans, arcs, self.points.spans, strict=True):
+            model, n = span.model, points.u.shape[1]
+            rooms = [
+                model.outputs[f"{name}_first_{side}"].expression
+                for name, mode in arc.modes.items()
+                for side in SIDES.values()
+                if not mode
+            ]
+            rows = ca.Function("rooms", span.symbols, [stacked(map(ca.SX, rooms))]).map(n)
+            t, z, p = np.zeros((1, n)), points.z[:, :: points.z.shape[1] // n], span.p[:, None]
+            values = rows(t, points.nodes[:, :-1], z, points.u, np.tile(p, (1, n))).full()
+            found.append((values < 0.0).any(axis=0))
+        return tuple(found)
 
     @property
     def ok(self) -> bool:
