@@ -45,7 +45,31 @@ def drives_get_there_and_the_c_is_verified(printed: str, folder: Path) -> None:
     assert {path.name for path in (folder / "c").iterdir()} == {"drive_mpc.c", "drive_mpc.h"}
 
 
-SAYS = {
+def motion_is_verified(printed: str, folder: Path) -> None:
+    """Every solution was simulated, and does what it was asked to."""
+    assert "False" not in printed
+    assert "True" in printed
+
+
+def out_and_back_is_the_motion_known_on_paper(printed: str, folder: Path) -> None:
+    motion_is_verified(printed, folder)
+    assert re.findall(r"slip.", printed) == ["slip+", "slip-"]
+    found, exact = map(float, re.findall(r"J = ([\d.]+) .* exact ([\d.]+);", printed)[0])
+    assert abs(found - exact) < 1e-3 * exact
+
+
+LONG = (
+    "arm_to_a_place",
+    "co_design",
+    "crank_start_up",
+    "quarter_car_profile",
+    "swing_up",
+    "through_a_spring",
+)
+"""Whole solves of several seconds; `tests/examples/test_motions.py` looks at their problems."""
+
+SAYS = dict.fromkeys(LONG, motion_is_verified) | {
+    "out_and_back": out_and_back_is_the_motion_known_on_paper,
     "mpc_drive": drives_get_there_and_the_c_is_verified,
     "learn_drive": drive_has_learnt_to_stop,
     "rabinowicz": period_is_between_those_of_two_laws,
@@ -53,7 +77,13 @@ SAYS = {
 }
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+RUN = [
+    pytest.param(path, id=path.stem, marks=[pytest.mark.slow] * (path.stem in LONG))
+    for path in EXAMPLES
+]
+
+
+@pytest.mark.parametrize("example", RUN)
 def test_example_runs_and_leaves_a_picture(example: Path, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-W", "error", str(example), "results"],

@@ -7,7 +7,6 @@ from typing import final
 from ocp.text.cost import Cost
 from ocp.text.ranges import Free, Range
 from ocp.text.signals import Signals
-from ocp.text.span import Condition
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
 from symfric.model import Model, check_model
@@ -18,6 +17,13 @@ Ranges = Mapping[str, Range]
 Start = Callable[[Signals], Scalar] | str | None
 """Where a state starts that continues another phase: an expression in the signals at its end, the
 name of one of them, or None for anywhere."""
+
+
+PathCondition = Callable[[Signals], object]
+"""A function that returns a comparison, such as `lambda s: s.tip_z <= 0.9`."""
+
+JoinCondition = Callable[[Signals, Signals], object]
+"""Likewise of the signals before and after: `lambda before, after: after.x >= before.x`."""
 
 
 def _nothing() -> dict[str, Range]:
@@ -70,10 +76,10 @@ class Phase:
     via: Mapping[float, Ranges] = field(default_factory=dict[float, Ranges], kw_only=True)
     bounds: Ranges = field(default_factory=_nothing, kw_only=True)
     rates: Ranges = field(default_factory=_nothing, kw_only=True)
-    path: Sequence[Condition] = field(default=(), kw_only=True)
+    path: Sequence[PathCondition] = field(default=(), kw_only=True)
     cost: Cost | None = field(default=None, kw_only=True)
     link: Mapping[str, Start] = field(default_factory=dict[str, Start], kw_only=True)
-    joins: Sequence[Condition] = field(default=(), kw_only=True)
+    joins: Sequence[JoinCondition] = field(default=(), kw_only=True)
     p: Mapping[str, float] = field(default_factory=dict[str, float], kw_only=True)
     name: str = field(default="", kw_only=True)
 

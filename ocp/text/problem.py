@@ -10,12 +10,12 @@ from ocp.text.choice import Choice, chosen_of
 from ocp.text.complaints import input_problems
 from ocp.text.cost import Cost
 from ocp.text.kinds import kind_problems
-from ocp.text.phase import Chain, Phase
+from ocp.text.phase import Chain, PathCondition, Phase
 from ocp.text.ranges import Free, Range
 from ocp.text.rates import rate_name
 from ocp.text.resolve import function_problems, resolved
 from ocp.text.settings import settings_of
-from ocp.text.span import Condition, Span
+from ocp.text.span import Span
 
 Duration = tuple[Sequence[int], float | Free]
 """Numbers of phases, and what their durations add up to [s]."""
@@ -53,7 +53,7 @@ class Problem:
     cost: Cost | None = None
     bounds: Mapping[str, Range] = field(default_factory=dict[str, Range], kw_only=True)
     rates: Mapping[str, Range] = field(default_factory=dict[str, Range], kw_only=True)
-    path: Sequence[Condition] = field(default=(), kw_only=True)
+    path: Sequence[PathCondition] = field(default=(), kw_only=True)
     choose: Mapping[str, tuple[float | None, ...]] = field(
         default_factory=dict[str, tuple[float | None, ...]], kw_only=True
     )

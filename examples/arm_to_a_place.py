@@ -1,0 +1,66 @@
+"""Bring the last link of a six-joint arm to a place: three coordinates are given, six angles not.
+
+Every joint rubs under the reaction of all links beyond it. The goal is a point in the room and all
+joints at rest; which angles the arm has there is the optimiser's choice. On the way the link stays
+above a table.
+
+The cost adds the speeds of the joints to the torques: torques alone leave so much open that the
+minimum is flat. Friction stays smooth here, 0.05 m/s wide: six contacts, whose normal forces depend
+on each other, have too many modes to be told apart. The loads of the bearings of the wrist pass
+zero, where their size has a kink; it is rounded over 0.5 N.
+
+    python examples/arm_to_a_place.py [OUT]
+"""
+
+import sys
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from ocp import Phase, Problem, Signals, integral, solve
+from ocp.friction.mode_models import smooth_model
+from symfric import BrownMcPhee
+from symfric.scenes import Arm
+
+JOINTS = range(1, 7)
+AT_REST = {f"q{i}_rate": 0.0 for i in JOINTS}
+TORQUES = {f"tau{i}": (-150.0, 150.0) for i in JOINTS}
+PLACE = {"link6_x": 0.5, "link6_y": 0.2, "link6_z": 0.3}
+TABLE = 0.25  # m
+
+
+def effort(s: Signals) -> object:
+    """Torques [N m] and speeds [rad/s] of all joints."""
+    return sum(0.01 * s[f"tau{i}"] ** 2 + 20.0 * s[f"q{i}_rate"] ** 2 for i in JOINTS)
+
+
+def problem() -> Problem:
+    """To the place within a second."""
+    arm = smooth_model(Arm(BrownMcPhee(mu_s=0.15, mu_d=0.1, v_t=0.05)).model())
+    return Problem(
+        Phase(arm, T=1.0, end=PLACE | AT_REST),
+        integral(effort),
+        bounds=TORQUES,
+        path=[lambda s: s.link6_z >= TABLE],
+        p={f"q{i}_eps": 0.5 for i in JOINTS},
+    )
+
+
+def main(out: Path) -> None:
+    """Solve, print the angles that were chosen, and draw."""
+    best = solve(problem(), intervals=20, friction="smooth", tolerance=1e-2)
+    table = Table("joint", "from [rad]", "to [rad]", "largest torque [N m]")
+    for i in JOINTS:
+        q, torque = best[f"q{i}"], best[f"tau{i}"]
+        table.add_row(f"q{i}", f"{q[0]:+.3f}", f"{q[-1]:+.3f}", f"{abs(torque).max():.1f}")
+    console = Console()
+    console.print(table)
+    console.print(f"J = {best.cost:.3f}, verified: {best.verified}")
+    best.plot(*(f"q{i}" for i in JOINTS), path=out / "arm_to_a_place.png")
+
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
+    folder.mkdir(parents=True, exist_ok=True)
+    main(folder)

@@ -1,0 +1,78 @@
+"""What a test rig must do under a wheel so that the body of the car rises most gently.
+
+A quarter car stands on a plate; body 240 kg, wheel 40 kg, suspension 28.9 kN/m and 260 N s/m, tyre
+920 kN/m and 3886 N s/m. The strut leans by 45 degrees and presses the body against its guide,
+where dry friction holds back 164 N at rest. The body shall rise by 85 mm in 1 s and be at rest:
+
+    min integral of a_body^2   over the profile of the plate
+
+Alone, a body does that with 12 (0.085 m)^2 / (1 s)^3. The plate cannot move faster than 1 m/s nor
+change its speed by more than 20 m/s^2, and the tyre must not lift off. Friction has to be overcome
+before anything moves, and is pulled along at the end.
+
+    python examples/quarter_car_profile.py [OUT]
+"""
+
+import sys
+from pathlib import Path
+
+import casadi as ca
+from rich.console import Console
+
+from ocp import Phase, Problem, integral, solve
+from symfric import BrownMcPhee, Contact, Model, Output, Variable
+
+BODY, WHEEL = 240.0, 40.0  # kg
+K_S, D_S, K_T, D_T = 28900.0, 260.0, 920e3, 3886.0  # N/m and N s/m
+RISE, GENTLEST = 0.085, 12 * 0.085**2
+WEIGHT = (BODY + WHEEL) * 9.81
+LAW = BrownMcPhee(mu_s=0.15, mu_d=0.1, v_t=1e-5)
+
+
+def rig() -> Model:
+    """Displacements from rest under the weight; the plate moves as fast as its input says."""
+    body, wheel, plate = (Variable(n, "m", nominal=0.1) for n in ("body", "wheel", "plate"))
+    v_body, v_wheel = (Variable(n, "m/s", nominal=0.1) for n in ("v_body", "v_wheel"))
+    speed = Variable("speed", "m/s", nominal=0.1, doc="speed of the plate")
+    strut = K_S * (wheel.symbol - body.symbol) + D_S * (v_wheel.symbol - v_body.symbol)
+    tyre = K_T * (plate.symbol - wheel.symbol) + D_T * (speed.symbol - v_wheel.symbol)
+    side = 1093.0 + ca.sqrt(strut**2 + 1.0) - 1.0  # preload and side force of the strut [N]
+    guide = Contact("guide", slip=v_body.symbol, N=side, law=LAW)
+    a_body = (strut - guide.force) / BODY
+    return Model(
+        "quarter car on a rig",
+        x=(body, wheel, plate, v_body, v_wheel),
+        u=(speed,),
+        ode=ca.vertcat(v_body.symbol, v_wheel.symbol, speed.symbol, a_body, (tyre - strut) / WHEEL),
+        contacts=(guide,),
+        outputs={
+            "a_body": Output(a_body, "m/s^2", "acceleration of the body"),
+            "tyre": Output(tyre, "N", "force of the tyre beyond the weight"),
+        },
+    )
+
+
+def problem() -> Problem:
+    """The gentlest rise."""
+    return Problem(
+        Phase(rig(), T=1.0, end={"body": RISE, "v_body": 0.0, "v_wheel": 0.0}),
+        integral(lambda s: s.a_body**2),
+        bounds={"speed": (-1.0, 1.0), "plate": (-0.05, 0.2), "tyre": (-WEIGHT, None)},
+        rates={"speed": (-20.0, 20.0)},
+    )
+
+
+def main(out: Path) -> None:
+    """Solve, print and draw."""
+    best = solve(problem())
+    console = Console()
+    console.print(best.message)
+    console.print(f"J = {best.cost:.5f} m^2/s^3, a body alone {GENTLEST:.5f}")
+    console.print(f"plate: {1e3 * best['plate'].max():.1f} mm at most; verified: {best.verified}")
+    best.plot("body", "plate", "speed", "a_body", path=out / "quarter_car_profile.png")
+
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
+    folder.mkdir(parents=True, exist_ok=True)
+    main(folder)
