@@ -33,6 +33,8 @@ INTERVALS = 50
 EARLY = 0.04
 """Layers, in multiples of the speeds, from which on the modes of a motion may be read."""
 STOPPED = (Status.INTERRUPTED, Status.TIME_LIMIT)
+EXACT_RTOL = 1e-7
+"""Relative tolerance of the motion with exact friction: a hundredth of what matters."""
 SHARPEST = 1e-4
 """Layers, in multiples of the speeds, that are too narrow for one solve with them."""
 MISSED = (Status.TERMINAL_MISS, Status.BOUND_MISS)
@@ -181,7 +183,7 @@ class _Job:
             clock=self.clock,
             progress=self.progress,
         )
-        tried: list[Solution] = []
+        tried: list[_Exact] = []
         reached = next(path)
         while reached.solution.ok:
             own = own_level(self.problem, reached.scales)
@@ -193,15 +195,17 @@ class _Job:
             )
             if readable and not reason:
                 tried.append(self.polished(reached))
-                if tried[-1].ok or tried[-1].status in STOPPED:
-                    return tried[-1]
+                if tried[-1].right or tried[-1].solution.status in STOPPED:
+                    return tried[-1].solution
             following = next(path, None)
             if following is None:
                 break
             reached = following
-        return max(tried, key=_worth) if tried else self.unpolished(reached)
+        if tried:
+            return max(tried, key=lambda one: one.worth).solution
+        return self.unpolished(reached)
 
-    def polished(self, sharp: Sharp) -> Solution:
+    def polished(self, sharp: Sharp) -> "_Exact":
         """The exact motion next to a sharpened one, verified with the user's own laws."""
         solver = self.solver if isinstance(self.solver, Ipopt) else None
         speeds = speeds_at(self.problem, sharp.scales, sharp.level)
@@ -210,32 +214,29 @@ class _Job:
             solver=solver, scheme=self.scheme, progress=self.progress,
         )  # fmt: skip
         exact = self.checked(_after(sharp.solution, exact))
-        if exact.status not in MISSED or self.clock.over:
-            return exact
-        if own_level(self.problem, sharp.scales) < SHARPEST:
-            return self.explained(exact)
-        return self.with_own_laws(exact)
+        narrow = own_level(self.problem, sharp.scales) < SHARPEST
+        if exact.status in MISSED and not narrow and not self.clock.over:
+            own = self.checked(self.plain(exact, exact.meshes))
+            if own.verified:
+                return _Exact(_after(exact, replace(own, modes=exact.modes)), True)
+            exact = _after(own, exact)
+        return self.judged(exact)
 
-    def explained(self, exact: Solution) -> Solution:
-        """A motion by modes that misses with the user's law, with what exact friction says."""
-        if not exact.modes:
-            return exact
-        found = verify_exactly(exact, self.tolerance)
+    def judged(self, exact: Solution) -> "_Exact":
+        """A motion by modes with what the law by events, which smooths nothing, says of it."""
+        if not self.verify or exact.status in STOPPED or not (exact.ok or exact.status in MISSED):
+            return _Exact(exact, exact.ok)
+        found = verify_exactly(exact, self.tolerance, EXACT_RTOL)
         if not found.ok:
-            return exact
-        said = (
-            f"{exact.message} With exact Coulomb friction and stiction it misses by "
-            f"{found.largest:.1g} only: the layers of the law creep at rest and break away later; "
-            "make them narrower, or allow this miss by `tolerance`."
-        )
-        return replace(exact, message=said)
-
-    def with_own_laws(self, exact: Solution) -> Solution:
-        """A motion by modes that misses with the layers of the user's laws, solved with these."""
-        own = self.checked(self.plain(exact, exact.meshes))
-        if not own.verified:
-            return self.explained(_after(own, exact))
-        return _after(exact, replace(own, modes=exact.modes))
+            said = f"{exact.message} With exact Coulomb friction: {found.sentence}"
+            return _Exact(replace(exact, message=said), right=False)
+        said = f"{exact.message} With exact Coulomb friction it misses by {found.largest:.1g}"
+        if not exact.ok:
+            said += (
+                " only: the layers of the law creep at rest and break away later; make them "
+                "narrower, or allow this by `tolerance`"
+            )
+        return _Exact(replace(exact, message=f"{said}."), exact.ok)
 
     def unpolished(self, sharp: Sharp) -> Solution:
         """What there is when modes were not found: the motion with layers that are left."""
@@ -259,6 +260,15 @@ def _after(first: Solution, later: Solution) -> Solution:
     return replace(later, statistics=first.statistics.then(later.statistics))
 
 
-def _worth(solution: Solution) -> tuple[bool, bool, float]:
-    """Order of partial results: verified, solved, cheap."""
-    return solution.verified, solution.verification is not None, -solution.cost
+@final
+@dataclass(frozen=True, eq=False)
+class _Exact:
+    """A motion by modes, and whether it is right with the user's laws and with exact friction."""
+
+    solution: Solution
+    right: bool
+
+    @property
+    def worth(self) -> tuple[bool, bool, float]:
+        """Order among several."""
+        return self.right, self.solution.ok, -self.solution.cost
