@@ -126,7 +126,7 @@ class Solution:
             lines.append(str(self.verification).splitlines()[0])
         counts = self.statistics
         lines.append(
-            f"{counts.iterations} iterations in {counts.solves} solves; "
+            f"solves: {counts.solves}, iterations: {counts.iterations}, "
             f"{counts.build_time + counts.solve_time + counts.verify_time:.2g} s"
         )
         return "\n".join(lines)

@@ -155,7 +155,7 @@ class Prepared:
         """
         begin = perf_counter()
         program = self.program
-        numbers = program.values if values is None else np.asarray(values, dtype=float).ravel()
+        numbers = program.values if values is None else _numbers(values, program)
         w = np.clip(_start(start, program), program.lower_w, program.upper_w)
         watch = Watch(program, progress, self.max_time)
         result, answer, status = None, OVERDETERMINED, Status.INFEASIBLE
@@ -278,6 +278,17 @@ class Prepared:
             statistics,
             watch.error,
         )
+
+
+def _numbers(values: ArrayLike, program: Program) -> Array:
+    """The numbers of the parameters."""
+    found = checks.array("values", values)
+    if found.size != program.p.numel():
+        raise ValueError(
+            f"values: expected {program.p.numel()} numbers of parameters, got {found.size}; "
+            "transcription.values(...) makes them"
+        )
+    return found
 
 
 def _equations(program: Program) -> int:

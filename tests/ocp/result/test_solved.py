@@ -166,7 +166,7 @@ def test_it_tells_itself_in_a_few_lines(move: Solution) -> None:
     assert lines[0] == told.message
     assert lines[1] == f"J = {told.cost:.6g}, T = {told.T:.6g} s"
     assert lines[2] == "guide: slip+ 0 ... 0.25 s, stick 0.25 ... 0.5 s"
-    assert lines[3].startswith(f"{told.iterations} iterations in 1 solves; ")
+    assert lines[3].startswith(f"solves: 1, iterations: {told.iterations}, ")
     assert repr(told.motions[0]).startswith("<Motion: x, v, force, friction, power over 0.4")
     assert repr(told.stored).startswith("<Stored solution of 'drive': SOLVED, J = 0.4")
     phases = str(solve_once(there_and_back(), 4)).splitlines()[1]

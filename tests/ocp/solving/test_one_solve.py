@@ -39,6 +39,8 @@ def test_a_program_is_solved_many_times_with_other_numbers() -> None:
     other = solve_on(late, prepared, values=late.program.values)
     assert other.cost == pytest.approx(solve_on(late, Ipopt().prepared(late.program)).cost)
     assert other.cost != first.cost
+    with pytest.raises(ValueError, match=r"values: expected 12 numbers of parameters, got 3"):
+        solve_on(late, prepared, values=[1.0, 2.0, 3.0])
 
 
 def test_times_of_places_go_on_over_the_phases() -> None:
