@@ -1,4 +1,4 @@
-"""Receding horizons: Gauss-Newton on implicit steps, in closed loop and as C."""
+"""Receding horizons: quadratic programs on implicit steps, in closed loop and as C."""
 
 from ocp.mpc.closed_loop import ClosedLoop as ClosedLoop
 from ocp.mpc.controller import Controller as Controller

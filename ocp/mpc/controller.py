@@ -162,10 +162,10 @@ def controller_of(
 
         min  sum_k h [sum_i w_i r_i^2 + L] + E(x_N)   s.t.  x_(k+1) = F(x_k, u_k),  bounds
 
-    by Gauss-Newton iterations from the shifted plan of the last cycle, over N = T / step intervals
-    with inputs held. Costs are `track`, `effort`, and convex quadratic `integral` and `at_end`;
-    what `track("x", "goal", 900.0)` refers to by name is a reference of the controller, whose
-    default stands in the `p` of the problem. The start of the phase is not
+    by sequential quadratic programs (`gauss_newton`) from the shifted plan of the last cycle, over
+    N = T / step intervals with inputs held. Costs are `track`, `effort`, and convex quadratic
+    `integral` and `at_end`; what `track("x", "goal", 900.0)` refers to by name is a reference of
+    the controller, whose default stands in the `p` of the problem. The start of the phase is not
     used: the state is measured. Bounds on inputs are hard; those on states and outputs, path
     conditions and the end of the phase are soft, with an exact penalty.
 
@@ -188,7 +188,7 @@ def controller_of(
             without curvature; names that C cannot have.
 
     Limits: inputs are constant over an interval; unmeasured states are not estimated, only
-    predicted; Gauss-Newton converges linearly, the slower the more the equations bend. Friction
+    predicted; far from the optimum iterations may use up their number, which is said. Friction
     that is very sharp hides the way out of rest: a plan that stays there is optimal to first order,
     and is what comes out, converged. Let the controller believe in a v_t of about a hundredth of
     the velocities (on a drive that moves at 1 m/s, 1e-2 m/s leaves rest and 1e-3 m/s does not); the

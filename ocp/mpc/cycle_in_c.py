@@ -61,7 +61,8 @@ static double go_on(NAME_t *m, double nu)
     }
 #endif
     if (defects > 0.0) {
-        const double least = (slope + 0.5 * m->go.curvature) / (0.5 * defects);
+        const double bend = m->go.curvature > 0.0 ? m->go.curvature : 0.0;
+        const double least = (slope + 0.5 * bend) / (0.5 * defects);
         nu = least > nu ? least : nu;
     }
     fall = slope - nu * defects;
@@ -143,6 +144,9 @@ static void improve(NAME_t *m, const NAME_param_t *param, NAME_out_t *out)
             break;
         }
         out->iterations++;
+        if (out->iterations > PLAIN) {
+            curve(m);
+        }
         out->program_iterations += program(m);
         nu = go_on(m, nu);
     }

@@ -1,8 +1,13 @@
 """Sequential quadratic programs over the horizon, and how far their result is from optimal.
 
     1. linearise at the plan (X, U); residual <= tolerance: done
-    2. change and multipliers by the quadratic program (`interior_point`), Hessian by Gauss-Newton
+    2. change and multipliers by the quadratic program (`interior_point`)
     3. a step of 1, 1/2, 1/4, ... of it by the merit  cost + prices + nu |defects|_1
+
+The Hessian is that of Gauss and Newton in the first two iterations of a cycle. Near rest, friction
+bends more than the cost does, and these converge slowly; from the third one on the curvature of the
+equations, weighted with their multipliers, is taken along wherever Riccati's recursion then finds
+no negative pivot.
 
 The residual is that of the conditions of Karush, Kuhn and Tucker at the plan that is handed out,
 whose multipliers of the equations make the gradients in the states zero: the largest of
@@ -30,6 +35,8 @@ from ocp.mpc.sweeps import Given, Move, Sweeps
 
 Array = NDArray[np.float64]
 
+PLAIN = 2
+"""Iterations without curvature of the equations, which has no meaning yet far from the optimum."""
 ARMIJO = 1e-4
 ROUNDING = 1e-12
 """Of the merit, relative: what a step may lose by it."""
@@ -118,6 +125,16 @@ def _later(rows: Array) -> Array:
     return np.vstack([rows[1:], rows[-1:]])
 
 
+def _curved(sweeps: Sweeps, plan: Plan, given: Given, L: Array, end: Array) -> Array:
+    """L with the curvature of the equations, where the Hessian stays positive over the horizon."""
+    _, multipliers = sweeps.adjoint(L, end, plan.z)
+    E = sweeps.curvature(plan.X, plan.U, multipliers, given)
+    found = L.copy()
+    found[:, L.shape[1] - E.shape[1] :] = E
+    pivots = sweeps.pivots(sweeps.matrix(found, end, np.zeros(plan.z.size)))
+    return found if bool((pivots > 0.0).all()) else L
+
+
 def residual_of(
     sweeps: Sweeps, L: Array, end: Array, z: Array, prices: Prices
 ) -> tuple[float, float]:
@@ -125,7 +142,8 @@ def residual_of(
     horizon = sweeps.horizon
     model, unit = horizon.model, horizon.curvature
     v = sweeps.rows_of(L, end)
-    gradients = np.abs(sweeps.adjoint(L, end, z) * model.nominal("u")) / unit
+    gradients, _ = sweeps.adjoint(L, end, z)
+    gradients = np.abs(gradients * model.nominal("u")) / unit
     defects = np.abs(sweeps.defects_of(L)) / model.nominal("x")
     below, soft = np.maximum(-v, 0.0), prices.soft
     kept = np.maximum(below, np.abs(z * v) / np.maximum(z, unit))
@@ -151,8 +169,9 @@ def improved(
         if done or made == settings.iterations or not isfinite(residual):
             break
         made += 1
+        taken = _curved(sweeps, plan, given, L, end) if made > PLAIN else L
         move, z, count = solve_program(
-            sweeps, L, end, prices, warm=plan.z, unit=unit, most=settings.program
+            sweeps, taken, end, prices, warm=plan.z, unit=unit, most=settings.program
         )
         programs += count
         alpha, nu = _step(merit, plan, move, nu, settings.halvings)
@@ -170,7 +189,7 @@ def _step(merit: "Merit", plan: Plan, move: Move, nu: float, halvings: int) -> t
     prices, gap = merit.prices, merit.gap(c)
     slope = total(move.costs[:, 0]) + (prices.of(v + move.D) - prices.of(v))
     if gap > 0.0:
-        nu = max(nu, (slope + 0.5 * total(move.costs[:, 1])) / (0.5 * gap))
+        nu = max(nu, (slope + 0.5 * max(0.0, total(move.costs[:, 1]))) / (0.5 * gap))
     fall = slope - nu * gap
     before = total(cost) + prices.of(v) + nu * gap
     alpha = 1.0

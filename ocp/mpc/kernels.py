@@ -66,13 +66,16 @@ class Kernels:
         advance: (x, u, r, p) -> x after a substep.
         tangent: (x, S, u, r, p) -> (x, S) after a substep; S holds the structural entries of the
             derivative with respect to (x, u) at the beginning of the interval.
+        bend: (lam, E, x, S, u, r, p) -> (lam, E) before a substep: multipliers of its end become
+            those of its beginning, and the curvature of lam' x after it joins E.
         linear: (x, u, after, r, r_after, p, t, b, to, S) -> L = (c, v, all that varies in the
             program), where to = F(x, u).
         value: the same arguments but S -> (c, v, cost).
         matrix: (P, L, w) -> (P, G): one step of Riccati's recursion; G is what the others need.
         vector: (q, L, G, e) -> (q, k): the linear part of the cost-to-go and of the control.
         forward: (d, L, G, k) -> (d, M = (du, change of v, slope and curvature of the cost)).
-        adjoint: (lam, L, m) -> (lam, gradient in u), with multipliers m of the rows.
+        adjoint: (lam, L, m) -> (lam, S = (gradient in u, multipliers of the equations)), with
+            multipliers m of the rows.
         end_linear, end_value: (x, r, p, t, b) -> L = (v, ...), (v, cost).
         end_matrix, end_vector, end_adjoint: (L, w | e | m) -> P | q | lam.
         end_forward: (d, L) -> M = (change of v, slope and curvature of the cost).
@@ -81,6 +84,7 @@ class Kernels:
 
     advance: ca.Function
     tangent: ca.Function
+    bend: ca.Function
     linear: ca.Function
     value: ca.Function
     matrix: ca.Function
@@ -181,10 +185,13 @@ def _interval(horizon: Horizon) -> tuple[list[ca.Function], tuple[float, ...]]:
         pack.add(f"H {name}", costs.hessian)
     pack.add("D early", ca.jacobian(v, start))
     pack.add("D late", ca.jacobian(v, h.after))
+    n = nx + nu
+    pack.add("E", ca.SX(n * (n + 1) // 2, 1), all_of_it=True)
     value = ca.vertcat(c, v, h.early.value + h.late.value)
     functions = [
         h.advance,
         tangent,
+        _bend(horizon, slopes),
         _function("linear", [*arguments, to, S], [pack.column()]),
         _function("value", [*arguments, to], [value]),
         *_recursion(pack, nx, nu, len(h.limits)),
@@ -204,7 +211,8 @@ def _recursion(pack: Packed, nx: int, nu: int, rows: int) -> list[ca.Function]:
     P, q, w, e = (ca.SX.sym(n, k) for n, k in (("P", size), ("q", nx), ("w", rows), ("e", rows)))
     # one step of the recursion
     whole = symmetric(P, nx) + H_late + D_late.T @ ca.diag(w) @ D_late
-    Q = H + D.T @ ca.diag(w) @ D + F.T @ whole @ F
+    curved = H + symmetric(pack.part("E", L), nx + nu)
+    Q = curved + D.T @ ca.diag(w) @ D + F.T @ whole @ F
     lower, inverse = factored(Q[nx:, nx:])
     gain = -solved(lower, inverse, Q[nx:, :nx])
     before = Q[:nx, :nx] + Q[:nx, nx:] @ gain
@@ -224,15 +232,16 @@ def _recursion(pack: Packed, nx: int, nu: int, rows: int) -> list[ca.Function]:
     then = F @ now + c
     moved = D @ now + D_late @ then
     tilt = ca.dot(g, now) + ca.dot(g_late, then)
-    bend = ca.dot(now, H @ now) + ca.dot(then, H_late @ then)
+    bend = ca.dot(now, curved @ now) + ca.dot(then, H_late @ then)
     # multipliers
     lam, m = ca.SX.sym("lam", nx), ca.SX.sym("m", rows)
-    gradient = g - D.T @ m + F.T @ (lam + g_late - D_late.T @ m)
+    late = lam + g_late - D_late.T @ m
+    gradient = g - D.T @ m + F.T @ late
     return [
         _function("matrix", [P, L, w], [upper(before), kept.column()]),
         _function("vector", [q, L, G, e], [both[:nx] + K.T @ both[nx:], k]),
         _function("forward", [d, L, G, feed], [then, ca.vertcat(du, moved, tilt, bend)]),
-        _function("adjoint", [lam, L, m], [gradient[:nx], gradient[nx:]]),
+        _function("adjoint", [lam, L, m], [gradient[:nx], ca.vertcat(gradient[nx:], late)]),
     ]
 
 
@@ -255,6 +264,20 @@ def _tangent(horizon: Horizon) -> tuple[ca.Function, ca.SX]:
     entries = ca.vertcat(ca.SX(0, 1), *ca.vertsplit(kept.nz[:]))
     function = _function("tangent", [h.x, S, h.u, h.r, h.p], [moved, entries])
     return function, slopes
+
+
+def _bend(horizon: Horizon, slopes: ca.SX) -> ca.Function:
+    """The kernel `bend`."""
+    h, nx, nu = horizon, horizon.x.numel(), horizon.u.numel()
+    n = nx + nu
+    lam, E = ca.SX.sym("lam", nx), ca.SX.sym("E", n * (n + 1) // 2)
+    S = ca.vertcat(ca.SX(0, 1), slopes.nz[:])
+    weighted = ca.dot(lam, h.advance(h.x, h.u, h.r, h.p))
+    here = ca.vertcat(h.x, h.u)
+    curvature, gradient = ca.hessian(weighted, here)
+    way = ca.vertcat(slopes, ca.horzcat(ca.SX(nu, nx), ca.SX.eye(nu)))
+    found = E + upper(way.T @ curvature @ way)
+    return _function("bend", [lam, E, h.x, S, h.u, h.r, h.p], [gradient[:nx], found])
 
 
 def _end(horizon: Horizon) -> list[ca.Function | None]:

@@ -115,11 +115,50 @@ static void change(NAME_t *m, move_t *to)
 #endif
 }
 
+/* Curvature of the equations, weighted with their multipliers, joins the Hessian where that stays
+   positive over the horizon. */
+static void curve(NAME_t *m)
+{
+    int k, i, sound = 1;
+    for (k = 0; k < N; k++) {
+        double to[SUBSTEPS + 1][NX], S[SUBSTEPS + 1][NS], lam[NX], *E = m->L[k] + (NL - NE);
+        for (i = 0; i < NX; i++) {
+            to[0][i] = m->x[k][i];
+            lam[i] = m->lam[k][i];
+        }
+        for (i = 0; i < NS; i++) {
+            S[0][i] = identity[i];
+        }
+        for (i = 0; i < SUBSTEPS; i++) {
+            tangent(to[i], S[i], m->u[k], m->r[k], m->p, to[i + 1], S[i + 1]);
+        }
+        for (i = SUBSTEPS - 1; i >= 0; i--) {
+            bend(lam, E, to[i], S[i], m->u[k], m->r[k], m->p, lam, E);
+        }
+    }
+#if ALL > 0
+    for (k = 0; k < ALL; k++) {
+        m->w[k] = 0.0;
+    }
+#endif
+    matrices(m);
+    for (k = 0; k < N; k++) {
+        for (i = PIVOTS; i < PIVOTS + NU; i++) {
+            sound = sound && m->G[k][i] > 0.0;
+        }
+    }
+    for (k = 0; k < N && !sound; k++) {
+        for (i = NL - NE; i < NL; i++) {
+            m->L[k][i] = 0.0;
+        }
+    }
+}
+
 /* The residual of the plan; the largest violation of a soft row. */
 static double residual_of(NAME_t *m, double *violation)
 {
     int k, i;
-    double l[NX], gradient[NU], found = 0.0;
+    double l[NX], S[NU + NX], found = 0.0;
     *violation = 0.0;
 #if END
     end_adjoint(m->L_end, m->z + N * ROWS, l);
@@ -129,11 +168,12 @@ static double residual_of(NAME_t *m, double *violation)
     }
 #endif
     for (k = N - 1; k >= 0; k--) {
-        adjoint(l, m->L[k], m->z + k * ROWS, l, gradient);
+        adjoint(l, m->L[k], m->z + k * ROWS, l, S);
         for (i = 0; i < NU; i++) {
-            found = larger(found, fabs(gradient[i] * nominal_u[i]) / CURVATURE);
+            found = larger(found, fabs(S[i] * nominal_u[i]) / CURVATURE);
         }
         for (i = 0; i < NX; i++) {
+            m->lam[k][i] = S[NU + i];
             found = larger(found, fabs(m->L[k][i]) / nominal_x[i]);
         }
     }

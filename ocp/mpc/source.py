@@ -14,7 +14,7 @@ import casadi as ca
 
 from ocp.mpc.cycle_in_c import CYCLE
 from ocp.mpc.design import Control, Design
-from ocp.mpc.gauss_newton import ARMIJO, ROUNDING, CycleStatus
+from ocp.mpc.gauss_newton import ARMIJO, PLAIN, ROUNDING, CycleStatus
 from ocp.mpc.interior_point import AWAY, BACK, CLOSE
 from ocp.mpc.program_in_c import PROGRAM
 from symfric.codegen.c99 import DOUBLE, TRANSCENDENTAL, macro
@@ -33,7 +33,7 @@ def header(design: Design) -> str:
     return f"""{_banner(f"{name}.h")}
  *
  * Model predictive controller of '{h.model.name}': every {h.step:g} s, over {h.count} intervals.
- * Gauss-Newton, Riccati's recursion and an interior point: no allocation, every loop is bounded.
+ * Quadratic programs by Riccati's recursion and an interior point: no allocation, bounded loops.
  */
 #ifndef {guard}
 #define {guard}
@@ -158,6 +158,9 @@ def sizes(design: Design) -> dict[str, int]:
         "NL": k.linear.size1_out(0),
         "NL_END": 0 if end is None else end.size1_out(0),
         "NG": k.matrix.size1_out(1),
+        "NE": k.bend.size1_in(1),
+        "PIVOTS": h.u.numel() * h.x.numel() + h.u.numel() * (h.u.numel() - 1) // 2,
+        "PLAIN": PLAIN,
         "NS": len(k.identity),
         "SUBSTEPS": h.substeps,
         "NP": k.matrix.size1_in(0),
@@ -201,7 +204,7 @@ def _memory(name: str, parts: dict[str, int]) -> str:
         _array("L", n, parts["NL"]),
         _array("L_end", parts["NL_END"]),
     ]
-    lines += [_array("G", n, parts["NG"]), _array("k", *inputs)]
+    lines += [_array("G", n, parts["NG"]), _array("k", *inputs), _array("lam", n, parts["NX"])]
     rows = ["w", "e"]
     if parts["ALL"]:
         rows += ["v", "ts", "zn", "s", "y", "f", "a", "o", "goal_t", "goal_s"]

@@ -82,6 +82,23 @@ def _over_substeps(horizon: Horizon, kernels: Kernels) -> tuple[ca.Function, ca.
     return linear, value
 
 
+def _curvatures(horizon: Horizon, kernels: Kernels) -> ca.Function:
+    """E of all intervals."""
+    steps, n = horizon.substeps, horizon.count
+    sizes = [kernels.bend.size1_in(i) for i in (0, 1, 2, 4, 5, 6)]
+    lam, E, x, u, r, p = (ca.MX.sym(f"a{i}", size) for i, size in enumerate(sizes))
+    tangent = cast(Any, kernels.tangent)
+    same = [ca.repmat(argument, 1, steps) for argument in (u, r, p)]
+    there, slopes = tangent.mapaccum("tangent", steps, 2)(x, ca.DM(kernels.identity), *same)
+    begins = ca.horzcat(x, there[:, :-1])
+    ways = ca.horzcat(ca.DM(kernels.identity), slopes[:, :-1])
+    back = list(reversed(range(steps)))
+    bend = cast(Any, kernels.bend).mapaccum("bend", steps, 2)
+    _, found = bend(lam, ca.DM.zeros(E.numel()), begins[:, back], ways[:, back], *same)
+    whole = cast(Any, ca.Function("curvature", [lam, x, u, r, p], [found[:, -1]]))
+    return whole.map(n, [False] * 4 + [True], [False])
+
+
 def backwards(array: Array) -> Array:
     """Rows in the opposite order."""
     return np.ascontiguousarray(array[::-1])
@@ -97,6 +114,7 @@ class Sweeps:
         self.nx, self.nu = horizon.x.numel(), horizon.u.numel()
         self.rows, self.end_rows = len(horizon.limits), len(horizon.end_limits)
         self._linear, self._value = _over_substeps(horizon, kernels)
+        self._curvature = _curvatures(horizon, kernels)
         self._matrix = kernels.matrix.mapaccum("matrix", n)
         self._vector = kernels.vector.mapaccum("vector", n)
         self._forward = kernels.forward.mapaccum("forward", n)
@@ -142,6 +160,11 @@ class Sweeps:
             last_P = called(kernels.end_matrix, end, last)[0][0]
         return backwards(called(self._matrix, last_P, backwards(L), backwards(inner))[1])
 
+    def pivots(self, G: Array) -> Array:
+        """1/D of the factors in G, shape (N, nu)."""
+        first = self.nu * self.nx + self.nu * (self.nu - 1) // 2
+        return G[:, first : first + self.nu]
+
     def vector(self, L: Array, end: Array, G: Array, e: Array) -> Array:
         """Feed-forward k of all intervals, for slopes e of all rows."""
         q, kernels = np.zeros(self.nx), self.kernels
@@ -160,13 +183,19 @@ class Sweeps:
             rows, costs = np.append(rows, last[:-2]), np.vstack([costs, last[-2:]])
         return Move(np.vstack([np.zeros((1, self.nx)), d]), M[:, : self.nu], rows, costs)
 
-    def adjoint(self, L: Array, end: Array, m: Array) -> Array:
-        """Gradients in the inputs, shape (N, nu), with multipliers m of all rows."""
+    def curvature(self, X: Array, U: Array, multipliers: Array, given: Given) -> Array:
+        """E of all intervals: upper triangles of the curvature of multipliers' F, columns."""
+        (E,) = called(self._curvature, multipliers, X[:-1], U, given.R[:-1], given.p)
+        return E
+
+    def adjoint(self, L: Array, end: Array, m: Array) -> tuple[Array, Array]:
+        """Gradients in the inputs (N, nu) and multipliers of the equations (N, nx)."""
         lam, kernels = np.zeros(self.nx), self.kernels
         inner, last = self.split(m)
         if kernels.end_adjoint is not None:
             lam = called(kernels.end_adjoint, end, last)[0][0]
-        return backwards(called(self._adjoint, lam, backwards(L), backwards(inner))[1])
+        S = backwards(called(self._adjoint, lam, backwards(L), backwards(inner))[1])
+        return S[:, : self.nu], np.ascontiguousarray(S[:, self.nu :])
 
     def split(self, rows: Array) -> tuple[Array, Array]:
         """Those of the intervals, shape (N, rows), and those of the end."""
