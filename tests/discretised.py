@@ -8,6 +8,7 @@ from ocp.text.problem import Problem
 from ocp.text.ranges import Free
 from symfric import BrownMcPhee, Model, Output, Variable, drive
 from symfric.multibody import JointSpringDamper, Mechanism, Revolute
+from symfric.multibody.constraints import Constraint
 from symfric.scenes import FourBar
 
 EFFORT = integral(lambda s: s.force**2)
@@ -35,7 +36,7 @@ def dae() -> Model:
     )
 
 
-def double_pendulum() -> Model:
+def double_pendulum(*constraints: Constraint) -> Model:
     M = Mechanism("arm", gravity=(0.0, 0.0, -9.81))
     turned = {"z": (0.0, -1.0, 0.0), "x": (0.0, 0.0, -1.0)}
     for name in ("upper", "lower"):
@@ -45,6 +46,8 @@ def double_pendulum() -> Model:
     M.frame("ground.top", **turned)
     M.joint(Revolute("q1", "ground.top", "upper.top"))
     M.joint(Revolute("q2", "upper.end", "lower.top"))
+    for constraint in constraints:
+        M.constraint(constraint)
     for i in (1, 2):
         tau = M.input(f"tau{i}", "N m", nominal=3.0)
         M.force(JointSpringDamper(f"motor{i}", f"q{i}", actuator=tau))

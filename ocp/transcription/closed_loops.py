@@ -174,7 +174,8 @@ def closing(
     phi, phi_dot, phi_q = ca.Function(
         "constraints", span.symbols, [ca.densify(part) for part in (mechanics.phi, rate, slope)]
     ).call(local.values)
-    loops = Loops(span, mechanics)
+    begin = sum(T.start if isinstance(T := s.T, Free) else T for _, s in local.before)
+    loops = Loops(span, mechanics, begin, local.free or bool(local.free_before))
     size = loops.sizes
     nominal = span.model.nominal("x")
     multipliers = ca.SX.sym("multipliers", 2 * m)

@@ -7,7 +7,6 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.text.ranges import Free
 from ocp.text.span import Span
 from symfric.model.holonomic import Holonomic
 
@@ -24,8 +23,9 @@ FINE, NEAR = 4, 5
 class Loops:
     """Numbers of the constraints of a span, by nominal coordinates."""
 
-    def __init__(self, span: Span, mechanics: Holonomic) -> None:
-        self.span, self.n = span, mechanics.n
+    def __init__(self, span: Span, mechanics: Holonomic, begin: float, free: bool) -> None:
+        """The span starts at the time `begin` [s], which may be chosen, or its end (`free`)."""
+        self.span, self.n, self.begin = span, mechanics.n, begin
         self.start = span.model.initial_state(None, _named(span))
         q, t, p = span.model.vector("x")[: self.n], span.model.t, span.model.vector("p")
         phi = mechanics.phi
@@ -36,12 +36,13 @@ class Loops:
         A = np.abs(self.at(self.start[: self.n], 0.0)[1]).max(axis=1)
         self.sizes = np.where(A > 0, A, 1.0)
         chosen = [v.symbol for v in span.model.p if v.name in span.chosen]
-        unknown = [*chosen, *([t] if isinstance(span.T, Free) else [])]
+        unknown = [*chosen, *([t] if free else [])]
         self.open = bool(unknown) and bool(ca.depends_on(phi, ca.vertcat(*unknown)))
 
     def at(self, q: Array, t: float) -> tuple[Array, Array, Array]:
-        """Phi (m,), its Jacobian by nominal coordinates (m, n), and phi_t (m,)."""
-        phi, slope, rate = (np.array(part) for part in self._function(q, t, self.span.p))
+        """Phi (m,), its Jacobian by nominal coordinates (m, n), and phi_t (m,), in span time."""
+        values = self._function(q, self.begin + t, self.span.p)
+        phi, slope, rate = (np.array(part) for part in values)
         return (
             phi.ravel() / self.sizes,
             slope * self.nominal / self.sizes[:, None],

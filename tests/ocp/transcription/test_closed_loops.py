@@ -1,7 +1,7 @@
 import casadi as ca
 import numpy as np
 import pytest
-from discretised import angles, four_bar
+from discretised import angles, double_pendulum, four_bar
 
 from ocp.text.cost import integral
 from ocp.text.phase import Phase
@@ -12,7 +12,7 @@ from ocp.transcription.schemes import Legendre, Radau, Scheme
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription
 from symfric import BrownMcPhee
-from symfric.multibody import JointSpringDamper
+from symfric.multibody import JointSpringDamper, PrescribedMotion
 from symfric.scenes import SliderCrank
 
 EFFORT = integral(lambda s: s.tau**2)
@@ -134,6 +134,30 @@ def test_named_start_moves_the_coordinates_that_follow() -> None:
     q, _ = angles(1.2)
     assert status == "Solve_Succeeded"
     np.testing.assert_allclose(points.spans[0].nodes[1, 0], q["theta_rocker"], atol=1e-9)
+
+
+def test_what_moves_in_time_goes_on_from_phase_to_phase() -> None:
+    """q1 = t^2, 0.4 s and 0.6 s: 1 rad at the end and not 0.36."""
+    model = double_pendulum(PrescribedMotion("shoulder", "q1", lambda t: t**2))
+    cost = integral(lambda s: s.tau2**2)
+
+    def moved(q1: float) -> Problem:
+        return Problem(Phase(model, 0.4) >> Phase(model, 0.6, end={"q1": q1, "q2": 0.1}), cost)
+
+    t = put(moved(1.0), Radau(2), 4)
+    spans: list[SpanPoints] = []
+    for number, T in enumerate((0.4, 0.6)):
+        nodes, inner = (
+            np.zeros((4, s.size)) for s in (t.meshes[number], t.inner_fractions(number))
+        )
+        z = np.tile([[float(v.start)] for v in model.z], (1, inner.shape[1]))
+        spans.append(SpanPoints(T, nodes, inner, z, np.zeros((2, 4))))
+    status, points = solved(t, t.consistent(Points(tuple(spans))))
+    assert status == "Solve_Succeeded"
+    at = 0.4 + 0.6 * t.meshes[1]
+    np.testing.assert_allclose(points.spans[1].nodes[[0, 2]], [at**2, 2 * at], atol=1e-9)
+    with pytest.raises(ValueError, match="end: expected values that satisfy the constraints"):
+        discretise(moved(0.36), Radau(2))
 
 
 def test_constraints_are_written_once_where_phases_meet() -> None:
