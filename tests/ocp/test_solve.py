@@ -19,7 +19,8 @@ from ocp import (
     solve,
 )
 from ocp.problems.friction import out_and_back
-from symfric import SolveError, Status
+from symfric import GMS, ExactCoulomb, SolveError, Status, drive
+from symfric.laws import Law
 
 OUT_AND_BACK = 40.0 + 0.5 / (1.0 - 4.0 * tanh(0.25))
 
@@ -123,3 +124,13 @@ def test_the_shortest_time_is_that_on_paper() -> None:
 def test_modes_need_contacts_that_have_them() -> None:
     with pytest.raises(ValueError, match="expected a contact that holds"):
         solve(unit_move(), friction="modes")
+
+
+@pytest.mark.parametrize("law", [ExactCoulomb(mu_s=6.0, mu_d=4.0), GMS()])
+def test_laws_with_states_are_verified_with_themselves(law: Law) -> None:
+    move = Phase(drive(law, m=1.0, N=1.0), 1.0, end={"x": 1.0, "v": 0.0})
+    solution = solve(Problem(move, integral(lambda s: s.force**2)), starts=2)
+    assert solution.verified
+    assert f"guide: {type(law).__name__}" in solution.message
+    assert "With exact Coulomb friction it misses by" in solution.message
+    assert solution.modes["guide"][0].kind in ("stick", "slip+")
