@@ -155,6 +155,12 @@ class _Job:
             what = "collocation, such as Radau(3)" if shooting else "a contact that holds at rest"
             raise ValueError(f"solve: friction '{self.friction}': expected {what}, got none")
         if self.friction == "smooth" or shooting or not holding:
+            events = dict.fromkeys(e.name for span in self.problem.spans for e in span.model.events)
+            if events:
+                raise ValueError(
+                    f"solve: expected models without events, got {checks.listed(events)}; with "
+                    "collocation friction='modes' or 'sharpen' replaces laws that have them"
+                )
             return self.checked(self.plain(self.guess))
         return self.sharp()
 
