@@ -120,6 +120,9 @@ def _span(problem: Problem, step: float) -> tuple[Span, int]:
         problems.append("expected nothing periodic, which has no meaning from a measured state")
     if set(span.nodes) | set(span.rows_at) > {0.0, 1.0}:
         problems.append("expected no via points: the horizon moves; use a reference over time")
+    held = sorted({n for at in span.inputs_at.values() for n in at if at[n] != span.boxes.get(n)})
+    if held:
+        problems.append(f"expected no values of inputs at the ends, got {', '.join(held)}")
     if not any(c.squares or c.running or c.end for c in _costs(problem)):
         problems.append("expected a cost, such as track(name, reference, weight), got none")
     if model.z:

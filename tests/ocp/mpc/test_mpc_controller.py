@@ -150,6 +150,7 @@ def phase(**changes: object) -> Phase:
         (lambda: Problem(phase(T=0.205), effort("force")), "whole number of steps"),
         (lambda: Problem(phase() >> phase(), effort("force")), "one phase"),
         (lambda: Problem(phase()), "a cost"),
+        (lambda: Problem(phase(end={"force": 0.0}), effort("force")), "no values of inputs"),
         (lambda: Problem(phase(), integral(lambda s: s.force**4)), "second derivative"),
         (lambda: Problem(phase(), at_end(lambda s: -(s.x**2))), "convex"),
         (lambda: positioning(drive(ExactCoulomb())), "events"),
