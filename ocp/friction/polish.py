@@ -50,7 +50,7 @@ AGAIN = 0.1
 KICK = 2e-3
 """Share of the whole duration that an interval has at least in which a contact breaks away."""
 
-GONE = 2.0
+GONE = 4.0
 """Arcs shorter than so many times the least duration are pruned."""
 
 ROUNDS = 4
