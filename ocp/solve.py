@@ -215,12 +215,21 @@ class _Job:
 
     def polished(self, sharp: Sharp) -> "_Exact":
         """The exact motion next to a sharpened one, verified with the user's own laws."""
-        solver = self.solver if isinstance(self.solver, Ipopt) else None
+        solver = self.solver if isinstance(self.solver, Ipopt) else Ipopt()
+        limits = [t for t in (solver.max_time, self.clock.left) if t is not None]
+        solver = Ipopt(max_time=min(limits, default=None), **solver.options)
         speeds = speeds_at(self.problem, sharp.scales, sharp.level)
         exact = polish(
             sharp.solution, self.problem, speeds,
             solver=solver, scheme=self.scheme, progress=self.progress,
         )  # fmt: skip
+        if exact.status in STOPPED and not exact.modes:
+            by = "The time limit was reached" if exact.status is Status.TIME_LIMIT else "Stopped"
+            name = self.problem.name
+            said = f"ocp '{name}': {by} while modes were sought; friction is still smooth."
+            both = _after(exact, sharp.solution)
+            stopped = replace(both, status=exact.status, message=said, cause=exact.cause)
+            return _Exact(stopped, right=False)
         exact = self.checked(_after(sharp.solution, exact))
         narrow = own_level(self.problem, sharp.scales) < SHARPEST
         if exact.status in MISSED and not narrow and not self.clock.over:

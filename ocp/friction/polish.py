@@ -17,6 +17,8 @@ Applied Optimal Control, 1975, 3.7 (conditions at instants that are free).
 """
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import replace
 from math import inf
 
 import numpy as np
@@ -36,6 +38,7 @@ from ocp.solvers.ipopt import Ipopt
 from ocp.solvers.outcome import Report
 from ocp.text.problem import Problem
 from ocp.transcription.schemes import Radau, Scheme
+from symfric.foundation.status import Status
 
 CREEP = (3.0, 1.0, 10.0)
 """Multiples of the width below which a contact counts as resting: the first that leads to a
@@ -83,6 +86,12 @@ MOST = 800
 
 Keep = Callable[[Solved], Solved]
 
+STOPPED = (Status.INTERRUPTED, Status.TIME_LIMIT)
+
+
+class _StoppedError(Exception):
+    """The user or the clock has stopped a solve: no further one is begun."""
+
 
 def polish(
     smooth: Solution,
@@ -104,7 +113,8 @@ def polish(
 
     Returns:
         A solution with `modes`, valid for exact Coulomb friction with stiction; not verified. One
-        whose status is not ok where no sequence led to a solution.
+        whose status is not ok where no sequence led to a solution; where that was stopped before
+        any did, without `modes`.
 
     Raises:
         ValueError: a problem that is not polished, see `refusal`.
@@ -147,17 +157,29 @@ def polished(
 
     def keep(solved: Solved) -> Solved:
         tried.append(solved)
+        if solved.outcome.status in STOPPED:
+            raise _StoppedError
         return solved
 
     best: Solved | None = None
-    for legs in _readings(problem, known, widths):
-        first = keep(polisher.solve(legs, known, intervals, 1e-2))
-        if first.ok:
-            best = _settled(polisher, first, keep)
-            best = _better(polisher, best, NEW_ARC * whole, keep)
-            best = _fine(polisher, best, keep)
-            break
-    return whole_solution(problem, best or tried[0], [s.outcome.statistics for s in tried])
+    with suppress(_StoppedError):
+        for legs in _readings(problem, known, widths):
+            first = keep(polisher.solve(legs, known, intervals, 1e-2))
+            if first.ok:
+                best = first
+                best = _settled(polisher, best, keep)
+                best = _better(polisher, best, NEW_ARC * whole, keep)
+                best = _fine(polisher, best, keep)
+                break
+    found = whole_solution(problem, best or tried[0], [s.outcome.statistics for s in tried])
+    last = tried[-1].outcome
+    if last.status not in STOPPED:
+        return found
+    message = f"ocp '{problem.name}': {last.sentence}"
+    if best is None:
+        return replace(found, status=last.status, message=message, cause=last.cause, modes={})
+    message += " What there is are the best modes so far."
+    return replace(found, status=last.status, message=message, cause=last.cause)
 
 
 def refusal(problem: Problem) -> str:

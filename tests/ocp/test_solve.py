@@ -134,3 +134,19 @@ def test_laws_with_states_are_verified_with_themselves(law: Law) -> None:
     assert f"guide: {type(law).__name__}" in solution.message
     assert "With exact Coulomb friction it misses by" in solution.message
     assert solution.modes["guide"][0].kind in ("stick", "slip+")
+
+
+def test_a_stop_while_modes_are_sought_leaves_the_smooth_motion() -> None:
+    stages: list[str] = []
+
+    def leave(progress: Progress) -> None:
+        stages.append(progress.stage)
+        if progress.stage.startswith("modes"):
+            raise KeyboardInterrupt
+
+    stopped = solve(out_and_back(v_t=1e-4), starts=1, progress=leave, throw=False)
+    assert stopped.status is Status.INTERRUPTED
+    assert "Stopped while modes were sought; friction is still smooth." in stopped.message
+    assert stopped.modes == {}
+    assert sum(stage.startswith("modes") for stage in stages) == 1
+    assert abs(stopped["x"][-1]) < 1e-3
