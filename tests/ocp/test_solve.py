@@ -14,6 +14,7 @@ from ocp import (
     Problem,
     Progress,
     Radau,
+    Verification,
     at_end,
     integral,
     solve,
@@ -52,6 +53,12 @@ def _through(x: float) -> float:
 
     v = 1.5  # the sum of both halves is least at 3/2 whatever x is
     return half(x, v) + half(1.0 - x, v)
+
+
+def test_the_cost_is_that_of_the_simulation() -> None:
+    solution = solve(unit_move(cost=integral(lambda s: s.a**2 + 50.0 * s.x**2)), intervals=20)
+    assert isinstance(solution.verification, Verification)
+    assert solution.verification.cost == pytest.approx(solution.cost, rel=1e-6)
 
 
 def test_phases_go_on_from_each_other() -> None:

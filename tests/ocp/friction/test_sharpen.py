@@ -8,6 +8,7 @@ from math import tanh
 import pytest
 from phases import unit_move
 
+from ocp.friction import sharpen
 from ocp.friction.scales import Scale, has_jumps, own_level, same_size, speeds_at, widths_at
 from ocp.friction.sharpen import FIRST, LAST, Sharp, sharpened, smoothed
 from ocp.problems.friction import out_and_back, parcel_on_tray
@@ -58,6 +59,12 @@ def test_only_the_first_solves_are_many(steps: list[Sharp]) -> None:
     counts = [step.solution.statistics.solves for step in steps]
     assert counts[0] <= 2 * 2 + 3
     assert all(b - a <= 6 for a, b in pairwise(counts))
+
+
+def test_a_step_to_something_worse_is_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sharpen, "ABOVE", -1.0)  # nothing is good enough
+    steps = list(path(out_and_back(), starts=1))
+    assert [step.level for step in steps] == [FIRST]
 
 
 def test_sizes_do_not_matter(steps: list[Sharp]) -> None:
