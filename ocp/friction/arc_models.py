@@ -16,13 +16,14 @@ CATCH = 0.05
 """Share of the sliding force that catches a contact which has slipped back for an instant."""
 
 PULLED = "_pull"
+CAUGHT = "_catch"
 LEFT = "rest_left"
 """State of an arc at whose end a contact leaves rest: the time that is left of it [s]."""
 
 
 def breaks_away(span: Span) -> bool:
-    """Whether some contact breaks away at the start of an arc."""
-    return any(name.endswith(PULLED) for name in span.model.outputs)
+    """Whether some contact breaks away or is caught at the start of an arc."""
+    return any(name.endswith((PULLED, CAUGHT)) for name in span.model.outputs)
 
 
 def carrier(model: Model, contact: Contact) -> tuple[str, int] | None:
@@ -92,7 +93,7 @@ def arc_model(
                 outputs[f"{c.name}_first_{name}"] = rooms[side] / size
             if side := caught.get(c.name, 0):
                 back = -side * c.sliding(-side)
-                outputs[f"{c.name}_catch"] = (side * force + (1.0 - CATCH) * back) / size
+                outputs[f"{c.name}{CAUGHT}"] = (side * force + (1.0 - CATCH) * back) / size
         new = {name: Output(expression, "1") for name, expression in outputs.items()}
         kept[key] = with_outputs(made, new)
     return kept[key]

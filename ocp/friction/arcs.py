@@ -28,7 +28,7 @@ from typing import TypeVar, final
 
 import casadi as ca
 
-from ocp.friction.arc_models import LEFT, PULLED, arc_model, carrier
+from ocp.friction.arc_models import CAUGHT, LEFT, PULLED, arc_model, carrier
 from ocp.friction.release import SIDES, excess, rubbing
 from ocp.friction.sequence import Arc, Leg
 from ocp.text.phase import Chain, Phase, Start
@@ -193,7 +193,7 @@ def _phase(
                 row = inside[f"{contact.name}_{side}"]
                 start[f"{contact.name}_first_{side}"] = row
             if contact.name in caught:
-                start[f"{contact.name}_catch"] = (0.0, None)
+                start[f"{contact.name}{CAUGHT}"] = (0.0, None)
         if contact.name in released:
             start[f"{contact.name}{PULLED}"] = _pull(place, contact.name, limited)
     signals = {*model.signals, *model.further}

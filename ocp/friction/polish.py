@@ -167,8 +167,8 @@ def polished(
             first = keep(polisher.solve(legs, known, intervals, 1e-2))
             if first.ok:
                 best = first
-                best = _settled(polisher, best, keep)
-                best = _better(polisher, best, NEW_ARC * whole, keep)
+                best = settled(polisher, best, keep)
+                best = better(polisher, best, NEW_ARC * whole, keep)
                 best = _fine(polisher, best, keep)
                 break
     found = whole_solution(problem, best or tried[0], [s.outcome.statistics for s in tried])
@@ -227,7 +227,7 @@ def _readings(
                 yield legs
 
 
-def _settled(polisher: Polisher, solved: Solved, keep: Keep) -> Solved:
+def settled(polisher: Polisher, solved: Solved, keep: Keep) -> Solved:
     """Without superfluous arcs, and with rests where contacts touch zero as they slip."""
     seen = {shown(solved.legs)}
     for _ in range(ROUNDS):
@@ -244,7 +244,7 @@ def _settled(polisher: Polisher, solved: Solved, keep: Keep) -> Solved:
     return solved
 
 
-def _better(polisher: Polisher, solved: Solved, width: float, keep: Keep) -> Solved:
+def better(polisher: Polisher, solved: Solved, width: float, keep: Keep) -> Solved:
     """The best of the sequence and of those next to it."""
     seen = {shown(solved.legs)}
     for _ in range(ROUNDS):
@@ -256,7 +256,7 @@ def _better(polisher: Polisher, solved: Solved, width: float, keep: Keep) -> Sol
             left = pruned(other.legs, GONE * polisher.shortest)
             if not other.ok or shown(left) in seen - {shown(legs)}:
                 continue
-            other = _settled(polisher, other, keep)
+            other = settled(polisher, other, keep)
             if other.ideal_cost < solved.ideal_cost - WORTH * abs(solved.ideal_cost):
                 solved = other
                 break
@@ -293,5 +293,5 @@ def _fine(polisher: Polisher, solved: Solved, keep: Keep) -> Solved:
         if not finer.ok:
             break
         before = solved.ideal_cost
-        solved = _settled(polisher, finer, keep)
+        solved = settled(polisher, finer, keep)
     return solved

@@ -119,7 +119,7 @@ class Polisher:
         at_rest: contacts that are at rest at the start.
         solver, scheme, progress: as in `polish`.
         shortest: least duration of an arc [s].
-        kick: least length of the interval in which a contact breaks away [s].
+        kick: least length of the interval in which a contact breaks away or is caught [s].
     """
 
     problem: Problem

@@ -8,7 +8,7 @@ import pytest
 
 from ocp.friction.carry import Known
 from ocp.friction.mode_models import smooth_model, widths
-from ocp.friction.polish import KICK, SHORTEST, Polisher, _better, _settled, parameters_of
+from ocp.friction.polish import KICK, SHORTEST, Polisher, better, parameters_of, settled
 from ocp.friction.reading import sizes_of
 from ocp.friction.repair import neighbours
 from ocp.friction.sequence import Leg, Run, Track, cut, shown, with_rests
@@ -49,10 +49,10 @@ def legs_of(*runs: tuple[int, float, float]) -> tuple[Leg, ...]:
     return cut([track], (0, 0), 0.0, 1.0), cut([track], (1, 0), 1.0, 2.0)
 
 
-def settled(legs: tuple[Leg, ...]) -> Solved:
+def found_for(legs: tuple[Leg, ...]) -> Solved:
     first = polisher().solve(legs, known(), 30, 1e-2)
     assert first.ok
-    return _settled(polisher(), first, lambda solved: solved)
+    return settled(polisher(), first, lambda solved: solved)
 
 
 WRONG = {
@@ -66,7 +66,7 @@ WRONG = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", WRONG)
 def test_what_is_superfluous_shrinks_and_is_pruned(name: str) -> None:
-    found = settled(legs_of(*WRONG[name]))
+    found = found_for(legs_of(*WRONG[name]))
     assert shown(found.legs) == "+ | -"
     assert found.ideal_cost == pytest.approx(64.59984, rel=1e-3)
 
@@ -76,22 +76,22 @@ def test_rests_are_put_where_nothing_was_and_pruned_again() -> None:
     rested = with_rests(track, lambda t: True, 0.01)
     legs = cut([rested], (0, 0), 0.0, 1.0), cut([rested], (1, 0), 1.0, 2.0)
     assert shown(legs) == "0+0- | -0"
-    assert shown(settled(legs).legs) == "+ | -"
+    assert shown(found_for(legs).legs) == "+ | -"
 
 
 def test_sequences_next_to_one_are_tried_and_the_better_one_is_kept() -> None:
     """Turning earlier or later than at the instant that is set costs more here."""
     legs = legs_of((1, 0, 1), (-1, 1, 2))
     assert [shown(other) for other in neighbours(legs, 0.01)] == ["+- | -", "+ | +-"]
-    found = settled(legs)
-    kept = _better(polisher(), found, 0.01, lambda solved: solved)
+    found = found_for(legs)
+    kept = better(polisher(), found, 0.01, lambda solved: solved)
     assert shown(kept.legs) == "+ | -"
     assert kept.outcome.cost <= found.outcome.cost
 
 
 def test_a_rest_that_leaves_below_the_static_level_is_no_solution() -> None:
     """The force when it breaks away is above the 6 N of the guide, from the start on."""
-    found = settled(legs_of((1, 0, 1), (-1, 1, 2)))
+    found = found_for(legs_of((1, 0, 1), (-1, 1, 2)))
     forces = [points.u[0, 0] for points in found.points.spans]
     assert forces[0] >= 6.0 * 1.009
     assert forces[1] <= -6.0 * 1.009
