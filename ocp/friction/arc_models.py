@@ -15,6 +15,7 @@ from symfric.model import Contact, Model, Output
 CATCH = 0.05
 """Share of the sliding force that catches a contact which has slipped back for an instant."""
 
+FIRST = "_first_"
 PULLED = "_pull"
 CAUGHT = "_catch"
 LEFT = "rest_left"
@@ -90,7 +91,7 @@ def arc_model(
             for side, name in SIDES.items():
                 less = fading if leaving.get(c.name) == side else 0.0
                 outputs[f"{c.name}_{name}"] = made.expression(f"{c.name}_grip_{name}") / size - less
-                outputs[f"{c.name}_first_{name}"] = rooms[side] / size
+                outputs[f"{c.name}{FIRST}{name}"] = rooms[side] / size
             if side := caught.get(c.name, 0):
                 back = -side * c.sliding(-side)
                 outputs[f"{c.name}{CAUGHT}"] = (side * force + (1.0 - CATCH) * back) / size

@@ -28,7 +28,7 @@ from typing import TypeVar, final
 
 import casadi as ca
 
-from ocp.friction.arc_models import CAUGHT, LEFT, PULLED, arc_model, carrier
+from ocp.friction.arc_models import CAUGHT, FIRST, LEFT, PULLED, arc_model, carrier
 from ocp.friction.release import SIDES, excess, rubbing
 from ocp.friction.sequence import Arc, Leg
 from ocp.text.phase import Chain, Phase, Start
@@ -191,7 +191,7 @@ def _phase(
         if not modes[contact.name]:  # between the start and the first point, too
             for side in SIDES.values():
                 row = inside[f"{contact.name}_{side}"]
-                start[f"{contact.name}_first_{side}"] = row
+                start[f"{contact.name}{FIRST}{side}"] = row
             if contact.name in caught:
                 start[f"{contact.name}{CAUGHT}"] = (0.0, None)
         if contact.name in released:

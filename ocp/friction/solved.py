@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.holding import holding_losses
-from ocp.friction.arc_models import breaks_away
+from ocp.friction.arc_models import FIRST, breaks_away
 from ocp.friction.arcs import in_arcs
 from ocp.friction.carry import Known, points_in
 from ocp.friction.release import SIDES
@@ -20,6 +20,7 @@ from ocp.solvers.ipopt import Ipopt
 from ocp.solvers.outcome import Iterate, Outcome, Report, in_stage
 from ocp.solving.one_solve import when
 from ocp.text.problem import Problem
+from ocp.text.span import Row
 from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise
@@ -86,7 +87,7 @@ class Solved:
         for span, arc, points in zip(spans, arcs, self.points.spans, strict=True):
             model, n = span.model, points.u.shape[1]
             rooms = [
-                model.outputs[f"{name}_first_{side}"].expression
+                model.outputs[f"{name}{FIRST}{side}"].expression
                 for name, mode in arc.modes.items()
                 for side in SIDES.values()
                 if not mode
@@ -144,7 +145,9 @@ class Polisher:
         whole = sum(leg.duration for leg in legs)
         parts = [max(LEAST, round(intervals * arc.duration / whole)) for arc in flat(legs)]
         meshes = [np.linspace(0.0, 1.0, n + 1) for n in parts]
-        return self.on(legs, discretise(problem, self.scheme), meshes, known, barrier)
+        return self.on(
+            legs, discretise(problem, self.scheme, _sawn(problem)), meshes, known, barrier
+        )
 
     def on(
         self,
@@ -172,6 +175,23 @@ class Polisher:
         )
         durations = [span.T for span in transcription.unpack(outcome.iterate.w).spans]
         return Solved(placed(legs, durations), discretisation, transcription, outcome)
+
+
+def _sawn(problem: Problem) -> dict[int, list[Row]]:
+    """Of each arc the rooms of rests that jump with the inputs: asked for where these begin.
+
+    Where the force at rest follows its level, inputs that are held make a saw of it, whose teeth
+    stand at the starts of intervals, between collocation points.
+    """
+    found: dict[int, list[Row]] = {}
+    for number, span in enumerate(problem.spans):
+        u = span.model.vector("u")
+        found[number] = [
+            row
+            for row in span.rows_at[0.0]
+            if FIRST in row.name and ca.depends_on(row.expression, u)
+        ]
+    return found
 
 
 def _with_kick(mesh: Array, kick: float) -> Array:

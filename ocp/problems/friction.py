@@ -4,7 +4,7 @@ All minimise the integral of the squared input. `v_t` is the width of the law [m
 1e-6 it is sharp, and the optimum is that of Coulomb's law with stiction.
 """
 
-from math import nan, pi
+from math import pi
 
 import casadi as ca
 
@@ -208,8 +208,8 @@ FRICTION = (
         "two_blocks",
         "two coupled blocks with a contact each",
         two_blocks,
-        nan,
-        nan,
+        60.65,
+        1e-2,
         BEST,
         friction=True,
     ),

@@ -114,6 +114,51 @@ def at_nodes(local: Local) -> list[AtNode]:
     return found
 
 
+@final
+@dataclass(frozen=True, eq=False)
+class AtStarts:
+    """Rows at the starts of the intervals of a span, with the inputs that begin there.
+
+    Inputs are held: what depends on them jumps there, before the first collocation point. That of
+    the first interval is left to the conditions at the start of the span.
+
+    Attributes:
+        local: their unknowns.
+        rows: the conditions.
+        block: their values.
+    """
+
+    local: Local
+    rows: tuple[Row, ...]
+    block: Block
+
+    def piece(self, layout: Layout, scheme: Coefficients, data: Data) -> Piece:
+        """The piece of it; algebraic variables are those of the first collocation points."""
+        number = self.local.number
+        span, at = layout.spans[number], np.arange(1, layout.spans[number].intervals)
+        z = span.z[:, at * scheme.degree]
+        parts = self.local.columns(layout, span.nodes[:, at], z, span.u[:, at], at.size)
+        return Piece(
+            tuple(row.name for row in self.rows),
+            np.array([row.nominal for row in self.rows]),
+            np.array([row.lower / row.nominal for row in self.rows]),
+            np.array([row.upper / row.nominal for row in self.rows]),
+            order_of(number, at, LAST - 1),
+            number,
+            at,
+            np.zeros(at.size),
+            self.block,
+            select(parts, at.size),
+            data.theta(at, np.zeros(at.size), np.zeros(at.size)),
+        )
+
+
+def at_starts(local: Local, rows: Sequence[Row]) -> AtStarts:
+    """Conditions at the starts of all intervals of a span but the first one."""
+    expressions = stacked(row.expression / row.nominal for row in rows)
+    return AtStarts(local, tuple(rows), _node_block(local, expressions, None))
+
+
 def _knows_inside(span: Span, expression: ca.SX) -> bool:
     """Whether an expression holds algebraic variables or inputs."""
     inside = ca.vertcat(span.model.vector("z"), span.model.vector("u"))

@@ -16,7 +16,14 @@ from ocp.transcription.blocks import Array, Piece
 from ocp.transcription.bounds import bounds_of, scale_of
 from ocp.transcription.closed_loops import Closing
 from ocp.transcription.collocation import PointEquations, ends_of, gaps, pieces_of_points
-from ocp.transcription.conditions import AtNode, Between, largest, plain_links, whole
+from ocp.transcription.conditions import (
+    AtNode,
+    AtStarts,
+    Between,
+    largest,
+    plain_links,
+    whole,
+)
 from ocp.transcription.local import Data
 from ocp.transcription.points import Layout, Sizes, lay_out
 from ocp.transcription.program import Stages
@@ -36,6 +43,7 @@ class Equations:
         closing: of each span the constraints of its mechanism; None where it has none.
         nodes: conditions at single nodes.
         between: conditions between spans.
+        starts: conditions at the starts of all intervals.
     """
 
     problem: Problem
@@ -44,6 +52,7 @@ class Equations:
     closing: tuple[Closing | None, ...]
     nodes: tuple[AtNode, ...]
     between: tuple[Between, ...]
+    starts: tuple[AtStarts, ...] = ()
 
     @property
     def released(self) -> list[dict[float, dict[int, Box]]]:
@@ -202,6 +211,10 @@ def _pieces(
         number = condition.local.number
         node = nodes[number][condition.fraction]
         yield condition.piece(layout, scheme, data[number], node)
+    for condition in made.starts:
+        number = condition.local.number
+        if layout.spans[number].intervals > 1:
+            yield condition.piece(layout, scheme, data[number])
     for condition in made.between:
         yield condition.piece(layout, scheme, data)
     yield from whole(made.problem, layout, made.released)

@@ -7,15 +7,16 @@ what holds at single nodes: `discretise` does it once. `Discretisation.on` puts 
 fractions, like all parameters, are parameters of the program.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import final
 
 from ocp.text.problem import Problem
+from ocp.text.span import Row
 from ocp.transcription.blocks import Array
 from ocp.transcription.closed_loops import Closing, closing
 from ocp.transcription.collocation import PointEquations, point_equations
-from ocp.transcription.conditions import AtNode, Between, at_nodes, between
+from ocp.transcription.conditions import AtNode, Between, at_nodes, at_starts, between
 from ocp.transcription.grid import check_meshes, nodes_of
 from ocp.transcription.local import Local
 from ocp.transcription.schemes import Scheme, Shooting
@@ -72,8 +73,17 @@ class Discretisation:
         return Transcription(problem, self.scheme, given, skeleton)
 
 
-def discretise(problem: Problem, scheme: Scheme) -> Discretisation:
-    """Write the equations of `problem` at points and nodes, and differentiate them."""
+def discretise(
+    problem: Problem, scheme: Scheme, starts: Mapping[int, Sequence[Row]] | None = None
+) -> Discretisation:
+    """Write the equations of `problem` at points and nodes, and differentiate them.
+
+    Args:
+        problem: what to discretise.
+        scheme: how; one of collocation where there are `starts`.
+        starts: number of a span -> conditions that hold at the start of each interval but the
+            first one, with the inputs that begin there.
+    """
     choices = {choice.name: choice.nominal for choice in problem.chosen}
     phases = len(problem.chain)
     made: dict[tuple[object, ...], PointEquations | Shot] = {}
@@ -97,5 +107,8 @@ def discretise(problem: Problem, scheme: Scheme) -> Discretisation:
         nodes += at_nodes(local)
         if earlier:
             joined += between(spans[-2].local, local)
-    equations = Equations(problem, scheme, tuple(spans), tuple(loops), tuple(nodes), tuple(joined))
+    held = tuple(at_starts(spans[k].local, rows) for k, rows in (starts or {}).items() if rows)
+    equations = Equations(
+        problem, scheme, tuple(spans), tuple(loops), tuple(nodes), tuple(joined), held
+    )
     return Discretisation(equations)

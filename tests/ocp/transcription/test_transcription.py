@@ -21,6 +21,7 @@ from ocp.text.cost import at_end, integral
 from ocp.text.phase import Phase
 from ocp.text.problem import Problem
 from ocp.text.ranges import Free
+from ocp.text.span import Row
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.points import Points, SpanPoints
 from ocp.transcription.schemes import Legendre, Radau, Scheme
@@ -119,6 +120,24 @@ def test_mechanism_without_inverse_is_the_one_with_it() -> None:
         scale = np.array([rows[i].scale for i in own])
         expected = -M(inner[:, k], []).full() @ plain[own]
         np.testing.assert_allclose(implicit[own] * scale, expected, atol=1e-9 * h)
+
+
+def test_conditions_at_starts_of_intervals_know_the_input_that_begins_there() -> None:
+    """x = t^3, a = (1, 2, 3, 4) held over quarters of 1 s: x + 10 a where each of them begins."""
+    problem = unit_move()
+    x, a = UNIT.expression("x"), UNIT.expression("a")
+    row = Row("the sum", x + 10.0 * a, 2.0, np.inf)
+    made = discretise(problem, Radau(3), {0: [row]})
+    for mesh in (np.linspace(0.0, 1.0, 5), np.array([0.0, 0.1, 0.5, 0.8, 1.0]), np.array([0.0, 1])):
+        t = made.on([mesh])
+        points = at_points(t, lambda s: (s**3, 3 * s**2), 1.0, 1.0).spans[0]
+        u = np.arange(1.0, mesh.size)[None]
+        _, g = values(t, Points((replace(points, u=u),)))
+        own = [i for i, place in enumerate(t.program.rows) if place.name == "the sum"]
+        np.testing.assert_allclose(2.0 * g[own], mesh[1:-1] ** 3 + 10.0 * u[0, 1:])
+        fractions = [t.program.rows[i].fraction for i in own]
+        np.testing.assert_allclose(fractions, mesh[1:-1])
+        assert (t.program.lower_g[own] == 1.0).all()
 
 
 def test_nominal_values_scale_unknowns_and_rows() -> None:
