@@ -23,7 +23,7 @@ from symfric import BrownMcPhee, drive
 
 def problems() -> dict[str, Problem]:
     """The moves by name."""
-    friction = BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-3)  # with N = 1 N these are newtons
+    friction = BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-5)  # with N = 1 N these are newtons
     move = Phase(drive(friction, m=1.0, N=1.0), T=1.0, end={"x": 1.0, "v": 0.0})
     free = replace(move, T=Free(0.1, 10.0, guess=1.0))
     gentle = Problem(move, integral(lambda s: s.force**2), bounds={"force": (-20.0, 20.0)})

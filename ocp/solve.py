@@ -34,6 +34,8 @@ Friction = Literal["auto", "smooth", "sharpen", "modes"]
 INTERVALS = 50
 EARLY = 0.04
 """Layers, in multiples of the speeds, from which on the modes of a motion may be read."""
+CLOSE_PASSES, CLOSE_INTERVALS, CLOSE_ITERATIONS = 4, 400, 60
+"""What a solve is allowed that starts at a motion by modes: its law is near, or not found."""
 STOPPED = (Status.INTERRUPTED, Status.TIME_LIMIT)
 EXACT_RTOL = 1e-7
 """Relative tolerance of the motion with exact friction: a hundredth of what matters."""
@@ -164,14 +166,20 @@ class _Job:
             return self.checked(self.plain(self.guess))
         return self.sharp()
 
-    def plain(self, guess: Start, meshes: Sequence[Array] | None = None) -> Solution:
-        """The models as they are."""
+    def plain(
+        self, guess: Start, meshes: Sequence[Array] | None = None, *, close: bool = False
+    ) -> Solution:
+        """The models as they are; from `close` by, a solver that loses its way is left."""
         if meshes is None:
             wanted = INTERVALS if self.intervals is None else self.intervals
             meshes = make_meshes(self.problem, wanted)
-        goals = Goals.of(self.tolerance)
+        goals, solver = Goals.of(self.tolerance), self.solver
+        if close:
+            goals = replace(goals, passes=CLOSE_PASSES, most=CLOSE_INTERVALS, patient=False)
+            if isinstance(solver, Ipopt) and "max_iter" not in solver.options:
+                solver = solver.with_options(max_iter=CLOSE_ITERATIONS)
         return refined_solve(
-            self.problem, meshes, self.scheme, self.solver, guess, self.progress,
+            self.problem, meshes, self.scheme, solver, guess, self.progress,
             goals=goals if self.refine else replace(goals, passes=1), limit=self.clock.within,
         )  # fmt: skip
 
@@ -233,7 +241,7 @@ class _Job:
         exact = self.checked(_after(sharp.solution, exact))
         narrow = own_level(self.problem, sharp.scales) < SHARPEST
         if exact.status in MISSED and not narrow and not self.clock.over:
-            own = self.checked(self.plain(exact, exact.meshes))
+            own = self.checked(self.plain(exact, exact.meshes, close=True))
             if own.verified:
                 return _Exact(_after(exact, replace(own, modes=exact.modes)), True)
             exact = _after(own, exact)

@@ -53,6 +53,7 @@ class Goals:
         most: intervals at most, of all phases together.
         nonzeros: of Jacobian and Hessian of the program, up to which a mesh is made finer for the
             sake of the cost alone: 1000 intervals of a small model, 70 of an arm with six joints.
+        patient: whether a mesh on which the solver runs out of iterations is made finer, too.
     """
 
     local: float
@@ -61,6 +62,7 @@ class Goals:
     passes: int = 8
     most: int = 1000
     nonzeros: int = 150_000
+    patient: bool = True
 
     @staticmethod
     def of(tolerance: float) -> "Goals":
@@ -128,7 +130,8 @@ def refined_solve(
     statistics, state = found.statistics, Excess()
     capped = False
     for number in range(2, goals.passes + 1):
-        if not new.ok and not (capped and new.status is Status.MAX_ITERATIONS):
+        spent = capped and goals.patient and new.status is Status.MAX_ITERATIONS
+        if not new.ok and not spent:
             break
         finer, state = finer_meshes(made, new, goals, state)
         fine = not finer or (state.stuck and _full(new.meshes, goals))

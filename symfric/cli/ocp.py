@@ -66,7 +66,7 @@ def ocp(
     plot: PlotOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Solve an optimal control problem, and check it by simulation.
+    """Solve an optimal control problem and check it.
 
     Without a name: the list of ready problems. --set takes their numbers, and those of the
     function in a file.
