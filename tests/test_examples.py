@@ -22,10 +22,12 @@ def period_is_between_those_of_two_laws(printed: str, folder: Path) -> None:
 
 def moves_are_solved_and_saved(printed: str, folder: Path) -> None:
     assert printed.count("SOLVED") == 3
-    ends = {"optimal_moves.png", "fastest_move.png", "fastest_move.csv", "fastest_move.json"}
-    assert {path.name for path in folder.iterdir()} == ends
+    files = {"optimal_moves.png", "fastest_move.png", "fastest_move.csv", "fastest_move.json"}
+    assert {path.name for path in folder.iterdir()} == files
     data = json.loads((folder / "fastest_move.json").read_text())
-    assert abs(data["terminal_miss"]["x"]) < 1e-3
+    ends = [m for m in data["verification"]["checked"] if m["what"] == "end"]
+    assert {m["name"] for m in ends} == {"x", "v"}
+    assert all(m["relative"] < 1e-4 for m in ends)
 
 
 def drive_has_learnt_to_stop(printed: str, folder: Path) -> None:
