@@ -11,11 +11,13 @@ from ocp.checking.refining import Goals, refined_solve
 from ocp.checking.verification import Verification
 from ocp.checking.verify import verified
 from ocp.checking.verify import verify as verify_solution
+from ocp.friction.own_law import STEPS, OwnLaw
 from ocp.friction.polish import polish, refusal
 from ocp.friction.referee import verify_exactly
 from ocp.friction.scales import has_jumps, own_level, speeds_at
 from ocp.friction.sharpen import FINE, LAST, STARTS, Sharp, sharpened
 from ocp.result.solution import Solution
+from ocp.result.stored import Stored
 from ocp.solvers.fatrop import Fatrop
 from ocp.solvers.ipopt import Ipopt
 from ocp.solvers.outcome import Report
@@ -75,7 +77,9 @@ def solve(
                    the instants between them (`ocp.friction.polish`): for exact Coulomb friction
                    with stiction, whatever smooths it. `solution.modes` tells them. A law with
                    states (LuGre, GMS) is replaced by its steady sliding and its static level, and
-                   the result verified with the law itself.
+                   the result verified with the law itself. If it misses, `Shooting` with
+                   exponential steps goes on from there with the law itself where it can; the
+                   message says so. `scheme=Shooting(...)` with "auto" always does.
         "sharpen"  layers from wide to narrow, down to those of the law, or as far as it gets.
         "smooth"   the models as they are, states of laws included.
 
@@ -153,6 +157,8 @@ class _Job:
     def solved(self) -> Solution:
         """By the way that the problem needs."""
         holding, shooting = has_jumps(self.problem), isinstance(self.scheme, Shooting)
+        if shooting and self.by_static_side:
+            return self.shot()
         if self.friction in ("sharpen", "modes") and (shooting or not holding):
             what = "collocation, such as Radau(3)" if shooting else "a contact that holds at rest"
             raise ValueError(f"solve: friction '{self.friction}': expected {what}, got none")
@@ -165,6 +171,25 @@ class _Job:
                 )
             return self.checked(self.plain(self.guess))
         return self.sharp()
+
+    @property
+    def by_static_side(self) -> bool:
+        """Whether shooting starts from what collocation finds with the static side of laws."""
+        known = isinstance(self.guess, Solution | Stored)
+        return self.friction == "auto" and not known and bool(self.hidden) and self.smoothable
+
+    @property
+    def smoothable(self) -> bool:
+        """Whether the modes of the problem can be sought."""
+        return not refusal(self.problem) and not any(s.model.events for s in self.problem.spans)
+
+    def shot(self) -> Solution:
+        """Laws with states by the user's shooting, from the motion with their static side."""
+        static = replace(self, scheme=Radau(), friction="modes", verify=False).sharp()
+        if static.status in STOPPED or not static.ok:
+            return static
+        own = self.by_own_law(static)
+        return own if own.verification is not None else self.checked(own)
 
     def plain(
         self, guess: Start, meshes: Sequence[Array] | None = None, *, close: bool = False
@@ -239,6 +264,10 @@ class _Job:
             stopped = replace(both, status=exact.status, message=said, cause=exact.cause)
             return _Exact(stopped, right=False)
         exact = self.checked(_after(sharp.solution, exact))
+        if exact.status in MISSED and self.hidden and not self.clock.over:
+            exact = self.by_own_law(exact)
+            if exact.verified:
+                return _Exact(exact, True)
         narrow = own_level(self.problem, sharp.scales) < SHARPEST
         if exact.status in MISSED and not narrow and not self.clock.over:
             own = self.checked(self.plain(exact, exact.meshes, close=True))
@@ -246,6 +275,28 @@ class _Job:
                 return _Exact(_after(exact, replace(own, modes=exact.modes)), True)
             exact = _after(own, exact)
         return self.judged(exact)
+
+    def by_own_law(self, exact: Solution) -> Solution:
+        """A motion that misses with a law with states, found with that law itself by shooting.
+
+        `exact`, with the reason, where that does not succeed.
+        """
+        scheme = (
+            self.scheme if isinstance(self.scheme, Shooting) else Shooting("exponential", STEPS)
+        )
+        solver = self.solver if isinstance(self.solver, Ipopt) else Ipopt()
+        way = OwnLaw(self.problem, scheme, solver, self.tolerance, self.clock, self.progress)
+        try:
+            own = way.solved(exact)
+        except ValueError as error:  # mechanisms, algebraic variables
+            return replace(exact, message=f"{exact.message} With the law itself: {error}.")
+        own = _after(exact, own)
+        if not own.verified:
+            said = f"{exact.message} By {scheme} with the law itself: {own.message}"
+            kept = replace(exact, message=said, statistics=own.statistics)
+            stopped = own.status in STOPPED
+            return replace(kept, status=own.status, cause=own.cause) if stopped else kept
+        return replace(own, modes=exact.modes)
 
     def judged(self, exact: Solution) -> "_Exact":
         """A motion by modes with what the law by events, which smooths nothing, says of it."""
@@ -300,12 +351,16 @@ class _Job:
 
         Intervals that start without them err.
         """
-        contacts = [c for phase in self.problem.chain for c in phase.model.contacts]
-        hidden = {v.name for c in contacts for v in c.states}
-        if not hidden:
+        if not self.hidden:
             return found
-        kept = [m for m in found.checked if m.name not in hidden and m.what != "local error"]
+        kept = [m for m in found.checked if m.name not in self.hidden and m.what != "local error"]
         return replace(found, checked=tuple(kept), restarted=None)
+
+    @property
+    def hidden(self) -> set[str]:
+        """States of laws, which a motion by modes does not know."""
+        contacts = [c for phase in self.problem.chain for c in phase.model.contacts]
+        return {v.name for c in contacts for v in c.states}
 
 
 def _after(first: Solution, later: Solution) -> Solution:
