@@ -88,6 +88,9 @@ SAME = 3.0
 
 EARLY = {"tol": 1e-4, "max_iter": 100}
 LATER = {"tol": 1e-5, "max_iter": 60, "mu_init": 1e-3}
+BOUNDING = {"max_iter": 150}
+"""Where the largest cost counts: with a small barrier parameter the multipliers of the bounds of
+the costs start wrong, and with them all curvature."""
 ENDED = (Status.INTERRUPTED, Status.TIME_LIMIT)
 
 
@@ -298,6 +301,8 @@ class _Path:
         """One solve with layers of `level`."""
         widths = widths_at(self.user, self.scales, level)
         values = transcription.values(widths)
+        if self.problem.kind == "worst":
+            options = {name: v for name, v in options.items() if name != "mu_init"} | BOUNDING
         key = (id(transcription.skeleton), str(options))
         prepared = self.prepared.get(key)
         if prepared is None:
