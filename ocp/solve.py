@@ -38,6 +38,9 @@ EARLY = 0.04
 """Layers, in multiples of the speeds, from which on the modes of a motion may be read."""
 CLOSE_PASSES, CLOSE_INTERVALS, CLOSE_ITERATIONS = 4, 400, 60
 """What a solve is allowed that starts at a motion by modes: its law is near, or not found."""
+SHARED_PASSES, SHARED_ITERATIONS = 4, 150
+"""What is allowed where scenarios share inputs: their contacts turn round at many instants, and
+each finer mesh is a search among kinks for a thousandth of the cost."""
 STOPPED = (Status.INTERRUPTED, Status.TIME_LIMIT)
 EXACT_RTOL = 1e-7
 """Relative tolerance of the motion with exact friction: a hundredth of what matters."""
@@ -195,14 +198,17 @@ class _Job:
         self, guess: Start, meshes: Sequence[Array] | None = None, *, close: bool = False
     ) -> Solution:
         """The models as they are; from `close` by, a solver that loses its way is left."""
+        goals, solver, most = Goals.of(self.tolerance), self.solver, 0
         if meshes is None:
             wanted = INTERVALS if self.intervals is None else self.intervals
             meshes = make_meshes(self.problem, wanted)
-        goals, solver = Goals.of(self.tolerance), self.solver
+        elif self.problem.scenarios:
+            goals, most = replace(goals, passes=SHARED_PASSES), SHARED_ITERATIONS
         if close:
+            most = CLOSE_ITERATIONS
             goals = replace(goals, passes=CLOSE_PASSES, most=CLOSE_INTERVALS, patient=False)
-            if isinstance(solver, Ipopt) and "max_iter" not in solver.options:
-                solver = solver.with_options(max_iter=CLOSE_ITERATIONS)
+        if most and isinstance(solver, Ipopt) and "max_iter" not in solver.options:
+            solver = solver.with_options(max_iter=most)
         return refined_solve(
             self.problem, meshes, self.scheme, solver, guess, self.progress,
             goals=goals if self.refine else replace(goals, passes=1), limit=self.clock.within,

@@ -119,7 +119,8 @@ def refined_solve(
         transcription = made.on(meshes)
         key = (transcription.skeleton, number == 1, capped)
         if key not in ready:  # on as many intervals the program is the same
-            ready[key] = _later(solver, number, capped).prepared(transcription.program)
+            later = _later(problem, solver, number, capped)
+            ready[key] = later.prepared(transcription.program)
         built = perf_counter() - began
         stage = in_stage(progress, f"mesh {number}")
         new = solve_on(transcription, limit(ready[key]), guess, stage)
@@ -157,11 +158,13 @@ def _told(solution: Solution, state: "Excess") -> Solution:
     return replace(solution, message=f"{solution.message} {said}")
 
 
-def _later(solver: Solver, number: int, capped: bool) -> Solver:
+def _later(problem: Problem, solver: Solver, number: int, capped: bool) -> Solver:
     """The solver of a pass that starts close by; what the user says wins."""
     if number == 1 or not isinstance(solver, Ipopt):
         return solver
-    later: dict[str, float] = {"mu_init": LATER} | ({"max_iter": CAP} if capped else {})
+    later: dict[str, float] = {"max_iter": CAP} if capped else {}
+    if problem.kind != "worst":  # whose multipliers must settle
+        later["mu_init"] = LATER
     return solver.with_options(**{k: v for k, v in later.items() if k not in solver.options})
 
 

@@ -88,7 +88,7 @@ SAME = 3.0
 
 EARLY = {"tol": 1e-4, "max_iter": 100}
 LATER = {"tol": 1e-5, "max_iter": 60, "mu_init": 1e-3}
-BOUNDING = {"max_iter": 150}
+BOUNDING = {"max_iter": 80}
 """Where the largest cost counts: with a small barrier parameter the multipliers of the bounds of
 the costs start wrong, and with them all curvature."""
 ENDED = (Status.INTERRUPTED, Status.TIME_LIMIT)

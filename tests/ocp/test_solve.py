@@ -18,9 +18,10 @@ from ocp import (
     at_end,
     integral,
     solve,
+    worst,
 )
 from ocp.problems.friction import out_and_back
-from symfric import GMS, ExactCoulomb, SolveError, Status, drive
+from symfric import GMS, BrownMcPhee, ExactCoulomb, SolveError, Status, drive
 from symfric.laws import Law
 
 OUT_AND_BACK = 40.0 + 0.5 / (1.0 - 4.0 * tanh(0.25))
@@ -157,3 +158,22 @@ def test_a_stop_while_modes_are_sought_leaves_the_smooth_motion() -> None:
     assert stopped.modes == {}
     assert sum(stage.startswith("modes") for stage in stages) == 1
     assert abs(stopped["x"][-1]) < 1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("largest", [False, True])
+def test_one_control_serves_dry_and_oiled(largest: bool) -> None:
+    law = BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-2, N_t=1e-3)
+    stage = drive(law, free=["mu_d"], m=1.0, N=1.0)
+    move = Phase(stage, 1.2, start={"x": 0.0, "v": 0.0}, end={"x": (0.9, 1.1)})
+    effort = integral(lambda s: s.force**2)
+    both = Problem(
+        move,
+        worst(effort) if largest else effort,
+        scenarios={"dry": {"mu_d": 5.0}, "oiled": {"mu_d": 3.0}},
+    )
+    solution = solve(both, starts=3)
+    assert solution.verified
+    ends = [motion["x"][-1] for motion in solution.scenarios.values()]
+    assert min(ends) == pytest.approx(0.9, abs=1e-3)
+    assert max(ends) <= 1.101
