@@ -13,11 +13,13 @@ from symfric.foundation.parameters import Variable
 from symfric.model import Contact, Model, Output
 
 CATCH = 0.05
-"""Share of the sliding force that catches a contact which has slipped back for an instant."""
+"""Share of the sliding force that catches a contact which has slipped back for an instant, or that
+stops one: with none it would only graze rest, and the least deviation lets it slip on."""
 
 FIRST = "_first_"
 PULLED = "_pull"
 CAUGHT = "_catch"
+STOPPED = "_stop"
 LEFT = "rest_left"
 """State of an arc at whose end a contact leaves rest: the time that is left of it [s]."""
 
@@ -48,6 +50,7 @@ def arc_model(
     released: Sequence[str],
     leaving: Mapping[str, int],
     caught: Mapping[str, int],
+    stopped: Mapping[str, int],
     sizes: Mapping[str, float],
     margin: tuple[float, float],
 ) -> Model:
@@ -59,6 +62,7 @@ def arc_model(
         released: contacts that break away at the start of the arc.
         leaving: contacts that leave rest at its end by a force that cannot jump, and to which side.
         caught: contacts that come to rest at its start, and to which side they slipped until then.
+        stopped: those that do by a force that cannot jump.
         sizes: contact -> typical static level [N].
         margin: share of the level that a rest keeps away from it, and how long before the end of
             the arc it begins to give that up where it leaves [s].
@@ -68,10 +72,20 @@ def arc_model(
         room of a rest to both sides, less margin times tanh (time left / that time)^2 where it
         leaves; "<contact>_first_up" and "<contact>_first_down", the same for what states and inputs
         at the start of an interval ask for; "<contact>_pull", excess of what is released; and
-        "<contact>_catch", room below the force of sliding back of what is caught.
+        "<contact>_catch", room below the force of sliding back of what is caught, "<contact>_stop"
+        below that of sliding on of what is stopped.
     """
     kept: dict[Any, Model] = model.memory.setdefault("ocp arcs", {})
-    key = (*modes.items(), *released, *leaving.items(), *caught.items(), *sizes.items(), *margin)
+    key = (
+        *modes.items(),
+        *released,
+        *leaving.items(),
+        *caught.items(),
+        STOPPED,
+        *stopped.items(),
+        *sizes.items(),
+        *margin,
+    )
     if key not in kept:
         made = mode_model(model, modes)
         outputs: dict[str, ca.SX] = {}
@@ -92,6 +106,9 @@ def arc_model(
                 less = fading if leaving.get(c.name) == side else 0.0
                 outputs[f"{c.name}_{name}"] = made.expression(f"{c.name}_grip_{name}") / size - less
                 outputs[f"{c.name}{FIRST}{name}"] = rooms[side] / size
+            if side := stopped.get(c.name, 0):
+                ahead = side * c.sliding(side)
+                outputs[f"{c.name}{STOPPED}"] = ((1.0 - CATCH) * ahead - side * force) / size
             if side := caught.get(c.name, 0):
                 back = -side * c.sliding(-side)
                 outputs[f"{c.name}{CAUGHT}"] = (side * force + (1.0 - CATCH) * back) / size

@@ -15,6 +15,9 @@ which the arcs are a motion with exact Coulomb friction and stiction, for each c
   turn it round. Then it slips back for this moment, and stops only if the force under the control
   after is below that of sliding, not just below the static level.
 
+* what comes to rest by a force that cannot jump is stopped by a share of the sliding force: where
+  slip only touches zero, the least deviation lets it slip on, past the rest.
+
 Conditions that depend on each other are written once, for solvers need independent ones: at rest
 slip stays zero by itself, so nothing is asked of it at the end of a rest.
 Source: Brogliato, Nonsmooth Mechanics, 3rd ed., 2016, ch. 5; Betts, Practical Methods for Optimal
@@ -28,7 +31,7 @@ from typing import TypeVar, final
 
 import casadi as ca
 
-from ocp.friction.arc_models import CAUGHT, FIRST, LEFT, PULLED, arc_model, carrier
+from ocp.friction.arc_models import CAUGHT, FIRST, LEFT, PULLED, STOPPED, arc_model, carrier
 from ocp.friction.release import SIDES, excess, rubbing
 from ocp.friction.sequence import Arc, Leg
 from ocp.text.phase import Chain, Phase, Start
@@ -170,9 +173,9 @@ def _phase(
     limited = {*problem.rates, *base.rates}
     tight = _tight(place, limited)
     leaving = {name: side for name, side in tight.items() if place.after.get(name) == side}
-    caught = _caught(place, limited)
+    caught, stopped = _caught(place, limited)
     margin = (GRIP, FADE * whole)
-    model = arc_model(base.model, modes, released, leaving, caught, sizes, margin)
+    model = arc_model(base.model, modes, released, leaving, caught, stopped, sizes, margin)
     start: Ranges = dict(base.start) if place.opens else {}
     link: dict[str, Start] = dict(base.link) if place.opens else {}
     end = _end(base, place)
@@ -194,6 +197,8 @@ def _phase(
                 start[f"{contact.name}{FIRST}{side}"] = row
             if contact.name in caught:
                 start[f"{contact.name}{CAUGHT}"] = (0.0, None)
+            if contact.name in stopped:
+                start[f"{contact.name}{STOPPED}"] = (0.0, None)
         if contact.name in released:
             start[f"{contact.name}{PULLED}"] = _pull(place, contact.name, limited)
     signals = {*model.signals, *model.further}
@@ -261,14 +266,17 @@ def _end_of(place: Place, contact: Contact, end: Ranges) -> Ranges:
     return end if mode else {n: r for n, r in end.items() if n != state}
 
 
-def _caught(place: Place, limited: Collection[str]) -> dict[str, int]:
-    """Contacts that come to rest under a control that may jump, and the side they slipped to."""
+def _caught(place: Place, limited: Collection[str]) -> tuple[dict[str, int], dict[str, int]]:
+    """Contacts that come to rest, and the side they slipped to.
+
+    First those under a control that may jump, then those by a force that cannot.
+    """
     modes = place.arc.modes
-    return {
-        name: side
-        for name, side in place.before.items()
-        if side and modes.get(name) == 0 and _jumps(place.model, {**modes, name: 1}, name, limited)
-    }
+    found: tuple[dict[str, int], dict[str, int]] = {}, {}
+    for name, side in place.before.items():
+        if side and modes.get(name) == 0:
+            found[not _jumps(place.model, {**modes, name: 1}, name, limited)][name] = side
+    return found
 
 
 def _tight(place: Place, limited: Collection[str]) -> dict[str, int]:

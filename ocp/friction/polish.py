@@ -269,17 +269,19 @@ def _fine(polisher: Polisher, solved: Solved, keep: Keep) -> Solved:
     """On intervals so short that holding the inputs costs next to nothing.
 
     What that costs is estimated, well enough where two meshes agree on the cost without it. As long
-    as they do not, all intervals are halved.
+    as they do not, all intervals are halved. Where a rest follows its level the estimate is too
+    large, and what the last mesh has gained decides.
     """
-    before = inf
+    before = inf, inf
     for _ in range(ROUNDS):
         t, allowed = solved.transcription, FINE * abs(solved.outcome.cost) + ZERO
         local = local_errors(arcs_of(t.problem, t.meshes, solved.points))
-        agree = abs(solved.ideal_cost - before) <= allowed
+        agree = abs(solved.ideal_cost - before[0]) <= allowed
+        enough = solved.loss <= allowed or 0.0 <= before[1] - solved.outcome.cost <= allowed
         exact = max(float(own.max()) for own in local) <= LOCAL
         outside = solved.overloaded
         held = not any(own.any() for own in outside)
-        if agree and exact and held and solved.loss <= allowed:
+        if agree and exact and held and enough:
             break
         least = 0.0 if agree else HALVED * LOCAL
         errors = [
@@ -289,9 +291,12 @@ def _fine(polisher: Polisher, solved: Solved, keep: Keep) -> Solved:
         meshes = refined(
             t.meshes, errors, [()] * len(errors), local=LOCAL, loss=allowed / 2, most=MOST
         )
-        finer = keep(polisher.on(solved.legs, solved.discretisation, meshes, solved.known, 1e-4))
+        parts = solved.legs, solved.discretisation, meshes
+        finer = keep(polisher.on(*parts, solved.known, 1e-4))
+        if not finer.ok:  # a long way along a flat valley
+            finer = keep(polisher.on(*parts, finer.known, 1e-2))
         if not finer.ok:
             break
-        before = solved.ideal_cost
+        before = solved.ideal_cost, solved.outcome.cost
         solved = settled(polisher, finer, keep)
     return solved

@@ -33,11 +33,12 @@ from ocp.checking.local_errors import local_errors
 from ocp.friction.many_starts import starts_around
 from ocp.friction.mode_models import smooth_model
 from ocp.friction.scales import Scale, Scales, guessed, same_size, scales_of, widths_at
+from ocp.friction.steps import Step, finalists, least
 from ocp.result.solution import Solution
 from ocp.result.stored import Stored, stored_spans
 from ocp.solvers.fatrop import Fatrop
 from ocp.solvers.ipopt import Ipopt
-from ocp.solvers.outcome import Iterate, Outcome, Report, SolverStatistics, in_stage
+from ocp.solvers.outcome import Iterate, Report, SolverStatistics, in_stage
 from ocp.solvers.prepared import Prepared
 from ocp.solvers.sqp import Sqp
 from ocp.solving.clock import Clock
@@ -51,7 +52,6 @@ from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Transcription
-from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
 Meshes = Sequence[Array]
@@ -88,10 +88,10 @@ SAME = 3.0
 
 EARLY = {"tol": 1e-4, "max_iter": 100}
 LATER = {"tol": 1e-5, "max_iter": 60, "mu_init": 1e-3}
+ONTO = LATER | {"max_iter": 150}
 BOUNDING = {"max_iter": 80}
 """Where the largest cost counts: with a small barrier parameter the multipliers of the bounds of
 the costs start wrong, and with them all curvature."""
-ENDED = (Status.INTERRUPTED, Status.TIME_LIMIT)
 
 
 @final
@@ -173,44 +173,6 @@ def sharpened(
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """One solve: what was solved, and what came out."""
-
-    transcription: Transcription
-    values: Array
-    outcome: Outcome
-    points: Points
-    level: float
-    accepted: bool = True
-    error: float = np.inf
-    errors: tuple[Array, ...] = ()
-
-    @property
-    def good(self) -> bool:
-        """Whether the path may go on from here."""
-        return self.accepted and self.outcome.status.ok
-
-    @property
-    def ended(self) -> bool:
-        """Whether the user or the clock has stopped the solver."""
-        return self.outcome.status in ENDED
-
-    @property
-    def iterations(self) -> int:
-        """Of the solver."""
-        return self.outcome.statistics.iterations
-
-    def better_than(self, other: "_Step") -> bool:
-        """Solved before not solved, then the lower cost, or the smaller violation."""
-        if self.outcome.status.ok != other.outcome.status.ok:
-            return self.outcome.status.ok
-        if self.outcome.status.ok:
-            return self.outcome.cost < other.outcome.cost
-        return self.outcome.violation < other.outcome.violation
-
-
-@final
 @dataclass
 class _Path:
     """What the steps share."""
@@ -229,51 +191,59 @@ class _Path:
         self.discretisation: Discretisation = discretise(self.problem, self.scheme)
         self.prepared: dict[tuple[int, str], Prepared] = {}
 
-    def first(self, guess: Start, starts: int, intervals: int) -> _Step:
+    def first(self, guess: Start, starts: int, intervals: int) -> Step:
         """The best of several coarse solves with wide layers, on the mesh to go on with."""
         coarse = self.discretisation.on(_meshes(self.problem, COARSE))
         begin = coarse.unpack(start_of(coarse, guess)[0].w)
+        straight = coarse.unpack(start_of(coarse, None)[0].w)
         tries = starts_around(coarse, begin, range(starts), SPREAD)
+        if guess is not None:
+            tries += starts_around(coarse, straight, range(1, starts, 2), SPREAD)
         found = [scales_of(self.user, self.problem, points) for points in tries]
         self.scales = guessed(self.user, found)
-        best = self.best_of(coarse, tries)
+        found = self.each(coarse, tries)
+        best = least(found)
         for more in range(1, FURTHER + 1):
             if best.ended or best.good:
                 break
-            straight = coarse.unpack(start_of(coarse, None)[0].w)
             seeds = range(more * starts, (more + 1) * starts)
-            best = self.best_of(coarse, starts_around(coarse, straight, seeds, SPREAD), best)
+            found += self.each(coarse, starts_around(coarse, straight, seeds, SPREAD))
+            best = least(found)
         if best.ended:
             return best
         now = scales_of(self.user, self.problem, best.points, self.scales)
         alike, self.scales = same_size(now, self.scales, SAME), now
         if not alike:
-            best = self.best_of(coarse, [best.points, *tries])
+            found = self.each(coarse, [best.points, *tries])
         fine = self.discretisation.on(_meshes(self.problem, intervals))
-        options = LATER if best.good else LATER | {"max_iter": 300}
-        step = self.solve(fine, self.moved(best, fine), FIRST, options, f"width {FIRST:.2g}")
+        step = least(self.each(fine, [self.moved(one, fine) for one in finalists(found)], ONTO))
+        if not step.good and not step.ended:
+            step = least(self.each(fine, [self.moved(best, fine)], LATER | {"max_iter": 300}))
         self.scales = scales_of(self.user, self.problem, step.points, self.scales)
         return self.refined(step, None) if step.good else step
 
-    def best_of(
-        self, coarse: Transcription, tries: Sequence[Points], best: _Step | None = None
-    ) -> _Step:
-        """The best of solves from several starts and of `best`, or one that was stopped."""
+    def each(
+        self,
+        mesh: Transcription,
+        tries: Sequence[Points],
+        options: Mapping[str, float | int] = EARLY,
+    ) -> list[Step]:
+        """Solves with the widest layers from several starts, until one is stopped."""
+        found: list[Step] = []
         for number, points in enumerate(tries, 1):
-            if best is not None and best.ended:
+            found.append(self.solve(mesh, points, FIRST, options, f"start {number}"))
+            if found[-1].ended:
                 break
-            step = self.solve(coarse, points, FIRST, EARLY, f"start {number}")
-            best = step if best is None or step.ended or step.better_than(best) else best
-        return best or self.solve(coarse, tries[0], FIRST, EARLY, "start")
+        return found
 
-    def settled(self, before: _Step, level: float, limit: float) -> _Step:
+    def settled(self, before: Step, level: float, limit: float) -> Step:
         """The step to another width, on a mesh that is fine enough for it."""
         step = self.solve(before.transcription, before.points, level, LATER, f"width {level:.2g}")
         if not step.good or step.outcome.cost > limit:
             return replace(step, accepted=False)
         return self.refined(step, limit)
 
-    def refined(self, step: _Step, limit: float | None) -> _Step:
+    def refined(self, step: Step, limit: float | None) -> Step:
         """`step` on finer and finer meshes, until its intervals are right or enough."""
         step = self.judged(step)
         for _ in range(PASSES - 1):
@@ -297,7 +267,7 @@ class _Path:
         level: float,
         options: Mapping[str, float | int],
         stage: str,
-    ) -> _Step:
+    ) -> Step:
         """One solve with layers of `level`."""
         widths = widths_at(self.user, self.scales, level)
         values = transcription.values(widths)
@@ -317,16 +287,16 @@ class _Path:
         )
         self.solves.append(outcome.statistics)
         found = transcription.unpack(outcome.iterate.w)
-        return _Step(transcription, values, outcome, found, level)
+        return Step(transcription, values, outcome, found, level)
 
-    def moved(self, step: _Step, into: Transcription) -> Points:
+    def moved(self, step: Step, into: Transcription) -> Points:
         """The motion of a step on other meshes."""
         old = step.transcription
         spans = stored_spans(self.problem, self.scheme, old.meshes, step.points)
         iterate = step.outcome.iterate
         return resample(into, Stored("", "", "", 0.0, "", spans, step.points.chosen, iterate))
 
-    def judged(self, step: _Step) -> _Step:
+    def judged(self, step: Step) -> Step:
         """`step` with the local errors of its intervals."""
         widths = widths_at(self.user, self.scales, step.level)
         arcs = [
@@ -342,7 +312,7 @@ class _Path:
         worst = max((float(e.max()) for e in errors), default=0.0)
         return replace(step, error=worst, errors=errors)
 
-    def finer(self, step: _Step) -> list[Array] | None:
+    def finer(self, step: Step) -> list[Array] | None:
         """Meshes with the intervals that err cut into pieces; None where there are none."""
         meshes, phases = step.transcription.meshes, len(self.problem.chain)
         if step.error <= self.tolerance or sum(m.size - 1 for m in meshes) > MOST:
@@ -356,7 +326,7 @@ class _Path:
             made.append(split(mesh, np.where(error > self.tolerance, parts, 1).tolist()))
         return made
 
-    def predicted(self, step: _Step, level: float) -> float:
+    def predicted(self, step: Step, level: float) -> float:
         """The largest cost at another width that belongs to the motion of `step`.
 
         Its Lagrangian there, with a share of J more, and of what the step is to change.
@@ -371,7 +341,7 @@ class _Path:
         now = step.outcome.cost
         return cost + ABOVE * abs(now) + 0.3 * max(0.0, now - cost)
 
-    def told(self, step: _Step, steady: bool) -> Sharp:
+    def told(self, step: Step, steady: bool) -> Sharp:
         """A step as a solution of the problem with these widths."""
         widths = widths_at(self.user, self.scales, step.level)
         solution = solution_of(step.transcription, step.outcome)

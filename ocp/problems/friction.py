@@ -208,7 +208,7 @@ FRICTION = (
         "two_blocks",
         "two coupled blocks with a contact each",
         two_blocks,
-        60.65,
+        59.18,
         1e-2,
         BEST,
         friction=True,
