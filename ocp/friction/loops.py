@@ -14,11 +14,10 @@ from dataclasses import dataclass
 from typing import final
 
 import casadi as ca
-import numpy as np
 
+from symfric.foundation.coupling import coupled
 from symfric.laws.base import smooth
 from symfric.model import Contact, Model
-from symfric.model.holonomic import Holonomic
 from symfric.multibody.mass import null_direction
 
 MINORS = 8
@@ -66,7 +65,8 @@ def loops_of(model: Model, contacts: Sequence[Contact]) -> tuple[Loop, ...]:
         return ()
     q, qd = model.vector("x")[: mechanics.n], model.vector("x")[mechanics.n : 2 * mechanics.n]
     found: list[Loop] = []
-    for columns, rows in _groups(mechanics, q):
+    pattern = ca.DM(ca.jacobian(mechanics.phi, q).sparsity(), 1).full() != 0
+    for columns, rows in coupled(pattern):
         if len(columns) != len(rows) + 1 or len(columns) > MINORS:
             continue
         tangent = ca.SX(mechanics.n, 1)
@@ -81,20 +81,3 @@ def loops_of(model: Model, contacts: Sequence[Contact]) -> tuple[Loop, ...]:
         if len(members) > 1:
             found.append(Loop(tuple(c for c, _ in members), tuple(g for _, g in members)))
     return tuple(found)
-
-
-def _groups(mechanics: Holonomic, q: ca.SX) -> list[tuple[list[int], list[int]]]:
-    """Coordinates and constraints in groups that do not touch each other."""
-    pattern = ca.DM(ca.jacobian(mechanics.phi, q).sparsity(), 1).full() != 0
-    left, found = set(range(pattern.shape[0])), list[tuple[list[int], list[int]]]()
-    while left:
-        rows, columns = {left.pop()}, set[int]()
-        while True:
-            columns |= {int(k) for row in rows for k in np.flatnonzero(pattern[row])}
-            more = {row for row in left if pattern[row][sorted(columns)].any()}
-            if not more:
-                break
-            rows |= more
-            left -= more
-        found.append((sorted(columns), sorted(rows)))
-    return found

@@ -36,6 +36,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.coupling import coupled
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import at_start, starts_of, symbols_of
 from symfric.laws import Law
@@ -163,18 +164,7 @@ class Loop:
 def loops_of(eq: Equations) -> list[Loop]:
     """Coordinates in groups that no constraint couples to each other; those that some couples."""
     pattern = ca.DM(eq.Phi_q.sparsity(), 1).full() != 0
-    left, found = set(range(eq.m)), list[Loop]()
-    while left:
-        rows, columns = {left.pop()}, set[int]()
-        while True:
-            columns |= {int(k) for row in rows for k in np.flatnonzero(pattern[row])}
-            more = {row for row in left if pattern[row][sorted(columns)].any()}
-            if not more:
-                break
-            rows |= more
-            left -= more
-        found.append(Loop(tuple(sorted(columns)), tuple(sorted(rows))))
-    return found
+    return [Loop(tuple(columns), tuple(rows)) for columns, rows in coupled(pattern)]
 
 
 @final
