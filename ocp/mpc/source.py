@@ -8,7 +8,6 @@ wanted; `NAME_out_t` controls and how the cycle went; `NAME_init`, `NAME_step`.
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from importlib.metadata import version
-from textwrap import wrap
 
 import casadi as ca
 
@@ -19,10 +18,9 @@ from ocp.mpc.interior_point import AWAY, BACK, CLOSE
 from ocp.mpc.program_in_c import PROGRAM
 from symfric.codegen.c99 import DOUBLE, TRANSCENDENTAL, macro
 from symfric.codegen.emitter import emit
+from symfric.codegen.source import folded
 from symfric.foundation.graph import graph
 from symfric.foundation.parameters import Variable
-
-WIDTH = 100
 
 
 def header(design: Design) -> str:
@@ -246,7 +244,7 @@ def _constants_of(design: Design) -> str:
     text = ""
     for name, values in tables.items():
         numbers = ", ".join(map(DOUBLE.literal, values))
-        text += _folded(f"static const double {name}[{len(values)}] = {{{numbers}}};", "") + "\n"
+        text += folded(f"static const double {name}[{len(values)}] = {{{numbers}}};", "") + "\n"
     if prices.soft.size:
         flags = ", ".join(str(int(flag)) for flag in prices.soft)
         text += f"static const int soft[{prices.soft.size}] = {{{flags}}};\n"
@@ -270,22 +268,9 @@ def _kernel(function: ca.Function) -> tuple[str, Counter[str]]:
     idle += [f"(void)r{i};" for i in range(results) if not targets[i]]
     arguments = [f"const double *a{i}" for i in range(count)]
     arguments += [f"double *r{i}" for i in range(results)]
-    head = _folded(f"static void {function.name()}({', '.join(arguments)})", "")
-    body = "".join(_folded(line, "    ") + "\n" for line in (*idle, *loads, *code.lines))
+    head = folded(f"static void {function.name()}({', '.join(arguments)})", "")
+    body = "".join(folded(line, "    ") + "\n" for line in (*idle, *loads, *code.lines))
     return f"{head}\n{{\n{body}}}\n\n", code.calls
-
-
-def _folded(line: str, margin: str) -> str:
-    return "\n".join(
-        wrap(
-            line,
-            WIDTH,
-            initial_indent=margin,
-            subsequent_indent=margin + "    ",
-            break_long_words=False,
-            break_on_hyphens=False,
-        )
-    )
 
 
 def _doors(design: Design) -> str:

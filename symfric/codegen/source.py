@@ -169,7 +169,7 @@ def source(block: Block, real: Real) -> str:
     if macros:
         macros = "/* Define these to put your own, faster functions in. */\n" + macros + "\n"
     bodies = "\n".join(
-        f"{r.head}\n{{\n" + "".join(_folded(line, "    ") + "\n" for line in r.statements) + "}\n"
+        f"{r.head}\n{{\n" + "".join(folded(line, "    ") + "\n" for line in r.statements) + "}\n"
         for r in functions
     )
     booleans = "#include <stdbool.h>\n" if "const bool " in bodies else ""
@@ -226,7 +226,7 @@ def _comment(text: str) -> str:
     return text.replace("*/", "* /").replace("/*", "/ *")
 
 
-def _folded(line: str, margin: str) -> str:
+def folded(line: str, margin: str) -> str:
     """A long line broken at blanks."""
     return "\n".join(
         wrap(
