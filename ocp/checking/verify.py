@@ -101,7 +101,7 @@ def _judged(
 ) -> Verification:
     """What runs of the arcs, in the order of time, say."""
     bad = next((run for run in runs if not run.ok), None)
-    value = float("nan") if bad else _cost(problem, runs)
+    value = float("nan") if bad else cost_of(problem, runs)
     checked = [*_looked(problem, runs), *map(_local, arcs, errors)]
     if bad is None:
         checked.append(Miss("cost", "the cost", runs[-1].end, value, cost, _size(runs, value)))
@@ -143,8 +143,8 @@ def _local(arc: Arc, errors: Array) -> Miss:
     return Miss("local error", name, float(arc.times[k]), float(errors[k]), 0.0, 1.0)
 
 
-def _cost(problem: Problem, runs: Sequence[Run]) -> float:
-    """J of the simulated motion."""
+def cost_of(problem: Problem, runs: Sequence[Run]) -> float:
+    """J of the simulated motion: of its scenarios the mean, the sum or the worst."""
     shares: dict[int, float] = {}
     for run in runs:
         span = run.arc.span

@@ -51,24 +51,19 @@ def _around(into: Transcription, begin: Points, spread: float, seed: int) -> Poi
         start = sum(points.T for points in begin.spans[first:number]) / whole
         mesh, inner = into.meshes[number], into.inner_fractions(number)
         positions = rates_of(span.model)
-
-        def moved(values: Array, fractions: Array) -> Array:
-            """States at fractions of the span."""
-            at = pi * (start + old.T / whole * fractions)[:, None] * HALF_WAVES  # noqa: B023
-            new = values.copy()
-            for row, v in zip(new, span.model.x, strict=True):  # noqa: B023
-                name = positions.get(v.name)  # noqa: B023
+        nodes, points, u = old.nodes.copy(), old.inner.copy(), old.u.copy()
+        for states, fractions in ((nodes, mesh), (points, inner)):
+            at = pi * (start + old.T / whole * fractions)[:, None] * HALF_WAVES
+            for row, v in zip(states, span.model.x, strict=True):
+                name = positions.get(v.name)
                 if name is None:
                     row += sizes[v.name] * (np.sin(at) / HALF_WAVES) @ waves[v.name]
                 else:
-                    row += sizes[name] * pi / whole * np.cos(at) @ waves[name]  # noqa: B023
-            return new
-
-        u = old.u.copy()
+                    row += sizes[name] * pi / whole * np.cos(at) @ waves[name]
         middles = pi * (start + old.T / whole * (mesh[1:] + mesh[:-1]) / 2)[:, None] * HALF_WAVES
         for row, v in zip(u, span.model.u, strict=True):
             row += _reach(span.box(v.name), v.nominal) * np.sin(middles) @ waves[v.name]
-        spans.append(SpanPoints(old.T, moved(old.nodes, mesh), moved(old.inner, inner), old.z, u))
+        spans.append(SpanPoints(old.T, nodes, points, old.z, u))
     return Points(tuple(spans), begin.chosen)
 
 

@@ -15,6 +15,7 @@ from ocp.checking.arcs import Arc, arcs_of
 from ocp.checking.conditions import at_nodes, between_nodes, joined, periodic
 from ocp.checking.resimulate import Run
 from ocp.checking.verification import Miss, Verification
+from ocp.checking.verify import cost_of
 from ocp.friction.exact import set_valued
 from ocp.friction.pieces import SetValued
 from ocp.result.solution import Solution
@@ -51,7 +52,7 @@ def verify_exactly(
     arcs = arcs_of(problem, solution.meshes, solution.points)
     found, failed = _followed(arcs, rtol)
     runs = [Run(arc, motion.trajectory, arc.end) for arc, motion in found]
-    value = float("nan") if failed else _cost(problem, runs)
+    value = float("nan") if failed else cost_of(problem, runs)
     checked = list(_asked(problem, runs))
     if not failed:
         size = max(abs(value), abs(solution.cost)) or 1.0
@@ -124,18 +125,3 @@ def _asked(problem: Problem, runs: Sequence[Run]) -> Iterator[Miss]:
         for first in (run for run in runs if run.arc.span.phase == 0):
             end = last.get(first.arc.number + len(problem.chain) - 1)
             yield from periodic(problem, first, end) if end is not None else ()
-
-
-def _cost(problem: Problem, runs: Sequence[Run]) -> float:
-    """J of the motion: of its scenarios the mean, the sum or the worst, as the problem says."""
-    shares: dict[int, float] = {}
-    for run in runs:
-        span = run.arc.span
-        share = run.integral(span.running)
-        if not span.end.is_zero():
-            share += float(run.of(span.end, run.end)[0, 0])
-        shares[span.scenario] = shares.get(span.scenario, 0.0) + share
-    values = list(shares.values())
-    if problem.kind == "worst":
-        return max(values)
-    return sum(values) / (len(values) if problem.kind == "mean" else 1)

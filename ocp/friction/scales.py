@@ -38,7 +38,9 @@ Scales = Mapping[str, Scale]
 """Contact -> its scale."""
 
 
-def scales_of(problem: Problem, smooth: Problem, points: Points, before: Scales = {}) -> Scales:  # noqa: B006
+def scales_of(
+    problem: Problem, smooth: Problem, points: Points, before: Scales | None = None
+) -> Scales:
     """The scales of the motion `points`; none is below `LEAST` of that before.
 
     Args:
@@ -53,7 +55,7 @@ def scales_of(problem: Problem, smooth: Problem, points: Points, before: Scales 
             kept[:] = [max(a, float(b)) for a, b in zip(kept, largest, strict=True)]
     return {
         name: Scale(
-            max(speed, LEAST * before[name].speed if name in before else 0.0),
+            max(speed, LEAST * before[name].speed if before and name in before else 0.0),
             load if load > 0.0 else 1.0,
         )
         for name, (speed, load) in found.items()
