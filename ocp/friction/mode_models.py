@@ -165,8 +165,13 @@ def _law(contact: Contact) -> Law:
 
 
 def jumps(model: Model, contact: Contact) -> bool:
-    """Whether friction holds at rest at all, at the start of the parameters: viscous does not."""
+    """Whether friction holds at rest at all, at the start of the parameters.
+
+    Viscous friction does not, nor does a contact that nothing presses.
+    """
     law = _law(contact)
+    if ca.SX(contact.N).is_zero():
+        return False
     one = law.static_level(1.0, 1, **dict.fromkeys(contact.further, 0.0))
     return float(at_start(one, model.p)) != 0.0
 

@@ -8,7 +8,14 @@ import pytest
 from numpy.testing import assert_allclose
 from rigs import blocks
 
-from ocp.friction.mode_models import WIDTH, mode_model, restless, smooth_model, widths
+from ocp.friction.mode_models import (
+    WIDTH,
+    jumps,
+    mode_model,
+    restless,
+    smooth_model,
+    widths,
+)
 from symfric import (
     BrownMcPhee,
     Contact,
@@ -229,3 +236,9 @@ def test_what_cannot_be_is_refused_by_name() -> None:
     with pytest.raises(ValueError, match=r"got arm, slide at rest together; in a loop of few"):
         mode_model(driven_twice(), {"arm": 0, "slide": 0})
     assert mode_model(drive(Viscous()), {}).z == ()
+
+
+def test_a_contact_that_nothing_presses_holds_nothing() -> None:
+    """Its law would: it is left out of what is sharpened, and the rest is solved as it is."""
+    loose, pressed = (drive(BrownMcPhee(), N=N) for N in (0.0, 1.0))
+    assert [jumps(m, c) for m in (loose, pressed) for c in m.contacts] == [False, True]
