@@ -25,6 +25,9 @@ SHADES = {"slip+": "#6baed6", "stick": "#fc9272", "slip-": "#74c476"}
 ASKED = "0.35"
 """Colour of bounds and of what is asked for."""
 
+CIRCLES = 60
+"""Nodes of a motion that are drawn, about: of more they would be a thick line."""
+
 
 def plot_solutions(
     solutions: Mapping[str, Solution],
@@ -112,7 +115,8 @@ def _signal(axis: "Axes", solution: Solution, motion: Motion, name: str, colour:
         axis.stairs(motion.controls[name], edges, baseline=None, color=colour, linewidth=1.2)
         return
     at = motion.nodes
-    axis.plot(motion.t[at], motion[name][at], "o", color=colour, ms=3.5, mfc="none")
+    nodes = np.arange(motion.t.size)[at][:: max(1, np.size(motion.t[at]) // CIRCLES)]
+    axis.plot(motion.t[nodes], motion[name][nodes], "o", color=colour, ms=3.5, mfc="none")
     runs = simulated(solution, motion)
     for run in runs:
         if name in run.units:

@@ -34,6 +34,7 @@ def plot_ocp(rows: "Sequence[OcpRow]", path: str | Path | None = None) -> "Figur
                 row.solver, (row.time_s, max(row.exact, LEAST)), xytext=(4, 3),
                 textcoords="offset points", fontsize="x-small",
             )  # fmt: skip
+        axis.margins(x=0.2, y=0.2)
         axis.axhline(1e-4, color="0.7", linewidth=0.8, zorder=0)
         axis.set_ylabel("miss [1]")
         axis.set_title(case.replace("_", " "), fontsize="small")
