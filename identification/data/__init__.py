@@ -1,0 +1,1 @@
+"""Measured records: reading, units, merging, resampling, and what is doubtful about them."""

@@ -1,0 +1,1 @@
+"""The pipelines before `Fit`: they go when it has taken over."""

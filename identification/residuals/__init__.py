@@ -1,0 +1,1 @@
+"""What a model leaves of the data: points, inverse dynamics, motion, closed loop."""

@@ -1,0 +1,1 @@
+"""What a fit found, and its numbers as text, JSON and pictures."""

@@ -1,0 +1,1 @@
+"""Filters, derivatives and features of measured signals."""

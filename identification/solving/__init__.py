@@ -1,0 +1,1 @@
+"""Weighted least squares from many starts."""

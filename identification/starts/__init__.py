@@ -1,0 +1,1 @@
+"""Start values from data: Stribeck curves, hysteresis, break-away, Maxwell-slip elements."""
