@@ -3,6 +3,8 @@
 from symfric.bench.calls import CallBenchmark as CallBenchmark
 from symfric.bench.calls import bench_calls as bench_calls
 from symfric.bench.ensemble import EnsembleRow as EnsembleRow
+from symfric.bench.identification import IdentificationBenchmark as IdentificationBenchmark
+from symfric.bench.identification import bench_identification as bench_identification
 from symfric.bench.integrator import Benchmark as Benchmark
 from symfric.bench.integrator import Row as Row
 from symfric.bench.integrator import bench_integrator as bench_integrator

@@ -98,3 +98,17 @@ def plot_regularisation(
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5,
                   fontsize="small")  # fmt: skip
     return save(figure, path)
+
+
+def plot_goals(
+    names: Sequence[str], decades: Sequence[float], met: Sequence[bool], path: str | Path | None
+) -> Figure:
+    """How many decades each number lies beyond its goal, a bar each; left of zero it is met."""
+    figure, axis = plt.subplots(figsize=(8, 1.2 + 0.25 * len(names)), layout="constrained")
+    axis.barh(names, decades, color=["C2" if well else "C3" for well in met])
+    axis.axvline(0.0, color="0.3", linewidth=0.8)
+    axis.invert_yaxis()
+    axis.set_xlabel("decades beyond the goal")
+    axis.tick_params(axis="y", labelsize="small")
+    axis.grid(axis="x", alpha=0.3)
+    return save(figure, path)

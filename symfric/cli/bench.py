@@ -18,6 +18,7 @@ SUBJECTS = (
     "jitter",
     "regularisation",
     "ocp",
+    "identification",
 )
 TABLES = ("calls", "ensemble")
 """Subjects without a picture."""
@@ -48,7 +49,8 @@ def bench(
     problems with published solutions (Test Set for IVP Solvers). jitter: total variation of
     accelerations against law, step and transition velocity. regularisation: error of smooth laws
     against dry friction, over their width or stiffness. ocp: optimal control from many starts,
-    whether it lands, large programs, controllers; beside CasADi's Opti and rockit.
+    whether it lands, large programs, controllers; beside CasADi's Opti and rockit. identification:
+    fits from many starts and noises, their intervals, measured machines, damaged files.
 
     Example: symfric bench multibody --plot bench.png --csv runs.csv
     """

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from symfric.bench import (
         Benchmark,
         CallBenchmark,
+        IdentificationBenchmark,
         IvpBenchmark,
         LaneBenchmark,
         MultibodyBenchmark,
@@ -263,6 +264,19 @@ def ocp(result: "OcpBenchmark") -> None:
             "Controller of a drive; hidden: failures that it did not report",
         )  # fmt: skip
     _skipped(result.skipped)
+
+
+def identification(result: "IdentificationBenchmark") -> None:
+    """Numbers beside their goals."""
+    output.show_table(
+        ["case", "what", "measured", "goal", "met", "cpu [s]", "note"],
+        [
+            [r.case, r.what, _known(r.value, 3), f"{r.better} {r.goal:g}",
+             "yes" if r.met else "no", round(r.seconds, 1), r.note]
+            for r in result.rows
+        ],
+        "Identification beside its goals",
+    )  # fmt: skip
 
 
 def _known(value: float, digits: int) -> float | str:
