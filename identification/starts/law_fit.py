@@ -1,0 +1,181 @@
+"""Levels and velocity scales of whatever law from binned points: a scan, then improvement."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import product
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares, lsq_linear
+
+from identification.starts.law_curve import LawCurve
+from identification.starts.stribeck import Curve
+from symfric.foundation.parameters import Parameter
+
+Array = NDArray[np.float64]
+
+SCALES = {0: 1, 1: 16, 2: 8}
+"""Values tried of each velocity scale, by the number of scales; 5 of each of more."""
+STEPS = 2
+"""Linear least-squares steps at each; one is exact for laws that are linear in their levels."""
+POLISHED = 3
+"""Best trials that are improved by nonlinear least squares."""
+PULL = 1e-3
+"""Weight of the guess against the points: what they do not tell stays there."""
+WIDE = 10.0
+"""Factor by which velocity scales may leave the speeds of the data."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """p = exp(w) for velocity scales, scale w for the others, p_low + scale w for ordered ones."""
+
+    curve: LawCurve
+    scale: Array
+    logarithmic: NDArray[np.bool_]
+    lower: Array
+    upper: Array
+
+    def p(self, w: Array) -> tuple[Array, Array]:
+        """Parameters and their slopes dp/dw."""
+        p = np.where(self.logarithmic, np.exp(np.where(self.logarithmic, w, 0)), self.scale * w)
+        slope = np.diag(np.where(self.logarithmic, p, self.scale))
+        for high, low, value in self.curve.floors:
+            p[high] += p[low] if low >= 0 else value
+            slope[high] += slope[low] if low >= 0 else 0.0
+        return p, slope
+
+    def w(self, p: Array) -> Array:
+        """Coordinates of parameters, moved inside the bounds."""
+        p = p.copy()
+        for high, low, value in self.curve.floors:
+            p[high] -= p[low] if low >= 0 else value
+        safe = np.log(np.where(self.logarithmic, np.maximum(p, 1e-300), 1.0))
+        return np.clip(np.where(self.logarithmic, safe, p / self.scale), self.lower, self.upper)
+
+
+def is_scale(parameter: Parameter) -> bool:
+    """Whether a parameter is a positive velocity scale, or the inverse of one."""
+    return parameter.role == "velocity scale" and parameter.lower >= 0
+
+
+def velocity(parameter: Parameter, scale: float) -> float:
+    """A velocity scale in the unit of the parameter: itself, or its inverse."""
+    return scale if parameter.unit in ("m/s", "rad/s") else 1 / scale
+
+
+def coordinates(curve: LawCurve, guess: Array, speeds: tuple[float, float]) -> Coordinates:
+    """Coordinates around `guess` for data between the slowest and the fastest of `speeds`."""
+    known = curve.parameters
+    logarithmic = np.array([is_scale(p) for p in known])
+    scale = np.where(guess == 0, 1.0, np.abs(guess))
+    lower = np.array([p.lower for p in known]) / scale
+    upper = np.array([p.upper for p in known]) / scale
+    for i in np.flatnonzero(logarithmic):
+        ends = sorted(velocity(known[i], s) for s in (speeds[0] / WIDE, speeds[1] * WIDE))
+        lower[i], upper[i] = np.log([max(ends[0], known[i].lower), min(ends[1], known[i].upper)])
+    for high, _, _ in curve.floors:
+        lower[high], upper[high] = (lower[high], upper[high]) if logarithmic[high] else (0, np.inf)
+    return Coordinates(curve, scale, logarithmic, lower, upper)
+
+
+def fit_law(curve: LawCurve, points: Curve, guess: Mapping[str, float]) -> dict[str, float]:
+    """Parameters with the smallest sum of squares over the bins.
+
+    At each combination of velocity scales between the slowest and the fastest bin the levels come
+    from linear least squares within their bounds; the best combinations are improved in all
+    parameters together. What the points do not tell stays at `guess`.
+    """
+    known, speed = curve.parameters, np.abs(points.v)
+    ends = float(max(speed.min() / 2, 1e-3 * speed.max())), float(speed.max())
+    start = np.array([guess[p.name] for p in known])
+    at = coordinates(curve, start, ends)
+    size = float(np.abs(points.F).max()) or 1.0
+    tried: list[tuple[float, int, Array]] = []
+    for number, p in enumerate(_scales(curve, start, ends)):
+        w = _levels(at, at.w(p), points.F, size)
+        tried.append((_cost(at, w, points.F, size), number, w))
+    best = min(tried, key=lambda trial: trial[:2])
+    for trial in sorted(tried, key=lambda trial: trial[:2])[:POLISHED]:
+        w = _polished(at, trial[2], points.F, size)
+        cost = _cost(at, w, points.F, size)
+        if cost < best[0] and _apart(curve, at.p(w)[0]):
+            best = cost, 0, w
+    return dict(zip([p.name for p in known], at.p(best[2])[0].tolist(), strict=True))
+
+
+def _scales(curve: LawCurve, start: Array, ends: tuple[float, float]) -> Iterator[Array]:
+    """Starts at all combinations of velocity scales; scales of one name move together."""
+    fields = sorted({p.field for p in curve.parameters if is_scale(p)})
+    values = np.geomspace(*ends, SCALES.get(len(fields), 5))
+    for chosen in product(values, repeat=len(fields)):
+        by_field, p = dict(zip(fields, chosen, strict=True)), start.copy()
+        for i, parameter in enumerate(curve.parameters):
+            if is_scale(parameter):
+                p[i] = velocity(parameter, by_field[parameter.field])
+        if _apart(curve, p):
+            yield p
+    if not _apart(curve, start) or not fields:
+        return
+    yield start
+
+
+def _apart(curve: LawCurve, p: Array) -> bool:
+    """Whether velocities that must differ do, by a twentieth."""
+    return all(p[high] > 1.05 * p[low] for high, low in curve.strict)
+
+
+def _levels(at: Coordinates, w: Array, F: Array, size: float) -> Array:
+    """Coordinates after bounded linear least squares in all but the velocity scales."""
+    linear = ~at.logarithmic
+    if not linear.any():
+        return w
+    pull = PULL * np.sqrt(F.size)
+    lower, upper = at.lower[linear], at.upper[linear]
+    begin = w[linear]
+    for _ in range(STEPS):
+        p, slope = at.p(w)
+        force, J = at.curve.at(p)
+        X = (J @ slope)[:, linear] / size
+        if not (np.isfinite(X).all() and np.isfinite(force).all()):
+            return w
+        rows = np.vstack([X, pull * np.eye(begin.size)])
+        goal = np.concatenate([(F - force) / size + X @ w[linear], pull * begin])
+        wide = upper > lower
+        found = w[linear].copy()
+        within, rest = (lower[wide], upper[wide]), goal - rows[:, ~wide] @ found[~wide]
+        found[wide] = lsq_linear(rows[:, wide], rest, within, method="bvls").x
+        w = w.copy()
+        w[linear] = found
+    return w
+
+
+def _cost(at: Coordinates, w: Array, F: Array, size: float) -> float:
+    force = at.curve.at(at.p(w)[0])[0]
+    cost = float(np.sum(((force - F) / size) ** 2)) if np.isfinite(force).all() else np.inf
+    return cost
+
+
+def _polished(at: Coordinates, w: Array, F: Array, size: float) -> Array:
+    """All coordinates after a few steps of a trust region; `w` where that fails."""
+    pull, begin = PULL * np.sqrt(F.size), w.copy()
+
+    def residuals(w: Array) -> Array:
+        found = np.concatenate([(at.curve.at(at.p(w)[0])[0] - F) / size, pull * (w - begin)])
+        return np.where(np.isfinite(found), found, 1e3)
+
+    def slopes(w: Array) -> Array:
+        p, slope = at.p(w)
+        found = np.vstack([at.curve.at(p)[1] @ slope / size, pull * np.eye(w.size)])
+        return np.where(np.isfinite(found), found, 0.0)
+
+    wide = np.maximum(at.upper, at.lower + 1e-6)
+    return least_squares(
+        residuals,
+        np.clip(w, at.lower + 1e-9, wide - 1e-9),
+        jac=slopes,  # pyright: ignore[reportArgumentType]
+        bounds=(at.lower, wide),
+        max_nfev=30,
+    ).x

@@ -1,0 +1,242 @@
+"""Start values of any law from data: its roles say which measured quantity belongs where."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from math import isfinite, sqrt
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.starts.hysteresis import Hysteresis, hysteresis
+from identification.starts.law_curve import law_curve, parts
+from identification.starts.law_fit import fit_law, velocity
+from identification.starts.measured import Measured
+from identification.starts.stribeck import BINS, Curve, StribeckCurve, binned, fit_curve
+from symfric.foundation import checks
+from symfric.foundation.parameters import Parameter, parameters, symbolise
+from symfric.laws.base.law import Law
+from symfric.scenes.drive import Drive
+
+Array = NDArray[np.float64]
+
+STEADY = ("level", "viscous", "velocity scale", "")
+"""Roles that the steady curve of a law tells."""
+ELASTIC = ("MaxwellSlip", "GMS", "Leuven", "BoucWen", "HaessigFriedland", "StickSlip", "Armstrong")
+"""Laws whose elements unload elastically; bristles unload at twice their stiffness."""
+DAMPED = 0.6
+"""Ratio of bristle damping to sqrt(stiffness mass) where the data do not tell it."""
+HEADROOM = 1.1
+"""What the elements of a law carry together over its static level."""
+SPIKE = 0.3
+"""Share of the sliding force that bristle damping gives at the largest speed, without a mass."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Facts:
+    """What the data say, whatever the law.
+
+    Attributes:
+        stribeck: curve through the bins.
+        curve: the bins, without mass and offset.
+        reversals: branches after reversals, or None.
+        m: moving mass [kg], 0 where the force moves none or its acceleration is not known.
+        offset: constant force [N].
+        N: normal force [N].
+        fastest: largest speed [m/s].
+    """
+
+    stribeck: StribeckCurve
+    curve: Curve
+    reversals: Hysteresis | None
+    m: float
+    offset: float
+    N: float
+    fastest: float
+
+
+def start_values(
+    what: Law | Drive, measured: Measured, *, free: Collection[str]
+) -> dict[str, float]:
+    """Start values of the parameters `free` of a law, or of a drive with its mass and offset.
+
+    Levels, viscous coefficients and velocity scales: least squares of the law's own steady curve
+    in bins of the velocity (`fit_law`). Stiffness and damping of bristles: branches after
+    reversals (`hysteresis`). Mass and offset: linear regression beside the Stribeck curve. What the
+    data do not tell keeps the value that `what` has. The same data give the same values; they
+    can be given to `with_values`.
+
+    Args:
+        what: with numbers; those that are not free stay as they are.
+        measured: velocity and force; positions or times for laws with states; accelerations for
+            the mass of a drive.
+        free: names of parameters.
+
+    Raises:
+        ValueError: unknown names; data that do not move.
+    """
+    names = checks.names("start_values: free", tuple(free), parameters(what))
+    law = what.law if isinstance(what, Drive) else what
+    N = float(what.N) if isinstance(what, Drive) else measured.N
+    facts = facts_of(replace(measured, N=N), mass="m" in names, offset="offset" in names)
+    known = parameters(what)
+    values = {n: _guess(known[n], facts, law) for n in names}
+    mine = [n for n in names if n in parameters(law) and _is_steady(known[n], law)]
+    if (curve := law_curve(law, mine, facts.curve.v, N)) is not None:
+        values |= fit_law(curve, facts.curve, values)
+    return _constructible(what, values)
+
+
+def _is_steady(parameter: Parameter, law: Law) -> bool:
+    """Whether the steady curve tells a parameter; of elements that share a level it does not."""
+    shared = parameter.field == "mu" and "mu_s" in parameters(law)
+    return parameter.role in STEADY and not shared
+
+
+def facts_of(measured: Measured, *, mass: bool = False, offset: bool = False) -> Facts:
+    """Levels, stiffness, mass and offset of the data, as far as they tell them."""
+    m = _mass(measured) if mass else 0.0
+    F = measured.F if measured.a is None else measured.F - m * measured.a
+    curve = binned(measured.v, F)
+    stribeck = fit_curve(curve)
+    shift = stribeck.offset if offset else 0.0
+    return Facts(
+        stribeck,
+        replace(curve, F=curve.F - shift),
+        hysteresis(replace(measured, F=F), offset=stribeck.offset),
+        m,
+        shift,
+        measured.N,
+        measured.fastest,
+    )
+
+
+def _mass(measured: Measured) -> float:
+    """Slope of the force over the acceleration inside bins of velocity [kg], >= 0.
+
+    Friction, which is alike inside a bin, cancels with the mean of the bin.
+    """
+    if measured.a is None:
+        return 0.0
+    edges = np.quantile(measured.v, np.linspace(0, 1, BINS + 1))
+    place = np.clip(np.searchsorted(edges, measured.v, side="right") - 1, 0, BINS - 1)
+    count = np.maximum(np.bincount(place, minlength=BINS), 1)
+    a, F = (
+        signal - (np.bincount(place, signal, BINS) / count)[place]
+        for signal in (measured.a, measured.F)
+    )
+    return max(float(a @ F) / max(float(a @ a), 1e-300), 0.0)
+
+
+def _guess(parameter: Parameter, facts: Facts, law: Law) -> float:
+    """Start of one parameter from its role and unit; its own value where nothing is known."""
+    value, unit = float(parameter.value), parameter.unit
+    parted = _elements(law) if parameter.field in ("k", "mu", "alpha") else 1
+    match parameter.role:
+        case "mass" if facts.m > 0:
+            return facts.m
+        case "offset":
+            return facts.offset
+        case "level":
+            return _level(parameter, facts, law) / parted
+        case "viscous" if unit in ("N s/m", "N m s/rad"):
+            return facts.stribeck.sigma_2
+        case "viscous" if unit in ("s/m", "s/rad"):
+            return facts.stribeck.sigma_2 / facts.N
+        case "velocity scale" if parameter.lower >= 0:
+            return velocity(parameter, facts.stribeck.v_s)
+        case "stiffness" if (stiffness := _stiffness(facts, law)) > 0:
+            per = facts.N if unit == "1/m" else 1.0
+            share = value / _sum_of(law, parameter.field) if parted > 1 else 1.0
+            return stiffness / per * share
+        case "damping" if (stiffness := _stiffness(facts, law)) > 0:
+            return _damping(facts, stiffness) / (facts.N if unit == "s/m" else 1.0)
+        case "length" if (stiffness := _stiffness(facts, law)) > 0:
+            return 0.3 * facts.stribeck.F_C / stiffness
+        case "time" if unit == "N/s" and facts.reversals is not None:
+            return facts.stribeck.F_C * facts.stribeck.v_s / facts.reversals.half
+        case _:
+            return value
+
+
+def _level(parameter: Parameter, facts: Facts, law: Law) -> float:
+    """A friction level in the unit of the parameter: the static one for upper ones of a pair."""
+    if parameter.unit not in ("1", "N", "N m"):
+        return float(parameter.value)
+    per = facts.N if parameter.unit == "1" else 1.0
+    sliding = facts.stribeck.F_C or float(np.median(np.abs(facts.curve.F)))
+    upper = {high for part in parts(law) for _, high in type(part).ordered}
+    if parameter.field in upper:
+        return max(facts.stribeck.F_S, sliding) / per
+    if parameter.field == "mu" and "mu_s" in parameters(law):  # its elements must carry mu_s
+        return HEADROOM * facts.stribeck.F_S / per
+    known = [p for p in parameters(law).values() if p.role == "level" and p.field not in upper]
+    largest = max(float(p.value) for p in known if p.unit == parameter.unit)
+    return sliding / per * (float(parameter.value) / largest if largest > 0 else 1.0)
+
+
+def _elements(law: Law) -> int:
+    """Elements of a law that is made of some, else 1."""
+    return max(len(getattr(part, "elements", "1")) for part in parts(law))
+
+
+def _sum_of(law: Law, field: str) -> float:
+    """Sum of the values of all parameters of one field, of one direction."""
+    same = [float(p.value) for p in parameters(law).values() if p.field == field]
+    return sum(same) * _elements(law) / len(same)
+
+
+def _stiffness(facts: Facts, law: Law) -> float:
+    """Of a bristle, or of all elements together [N/m]; 0 where the data do not tell it."""
+    if facts.reversals is None:
+        return 0.0
+    elastic = any(type(part).__name__ in ELASTIC for part in parts(law))
+    return facts.reversals.elastic if elastic else facts.reversals.bristle
+
+
+def _damping(facts: Facts, stiffness: float) -> float:
+    """Of a bristle [N s/m]: from reversals, or .6 of critical, or small against sliding."""
+    if facts.m > 0:
+        return DAMPED * sqrt(stiffness * facts.m)
+    if facts.reversals is not None and facts.reversals.damping > facts.stribeck.sigma_2:
+        return (facts.reversals.damping - facts.stribeck.sigma_2) / 2
+    return SPIKE * facts.stribeck.F_C / facts.fastest
+
+
+def _constructible(what: Law | Drive, values: Mapping[str, float]) -> dict[str, float]:
+    """`values` moved inside bounds and into order, so that `with_values` takes them."""
+    known = parameters(what)
+    found = {n: _inside(known[n], value) for n, value in values.items()}
+    for _ in range(3):  # a pair put into order may leave another one out of it
+        for low, high, ratio in _pairs(what):
+            at = {n: found.get(n, float(known[n].value)) for n in (low, high)}
+            if at[high] >= ratio * at[low]:
+                continue
+            if high in found:
+                found[high] = _inside(known[high], ratio * at[low])
+            elif low in found:
+                found[low] = _inside(known[low], at[high] / ratio)
+    return found
+
+
+def _inside(parameter: Parameter, value: float) -> float:
+    """`value` inside the bounds; of what must be positive, not below a millionth of the default."""
+    own = float(parameter.value)
+    least = parameter.lower
+    if 0 < least < 1e-6 * abs(own):
+        least = 1e-6 * abs(own)
+    return min(max(value if isfinite(value) else own, least), parameter.upper)
+
+
+def _pairs(what: Law | Drive) -> list[tuple[str, str, float]]:
+    """Names that must be in order: (low, high, least ratio)."""
+    model, variables = symbolise(what, *parameters(what))
+    found = list[tuple[str, str, float]]()
+    for part in parts(model):
+        for pairs, ratio in ((type(part).ordered, 1.0), (type(part).strictly_ordered, 1.05)):
+            for pair in pairs:
+                symbols = [getattr(part, field) for field in pair]
+                low, high = (next(x.name for x in variables if x.symbol is s) for s in symbols)
+                found.append((low, high, ratio))
+    return found
