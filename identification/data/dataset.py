@@ -1,0 +1,201 @@
+"""Measured data: one or several records of named signals, in SI units."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import final
+
+from identification.data.frames import ASSUMED, columns_of
+from identification.data.raw import Wanted, record
+from identification.data.reading import Paths, files, read_records
+from identification.data.record import Record
+from symfric.foundation import checks
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Dataset:
+    """Records that are fitted together.
+
+    Attributes:
+        records: at least one.
+        name: of all of them, for messages.
+
+    Raises:
+        ValueError: no records, or some that turn and some that slide.
+    """
+
+    records: tuple[Record, ...]
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        records = checks.many("Dataset: records", self.records, "records")
+        for one in records:
+            checks.kind(
+                "Dataset: records", one, Record, "a record, such as Dataset.of(t=t, x=x)[0]"
+            )
+        if not records:
+            raise ValueError("Dataset: expected at least one record, got none")
+        object.__setattr__(self, "records", records)
+        object.__setattr__(self, "name", self.name or _name([r.name for r in records]))
+        turning = {turns for turns in map(_turns, records) if turns is not None}
+        if len(turning) > 1:
+            names = {turns: r.name for r in reversed(records) for turns in [_turns(r)]}
+            raise ValueError(
+                f"data '{self.name}': expected records that all slide or all turn, got "
+                f"'{names[False]}' in m and '{names[True]}' in rad"
+            )
+
+    @classmethod
+    def read(
+        cls,
+        paths: Paths,
+        *,
+        columns: Mapping[str, str] | Sequence[str] | None = None,
+        units: Mapping[str, str] | str | None = None,
+        step: float | None = None,
+        variable: str | None = None,
+        points: bool = False,
+    ) -> "Dataset":
+        """Records from files: CSV and other text, `.mat` up to version 7, `.npz`, `.npy`.
+
+        Text: comma, semicolon, tab or spaces; decimal commas where they do not separate; comment
+        lines; a header such as `t [s], x [mm], F [N]` or none; a row of units below it or none.
+        MATLAB: variables, structs (nested; a vector of structs is several records), matrices.
+
+        A column becomes the channel t, x, v, a or force if its name is that or a usual other one
+        (time, q, pos, angle, vel, omega, torque, ...) and no second column could be meant; all
+        others keep their names. Every canonical channel needs a unit, from the file or the call;
+        numbers are SI afterwards. Columns that are not all numbers are left out, and whoever asks
+        for one is told why; for canonical channels they are an error.
+
+        Args:
+            paths: a file, a pattern such as "run*.csv", or a list of them.
+            columns: channel -> column ({"x": "encoder [mm]"}), or the names of all columns in
+                their order (["t [ms]", "x", "-", "force"]; "-" leaves one out).
+            units: "rad, N m" for canonical channels whose columns have no unit, or channel ->
+                unit ({"x": "mm", "theta_2": "deg"}), which overrules the file.
+            step: sample interval [s] of files without a time.
+            variable: struct, matrix or deeper part of a `.mat` or `.npz` file: "run(2).log".
+            points: rows are points (v, F) of a friction curve; no time is needed.
+
+        Raises:
+            ValueError: what cannot be used, with file, row and column; of several files all.
+        """
+        wanted = Wanted(columns, units, step, checks.flag("read: points", points))
+        found = read_records(paths, wanted, variable)
+        pattern = paths if isinstance(paths, str) and len(files(paths)) > 1 else ""
+        return cls(found, pattern)
+
+    @classmethod
+    def of(
+        cls,
+        frame: object = None,
+        /,
+        *,
+        units: Mapping[str, str] | str | None = None,
+        columns: Mapping[str, str] | None = None,
+        step: float | None = None,
+        points: bool = False,
+        name: str = "data",
+        **arrays: object,
+    ) -> "Dataset":
+        """One record from arrays: `Dataset.of(t=t, x=x, force=force)`, a dict, a pandas frame.
+
+        Numbers are SI (m, N; `units="rad, N m"` where it turns) unless a name says more, such as
+        "x [mm]"; the columns of a frame need units as those of a file do.
+
+        Args:
+            frame: what holds the columns: a mapping or a frame.
+            units, columns, step, points: as in `read`.
+            name: of the record.
+            arrays: further columns by name.
+
+        Raises:
+            ValueError: columns that are no numbers or of different lengths, no time, no unit.
+        """
+        checks.text("Dataset.of: name", name)
+        raw, framed = columns_of(name, frame, arrays)
+        assumed = None if framed else ASSUMED
+        wanted = Wanted(columns, units, step, checks.flag("Dataset.of: points", points), assumed)
+        return cls((record(raw, wanted),), name)
+
+    def __iter__(self) -> Iterator[Record]:
+        return iter(self.records)
+
+    def __len__(self) -> int:
+        return len(self.records)
+
+    def __getitem__(self, index: int) -> Record:
+        return self.records[index]
+
+    def __add__(self, other: "Dataset") -> "Dataset":
+        """The records of both."""
+        other = checks.kind("Dataset: +", other, Dataset, "a Dataset")
+        return Dataset((*self.records, *other.records), f"{self.name} + {other.name}")
+
+    def __str__(self) -> str:
+        return "\n".join([f"{self.name}: {len(self)} record(s)", *map(_line, self.records)])
+
+    @property
+    def rotary(self) -> bool:
+        """Whether the drive turns: its channels are in rad and N m."""
+        return any(_turns(one) for one in self.records)
+
+    @property
+    def size(self) -> int:
+        """Number of samples of all records."""
+        return sum(one.size for one in self.records)
+
+    def each(self, change: Callable[[Record], Record]) -> "Dataset":
+        """The data with every record changed."""
+        return Dataset(tuple(map(change, self.records)), self.name)
+
+    def between(self, begin: float, end: float) -> "Dataset":
+        """The samples of each record with begin <= t <= end [s]."""
+        return self.each(lambda one: one.between(begin, end))
+
+    def thinned(self, every: int) -> "Dataset":
+        """Every `every`-th sample of each record; noise is not filtered before."""
+        return self.each(lambda one: one.thinned(every))
+
+    def renamed(self, names: Mapping[str, str]) -> "Dataset":
+        """The data with other names of signals: {"old": "new"}."""
+        return self.each(lambda one: one.renamed(names))
+
+    def split(self, share: float = 0.5) -> "tuple[Dataset, Dataset]":
+        """The first `share` of the samples of each record, and the rest: to fit and to validate.
+
+        Raises:
+            ValueError: a share that leaves fewer than two samples on a side.
+        """
+        where = f"data '{self.name}': split"
+        share = checks.number(where, share, lower=0.0, upper=1.0)
+        cuts = [round(share * one.size) for one in self.records]
+        for one, cut in zip(self.records, cuts, strict=True):
+            if not 2 <= cut <= one.size - 2:
+                raise ValueError(
+                    f"{where}: expected a share that leaves two samples on each side, got {share:g}"
+                    f" of {one.size}"
+                )
+        pairs = list(zip(self.records, cuts, strict=True))
+        first = Dataset(tuple(one.at(slice(0, cut)) for one, cut in pairs), self.name)
+        return first, Dataset(tuple(one.at(slice(cut, None)) for one, cut in pairs), self.name)
+
+
+def _name(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
+
+
+def _turns(one: Record) -> bool | None:
+    """Whether a record is that of a turning drive; None where no canonical channel tells."""
+    for key, turning in (("x", "rad"), ("v", "rad/s"), ("force", "N m"), ("F", "N m")):
+        if key in one.signals and one.units[key]:
+            return one.units[key] == turning
+    return None
+
+
+def _line(one: Record) -> str:
+    signals = ", ".join(f"{key} [{one.units[key] or '?'}]" for key in one.signals)
+    if one.t is None:
+        return f"  {one.name}: {one.size} points, {signals}"
+    return f"  {one.name}: {one.t[0]:g} ... {one.t[-1]:g} s, {one.size} samples, {signals}"

@@ -1,0 +1,295 @@
+"""Columns as a file holds them, and how they become a record: names, units, time."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from re import fullmatch
+from typing import TypeVar, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.data.record import Record
+from identification.data.units import EXAMPLES, KINDS, by_channel, unit
+from symfric.foundation import checks
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+
+ALIASES: Mapping[str, tuple[str, ...]] = {
+    "t": ("t", "time", "timestamp"),
+    "x": ("x", "q", "qm", "pos", "position", "displacement", "angle", "theta", "phi"),
+    "v": ("v", "qd", "dq", "vel", "velocity", "speed", "omega"),
+    "a": ("a", "qdd", "ddq", "acc", "acceleration"),
+    "force": ("force", "F", "f", "torque", "tau"),
+}
+"""Names that a column may have, by canonical channel; longer ones in any case of letters."""
+POINTS: Mapping[str, tuple[str, ...]] = {
+    "v": ALIASES["v"],
+    "F": ("F", "f", "force", "friction", "torque", "tau"),
+    "N": ("N", "normal", "normal_force"),
+}
+"""The same of points."""
+SKIPPED = ("", "-", "_")
+"""Names in `columns` of columns that are not wanted."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Column:
+    """One column of a file.
+
+    Attributes:
+        label: what stands above it, without its unit.
+        unit: what the file says, "" for nothing.
+        values: its numbers, NaN where there is none, shape (n,).
+        problem: what its first bad cell is, with its place; "" where all are numbers.
+    """
+
+    label: str
+    unit: str
+    values: Array
+    problem: str = ""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Raw:
+    """Columns of one record before anybody knows what they are.
+
+    Attributes:
+        name: of the file, and of the record in it.
+        columns: in their order; without a header their labels are "".
+        first_row: row of the first sample in the file; 0 where samples have no rows.
+    """
+
+    name: str
+    columns: tuple[Column, ...]
+    first_row: int = 0
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """What the caller says about columns.
+
+    Attributes:
+        columns: channel -> column, or the names of all columns in their order; None: the header.
+        units: channel or column -> unit, or the short form "rad, N m"; None: the header.
+        step: sample interval of records without a time [s].
+        points: whether the rows are points without time.
+        assumed: units of canonical channels about which nobody says anything.
+    """
+
+    columns: Mapping[str, str] | Sequence[str] | None = None
+    units: Mapping[str, str] | str | None = None
+    step: float | None = None
+    points: bool = False
+    assumed: Mapping[str, str] | None = None
+
+
+def label(cell: str) -> tuple[str, str]:
+    """Name and unit of a header cell: `x [mm]`, `x (mm)`, `x / mm`; of anything else the cell."""
+    cell = cell.strip()
+    match = fullmatch(r"(.*?)\s*\[(.*)\]", cell)
+    if match:
+        return match[1], match[2].strip()
+    for pattern in (r"(.*?)\s*\((.*)\)", r"(.*\S)\s+/\s*(\S.*)", r"([^/]*\w)/(\w[^/]*)"):
+        match = fullmatch(pattern, cell)
+        if match and match[1] and unit(match[2]) is not None:
+            return match[1], match[2].strip()
+    match = fullmatch(r"(.+)_([A-Za-z]+)", cell)
+    if match and unit(match[2]) is not None and _alias(match[1]):
+        return match[1], match[2]
+    return cell, ""
+
+
+def _alias(name: str) -> bool:
+    return any(_matches(name, names) for names in ALIASES.values())
+
+
+def _matches(name: str, names: Sequence[str]) -> bool:
+    return name in names or (len(name) > 1 and name.lower() in names)
+
+
+def record(raw: Raw, wanted: Wanted) -> Record:
+    """The record that the columns of `raw` are.
+
+    Raises:
+        ValueError: a channel asked for that is not there or no numbers, no unit or the wrong one,
+            no time; all problems at once.
+    """
+    where = f"read '{raw.name}'"
+    raw = _labelled(where, raw, wanted)
+    places = _places(where, raw, wanted)
+    named = {key: raw.columns[k] for key, k in places.items()}
+    asked = wanted.columns.keys() if isinstance(wanted.columns, Mapping) else set[str]()
+    needed = {*asked, *({"v", "F"} if wanted.points else KINDS)}
+    given = _units(where, named, wanted)
+    problems: list[str] = []
+    signals, units, left_out = dict[str, Array](), dict[str, str](), dict[str, str]()
+    for key, column in named.items():
+        if column.problem:
+            if key in needed:
+                problems.append(f"column '{_shown(column)}', {column.problem}")
+            left_out[column.label] = column.problem
+            continue
+        try:
+            factor, units[key] = _scale(key, column, given.get(key, ""), wanted)
+        except ValueError as error:
+            problems.append(str(error))
+            continue
+        signals[key] = factor * column.values
+    if problems:
+        raise ValueError(f"{where}: " + "; ".join(problems))
+    t = _time(where, raw, signals, wanted)
+    signals.pop("t", None)
+    return Record(
+        raw.name,
+        t,
+        signals,
+        {key: units[key] for key in signals},
+        first_row=raw.first_row,
+        columns={k: c.label for k, c in named.items() if c.label not in (k, "") and k in signals},
+        left_out=left_out,
+    )
+
+
+def _shown(column: Column) -> str:
+    return f"{column.label} [{column.unit}]" if column.unit else column.label
+
+
+def _labelled(where: str, raw: Raw, wanted: Wanted) -> Raw:
+    """The columns with the names of the call, where it names them all in their order."""
+    have = ", ".join(_shown(c) for c in raw.columns)
+    if isinstance(wanted.columns, Mapping) or wanted.columns is None:
+        if any(c.label == "" for c in raw.columns):
+            hint = "write columns=['t', 'x', 'force'], with '-' for a column that is not wanted"
+            raise ValueError(
+                f"{where}: expected names of {len(raw.columns)} columns, got a file without a "
+                f"header; {hint}"
+            )
+        return raw
+    names = checks.many(f"{where}: columns", wanted.columns, "names")
+    if len(names) != len(raw.columns):
+        raise ValueError(
+            f"{where}: columns: expected {len(raw.columns)} names, one for each column"
+            f"{f' ({have})' if any(c.label for c in raw.columns) else ''}, got {len(names)}; "
+            "write '-' for a column that is not wanted"
+        )
+    kept: list[Column] = []
+    for name, column in zip(names, raw.columns, strict=True):
+        text = "" if name is None else str(name).strip()
+        if text not in SKIPPED:
+            new, said = label(text)
+            kept.append(replace(column, label=new, unit=said or column.unit))
+    return replace(raw, columns=tuple(kept))
+
+
+def _places(where: str, raw: Raw, wanted: Wanted) -> dict[str, int]:
+    """Channel -> number of its column. Names of the call come first, then canonical ones."""
+    labels = [c.label for c in raw.columns]
+    found: dict[str, int] = {}
+    if isinstance(wanted.columns, Mapping):
+        for key, name in checks.named(f"{where}: columns", wanted.columns).items():
+            name = checks.text(f"{where}: columns: {key}", name, "the name of a column")
+            hits = [k for k, c in enumerate(raw.columns) if name in (c.label, _shown(c))]
+            if len(hits) != 1:
+                got = f"{len(hits)} of them" if hits else ", ".join(map(_shown, raw.columns))
+                raise ValueError(f"{where}: expected one column '{name}' for {key}, got {got}")
+            found[key] = hits[0]
+    for key, names in ({**POINTS, "t": ALIASES["t"]} if wanted.points else ALIASES).items():
+        if key in found:
+            continue
+        free = [k for k in range(len(labels)) if k not in found.values()]
+        exact = [k for k in free if labels[k] == key]
+        near = [k for k in free if _matches(labels[k], names)]
+        if len(exact) > 1:
+            shown = ", ".join(f"'{_shown(raw.columns[k])}'" for k in exact)
+            raise ValueError(f"{where}: expected one column for {key}, got {shown}")
+        if exact or len(near) == 1:  # of several near ones the caller says which he means
+            found[key] = (exact or near)[0]
+    for k, name in enumerate(labels):
+        if k not in found.values():
+            if name in found:
+                name = f"{name}_{k + 1}"
+            found[name] = k
+    return found
+
+
+def _units(where: str, named: Mapping[str, Column], wanted: Wanted) -> dict[str, str]:
+    """Units that the call says, by channel."""
+    if wanted.units is None:
+        return {}
+    if isinstance(wanted.units, str):
+        given = by_channel(f"{where}: units", wanted.units)
+        for key, said in given.items():
+            own = named[key].unit if key in named else ""
+            if own and unit(own) != unit(said) and said in wanted.units:
+                raise ValueError(
+                    f"{where}: column '{_shown(named[key])}': expected its unit once, got "
+                    f"'{own}' in the file and '{said}' in the call; units={{'{key}': '{said}'}} "
+                    "overrules the file"
+                )
+        return {key: said for key, said in given.items() if key in named and not named[key].unit}
+    given = checks.named(f"{where}: units", wanted.units)
+    known = {**{c.label: key for key, c in named.items()}, **{key: key for key in named}}
+    checks.check_names(f"{where}: units", given, known)
+    return {known[key]: checks.text(f"{where}: units: {key}", u) for key, u in given.items()}
+
+
+def _scale(key: str, column: Column, given: str, wanted: Wanted) -> tuple[float, str]:
+    """Factor to SI and SI unit of a column."""
+    said = given or column.unit or (wanted.assumed or {}).get(key, "")
+    kinds = KINDS.get(key, ()) if not wanted.points or key in ("v", "F", "N") else ()
+    if key == "t" and not said and wanted.units is not None:
+        said = "s"
+    meant = unit(said) if said else None
+    if kinds and (meant is None or meant.si not in kinds):
+        got = said or "none"
+        hint = "" if said else "; say it in the call: units='m, N', units='rad, N m'"
+        hint = hint if key != "t" or said else "; say it in the call: units={'t': 's'}"
+        raise ValueError(
+            f"column '{_shown(column)}': expected a unit of {EXAMPLES[key]}, got {got}{hint}"
+        )
+    if meant is None:
+        return 1.0, said
+    return meant.factor, meant.si
+
+
+def _time(where: str, raw: Raw, signals: Mapping[str, Array], wanted: Wanted) -> Array | None:
+    if wanted.points:
+        return None
+    if wanted.step is not None:
+        if "t" in signals:
+            raise ValueError(
+                f"{where}: expected step= only where there is no time, got a column of times, too; "
+                "name it '-' in columns"
+            )
+        step = checks.number(f"{where}: step", wanted.step, unit="s", above=0.0)
+        return step * np.arange(raw.columns[0].values.size, dtype=np.float64)
+    if "t" not in signals:
+        have = ", ".join(_shown(c) for c in raw.columns)
+        raise ValueError(
+            f"{where}: expected a column of time 't [s]', got {have}; name it with "
+            "columns={'t': ...}, give step= [s] for equally spaced samples, or points=True"
+        )
+    return signals["t"]
+
+
+def each(raws: Sequence[Raw], wanted: Wanted) -> tuple[Record, ...]:
+    """Records of all, with the problems of all in one error."""
+    return tuple(gathered([lambda raw=raw: record(raw, wanted) for raw in raws]))
+
+
+def gathered(works: Sequence[Callable[[], T]]) -> list[T]:
+    """Results of `works`; what they refuse becomes one error, a line each."""
+    found: list[T] = []
+    problems: list[str] = []
+    for work in works:
+        try:
+            found.append(work())
+        except ValueError as error:
+            problems.append(str(error))
+    if problems:
+        raise ValueError("\n".join(problems))
+    return found

@@ -1,0 +1,255 @@
+"""One measured record: named signals over time, or points without time."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.data.loop import PositionLoop
+from symfric.foundation import checks
+
+Array = NDArray[np.float64]
+
+JITTER = 0.01
+"""Largest deviation of a sample interval from the mean one, relative, that counts as uniform."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Record:
+    """Signals of one experiment, all in SI units and of one length.
+
+    Canonical channels of a drive are x, v, a and force, also where it turns: then the units are
+    rad, rad/s, rad/s^2 and N m. Points of a friction curve are v and F. Every other signal keeps
+    the name of its column.
+
+    Attributes:
+        name: where it comes from; every message starts with it.
+        t: increasing sample times [s], shape (n,); None: points without time.
+        signals: name -> values, shape (n,) each.
+        units: name -> SI unit; "" where nobody said one.
+        first_row: row of the first sample in its file, for messages; 0 counts samples instead.
+        loop: the position controller of the experiment, where it is known.
+        columns: name -> what the column is called in its file, where that differs.
+        left_out: column -> why it is no signal.
+
+    Raises:
+        ValueError: unequal lengths, values that are not finite, times that do not increase, fewer
+            than two samples; all problems at once, each with its place.
+    """
+
+    name: str
+    t: Array | None
+    signals: Mapping[str, Array]
+    units: Mapping[str, str]
+    first_row: int = 0
+    loop: PositionLoop | None = None
+    columns: Mapping[str, str] = field(default_factory=dict[str, str])
+    left_out: Mapping[str, str] = field(default_factory=dict[str, str])
+
+    def __post_init__(self) -> None:
+        where = f"data '{self.name}'"
+        signals: dict[str, Array] = {}
+        for key, values in checks.named(f"{where}: signals", self.signals).items():
+            signals[key] = self._column(key, values)
+        units = checks.named(f"{where}: units", self.units, signals)
+        object.__setattr__(self, "signals", signals)
+        object.__setattr__(self, "units", {key: units.get(key, "") for key in signals})
+        if self.t is not None:
+            object.__setattr__(self, "t", self._column("t", self.t))
+        problems = self._shape_problems() or self._value_problems()
+        if problems:
+            raise ValueError(f"{where}: " + "; ".join(problems))
+
+    def _column(self, key: str, values: object) -> Array:
+        where = f"data '{self.name}': {key}"
+        column = checks.array(where, values, ndim=None, what="a column of numbers", nan=True)
+        column = column.copy()
+        column.setflags(write=False)
+        return column
+
+    def _everything(self) -> dict[str, Array]:
+        return dict(self.signals) if self.t is None else {"t": self.t, **self.signals}
+
+    def _shape_problems(self) -> list[str]:
+        shapes = {key: values.shape for key, values in self._everything().items()}
+        if not self.signals:
+            return ["expected at least one signal, got none"]
+        if any(len(shape) != 1 for shape in shapes.values()) or len(set(shapes.values())) > 1:
+            found = ", ".join(f"{key}: {shape}" for key, shape in shapes.items())
+            return [f"expected columns of one length, got {found}"]
+        if self.size < 2:
+            return [f"expected at least two samples, got {self.size}"]
+        if self.loop is not None and self.loop.reference.size != self.size:
+            return [
+                f"expected a controller with a reference of {self.size} samples, "
+                f"got {self.loop.reference.size}"
+            ]
+        return []
+
+    def _value_problems(self) -> list[str]:
+        problems: list[str] = []
+        for key, values in self._everything().items():
+            bad = np.flatnonzero(~np.isfinite(values))
+            if bad.size:
+                problems.append(
+                    f"column {key}, {self.place(int(bad[0]))}: expected a finite number, "
+                    f"got {values[bad[0]]} ({bad.size} such cells)"
+                )
+        if self.t is None or problems:
+            return problems
+        back = np.flatnonzero(np.diff(self.t) <= 0)
+        if back.size:
+            k = int(back[0])
+            later = ""
+            if back.size <= self.size // 20 and self.t[k + 1] <= self.t[0] + self.step:
+                later = "; the time starts again: one file for each record"
+            problems.append(
+                f"column t, {self.place(k + 1)}: expected increasing times, "
+                f"got {self.t[k + 1]:.12g} s after {self.t[k]:.12g} s "
+                f"({back.size} such rows){later}"
+            )
+        return problems
+
+    def place(self, sample: int) -> str:
+        """Where a sample stands, for messages: its row in the file, else its number."""
+        return f"row {sample + self.first_row}" if self.first_row else f"sample {sample}"
+
+    def __getitem__(self, name: str) -> Array:
+        """A signal by its name or that of its column; "t" gives the times."""
+        if name == "t" and self.t is not None:
+            return self.t
+        return self.signals[self.channel(name)]
+
+    def __contains__(self, name: object) -> bool:
+        return (name == "t" and self.t is not None) or (
+            name in self.signals or name in self.columns.values()
+        )
+
+    def channel(self, name: str) -> str:
+        """The name of a signal, given that or the name of its column.
+
+        Raises:
+            ValueError: there is none; with the reason where it was left out.
+        """
+        if name in self.signals:
+            return name
+        for key, column in self.columns.items():
+            if column == name and key in self.signals:
+                return key
+        why = self.left_out.get(name)
+        hint = f"it was left out: {why}" if why else f"name it with columns={{'{name}': ...}}"
+        raise ValueError(
+            f"data '{self.name}': expected a signal '{name}', got {', '.join(self.signals)}; {hint}"
+        )
+
+    def unit(self, name: str) -> str:
+        """SI unit of a signal."""
+        return "s" if name == "t" else self.units[self.channel(name)]
+
+    @property
+    def size(self) -> int:
+        """Number of samples."""
+        return next(iter(self.signals.values())).size
+
+    @property
+    def time(self) -> Array:
+        """The sample times [s].
+
+        Raises:
+            ValueError: points without time.
+        """
+        if self.t is None:
+            raise ValueError(
+                f"data '{self.name}': expected a record over time, got points without time; "
+                "fit them with Points(), or give step= [s]"
+            )
+        return self.t
+
+    @property
+    def step(self) -> float:
+        """Mean sample interval [s]."""
+        t = self.time
+        return float(t[-1] - t[0]) / (t.size - 1)
+
+    @property
+    def median_step(self) -> float:
+        """Median sample interval [s], which gaps do not move."""
+        return float(np.median(np.diff(self.time)))
+
+    def uniform(self) -> "Record":
+        """The record itself, if its samples are equally spaced to 1 % of the interval.
+
+        Raises:
+            ValueError: they are not. Filters and differences need equal intervals, and whether
+                interpolated samples may stand for measured ones is the user's decision.
+        """
+        t = self.time
+        intervals = np.diff(t)
+        k = int(np.argmax(np.abs(intervals - self.step)))
+        if abs(intervals[k] - self.step) > JITTER * self.step:
+            raise ValueError(
+                f"data '{self.name}': column t, {self.place(k + 1)}: expected equal intervals of "
+                f"{self.step:.6g} s to {JITTER:.0%}, got {intervals[k]:.6g} s at t = {t[k]:.6g} s; "
+                "use data.resampled()"
+            )
+        return self
+
+    def at(self, rows: slice | NDArray[np.integer] | NDArray[np.bool_]) -> "Record":
+        """The record at some of its samples; a slice without step keeps the controller."""
+        first, loop = 0, None
+        if isinstance(rows, slice) and rows.step in (None, 1):
+            begin, end, _ = rows.indices(self.size)
+            first = self.first_row + begin if self.first_row else 0
+            loop = None if self.loop is None else self.loop.between(begin, end)
+        return replace(
+            self,
+            t=None if self.t is None else self.t[rows],
+            signals={key: values[rows] for key, values in self.signals.items()},
+            first_row=first,
+            loop=loop,
+        )
+
+    def between(self, begin: float, end: float) -> "Record":
+        """The samples with begin <= t <= end [s]; the times stay what they are.
+
+        Raises:
+            ValueError: fewer than two samples lie there.
+        """
+        where = f"data '{self.name}': between"
+        begin = checks.number(where, begin, unit="s")
+        end = checks.number(where, end, unit="s")
+        t = self.time
+        first, last = np.searchsorted(t, begin, "left"), np.searchsorted(t, end, "right")
+        if last - first < 2:
+            raise ValueError(
+                f"{where}: expected times within {t[0]:g} ... {t[-1]:g} s with at least two "
+                f"samples, got {begin:g} ... {end:g} s"
+            )
+        return self.at(slice(int(first), int(last)))
+
+    def thinned(self, every: int) -> "Record":
+        """Every `every`-th sample, from the first on; noise is not filtered before.
+
+        The controller is dropped: its reference belongs to all samples.
+        """
+        every = checks.count(f"data '{self.name}': thinned", every)
+        return self if every == 1 else self.at(slice(None, None, every))
+
+    def renamed(self, names: Mapping[str, str]) -> "Record":
+        """The record with other names of signals: {"old": "new"}."""
+        where = f"data '{self.name}': renamed"
+        given = {self.channel(old): new for old, new in checks.named(where, names).items()}
+        for new in given.values():
+            checks.text(where, new, "names")
+        keys = [given.get(key, key) for key in self.signals]
+        if len(set(keys)) < len(keys) or "t" in keys:
+            raise ValueError(f"{where}: expected every name once, got {', '.join(keys)}")
+        return replace(
+            self,
+            signals=dict(zip(keys, self.signals.values(), strict=True)),
+            units=dict(zip(keys, self.units.values(), strict=True)),
+            columns={given.get(key, key): column for key, column in self.columns.items()},
+        )

@@ -1,0 +1,223 @@
+"""Text files of numbers: CSV in its dialects, columns of spaces, with or without a header."""
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from re import fullmatch
+from typing import final
+
+import numpy as np
+
+from identification.data.raw import Array, Column, Raw, label
+from identification.data.units import unit
+
+COMMENTS = ("#", "%", "//")
+"""What a line begins with that says something about the file."""
+DELIMITERS = ("\t", ";", ",", " ")
+LOOKED_AT = 40
+"""Lines at the end of the file that tell the delimiter."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Lines as cells.
+
+    Attributes:
+        delimiter: between the cells; a space stands for any number of spaces and tabs.
+        numbers: of the rows in the file.
+        cells: of each row.
+        comments: rows that begin with a sign of comment, before the first other one.
+    """
+
+    delimiter: str
+    numbers: list[int]
+    cells: list[list[str]]
+    comments: list[str]
+
+
+def read_text(file: Path) -> Raw:
+    """The columns of a text file.
+
+    Comma, semicolon, tab or spaces separate the cells; decimal commas are understood where they
+    do not separate. Lines before the header and lines that begin with #, % or // are passed over,
+    but a last comment with as many words as there are columns is the header of a file without
+    another. A row of units may follow the header.
+
+    Raises:
+        ValueError: no file, no text, no rows of numbers, rows of different lengths.
+    """
+    rows = _rows(file)
+    where = f"read '{file.name}'"
+    comma = rows.delimiter != "," and _decimal_comma(rows)
+    first = _first(rows, comma)
+    header, names, units = _header(rows, first)
+    if first is None:
+        got = "an empty file" if not rows.cells else f"{len(rows.cells)} rows of text only"
+        if header is not None:
+            got = "a header alone"
+        raise ValueError(f"{where}: expected rows of numbers, got {got}")
+    width = len(names) if names else len(rows.cells[first])
+    body, numbers = rows.cells[first:], rows.numbers[first:]
+    for number, row in zip(numbers, body, strict=True):
+        if len(row) > width and any(cell for cell in row[width:]):
+            hint = "; write numbers with a decimal point" if rows.delimiter == "," else ""
+            raise ValueError(
+                f"{where}: row {number}: expected {width} cells as in the "
+                f"{'header' if names else 'first row'}, got {len(row)}{hint}"
+            )
+    columns: list[Column] = []
+    for k in range(width):
+        values, problem = _column(body, numbers, k, comma)
+        name, said = label(names[k]) if names else ("", "")
+        columns.append(Column(name, said or (units[k] if units else ""), values, problem))
+    return Raw(file.name, tuple(columns), numbers[0])
+
+
+def _rows(file: Path) -> Rows:
+    """Lines that are not empty, as cells."""
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raw = file.read_bytes()
+        if not raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+            text = raw.decode("latin-1")  # degrees and micro of older recorders
+        else:
+            try:
+                text = raw.decode("utf-16")
+            except UnicodeDecodeError:
+                raise ValueError(
+                    f"read '{file.name}': expected text in UTF-8 or UTF-16, got other bytes"
+                ) from None
+    if "\0" in text:
+        raise ValueError(f"read '{file.name}': expected a text file, got one with binary numbers")
+    lines = [(n, line.strip("\ufeff \r")) for n, line in enumerate(text.split("\n"), start=1)]
+    comments: list[str] = []
+    plain: list[tuple[int, str]] = []
+    for number, line in lines:
+        if line.lstrip('" \t').startswith(COMMENTS):
+            if not plain:
+                comments.append(line.lstrip('" \t#%/').strip())
+        elif line.strip(" \t,;"):
+            plain.append((number, line))
+    if not plain:
+        return Rows(",", [], [], comments)
+    delimiter = _delimiter([line for _, line in plain])
+    cells = [split_line(line, delimiter) for _, line in plain]
+    return Rows(delimiter, [n for n, _ in plain], cells, comments)
+
+
+def _delimiter(lines: Sequence[str]) -> str:
+    """The delimiter that makes most of the last lines rows of as many numbers."""
+    last = lines[-LOOKED_AT:]
+
+    def score(delimiter: str) -> tuple[float, int]:
+        rows = [split_line(line, delimiter) for line in last]
+        widths = [len(row) for row in rows]
+        usual = max(set(widths), key=widths.count)
+        numbers = sum(sum(map(_is_number, row)) for row in rows if len(row) == usual)
+        return (numbers / (usual * len(rows)) if usual > 1 else 0.0), -DELIMITERS.index(delimiter)
+
+    best = max(DELIMITERS, key=score)
+    if score(best)[0] > 0:
+        return best
+    return max(",;\t", key=lines[0].count) if any(d in lines[0] for d in ",;\t") else " "
+
+
+def split_line(line: str, delimiter: str) -> list[str]:
+    """The cells of one line."""
+    if delimiter == " ":
+        return line.split()
+    if '"' in line:
+        try:
+            return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+        except (csv.Error, StopIteration):
+            pass
+    return [cell.strip() for cell in line.split(delimiter)]
+
+
+def _number(cell: str) -> float:
+    if "_" in cell:  # which Python takes for a number
+        raise ValueError
+    return float(cell)
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        _number(cell)
+    except ValueError:
+        return fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", cell) is not None
+    return True
+
+
+def _decimal_comma(rows: Rows) -> bool:
+    """Whether numbers have decimal commas: cells of digits with one comma, and no point."""
+    cells = [cell for row in rows.cells[-LOOKED_AT:] for cell in row]
+    with_comma = sum(fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", c) is not None for c in cells)
+    with_point = sum(fullmatch(r"[-+]?\d*\.\d+([eE][-+]?\d+)?", c) is not None for c in cells)
+    return with_comma > with_point
+
+
+def _numeric(row: Sequence[str], comma: bool) -> bool:
+    """Whether most of the cells are numbers, so that the row is no header."""
+    cells = [cell.replace(",", ".") if comma else cell for cell in row if cell]
+    numbers = sum(map(_is_number, cells))
+    return numbers > 0 and numbers >= len(cells) / 2
+
+
+def _first(rows: Rows, comma: bool) -> int | None:
+    """The first row of numbers: as wide as most of the last ones are."""
+    widths = [_trimmed(row) for row in rows.cells[-LOOKED_AT:] if _numeric(row, comma)]
+    usual = max(set(widths), key=widths.count, default=0)
+    return next(
+        (k for k, r in enumerate(rows.cells) if _trimmed(r) >= usual and _numeric(r, comma)), None
+    )
+
+
+def _header(rows: Rows, first: int | None) -> tuple[int | None, list[str] | None, list[str] | None]:
+    """Number of the header row, names and units of the columns, as far as there are any."""
+    end = len(rows.cells) if first is None else first
+    width = 0 if first is None else _trimmed(rows.cells[first])
+    above = [k for k in range(end) if first is None or len(rows.cells[k]) >= width]
+    if not above:
+        spoken = [split_line(c, rows.delimiter) for c in rows.comments[-1:]]
+        spoken += [c.split() for c in rows.comments[-1:]]
+        names = next((s for s in spoken if len(s) == width and width), None)
+        return None, names, None
+    last = above[-1]
+    cells = rows.cells[last]
+    if len(above) > 1 and all(unit(c.strip("[]()")) is not None for c in cells):
+        names = rows.cells[above[-2]]
+        if len(names) == len(cells) and not all(unit(c) is not None for c in names if c):
+            return above[-2], names, [c.strip("[]()") for c in cells]
+    while cells and not cells[-1]:
+        cells = cells[:-1]
+    return last, cells, None
+
+
+def _trimmed(row: Sequence[str]) -> int:
+    """Number of cells up to the last that holds something."""
+    return max((k + 1 for k, cell in enumerate(row) if cell), default=0)
+
+
+def _column(
+    body: Sequence[Sequence[str]], numbers: Sequence[int], index: int, comma: bool
+) -> tuple[Array, str]:
+    """One column as numbers, and a sentence about its first bad cell, if any."""
+    cells = [row[index] if index < len(row) else "" for row in body]
+    if comma:
+        cells = [cell.replace(",", ".") if cell.count(",") == 1 else cell for cell in cells]
+    values = np.full(len(cells), np.nan)
+    for k, cell in enumerate(cells):
+        try:
+            values[k] = _number(cell)
+        except ValueError:
+            return values, f"row {numbers[k]}: expected a number, got '{cell[:40]}'"
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        place = f"row {numbers[int(bad[0])]}"
+        return values, f"{place}: expected a finite number, got {cells[int(bad[0])]}" + (
+            f" ({bad.size} such cells)" if bad.size > 1 else ""
+        )
+    return values, ""

@@ -1,0 +1,74 @@
+from math import pi
+
+import pytest
+
+from identification.data.units import by_channel, unit
+
+
+@pytest.mark.parametrize(
+    ("text", "si", "factor"),
+    [
+        ("m", "m", 1.0),
+        ("µm", "m", 1e-6),
+        ("μm", "m", 1e-6),
+        ("ms", "s", 1e-3),
+        ("min", "s", 60.0),
+        ("deg", "rad", pi / 180),
+        ("°", "rad", pi / 180),
+        ("°/s", "rad/s", pi / 180),
+        ("mrad", "rad", 1e-3),
+        ("rpm", "rad/s", 2 * pi / 60),
+        ("1/min", "rad/s", 2 * pi / 60),
+        ("rev/s", "rad/s", 2 * pi),
+        ("mm/s", "m/s", 1e-3),
+        ("mm s^-1", "m/s", 1e-3),
+        ("m/s²", "m/s^2", 1.0),
+        ("m/s2", "m/s^2", 1.0),
+        ("m/s/s", "m/s^2", 1.0),
+        ("deg/s^2", "rad/s^2", pi / 180),
+        ("kN", "N", 1e3),
+        ("N m", "N m", 1.0),
+        ("Nm", "N m", 1.0),
+        ("N*m", "N m", 1.0),
+        ("N·m", "N m", 1.0),
+        ("N mm", "N m", 1e-3),
+        ("mNm", "N m", 1e-3),
+        ("mN m", "N m", 1e-3),
+        ("Ncm", "N m", 1e-2),
+        ("N m s/rad", "N m s/rad", 1.0),
+        ("kg m^2", "kg m^2", 1.0),
+        ("1/s", "1/s", 1.0),
+        ("%", "1", 0.01),
+        ("-", "1", 1.0),
+    ],
+)
+def test_unit_becomes_si(text: str, si: str, factor: float) -> None:
+    found = unit(text)
+    assert found is not None
+    assert found.si == si
+    assert found.factor == pytest.approx(factor, rel=1e-14)
+
+
+@pytest.mark.parametrize("text", ["parsec", "counts", "N/", "mmm", "kmin", "x y", "3", "m^m"])
+def test_what_is_no_unit_is_none(text: str) -> None:
+    assert unit(text) is None
+
+
+def test_short_form_reaches_every_canonical_channel() -> None:
+    given = by_channel("read", "deg, N mm")
+    assert given == {"x": "deg", "v": "deg/s", "a": "deg/s^2", "force": "N mm", "F": "N mm"}
+    assert by_channel("read", "ms, mm, mm/s, kN")["t"] == "ms"
+    assert by_channel("read", "rpm, N m")["x"] == "rad"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("mm, m", "expected one unit for x, got 'mm' and 'm'"),
+        ("mm, V", "expected units of position and force .*got 'V'"),
+        ("", "got ''"),
+    ],
+)
+def test_short_form_refuses(text: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        by_channel("read", text)
