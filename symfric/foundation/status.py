@@ -46,6 +46,10 @@ class Status(Enum):
         "No step fits better, although the derivatives say that one should: this is no minimum; "
         "start elsewhere or narrow the bounds."
     )
+    DOUBTFUL = (
+        "The best fit of this model was found, but the residuals say that it does not explain the "
+        "data; use another model, or take the numbers with care."
+    )
     IMPLAUSIBLE = (
         "The optimality conditions hold, but what was found cannot be meant: the record and what "
         "is asked of it contradict each other."
@@ -66,7 +70,13 @@ class Status(Enum):
     @property
     def ok(self) -> bool:
         """Whether the result can be used as it is."""
-        return self in (Status.SUCCESS, Status.TERMINATED, Status.SOLVED, Status.ACCEPTABLE)
+        return self in (
+            Status.SUCCESS,
+            Status.TERMINATED,
+            Status.SOLVED,
+            Status.ACCEPTABLE,
+            Status.DOUBTFUL,
+        )
 
 
 class SolveError(RuntimeError):

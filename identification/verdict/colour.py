@@ -1,0 +1,202 @@
+"""The colour of residuals: an autoregressive model of one channel, of an order that BIC chooses.
+
+    e_i = phi_1 e_(i-1) + ... + phi_p e_(i-p) + u_i,     u white with variance s^2
+
+The order comes from Burg's recursion. The coefficients are then those of the largest restricted
+likelihood: what a fit of n unknowns took out of the noise is accounted for, without which the
+correlation, and with it every standard error, comes out too small (by a quarter for 200 samples
+of AR(1) 0.9 noise and three unknowns).
+Sources: Burg, thesis, Stanford 1975; Cooper and Thompson, Biometrika 64(3), 1977 (restricted
+likelihood of ARMA noise); den Haan and Levin, Handbook of Statistics 15, 1997 (order by BIC).
+"""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from identification.residuals.evaluation import Array
+from identification.verdict.order import Count
+
+MOST = 30
+"""Largest order."""
+REFINED = 6
+"""Largest order whose coefficients are refined; higher ones are only chosen for long records."""
+NEAR_ONE = 0.9995
+"""Largest partial autocorrelation: noise that wanders off has no variance."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Colour:
+    """An autoregressive model of the residuals of one channel.
+
+    Attributes:
+        partial: partial autocorrelations, shape (p,); they determine phi.
+        variance: s^2 of the innovations.
+        freedom: degrees of freedom of s^2.
+        rows: of the channel.
+        white: variance per degree of freedom if the residuals are taken as white.
+    """
+
+    partial: Array
+    variance: float
+    freedom: float
+    rows: int
+    white: float
+
+    @property
+    def order(self) -> int:
+        """P."""
+        return self.partial.size
+
+    @property
+    def phi(self) -> Array:
+        """Coefficients, shape (p,)."""
+        return predictors(self.partial)[0][-1]
+
+    @property
+    def effective(self) -> float:
+        """Number of independent samples that tell a mean as well as these, at most `rows`.
+
+        n_eff = n gamma(0) / (gamma(0) + 2 gamma(1) + 2 gamma(2) + ...)
+        """
+        relative = predictors(self.partial)[1][0]  # gamma(0) / s^2
+        slow = 1 / (1 - float(self.phi.sum())) ** 2
+        return float(np.clip(self.rows * relative / slow, 1.0, self.rows))
+
+    def spectrum(self, places: int) -> tuple[Array, Array]:
+        """Spectral density over a grid of that many frequencies of a full turn, and its slopes.
+
+            S(w) = s^2 / |A(w)|^2,   A(w) = 1 - sum phi_j exp(-i w j),   dS/dphi_j = 2 S Re(e/A)
+
+        Shapes (places,), (p, places).
+        """
+        w = 2 * np.pi * np.arange(places) / places
+        waves = np.exp(-1j * np.outer(np.arange(1, self.order + 1), w))
+        A = 1 - self.phi @ waves
+        S = self.variance / np.abs(A) ** 2
+        return S, 2 * S * np.real(waves / A)
+
+    @property
+    def doubt(self) -> Array:
+        """Covariance of the estimated phi, s^2 Gamma^-1 / n, shape (p, p)."""
+        p = self.order
+        if not p:
+            return np.zeros((0, 0))
+        table, spread = predictors(self.partial)
+        inverse = np.zeros((p, p))  # Cholesky factors of Gamma^-1: prediction errors of each order
+        for k in range(p):
+            row = np.zeros(p)
+            row[k] = 1.0
+            row[:k] = -table[k, :k][::-1]
+            inverse += np.outer(row, row) / spread[k]
+        return inverse / max(self.freedom, 1.0)
+
+
+def colour(r: Array, J: Array, position: Count) -> Colour:
+    """The colour of residuals that a fit with sensitivities J left.
+
+    Args:
+        r: residuals of one channel in the order of time, shape (n,).
+        J: their sensitivities to what was fitted, shape (n, k), of any rank.
+        position: neighbours before each row, see `positions`.
+    """
+    basis = span(J)
+    n, k = basis.shape
+    if n - k < 3 or not np.any(r):
+        left = max(1.0, float(n - k))
+        found = float(r @ r) / left
+        return Colour(np.zeros(0), found, left, n, found)
+    white = _likelihood(np.zeros(0), r, basis, position)[1]
+    partial = _burg(r, position, most=int(min(MOST, 10 * np.log10(n), (n - k) // 10)))
+    if 0 < partial.size <= REFINED and k:
+        partial = _refined(partial, r, basis, position)
+    variance = _likelihood(partial, r, basis, position)[1]
+    return Colour(partial, variance, float(n - k), n, white)
+
+
+def whitened(x: Array, partial: Array, position: Count) -> Array:
+    """Prediction errors of each column of x, shape of x, all with the variance of u.
+
+    The first rows of a run are predicted by as many as there are.
+    """
+    table, spread = predictors(partial)
+    order = np.minimum(position, partial.size)
+    out = x.copy()
+    wide = (-1,) + (1,) * (x.ndim - 1)
+    for j in range(1, partial.size + 1):
+        out[j:] -= table[order[j:], j - 1].reshape(wide) * x[:-j]
+    return out / np.sqrt(spread[order]).reshape(wide)
+
+
+def predictors(partial: Array) -> tuple[Array, Array]:
+    """Coefficients of the best predictors of order 0 ... p, (p+1, p), and error variances / s^2.
+
+    Levinson's and Durbin's recursion from the partial autocorrelations.
+    """
+    p = partial.size
+    table = np.zeros((p + 1, p))
+    for m, c in enumerate(partial):
+        table[m + 1, :m] = table[m, :m] - c * table[m, :m][::-1]
+        table[m + 1, m] = c
+    shrink = np.concatenate([[1.0], np.cumprod(1 - partial**2)])
+    return table, shrink / shrink[-1]
+
+
+def span(J: Array, tolerance: float = 1e-9) -> Array:
+    """Orthonormal basis of the columns of J, shape (rows, rank)."""
+    size = np.linalg.norm(J, axis=0)
+    used = J[:, size > 0] / size[size > 0]
+    if not used.size:
+        return np.zeros((J.shape[0], 0))
+    U, s, _ = np.linalg.svd(used, full_matrices=False)
+    return U[:, s > tolerance * s[0]]
+
+
+def _burg(r: Array, position: Count, most: int) -> Array:
+    """Partial autocorrelations of the order of the smallest BIC."""
+    f, b = r.copy(), r.copy()
+    partial = list[float]()
+    total, best, order = 0.0, 0.0, 0
+    for m in range(1, most + 1):
+        near = position[1:] >= m
+        front, back = f[1:][near], b[:-1][near]
+        size = float(front @ front + back @ back)
+        if front.size < 2 * m + 2 or not size > 0:
+            break
+        c = float(np.clip(2 * float(front @ back) / size, -NEAR_ONE, NEAR_ONE))
+        b[1:] = np.where(near, b[:-1] - c * f[1:], b[1:])
+        f[1:][near] = front - c * back
+        partial.append(c)
+        total += front.size * np.log(1 - c * c) + np.log(r.size)
+        if total < best:
+            best, order = total, m
+    return np.array(partial[:order])
+
+
+def _likelihood(partial: Array, r: Array, basis: Array, position: Count) -> tuple[float, float]:
+    """-2 log of the restricted likelihood but for a constant, and the variance s^2.
+
+    (n - k) log s^2 + log |Sigma / s^2| + log |B' (Sigma / s^2)^-1 B|
+    """
+    both = whitened(np.column_stack([basis, r]), partial, position)
+    k, free = basis.shape[1], r.size - basis.shape[1]
+    R: Array = np.asarray(np.linalg.qr(both, mode="r"))
+    variance = max(float(R[k, k]) ** 2 / free, np.finfo(float).tiny)
+    spread = predictors(partial)[1][np.minimum(position, partial.size)]
+    inside = 2 * float(np.log(np.abs(np.diag(R)[:k])).sum())
+    return free * np.log(variance) + float(np.log(spread).sum()) + inside, variance
+
+
+def _refined(partial: Array, r: Array, basis: Array, position: Count) -> Array:
+    """The partial autocorrelations of the largest restricted likelihood, from those of Burg."""
+    from scipy.optimize import minimize  # noqa: PLC0415  (SciPy is loaded by those who fit)
+
+    def cost(z: Array) -> float:
+        return _likelihood(NEAR_ONE * np.tanh(z), r, basis, position)[0]
+
+    start = np.arctanh(np.clip(partial / NEAR_ONE, -0.999, 0.999))
+    found = minimize(cost, start, method="BFGS", options={"gtol": 1e-4 * r.size, "maxiter": 20})
+    better = np.isfinite(found.fun) and found.fun <= cost(start)
+    return NEAR_ONE * np.tanh(found.x) if better else partial

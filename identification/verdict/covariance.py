@@ -1,0 +1,173 @@
+"""Uncertainty of what was fitted: covariance, 95 % intervals, what is not told, in words."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.residuals.evaluation import Array
+from identification.verdict.combinations import Trace, lost
+from identification.verdict.minimum import Minimum
+from identification.verdict.sandwich import Sandwich, sandwich
+
+LEVEL = 0.95
+"""Of the intervals."""
+TOGETHER = 0.98
+"""Correlation from which on two estimates are said to go together."""
+FEW = 3.0
+"""Effective samples for each unknown below which intervals cannot be relied on."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Covariance:
+    """Uncertainty of k values; NaN where the data do not tell one or where it stands at a bound.
+
+    Attributes:
+        names: of the values.
+        matrix: covariance with the colour of the residuals, shape (k, k).
+        white: the same as if the residuals were white, shape (k, k).
+        freedom: effective degrees of freedom, for quantiles of Student's t, shape (k,).
+        low, high: 95 % intervals, shape (k,). Those of logarithmic unknowns are symmetric in the
+            logarithm, as a stiffness known to a factor of 2 is no stiffness of 1 +- 1.
+        at_bound: values that stand at a bound.
+        undetermined: groups of names of which fewer combinations are told than there are names; a
+            group of one has no influence at all.
+        effective: number of independent samples of each channel, by its name.
+        sentences: what is not told or hardly told.
+    """
+
+    names: tuple[str, ...]
+    matrix: Array
+    white: Array
+    freedom: Array
+    low: Array
+    high: Array
+    at_bound: tuple[str, ...]
+    undetermined: tuple[tuple[str, ...], ...]
+    effective: dict[str, float]
+    sentences: tuple[str, ...]
+
+    @property
+    def standard_errors(self) -> Array:
+        """Shape (k,)."""
+        return np.sqrt(np.diag(self.matrix))
+
+    @property
+    def white_errors(self) -> Array:
+        """Standard errors as if the residuals were white, shape (k,)."""
+        return np.sqrt(np.diag(self.white))
+
+    @property
+    def correlation(self) -> Array:
+        """Of the estimates, NaN where there is none, shape (k, k)."""
+        error = self.standard_errors
+        both = np.outer(error, error)
+        return np.divide(self.matrix, both, out=np.full_like(both, np.nan), where=both > 0)
+
+
+def covariance_of(found: Minimum, trace: Trace, inside: Sandwich | None = None) -> Covariance:
+    """Uncertainty of the values at a minimum.
+
+    Limits: linear in the values (in logarithms where an unknown is logarithmic), see `profile` for
+    what is not; channels are taken as independent; with fewer effective samples than three times
+    the unknowns the intervals are too small, which is said.
+
+    Args:
+        found: the minimum.
+        trace: how much the weighted residuals change at other values, to find the right words.
+        inside: the sandwich if it is there already.
+    """
+    inside = sandwich(found) if inside is None else inside
+    names, values = found.names, found.values
+    moved = found.slope @ inside.null  # values along directions without a trace
+    own = [names.index(u.name) for u in found.unknowns]
+    size = _sensitivity(found, own)
+    wanders = np.abs(moved * size[:, None]).max(axis=1, initial=0.0) > 1e-4
+    fixed = ~np.any((found.slope != 0) & ~found.held, axis=1)
+    matrix, white = inside.coloured.copy(), inside.white.copy()
+    for C in (matrix, white):
+        C[wanders | fixed, :] = C[:, wanders | fixed] = np.nan
+    low, high = _intervals(found, np.sqrt(np.diag(matrix)), inside.freedom)
+    groups = list(
+        lost(
+            tuple(names[i] for i in own),
+            values[own],
+            moved[own],
+            size[own],
+            lambda some: trace(_spread(found, own, some)),
+        )
+    )
+    at_bound = tuple(u.name for u, held in zip(found.unknowns, found.held, strict=True) if held)
+    labels = [found.label(c) for c in found.channels]
+    effective = {n: c.effective for n, c in zip(labels, inside.colours, strict=True)}
+    made = Covariance(
+        names, matrix, white, inside.freedom, low, high, at_bound,
+        tuple(tuple(names[own[i]] for i in g.members) for g in groups),
+        effective, tuple(g.sentence for g in groups),
+    )  # fmt: skip
+    said = (*made.sentences, *_weak(found, made), *_few(found, effective))
+    return replace(made, sentences=said)
+
+
+def _sensitivity(found: Minimum, own: list[int]) -> Array:
+    """Norm of dr/dvalue of unknowns with the others held; of tied ones the inverse value, (k,)."""
+    size = 1 / np.maximum(np.abs(found.values), 1e-300)
+    alone = np.linalg.norm(found.J @ np.linalg.inv(found.slope[own]), axis=0)
+    for i, s in zip(own, alone, strict=True):
+        size[i] = s if s > 0 else size[i]
+    return size
+
+
+def _spread(found: Minimum, own: list[int], some: Array) -> Array:
+    """All values where those of the unknowns are `some`: tied ones follow in first order."""
+    w = np.linalg.solve(found.slope[own], some - found.values[own])
+    there = found.values + found.slope @ w
+    there[own] = some
+    return there
+
+
+def _intervals(found: Minimum, error: Array, freedom: Array) -> tuple[Array, Array]:
+    from scipy.special import stdtrit  # noqa: PLC0415  (SciPy is loaded by those who fit)
+
+    reach = stdtrit(freedom, 0.5 + LEVEL / 2) * error
+    low, high = found.values - reach, found.values + reach
+    for unknown in found.unknowns:
+        i = found.names.index(unknown.name)
+        if unknown.logarithmic and found.values[i] > 0 and np.isfinite(reach[i]):
+            factor = np.exp(min(reach[i] / found.values[i], 700.0))
+            low[i], high[i] = found.values[i] / factor, found.values[i] * factor
+    return low, high
+
+
+def _weak(found: Minimum, made: Covariance) -> Iterator[str]:
+    """What is told, but hardly."""
+    error, correlation = made.standard_errors, made.correlation
+    told: NDArray[np.bool_] = np.isfinite(error)
+    nuisance = {u.name for u in found.unknowns if u.nuisance}
+    units = {u.name: u.unit for u in found.unknowns}
+    for i, name in enumerate(made.names):
+        if not told[i] or name in nuisance or not error[i] > abs(found.values[i]):
+            continue
+        unit = units.get(name, "1")
+        unit = "" if unit == "1" else f" {unit}"
+        others = np.where(told, np.abs(correlation[i]), 0.0)
+        others[i] = 0.0
+        j = int(np.argmax(others))
+        goes = f"; it goes with {made.names[j]}" if others[j] > TOGETHER else ""
+        yield (
+            f"{name} is hardly told: between {made.low[i]:.3g} and {made.high[i]:.3g}{unit} "
+            f"with 95 %{goes}."
+        )
+
+
+def _few(found: Minimum, effective: dict[str, float]) -> Iterator[str]:
+    count = sum(effective.values())
+    n = int((~found.held).sum())
+    if n and count < FEW * n:
+        yield (
+            f"The residuals are so coloured that they count as {count:.0f} independent samples "
+            f"for {n} unknowns: the intervals are rather too small."
+        )

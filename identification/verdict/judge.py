@@ -1,0 +1,219 @@
+"""What a fit is worth in view of its residuals.
+
+A least-squares fit ends at a minimum whatever model it is given. A right model leaves noise that
+has nothing to do with what was applied and how the machine moved; white noise of the size that the
+sensor has, if one is lucky. So
+
+* dependence on inputs, speed, direction, place or history makes a fit doubtful: the model is wrong;
+* residuals larger than a noise level that was given do, too;
+* colour alone does not: intervals carry it, see `covariance`;
+* a mass at its bound, or residuals as large as the signal, are no physics.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import final
+
+import numpy as np
+
+from identification.residuals.evaluation import Channel
+from identification.verdict.colour import Colour
+from identification.verdict.independence import Dependence, dependences
+from identification.verdict.minimum import Minimum
+from identification.verdict.order import positions
+from identification.verdict.resolution import resolution
+from identification.verdict.sandwich import Sandwich, sandwich
+from identification.verdict.whiteness import Whiteness, whiteness
+from symfric.foundation.status import Status
+
+ALARM = 0.02
+"""Chance of a false alarm over all tests of a fit."""
+WHITE = 0.05
+"""Level of the test for white noise of one channel, which decides nothing."""
+SHARE = 0.01
+"""Share of the variance of the residuals from which on a dependence counts."""
+UNEXPLAINED = 0.7
+"""Residuals over the spread of the signal from which on a model says next to nothing."""
+INERTIA = ("kg", "kg m^2")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Test:
+    """One question to the residuals.
+
+    Attributes:
+        channel: signal, with the number of its record where there are several: "force[2]".
+        name: "whiteness", "independence of ...", "size", "explained", "bound".
+        statistic, p: of the test, and the chance of a larger statistic if the model is right.
+        limit: p below which the test fails; for `size` and `explained` that of the statistic.
+        passed: whether it did not fail.
+        decides: whether failing makes the fit doubtful.
+        sentence: what was found.
+    """
+
+    __test__ = False  # not one of pytest
+
+    channel: str
+    name: str
+    statistic: float
+    p: float
+    limit: float
+    passed: bool
+    decides: bool
+    sentence: str
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What the residuals say of a fit.
+
+    Attributes:
+        tests: all that was asked.
+        effective: number of independent samples of each channel.
+        whiteness: autocorrelations of each channel with their limits, for a plot over lags.
+        nonsense: why the result is no physics; empty if it may be.
+        sentences: what a reader has to know, worst first.
+    """
+
+    tests: tuple[Test, ...]
+    effective: dict[str, float]
+    whiteness: dict[str, Whiteness]
+    nonsense: tuple[str, ...] = ()
+    sentences: tuple[str, ...] = field(default=())
+
+    @property
+    def good(self) -> bool:
+        """Whether nothing speaks against the model."""
+        return not self.nonsense and all(t.passed for t in self.tests if t.decides)
+
+    def status(self, solved: Status) -> Status:
+        """How the fit ended, if the solver ended so."""
+        if not solved.ok or self.good:
+            return solved
+        return Status.IMPLAUSIBLE if self.nonsense else Status.DOUBTFUL
+
+
+def judged(found: Minimum, inside: Sandwich | None = None) -> Verdict:
+    """The verdict on a minimum; `inside` is its sandwich if it is there already."""
+    inside = sandwich(found) if inside is None else inside
+    white = dict[str, Whiteness]()
+    tests, effective = list[Test](), dict[str, float]()
+    every = list[tuple[Channel, list[Dependence]]]()
+    for channel, colour in zip(found.channels, inside.colours, strict=True):
+        name = found.label(channel)
+        effective[name] = colour.effective
+        position = positions(channel)
+        r = found.r[channel.rows]
+        J = (found.J * ~found.held * found.gain[:, None])[channel.rows]
+        white[name] = whiteness(r, J, position)
+        tests.append(_white(name, white[name], colour))
+        every.append((channel, list(dependences(r, J, colour, channel.regressors, position))))
+        tests += _size(found, channel, colour)
+    count = sum(len(some) for _, some in every)
+    for channel, some in every:
+        tests += _independent(found, channel, some, ALARM / max(count, 1))
+    nonsense = (*_unexplained(found), *_no_mass(found))
+    bounds = tuple(_bounds(found))
+    failed = [t for t in tests if not t.passed]
+    failed.sort(key=lambda t: (not t.decides, t.p))
+    said = (*nonsense, *(t.sentence for t in failed), *bounds)
+    return Verdict(tuple(tests), effective, white, nonsense, said)
+
+
+def _white(name: str, found: Whiteness, colour: Colour) -> Test:
+    if not found.lags.size:
+        return Test(
+            name, "whiteness", 0.0, 1.0, WHITE, True, False, f"{name}: not ordered in time."
+        )
+    passed = found.p >= WHITE
+    first = float(found.correlation[0])
+    text = (
+        f"The residuals of {name} look like white noise."
+        if passed
+        else f"The residuals of {name} are coloured (correlation {first:.2f} of neighbours): "
+        f"{colour.rows} samples count as {colour.effective:.0f}; the intervals allow for it."
+    )
+    return Test(name, "whiteness", found.statistic, found.p, WHITE, passed, False, text)
+
+
+def _independent(
+    found: Minimum, channel: Channel, some: list[Dependence], limit: float
+) -> Iterator[Test]:
+    """One test a family; what cannot be told from rounding or is a hundredth does not count."""
+    name, unit = found.label(channel), channel.unit
+    fine = resolution(channel.measured)
+    level = _level(found, channel)
+    for d in some:
+        size = d.size * level
+        passed = d.p >= limit or size <= fine or d.share < SHARE
+        text = (
+            f"The residuals of {name} depend on {d.what}: {size:.2g} {unit} of them, "
+            f"{100 * min(d.share, 1.0):.0f} % of their variance ({d.hint})."
+        )
+        if passed:
+            text = f"The residuals of {name} do not depend on {d.what}."
+        test = Test(name, f"independence of {d.what}", d.statistic, d.p, limit, passed, True, text)
+        yield test
+
+
+def _level(found: Minimum, channel: Channel) -> float:
+    """Unit of the signal over that of the weighted residuals."""
+    raw, r = found.raw[channel.rows], found.r[channel.rows]
+    size = float(np.linalg.norm(r))
+    return float(np.linalg.norm(raw)) / size if size > 0 else 1.0
+
+
+def _size(found: Minimum, channel: Channel, colour: Colour) -> Iterator[Test]:
+    """Residuals against a noise level that is known: chi2 with the effective number of samples."""
+    from scipy.special import chdtrc  # noqa: PLC0415  (SciPy is loaded by those who fit)
+
+    sigma = found.noise.get(channel.signal)
+    if sigma is None:
+        return
+    name = found.label(channel)
+    rms = float(np.sqrt(np.mean(found.raw[channel.rows] ** 2)))
+    free = max(colour.effective * colour.freedom / colour.rows, 1.0)
+    p = float(chdtrc(free, free * (rms / sigma) ** 2))
+    passed = p >= ALARM / len(found.channels) or rms <= resolution(channel.measured)
+    text = (
+        f"The residuals of {name} are {rms:.2g} {channel.unit}, {rms / sigma:.2g} times the noise "
+        f"that was given."
+    )
+    yield Test(name, "size", rms / sigma, p, ALARM / len(found.channels), passed, True, text)
+
+
+def _unexplained(found: Minimum) -> Iterator[str]:
+    """Signals of which a model leaves nearly everything."""
+    signals = dict.fromkeys(c.signal for c in found.channels)
+    for signal in signals:
+        some = [c for c in found.channels if c.signal == signal]
+        left = sum(float(np.sum(found.raw[c.rows] ** 2)) for c in some)
+        there = sum(float(np.sum((c.measured - c.measured.mean()) ** 2)) for c in some)
+        if there > 0 and left > UNEXPLAINED**2 * there:
+            yield (
+                f"The model leaves {100 * np.sqrt(left / there):.0f} % of {signal} unexplained: "
+                "another model, another column, another sign or another unit is needed."
+            )
+
+
+def _no_mass(found: Minimum) -> Iterator[str]:
+    for unknown, held in zip(found.unknowns, found.held, strict=True):
+        value = found.values[found.names.index(unknown.name)]
+        near = value <= unknown.lower + 1e-3 * max(abs(unknown.start), abs(unknown.lower))
+        if held and unknown.unit in INERTIA and near:
+            yield (
+                f"{unknown.name} is at its lower bound, {value:.3g} {unknown.unit}: the force has "
+                "nothing to do with the acceleration, or one of them has the wrong sign."
+            )
+
+
+def _bounds(found: Minimum) -> Iterator[str]:
+    at = [
+        u.name
+        for u, held in zip(found.unknowns, found.held, strict=True)
+        if held and not u.nuisance
+    ]
+    if at:
+        yield f"At a bound: {', '.join(at)}."

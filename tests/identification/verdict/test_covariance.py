@@ -1,0 +1,100 @@
+"""Intervals and words about what the data do not tell."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from linear_fits import ar1, coulomb, fitted
+
+from identification.unknowns.unknown import Unknown
+from identification.verdict.covariance import Covariance, covariance_of
+from identification.verdict.minimum import Minimum
+
+N = 400
+C, V = coulomb(N).T[1:3]
+
+
+def unknowns(*names: str) -> tuple[Unknown, ...]:
+    return tuple(Unknown(n, "N", 1.0) for n in names)
+
+
+def covariance(names: str, values: tuple[float, ...], *columns: np.ndarray) -> Covariance:
+    """Of a fit at `values` with these derivatives by them."""
+    J = np.column_stack(columns)
+    made = fitted(J, ar1(N, 0.0, 1), unknowns(*names.split()))
+    made = replace(made, values=np.array(values))
+    return covariance_of(made, lambda there: float(np.linalg.norm(J @ (there - made.values))))
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "columns", "sentence"),
+    [
+        ("a b", (2.0, 5.0), (C, 0 * C), "b has no influence on what was measured."),
+        ("mu_s mu_d", (2.0, 5.0), (C, -C), "Only the difference mu_s - mu_d is told"),
+        ("a b", (2.0, 5.0), (C, C), "Only the sum a + b is told, not a and b each."),
+        ("mu N", (2.0, 5.0), (5 * C, 2 * C), "Only the product mu N is told, not mu and N each."),
+        ("k m", (2.0, 5.0), (5 * C, -2 * C), "Only the ratio k / m is told, not k and m each."),
+        ("a b c", (2.0, 5.0, 3.0), (15 * C, 6 * C, 10 * C), "Only the product a b c is told, not"),
+        ("a b c", (2.0, 5.0, 3.0), (C, V, C + 2 * V), "Of a, b and c only 2 combinations are told"),
+    ],
+)  # fmt: skip
+def test_what_is_not_told_is_said(
+    names: str, values: tuple[float, ...], columns: tuple[np.ndarray, ...], sentence: str
+) -> None:
+    found = covariance(names, values, *columns)
+    assert found.sentences[0].startswith(sentence)
+    group = found.undetermined[0]
+    for name, error in zip(found.names, found.standard_errors, strict=True):
+        assert np.isnan(error) == (name in group)
+
+
+def test_equal_values_are_told_apart_by_going_a_little_way() -> None:
+    """a = b = 2: a product and a sum have the same derivatives."""
+    made = fitted(2 * np.column_stack([C, C]), ar1(N, 0.0, 1), unknowns("a", "b"))
+    made = replace(made, values=np.array([2.0, 2.0]))
+    product = covariance_of(made, lambda p: float(np.linalg.norm((p[0] * p[1] - 4) * C)))
+    total = covariance_of(made, lambda p: float(np.linalg.norm(2 * (p[0] + p[1] - 4) * C)))
+    assert "product a b" in product.sentences[0]
+    assert "sum a + b" in total.sentences[0]
+
+
+def test_difference_is_told_where_the_coordinate_is_the_excess() -> None:
+    """mu_s = mu_d + w: the untold coordinate is mu_d, the untold values are both."""
+    J = np.column_stack([0 * C, C])
+    made = fitted(J, ar1(N, 0.0, 1), unknowns("mu_d", "mu_s"))
+    made = replace(made, values=np.array([2.0, 5.0]), slope=np.array([[1.0, 0.0], [1.0, 1.0]]))
+    found = covariance_of(made, lambda p: float(np.linalg.norm((p[1] - p[0] - 3) * C)))
+    assert found.sentences[0].startswith("Only the difference mu_d - mu_s is told")
+    assert np.isnan(found.standard_errors).all()
+
+
+def test_bounds_count_as_known_and_logarithms_keep_their_sign() -> None:
+    log = replace_unknown("v_s", logarithmic=True)
+    made = fitted(np.column_stack([C, V]), 30 * ar1(N, 0.0, 1), (log, *unknowns("b")))
+    made = replace(made, values=np.array([0.5, 3.0]), held=np.array([False, True]))
+    found = covariance_of(made, lambda _: 0.0)
+    assert found.at_bound == ("b",)
+    assert np.isnan(found.standard_errors[1])
+    assert found.low[0] > 0
+    assert found.low[0] * found.high[0] == pytest.approx(0.25)
+    assert found.sentences[0].startswith("v_s is hardly told: between ")
+
+
+def test_tied_values_follow() -> None:
+    J = np.column_stack([C, V])
+    made = fitted(J, ar1(N, 0.0, 1), unknowns("a", "b"))
+    slope = np.array([[1.0, 0.0], [0.0, 1.0], [1.2, 0.0]])
+    made = replace(made, names=("a", "b", "c"), values=slope @ made.values, slope=slope)
+    found = covariance_of(made, lambda _: 0.0)
+    assert found.standard_errors[2] == pytest.approx(1.2 * found.standard_errors[0])
+    assert found.correlation[0, 2] == pytest.approx(1.0)
+
+
+def test_few_effective_samples_are_said() -> None:
+    made: Minimum = fitted(coulomb(200), 0.01 * np.cumsum(ar1(200, 0.5, 2)))
+    said = covariance_of(made, lambda _: 0.0).sentences
+    assert any("independent samples for 4 unknowns" in s for s in said)
+
+
+def replace_unknown(name: str, *, logarithmic: bool) -> Unknown:
+    return Unknown(name, "m/s", 1.0, lower=0.0, logarithmic=logarithmic)

@@ -1,0 +1,74 @@
+"""Tests of residuals: how often they cry out for nothing, and what they find."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from linear_fits import ar1, coulomb, fitted, motion
+
+from identification.verdict.judge import ALARM, judged
+from identification.verdict.order import positions
+from identification.verdict.whiteness import whiteness
+
+TRUTH = [2.0, 3.0, 1.0, 0.5]
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.9])
+def test_right_models_are_seldom_doubted(rho: float) -> None:
+    J = coulomb(300)
+    right = J @ TRUTH
+    noise = [ar1(300, rho, seed) for seed in range(60)]
+    assert sum(not judged(fitted(J, right + e)).good for e in noise) <= 3
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.9])
+@pytest.mark.parametrize(
+    ("missing", "named"),
+    [
+        (lambda m: np.sign(m["v"]) * np.exp(-np.abs(m["v"] / 0.1)), "speed"),  # Stribeck
+        (lambda m: np.cos(2 * np.pi * m["x"] / np.ptp(m["x"]) * 2), "place"),  # ripple
+        (lambda m: np.roll(m["force"], 8), "force"),  # a delay
+    ],
+)
+def test_what_is_missing_is_named(
+    missing: Callable[[dict[str, np.ndarray]], np.ndarray], named: str, rho: float
+) -> None:
+    m = motion(2000)
+    J = coulomb(2000)
+    found = judged(fitted(J, 3 * J @ TRUTH + ar1(2000, rho, 1) + 1.5 * missing(m)))
+    assert not found.good
+    failed = [t for t in found.tests if t.decides and not t.passed]
+    assert any(named in t.name for t in failed)
+    assert failed[0].p < ALARM
+
+
+def test_rounding_is_no_model_error() -> None:
+    """Of noise-free data what is left depends on everything, and means nothing."""
+    J, v = coulomb(1000), motion(1000)["v"]
+    right = J @ TRUTH
+    assert judged(fitted(J, right + 1e-8 * np.sign(v) * v**2)).good
+    assert not judged(fitted(J, right + 1e-3 * np.sign(v) * v**2)).good
+    assert judged(fitted(J, np.round(right, 2))).good
+    assert judged(fitted(J, right)).good
+
+
+def test_noise_that_was_given_is_a_yardstick() -> None:
+    J = coulomb(500)
+    e = J @ TRUTH + ar1(500, 0.0, 2)
+    assert judged(fitted(J, e, noise={"force": 1.0})).good
+    found = judged(fitted(J, e, noise={"force": 0.5}))
+    assert [t.name for t in found.tests if t.decides and not t.passed] == ["size"]
+
+
+def test_whiteness_keeps_its_level_in_short_records() -> None:
+    """Forty samples, eight unknowns: without moments of the projection a third is rejected."""
+    n, k, rejected = 40, 8, 0
+    J = np.cos(np.outer(np.arange(n), np.arange(k)) * 0.2)
+    channel = fitted(J, ar1(n, 0.0, 0), regressors={}).channels[0]
+    for seed in range(200):
+        r = fitted(J, ar1(n, 0.0, seed), regressors={}).r
+        rejected += whiteness(r, J, positions(channel)).p < 0.05
+    assert rejected <= 24
+    coloured = fitted(J, ar1(n, 0.9, 1), regressors={}).r
+    assert whiteness(ar1(400, 0.5, 1), np.ones((400, 1)), np.arange(400)).p < 1e-6
+    assert whiteness(coloured, J, np.zeros(n, dtype=int)).lags.size == 0
