@@ -1,0 +1,246 @@
+"""Maxwell-slip elements from force against path: a convex problem, then better radii.
+
+    F = sum_i k_i e_i + sigma_2 v + offset,   e_i: path x kept within +-r_i by its slider
+
+For given radii r_i (break-away displacements) the e_i are known, and k_i >= 0 a non-negative least
+squares problem with one minimum. A dense set of radii gives the virgin curve
+f(x) = sum k_i min(x, r_i); a few elements start where it bends and are improved together with their
+radii, with exact derivatives.
+Source: Lampaert, Al-Bender, Swevers, Phys. Conf. 2003 (elements from a hysteresis curve);
+Rizos and Fassois, Chaos 14(2), 2004 (regression on Maxwell-slip elements).
+"""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares, nnls
+
+from identification.starts.hysteresis import DEAD, turning_points
+from identification.starts.measured import Measured
+from symfric.foundation import checks
+
+Array = NDArray[np.float64]
+
+CANDIDATES = 60
+"""Radii of the dense set, by equal factors."""
+MOST = 6000
+"""Samples that are used; of more, every so many and all turning points."""
+SHORTEST = 1e-4
+"""Smallest radius over the travel, unless the steps of the record are larger."""
+SPARE = 4
+"""Elements beyond those wanted, which are merged with their neighbours later on."""
+TOLD = 0.1
+"""Share of the force that elements must explain."""
+STEPS = 40
+"""Evaluations that improve the radii."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Elements:
+    """Maxwell-slip elements, the one that slips first in front.
+
+    Attributes:
+        k: stiffnesses [N/m], shape (n,), > 0.
+        radii: paths after which an element slips [m], shape (n,).
+        sigma_2: viscous coefficient [N s/m].
+        offset: constant force [N].
+        rms: root mean square error [N] over the samples that were used.
+    """
+
+    k: Array
+    radii: Array
+    sigma_2: float
+    offset: float
+    rms: float
+
+    @property
+    def levels(self) -> Array:
+        """Forces k_i r_i [N] at which they slip."""
+        return self.k * self.radii
+
+    @property
+    def shares(self) -> Array:
+        """Shares alpha_i of the friction, sum 1."""
+        return self.levels / self.levels.sum()
+
+    def virgin(self, x: Array) -> Array:
+        """Force [N] after the path `x` >= 0 [m] from rest without load."""
+        return np.minimum(x[:, None], self.radii) @ self.k
+
+    def force(self, measured: Measured) -> Array:
+        """The force [N] along a record that begins without load."""
+        path = _path(measured)
+        e = np.concatenate([stretches(path[r], self.radii)[0] for r in measured.records])
+        return e @ self.k + self.sigma_2 * measured.v + self.offset
+
+
+def stretches(x: Array, radii: Array) -> tuple[Array, Array]:
+    """Stretch e of each element along the path `x`, from e = 0, and de/dr.
+
+    e <- clip(e + dx, -r, r), exact for any dx in one direction; shapes (samples, radii).
+    """
+    e, slope = np.zeros((x.size, radii.size)), np.zeros((x.size, radii.size))
+    now, moved = e[0].copy(), slope[0].copy()
+    for i, dx in enumerate(np.diff(x), start=1):
+        free = now + dx
+        now = np.clip(free, -radii, radii)
+        moved = np.where(now == free, moved, np.sign(free))
+        e[i], slope[i] = now, moved
+    return e, slope
+
+
+def fit_elements(
+    measured: Measured, count: int = 10, *, viscous: bool = True, offset: bool = True
+) -> Elements:
+    """`count` elements, or fewer where fewer explain the data as well, by least squares.
+
+    Args:
+        measured: with positions or times. The record begins without load; what it says before
+            its second turning point is wrong otherwise, which a long record forgets.
+        count: elements wanted.
+        viscous: fit sigma_2 >= 0, too.
+        offset: fit a constant force, too.
+
+    Raises:
+        ValueError: no path; nothing moves; no friction that follows the path.
+    """
+    count = checks.count("fit_elements: count", count)
+    used = _thinned(measured)
+    path, beside = _path(used), _beside(used, viscous, offset)
+    travel = max(float(np.ptp(path[r])) for r in used.records)
+    if not travel > 0:
+        raise ValueError("fit_elements: expected a position that moves, got the same everywhere")
+    radii = np.geomspace(_shortest(path, travel), travel / 2, CANDIDATES)
+    dense = np.column_stack([_stretches(used, path, radii)[0], beside])
+    scale = np.maximum(np.linalg.norm(dense, axis=0), 1e-300)
+    w, left = nnls(dense / scale, used.F)
+    k = w[:CANDIDATES] / scale[:CANDIDATES]
+    if not k.any() or left > (1 - TOLD) * np.linalg.norm(used.F):
+        raise ValueError(
+            "fit_elements: expected a force that grows along the path after each reversal, got one "
+            f"that elements explain to {100 * (1 - left / np.linalg.norm(used.F)):.0f} %; "
+            "is its sign that of the sliding velocity?"
+        )
+    more = _improved(used, path, beside, _quantiles(radii, k, count + SPARE), viscous, offset)
+    if more.k.size <= count:
+        return more
+    starts = (_merged(more, count), _quantiles(radii, k, count))
+    found = [_improved(used, path, beside, start, viscous, offset) for start in starts]
+    return min(found, key=lambda elements: elements.rms)
+
+
+def _path(measured: Measured) -> Array:
+    if measured.x is None:
+        raise ValueError(
+            "fit_elements: expected positions or times, got points of velocity and force alone; "
+            "give x= or t="
+        )
+    return measured.x
+
+
+def _thinned(measured: Measured) -> Measured:
+    """At most some 6000 samples, the turning points among them."""
+    every = -(-measured.v.size // MOST)
+    if every == 1:
+        return measured
+    path, kept = _path(measured), list[NDArray[np.intp]]()
+    for r in measured.records:
+        turns = turning_points(path[r], DEAD * float(np.ptp(path[r])))
+        regular = np.arange(0, r.stop - r.start, every)
+        kept.append(r.start + np.union1d(regular, np.array(turns, dtype=np.intp)))
+    rows = np.concatenate(kept)
+    breaks = tuple(np.cumsum([k.size for k in kept])[:-1].tolist())
+    t = None if measured.t is None else measured.t[rows]
+    return Measured(measured.v[rows], measured.F[rows], path[rows], t, None, measured.N, breaks)
+
+
+def _beside(measured: Measured, viscous: bool, offset: bool) -> Array:
+    """Columns for sigma_2 and for both signs of the offset."""
+    one = np.ones(measured.v.size)
+    columns = [measured.v] * viscous + [one, -one] * offset
+    return np.column_stack(columns) if columns else np.zeros((one.size, 0))
+
+
+def _shortest(path: Array, travel: float) -> float:
+    """Radius below which the samples do not resolve an element."""
+    moves = np.abs(np.diff(path))
+    step = float(np.quantile(moves[moves > 0], 0.1)) if (moves > 0).any() else travel
+    return min(max(SHORTEST * travel, step), travel / 4)
+
+
+def _stretches(measured: Measured, path: Array, radii: Array) -> tuple[Array, Array]:
+    found = [stretches(path[r], radii) for r in measured.records]
+    return np.vstack([e for e, _ in found]), np.vstack([slope for _, slope in found])
+
+
+def _quantiles(radii: Array, k: Array, count: int) -> Array:
+    """Radii that divide the force of the dense set evenly."""
+    share = np.cumsum(k * radii)
+    goals = (np.arange(count) + 0.5) / count * share[-1]
+    found = np.interp(goals, np.concatenate([[0.0], share]), np.concatenate([radii[:1], radii]))
+    return np.unique(np.maximum.accumulate(found * (1 + 1e-6 * np.arange(count))))
+
+
+def _merged(elements: Elements, count: int) -> Array:
+    """Radii of `count` elements: neighbours whose merging bends the virgin curve least are one."""
+    k, levels = elements.k, elements.levels
+    while k.size > count:
+        pair = np.add(k[:-1], k[1:]), np.add(levels[:-1], levels[1:])
+        mean = pair[1] / pair[0]
+        first, second = levels[:-1] / k[:-1], levels[1:] / k[1:]
+        bend = k[:-1] * (mean - first) * (second - mean)  # force lost, times the path over which
+        i = int(np.argmin(bend))
+        k = np.concatenate([k[:i], pair[0][i : i + 1], k[i + 2 :]])
+        levels = np.concatenate([levels[:i], pair[1][i : i + 1], levels[i + 2 :]])
+    return levels / k
+
+
+def _improved(
+    measured: Measured, path: Array, beside: Array, radii: Array, viscous: bool, offset: bool
+) -> Elements:
+    """Stiffnesses, log radii and the rest together by a trust region."""
+    n, size = radii.size, float(np.abs(measured.F).max())
+    k, rest = _linear(measured, path, beside, radii)
+
+    def split(w: Array) -> tuple[Array, Array, Array]:
+        return np.exp(w[:n]), w[n : 2 * n] * size / np.exp(w[:n]), w[2 * n :]
+
+    def residuals(w: Array) -> Array:
+        r, k, rest = split(w)
+        return (_stretches(measured, path, r)[0] @ k + beside @ rest - measured.F) / size
+
+    def slopes(w: Array) -> Array:
+        r, k, _ = split(w)
+        e, moved = _stretches(measured, path, r)
+        by_radius = (moved * r - e) * k  # at constant k r
+        return np.hstack([by_radius, e / r * size, beside]) / size
+
+    start = np.concatenate([np.log(radii), k * radii / size, rest])
+    low = np.concatenate([np.log(radii) - 3, np.zeros(n), np.zeros(rest.size)])
+    high = np.concatenate([np.log(radii) + 3, np.full(n + rest.size, np.inf)])
+    found = least_squares(
+        residuals,
+        np.clip(start, low + 1e-9, high - 1e-9),
+        jac=slopes,  # pyright: ignore[reportArgumentType]
+        bounds=(low, high),
+        x_scale="jac",
+        max_nfev=STEPS,
+    )
+    radii = np.sort(np.exp(found.x[:n]))
+    k, rest = _linear(measured, path, beside, radii)
+    error = _stretches(measured, path, radii)[0] @ k + beside @ rest - measured.F
+    kept = k * radii > 1e-6 * float(k @ radii)
+    shift = float(rest[-2] - rest[-1]) if offset else 0.0
+    rms = float(np.sqrt(np.mean(error**2)))
+    return Elements(k[kept], radii[kept], float(rest[0]) if viscous else 0.0, shift, rms)
+
+
+def _linear(measured: Measured, path: Array, beside: Array, radii: Array) -> tuple[Array, Array]:
+    """Stiffnesses and the rest for given radii."""
+    X = np.column_stack([_stretches(measured, path, radii)[0], beside])
+    scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+    w = nnls(X / scale, measured.F)[0] / scale
+    return w[: radii.size], w[radii.size :]

@@ -1,0 +1,232 @@
+"""The six-step procedure for the static parameters of LuGre, step by step beside the curve.
+
+    F = F_C + (F_S - F_C) exp(-(v/v_s)^delta) + sigma_2 v
+
+    1  F_S                    largest force of the curve
+    2  F_C + sigma_2 v        smallest force, at v_min
+    3  m^2 = 1/v_s^2          exponential part, up to v_min, with delta = 2
+    4  sigma_2                linear part, from v_min on
+    5  F_C                    step 2 less step 4
+    6  delta, v_s             exponential part again, with a free exponent
+
+Each step uses a part of the curve alone; a fit of all points at once (`identification.Fit`) has the
+smaller error. What it cannot know it says in `doubts`.
+Source: A Friction Model for Laminator Nips, MSc thesis TFRT-5968, Lund 2015, section 4.2; after
+Olsson, Control Systems with Friction, PhD thesis, Lund 1996.
+"""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.starts.stribeck import Curve, StribeckCurve, binned
+from symfric.laws.static.exponential import SteadyStateLuGre
+
+Array = NDArray[np.float64]
+
+NAMES = ("F_S", "F_C", "v_s", "sigma_2", "delta")
+SHARE = (0.02, 0.98)
+"""Shares of F_S - F_C between which a force counts for the exponential part."""
+EXPONENTS = (0.3, 10.0)
+"""What the exponent is kept within."""
+LOOSE = 0.3
+"""Relative standard error beyond which a parameter counts as not determined."""
+LEAST = 4
+"""Speeds of one direction without which there is no curve to take apart."""
+
+
+@final
+@dataclass(frozen=True)
+class Step:
+    """One step: its number, what it finds, from which part of the curve, and the numbers."""
+
+    number: int
+    what: str
+    points: int
+    values: dict[str, float]
+
+    def __str__(self) -> str:
+        shown = ", ".join(f"{name} = {value:.4g}" for name, value in self.values.items())
+        return f"{self.number}  {self.what:<44} {self.points:4d} points   {shown}"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class SixSteps:
+    """Result of the procedure.
+
+    Attributes:
+        steps: as they were done, in the order of the numbers.
+        values: F_S, F_C [N], v_s [m/s], sigma_2 [N s/m], delta.
+        errors: relative standard errors if all points were fitted at once around these values,
+            with the scatter that the curve leaves; inf where the points cannot tell.
+        rms: root mean square error over the mean force [%].
+        curve: mean force at each speed.
+        doubts: what the points cannot tell, one sentence each.
+    """
+
+    steps: tuple[Step, ...]
+    values: dict[str, float]
+    errors: dict[str, float]
+    rms: float
+    curve: Curve
+    doubts: tuple[str, ...]
+
+    @property
+    def law(self) -> SteadyStateLuGre:
+        """The law with these values."""
+        return SteadyStateLuGre(**self.values, v_eps=1e-3 * float(self.curve.v.min()))
+
+    def __str__(self) -> str:
+        lines = [str(step) for step in self.steps]
+        lines.append(f"error {self.rms:.2f} % of the mean force (rms)")
+        for name in NAMES:
+            error = self.errors[name]
+            shown = f"{100 * error:.3g} %" if error < 100 else "not determined"
+            lines.append(f"  {name:<8} {self.values[name]:<12.5g} standard error {shown}")
+        return "\n".join([*lines, *(f"doubt: {sentence}" for sentence in self.doubts)])
+
+
+def six_steps(v: Array, F: Array, *, unstable: float = 0.0) -> SixSteps:
+    """Static parameters of LuGre from points in sliding at constant speeds.
+
+    Both directions count alike: points of negative velocity are mirrored.
+
+    Args:
+        v: sliding velocities [m/s], shape (n,).
+        F: friction forces with the sign of v [N], shape (n,).
+        unstable: speed [m/s] up to which the measured motion was stick-slip, if it was; the points
+            are used, and what rests on them is doubted.
+
+    Raises:
+        ValueError: fewer than four speeds, or forces that point forward.
+    """
+    side = np.sign(np.asarray(v, dtype=float))
+    curve = binned(np.abs(v), side * np.asarray(F, dtype=float))
+    if curve.v.size < LEAST or curve.F.min() <= 0:
+        raise ValueError(
+            f"six_steps: expected at least {LEAST} speeds and forces with the sign of the velocity,"
+            f" got {curve.v.size} speeds and a smallest force of {curve.F.min():.3g}"
+        )
+    speed, force = curve.v, curve.F
+    low = int(np.argmin(force))
+    top = int(np.argmax(force[: low + 1]))
+    F_S, F_min, v_min = float(force[top]), float(force[low]), float(speed[low])
+    sigma_2 = _slope(speed[low:], force[low:])
+    F_C = max(F_min - sigma_2 * v_min, 0.0)
+    part = _exponential(curve, top, low, F_S, F_C, sigma_2)
+    gaussian, v_s, delta = _exponents(*part)
+    values = {"F_S": F_S, "F_C": F_C, "v_s": v_s, "sigma_2": sigma_2, "delta": delta}
+    count = part[0].size
+    steps = (
+        Step(1, "F_S: largest force", 1, {"F_S": F_S, "v": float(speed[top])}),
+        Step(2, "F_C + sigma_2 v: smallest force", 1, {"F_min": F_min, "v_min": v_min}),
+        Step(3, "m^2 = 1/v_s^2: exponential part, delta = 2", count, {"v_s": gaussian}),
+        Step(4, "sigma_2: linear part", force.size - low, {"sigma_2": sigma_2}),
+        Step(5, "F_C: step 2 less sigma_2 v_min", 1, {"F_C": F_C}),
+        Step(6, "delta: exponential part again", count, {"delta": delta, "v_s": v_s}),
+    )
+    found = StribeckCurve(F_S, F_C, v_s, delta, sigma_2, 0.0, 0.0)
+    error = found.force(speed) - force
+    errors = standard_errors(found, speed, _noise(error))
+    rms = 100 * float(np.sqrt(np.mean(error**2)) / force.mean())
+    doubts = (*_doubts(found, curve, low, count, unstable), *_undetermined(errors))
+    return SixSteps(steps, values, errors, rms, curve, doubts)
+
+
+def standard_errors(curve: StribeckCurve, speed: Array, noise: float) -> dict[str, float]:
+    """Relative standard errors of a least-squares fit of all five parameters (Cramer-Rao).
+
+    The smallest that any unbiased method can have at white noise of standard deviation `noise` [N]
+    in each point; inf for values of 0 and for what the points cannot tell at all.
+    """
+    F_S, F_C, v_s, delta = curve.F_S, curve.F_C, curve.v_s, curve.delta
+    power = (speed / v_s) ** delta
+    falling = np.exp(-power)
+    bend = (F_S - F_C) * falling * power
+    columns = falling, 1 - falling, bend * delta / v_s, speed, -bend * np.log(speed / v_s)
+    J = np.column_stack(columns)
+    scale = np.linalg.norm(J, axis=0)
+    told = scale > 0
+    error = np.full(len(NAMES), np.inf)
+    covariance = np.linalg.pinv((X := J[:, told] / scale[told]).T @ X, rcond=1e-14)
+    error[told] = noise * np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale[told]
+    size = np.abs([F_S, F_C, v_s, curve.sigma_2, delta])
+    found = np.divide(error, size, out=np.full(size.size, np.inf), where=size > 0)
+    return dict(zip(NAMES, found.tolist(), strict=True))
+
+
+def _noise(error: Array) -> float:
+    """Standard deviation of what five parameters leave."""
+    return float(np.sqrt(np.sum(error**2) / max(error.size - len(NAMES), 1)))
+
+
+def _slope(speed: Array, force: Array) -> float:
+    """Slope of the linear part [N s/m], >= 0; 0 where it has one point."""
+    if speed.size < 2:
+        return 0.0
+    return max(float(np.polyfit(speed, force, 1)[0]), 0.0)
+
+
+def _exponential(
+    curve: Curve, top: int, low: int, F_S: float, F_C: float, sigma_2: float
+) -> tuple[Array, Array]:
+    """Speeds and -log of the share of F_S - F_C that is left, where it can be told from both."""
+    speed = curve.v[top : low + 1]
+    share = (curve.F[top : low + 1] - F_C - sigma_2 * speed) / max(F_S - F_C, 1e-300)
+    inside = (share > SHARE[0]) & (share < SHARE[1])
+    return speed[inside], -np.log(share[inside])
+
+
+def _exponents(speed: Array, power: Array) -> tuple[float, float, float]:
+    """v_s for delta = 2; v_s and delta: straight lines through power = (v/v_s)^delta.
+
+    With a free exponent it is a line through the logarithms. Each point weighs as much as an error
+    of the force moves it: share = exp(-power), so d log(power) = d share / (share power).
+    """
+    if speed.size < 2:
+        scale = float(speed[0] / np.sqrt(power[0])) if speed.size else float("nan")
+        return scale, scale, 2.0
+    weight = np.exp(-power)
+    gaussian = np.sqrt(np.sum((weight * speed**2) ** 2) / np.sum(weight**2 * speed**2 * power))
+    slope = np.polyfit(np.log(speed), np.log(power), 1, w=weight * power)[0]
+    delta = float(np.clip(slope, *EXPONENTS))
+    middle = np.average(np.log(power) - delta * np.log(speed), weights=(weight * power) ** 2)
+    return float(gaussian), float(np.exp(-middle / delta)), delta
+
+
+def _doubts(found: StribeckCurve, curve: Curve, low: int, count: int, unstable: float) -> list[str]:
+    """What the shape of the curve cannot tell."""
+    said = list[str]()
+    v_s, slowest, fastest = found.v_s, float(curve.v[0]), float(curve.v[-1])
+    lost = (found.F_S - found.F_C) * -np.expm1(-((slowest / v_s) ** found.delta))
+    if lost > 0.005 * found.F_S:
+        said.append(
+            f"at the slowest point, {slowest:.3g} m/s, the force has already fallen: F_S is the "
+            "largest force measured, a lower bound of the static one"
+        )
+    if v_s <= unstable:
+        said.append(
+            f"v_s = {v_s:.3g} m/s lies among speeds of stick-slip (up to {unstable:.3g} m/s): "
+            "F_S, v_s and delta describe means of an unsteady force"
+        )
+    if low == curve.v.size - 1:
+        said.append("the force falls up to the fastest point: no linear part, sigma_2 is set to 0")
+    elif curve.v.size - low < LEAST:
+        said.append(f"the linear part has {curve.v.size - low} points: sigma_2 is a guess")
+    if count < LEAST:
+        said.append(f"the exponential part has {count} points: v_s and delta are guesses")
+    if not slowest < v_s < fastest:
+        said.append(f"v_s = {v_s:.3g} m/s lies outside the speeds measured")
+    return said
+
+
+def _undetermined(errors: dict[str, float]) -> list[str]:
+    return [
+        f"{name} is not determined by these points: standard error "
+        + (f"{100 * error:.0f} %" if error < 100 else "larger than any value")
+        for name, error in errors.items()
+        if error > LOOSE
+    ]

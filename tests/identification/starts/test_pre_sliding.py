@@ -1,0 +1,101 @@
+"""Stiffness from reversals, Maxwell-slip elements and break-away against records made of them."""
+
+import numpy as np
+import pytest
+
+from identification.starts.break_away import break_away
+from identification.starts.hysteresis import hysteresis, turning_points
+from identification.starts.maxwell_slip import fit_elements, stretches
+from identification.starts.measured import Measured
+
+T = 0.015 * np.arange(1000)
+X = 8e-6 * np.sin(0.63 * T) + 5e-6 * np.sin(2.3 * T) + 15e-6 * np.sin(0.9 * T)
+V = np.gradient(X, T)
+
+
+def dahl(x: np.ndarray, sigma_0: float, level: float) -> np.ndarray:
+    """Force of a bristle along a path, exact for each increment."""
+    F = np.zeros(x.size)
+    for i, dx in enumerate(np.diff(x)):
+        side = np.sign(dx)
+        F[i + 1] = side * level + (F[i] - side * level) * np.exp(-sigma_0 * abs(dx) / level)
+    return F
+
+
+def test_turning_points_ignore_what_is_within_the_dead_band() -> None:
+    x = np.array([0.0, 1.0, 0.95, 2.0, 1.0, 1.02, 0.0, 1.0])
+    assert turning_points(x, 0.1) == [3, 6]
+
+
+def test_stiffness_of_a_bristle() -> None:
+    found = hysteresis(Measured(V, dahl(X, 2e5, 1.0), X, T))
+    assert found is not None
+    assert abs(found.bristle / 2e5 - 1) < 0.05
+
+
+def test_stiffness_of_an_elastic_element_with_noise() -> None:
+    noise = 0.02 * np.random.default_rng(0).standard_normal(T.size)
+    F = stretches(X, np.array([2e-6]))[0] @ np.array([3e5]) + noise
+    found = hysteresis(Measured(V, F, X, T))
+    assert found is not None
+    assert abs(found.elastic / 3e5 - 1) < 0.1
+
+
+def test_nothing_is_said_of_points_without_a_path() -> None:
+    assert hysteresis(Measured(V, np.sign(V))) is None
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_elements_are_found_with_their_radii(noise: float) -> None:
+    radii, k = np.array([3e-7, 1.1e-6, 2.9e-6, 8e-6]), np.array([9e5, 3e5, 8e4, 3e4])
+    F = stretches(X, radii)[0] @ k
+    error = noise * np.random.default_rng(0).standard_normal(T.size)
+    measured = Measured(V, F + error, X, T)
+    found = fit_elements(measured, 4)
+    rms = float(np.sqrt(np.mean((found.force(measured) - F) ** 2)))
+    assert rms < (1e-3 if noise == 0 else 0.2 * noise)
+    assert np.allclose(found.radii, radii, rtol=1e-3 if noise == 0 else 0.1)
+    assert np.isclose(found.shares.sum(), 1.0)
+
+
+def test_slopes_of_the_stretches_by_differences() -> None:
+    radii, h = np.array([4e-7, 3.1e-6]), 1e-11
+    up, down = stretches(X, radii + h)[0], stretches(X, radii - h)[0]
+    error = np.abs((up - down) / (2 * h) - stretches(X, radii)[1])
+    assert np.mean(error > 1e-3) < 1e-3  # at corners alone
+
+
+def test_force_against_the_path_is_refused() -> None:
+    with pytest.raises(ValueError, match="sign of the sliding velocity"):
+        fit_elements(Measured(V, -np.sign(V), X, T), 3, offset=False)
+
+
+def ramps(rates: list[float], level: float, per_decade: float) -> Measured:
+    """Force ramps from rest, each followed by a slide and by a rest."""
+    h, F, v = 1e-3, list[float](), list[float]()
+    for rate in rates:
+        top = level + per_decade * np.log10(rate)
+        up = np.arange(0.0, top, rate * h)
+        F += [*up, top, *np.full(50, 0.6 * top), *np.zeros(50)]
+        v += [*np.zeros(up.size + 1), *np.full(50, 0.1), *np.zeros(50)]
+    return Measured(np.array(v), np.array(F), t=h * np.arange(len(F)))
+
+
+def test_break_away_of_ramps_and_how_it_depends_on_their_rate() -> None:
+    found = break_away(ramps([1.0, 3.0, 10.0, 30.0], 2.0, -0.2))
+    assert len(found.events) == 4
+    assert np.allclose([e.rate for e in found.events], [1, 3, 10, 30], rtol=1e-6)
+    assert found.per_decade is not None
+    assert abs(found.per_decade + 0.2) < 1e-9
+    assert "falls" in found.note
+
+
+def test_ramps_of_one_rate_say_nothing_about_it() -> None:
+    found = break_away(ramps([2.0, 2.0, 2.0], 2.0, 0.0))
+    assert found.per_decade is None
+    assert abs(found.level - 2.0) < 1e-12
+
+
+def test_record_without_rest_is_refused() -> None:
+    with pytest.raises(ValueError, match="expected a rest"):
+        break_away(Measured(1 + 0.1 * T, np.ones(T.size), t=T))

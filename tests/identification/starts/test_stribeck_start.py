@@ -1,0 +1,83 @@
+"""Stribeck curves from bins, and the six steps, against curves that are known."""
+
+import numpy as np
+import pytest
+
+from identification.starts.six_steps import six_steps, standard_errors
+from identification.starts.stribeck import StribeckCurve, binned, fit_curve
+
+PILOT = StribeckCurve(4.4861, 2.5498, 0.0012, 2.0, 230.0, 0.0, 0.0)
+MAIN = StribeckCurve(4.2672, 2.6063, 0.0049, 3.2, 5.0, 0.0, 0.0)
+"""Tables 5.1 and 5.2 of the thesis on laminator nips, whose speeds are 10 to 500 mm/min."""
+
+
+def mm_min(first: int) -> np.ndarray:
+    return np.arange(first, 501, 10) / 60e3
+
+
+def test_curve_is_recovered_from_its_own_points() -> None:
+    v = mm_min(10)
+    found = fit_curve(binned(v, PILOT.force(v)))
+    got = (found.F_S, found.F_C, found.v_s, found.delta, found.sigma_2)
+    assert np.allclose(got, (4.4861, 2.5498, 0.0012, 2.0, 230.0), rtol=1e-4)
+
+
+def test_spikes_and_direction_do_not_move_the_levels() -> None:
+    rng = np.random.default_rng(0)
+    v = rng.uniform(-8e-3, 8e-3, 20_000)
+    F = PILOT.force(v) + 0.3 + 0.05 * rng.standard_normal(v.size)
+    F[::50] += 40.0
+    found = fit_curve(binned(v, F), delta=2.0)
+    assert abs(found.offset - 0.3) < 0.01
+    assert abs(found.F_C / PILOT.F_C - 1) < 0.02
+    assert abs(found.v_s / PILOT.v_s - 1) < 0.05
+
+
+def test_standing_still_is_refused() -> None:
+    with pytest.raises(ValueError, match="expected samples that move"):
+        binned(np.zeros(9), np.ones(9))
+
+
+def test_levels_are_ordered_even_where_the_curve_rises() -> None:
+    v = mm_min(10)
+    found = fit_curve(binned(v, 2.0 + 100 * v))
+    assert found.F_S >= found.F_C > 0
+    assert abs(found.sigma_2 - 100) < 1
+
+
+def test_pilot_study_by_six_steps() -> None:
+    v = np.repeat(mm_min(10), 9)
+    noise = 1 + 0.02 * np.random.default_rng(0).standard_normal(v.size)
+    found = six_steps(v, PILOT.force(v) * noise)
+    truth = {"F_S": 4.4861, "F_C": 2.5498, "v_s": 0.0012, "sigma_2": 230.0, "delta": 2.0}
+    assert all(abs(found.values[n] / truth[n] - 1) < 0.08 for n in truth)
+    assert [step.number for step in found.steps] == [1, 2, 3, 4, 5, 6]
+    assert not any("not determined" in doubt for doubt in found.doubts)
+
+
+def test_main_study_says_that_it_cannot_tell_the_viscous_part() -> None:
+    v = np.repeat(mm_min(100), 9)
+    noise = 1 + 0.02 * np.random.default_rng(0).standard_normal(v.size)
+    said = " ".join(six_steps(v, MAIN.force(v) * noise, unstable=140 / 60e3).doubts)
+    assert "sigma_2 is not determined" in said
+    assert "lower bound" in said
+    assert "stick-slip" not in said  # v_s = 294 mm/min is above the 140 of the thesis
+
+
+def test_velocity_among_unstable_speeds_is_said() -> None:
+    v = mm_min(10)
+    assert "stick-slip" in " ".join(six_steps(v, PILOT.force(v), unstable=140 / 60e3).doubts)
+
+
+def test_smallest_errors_of_the_main_study_are_those_of_its_points() -> None:
+    v = mm_min(100)
+    found = standard_errors(MAIN, v, 0.01 * MAIN.force(v).mean() / 3)
+    assert np.allclose(
+        [100 * found[n] for n in ("sigma_2", "F_C", "delta")], [430, 6.8, 4.5], rtol=0.01
+    )
+
+
+def test_forward_forces_are_refused() -> None:
+    v = mm_min(10)
+    with pytest.raises(ValueError, match="forces with the sign of the velocity"):
+        six_steps(v, -PILOT.force(v))
