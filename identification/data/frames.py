@@ -42,11 +42,14 @@ def columns_of(name: str, frame: object, arrays: Mapping[str, object]) -> tuple[
     columns = tuple(_column(where, key, v) for key, v in (given | dict(arrays)).items())
     if not columns:
         raise ValueError(f"{where}: expected columns such as t=..., x=..., force=..., got none")
+    labels = [c.label for c in columns]
+    if len(set(labels)) < len(labels):
+        raise ValueError(f"{where}: expected every column once, got {', '.join(labels)}")
     sizes = {c.label: c.values.size for c in columns}
     if len(set(sizes.values())) > 1:
         got = ", ".join(f"{key}: {size}" for key, size in sizes.items())
         raise ValueError(f"{where}: expected columns of one length, got {got}")
-    return Raw(name, columns), framed
+    return Raw(name, columns, verb="data"), framed
 
 
 def _column(where: str, key: str, values: object) -> Column:
@@ -55,6 +58,8 @@ def _column(where: str, key: str, values: object) -> Column:
         found = np.asarray(values)
     except (ValueError, TypeError):
         raise checks.refused(f"{where}: {key}", "a vector of numbers", values) from None
+    if found.ndim == 2 and min(found.shape) == 1:  # a vector as MATLAB has them
+        found = found.ravel()
     if found.dtype.kind in "mM" and found.ndim == 1 and found.size:
         seconds = (found - found[0]).astype("timedelta64[ns]").astype(np.int64) * 1e-9
         return Column(name, "s", seconds, _problem(seconds))

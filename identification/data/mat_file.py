@@ -6,12 +6,14 @@ Source: A. Janot, M. Gautier, M. Brunot: Data set and reference models of EMPS, 
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from identification.data.loop import PositionLoop
+from identification.data.mat_bytes import variables
 from identification.data.raw import Array, Column, Raw, label
 from identification.data.record import Record
 
@@ -45,7 +47,7 @@ def read_npy(file: Path, variable: str | None) -> list[Raw]:
     """The columns of a `.npy` matrix or structured array, or of an `.npz` archive of arrays."""
     where = f"read '{file.name}'"
     try:
-        loaded = np.load(file, allow_pickle=False)
+        loaded = np.load(BytesIO(file.read_bytes()), allow_pickle=False)
         archive = not isinstance(loaded, np.ndarray)
         content = {name: loaded[name] for name in loaded.files} if archive else {"array": loaded}
     except Exception as error:  # noqa: BLE001 (damaged bytes raise whatever they meet)
@@ -138,7 +140,7 @@ def _matrix(name: str, value: Array) -> Raw:
 
 def _raw(where: str, name: str, variables: Mapping[str, Node]) -> Raw:
     """Vectors of one length as columns; shorter ones and what is none are left out."""
-    flat = dict(_flat(variables))
+    flat = _shortened(dict(_flat(variables)))
     lengths = [v.size for v in flat.values() if isinstance(v, np.ndarray)]
     if not lengths:
         raise ValueError(
@@ -159,8 +161,17 @@ def _raw(where: str, name: str, variables: Mapping[str, Node]) -> Raw:
     return Raw(name, tuple(columns))
 
 
+def _shortened(flat: Mapping[str, Node]) -> dict[str, Node]:
+    """Leaves by the last part of their names where that tells them apart."""
+    last = [key.rpartition(".")[2] for key in flat]
+    return {
+        key if last.count(short) > 1 else short: value
+        for (key, value), short in zip(flat.items(), last, strict=True)
+    }
+
+
 def _flat(variables: Mapping[str, Node], prefix: str = "") -> Iterator[tuple[str, Node]]:
-    """Leaves by name; what lies in a struct has its name before, unless that stands alone."""
+    """Leaves by name; what lies in a struct has its name before."""
     for key, value in variables.items():
         if isinstance(value, dict):
             yield from _flat(value, f"{prefix}{key}.")
@@ -190,45 +201,38 @@ def _is_matrix(value: Node) -> bool:
 
 
 def _load(file: Path) -> dict[str, Node]:
-    from scipy.io import loadmat  # noqa: PLC0415  (slow to import, and only such files need it)
-
-    name = file.name
     try:
-        with file.open("rb") as stream:
-            head = stream.read(128)
-        if head.startswith(HDF5) or (len(head) == 128 and b"7.3" in head[:40]):
+        content = file.read_bytes()
+        if content.startswith(HDF5):
             raise NotImplementedError
-        loaded = loadmat(file, struct_as_record=False, squeeze_me=False)
+        loaded = variables(content)
     except NotImplementedError:
         raise ValueError(
-            f"read '{name}': expected a MATLAB file of version 7 or older, got version 7.3 (HDF5); "
-            "save it with save(name, '-v7')"
+            f"read '{file.name}': expected a MATLAB file of version 7 or older, got version 7.3 "
+            "(HDF5); save it with save(name, '-v7')"
         ) from None
-    except Exception as error:  # noqa: BLE001 (damaged bytes raise whatever they meet)
+    except ValueError as error:
         raise ValueError(
-            f"read '{name}': expected a MATLAB file, got one that is damaged or none "
-            f"({type(error).__name__}: {str(error)[:80]})"
+            f"read '{file.name}': expected a MATLAB file, got one that is damaged or none: {error}"
         ) from None
-    return {key: _node(value) for key, value in loaded.items() if not key.startswith("__")}
+    return {key: _node(value) for key, value in loaded.items() if key and key[:2] != "__"}
 
 
 def _node(value: Any) -> Node:
-    """What SciPy or NumPy loaded, as arrays of floats, texts, dicts and lists."""
-    if hasattr(value, "_fieldnames"):
-        return {name: _node(getattr(value, name)) for name in value._fieldnames}
+    """The same with arrays of floats, and fields of structured arrays as a dict."""
+    if isinstance(value, dict):
+        return {str(key): _node(one) for key, one in value.items()}  # pyright: ignore[reportUnknownArgumentType]
+    if isinstance(value, list):
+        items = [_node(item) for item in value]  # pyright: ignore[reportUnknownVariableType]
+        return items[0] if len(items) == 1 else items
     if not isinstance(value, np.ndarray):
-        return "a sparse matrix" if hasattr(value, "tocsc") else type(value).__name__
+        return str(value)
     if value.dtype.names:
         return {name: _node(value[name]) for name in value.dtype.names}
-    if value.dtype.kind in "SU":
-        return str(value.ravel()[0]) if value.size else "an empty text"
-    if value.dtype.kind == "O":
-        items = [_node(item) for item in value.ravel()]
-        return items[0] if len(items) == 1 else items
     if value.dtype.kind in "iufb":
         numbers = value.astype(float)
         return np.squeeze(numbers) if numbers.ndim > 2 else numbers
-    return f"numbers of type {value.dtype}"
+    return f"values of type {value.dtype}"
 
 
 def _vector(where: str, found: Mapping[str, Node], name: str) -> Array:

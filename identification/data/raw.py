@@ -60,11 +60,13 @@ class Raw:
         name: of the file, and of the record in it.
         columns: in their order; without a header their labels are "".
         first_row: row of the first sample in the file; 0 where samples have no rows.
+        verb: what messages begin with.
     """
 
     name: str
     columns: tuple[Column, ...]
     first_row: int = 0
+    verb: str = "read"
 
 
 @final
@@ -118,7 +120,7 @@ def record(raw: Raw, wanted: Wanted) -> Record:
         ValueError: a channel asked for that is not there or no numbers, no unit or the wrong one,
             no time; all problems at once.
     """
-    where = f"read '{raw.name}'"
+    where = f"{raw.verb} '{raw.name}'"
     raw = _labelled(where, raw, wanted)
     places = _places(where, raw, wanted)
     named = {key: raw.columns[k] for key, k in places.items()}
@@ -140,7 +142,9 @@ def record(raw: Raw, wanted: Wanted) -> Record:
             continue
         signals[key] = factor * column.values
     if problems:
-        raise ValueError(f"{where}: " + "; ".join(problems))
+        silent = any(problem.endswith("got none") for problem in problems)
+        hint = "; say it in the call: units='m, N', units='rad, N m' or units={'x': 'mm'}" * silent
+        raise ValueError(f"{where}: " + "; ".join(problems) + hint)
     t = _time(where, raw, signals, wanted)
     signals.pop("t", None)
     return Record(
@@ -245,11 +249,8 @@ def _scale(key: str, column: Column, given: str, wanted: Wanted) -> tuple[float,
         said = "s"
     meant = unit(said) if said else None
     if kinds and (meant is None or meant.si not in kinds):
-        got = said or "none"
-        hint = "" if said else "; say it in the call: units='m, N', units='rad, N m'"
-        hint = hint if key != "t" or said else "; say it in the call: units={'t': 's'}"
         raise ValueError(
-            f"column '{_shown(column)}': expected a unit of {EXAMPLES[key]}, got {got}{hint}"
+            f"column '{_shown(column)}': expected a unit of {EXAMPLES[key]}, got {said or 'none'}"
         )
     if meant is None:
         return 1.0, said

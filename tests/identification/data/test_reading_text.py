@@ -162,7 +162,11 @@ ROWS = text("").splitlines()
     ("header", "rows", "message"),
     [
         ("t [s],x [inches],force [N]", None, r"column 'x \[inches\]': expected a unit of m, cm"),
-        ("t,x [m],force [N]", None, "column 't': expected a unit of s, ms.*none; say it in"),
+        (
+            "t,x [m],force [N]",
+            None,
+            "column 't': expected a unit of s, ms.*none; say it in the call",
+        ),
         ("t [s],x,force", None, r"'x': expected a unit .*'force': expected a unit"),
         ("t [s],x [m],x [mm]", None, r"expected one column for x, got 'x \[m\]', 'x \[mm\]'"),
         (",".join(HEADER), [*ROWS[:5], "0.05,abc,1", *ROWS[6:]], r"'x \[m\]', row 7: .*got 'abc'"),
