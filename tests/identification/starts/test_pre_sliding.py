@@ -66,7 +66,7 @@ def test_slopes_of_the_stretches_by_differences() -> None:
 
 
 def test_force_against_the_path_is_refused() -> None:
-    with pytest.raises(ValueError, match="sign of the sliding velocity"):
+    with pytest.raises(ValueError, match="is its sign that of the sliding"):
         fit_elements(Measured(V, -np.sign(V), X, T), 3, offset=False)
 
 
