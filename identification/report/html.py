@@ -1,0 +1,140 @@
+"""Pieces of one self-contained page: everything that comes from a user is escaped here."""
+
+from collections.abc import Iterable, Sequence
+from html import escape
+
+from identification.report.style import STYLE
+
+
+def page(title: str, language: str, body: str) -> str:
+    """A whole document that needs nothing from elsewhere."""
+    return (
+        f'<!DOCTYPE html>\n<html lang="{language}">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<meta name="color-scheme" content="light dark">\n'
+        f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n"
+        f"<body>\n<main>\n{body}\n</main>\n</body>\n</html>\n"
+    )
+
+
+def section(anchor: str, heading: str, *parts: str) -> str:
+    """A section with a heading that can be linked to; "" where all parts are empty."""
+    inside = "\n".join(part for part in parts if part)
+    if not inside:
+        return ""
+    return f'<section id="{anchor}">\n<h2>{escape(heading)}</h2>\n{inside}\n</section>'
+
+
+def paragraph(text: str, kind: str = "") -> str:
+    """One paragraph; "" of nothing."""
+    mark = f' class="{kind}"' if kind else ""
+    return f"<p{mark}>{escape(text)}</p>" if text else ""
+
+
+def bullets(sentences: Iterable[str]) -> str:
+    """A list; "" of nothing."""
+    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences)
+    return f"<ul>{items}</ul>" if items else ""
+
+
+def title(text: str) -> str:
+    """The heading of the page."""
+    return f"<h1>{escape(text)}</h1>"
+
+
+def code(text: str) -> str:
+    """A program text."""
+    return f"<pre><code>{escape(text)}</code></pre>" if text else ""
+
+
+def heading(text: str) -> str:
+    """A heading inside a section."""
+    return f"<h3>{escape(text)}</h3>"
+
+
+def figure(drawing: str, caption: str = "") -> str:
+    """A chart with words below."""
+    below = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
+    return f"<figure>{drawing}{below}</figure>"
+
+
+def verdict(kind: str, word: str, sentences: Iterable[str]) -> str:
+    """The verdict in a box: kind "good", "doubtful" or "bad"."""
+    text = "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences)
+    return f'<div class="verdict {kind}" role="status"><strong>{escape(word)}</strong>{text}</div>'
+
+
+def contents(links: Sequence[tuple[str, str]]) -> str:
+    """Links to sections: (anchor, text)."""
+    text = "".join(f'<a href="#{anchor}">{escape(name)}</a>' for anchor, name in links)
+    return f'<nav aria-label="Sections">{text}</nav>'
+
+
+def table(
+    caption: str,
+    header: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    numbers: Sequence[int] = (),
+    kinds: Sequence[str] = (),
+) -> str:
+    """A table whose first column heads the rows; "" without rows.
+
+    Args:
+        caption: what it shows.
+        header: names of the columns.
+        rows: texts.
+        numbers: columns that stand at the right.
+        kinds: class of the last column by row: "good", "bad", "note" or "".
+    """
+    lines = [list(row) for row in rows]
+    if not lines:
+        return ""
+    body: list[str] = []
+    for k, row in enumerate(lines):
+        last = kinds[k] if k < len(kinds) else ""
+        body.append(f"<tr>{_cells(row, numbers, last)}</tr>")
+    top = "".join(
+        f'<th scope="col"{_class(j in numbers)}>{escape(name)}</th>'
+        for j, name in enumerate(header)
+    )
+    return (
+        f'<div class="wide"><table><caption>{escape(caption)}</caption>'
+        f"<thead><tr>{top}</tr></thead><tbody>{''.join(body)}</tbody></table></div>"
+    )
+
+
+def _cells(row: Sequence[str], numbers: Sequence[int], last: str) -> str:
+    cells = [f'<th scope="row">{escape(row[0])}</th>']
+    for j, text in enumerate(row[1:], start=1):
+        kind = last if j == len(row) - 1 else ""
+        cells.append(f"<td{_class(j in numbers, kind)}>{escape(text)}</td>")
+    return "".join(cells)
+
+
+def _class(number: bool, kind: str = "") -> str:
+    both = " ".join(part for part in ("number" * number, kind) if part)
+    return f' class="{both}"' if both else ""
+
+
+def triangle(caption: str, names: Sequence[str], values: Sequence[Sequence[float | None]]) -> str:
+    """Correlations below the diagonal, the darker the nearer to -1 or 1."""
+    if len(names) < 2:
+        return ""
+    rows: list[str] = []
+    for i, name in enumerate(names[1:], start=1):
+        cells = "".join(_shade(values[i][j]) for j in range(i))
+        rows.append(f'<tr><th scope="row">{escape(name)}</th>{cells}</tr>')
+    top = "".join(f'<th scope="col">{escape(name)}</th>' for name in names[:-1])
+    return (
+        f'<div class="wide"><table class="square"><caption>{escape(caption)}</caption>'
+        f"<thead><tr><td></td>{top}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
+    )
+
+
+def _shade(value: float | None) -> str:
+    if value is None:
+        return "<td>–</td>"
+    colour = "predicted" if value > 0 else "residual"
+    share = round(60 * abs(value))
+    mixed = f"color-mix(in srgb, var(--{colour}) {share}%, transparent)"
+    return f'<td style="background:{mixed}">{value:+.2f}</td>'

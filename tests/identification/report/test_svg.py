@@ -1,0 +1,130 @@
+"""Charts and pages as text: parsed as XML, with points where they belong and nothing unescaped."""
+
+import xml.etree.ElementTree as ET
+from html.parser import HTMLParser
+from re import findall
+
+import numpy as np
+import pytest
+
+from identification.report import html
+from identification.report.scale import Axis, around
+from identification.report.svg import (
+    BOTTOM,
+    LEFT,
+    RIGHT,
+    TOP,
+    Band,
+    Dots,
+    Level,
+    Path,
+    Stems,
+    chart,
+)
+
+NASTY = "<script>alert('1')</script> & \"x\""
+
+
+class Balanced(HTMLParser):
+    """Every element is closed where it should be."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag != "meta":
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_points_stand_where_their_numbers_say() -> None:
+    x, y = Axis("t", "s", 0.0, 10.0), Axis("v", "m/s", -1.0, 1.0)
+    drawn = chart("v", x, y, [Path("line", np.array([0.0, 5.0, 10.0]), np.array([-1.0, 0.0, 1.0]))])
+    w, h = 720 - LEFT - RIGHT, 230 - TOP - BOTTOM
+    found = findall(r'points="([^"]*)"', drawn)
+    assert found == [f"0,{h:g} {w / 2:g},{h / 2:g} {w:g},0"]
+
+
+def test_a_logarithmic_axis_has_its_decades() -> None:
+    axis = around("cost", "", [np.array([1e-3, 1.0, 0.0, -2.0, np.nan])], logarithmic=True)
+    assert 0 < axis.low < 1e-3 < 1.0 < axis.high
+    assert [label for _, label in axis.ticks()] == ["10⁻³", "10⁻²", "10⁻¹", "10⁰"]
+    middle = Axis("c", "", 1e-4, 1.0, logarithmic=True).at(np.array([1e-2]))
+    np.testing.assert_allclose(middle, 0.5)
+
+
+@pytest.mark.parametrize(("low", "high"), [(-3e-7, 4e-7), (0.0, 1e6), (2.0, 2.0 + 1e-9)])
+def test_ticks_are_few_round_and_distinct(low: float, high: float) -> None:
+    axis = around("x", "m", [np.array([low, high])])
+    ticks = axis.ticks()
+    labels = [label for _, label in ticks]
+    assert 2 <= len(ticks) <= 8
+    assert len(set(labels)) == len(labels)
+    assert max(map(len, labels)) <= 12
+    assert all(axis.low <= value <= axis.high for value, _ in ticks)
+
+
+def test_small_and_large_numbers_give_their_power_to_the_label() -> None:
+    assert Axis("x", "m", -3e-7, 4e-7).label == "x [10⁻⁹ m]"
+    assert Axis("F", "N", 0.0, 2e6).label == "F [10⁶ N]"
+    assert Axis("F", "N", 0.0, 2e3).label == "F [N]"
+    assert Axis("n", "1", 0.0, 2.0).label == "n"
+
+
+def test_signals_without_numbers_or_range_are_drawn() -> None:
+    none, same = np.full(3, np.nan), np.full(3, 7.0)
+    for y in (none, same, np.zeros(0)):
+        x = np.arange(float(y.size))
+        drawn = chart("x", around("x", "", [x]), around("y", "", [y]), [Path("a", x, y)])
+        ET.fromstring(drawn)
+        assert "nan" not in drawn
+
+
+def test_every_chart_is_xml_with_a_title_and_a_description() -> None:
+    x, y = Axis(NASTY, "s", 0.0, 1.0), Axis("y", NASTY, 0.0, 1.0)
+    ones = np.array([0.2, 0.8, 5e9])
+    marks = [
+        Path("a", ones, ones, NASTY), Dots("b", ones, ones, "dots"), Stems("c", ones, ones),
+        Level("d", 0.5), Level("e", 7.0), Level("f", 0.2, upright=True), Band("g", -1.0, 2.0),
+    ]  # fmt: skip
+    root = ET.fromstring(chart(NASTY, x, y, marks, says=NASTY))
+    texts = ["".join(e.itertext()) for e in root.iter()]
+    assert [e.text for e in root.iter("title")] == [NASTY]
+    assert [e.text for e in root.iter("desc")] == [NASTY]
+    assert root.get("role") == "img"
+    assert not list(root.iter("script"))
+    assert f"{NASTY} [s]" in texts
+
+
+def test_points_that_fall_together_are_left_out() -> None:
+    x = np.linspace(0, 1, 100_000)
+    line = Path("a", x, np.zeros(x.size)).draw(Axis("x", "", 0, 1), Axis("y", "", -1, 1), 600, 200)
+    dots = Dots("a", x, np.zeros(x.size)).draw(Axis("x", "", 0, 1), Axis("y", "", -1, 1), 600, 200)
+    assert len(line) < 80_000
+    assert dots.count("M") <= 6001
+
+
+def test_a_page_is_one_document_with_escaped_text() -> None:
+    body = [
+        html.title(NASTY), html.paragraph(NASTY), html.bullets([NASTY]), html.heading(NASTY),
+        html.code(NASTY), html.verdict("bad", NASTY, [NASTY]), html.contents([("a", NASTY)]),
+        html.table(NASTY, [NASTY, "b"], [[NASTY, NASTY]], (1,), ["note"]),
+        html.triangle(NASTY, [NASTY, "b"], [[1.0, None], [-0.5, 1.0]]),
+        html.section("a", NASTY, html.figure("<svg></svg>", NASTY)),
+    ]  # fmt: skip
+    page = html.page(NASTY, "en", "".join(body))
+    assert "<script" not in page
+    assert page.startswith("<!DOCTYPE html>")
+    check = Balanced()
+    check.feed(page)
+    assert check.open == []
+    assert page.count("&lt;script&gt;") == 17
+
+
+def test_nothing_of_nothing() -> None:
+    assert html.table("", ["a"], []) == ""
+    assert html.section("a", "b", "", "") == ""
+    assert html.bullets([]) == html.paragraph("") == html.triangle("", ["a"], [[1.0]]) == ""
