@@ -1,0 +1,218 @@
+"""From one start to a minimum, with an end that says what was reached.
+
+The trust region is SciPy's (`least_squares`, method "trf"): it keeps bounds in the interior,
+scales by the derivatives, is deterministic and well kept; CasADi has Ipopt and SQP, which want
+expressions of the residuals, and simulated ones have none. Robust losses and weights are applied to
+the rows before they are reduced to a triangle, so its linear algebra sees n + 1 rows.
+
+Whether the end is a minimum is judged by what a whole Gauss-Newton step would still gain, never by
+the size of a short one:
+
+    fall = max over s of  f'f - |f + J s|^2     in the coordinates that no bound holds
+
+Source: M. A. Branch, T. F. Coleman, Y. Li, SIAM J. Sci. Comput. 21, 1999; J. Nocedal, S. J. Wright,
+Numerical Optimization, 2nd ed., 2006, chapter 10.
+"""
+
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.solving.noise import change, levels, objective
+from identification.solving.task import Point, Task
+from symfric.foundation.status import Status
+
+Array = NDArray[np.float64]
+
+GAIN, NEAR = 1e-6, 1e-2
+"""Fall of the cost over the variance: of a minimum, and of an end that is near enough (a tenth of a
+standard error)."""
+FAR = 15.0
+"""Longest step that is believed in: of a logarithmic coordinate a factor of three million."""
+ROUNDS = 12
+"""Times that noise levels are estimated anew."""
+SETTLED = 0.02
+"""Change of the noise levels that no longer matters for the weights."""
+ROUGH = 0.1
+"""Fall over the variance that is small enough while noise levels still change."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Start:
+    """One start and where it ended.
+
+    Attributes:
+        number: of the start, in the order in which they were made.
+        w0, w: coordinates at the start and at the end, shape (n,).
+        cost: sum of the losses at the end, under the noise levels of the best start.
+        status, message: how it ended.
+        evaluations: of the residuals.
+        noise: noise levels at the end [SI].
+        objective: minus twice the logarithm of the likelihood, by which starts are compared.
+        evidence: cost of each trial in turn; inf where there was none.
+    """
+
+    number: int
+    w0: Array
+    w: Array
+    cost: float
+    status: Status
+    message: str
+    evaluations: int
+    noise: dict[str, float]
+    objective: float
+    evidence: tuple[float, ...] = ()
+
+
+class _EndedError(Exception):
+    """There is nothing left to gain."""
+
+
+@final
+@dataclass(eq=False)
+class _Search:
+    """Points that were tried, for SciPy and for whoever interrupts it."""
+
+    task: Task
+    best: Point
+    left: int
+    goal: float = GAIN
+    why: str = ""
+    costs: list[float] = field(default_factory=list[float])
+    last: Point | str = ""
+    interrupted: bool = False
+
+    def at(self, w: Array) -> Point | str:
+        for known in (self.best, self.last):
+            if isinstance(known, Point) and np.array_equal(known.w, w):
+                return known
+        if self.left <= 0:
+            raise _EndedError
+        self.left -= 1
+        self.last = self.task.at(w)
+        if isinstance(self.last, str):
+            self.why = self.last
+            self.costs.append(np.inf)
+            return self.last
+        self.costs.append(self.last.cost)
+        if self.last.cost < self.best.cost:
+            self.best = self.last
+        return self.last
+
+    def residuals(self, w: Array) -> Array:
+        """Reduced residuals; where there are none, infinite ones, at which the step shrinks."""
+        found = self.at(w)
+        if isinstance(found, str):
+            return np.full(len(self.task.unknowns.names) + 1, np.inf)
+        return found.reduced[0]
+
+    def slopes(self, w: Array) -> Array:
+        """Their derivatives, asked for at accepted points only: there it may end."""
+        found = self.at(w)
+        if isinstance(found, str):  # never: SciPy asks only where residuals are finite
+            raise _EndedError
+        if remaining(self.task, found) <= self.goal * variance(self.task, found):
+            raise _EndedError
+        return found.reduced[1]
+
+    def run(self) -> None:
+        """Minimise from `best` under the noise levels of the task."""
+        optimize: Any = import_module("scipy.optimize")  # slow to import, and seldom needed
+        box = self.task.unknowns
+        try:
+            optimize.least_squares(
+                self.residuals, self.best.w, self.slopes, bounds=(box.lower, box.upper),
+                x_scale="jac", ftol=1e-15, xtol=1e-12, gtol=1e-15, max_nfev=self.left + 9,
+            )  # fmt: skip
+        except _EndedError:
+            pass
+        except KeyboardInterrupt:
+            self.interrupted = True
+
+
+def descend(task: Task, w0: Array, number: int = 0, evaluations: int = 200) -> Start:
+    """Go from `w0` to a minimum, noise levels estimated on the way where nobody gave them.
+
+    Returns what was reached in any case: after an interruption or where the start has no residuals,
+    too; `status` and `message` say so.
+    """
+    try:
+        first = task.at(task.unknowns.inside(w0))
+    except KeyboardInterrupt:
+        first = "interrupted by the user before the first residuals"
+    if isinstance(first, str):
+        return Start(
+            number, w0, w0, np.inf, Status.NOT_FINITE, first, 1, task.noise, np.inf, (np.inf,)
+        )
+    search = _Search(task, first, evaluations - 1, costs=[first.cost])
+    if task.estimated:
+        _renew(search)
+    for count in range(ROUNDS if task.estimated else 1):
+        search.goal = GAIN if count or not task.estimated else ROUGH
+        search.run()
+        if search.interrupted or search.left <= 0 or not task.estimated:
+            break
+        moved = _renew(search)
+        settled = moved < SETTLED or (len(search.task.noise) == 1 and task.loss == "squares")
+        fall = remaining(search.task, search.best)
+        if settled and (fall <= GAIN * variance(search.task, search.best) or count):
+            break
+    status, message = _verdict(search)
+    end = search.best
+    return Start(
+        number, w0, end.w, end.cost, status, message, evaluations - search.left,
+        search.task.noise, objective(search.task, end), tuple(search.costs),
+    )  # fmt: skip
+
+
+def _renew(search: _Search) -> float:
+    """Estimate noise levels at the best point; by how much they changed."""
+    old = search.task.noise
+    search.task = search.task.with_noise(levels(search.task, search.best))
+    search.best = search.task.again(search.best)
+    search.last = ""
+    return change(old, search.task.noise)
+
+
+def variance(task: Task, point: Point) -> float:
+    """Variance of the weighted residuals, at least that of the noise."""
+    freedom = max(1, point.sigma.size - point.w.size)
+    return max(1.0, point.cost / freedom)
+
+
+def remaining(task: Task, point: Point) -> float:
+    """Fall of the cost that a Gauss-Newton step in the coordinates off their bounds promises.
+
+    The step goes no further than `FAR` in any principal direction: beyond, derivatives promise
+    nothing, and a coordinate that has lost its influence would have to go further than any.
+    """
+    f, J = point.reduced
+    g, box = np.einsum("ij,i->j", J, f), task.unknowns
+    near = box.at_bound(point.w)
+    low = near & (point.w - box.lower < box.upper - point.w)
+    free = ~((low & (g > 0)) | (near & ~low & (g < 0)))
+    u, s, _ = np.linalg.svd(J[:, free], full_matrices=False)
+    part = np.abs(u.T @ f)
+    reached = np.minimum(part, FAR * s)
+    return float(((2 * part - reached) * reached).sum())
+
+
+def _verdict(search: _Search) -> tuple[Status, str]:
+    """What was reached."""
+    task, point = search.task, search.best
+    fall = remaining(task, point) / variance(task, point)
+    if search.interrupted:
+        return Status.INTERRUPTED, "interrupted by the user; the best so far"
+    if fall <= 1e2 * GAIN:
+        return Status.SOLVED, ""
+    if fall <= NEAR:
+        return Status.ACCEPTABLE, ""
+    if search.left <= 0:
+        return Status.MAX_ITERATIONS, f"a step would still gain {fall:.3g} of the variance"
+    if search.why:
+        return Status.NO_DESCENT, f"the last trial that failed: {search.why}"
+    return Status.NO_DESCENT, f"a step should gain {fall:.3g} of the variance, and none does"

@@ -1,0 +1,145 @@
+"""Several starts, on any executor, with the same result to the bit as one after the other.
+
+Starts are numbered; results are taken in the order of the numbers, whoever is ready first. They end
+early where another start cannot matter: one left nothing but white noise, or `AGREE` of them have
+found the same lowest minimum. What was computed beyond is thrown away, so that the result does not
+depend on who computed it.
+"""
+
+import pickle
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import Executor, Future
+from dataclasses import replace
+from functools import lru_cache
+from threading import get_ident
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.solving.descent import Start, descend
+from identification.solving.reduce import square
+from identification.solving.task import Point, Task
+from symfric.foundation.status import Status
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+"""Called with what is being done and the fraction done."""
+
+AGREE = 3
+"""Starts that find the same lowest minimum before one believes that it is the lowest."""
+SAME = 1.0
+"""Difference of minus twice the log-likelihood below which two minima are the same."""
+WHITE = 3.0
+"""Correlation of neighbours, over its standard deviation, that white noise hardly exceeds."""
+
+
+def many_starts(
+    task: Task,
+    starts: Sequence[Array],
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+    evaluations: int = 200,
+    agree: int = AGREE,
+) -> tuple[Start, ...]:
+    """Descend from each of `starts`, shape (n,) each.
+
+    Args:
+        task: the problem; for an executor it must pickle.
+        executor: threads or processes, or None: one after the other here.
+        progress: called after each start.
+        evaluations: of the residuals, allowed to each start.
+        agree: starts that must find the same minimum for an early end; 0: all starts are made.
+
+    Returns:
+        In the order of their numbers, costs under the noise levels of the best. After Ctrl-C what
+        was finished until then, and where the interrupted one stood.
+    """
+    done: list[Start] = []
+    found = _in_turn(task, starts, executor, evaluations)
+    try:
+        for start in found:
+            done.append(start)
+            if progress is not None:
+                progress(f"start {len(done)} of {len(starts)}", len(done) / len(starts))
+            if start.status is Status.INTERRUPTED or (agree and _enough(task, done, agree)):
+                break
+    except KeyboardInterrupt:
+        if not done:
+            raise
+    finally:
+        found.close()
+    return tuple(_alike(done))
+
+
+def best_of(starts: Sequence[Start]) -> Start:
+    """The likeliest end; of equal ones the first."""
+    return min(starts, key=lambda s: (s.objective, s.number))
+
+
+def _in_turn(
+    task: Task, starts: Sequence[Array], executor: Executor | None, evaluations: int
+) -> Generator[Start]:
+    """Results in the order of the numbers."""
+    if executor is None:
+        for number, w in enumerate(starts):
+            yield descend(task, w, number, evaluations)
+        return
+    packed = pickle.dumps(task)
+    waiting: list[Future[Start]] = [
+        executor.submit(_descend_packed, packed, w, number, evaluations)
+        for number, w in enumerate(starts)
+    ]
+    try:
+        for future in waiting:
+            yield future.result()
+    finally:
+        for future in waiting:
+            future.cancel()
+
+
+def _descend_packed(packed: bytes, w: Array, number: int, evaluations: int) -> Start:
+    return descend(_unpacked(packed, get_ident()), w, number, evaluations)
+
+
+@lru_cache(maxsize=4)
+def _unpacked(packed: bytes, thread: int) -> Task:
+    """The task of this thread, made once: to compile a model again takes longer than a start."""
+    del thread
+    return pickle.loads(packed)
+
+
+def _alike(done: Sequence[Start]) -> list[Start]:
+    """Costs under the noise levels of the best start, so that they can be compared."""
+    if not done:
+        return []
+    best = best_of(done)
+    if not np.isfinite(best.objective):
+        return list(done)
+    return [replace(s, cost=best.cost + s.objective - best.objective) for s in done]
+
+
+def _enough(task: Task, done: Sequence[Start], agree: int) -> bool:
+    """Whether no further start is needed."""
+    best = best_of(done)
+    if not best.status.ok:
+        return False
+    same = [s for s in done if s.status.ok and s.objective - best.objective < SAME]
+    if len(same) >= agree:
+        return True
+    if best is not done[-1]:
+        return False
+    point = task.with_noise(best.noise).at(best.w)
+    return isinstance(point, Point) and is_white(task, point)
+
+
+def is_white(task: Task, point: Point) -> bool:
+    """Whether neighbouring residuals are uncorrelated in every channel, at several distances."""
+    for channel in task.channels:
+        r = point.r[channel.rows]
+        if not channel.ordered or r.size < 20:
+            return False
+        for lag in (1, 2, 4):
+            pairs = float(np.sum(r[lag:] * r[:-lag])) / max(square(r), 1e-300)
+            if abs(pairs) > WHITE / np.sqrt(r.size):
+                return False
+    return True

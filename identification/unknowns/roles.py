@@ -1,0 +1,224 @@
+"""Which parameters of a law are fitted, and why the others are not."""
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import fields
+from math import floor, log10
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.parameters import Parameter, Parametric, parameters, symbolise
+from symfric.laws import Asymmetric, Law
+
+Array = NDArray[np.float64]
+
+VELOCITIES = ("m/s", "rad/s")
+STEEPNESSES = ("s/m", "s/rad")
+"""Units of what places a feature on the velocity axis, and of its inverse."""
+
+FITTED = ("mass", "inertia", "offset", "level", "viscous", "velocity scale", "")
+"""Roles that are fitted unless named in `fixed`; nobody has said what "" is for."""
+BRISTLE = ("stiffness", "damping", "length")
+"""Roles that are fitted of a law with internal states, whose motion shows them."""
+
+REASONS = {
+    "width": "smoothing width, small against the speeds",
+    "load": "the load is constant in the data",
+}
+STEADY = "steady sliding says nothing of it"
+MACHINE = "of the machine, fitted only on request"
+
+ALIKE = 1e-7
+"""Part of a parameter's effect on the force, relative to it, that no other one has as well."""
+WIDTH, BLEND = 1e-3, 1e-4
+"""Smoothing widths over the largest speed in the data; the blend is the narrower one."""
+SLOWEST, NARROWEST = 2e-3, 1e-5
+"""Least velocity scale, and least smoothing width, over the largest speed that data can tell."""
+
+LINEAR = ("level", "viscous", "offset", "temperature", "motion")
+"""Roles of which the force is linear, or whose sign is open: fitted by their value."""
+
+
+def parts(obj: Parametric) -> Iterator[Parametric]:
+    """`obj` and every parametric object inside it."""
+    yield obj
+    for item in fields(obj):
+        value = getattr(obj, item.name)
+        for child in value if isinstance(value, tuple) else (value,):
+            if isinstance(child, Parametric):
+                yield from parts(child)
+
+
+def orders(obj: Parametric) -> Iterator[tuple[str, str, bool]]:
+    """Pairs of parameters (low, high, strictly) of `obj` that must stay in order, by flat name."""
+    plain = [n for n, p in parameters(obj).items() if np.ndim(p.value) == 0]
+    yield from symbols_in_order(symbolise(obj, *plain)[0])
+
+
+def symbols_in_order(obj: Parametric) -> Iterator[tuple[str, str, bool]]:
+    """The same by the names of symbols, where both of a pair are one."""
+    for part in parts(obj):
+        for pairs, strictly in ((type(part).ordered, False), (type(part).strictly_ordered, True)):
+            for pair in pairs:
+                low, high = (getattr(part, field) for field in pair)
+                if all(isinstance(x, ca.SX) and x.is_symbolic() for x in (low, high)):
+                    yield low.name(), high.name(), strictly
+
+
+def is_coefficient(parameter: Parameter) -> bool:
+    """Whether a parameter is a friction coefficient: times N it is a force level."""
+    return parameter.role == "level" and parameter.unit == "1"
+
+
+def is_velocity(parameter: Parameter) -> bool:
+    """Whether a parameter places a feature on the velocity axis, or is as small as one."""
+    scale = parameter.role in ("velocity scale", "width", "")
+    return scale and parameter.unit in (*VELOCITIES, *STEEPNESSES)
+
+
+def is_logarithmic(parameter: Parameter) -> bool:
+    """Whether a parameter is fitted by its logarithm.
+
+    Positive by nature, and of a scale that nobody knows. The friction levels of laws that divide
+    by them (their lower bound is above zero) are such, too; others may vanish.
+    """
+    if float(parameter.value) <= 0 or parameter.lower < 0:
+        return False
+    return parameter.role not in LINEAR or (parameter.role == "level" and parameter.lower > 0)
+
+
+def window(parameter: Parameter, v_max: float) -> tuple[float, float]:
+    """Range in which data with speeds up to `v_max` can tell the parameter, in its unit."""
+    low, high = parameter.lower, parameter.upper
+    if is_velocity(parameter) and v_max > 0 and np.isfinite(v_max):
+        least = (NARROWEST if parameter.role == "width" else SLOWEST) * v_max
+        slow, fast = (least, v_max)
+        if parameter.unit in STEEPNESSES:
+            slow, fast = 1 / fast, 1 / slow
+        low, high = max(low, slow), min(high, fast)
+    return low, high
+
+
+def reason(parameter: Parameter, *, directions: bool, bristle: bool | None, machine: bool) -> str:
+    """Why a parameter is not fitted unless it is asked for; "" where it is.
+
+    Args:
+        directions: the law has two directions, whose levels hold the offset.
+        bristle: the data show the internal states of a law that has them; None: it has none.
+        machine: the parameter is none of the law, nor of a `Drive`.
+    """
+    if parameter.name == "N":
+        return "given"
+    if parameter.role == "offset" and directions:
+        return "part of the direction-dependent levels"
+    if machine:
+        return MACHINE
+    if parameter.role in FITTED or (bristle and parameter.role in BRISTLE):
+        return ""
+    if bristle is False and parameter.role in BRISTLE:
+        return STEADY
+    return REASONS.get(parameter.role, f"{parameter.role}, fitted only on request")
+
+
+def has_directions(obj: Parametric) -> bool:
+    """Whether some law in `obj` tells the two directions apart."""
+    return any(isinstance(part, Asymmetric) for part in parts(obj))
+
+
+def held_value(parameter: Parameter, v_max: float) -> float:
+    """Value of a parameter that is not fitted; a width the user changed is kept."""
+    value = float(parameter.value)
+    if parameter.role != "width" or parameter.unit not in VELOCITIES:
+        return value
+    if value != parameter.default or not v_max > 0:
+        return value
+    return one_digit((BLEND if parameter.field == "v_blend" else WIDTH) * v_max)
+
+
+def one_digit(value: float) -> float:
+    """`value` > 0 rounded to one significant digit."""
+    digits = -floor(log10(value))
+    return round(value, digits)
+
+
+def inseparable(
+    law: Law, load: float, names: Sequence[str], asked: Collection[str], bristle: bool
+) -> dict[str, str]:
+    """Those of `names` that only a change of load or temperature could tell from others.
+
+    Each is compared with those before it, by sensitivities of the force (and of the rates of the
+    states, where the data show them; else of the force in steady sliding) at many speeds and a
+    position of the parameters that is special in nothing; those in `asked` are kept. What no change
+    could tell apart either is left to the fit, which names it.
+    """
+    known = parameters(law)
+    mine = [n for n in names if n in known]
+    around = [n for n, p in known.items() if n not in names and p.role in ("load", "temperature")]
+    if law.inputs or not mine:
+        return {}
+    columns = _effects(law, load, mine, around, bristle)
+    constant, changing = columns[0], np.vstack(columns)
+    kept, found = list[int](), dict[str, str]()
+    for i, name in enumerate(mine):
+        others = _same_effect(constant, kept, i)
+        if bristle and not np.any(constant[:, i]):
+            others = None
+        if not bristle and law.states and others == [] and name not in asked:
+            found[name] = STEADY
+        elif name in asked or others is None or _same_effect(changing, kept, i) is not None:
+            kept.append(i)
+        else:
+            told = ", ".join(mine[k] for k in others)
+            found[name] = f"load and temperature are constant: it cannot be told from {told}"
+    return found
+
+
+def _effects(
+    law: Law, load: float, mine: Sequence[str], around: Sequence[str], bristle: bool
+) -> list[Array]:
+    """Derivatives by the parameters `mine` at many speeds (rows, parameters), at four places.
+
+    At the first all is as it is, at the others load and temperature are different.
+    """
+    law, variables = symbolise(law, *mine, *around)
+    v, N = ca.SX.sym("v"), ca.SX.sym("N")
+    z = ca.SX.sym("z", len(law.states))
+    by_name = {x.name: x for x in variables}
+    p = ca.vertcat(*(by_name[n].symbol for n in mine), *(by_name[n].symbol for n in around), N)
+    state = z if bristle else ca.SX(law.steady_state(v, N))
+    found = ca.SX(law.force(v, N, state if law.states else ca.SX(0, 1)))
+    if bristle and law.states:
+        found = ca.vertcat(found, ca.SX(law.rate(v, N, z)))
+    slope = ca.jacobian(found, p)[:, : len(mine)]
+    usual = [float(by_name[n].start) or 0.1 for n in (*mine, *around)]
+    speeds = np.concatenate([side * np.geomspace(1e-7, 1e2, 200) for side in (-1, 1)])
+    rng = np.random.default_rng(0)
+    nominal = np.array([s.nominal for s in law.states])
+    states = nominal[:, None] * rng.uniform(-1, 1, (len(nominal), speeds.size))
+    slopes = ca.Function("slope", [v, z, p], [ca.densify(ca.vec(slope))]).map(speeds.size)
+    here = np.array([*usual, load or 1.0])
+    here *= 1 + 0.1 * rng.random(here.size)
+    apart = 0.3 * (np.arange(here.size) >= len(mine))
+    places = [here, *(here * (1 + apart * rng.random(here.size)) for _ in range(3))]
+    return [_by_parameter(slopes(speeds[None, :], states, at), len(mine)) for at in places]
+
+
+def _by_parameter(slopes: ca.DM, count: int) -> Array:
+    """Columns of mapped derivatives, one for each of `count` parameters."""
+    outputs = slopes.shape[0] // count
+    values = slopes.full().reshape(count, outputs, -1)
+    size = np.abs(values).max(axis=(0, 2), where=np.isfinite(values), initial=1e-300)
+    return (values / size[None, :, None]).reshape(count, -1).T
+
+
+def _same_effect(columns: Array, kept: Sequence[int], i: int) -> list[int] | None:
+    """Which of the columns `kept` make up column i; None where they do not."""
+    columns = columns[np.isfinite(columns).all(axis=1)]
+    column, others = columns[:, i], columns[:, list(kept)]
+    others = others / np.maximum(np.linalg.norm(others, axis=0), 1e-300)
+    shares = np.linalg.lstsq(others, column, rcond=None)[0]
+    if np.linalg.norm(column - others @ shares) > ALIKE * np.linalg.norm(column):
+        return None
+    least = 1e-3 * np.abs(shares).max(initial=0.0)
+    return [k for k, share in zip(kept, shares, strict=True) if abs(share) > least]

@@ -1,0 +1,139 @@
+"""How a user says what becomes of a parameter: a range, an order, a tie.
+
+free={"sigma_0": log(1e3, 1e7), "mu_s": above("mu_d"), "sigma_1": tied(lambda p: ...)}
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import inf
+from typing import Any, final
+
+from symfric.foundation import checks
+
+
+@final
+@dataclass(frozen=True)
+class Range:
+    """A parameter between bounds.
+
+    Attributes:
+        lower, upper: bounds in the unit of the parameter; its own bounds hold, too.
+        start: where the fit starts; None: from the data, or from the law.
+        logarithmic: fitted by its logarithm, by its value, or (None) as its role says.
+    """
+
+    lower: float = -inf
+    upper: float = inf
+    start: float | None = None
+    logarithmic: bool | None = None
+
+
+@final
+@dataclass(frozen=True)
+class Above:
+    """A parameter that does not fall below another one, and stays below `upper`."""
+
+    name: str
+    upper: float = inf
+    start: float | None = None
+
+
+@final
+@dataclass(frozen=True)
+class Tied:
+    """A parameter that follows from the others: `rule` takes them by name, symbols or numbers."""
+
+    rule: Callable[[Mapping[str, Any]], Any]
+
+
+Spec = Range | Above | Tied
+
+
+def log(lower: float, upper: float, start: float | None = None) -> Range:
+    """Fitted by its logarithm between 0 < lower < upper: a scale of which nobody knows the order.
+
+    Raises:
+        ValueError: bounds that are not positive or not in order, a start outside them.
+    """
+    low = checks.number("log: lower", lower, above=0.0)
+    return _range("log", low, upper, start, True)
+
+
+def linear(lower: float = -inf, upper: float = inf, start: float | None = None) -> Range:
+    """Fitted by its value between lower < upper, which may be infinite.
+
+    Raises:
+        ValueError: bounds that are not in order, a start outside them.
+    """
+    return _range("linear", lower, upper, start, False)
+
+
+def above(name: str, upper: float = inf, start: float | None = None) -> Above:
+    """Not below the parameter `name`, whatever value that one takes."""
+    checks.text("above", name, "the name of a parameter, such as 'mu_d'")
+    high = inf if _is_infinite(upper) else checks.number("above: upper", upper)
+    return Above(name, high, None if start is None else checks.number("above: start", start))
+
+
+def tied(to: str | Callable[[Mapping[str, Any]], Any], factor: float = 1.0) -> Tied:
+    """`factor` times the parameter `to`, or what the function `to` makes of all of them.
+
+    The function takes values by name and returns an expression in them: `lambda p: p["m"] * 9.81`.
+    """
+    if isinstance(to, str):
+        times = checks.number("tied: factor", factor)
+        return Tied(_Multiple(to, times))
+    return Tied(checks.function("tied", to, "the name of a parameter or a function of them"))
+
+
+@final
+@dataclass(frozen=True)
+class _Multiple:
+    """A function that pickles."""
+
+    name: str
+    factor: float
+
+    def __call__(self, values: Mapping[str, Any]) -> Any:
+        if self.name not in values:
+            checks.check_names("tied", [self.name], list(values))
+        return self.factor * values[self.name]
+
+
+def as_spec(where: str, value: object) -> Spec:
+    """What a user wrote for one parameter: a spec, a pair of bounds, a start value, or None.
+
+    Raises:
+        ValueError: anything else.
+    """
+    if isinstance(value, Range | Above | Tied):
+        return value
+    if value is None:
+        return Range()
+    if isinstance(value, tuple | list):
+        pair: list[Any] = list(value)  # pyright: ignore[reportUnknownArgumentType]
+        if len(pair) != 2:
+            raise checks.refused(where, "two bounds", value, "write (lower, upper)")
+        return _range(where, pair[0], pair[1], None, None)
+    if checks.as_number(value) is None:
+        such = "a start value, (lower, upper), log(...), linear(...), above(...) or tied(...)"
+        raise checks.refused(where, such, value)
+    return Range(start=checks.number(where, value))
+
+
+def _range(
+    where: str, lower: object, upper: object, start: object, logarithmic: bool | None
+) -> Range:
+    low = -inf if _is_infinite(lower) else checks.number(f"{where}: lower", lower)
+    high = inf if _is_infinite(upper) else checks.number(f"{where}: upper", upper)
+    if not low < high:
+        raise ValueError(f"{where}: expected lower < upper, got {low:g} and {high:g}")
+    first = None
+    if start is not None:
+        first = checks.number(f"{where}: start", start, lower=low, upper=high)
+    return Range(low, high, first, logarithmic)
+
+
+def _is_infinite(value: object) -> bool:
+    number = checks.as_number(value)
+    return number is not None and abs(number) == inf

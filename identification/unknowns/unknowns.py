@@ -1,0 +1,221 @@
+"""Coordinates of the fit: scaled, logarithmic or as an excess, so that only boxes are left.
+
+    p = scale w                      linear
+    p = exp(w)                       logarithmic: positive scales
+    p = low + scale w, w >= 0        not below another value; low + exp(w) where it is logarithmic
+    p = low + (upper - low) w        not below another value and not above a bound, 0 <= w <= 1
+    p = low (upper / low)^w          likewise, where it is logarithmic, and strictly above
+    p = rule(p)                      tied: no coordinate of its own
+
+A box in w is all that a solver has to keep; orders and ties hold at every trial.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.unknowns.spec import Tied
+from identification.unknowns.unknown import Unknown
+from symfric.foundation.numeric import evaluate_all
+
+Array = NDArray[np.float64]
+
+DECADES = 12.0
+"""Decades about its start that a logarithmic value without bounds may go."""
+MARGIN = 1e-3
+"""Distance of a start to its bounds, over theirs or over one."""
+STRICTLY = 1e-4
+"""Least share of the way from a lower value to the bound of what is strictly above it."""
+AT_BOUND = 1e-5
+"""Distance to a bound, in coordinates over their width or one, below which a value is there."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """Values that residuals take, as functions of the coordinates w that are fitted.
+
+    Attributes:
+        unknowns: what has a coordinate, in the order of w, shape (n,).
+        names: of the values, shape (k,), tied ones included.
+        lower, upper: box of w, shape (n,).
+        function: w -> values (k,), dvalues/dw (k, n).
+    """
+
+    unknowns: tuple[Unknown, ...]
+    names: tuple[str, ...]
+    lower: Array
+    upper: Array
+    function: ca.Function
+
+    @property
+    def fitted(self) -> tuple[str, ...]:
+        """Names of what has a coordinate."""
+        return tuple(u.name for u in self.unknowns)
+
+    @property
+    def nuisance(self) -> tuple[str, ...]:
+        """Names of values that are fitted but not asked for."""
+        return tuple(u.name for u in self.unknowns if u.nuisance)
+
+    def values(self, w: Array) -> Array:
+        """The values at w, shape (k,)."""
+        return self._both(w)[0]
+
+    def slope(self, w: Array) -> Array:
+        """dvalues/dw at w, shape (k, n)."""
+        return self._both(w)[1]
+
+    def _both(self, w: Array) -> tuple[Array, Array]:
+        found, slope = evaluate_all(self.function, np.asarray(w, float))
+        return found.ravel(), slope.reshape(len(self.names), len(self.unknowns))
+
+    def named(self, w: Array) -> dict[str, float]:
+        """The values at w by name."""
+        return dict(zip(self.names, self.values(w).tolist(), strict=True))
+
+    @property
+    def start(self) -> Array:
+        """Coordinates of the start values, shape (n,)."""
+        return self.of({})
+
+    def of(self, values: Mapping[str, float]) -> Array:
+        """Coordinates of `values`, moved inside the box; what is not named is at its start."""
+        known = {u.name: u.start for u in self.unknowns} | dict(values)
+        low = {u.above: known[u.above] for u in self.unknowns if u.above in known}
+        if any(u.above and u.above not in known for u in self.unknowns):
+            low = self._lows(known)
+        w = [_coordinate(u, known[u.name], low.get(u.above, 0.0)) for u in self.unknowns]
+        return self.inside(np.array(w))
+
+    def _lows(self, known: Mapping[str, float]) -> dict[str, float]:
+        """Values that others do not fall below, tied ones among them."""
+        free = [replace(u, above="") for u in self.unknowns]
+        w = np.array([_coordinate(u, known[u.name], 0.0) for u in free])
+        for _ in range(2):  # a tied value may follow from one with an order of its own
+            found = self.named(self.inside(w))
+            w = np.array([_coordinate(u, known[u.name], found[u.above]) if u.above else w[i]
+                          for i, u in enumerate(self.unknowns)])  # fmt: skip
+        return self.named(self.inside(w))
+
+    def inside(self, w: Array) -> Array:
+        """`w` moved inside the box by a thousandth of its width or of one."""
+        margin = MARGIN * np.minimum(1.0, self.upper - self.lower)
+        return np.clip(w, self.lower + margin, self.upper - margin)
+
+    def at_bound(self, w: Array) -> NDArray[np.bool_]:
+        """Which of the unknowns stand at a bound, shape (n,)."""
+        near = AT_BOUND * np.minimum(1.0, self.upper - self.lower)
+        return (w - self.lower < near) | (self.upper - w < near)
+
+
+def unknowns_of(
+    unknowns: Sequence[Unknown],
+    ties: Mapping[str, Tied],
+    names: Sequence[str],
+    held: Mapping[str, float] | None = None,
+) -> Unknowns:
+    """The coordinates of `unknowns` and what `ties` make of them, in the order of `names`.
+
+    Values of `held` parameters are constants: ties may name them, residuals may ask for them.
+
+    Raises:
+        ValueError: a tie or an order to what is not there, or that leads back to itself; a name
+            that is neither an unknown nor tied.
+    """
+    w = ca.SX.sym("w", len(unknowns))
+    by_name = {u.name: (u, w[i]) for i, u in enumerate(unknowns)}
+    values: dict[str, Any] = {n: ca.SX(x) for n, x in (held or {}).items()}
+    waiting = [*by_name, *ties]
+    while waiting:
+        done = [n for n in waiting if _write(n, by_name, ties, values)]
+        if not done:
+            raise ValueError(_circle(waiting, by_name, ties, values))
+        waiting = [n for n in waiting if n not in done]
+    absent = [n for n in names if n not in values]
+    if absent:
+        raise ValueError(f"Fit: expected an unknown for each value, got none for {absent[0]}")
+    column = ca.densify(ca.vertcat(*(values[n] for n in names))) if names else ca.SX(0, 1)
+    function = ca.Function("values", [w], [column, ca.densify(ca.jacobian(column, w))])
+    box = np.array([_box(u) for u in unknowns]).reshape(-1, 2)
+    return Unknowns(tuple(unknowns), tuple(names), box[:, 0], box[:, 1], function)
+
+
+def _write(
+    name: str,
+    unknowns: Mapping[str, tuple[Unknown, ca.SX]],
+    ties: Mapping[str, Tied],
+    values: dict[str, Any],
+) -> bool:
+    """Whether the expression of `name` could be written with the `values` that there are."""
+    if name in ties:
+        try:
+            values[name] = ca.SX(ties[name].rule(values))
+        except (KeyError, ValueError):
+            return False
+        return True
+    unknown, w = unknowns[name]
+    if unknown.above and unknown.above not in values:
+        return False
+    low = values[unknown.above] if unknown.above else ca.SX(0)
+    if unknown.above and unknown.upper < inf:
+        high = unknown.upper
+        values[name] = low * (high / low) ** w if unknown.logarithmic else low + (high - low) * w
+    else:
+        values[name] = low + (ca.exp(w) if unknown.logarithmic else unknown.scale * w)
+    return True
+
+
+def _circle(
+    waiting: Iterable[str],
+    unknowns: Mapping[str, tuple[Unknown, ca.SX]],
+    ties: Mapping[str, Tied],
+    values: Mapping[str, Any],
+) -> str:
+    """Why none of `waiting` can be written."""
+    said: list[str] = []
+    for name in waiting:
+        if name in ties:
+            try:
+                ties[name].rule(values)
+            except (KeyError, ValueError) as error:
+                said.append(f"{name} is tied to what is not fitted or leads back to it ({error})")
+        else:
+            said.append(f"{name} is above {unknowns[name][0].above}, which is not fitted")
+    return "Fit: free: expected ties and orders that end somewhere, got " + "; ".join(said)
+
+
+def _coordinate(unknown: Unknown, value: float, low: float) -> float:
+    if unknown.above:
+        excess = max(value - low, 1e-3 * max(abs(low), 1e-12))
+        if unknown.upper < inf and unknown.logarithmic:
+            return float(np.log(1 + excess / low) / np.log(max(unknown.upper / low, 1 + 1e-12)))
+        if unknown.upper < inf:
+            return excess / max(unknown.upper - low, 1e-300)
+        return float(np.log(excess)) if unknown.logarithmic else excess / unknown.scale
+    if unknown.logarithmic:
+        return float(np.log(max(value, 1e-300)))
+    return value / unknown.scale
+
+
+def _box(unknown: Unknown) -> tuple[float, float]:
+    """Box of the coordinate."""
+    if unknown.above:
+        if unknown.upper < inf:
+            return (STRICTLY if unknown.logarithmic else 0.0), 1.0
+        if not unknown.logarithmic:
+            return 0.0, inf
+    if unknown.logarithmic:
+        reach = float(np.log(10.0)) * DECADES
+        first = float(np.log(max(unknown.start, 1e-300)))
+        low = float(np.log(unknown.lower)) if unknown.lower > 0 else -inf
+        high = float(np.log(unknown.upper)) if unknown.upper < inf else inf
+        if unknown.above:
+            low, high = -inf, inf
+        return max(low, first - reach), min(high, first + reach)
+    return unknown.lower / unknown.scale, unknown.upper / unknown.scale

@@ -1,0 +1,232 @@
+"""Weighted least squares from many starts against closed forms, counts and other processes."""
+
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from identification.residuals.evaluation import Channel, Evaluation
+from identification.solving.descent import descend
+from identification.solving.loss import THRESHOLD, shaped
+from identification.solving.many_starts import best_of, many_starts
+from identification.solving.reduce import triangle
+from identification.solving.task import Point, Task, task
+from identification.unknowns.unknown import Unknown
+from identification.unknowns.unknowns import unknowns_of
+from symfric.foundation.status import Status
+
+Array = NDArray[np.float64]
+
+
+@dataclass(eq=False)
+class Decay:
+    """y = a exp(-b t) + c, measured twice: as it is, and three times as large with other noise."""
+
+    y: Array
+    z: Array
+    calls: int = 0
+    limit: float = 50.0
+    interrupt: int = 0
+
+    names: ClassVar[tuple[str, ...]] = ("a", "b", "c")
+    own: ClassVar[tuple[Unknown, ...]] = ()
+
+    @property
+    def t(self) -> Array:
+        return np.linspace(0, 4, self.y.size)
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        n = self.y.size
+        first = Channel(0, "y", "m", slice(0, n), self.t, self.y, {})
+        if not self.z.size:
+            return (first,)
+        return first, Channel(0, "z", "m", slice(n, 2 * n), self.t, self.z, {})
+
+    def at(self, values: Array) -> Evaluation | str:
+        self.calls += 1
+        if self.interrupt and self.calls >= self.interrupt:
+            raise KeyboardInterrupt
+        a, b, c = values
+        if b > self.limit:
+            return f"b = {b:g} cannot be simulated"
+        e = np.exp(-b * self.t)
+        J = np.stack([e, -a * self.t * e, np.ones_like(e)], axis=1)
+        r = a * e + c
+        if not self.z.size:
+            return Evaluation(r - self.y, J)
+        return Evaluation(np.concatenate([r - self.y, 3 * r - self.z]), np.vstack([J, 3 * J]))
+
+
+TRUTH = np.array([2.0, 1.5, 0.3])
+UNKNOWNS = [
+    Unknown("a", "m", 1.0, 0.0, np.inf),
+    Unknown("b", "1/s", 0.1, logarithmic=True),
+    Unknown("c", "m", 0.0),
+]
+
+
+def decay(seed: int = 0, noise: float = 0.01, other: float | None = None, n: int = 400) -> Decay:
+    rng = np.random.default_rng(seed)
+    y = 2 * np.exp(-1.5 * np.linspace(0, 4, n)) + 0.3
+    z = np.zeros(0) if other is None else 3 * y + other * rng.standard_normal(n)
+    return Decay(y + noise * rng.standard_normal(n), z)
+
+
+def problem(residuals: Decay, **given: object) -> Task:
+    return task(residuals, unknowns_of(UNKNOWNS, {}, Decay.names), **given)  # pyright: ignore[reportArgumentType]
+
+
+def starts(at: Task, count: int = 6) -> list[Array]:
+    rng = np.random.default_rng(0)
+    first = at.unknowns.start
+    return [first, *(first + rng.uniform(-2, 2, 3) for _ in range(count - 1))]
+
+
+def test_the_triangle_has_the_cost_and_the_normal_equations_of_all_rows() -> None:
+    rng = np.random.default_rng(0)
+    for rows, k in ((5000, 7), (3, 7), (900, 60)):
+        A = rng.standard_normal((rows, k))
+        R = triangle(A)
+        assert R.shape == (k, k)
+        assert pytest.approx(A.T @ A, abs=1e-10 * rows) == R.T @ R
+
+
+@pytest.mark.parametrize("loss", list(THRESHOLD))
+def test_loss_has_its_own_derivative_and_leaves_small_residuals_alone(loss: str) -> None:
+    r = np.array([-30.0, -2.0, -1e-3, 1e-9, 0.4, 1.344, 1.346, 8.0])
+    e, slope = shaped(r, loss)
+    h = 1e-6
+    numeric = (shaped(r + h, loss)[0] - shaped(r - h, loss)[0]) / (2 * h)
+    assert slope == pytest.approx(numeric, rel=1e-4)
+    assert e[2:4] == pytest.approx(r[2:4], rel=1e-4)
+    if loss != "squares":
+        assert abs(e[0]) < 30
+
+
+def test_gradient_and_cost_are_those_of_the_rows() -> None:
+    at = problem(decay(other=0.5), loss="cauchy")
+    w = at.unknowns.start
+    point = at.at(w)
+    assert isinstance(point, Point)
+    f, J = point.reduced
+    assert f @ f == pytest.approx(point.cost)
+    h = 1e-6
+    for i, step in enumerate(np.eye(3) * h):
+        above, below = at.at(w + step), at.at(w - step)
+        assert isinstance(above, Point) and isinstance(below, Point)
+        assert 2 * (J.T @ f)[i] == pytest.approx((above.cost - below.cost) / (2 * h), rel=1e-5)
+
+
+def test_one_signal_is_fitted_as_by_linear_algebra_at_its_minimum() -> None:
+    at = problem(decay())
+    end = best_of(many_starts(at, starts(at)))
+    assert end.status is Status.SOLVED
+    point = at.at(end.w)
+    assert isinstance(point, Point)
+    step = np.linalg.lstsq(point.J, point.r, rcond=None)[0]
+    error = np.sqrt(np.diag(np.linalg.inv(point.J.T @ point.J))) * np.std(point.r)
+    assert np.all(np.abs(step) < 2e-3 * error)
+    assert end.noise["y"] == pytest.approx(0.01, rel=0.1)
+
+
+def test_a_noisy_signal_never_makes_the_estimate_worse() -> None:
+    alone, both = np.zeros((2, 40, 3))
+    for seed in range(40):
+        one, two = decay(seed), decay(seed, other=3.0)
+        two.y = one.y
+        for found, data in ((alone, one), (both, two)):
+            at = problem(data)
+            found[seed] = at.unknowns.values(descend(at, at.unknowns.start).w) - TRUTH
+    worse = np.sqrt((both**2).mean(axis=0) / (alone**2).mean(axis=0))
+    assert worse.max() < 1.1
+
+
+def test_noise_levels_of_signals_are_those_of_the_data() -> None:
+    at = problem(decay(other=1.0))
+    noise = descend(at, at.unknowns.start).noise
+    assert noise["y"] == pytest.approx(0.01, rel=0.1)
+    assert noise["z"] == pytest.approx(1.0, rel=0.1)
+
+
+def test_given_noise_is_kept_and_the_rest_estimated() -> None:
+    at = problem(decay(other=1.0), noise={"z": 0.5})
+    end = descend(at, at.unknowns.start)
+    assert end.noise["z"] == 0.5
+    assert end.noise["y"] == pytest.approx(0.01, rel=0.1)
+
+
+def test_data_without_noise_are_fitted_to_rounding() -> None:
+    at = problem(decay(noise=0.0))
+    end = descend(at, at.unknowns.start)
+    assert end.status is Status.SOLVED
+    assert at.unknowns.values(end.w) == pytest.approx(TRUTH, rel=1e-7)
+
+
+def test_outliers_hardly_move_a_robust_fit() -> None:
+    data = decay()
+    data.y[::25] += 1.0
+    errors = {}
+    for loss in ("squares", "huber", "cauchy"):
+        at = problem(data, loss=loss)
+        errors[loss] = np.abs(at.unknowns.values(descend(at, at.unknowns.start).w) - TRUTH).max()
+    assert errors["huber"] < errors["squares"] / 5
+    assert errors["cauchy"] < errors["squares"] / 5
+
+
+def test_a_trial_that_cannot_be_simulated_shortens_the_step() -> None:
+    data = decay()
+    data.limit = 1.6
+    at = problem(data)
+    end = descend(at, at.unknowns.of({"a": 1.0, "b": 0.02, "c": 0.0}))
+    assert np.inf in end.evidence
+    assert at.unknowns.values(end.w) == pytest.approx(TRUTH, rel=0.05)
+
+
+def test_a_start_without_residuals_is_said_and_others_go_on() -> None:
+    data = decay()
+    at = problem(data)
+    bad = at.unknowns.of({"a": 1.0, "b": 1e3, "c": 0.0})
+    first, second = many_starts(at, [bad, at.unknowns.start])
+    assert first.status is Status.NOT_FINITE and "cannot be simulated" in first.message
+    assert second.status is Status.SOLVED
+
+
+def test_evaluations_are_counted_and_limited() -> None:
+    data = decay()
+    at = problem(data)
+    end = descend(at, at.unknowns.start, evaluations=3)
+    assert end.status is Status.MAX_ITERATIONS
+    assert end.evaluations == data.calls == 3
+
+
+def test_an_interruption_keeps_the_best_so_far() -> None:
+    data = decay()
+    data.interrupt = 5
+    at = problem(data)
+    (end,) = many_starts(at, starts(at))
+    assert end.status is Status.INTERRUPTED
+    assert end.cost < np.inf and data.calls == 5
+
+
+def test_any_executor_gives_the_same_bits() -> None:
+    at = problem(decay(other=1.0))
+    here = many_starts(at, starts(at), agree=0)
+    with ThreadPoolExecutor(2) as threads, ProcessPoolExecutor(2) as processes:
+        for executor in (threads, processes):
+            there = many_starts(at, starts(at), executor, agree=0)
+            assert [s.number for s in there] == list(range(6))
+            for a, b in zip(here, there, strict=True):
+                assert (a.w == b.w).all() and a.cost == b.cost
+
+
+def test_white_residuals_end_the_starts_and_wrong_models_go_on() -> None:
+    at = problem(decay())
+    assert len(many_starts(at, starts(at))) == 1
+    wrong = decay()
+    wrong.y += 0.1 * np.sin(wrong.t)
+    at = problem(wrong)
+    assert len(many_starts(at, starts(at))) == 3

@@ -1,0 +1,156 @@
+"""What is fitted of a law, a scene, a model; every coordinate gives a law that can be made."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+from identification.unknowns.spec import above, linear, log, tied
+from identification.unknowns.subject import Subject, subject
+from identification.unknowns.unknowns import Unknowns, unknowns_of
+from symfric.laws import GMS, ExactCoulomb, LuGre, Stribeck
+from symfric.laws.catalogue import ALL_LAWS
+from symfric.scenes import Drive, Rabinowicz
+
+NEED_MORE = {"wojewoda", "quarter_car_general", "bam"}
+"""Laws with inputs that a drive does not offer."""
+BEYOND_ORDER = {"leuven", "rate_and_state"}
+"""Laws with conditions that are no order of two parameters: the guard refuses a trial."""
+
+
+def coordinates(found: Subject) -> Unknowns:
+    return unknowns_of(found.unknowns, found.ties, found.names, found.held)
+
+
+@pytest.mark.parametrize("name", sorted(ALL_LAWS.keys() - NEED_MORE))
+def test_every_point_of_the_box_is_a_law_that_can_be_constructed(name: str) -> None:
+    found = subject(ALL_LAWS[name](), v_max=0.15)
+    at = coordinates(found)
+    rng = np.random.default_rng(0)
+    refused = 0
+    for _ in range(25):
+        w = np.clip(at.start + 2 * rng.standard_normal(at.start.size), at.lower, at.upper)
+        try:
+            assert found.close(at.named(w)).law is not None
+        except ValueError:
+            refused += 1
+    assert refused == 0 or name in BEYOND_ORDER
+
+
+@pytest.mark.parametrize("name", ["stribeck", "velocity_based", "ambrosio", "lugre", "specker"])
+def test_slope_is_the_derivative_of_the_values(name: str) -> None:
+    found = subject(ALL_LAWS[name](), v_max=0.15, free={"m": (0.1, 10)})
+    at = coordinates(found)
+    w, h = at.start + 0.01, 1e-6
+    numeric = np.stack([(at.values(w + h * e) - at.values(w - h * e)) / (2 * h)
+                        for e in np.eye(w.size)], axis=1)  # fmt: skip
+    assert at.slope(w) == pytest.approx(numeric, rel=1e-6, abs=1e-8 * np.abs(numeric).max())
+
+
+def test_values_and_coordinates_invert_each_other() -> None:
+    at = coordinates(subject("velocity_based", v_max=0.15))
+    values = {"m": 2.0, "mu_s": 3.0, "mu_d": 2.5, "v_s": 0.004, "v_d": 0.02, "offset": -0.3}
+    assert at.named(at.of(values)) == pytest.approx(values)
+
+
+def test_roles_say_what_is_fitted_and_why_not() -> None:
+    found = subject("lugre", v_max=0.1)
+    assert found.names == (
+        "m", "offset", "mu_s", "mu_d", "v_s", "sigma_0", "sigma_1", "sigma_2",
+    )  # fmt: skip
+    assert set(found.reasons) == {"N", "delta", "v_eps"}
+    steady = subject("lugre", points=True, v_max=0.1)
+    assert steady.names == ("mu_s", "mu_d", "v_s", "sigma_2")
+    assert "steady" in steady.reasons["sigma_0"]
+    moving = subject("lugre", points=True, moving=True, v_max=0.1)
+    assert {"sigma_0", "sigma_1"} <= set(moving.names)
+    machine = subject(Rabinowicz(Stribeck()), v_max=0.1)
+    assert "m" in machine.reasons and "mu_d" in machine.names
+
+
+def test_widths_follow_the_speeds_unless_the_user_chose_them() -> None:
+    assert subject("stribeck", v_max=0.3).held["v_eps"] == pytest.approx(3e-4)
+    assert subject(Stribeck(v_eps=1e-5), v_max=0.3).held["v_eps"] == 1e-5
+    assert subject("stribeck").held["v_eps"] == 1e-4
+
+
+def test_a_drive_that_turns_has_units_that_turn() -> None:
+    found = subject("stribeck", turning=True)
+    units = {u.name: u.unit for u in found.unknowns}
+    assert units["m"] == "kg m^2" and units["v_s"] == "rad/s" and units["sigma_2"] == "N m s/rad"
+    assert found.drive is not None and found.drive.turning
+
+
+def test_specs_bound_tie_and_order() -> None:
+    found = subject(
+        "lugre",
+        free={
+            "sigma_0": log(1e3, 1e7),
+            "sigma_1": tied(lambda p: 2 * p["sigma_0"] ** 0.5),
+            "offset": linear(-1, 1),
+            "v_s": (1e-4, 1e-2),
+            "m": 2.5,
+        },
+    )
+    at = coordinates(found)
+    assert "sigma_1" in found.names and "sigma_1" not in at.fitted
+    values = at.named(at.start)
+    assert values["sigma_1"] == pytest.approx(2 * values["sigma_0"] ** 0.5)
+    assert values["m"] == pytest.approx(2.5)
+    by_name = {u.name: u for u in at.unknowns}
+    assert (by_name["sigma_0"].lower, by_name["sigma_0"].upper) == (1e3, 1e7)
+    assert by_name["mu_s"].above == "mu_d"
+    ordered = subject("lugre", free={"sigma_1": above("sigma_2")})
+    assert {u.name: u.above for u in ordered.unknowns}["sigma_1"] == "sigma_2"
+
+
+def test_a_fixed_partner_of_an_order_becomes_a_bound() -> None:
+    low = {u.name: u.lower for u in subject("stribeck", fixed={"mu_d": 3.0}).unknowns}
+    assert low["mu_s"] == 3.0
+    high = {u.name: u.upper for u in subject("stribeck", fixed={"mu_s": 3.0}).unknowns}
+    assert high["mu_d"] == 3.0
+
+
+def test_nothing_else_is_fitted_where_the_others_are_fixed() -> None:
+    found = subject("stribeck", free=["mu_d"], fixed="others")
+    assert found.names == ("mu_d",)
+
+
+def test_a_model_keeps_orders_and_gives_its_law() -> None:
+    model = Rabinowicz(LuGre()).model(free=["mu_s", "mu_d", "sigma_0"])
+    found = subject(model, fixed={"sigma_0": 2e5})
+    at = coordinates(found)
+    assert {u.name: u.above for u in at.unknowns} == {"mu_s": "mu_d", "mu_d": ""}
+    closed = found.close({"mu_s": 0.4, "mu_d": 0.3})
+    assert isinstance(closed.law, LuGre)
+    assert (closed.law.mu_s, closed.law.sigma_0) == (0.4, 2e5)
+    assert [v.start for v in closed.model.p] == [0.4, 0.3, 2e5]
+
+
+def test_what_processes_need_pickles() -> None:
+    for what in ("gms", Rabinowicz(GMS()).model(free=["mu_d", "k_1"])):
+        found = subject(what)
+        at, guard = pickle.loads(pickle.dumps((coordinates(found), found.guard)))
+        assert (at.values(at.start) == coordinates(found).values(at.start)).all()
+        guard(at.named(at.start))
+
+
+@pytest.mark.parametrize(
+    ("what", "given", "said"),
+    [
+        ("stribeck", {"free": {"mu_q": 1.0}, "fixed": {"v_x": 2.0}}, "mu_q.*v_x"),
+        ("stribeck", {"free": ["mu_s"], "fixed": {"mu_s": 1.0}}, "both"),
+        ("stribeck", {"free": {"v_s": (1.0, 0.1), "m": "heavy"}}, "v_s.*m"),
+        ("stribeck", {"free": {"mu_d": tied("mu_q")}}, "mu_q"),
+        ("stribeck", {"fixed": {"mu_s": 0.1, "mu_d": 0.2}}, "mu_d <= mu_s"),
+        ("stribeck", {"free": {"v_s": (-1.0, 0.1)}}, "v_s: lower"),
+        ("stribeck", {"fixed": "all"}, "others"),
+        (3, {}, "a law or its text"),
+        (Drive(Stribeck()).model(), {}, "parameters, got none"),
+        (ExactCoulomb, {}, "a law or its text"),
+    ],
+)
+def test_errors_say_all_at_once(what: object, given: dict[str, object], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        found = subject(what, **given)  # pyright: ignore[reportArgumentType]
+        coordinates(found)
