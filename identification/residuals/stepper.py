@@ -1,0 +1,355 @@
+"""The sampled motion of one mass under friction, with exact sensitivities, sample by sample.
+
+One step of length H solves an implicit equation for the velocity, and stretches itself by what it
+found (friction of slope -a_v is a decay, which one implicit step would underrate):
+
+    vb = v + H a(vb),   v1 = v + S a(v1),   S = H phi(-H a_v(vb)),   x1 = x + H (v + v1)/2
+
+phi(z) = (e^z - 1)/z for z within +-1. The step is of second order where the mass slides, and exact
+under constant force for Coulomb with viscous friction. A friction law that takes power out never
+turns the velocity round by itself, so v1 lies between 0 and v + S a(0): a guarded Newton iteration
+finds it for any slope at rest. Friction that holds the mass at rest is found at once, at the speed
+`CREEP`: a jump at v = 0 is the exact impulse clamp, and sticking needs no events and small steps.
+
+The iteration is not differentiated: by the implicit function theorem
+
+    (1 - S a_v) dv1 = dv + S (a_x dx + a_u du + a_p dp) + a dS,
+
+and dv1 = 0 where the mass is held. All is one CasADi Function of a sample, whose chain runs as
+compiled C where there is a compiler, else in CasADi's virtual machine: both give the same bits.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.compiler import find_compiler
+from symfric.integrator.compiled.columns import Columns
+from symfric.model import Model
+
+Array = NDArray[np.float64]
+
+SEARCH, POLISH = 9, 5
+"""Evaluations of the law to find vb, and from there v1; two or three do the work."""
+CREEP = 1e-12
+"""Speed over the model's typical velocity below which a mass that friction holds is at rest."""
+LOOSE = 1e-3
+"""Largest gap of the implicit equation, over the velocities in it, that is taken for solved."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Mass:
+    """Equations of one mass, x' = v and v' = a(x, v, u, p), and their derivatives.
+
+    Attributes:
+        a: acceleration (x, v, u, p) -> a.
+        slopes: (x, v, u, p) -> a, a_x, a_v, a_u, a_p.
+        bends: (x, v, u, p) -> derivatives of a_v by x, v, u, p.
+        newton: (x, v, u, p) -> a, a_v.
+        inputs, parameters: names of u and p.
+        states: names of x and v.
+        creep: speed [velocity unit] below which a held mass is at rest.
+    """
+
+    a: ca.Function
+    slopes: ca.Function
+    bends: ca.Function
+    newton: ca.Function
+    inputs: tuple[str, ...]
+    parameters: tuple[str, ...]
+    states: tuple[str, str]
+    creep: float
+
+    @classmethod
+    def of(cls, model: Model) -> "Mass":
+        """The mass of `model`.
+
+        Raises:
+            ValueError: other states than a position and its velocity (a law with states of its
+                own), algebraic variables, events, or equations with time.
+        """
+        wrong = why_not_sampled(model)
+        if wrong:
+            raise ValueError(f"sampled motion of '{model.name}': {wrong}")
+        x, v = (variable.symbol for variable in model.x)
+        u, p = model.vector("u"), model.vector("p")
+        a, at = ca.SX(ca.SX(model.ode)[1]), [x, v, u, p]
+        a_v = ca.jacobian(a, v)
+        return cls(
+            a=ca.Function("a", at, [a]),
+            slopes=ca.Function("slopes", at, [a, *(ca.jacobian(a, q) for q in at)]),
+            bends=ca.Function("bends", at, [ca.jacobian(a_v, q) for q in at]),
+            newton=ca.Function("newton", at, [a, a_v]),
+            inputs=tuple(variable.name for variable in model.u),
+            parameters=tuple(variable.name for variable in model.p),
+            states=(model.x[0].name, model.x[1].name),
+            creep=CREEP * model.x[1].nominal,
+        )
+
+
+def why_not_sampled(model: Model) -> str:
+    """Why a model cannot be stepped as one mass; "" where it can."""
+    states = [variable.name for variable in model.x]
+    if len(states) != 2 or model.z or model.ode is None:
+        return (
+            "expected two states, a position and its velocity, and a friction law without states, "
+            f"got states {', '.join(states) or 'none'}"
+            f"{' and algebraic ' + ', '.join(z.name for z in model.z) if model.z else ''}; "
+            "use engine='simulate'"
+        )
+    rate = ca.SX(model.ode)[0]
+    if model.events or not ca.is_equal(ca.simplify(rate), model.x[1].symbol, 2):
+        what = "events" if model.events else f"{states[0]}' = {rate}"
+        return f"expected {states[0]}' = {states[1]} without events, got {what}"
+    for contact in model.contacts:
+        slip = ca.simplify(ca.SX(contact.slip))
+        if not ca.is_equal(slip, model.x[1].symbol, 2):
+            return f"expected friction at the velocity {model.x[1].name} alone, got it at {slip}"
+    if ca.depends_on(model.ode, model.t):
+        return "expected equations without time, got some that hold it; give it as an input"
+    return ""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """How a quantity moves with the start and the parameters: a row (1, n) of SX."""
+
+    value: ca.SX
+    slope: ca.SX
+
+
+def advance(
+    mass: Mass, at: Sequence[Tangent], p: Tangent, H: ca.SX
+) -> tuple[Tangent, Tangent, ca.SX]:
+    """Position, velocity after one step from (x, v, u), and the gap left in the equation."""
+    x, v, u = at
+    middle = Tangent(x.value + H / 2 * v.value, x.slope + H / 2 * v.slope)
+    here = (middle.value, u.value, p.value)
+    held, vb, _ = _velocity(mass, here, v.value, H, v.value, SEARCH)
+    sides = (middle.slope, u.slope, p.slope)
+    _, _, slope_b, *_ = found = mass.slopes(middle.value, vb, u.value, p.value)
+    moved_b = ca.if_else(held, 0, 1) * (v.slope + H * _along(found[1:], sides))
+    moved_b = moved_b / ca.if_else(held, 1, 1 - H * slope_b)
+    bend = mass.bends(middle.value, vb, u.value, p.value)
+    z = -H * slope_b
+    z_slope = -H * (_along(bend, sides) + bend[1] * moved_b)
+    inside = ca.logic_and(z > -1, z < 1)
+    stretch, growth = _phi(ca.fmin(ca.fmax(z, -1), 1))
+    S, S_slope = H * stretch, H * ca.if_else(inside, growth, 0) * z_slope
+    held, v1, free = _velocity(mass, here, v.value, S, vb, POLISH)
+    found = mass.slopes(middle.value, v1, u.value, p.value)
+    a, a_v = found[0], found[2]
+    steep = ca.if_else(held, 1, 1 - S * a_v)
+    moved = (v.slope + S * _along(found[1:], sides) + a * S_slope) / steep
+    moved = ca.if_else(held, 0, 1) * moved
+    scale = ca.fabs(v.value) + ca.fabs(free) + mass.creep
+    gap = ca.if_else(held, 0, ca.fabs(v1 - v.value - S * a) / scale)
+    new = Tangent(x.value + H / 2 * (v.value + v1), x.slope + H / 2 * (v.slope + moved))
+    return new, Tangent(v1, moved), gap
+
+
+def _along(slopes: Sequence[Any], sides: Sequence[ca.SX]) -> ca.SX:
+    """a_x dx + a_u du + a_p dp, where `slopes` are those by x, v, u, p."""
+    by_x, _, by_u, by_p = slopes
+    return sum((ca.mtimes(s, d) for s, d in zip((by_x, by_u, by_p), sides, strict=True)), ca.SX(0))
+
+
+def _phi(z: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """phi(z) = (e^z - 1)/z and its derivative, by their series near 0."""
+    small = ca.fabs(z) < 1e-2
+    safe = ca.if_else(small, 1, z)
+    phi = ca.if_else(
+        small, 1 + z / 2 * (1 + z / 3 * (1 + z / 4 * (1 + z / 5))), ca.expm1(safe) / safe
+    )
+    growth = ca.if_else(
+        small,
+        0.5 + z * (1 / 3 + z * (1 / 8 + z * (1 / 30 + z / 144))),
+        (ca.exp(safe) - phi) / safe,
+    )
+    return phi, growth
+
+
+def _velocity(
+    mass: Mass, here: Sequence[ca.SX], v: ca.SX, S: ca.SX, guess: ca.SX, evaluations: int
+) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Whether friction holds the mass; w = v + S a(w), between 0 and v + S a(0); and the latter.
+
+    Newton's method inside a bracket. A step that leaves the bracket towards rest goes on from
+    there, where friction is steep and bends away from the step; only then the bracket is halved.
+    """
+    x, u, p = here
+    free = v + S * mass.a(x, 0, u, p)
+    side = ca.if_else(free < 0, -1, 1)
+    rest = mass.creep * side
+    a, a_v = mass.newton(x, rest, u, p)
+    gap = rest - v - S * a
+    held = side * gap >= 0
+    off_rest = rest - gap / (1 - S * a_v)
+    low, high = rest, side * ca.fmax(side * free, mass.creep)
+    w = _between(guess, low, high, side)
+    for k in range(evaluations):
+        a, a_v = mass.newton(x, w, u, p)
+        gap = w - v - S * a
+        short = side * gap < 0
+        low, high = ca.if_else(short, w, low), ca.if_else(short, high, w)
+        step = w - gap / (1 - S * a_v)
+        middle = (low + high) / 2
+        other = middle if k else ca.if_else(_inside(off_rest, low, high, side), off_rest, middle)
+        w = ca.if_else(_inside(step, low, high, side), step, other)
+    return held, ca.if_else(held, 0, w), free
+
+
+def _between(w: ca.SX, low: ca.SX, high: ca.SX, side: ca.SX) -> ca.SX:
+    return side * ca.fmin(ca.fmax(side * w, side * low), side * high)
+
+
+def _inside(w: ca.SX, low: ca.SX, high: ca.SX, side: ca.SX) -> ca.SX:
+    return ca.logic_and(side * w >= side * low, side * w <= side * high)
+
+
+Feedback = Callable[[Sequence[Tangent], ca.SX, ca.SX], tuple[list[Tangent], list[Tangent]]]
+"""(x, v, controller's states; row of a sample; its length [s]) -> (inputs, controller's states)."""
+
+
+def given_inputs(count: int) -> Feedback:
+    """No controller: the inputs are what the rows bring."""
+
+    def feedback(
+        state: Sequence[Tangent], row: ca.SX, length: ca.SX
+    ) -> tuple[list[Tangent], list[Tangent]]:
+        still = ca.SX(1, state[0].slope.shape[1])
+        return [Tangent(row[i], still) for i in range(count)], []
+
+    return feedback
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A motion at n + 1 instants, the inputs in the n samples between, and all their slopes.
+
+    Attributes:
+        states: x, v and the states of the controller, shape (n + 1, states).
+        slopes: by the parameters and the unknowns of the start, shape (n + 1, states, unknowns).
+        inputs: of the mass, shape (n, inputs).
+        input_slopes: shape (n, inputs, unknowns).
+        gap: the largest gap of an implicit equation, over the velocities in it.
+    """
+
+    states: Array
+    slopes: Array
+    inputs: Array
+    input_slopes: Array
+    gap: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """A mass stepped from sample to sample, with the controller that acts at each of them.
+
+    Attributes:
+        sample: (state, row, p) -> (state after the sample, inputs in it). The state holds x, v,
+            those of the controller, the largest gap so far, and the slopes of all but the gap; the
+            row the length of the sample [s] and what the feedback takes.
+        inputs, states, slopes: their numbers; without slopes none are carried.
+    """
+
+    sample: ca.Function
+    inputs: int
+    states: int
+    slopes: int
+
+    @classmethod
+    def of(
+        cls, mass: Mass, feedback: Feedback, *, row: int, memory: int = 0, starts: int = 2,
+        substeps: int = 2, sensitivities: bool = True,
+    ) -> "Chain":  # fmt: skip
+        """The chain of `mass`.
+
+        Args:
+            feedback: what acts on it.
+            row: how many numbers a sample brings besides its length.
+            memory: states of the controller.
+            starts: unknowns of the start.
+            substeps: steps a sample.
+            sensitivities: whether slopes are carried.
+        """
+        count, n = len(mass.parameters), 2 + memory
+        many = count + starts if sensitivities else 0
+        values, gap, slope = ca.SX.sym("s", n), ca.SX.sym("gap"), ca.SX.sym("S", n, many)
+        length, given, p = ca.SX.sym("length"), ca.SX.sym("row", row), ca.SX.sym("p", count)
+        by_p = ca.horzcat(ca.SX.eye(count), ca.SX(count, starts)) if many else ca.SX(count, 0)
+        before = [Tangent(values[i], slope[i, :]) for i in range(n)]
+        inputs, after = feedback(before, given, length)
+        u = _stacked(inputs, many)
+        x, v, most = before[0], before[1], gap
+        for _ in range(substeps):
+            x, v, left = advance(mass, (x, v, u), Tangent(p, by_p), length / substeps)
+            most = ca.fmax(most, left)
+        new = _stacked([x, v, *after], many)
+        arguments = [ca.vertcat(values, gap, ca.vec(slope)), ca.vertcat(length, given), p]
+        results = [ca.vertcat(new.value, most, ca.vec(new.slope))]
+        results.append(ca.vertcat(u.value, ca.vec(u.slope)))
+        made = ca.Function("sample", arguments, list(map(ca.densify, results)), {"cse": True})
+        return cls(made, len(inputs), n, many)
+
+    @cached_property
+    def _columns(self) -> Columns:
+        return Columns(self.sample, chained=True)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    def __call__(self, rows: Array, p: Array, start: Array, start_slopes: Array) -> Motion:
+        """The motion from `start`.
+
+        Args:
+            rows: length of each sample [s] and what the feedback takes, shape (n, 1 + row).
+            p: parameters.
+            start: states at the first instant, shape (states,).
+            start_slopes: theirs, shape (states, slopes).
+        """
+        n, k, many = self.states, self.inputs, self.slopes
+        first = np.concatenate([start, [0.0], start_slopes.ravel("F")])
+        same = (p.reshape(1, -1), np.zeros(len(rows), dtype=np.intp))
+        after, inputs = self._columns([rows, same], first, backend())
+        every = np.vstack([first, after])
+        return Motion(
+            states=every[:, :n],
+            slopes=every[:, n + 1 :].reshape(len(every), many, n).transpose(0, 2, 1),
+            inputs=inputs[:, :k],
+            input_slopes=inputs[:, k:].reshape(len(rows), many, k).transpose(0, 2, 1),
+            gap=float(every[-1, n]),
+        )
+
+
+def _stacked(parts: Sequence[Tangent], many: int) -> Tangent:
+    """Values and dense slopes below each other."""
+    slopes = ca.vertcat(*(part.slope for part in parts)) if many else ca.SX(len(parts), 0)
+    return Tangent(ca.vertcat(*(part.value for part in parts)), ca.densify(slopes))
+
+
+def backend() -> str:
+    """Compiled code wherever there is a compiler: never a question of elapsed time."""
+    return "vm" if find_compiler() is None else "compiled"
+
+
+def why_no_motion(motion: Motion) -> str:
+    """Why a motion is not to be used; "" where it is."""
+    finite = np.isfinite(motion.states).all(axis=1)
+    if not finite.all():
+        return f"the simulated motion is not finite from sample {int(np.argmin(finite))} on"
+    if not motion.gap < LOOSE:
+        return (
+            f"steps were not solved (gap {motion.gap:.1e} of the velocity): friction that feeds "
+            "power in, or that jumps or falls too steeply with speed for this sample time"
+        )
+    return ""

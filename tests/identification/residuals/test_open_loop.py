@@ -1,0 +1,205 @@
+import pickle
+from collections.abc import Callable
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from identification.residuals import stepper
+from identification.residuals.open_loop import sampled_motion, why_not_sampled
+from symfric import (
+    Coulomb,
+    Linear,
+    LuGre,
+    Stribeck,
+    Sum,
+    Viscous,
+    drive,
+    law_from_text,
+    parameters,
+    rabinowicz,
+    simulate,
+    with_values,
+)
+from symfric.foundation.compiler import find_compiler
+from symfric.foundation.parameters import Variable
+from symfric.model import Model
+
+STEP = 1e-3
+
+
+@pytest.fixture(autouse=True)
+def _no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Short runs are not worth a compiler, and have the same bits without it."""
+    monkeypatch.setattr(stepper, "find_compiler", lambda: None)
+
+
+def run(model: Model, force: np.ndarray, p: list[float], start: list[float], **how: object):
+    t = np.arange(force.size) * how.pop("step", STEP)  # type: ignore[operator]
+    motion = sampled_motion(model, t, force, np.array(p), np.array(start), **how)  # type: ignore[arg-type]
+    assert not isinstance(motion, str), motion
+    return motion
+
+
+def stick_slip() -> tuple[Model, np.ndarray, list[float]]:
+    """A drive that slides both ways, stops, is held and breaks away; two seconds."""
+    law = Sum((Stribeck(mu_s=3.0, mu_d=2.0, v_s=0.05, v_eps=1e-5), Viscous(1.0)))
+    free = ["m", "offset", "mu_s", "mu_d", "v_s", "sigma_2_2"]
+    names = [name for name in parameters(law) if name.startswith("sigma_2")]
+    free[-1] = names[-1]
+    model = drive(law, m=1.5, N=1.0, free=free)
+    t = np.arange(2001) * STEP
+    force = 5 * np.sin(2 * np.pi * t) + 2 * np.sin(2 * np.pi * 2.3 * t)
+    values = {"m": 1.5, "offset": -0.4, "mu_s": 3.0, "mu_d": 2.0, "v_s": 0.05, names[-1]: 1.0}
+    return model, force, [values[v.name] for v in model.p]
+
+
+def test_coulomb_and_viscous_friction_are_exact_at_any_step() -> None:
+    m, s, c, f = 2.0, 30.0, 4.0, 10.0
+    model = drive(Sum((Coulomb(c, v_eps=1e-9), Viscous(s))), m=m, N=1.0)
+    for step in (1e-3, 0.05):  # s step / m up to 0.75
+        motion = run(model, np.full(5, f), [], [0.0, 1.0], step=step, substeps=1)
+        end, rate = (f - c) / s, s / m
+        expected = end + (1 - end) * np.exp(-rate * step * np.arange(5))
+        np.testing.assert_allclose(motion.states[:, 1], expected, rtol=1e-13)
+
+
+def test_a_thrown_block_stops_where_the_closed_form_says() -> None:
+    model = drive(Coulomb(mu_d=4.0, v_eps=1e-9), m=2.0, N=1.0, free=["m", "mu_d"])
+    motion = run(model, np.zeros(2001), [2.0, 4.0], [0.0, 1.0])
+    x, v = motion.states[-1]
+    # x = m v^2 / (2 F): slopes by m, F, x0, v0
+    assert x == pytest.approx(2.0 / 8.0, rel=1e-6)
+    assert v == 0.0
+    np.testing.assert_allclose(motion.slopes[-1, 0], [0.125, -0.0625, 1.0, 0.5], rtol=2e-3)
+    assert not motion.slopes[-1, 1].any()
+
+
+@pytest.mark.parametrize("v_eps", [0.0, 1e-12, 1e-6, 1e-2])
+def test_a_loaded_block_is_held_at_any_stiffness(v_eps: float) -> None:
+    model = drive(Coulomb(mu_d=4.0, v_eps=v_eps), m=2.0, N=1.0)
+    motion = run(model, np.full(1000, 3.0), [], [0.0, 0.0])
+    assert motion.states[-1, 1] == pytest.approx(v_eps * np.arctanh(0.75), rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize("v_eps", [0.0, 1e-9, 1e-4])
+def test_a_loaded_block_breaks_away_at_any_stiffness(v_eps: float) -> None:
+    model = drive(Coulomb(mu_d=4.0, v_eps=v_eps), m=2.0, N=1.0)
+    force = np.where(np.arange(1001) < 500, 3.9, 5.0)
+    motion = run(model, force, [], [0.0, 0.0], hold="held")
+    assert abs(motion.states[500, 1]) < 4 * v_eps + 1e-12
+    assert motion.states[-1, 1] == pytest.approx(0.5 * 0.5, rel=5e-3)
+
+
+def test_slopes_are_those_of_finite_differences_through_stick() -> None:
+    model, force, p = stick_slip()
+    start = [0.01, 0.2]
+    base = run(model, force, p, start)
+    still = np.abs(base.states[:, 1]) < 1e-4
+    assert still.sum() > 100 and np.abs(np.diff(np.sign(base.states[~still, 1]))).sum() >= 4
+    at = np.array([*p, *start])
+    for i, value in enumerate(at):
+        h = 1e-7 * max(1.0, abs(value))
+        sides = [run(model, force, *_moved(at, i, d, len(p))).states for d in (h, -h)]
+        slope = (sides[0] - sides[1]) / (2 * h)
+        error = np.abs(slope - base.slopes[:, :, i]).max(axis=0)
+        assert (error <= 1e-5 * np.abs(base.slopes[:, :, i]).max(axis=0) + 1e-8).all()
+
+
+def _moved(at: np.ndarray, i: int, by: float, count: int) -> tuple[list[float], list[float]]:
+    moved = at.copy()
+    moved[i] += by
+    return list(moved[:count]), list(moved[count:])
+
+
+def test_agrees_with_the_adaptive_simulation() -> None:
+    _, force, _ = stick_slip()
+    law = Sum((Stribeck(mu_s=3.0, mu_d=2.0, v_s=0.05, v_eps=1e-5), Viscous(1.0)))
+    model = drive(law, m=1.5, N=1.0, offset=-0.4)
+    t = np.arange(force.size) * STEP
+    exact = simulate(model, 2.0, u={"force": Linear(t, force)}, rtol=1e-9, t_eval=t)
+    motion = run(model, force, [], [0.0, 0.0])
+    assert np.abs(motion.states[:, 0] - exact["x"]).max() < 5e-4 * np.ptp(exact["x"])
+
+
+def test_the_step_is_of_second_order_where_the_mass_slides() -> None:
+    model = drive(Stribeck(mu_s=3.0, mu_d=1.0, v_s=0.5, v_eps=1e-6, sigma_2=4.0), m=1.0, N=1.0)
+
+    def end(n: int) -> np.ndarray:
+        return run(model, np.full(n + 1, 6.0), [], [0.0, 0.4], step=0.4 / n, substeps=1).states[-1]
+
+    fine = end(4096)
+    errors = np.array([np.abs(end(n) - fine) for n in (32, 64, 128)])
+    np.testing.assert_allclose(errors[:-1] / errors[1:], 4.0, rtol=0.15)
+
+
+def test_virtual_machine_and_compiler_give_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    model, force, p = stick_slip()
+    again = run(model, force[:300], p, [0.0, 0.0])
+    monkeypatch.setattr(stepper, "find_compiler", find_compiler)
+    compiled = run(model, force[:300], p, [0.0, 0.0])
+    np.testing.assert_array_equal(compiled.states, again.states)
+    np.testing.assert_array_equal(compiled.slopes, again.slopes)
+
+
+def test_a_chain_survives_pickling() -> None:
+    model, force, p = stick_slip()
+    run(model, force[:5], p, [0.0, 0.0])
+    (chain,) = (value for key, value in model.memory.items() if "sampled" in key)
+    again = pickle.loads(pickle.dumps(chain))
+    rows, slopes = np.array([[STEP, 4.0]]), np.zeros((2, len(p) + 2))
+    one, two = (c(rows, np.array(p), np.zeros(2), slopes).states for c in (chain, again))
+    np.testing.assert_array_equal(one, two)
+
+
+def test_a_pendulum_is_one_mass_too() -> None:
+    x, v = Variable("phi", "rad"), Variable("omega", "rad/s")
+    wave = Variable("w", "1/s^2")
+    ode = ca.vertcat(v.symbol, -wave.symbol * ca.sin(x.symbol))
+    model = Model("pendulum", x=(x, v), p=(wave,), ode=ode)
+    t = np.linspace(0.0, 3.0, 3001)
+    motion = sampled_motion(model, t, np.zeros((t.size, 0)), np.array([9.0]), np.array([1.0, 0.0]))
+    assert not isinstance(motion, str)
+    exact = simulate(model, 3.0, x0={"phi": 1.0}, p={"w": 9.0}, t_eval=t, rtol=1e-10)
+    assert np.abs(motion.states[:, 0] - exact["phi"]).max() < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("model", "why"),
+    [
+        (lambda: drive(LuGre()), "friction law without states"),
+        (lambda: rabinowicz(Coulomb()), "friction at the velocity v alone"),
+        (lambda: replace(drive(Coulomb()), name="other", ode=ca.SX.zeros(2)), "x' = 0"),
+    ],
+)
+def test_other_models_are_refused(model: Callable[[], Model], why: str) -> None:
+    assert why in why_not_sampled(model())
+    with pytest.raises(ValueError, match="sampled motion of"):
+        sampled_motion(model(), np.arange(3.0), np.zeros(3), np.zeros(0), np.zeros(2))
+
+
+def test_a_motion_that_runs_away_is_said() -> None:
+    model = drive(Viscous(1.0), m=1.0, free=["sigma_2"])
+    t = np.arange(400.0)
+    said = sampled_motion(model, t, np.ones(400), np.array([-50.0]), np.array([0.0, 1.0]))
+    assert isinstance(said, str)
+
+
+@pytest.mark.parametrize("text", ["stribeck", "specker", "asymmetric(coulomb+viscous)"])
+def test_static_laws_are_solved_in_the_given_number_of_evaluations(text: str) -> None:
+    law = law_from_text(text)
+    widths = {n: 1e-6 for n, p in parameters(law).items() if p.role == "width" and p.unit == "m/s"}
+    model = drive(with_values(law, widths), m=1.0, N=1.0)
+    t = np.arange(2001) * STEP
+    motion = run(model, 0.6 * np.sin(6 * t) * t, [], [0.0, 0.0])
+    assert motion.gap < 1e-6
+
+
+def test_friction_that_jumps_down_with_speed_is_not_stepped_in_silence() -> None:
+    model = drive(law_from_text("karnopp"), m=1.0, N=1.0)
+    t = np.arange(2001) * STEP
+    force = 0.6 * np.sin(6 * t) * t
+    said = sampled_motion(model, t, force, np.zeros(0), np.zeros(2))
+    assert isinstance(said, str)
+    assert "steps were not solved" in said
