@@ -1,0 +1,207 @@
+"""Start values of a motion from measured signals.
+
+A measured state starts at a cubic through the samples around, and so does one that is the rate of a
+measured state. Whether a contact slides steadily at the start no signal tells: the bristle of a law
+with one is unknown, the many of others hold what the model says where the contact is fast, and are
+unstrained where it rests. Everything else starts where the model says.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import comb
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.model import Model
+
+Array = NDArray[np.float64]
+
+ORDERS = 6
+"""Highest differences that look for the noise of a signal."""
+LEAST, MOST = 4, 512
+"""Samples on either side of a start that its cubic goes through."""
+MISFIT = 3.0
+"""Standard deviations by which the misfit of a cubic may exceed the noise."""
+REST = 0.02
+"""Sliding velocity over its usual size in the record below which a contact counts as resting."""
+
+
+def noise_of(y: Array) -> float:
+    """Standard deviation of white noise on a smooth signal, at most: that of its high differences.
+
+    White noise of variance s^2 has k-th differences of variance binomial(2k, k) s^2.
+    """
+    found, d = [float(np.std(y))], y
+    for k in range(1, min(ORDERS, y.size - 2) + 1):
+        d = np.diff(d)
+        found.append(float(np.sqrt(np.mean(d * d) / comb(2 * k, k))))
+    return min(found)
+
+
+@final
+@dataclass(frozen=True)
+class Local:
+    """Value and rate of a signal at one time, with standard errors for white noise."""
+
+    value: float
+    rate: float
+    value_error: float
+    rate_error: float
+
+
+def local(t: Array, y: Array, k: int, noise: float) -> Local:
+    """The signal at sample k: a cubic through as many samples around as noise alone explains."""
+    found, reach = _cubic(t, y, k, LEAST)[0], LEAST
+    while reach < min(MOST, y.size):
+        reach *= 2
+        wider, misfit, free = _cubic(t, y, k, reach)
+        if free > 0 and misfit > noise**2 * (1 + MISFIT * np.sqrt(2 / free)):
+            break
+        found = wider
+    return Local(*found[:2], *(noise * found[2:]))
+
+
+def _cubic(t: Array, y: Array, k: int, reach: int) -> tuple[Array, float, int]:
+    """Value, rate and their errors over the noise; mean square misfit and degrees of freedom."""
+    rows = slice(max(0, k - reach), min(t.size, k + reach + 1))
+    s = t[rows] - t[k]
+    scale = max(float(np.abs(s).max()), 1e-300)
+    A = np.vander(s / scale, min(4, s.size), increasing=True)
+    q, r = np.linalg.qr(A)
+    c = np.linalg.solve(r, q.T @ y[rows])
+    errors = np.linalg.norm(np.linalg.inv(r), axis=1)
+    free = s.size - c.size
+    left = y[rows] - A @ c
+    found = np.array([c[0], c[1] / scale, errors[0], errors[1] / scale])
+    return found, float(left @ left) / max(free, 1), free
+
+
+def rates(model: Model) -> dict[str, str]:
+    """State -> the state whose rate it is, where the equations say just that."""
+    if model.ode is None:
+        return {}
+    states = {v.symbol.element_hash(): v.name for v in model.x}
+    found = dict[str, str]()
+    for v, row in zip(model.x, ca.vertsplit(model.ode), strict=True):
+        if row.nnz() and row.is_symbolic() and row.element_hash() in states:
+            found[states[row.element_hash()]] = v.name
+    return found
+
+
+@final
+@dataclass(frozen=True)
+class Begin:
+    """The start value of one state.
+
+    Attributes:
+        value: number, from which an estimate starts; None: as the model says.
+        scale: its typical magnitude; 0: the nominal value.
+        estimated: whether it is an unknown.
+    """
+
+    value: float | None
+    scale: float = 0.0
+    estimated: bool = True
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Sensed:
+    """What the signals of one record tell of the states of a model.
+
+    Attributes:
+        t: times [s], shape (n,).
+        measured: state -> its samples, shape (n,).
+        noise: state -> standard deviation of the noise on them.
+        told: state -> the measured state that tells it, and whether it is the rate of that.
+        slips: contact with bristles -> its sliding velocity as a Function of the told states, and
+            the names of the bristles.
+    """
+
+    t: Array
+    measured: Mapping[str, Array]
+    noise: Mapping[str, float]
+    told: Mapping[str, tuple[str, bool]]
+    slips: Mapping[str, tuple[ca.Function, tuple[str, ...]]]
+
+    @classmethod
+    def of(cls, model: Model, t: Array, measured: Mapping[str, Array]) -> "Sensed":
+        """Those of `model`, with its contacts."""
+        told = {r: (s, True) for r, s in rates(model).items() if s in measured}
+        told |= {name: (name, False) for name in measured}
+        slips = dict(_slips(model, list(told)))
+        noise = {name: noise_of(y) for name, y in measured.items()}
+        return cls(t, measured, noise, told, slips)
+
+    def at(self, k: int) -> dict[str, Begin]:
+        """Start values at sample k; of bristles where they are unknown or unstrained."""
+        here = {
+            name: local(self.t, self.measured[source], k, self.noise[source])
+            for name, (source, _) in self.told.items()
+        }
+        values, errors, scales = list[float](), list[float](), list[float]()
+        for name, (source, is_rate) in self.told.items():
+            y, one = self.measured[source], here[name]
+            values.append(one.rate if is_rate else one.value)
+            errors.append(one.rate_error if is_rate else one.value_error)
+            scales.append(self._pace(y) if is_rate else float(np.std(y)))
+        rows = zip(self.told, values, scales, strict=True)
+        found = {name: Begin(value, scale) for name, value, scale in rows}
+        for slip, names in self.slips.values():
+            value, slope = (np.ravel(np.array(a)) for a in slip(np.array(values)))
+            usual = float(np.linalg.norm(slope * scales))
+            error = float(np.linalg.norm(slope * errors))
+            rests = abs(value[0]) <= max(REST * usual, MISFIT * error)
+            if len(names) == 1:  # before a record nobody knows which way it went
+                found[names[0]] = Begin(0.0 if rests or k == 0 else None)
+            elif rests:
+                found |= dict.fromkeys(names, Begin(0.0, estimated=False))
+        return found
+
+    @property
+    def speed(self) -> Array:
+        """How fast the measured states change, each over its usual pace, shape (n,)."""
+        found = np.zeros(self.t.size)
+        for y in self.measured.values():
+            pace = self._pace(y)
+            if pace > 0:
+                found += np.abs(_smoothed_rate(self.t, y)) / pace
+        return found
+
+    def _pace(self, y: Array) -> float:
+        """Usual rate of a signal: root mean square over fiftieths of the record."""
+        every = max(1, y.size // 50)
+        return float(np.sqrt(np.mean((np.diff(y[::every]) / np.diff(self.t[::every])) ** 2)))
+
+
+def _slips(
+    model: Model, told: list[str]
+) -> Iterator[tuple[str, tuple[ca.Function, tuple[str, ...]]]]:
+    """Sliding velocities that the told states give, of contacts whose laws have bristles.
+
+    Bristles are the states that turn round with the velocity; others, such as the age of a
+    contact, start where the model says.
+    """
+    others = [v for v in model.x if v.name not in told]
+    symbols = {v.name: v.symbol for v in model.x}
+    x = ca.vertcat(*(symbols[name] for name in told))
+    rest = ca.vertcat(*(v.symbol for v in others), model.vector("z"), model.vector("u"))
+    for contact in model.contacts:
+        pairs = zip(contact.law.states, contact.states, strict=True)
+        names = tuple(v.name for state, v in pairs if not state.even)
+        if not names or ca.depends_on(contact.slip, rest):
+            continue
+        slip = ca.substitute(contact.slip, model.vector("p"), ca.DM(model.values("p")))
+        slope = ca.densify(ca.jacobian(slip, x))
+        yield contact.name, (ca.Function("slip", [x], [slip, slope]), names)
+
+
+def _smoothed_rate(t: Array, y: Array) -> Array:
+    """Rate of a signal over fiftieths of the record."""
+    k = max(1, t.size // 100)
+    a, b = np.arange(t.size) - k, np.arange(t.size) + k
+    a, b = np.maximum(a, 0), np.minimum(b, t.size - 1)
+    return (y[b] - y[a]) / (t[b] - t[a])

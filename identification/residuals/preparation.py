@@ -1,0 +1,262 @@
+"""From a model and data to the simulations that are compared: names, windows, start values."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.residuals.delays import DEAD_TIME, delayed
+from identification.residuals.evaluation import Channel
+from identification.residuals.initial import Begin, Sensed, noise_of
+from identification.residuals.portable import plain
+from identification.residuals.shots import Drives, Shot, Shots
+from identification.residuals.windows import cut
+from identification.unknowns.unknown import Unknown
+from symfric.foundation import checks
+from symfric.foundation.compiler import find_compiler
+from symfric.foundation.parameters import Variable
+from symfric.model import Model
+
+if TYPE_CHECKING:
+    from identification.data.dataset import Dataset
+    from identification.data.record import Record
+    from identification.residuals.shooting import Shooting
+
+Array = NDArray[np.float64]
+RTOLS, FINEST = (1e-6, 1e-7, 1e-8), 1e-9
+"""Tolerances to choose from, and that of what they are compared with."""
+BIAS = 0.1
+"""Standard errors by which the simulation may move an estimate."""
+NOISELESS = 1e-9
+"""Noise over the size of a signal below which it has none."""
+
+
+@final
+class Preparation:
+    """One set of residuals being made of a kind, a model and data."""
+
+    def __init__(
+        self, kind: "Shooting", model: Model, data: "Dataset", start: Mapping[str, float]
+    ) -> None:
+        self.kind, self.model = kind, model
+        self.values = {v.name: float(start.get(v.name, v.start)) for v in model.p}
+        self.records = list(data)
+        self.states = [v.name for v in model.x]
+        self.signals = self._signals()
+        self.inputs = self._inputs()
+        self._check_x0()
+        self.own = list[Unknown]()
+        self.first = len(model.p)
+
+    def shots(self) -> Shots:
+        """The residuals."""
+        estimated = self.kind.estimates_dead_time
+        if estimated:
+            low, high = self.kind.dead_time  # type: ignore[misc]
+            unknown = Unknown(
+                DEAD_TIME, "s", (low + high) / 2, low, high, high - low, nuisance=True
+            )
+            self.own.append(unknown)
+        pieces, channels, rows = list[Shot](), list[Channel](), 0
+        for number, record in enumerate(self.records):
+            found = list(self._cut(number, record, rows))
+            pieces += found
+            channels += self._channels(number, record, found, rows)
+            rows = channels[-1].rows.stop
+        model = plain(self.model, self.signals)
+        names = tuple(v.name for v in model.p)
+        if estimated:
+            sampled = [n for n, given in self.inputs.items() if isinstance(given, str)]
+            if not sampled:
+                raise ValueError(
+                    "Shooting: dead_time: expected an input that is a channel, got none"
+                )
+            model = delayed(model, sampled)
+        tau = self.kind.dead_time if not estimated else None
+        backend = "compiled" if find_compiler() else "vm"
+        shots = Shots(
+            model, names, tuple(self.own), tuple(channels), tuple(pieces), tau,  # type: ignore
+            self.kind.rtol or RTOLS[-1], backend,
+        )  # fmt: skip
+        if self.kind.rtol is None:
+            shots = replace(shots, rtol=self._rtol(shots))
+        return shots
+
+    # ---- what is compared, and what drives
+
+    def _signals(self) -> dict[str, str]:
+        """Signal of the model -> channel, of all signals that some record has."""
+        where, given = "Shooting: signals", self.kind.signals
+        driven = {v.name for v in self.model.u}
+        known = [n for n in self.model.signals if n not in driven]
+        if given is None:
+            found = {n: n for n in known if any(n in record for record in self.records)}
+        elif isinstance(given, Mapping):
+            found = {n: str(c) for n, c in checks.named(where, given, known).items()}
+        else:
+            found = {n: n for n in checks.names(where, given, known)}
+        missing = [c for c in found.values() if not any(c in r for r in self.records)]
+        here = sorted({name for record in self.records for name in record.signals})
+        if missing or not found:
+            lacking = ", ".join(missing) or ", ".join(known)
+            raise ValueError(
+                f"{where}: expected channels for {lacking}, got {', '.join(here)}; name them as "
+                "signals={'signal of the model': 'channel'}"
+            )
+        for n, channel in found.items():
+            self._same_unit(where, n, self.model.signals[n], channel)
+        return found
+
+    def _same_unit(self, where: str, name: str, unit: str, channel: str) -> None:
+        for record in self.records:
+            if channel not in record:
+                continue
+            there = record.unit(channel)
+            if unit and there and unit != there:
+                raise ValueError(
+                    f"{where}: expected {name} in {unit}, got {channel} of '{record.name}' in "
+                    f"{there}; say units= when the data are read"
+                )
+
+    def _inputs(self) -> dict[str, Any]:
+        """Input of the model -> channel, or what `simulate` takes."""
+        where = "Shooting: inputs"
+        units = {v.name: v.unit for v in self.model.u}
+        given = checks.named(where, self.kind.inputs, units)
+        found = {name: given.get(name, name) for name in units}
+        for name, source in found.items():
+            if not isinstance(source, str):
+                continue
+            lacking = [record.name for record in self.records if source not in record]
+            if lacking:
+                raise ValueError(
+                    f"{where}: expected a channel '{source}' for the input {name}, got none in "
+                    f"'{lacking[0]}'; name it as inputs={{'{name}': 'channel'}}, or give a number"
+                )
+            self._same_unit(where, name, units[name], source)
+        return found
+
+    def _check_x0(self) -> None:
+        if isinstance(self.kind.x0, str):
+            return
+        where = "Shooting: x0"
+        for name, value in checks.named(where, self.kind.x0, self.states).items():
+            if isinstance(value, str):
+                checks.choice(f"{where}: {name}", value, ("estimate",))
+            elif np.ndim(value):
+                numbers = checks.array(f"{where}: {name}", value)
+                if numbers.size != len(self.records):
+                    raise ValueError(
+                        f"{where}: {name}: expected a number for each of the {len(self.records)} "
+                        f"records, got {numbers.size}"
+                    )
+            else:
+                checks.number(f"{where}: {name}", value)
+
+    # ---- pieces of records
+
+    def _cut(self, number: int, record: "Record", row: int) -> Iterator[Shot]:
+        """The windows of one record; residuals begin at `row`, a signal after the other."""
+        t = record.time
+        measured = {s: record[c] for s, c in self.signals.items() if c in record}
+        if not measured:
+            raise ValueError(
+                f"Shooting: expected one of {', '.join(self.signals.values())} in "
+                f"'{record.name}', got {', '.join(record.signals)}"
+            )
+        sensed = Sensed.of(self.model, t, {s: y for s, y in measured.items() if s in self.states})
+        windows = cut(t, self.kind.seconds, sensed.speed if sensed.slips else None)
+        every = self.kind.every
+        looks = [np.arange(w.start, w.stop, every) for w in windows]
+        total = sum(look.size for look in looks)
+        done = 0
+        drives = Drives(
+            t,
+            {n: record[c] for n, c in self.inputs.items() if isinstance(c, str)},
+            {n: given for n, given in self.inputs.items() if not isinstance(given, str)},
+            self.kind.interpolation == "hold",
+        )
+        for w, look in enumerate(looks):
+            places = {
+                s: slice(row + k * total + done, row + k * total + done + look.size)
+                for k, s in enumerate(measured)
+            }
+            label = f"[{number}]" if len(windows) == 1 else f"[{number},{w}]"
+            held, free = self._start(number, sensed, int(look[0]), label)
+            last = windows[w].stop - 1
+            yield Shot(
+                record.name, t[look], float(t[last]), {s: y[look] for s, y in measured.items()},
+                places, drives, held, free,
+            )  # fmt: skip
+            done += look.size
+
+    def _start(
+        self, number: int, sensed: Sensed, k: int, label: str
+    ) -> tuple[dict[str, float], dict[str, int]]:
+        """Start values that are held, and columns of those that are estimated."""
+        given = self.kind.x0
+        if given == "given":
+            return {}, {}
+        begin = sensed.at(k)
+        held, free = dict[str, float](), dict[str, int]()
+        for v in self.model.x:
+            wish = None if isinstance(given, str) else given.get(v.name)
+            here = begin.get(v.name, None if wish is None else Begin(None))
+            if wish is not None and not isinstance(wish, str):
+                held[v.name] = float(np.ravel(wish)[number if np.ndim(wish) else 0])
+            elif here is not None and not here.estimated and wish is None:
+                held[v.name] = here.value or 0.0
+            elif here is not None:
+                free[v.name] = self.first + len(self.own)
+                self.own.append(self._unknown(v, here, label, begin))
+        return held, free
+
+    def _unknown(self, v: Variable, here: Begin, label: str, begin: Mapping[str, Begin]) -> Unknown:
+        """The start value of a state; without data it begins as the model says."""
+        value = here.value
+        if value is None:
+            known = {n: b.value for n, b in begin.items() if b.value is not None}
+            starts = self.model.initial_state(known, self.values)
+            value = float(starts[self.states.index(v.name)])
+        scale = here.scale if here.scale > 0 else v.nominal
+        return Unknown(f"x0.{v.name}{label}", v.unit, value, scale=scale, nuisance=True)
+
+    def _channels(
+        self, number: int, record: "Record", pieces: Sequence[Shot], row: int
+    ) -> Iterator[Channel]:
+        t = np.concatenate([piece.t for piece in pieces])
+        breaks = tuple(np.cumsum([piece.t.size for piece in pieces])[:-1].tolist())
+        inputs = {n: np.interp(t, record.time, record[c])
+                  for n, c in self.inputs.items() if isinstance(c, str)}  # fmt: skip
+        for s in pieces[0].measured:
+            y = np.concatenate([piece.measured[s] for piece in pieces])
+            yield Channel(
+                number, s, self.model.signals[s], slice(row, row + t.size), t, y, inputs, breaks
+            )
+            row += t.size
+
+    # ---- how exactly
+
+    def _rtol(self, shots: Shots) -> float:
+        """The loosest tolerance whose error biases no estimate by a tenth of its standard error.
+
+        An error e of the simulation moves estimates by at most |e / noise| standard errors,
+        however many samples there are. It is looked at for the start values.
+        """
+        values = np.array([*self.values.values(), *(u.start for u in self.own)])
+        fine = replace(shots, rtol=FINEST).predicted(values)
+        if isinstance(fine, str):
+            return RTOLS[-1]
+        noise = np.empty(fine.size)
+        for channel in shots.channels:
+            size = float(np.abs(channel.measured).max()) or np.inf
+            noise[channel.rows] = max(noise_of(channel.measured), NOISELESS * size)
+        for rtol in RTOLS[:-1]:
+            found = replace(shots, rtol=rtol).predicted(values)
+            if isinstance(found, str):
+                break
+            if np.linalg.norm((found - fine) / noise) <= BIAS:
+                return rtol
+        return RTOLS[-1]

@@ -1,0 +1,128 @@
+"""Simulated motions compared with measured ones, over whole records or windows of them.
+
+    r_s(t_i) = y_s(t_i; p, x0, tau) - measured_s(t_i),    x' = f(x, u(t - tau), p),  x(t_0) = x0
+
+with the derivatives of the steps that the simulation took by parameters p, start values x0 of every
+record and window, and the dead time tau of the inputs. It takes any model: laws with states,
+several bodies, friction from reactions, laws by modes.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, final
+
+from identification.residuals.preparation import Preparation
+from identification.residuals.shots import Shots
+from symfric.foundation import checks
+
+if TYPE_CHECKING:
+    from identification.data.dataset import Dataset
+    from identification.unknowns.subject import Subject
+
+INTERPOLATIONS = ("linear", "hold")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Shooting:
+    """Simulate the motion and compare named signals.
+
+    Attributes:
+        signals: of the model (states, outputs) that are compared: names, or signal -> channel of
+            the data; None: all that the data have. A record may lack some of them.
+        windows: None: each record is simulated from its start; a length [s]: it is cut into windows
+            of about that length, each with its own start values, so that motions that part from the
+            measured ones do not drift away; "choose": the length that predicts best on the data at
+            hand (`windows.choose`).
+        x0: "estimate": start values of states that are measured, or are rates of measured ones, are
+            unknowns of their own, "x0.v[2]" of record 2, "x0.v[2,3]" of its window 3, and so is the
+            bristle of a law with one; the many of others start in steady sliding or, where the
+            contact rests, unstrained; other states as the model says. "given": all as the model
+            says. Or state -> number, numbers (one a record) or "estimate"; others as "estimate".
+        inputs: input of the model -> channel, or an input as `simulate` takes it (a number,
+            samples, a function of time); by default the channel of the same name.
+        interpolation: of sampled inputs: "linear" for a measured one, "hold" for one that a
+            controller holds from each sample to the next.
+        dead_time: the motion feels sampled inputs this much later [s]; (low, high): estimated
+            between these bounds, as "dead_time". Needs linear inputs; a held input is about a
+            linear one that comes half a sample later.
+        every: compare every this many samples; inputs are sampled in full.
+        rtol: of the simulation; None: the loosest of 1e-6, 1e-7, 1e-8 whose error moves no estimate
+            by more than a tenth of its standard error.
+
+    Raises:
+        ValueError: bad input.
+
+    Limits: over a long record the motion of a wrong start may part from the measured one for good
+    (chaos, a contact that sticks in one and slides in the other): take windows, or many starts.
+    Dead time is common to all inputs and records.
+    """
+
+    signals: Sequence[str] | Mapping[str, str] | None = None
+    windows: float | str | None = None
+    x0: str | Mapping[str, Any] = "estimate"
+    inputs: Mapping[str, Any] | None = None
+    interpolation: str = "linear"
+    dead_time: float | tuple[float, float] = 0.0
+    every: int = 1
+    rtol: float | None = None
+
+    def __post_init__(self) -> None:
+        where = "Shooting"
+        windows = self.windows
+        if isinstance(windows, str):
+            checks.choice(f"{where}: windows", windows, ("choose",))
+        elif windows is not None:
+            seconds = checks.number(f"{where}: windows", windows, unit="s", above=0.0)
+            object.__setattr__(self, "windows", seconds)
+        if isinstance(self.x0, str):
+            checks.choice(f"{where}: x0", self.x0, ("estimate", "given"))
+        else:
+            object.__setattr__(self, "x0", checks.named(f"{where}: x0", self.x0))
+        checks.choice(f"{where}: interpolation", self.interpolation, INTERPOLATIONS)
+        object.__setattr__(self, "every", checks.count(f"{where}: every", self.every))
+        if self.rtol is not None:
+            checks.number(f"{where}: rtol", self.rtol, above=0.0, upper=0.1)
+        self._check_dead_time()
+
+    def _check_dead_time(self) -> None:
+        where, given = "Shooting: dead_time", self.dead_time
+        bounds = given if isinstance(given, tuple) else (given,)
+        if len(bounds) > 2:
+            raise checks.refused(where, "seconds, or (low, high) to estimate it between", given)
+        numbers = tuple(checks.number(where, x, unit="s", lower=0.0) for x in bounds)
+        if len(numbers) == 2 and numbers[0] >= numbers[1]:
+            raise checks.refused(where, "(low, high) with low < high", given)
+        if len(numbers) == 2 and self.interpolation == "hold":
+            raise ValueError(
+                f"{where}: expected interpolation='linear' where it is estimated, got 'hold', "
+                "whose motion has no derivative by it; a held input is about a linear one that "
+                "comes half a sample later"
+            )
+        object.__setattr__(self, "dead_time", numbers if len(numbers) == 2 else numbers[0])
+
+    @property
+    def estimates_dead_time(self) -> bool:
+        """Whether the dead time is an unknown."""
+        return isinstance(self.dead_time, tuple)
+
+    @property
+    def seconds(self) -> float | None:
+        """Length of windows [s], once it is known; None: whole records.
+
+        Raises:
+            ValueError: it is still to be chosen.
+        """
+        if isinstance(self.windows, str):
+            raise ValueError(
+                "Shooting: windows: expected a length [s] by now, got 'choose'; see windows.choose"
+            )
+        return self.windows
+
+    def prepare(self, subject: "Subject", data: "Dataset", start: Mapping[str, float]) -> Shots:
+        """The residuals of `data`; simulations that choose the tolerance run at `start`.
+
+        Raises:
+            ValueError: names that model or data do not have, windows that are too short.
+        """
+        return Preparation(self, subject.model, data, start).shots()

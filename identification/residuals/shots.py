@@ -1,0 +1,193 @@
+"""Simulations of windows of records, and what they leave of the data."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.residuals.delays import DEAD_TIME, RATE, rate
+from identification.residuals.evaluation import Channel, Evaluation
+from identification.residuals.portable import packed, unpacked
+from identification.unknowns.unknown import Unknown
+from symfric.integrator import Hold, Input, Linear, Trajectory, simulate
+from symfric.model import Model
+
+Array = NDArray[np.float64]
+
+METHOD = "radau5"
+"""What `simulate` takes for derivatives; without them it would take another one."""
+LISTED = 6
+"""Values that a sentence about a failure shows."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Drives:
+    """Inputs of one record.
+
+    Attributes:
+        t: sample times [s], shape (n,).
+        sampled: input -> samples, shape (n,).
+        others: input -> what `simulate` takes.
+        held: samples are held until the next one; else linear between them.
+    """
+
+    t: Array
+    sampled: Mapping[str, Array]
+    others: Mapping[str, Input]
+    held: bool
+
+    def over(self, begin: float, end: float, tau: float, rates: bool) -> dict[str, Input]:
+        """Inputs from `begin` to `end` [s], `tau` [s] late, and their `rates`."""
+        first = max(0, int(np.searchsorted(self.t, begin - tau, "right")) - 2)
+        last = min(self.t.size, int(np.searchsorted(self.t, end - tau)) + 2)
+        if last - first < 2:  # a window that lies before the first sample, or behind the last one
+            first, last = (0, 2) if last < 2 else (self.t.size - 2, self.t.size)
+        late = self.t[first:last] + tau
+        found = dict(self.others)
+        for name, samples in self.sampled.items():
+            part = samples[first:last]
+            found[name] = Hold(late, part) if self.held else Linear(late, part)
+            if rates:
+                found[name + RATE] = rate(late, part)
+        return found
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """One simulation: a window of a record, or a whole one.
+
+    Attributes:
+        record: its name.
+        t: times that are compared [s], shape (m,); the simulation starts at the first.
+        end: last time that is simulated [s].
+        measured: signal -> values at `t`.
+        places: signal -> where its residuals stand among the rows.
+        drives: inputs of the record.
+        held: state -> start value that is known.
+        free: state -> column of its start value among the values.
+    """
+
+    record: str
+    t: Array
+    end: float
+    measured: Mapping[str, Array]
+    places: Mapping[str, slice]
+    drives: Drives
+    held: Mapping[str, float]
+    free: Mapping[str, int]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Shots:
+    """Residuals of simulated motions; see `Residuals`.
+
+    Attributes:
+        model: plain equations, with a parameter for the dead time where that is estimated.
+        parameters: free parameters of the user's model.
+        own: start values and dead time.
+        channels: what the rows are.
+        shots: the simulations.
+        dead_time: of the inputs [s]; None: it is the first of the own unknowns.
+        rtol, backend: as `simulate` takes them.
+    """
+
+    model: Model
+    parameters: tuple[str, ...]
+    own: tuple[Unknown, ...]
+    channels: tuple[Channel, ...]
+    shots: tuple[Shot, ...]
+    dead_time: float | None
+    rtol: float
+    backend: str
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = {item.name: getattr(self, item.name) for item in fields(self)}
+        return {**state, "model": packed(self.model)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for name, value in state.items():
+            object.__setattr__(self, name, unpacked(value) if name == "model" else value)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Free parameters of the model, then the own unknowns."""
+        return (*self.parameters, *(u.name for u in self.own))
+
+    @property
+    def rows(self) -> int:
+        """Number of residuals."""
+        return self.channels[-1].rows.stop
+
+    def at(self, values: Array) -> Evaluation | str:
+        """Residuals and derivatives; a sentence where a motion cannot be simulated."""
+        r, J = np.empty(self.rows), np.zeros((self.rows, len(self.names)))
+        columns = {name: i for i, name in enumerate(self.parameters)}
+        if self.dead_time is None:
+            columns[DEAD_TIME] = len(self.parameters)
+        for shot in self.shots:
+            own = columns | {f"x0.{state}": i for state, i in shot.free.items()}
+            try:
+                run = self._run(shot, values, tuple(own))
+                if isinstance(run, str):
+                    return self._failed(shot, values, run)
+                for s, y in shot.measured.items():
+                    place = shot.places[s]
+                    r[place] = run[s] - y
+                    for name, column in own.items():
+                        J[place, column] = run.sensitivities[name][s]
+            except ValueError as error:  # no consistent start, or a motion without derivative
+                return self._failed(shot, values, str(error))
+        if not (np.isfinite(r).all() and np.isfinite(J).all()):
+            return self._failed(None, values, "the motion or its derivatives are not finite")
+        return Evaluation(r, J)
+
+    def predicted(self, values: Array) -> Array | str:
+        """Simulated values alone, shape (rows,)."""
+        found = np.empty(self.rows)
+        for shot in self.shots:
+            try:
+                run = self._run(shot, values, ())
+            except ValueError as error:
+                run = str(error)
+            if isinstance(run, str):
+                return self._failed(shot, values, run)
+            for s, place in shot.places.items():
+                found[place] = run[s]
+        return found
+
+    def _run(self, shot: Shot, values: Array, names: tuple[str, ...]) -> Trajectory | str:
+        """The motion of one window; why there is none."""
+        estimated = self.dead_time is None
+        tau = float(values[len(self.parameters)]) if self.dead_time is None else self.dead_time
+        begin = float(shot.t[0])
+        run = simulate(
+            self.model,
+            shot.end,
+            t_start=begin,
+            x0={**shot.held, **{state: float(values[i]) for state, i in shot.free.items()}},
+            u=shot.drives.over(begin, shot.end, tau, estimated),
+            p={name: float(values[i]) for i, name in enumerate(self.parameters)},
+            rtol=self.rtol,
+            t_eval=shot.t,
+            method=METHOD,
+            backend=self.backend,
+            sensitivities=names,
+            throw=False,
+        )
+        if not run.status.ok:
+            return run.message
+        if run.t.size < shot.t.size:
+            return f"the motion ends at t = {run.span[1]:g} s; {run.message}"
+        return run
+
+    def _failed(self, shot: Shot | None, values: Array, why: str) -> str:
+        shown = zip(self.parameters[:LISTED], values, strict=False)
+        there = ", ".join(f"{name} = {x:.5g}" for name, x in shown)
+        more = ", ..." if len(self.parameters) > LISTED else ""
+        where = "" if shot is None else f"'{shot.record}' from t = {shot.t[0]:g} s "
+        return f"{where}with {there}{more}: {why}"

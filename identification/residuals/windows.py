@@ -1,0 +1,57 @@
+"""Where a record is cut, so that a simulation starts again from the data."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+FEWEST = 8
+"""Samples of a window: fewer do not tell its start values."""
+MARGIN = 0.25
+"""How far a cut may move, over the length of a window."""
+
+
+def cut(t: Array, length: float | None, speed: Array | None = None) -> tuple[slice, ...]:
+    """Samples of consecutive windows of about `length` [s]; None is one window.
+
+    Windows are of one length that divides the record. Where `speed` (n,) is given, each cut moves
+    to the fastest sample within a quarter of a window: bristles slide steadily there, and their
+    start follows from the velocity.
+
+    Raises:
+        ValueError: windows of fewer than eight samples.
+    """
+    n, span = t.size, float(t[-1] - t[0])
+    if length is None or length >= span:
+        return (slice(0, n),)
+    count = max(1, round(span / length))
+    ends = t[0] + span * np.arange(1, count) / count
+    cuts = np.searchsorted(t, ends)
+    if speed is not None:
+        reach = MARGIN * span / count
+        cuts = np.array([_fastest(t, speed, float(end), reach) for end in ends], dtype=np.intp)
+    edges = [0, *cuts.tolist(), n]
+    pieces = tuple(slice(a, b) for a, b in pairwise(edges))
+    shortest = min(piece.stop - piece.start for piece in pieces)
+    if shortest < FEWEST:
+        raise ValueError(
+            f"Shooting: windows: expected windows of at least {FEWEST} samples, got one of "
+            f"{shortest} with windows={length:g} s"
+        )
+    return pieces
+
+
+def _fastest(t: Array, speed: Array, middle: float, reach: float) -> int:
+    a, b = np.searchsorted(t, [middle - reach, middle + reach])
+    return int(a + np.argmax(np.abs(speed[a : max(b, a + 1)])))
+
+
+def ladder(shortest: float, longest: float) -> Iterator[float]:
+    """Lengths to try [s], each half the one before, from the longest down."""
+    length = longest
+    while length >= shortest:
+        yield length
+        length /= 2

@@ -1,0 +1,193 @@
+"""Simulated motions against measured ones: rows, names, exact derivatives, start values."""
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+from identification.data.dataset import Dataset
+from identification.residuals.evaluation import Evaluation
+from identification.residuals.shooting import Shooting
+from identification.residuals.shots import Shots
+from identification.unknowns.subject import subject
+from symfric import BrownMcPhee, LuGre, Model, simulate
+from symfric.foundation.parameters import Variable
+from symfric.integrator import Hold, Linear
+from symfric.scenes import Drive, Pendulum
+
+SLIDE = Drive(BrownMcPhee(mu_s=1.2, mu_d=1.0, v_t=0.05), m=2.0, N=1.0)
+FREE = ["m", "mu_d"]
+T = np.linspace(0.0, 1.0, 201)
+FORCE = 3 * np.sin(2 * np.pi * 1.3 * T) + 0.5
+
+
+def slide(seed: int = 0, noise: float = 1e-5, tau: float = 0.0, **x0: float) -> Any:
+    """A record of the sliding mass; its force acts `tau` late."""
+    run = simulate(
+        SLIDE.model(free=FREE), 1.0, t_eval=T, rtol=1e-10, x0={"x": 0.0, "v": 0.0, **x0},
+        u={"force": Linear(T + tau, FORCE)},
+    )  # fmt: skip
+    x = run["x"] + noise * np.random.default_rng(seed).standard_normal(T.size)
+    return Dataset.of(t=T, x=x, force=FORCE, units={"x": "m", "force": "N"}, name=f"r{seed}")
+
+
+def shots(kind: Shooting, data: Dataset, what: object = SLIDE) -> Shots:
+    made = subject(what, free=FREE, fixed="others")
+    return kind.prepare(made, data, {u.name: u.start for u in made.unknowns})
+
+
+def start(found: Shots, **parameters: float) -> Any:
+    given = {"m": 2.0, "mu_d": 1.0} | parameters
+    return np.array([*(given[n] for n in found.parameters), *(u.start for u in found.own)])
+
+
+def good(found: Evaluation | str) -> Evaluation:
+    assert isinstance(found, Evaluation)
+    return found
+
+
+def check_derivatives(found: Shots, values: Any, step: float = 1e-5, rel: float = 1e-5) -> None:
+    J = good(found.at(values)).J
+    for i, value in enumerate(values):
+        h = np.zeros(values.size)
+        h[i] = step * max(abs(value), 1e-2)
+        change = good(found.at(values + h)).r - good(found.at(values - h)).r
+        slope = change / (2 * h[i])
+        assert J[:, i] == pytest.approx(slope, abs=rel * np.abs(slope).max()), found.names[i]
+
+
+def test_at_the_truth_only_the_noise_is_left() -> None:
+    found = shots(Shooting(x0="given"), slide() + slide(1))
+    r = good(found.at(start(found))).r
+    assert found.names == ("m", "mu_d")
+    assert [c.record for c in found.channels] == [0, 1]
+    assert np.std(r) == pytest.approx(1e-5, rel=0.1)
+
+
+def test_derivatives_by_parameters_starts_and_dead_time() -> None:
+    kind = Shooting(windows=0.35, dead_time=(0.0, 0.02), rtol=1e-9)
+    found = shots(kind, slide(v=0.1))
+    assert found.names[2:] == ("dead_time", *(f"x0.{s}[0,{w}]" for w in range(3) for s in "xv"))
+    values = start(found, mu_d=1.1)
+    values[2] = 0.0033
+    check_derivatives(found, values)
+
+
+def test_dead_time_is_that_of_the_input() -> None:
+    late = shots(Shooting(x0="given", dead_time=0.012), slide(tau=0.012, noise=0.0))
+    assert np.abs(good(late.at(start(late))).r).max() < 1e-8
+    early = shots(Shooting(x0="given"), slide(tau=0.012, noise=0.0))
+    assert np.abs(good(early.at(start(early))).r).max() > 1e-4
+
+
+def test_start_values_come_from_the_data_within_a_few_times_their_noise() -> None:
+    found = shots(Shooting(), slide(v=0.2))
+    x0, v0 = (u.start for u in found.own)
+    assert abs(x0) < 4e-5
+    assert v0 == pytest.approx(0.2, abs=6e-3)
+
+
+def test_windows_cover_every_sample_once() -> None:
+    found = shots(Shooting(windows=0.2), slide())
+    (channel,) = found.channels
+    assert np.array_equal(channel.t, T)
+    assert len(channel.breaks) == 4
+    assert len(found.own) == 2 * 5
+    r = good(found.at(start(found))).r
+    assert np.abs(r).max() < 1e-3
+
+
+def test_thinned_outputs_are_rows_of_the_full_ones() -> None:
+    data = slide()
+    full, thin = (shots(Shooting(x0="given", every=k, rtol=1e-8), data) for k in (1, 5))
+    assert np.array_equal(good(full.at(start(full))).r[::5], good(thin.at(start(thin))).r)
+
+
+def test_held_inputs_stay_until_the_next_sample() -> None:
+    u = {"force": Hold(T, FORCE)}
+    x = simulate(SLIDE.model(), 1.0, t_eval=T, u=u, rtol=1e-10)["x"]
+    data = Dataset.of(t=T, x=x, force=FORCE, units={"x": "m", "force": "N"})
+    found = shots(Shooting(x0="given", interpolation="hold"), data)
+    assert np.abs(good(found.at(start(found))).r).max() < 1e-8
+
+
+def test_a_copy_in_another_process_gives_the_same_bits() -> None:
+    found = shots(Shooting(dead_time=(0.0, 0.01)), slide())
+    copy = pickle.loads(pickle.dumps(found))
+    one, other = (good(one.at(start(found))) for one in (found, copy))
+    assert np.array_equal(one.r, other.r)
+    assert np.array_equal(one.J, other.J)
+
+
+def test_the_bristle_of_a_law_with_one_is_unknown() -> None:
+    found = shots(Shooting(), slide(), Drive(LuGre(mu_s=1.2, mu_d=1.0), m=2.0, N=1.0))
+    assert [u.name for u in found.own] == ["x0.x[0]", "x0.v[0]", "x0.z[0]"]
+    assert found.own[2].start == 0.0
+
+
+def test_records_may_lack_signals() -> None:
+    one = slide()
+    other = Dataset.of(t=T, v=0 * T, force=FORCE, units={"v": "m/s", "force": "N"})
+    found = shots(Shooting(x0="given"), one + other)
+    assert [(c.record, c.signal) for c in found.channels] == [(0, "x"), (1, "v")]
+
+
+def test_a_motion_that_cannot_be_simulated_is_a_sentence() -> None:
+    x = Variable("x", "m", start=1.0)
+    rate = Variable("rate", "1/s", start=1.0)
+    burst = Model("burst", x=(x,), p=(rate,), ode=rate.symbol * x.symbol**2)
+    data = Dataset.of(t=T, x=1 / (1 - 0.5 * T), units={"x": "m"})
+    found = Shooting(x0="given").prepare(subject(burst), data, {"rate": 0.5})
+    assert np.abs(good(found.at(np.array([0.5]))).r).max() < 1e-6
+    said = found.at(np.array([1.5]))
+    assert isinstance(said, str)
+    assert "rate = 1.5" in said
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        (dict(windows="short"), "choose"),
+        (dict(windows=-1.0), "windows"),
+        (dict(x0="none"), "estimate"),
+        (dict(every=0), "every"),
+        (dict(dead_time=(0.1, 0.0)), "low < high"),
+        (dict(dead_time=(0.0, 0.1), interpolation="hold"), "linear"),
+    ],
+)
+def test_bad_kinds_are_refused(kind: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        Shooting(**kind)
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        (dict(signals=["y"]), "y"),
+        (dict(signals={"x": "pos"}), "pos"),
+        (dict(inputs={"force": "u"}), "'u'"),
+        (dict(x0={"y": 0.0}), "y"),
+        (dict(x0={"x": [0.0, 1.0]}), "1 records"),
+        (dict(windows=0.02), "at least 8 samples"),
+    ],
+)
+def test_kinds_that_do_not_suit_the_data_are_refused(kind: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        shots(Shooting(**kind), slide())
+
+
+def test_other_units_are_refused() -> None:
+    data = Dataset.of(t=T, x=T, force=FORCE, units={"x": "rad", "force": "N m"})
+    with pytest.raises(ValueError, match="rad"):
+        shots(Shooting(), data)
+
+
+def test_coordinates_and_rates_of_a_mechanism() -> None:
+    scene = Pendulum(BrownMcPhee(mu_s=0.3, mu_d=0.2, v_t=0.02))
+    model = scene.model(free=["mu_d"])
+    t = np.linspace(0.0, 1.0, 101)
+    run = simulate(model, 1.0, t_eval=t, rtol=1e-9)
+    data = Dataset.of(t=t, phi=run["phi"], units={"phi": "rad"})
+    found = Shooting().prepare(subject(scene, free=["mu_d"], fixed="others"), data, {"mu_d": 0.2})
+    assert [u.name for u in found.own] == ["x0.phi[0]", "x0.phi_rate[0]"]
