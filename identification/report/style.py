@@ -13,12 +13,13 @@ STYLE = """
   --panel: #fff; --line: #999; --grid: #ddd; --measured: #8a949e; --predicted: #b3261e;
   --residual: #1f5f99; --second: #6a3f93; --good: #145c2e; --doubtful: #7a4d00; --bad: #9c1c15;
   --band: #2b6ca322; } main { max-width: none; padding: 0; } nav { display: none; }
-  figure, tr, section > h2 { break-inside: avoid; } h2 { break-after: avoid; }
+  svg.chart { min-width: 0; break-inside: avoid; }
+  tr { break-inside: avoid; } h2 { break-after: avoid; }
   .wide { overflow: visible; } }
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--paper); color: var(--ink);
   font: 15px/1.5 system-ui, "Segoe UI", "Helvetica Neue", "DejaVu Sans", Arial, sans-serif; }
-main { max-width: 60rem; margin: 0 auto; padding: 1.5rem 1.25rem 4rem; }
+main { max-width: 62rem; margin: 0 auto; padding: 1.5rem 1.25rem 4rem; }
 h1 { font-size: 1.6rem; line-height: 1.25; margin: 0 0 .25rem; overflow-wrap: anywhere; }
 h2 { font-size: 1.15rem; margin: 2.2rem 0 .6rem; padding-top: .6rem;
   border-top: 1px solid var(--line); }
@@ -28,23 +29,24 @@ nav { font-size: .9rem; margin: .8rem 0; } nav a { margin-right: .9rem; white-sp
 a { color: var(--residual); }
 .verdict { background: var(--panel); border-left: .4rem solid var(--soft); border-radius: .3rem;
   padding: .7rem 1rem; margin: 1rem 0; } .verdict strong { font-size: 1.1rem; }
-.good { border-color: var(--good); } .doubtful { border-color: var(--doubtful); }
-.bad { border-color: var(--bad); }
+.verdict.good { border-color: var(--good); } .verdict.bad { border-color: var(--bad); }
+.verdict.doubtful { border-color: var(--doubtful); }
 .verdict.good strong, td.good { color: var(--good); }
 .verdict.doubtful strong, td.doubtful { color: var(--doubtful); }
 .verdict.bad strong, td.bad { color: var(--bad); }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .9rem; margin: .4rem 0 .8rem;
   font-variant-numeric: tabular-nums; }
-caption { text-align: left; color: var(--soft); padding-bottom: .3rem; }
+caption { text-align: left; white-space: nowrap; color: var(--soft); padding-bottom: .3rem; }
 th, td { padding: .22rem .7rem .22rem 0; border-bottom: 1px solid var(--line); text-align: left;
   vertical-align: top; } thead th { color: var(--soft); font-weight: 600; }
 th.number, td.number { text-align: right; white-space: nowrap; }
 tbody th { font-weight: 600; } td.note { color: var(--soft); min-width: 12rem; }
 table.square th, table.square td { padding: .2rem .5rem; text-align: right; }
 table.square td { border: 1px solid var(--paper); }
-figure { margin: .6rem 0 1.2rem; } figcaption { font-size: .9rem; max-width: 46rem; }
-svg.chart { display: block; width: 100%; height: auto; }
+figure { margin: .6rem 0 1.2rem; overflow-x: auto; }
+figcaption { font-size: .9rem; max-width: 46rem; }
+svg.chart { display: block; width: 100%; min-width: 36rem; height: auto; }
 svg text { fill: var(--ink); font: 12px system-ui, "DejaVu Sans", Arial, sans-serif; }
 svg .title { font-weight: 600; font-size: 13px; } svg .tick { fill: var(--soft); font-size: 11px;
   text-anchor: middle; } svg .tick.y { text-anchor: end; } svg .label { fill: var(--soft);

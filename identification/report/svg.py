@@ -150,7 +150,7 @@ def chart(
     x: Axis,
     y: Axis,
     marks: Sequence[Mark],
-    width: float = 720.0,
+    width: float = 920.0,
     height: float = 230.0,
     says: str = "",
 ) -> str:
@@ -166,8 +166,7 @@ def chart(
     w, h = width - LEFT - RIGHT, height - TOP - BOTTOM
     inside = "".join(mark.draw(x, y, w, h) for mark in marks)
     return (
-        f'<svg class="chart" role="img" viewBox="0 0 {width:g} {height:g}" '
-        f'style="max-width:{width:g}px">'
+        f'<svg class="chart" role="img" viewBox="0 0 {width:g} {height:g}">'
         f"<title>{escape(title)}</title><desc>{escape(says or title)}</desc>"
         f'<text class="title" x="{LEFT:g}" y="15">{escape(title)}</text>'
         f"{_legend(marks, width)}"

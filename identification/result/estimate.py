@@ -1,6 +1,7 @@
 """One parameter of a fit with its uncertainty, and what a fit leaves of one signal."""
 
 from dataclasses import dataclass
+from math import nan
 from typing import final
 
 from symfric.foundation.status import Status
@@ -54,6 +55,7 @@ class Error:
             has it; it says little of a signal far from zero, such as a position with an offset.
         largest: largest magnitude of the difference.
         rows: number of differences.
+        effective: how many independent ones they count as, by their colour; NaN where unknown.
     """
 
     unit: str
@@ -61,6 +63,7 @@ class Error:
     relative: float
     largest: float
     rows: int
+    effective: float = nan
 
 
 @final

@@ -43,7 +43,7 @@ class Balanced(HTMLParser):
 def test_points_stand_where_their_numbers_say() -> None:
     x, y = Axis("t", "s", 0.0, 10.0), Axis("v", "m/s", -1.0, 1.0)
     drawn = chart("v", x, y, [Path("line", np.array([0.0, 5.0, 10.0]), np.array([-1.0, 0.0, 1.0]))])
-    w, h = 720 - LEFT - RIGHT, 230 - TOP - BOTTOM
+    w, h = 920 - LEFT - RIGHT, 230 - TOP - BOTTOM
     found = findall(r'points="([^"]*)"', drawn)
     assert found == [f"0,{h:g} {w / 2:g},{h / 2:g} {w:g},0"]
 

@@ -1,0 +1,219 @@
+"""The result of a fit, put together from where the solver ended and what the residuals say."""
+
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, fields, is_dataclass
+from math import isfinite
+
+import casadi as ca
+import numpy as np
+
+from identification.data.dataset import Dataset
+from identification.data.findings import Finding
+from identification.result.curve import Curve, of_drive, of_points
+from identification.result.estimate import Errors, Estimate
+from identification.result.fitted import Fitted, Tried
+from identification.result.live import Kind, Live, errors_of, labels
+from identification.result.series import Series, points_each, series
+from identification.solving.descent import Start
+from identification.solving.task import Point, Task
+from identification.unknowns.roles import is_coefficient
+from identification.unknowns.subject import Subject
+from identification.verdict.covariance import Covariance
+from identification.verdict.judge import Verdict
+from symfric import __version__
+from symfric.foundation.parameters import parameters
+from symfric.foundation.status import Status
+from symfric.laws import Law
+from symfric.scenes import Drive
+from symfric.scenes.base import Scene
+
+
+def fitted(
+    kind: Kind,
+    subject: Subject,
+    data: Dataset,
+    task: Task,
+    point: Point,
+    starts: Sequence[Start],
+    verdict: Verdict,
+    covariance: Covariance,
+    findings: Sequence[Finding] = (),
+    *,
+    status: Status,
+    message: str = "",
+    seconds: float = 0.0,
+    call: str = "",
+    validation: Errors | None = None,
+) -> Fitted:
+    """The result.
+
+    Args:
+        kind, subject, data: what was asked.
+        task: the problem with the noise levels at the end.
+        point: the end of the best start.
+        starts: all of them.
+        verdict, covariance: what the residuals say there.
+        findings: what is doubtful about the data.
+        status: how the fit ended in view of the verdict.
+        message: more about the end; the sentence of `status` stands before it.
+        seconds: of all starts.
+        call: how it was asked for, as Python.
+        validation: what is left of other data.
+    """
+    names = task.residuals.names
+    records = tuple(r.name for r in data)
+    found = dict(zip(names, point.values.tolist(), strict=True))
+    closed = subject.close(found)
+    machine = closed.scene
+    timed = all(r.t is not None for r in data)
+    abscissa = "t [s]" if timed else ("v [rad/s]" if data.rotary else "v [m/s]")
+    return Fitted(
+        name=subject.name,
+        kind=written(kind),
+        records=records,
+        parameters=_estimates(subject, task, found, covariance),
+        names=covariance.names,
+        correlation=covariance.correlation,
+        undetermined=covariance.undetermined,
+        directions=covariance.sentences,
+        status=status,
+        message=" ".join(part for part in (status.value, message) if part),
+        verdict=verdict,
+        errors=errors_of(task.residuals, records, point.evaluation.r, verdict.effective),
+        validation=validation,
+        noise=dict(task.noise),
+        starts=_tried(task, starts),
+        findings=tuple(findings),
+        series=_series(task, point, records, verdict, abscissa),
+        curve=_curve(subject, closed.law, machine, data, task),
+        law=closed.law,
+        machine=machine,
+        seconds=seconds,
+        evaluations=sum(s.evaluations for s in starts),
+        made=_made(call, written(kind)),
+        live=Live(kind, subject, data, task, point, covariance, closed.model),
+    )
+
+
+def _estimates(
+    subject: Subject, task: Task, found: Mapping[str, float], made: Covariance
+) -> dict[str, Estimate]:
+    """Every parameter in the order of the subject, then what belongs to records."""
+    own = {u.name: u for u in (*task.unknowns.unknowns, *task.residuals.own)}
+    errors, white = made.standard_errors, made.white_errors
+    notes = dict.fromkeys(made.at_bound, "at its bound")
+    for group in made.undetermined:
+        for name in group:
+            others = ", ".join(n for n in group if n != name)
+            notes[name] = f"not told from {others}" if others else "without influence"
+    estimates: dict[str, Estimate] = {}
+    for name in dict.fromkeys([*subject.variables, *task.residuals.names]):
+        unknown = own.get(name)
+        unit = unknown.unit if unknown else subject.variables[name].unit
+        if name not in found:
+            held, note = float(subject.held[name]), subject.reasons.get(name, "")
+            unit = _in_forces(subject, name, unit)
+            estimates[name] = Estimate(held, unit, fixed=True, note=note)
+            continue
+        i = made.names.index(name)
+        tied = "tied" if name in subject.ties else ""
+        estimates[name] = Estimate(
+            found[name], _in_forces(subject, name, unit),
+            _known(errors[i]), _known(made.low[i]), _known(made.high[i]), _known(white[i]),
+            note=notes.get(name, tied), nuisance=unknown is not None and unknown.nuisance,
+        )  # fmt: skip
+    return estimates
+
+
+def _known(value: float) -> float | None:
+    return float(value) if isfinite(value) else None
+
+
+def _in_forces(subject: Subject, name: str, unit: str) -> str:
+    """The unit of a coefficient under a load of 1 N, which is a force then."""
+    whole = subject.scene or subject.law
+    known = {} if whole is None else parameters(whole)
+    if load_of(subject) != 1.0 or name not in known or not is_coefficient(known[name]):
+        return unit
+    return "N m" if subject.drive is not None and subject.drive.turning else "N"
+
+
+def load_of(subject: Subject) -> float | None:
+    """The normal force of a drive or of points [N]; None where there are other loads."""
+    if subject.drive is not None:
+        return float(subject.drive.N)
+    loads = [v.start for v in subject.model.u if v.name == "N"] if subject.scene is None else []
+    return float(loads[0]) if loads and subject.law is not None else None
+
+
+def _tried(task: Task, starts: Sequence[Start]) -> tuple[Tried, ...]:
+    """Where the starts ended, best first."""
+    best = min([s.objective for s in starts if isfinite(s.objective)], default=0.0)
+    return tuple(
+        Tried(
+            number=s.number,
+            above=s.objective - best,
+            cost=s.cost,
+            status=s.status,
+            message=s.message,
+            evaluations=s.evaluations,
+            values=task.unknowns.named(s.w),
+        )
+        for s in sorted(starts, key=lambda s: (s.objective, s.number))
+    )
+
+
+def _series(
+    task: Task, point: Point, records: Sequence[str], verdict: Verdict, abscissa: str
+) -> tuple[Series, ...]:
+    channels = task.residuals.channels
+    most = points_each(len(channels))
+    return tuple(
+        series(c, records[c.record], point.evaluation.r, verdict.whiteness[label], abscissa, most)
+        for c, label in zip(channels, labels(task.residuals), strict=True)
+    )
+
+
+def _curve(
+    subject: Subject, law: Law | None, machine: Scene | None, data: Dataset, task: Task
+) -> Curve | None:
+    """Friction over velocity, of a law that acts in a drive or was fitted to points."""
+    if isinstance(machine, Drive):
+        return of_drive(machine, data.records)
+    load = load_of(subject)
+    if law is None or load is None:
+        return None
+    points = {
+        data[c.record].name: (c.regressors.get("v", c.t), c.measured)
+        for c in task.residuals.channels
+    }
+    return of_points(law, load, points, data.rotary)
+
+
+def written(kind: object) -> str:
+    """A kind of residuals as Python, without what is left as it is by default."""
+    if not is_dataclass(kind):
+        return type(kind).__name__
+    given = [
+        f"{item.name}={getattr(kind, item.name)!r}"
+        for item in fields(kind)
+        if item.default is MISSING or getattr(kind, item.name) is not item.default
+    ]
+    return f"{type(kind).__name__}({', '.join(given)})"
+
+
+def _made(call: str, kind: str) -> dict[str, str]:
+    """Versions, and how the fit was called."""
+    import scipy  # noqa: PLC0415  (SciPy is loaded by those who fit)
+
+    return {
+        "call": call,
+        "residuals": kind,
+        "symfric": __version__,
+        "CasADi": ca.CasadiMeta.version(),
+        "NumPy": np.__version__,
+        "SciPy": scipy.__version__,
+        "Python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}",
+    }

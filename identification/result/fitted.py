@@ -1,0 +1,181 @@
+"""What a fit found: parameters with intervals, a verdict, errors, the law and the model."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.data.dataset import Dataset
+from identification.data.findings import Finding
+from identification.result.curve import Curve
+from identification.result.estimate import Errors, Estimate, Tried
+from identification.result.live import Live
+from identification.result.page import Ranking, page_of
+from identification.result.series import Series
+from identification.result.stored import read, to_dict
+from identification.result.text import text_of
+from identification.verdict.judge import Verdict
+from symfric.foundation.files import write_text
+from symfric.foundation.parameters import Parametric
+from symfric.foundation.status import Status
+from symfric.laws import Law
+from symfric.model import Model
+from symfric.scenes import Drive
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class Fitted:
+    """The result of a fit.
+
+    `print(fit)` is a report of a page; `fit.report("out.html")` one with pictures; `fit.plot()` the
+    pictures alone. Of a fit that was read from a file, `live` is None and the model of a machine
+    that is no `Drive` is absent.
+
+    Attributes:
+        name: of the law or the model.
+        kind: of residuals, as it was written.
+        records: their names.
+        parameters: name -> estimate of everything: fitted, held, start values, dead times.
+        names, correlation: what was fitted, and the correlation of the estimates, shape (n, n);
+            NaN where one is not determined.
+        undetermined: groups of parameters that the data cannot tell apart, and `directions`, the
+            same in words.
+        status, message: how the fit ended. Only SOLVED says that residuals are what noise leaves.
+        verdict: tests of the residuals.
+        errors: (record, signal) -> what is left.
+        validation: the same on other data with the same parameters; None without them.
+        noise: signal -> standard deviation of the noise that weighted it.
+        starts: of each start, best first, how it ended.
+        findings: what is doubtful about the data.
+        series: signals as they are drawn.
+        curve: friction over velocity; None of a model without a law.
+        law: with the fitted numbers; None of a model with none or several.
+        machine: the drive or scene with them; None of a law alone or a model.
+        seconds, evaluations: of all starts together.
+        made: versions and how it was called.
+        live: what only a fit of this process has; None from a file.
+    """
+
+    name: str
+    kind: str
+    records: tuple[str, ...]
+    parameters: dict[str, Estimate]
+    names: tuple[str, ...]
+    correlation: Array
+    undetermined: tuple[tuple[str, ...], ...]
+    directions: tuple[str, ...]
+    status: Status
+    message: str
+    verdict: Verdict
+    errors: Errors
+    validation: Errors | None
+    noise: dict[str, float]
+    starts: tuple[Tried, ...]
+    findings: tuple[Finding, ...]
+    series: tuple[Series, ...]
+    curve: Curve | None
+    law: Law | None
+    machine: Parametric | None
+    seconds: float
+    evaluations: int
+    made: dict[str, str] = field(default_factory=dict[str, str])
+    live: Live | None = None
+
+    def __str__(self) -> str:
+        return text_of(self)
+
+    def __repr__(self) -> str:
+        return f"<Fitted {self.name}: {self.status.name}>"
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Every parameter by name, fitted or held."""
+        return {name: e.value for name, e in self.parameters.items()}
+
+    @property
+    def drive(self) -> Drive | None:
+        """The machine, where it is a mass with a force input."""
+        return self.machine if isinstance(self.machine, Drive) else None
+
+    @property
+    def model(self) -> Model:
+        """The model with the fitted numbers.
+
+        Raises:
+            ValueError: of a fit from a file, unless it is one of a drive.
+        """
+        if self.live is not None:
+            return self.live.model
+        if self.drive is not None:
+            return self.drive.model()
+        raise ValueError(
+            f"fit of {self.name}: expected one of this process, or of a drive, got one from a "
+            "file, which holds no equations; close your model with fit.values"
+        )
+
+    def validate(self, data: Dataset) -> Errors:
+        """What the fitted parameters leave of other data; start values are estimated there.
+
+        Raises:
+            ValueError: data without the signals of the fit, or a fit from a file.
+        """
+        return self._alive("validate").errors_on(data)
+
+    def _alive(self, what: str) -> Live:
+        if self.live is None:
+            raise ValueError(
+                f"fit of {self.name}: {what}: expected a fit of this process, got one from a file, "
+                "which holds no data; fit again"
+            )
+        return self.live
+
+    def plot(self, path: str | Path | None = None, names: Sequence[str] = ()) -> "Figure":
+        """Friction over velocity; data and fit, what is left and its correlation.
+
+        Args:
+            path: image file, its format taken from the ending.
+            names: signals to show, of all records; the first ones if none is given.
+        """
+        from identification.result.picture import picture  # noqa: PLC0415  (matplotlib is slow)
+
+        return picture(self, names, path)
+
+    def report(self, path: str | Path, ranking: Ranking | None = None) -> None:
+        """Write one HTML page with everything, self-contained: no network, no scripts.
+
+        Args:
+            path: of the page.
+            ranking: of several laws, from `select`.
+        """
+        write_text(path, page_of(self, ranking))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but `live` as plain data, ready for JSON."""
+        return to_dict(self)
+
+    def to_json(self, path: str | Path) -> None:
+        """Write `to_dict` as JSON; `Fitted.from_json` reads it."""
+        write_text(path, json.dumps(self.to_dict(), allow_nan=False, ensure_ascii=False))
+
+    @staticmethod
+    def from_json(path: str | Path, own: Mapping[str, type[Parametric]] | None = None) -> "Fitted":
+        """The fit that `to_json` wrote, without its data.
+
+        Args:
+            path: of the file.
+            own: classes of your own laws by their names; a law of an unknown class is None.
+
+        Raises:
+            ValueError: no such file, one that something else wrote, or one of a later version.
+        """
+        return read(Fitted, path, own)

@@ -1,0 +1,118 @@
+"""What only a fit of this process has: its problem, its minimum, its model."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import nan
+from typing import Protocol, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.data.dataset import Dataset
+from identification.residuals.evaluation import Residuals
+from identification.result.estimate import Errors
+from identification.result.series import error
+from identification.solving.many_starts import best_of, many_starts
+from identification.solving.task import Point, Task
+from identification.unknowns.spec import Tied
+from identification.unknowns.subject import Subject
+from identification.unknowns.unknowns import unknowns_of
+from identification.verdict.covariance import Covariance
+from symfric.foundation import checks
+from symfric.model import Model
+
+Array = NDArray[np.float64]
+
+
+class Kind(Protocol):
+    """A kind of residuals: points, inverse dynamics, shooting, closed loop."""
+
+    def prepare(
+        self, subject: Subject, data: Dataset, start: Mapping[str, float] | None = None
+    ) -> Residuals:
+        """The residuals of `subject` on `data`; start values are guessed near `start`."""
+        ...
+
+
+@final
+@dataclass(frozen=True)
+class Constant:
+    """A rule that ties a parameter to a number."""
+
+    value: float
+
+    def __call__(self, values: Mapping[str, object]) -> float:
+        """The number."""
+        del values
+        return self.value
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Live:
+    """The problem of a fit and its end.
+
+    Attributes:
+        kind, subject, data: what was asked.
+        task: with the noise levels at the end.
+        point: the minimum.
+        covariance: of the values there.
+        model: with numbers.
+    """
+
+    kind: Kind
+    subject: Subject
+    data: Dataset
+    task: Task
+    point: Point
+    covariance: Covariance
+    model: Model
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Free parameters, start values and dead times by name."""
+        names = self.task.residuals.names
+        return dict(zip(names, self.point.values.tolist(), strict=True))
+
+    def errors_on(self, data: Dataset) -> Errors:
+        """What the parameters leave of other data, whose own start values are estimated there.
+
+        Raises:
+            ValueError: data without the signals of the fit, or that cannot be simulated.
+        """
+        data = checks.kind("validate", data, Dataset, "data, such as Dataset.read('v.csv')")
+        start = {n: v for n, v in self.values.items() if n in self.subject.names}
+        residuals = self.kind.prepare(self.subject, data, start)
+        ties = {name: Tied(Constant(value)) for name, value in start.items()}
+        unknowns = unknowns_of(residuals.own, ties, residuals.names)
+        signals = {c.signal for c in residuals.channels}
+        noise = {s: sigma for s, sigma in self.task.noise.items() if s in signals}
+        task = Task(residuals, unknowns, noise, (), self.task.loss)
+        w = unknowns.start
+        if w.size:
+            w = best_of(many_starts(task, [w])).w
+        point = task.at(w)
+        if isinstance(point, str):
+            raise ValueError(f"validate: expected data '{data.name}' that can be compared: {point}")
+        return errors_of(residuals, [r.name for r in data], point.evaluation.r)
+
+
+def errors_of(
+    residuals: Residuals,
+    records: Sequence[str],
+    r: Array,
+    effective: Mapping[str, float] | None = None,
+) -> Errors:
+    """(record, signal) -> what is left [SI]; `effective` samples by label of the channel."""
+    known = effective or {}
+    names = labels(residuals)
+    return {
+        (records[c.record], c.signal): error(c, r, known.get(names[k], nan))
+        for k, c in enumerate(residuals.channels)
+    }
+
+
+def labels(residuals: Residuals) -> list[str]:
+    """What verdict and covariance call the channels: "force", of several records "force[0]"."""
+    several = len({c.record for c in residuals.channels}) > 1
+    return [f"{c.signal}[{c.record}]" if several else c.signal for c in residuals.channels]

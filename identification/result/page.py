@@ -1,0 +1,217 @@
+"""A fit as one HTML page that needs nothing from elsewhere."""
+
+from collections.abc import Iterator, Sequence
+from math import isfinite
+from typing import TYPE_CHECKING, Any, Protocol
+
+from identification.report import html
+from identification.result import charts
+from identification.result.estimate import Errors, Estimate
+from identification.result.law_data import source_of
+from identification.result.text import (
+    best_starts,
+    correlated,
+    interval,
+    number,
+    percent,
+    remark,
+    rounded,
+    sentences,
+    unit_of,
+    with_unit,
+)
+
+if TYPE_CHECKING:
+    from identification.result.fitted import Fitted
+    from identification.verdict.judge import Test
+
+CONTENTS = (
+    ("parameters", "Parameters"),
+    ("data", "Data and fit"),
+    ("friction", "Friction"),
+    ("residuals", "Residuals"),
+    ("starts", "Starts"),
+    ("ranking", "Ranking"),
+    ("findings", "Data warnings"),
+    ("made", "How it was made"),
+)
+WORDS = {"good": "Good", "doubtful": "Doubtful", "bad": "No result"}
+
+
+class Ranking(Protocol):
+    """What `select` returns, as far as it is shown here."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """With "rows": for each law a dictionary of what is known of it."""
+        ...
+
+
+def page_of(fit: "Fitted", ranking: Ranking | None = None) -> str:
+    """The page as text."""
+    parts = {
+        "parameters": html.section("parameters", "Parameters", *_parameters(fit)),
+        "data": html.section("data", "Data and fit", *_data(fit)),
+        "friction": html.section("friction", "Force against velocity", *_friction(fit)),
+        "residuals": html.section("residuals", "Residuals", *_residuals(fit)),
+        "starts": html.section("starts", "Starts", *_starts(fit)),
+        "ranking": html.section("ranking", "Ranking of laws", *_ranking(ranking)),
+        "findings": html.section("findings", "What is doubtful in the data", *_findings(fit)),
+        "made": html.section("made", "How it was made", *_made(fit)),
+    }
+    kind = kind_of(fit)
+    top = [
+        f"<header>{html.title(fit.name)}",
+        html.paragraph(f"fitted to {', '.join(fit.records)} by {fit.kind}", "soft"),
+        html.verdict(kind, WORDS[kind], sentences(fit)),
+        html.contents([(a, name) for a, name in CONTENTS if parts[a]]),
+        "</header>",
+    ]
+    order = [name for name, _ in CONTENTS]
+    if any(f.severity == "error" for f in fit.findings):
+        order = ["findings", *(name for name in order if name != "findings")]
+    body = "\n".join([*top, *(parts[name] for name in order if parts[name])])
+    return html.page(f"{fit.name}: fit", "en", body)
+
+
+def kind_of(fit: "Fitted") -> str:
+    """What the box of the verdict looks like: "good", "doubtful" or "bad"."""
+    if not fit.status.ok:
+        return "bad"
+    return "good" if fit.status.name == "SOLVED" else "doubtful"
+
+
+def _parameters(fit: "Fitted") -> Iterator[str]:
+    fitted = {n: e for n, e in fit.parameters.items() if not e.fixed}
+    yield _estimates(
+        "Fitted, with 95 % intervals", {n: e for n, e in fitted.items() if not e.nuisance}
+    )
+    held = [
+        (n, number(e.value), unit_of(e.unit), e.note) for n, e in fit.parameters.items() if e.fixed
+    ]
+    yield html.table(
+        "Held", ("parameter", "value", "unit", "why"), held, (1,), ["note"] * len(held)
+    )
+    nuisance = {n: e for n, e in fitted.items() if e.nuisance}
+    yield _estimates("Of single records: start values, dead times", nuisance)
+    matrix = [[float(c) if isfinite(c) else None for c in row] for row in fit.correlation]
+    shown = [i for i, n in enumerate(fit.names) if not fit.parameters[n].nuisance]
+    names = [fit.names[i] for i in shown]
+    values = [[matrix[i][j] for j in shown] for i in shown]
+    yield html.triangle("Correlation of the estimates", names, values)
+    close = correlated(fit)
+    if close:
+        pairs = ", ".join(f"{a} and {b} ({c:+.3f})" for a, b, c in close[:8])
+        yield html.paragraph(f"Hard to tell apart: {pairs}.", "soft")
+
+
+def _estimates(caption: str, estimates: dict[str, Estimate]) -> str:
+    header = ["parameter", "value", "unit", "standard error", "", "95 % interval", "if white"]
+    rows = [
+        [n, rounded(e.value, e.standard_error), unit_of(e.unit), number(e.standard_error, 2),
+         percent(e.relative_error), interval(e), number(e.white_error, 2)]
+        for n, e in estimates.items()
+    ]  # fmt: skip
+    notes = [remark(e) for e in estimates.values()]
+    if any(notes):
+        header.append("note")
+        rows = [[*row, note] for row, note in zip(rows, notes, strict=True)]
+    return html.table(caption, header, rows, (1, 3, 4, 5, 6), ["note"] * len(rows) * any(notes))
+
+
+def _errors(caption: str, errors: Errors, records: Sequence[str]) -> str:
+    several = len(records) > 1
+    rows = [
+        (f"[{records.index(record)}] {record}" if several and record in records else record,
+         signal, with_unit(number(e.rms, 3), e.unit), percent(e.relative, 3),
+         with_unit(number(e.largest, 3), e.unit), f"{e.rows}", number(e.effective, 3))
+        for (record, signal), e in errors.items()
+    ]  # fmt: skip
+    header = ("record", "signal", "rms", "of the signal", "largest", "rows", "independent rows")
+    return html.table(caption, header, rows, (2, 3, 4, 5, 6))
+
+
+def _data(fit: "Fitted") -> Iterator[str]:
+    yield _errors("What the fit leaves of each signal", fit.errors, fit.records)
+    yield _errors("The same parameters on other data", fit.validation or {}, ())
+    for one in fit.series:
+        yield html.figure(charts.data_and_fit(one) + charts.left(one))
+
+
+def _friction(fit: "Fitted") -> Iterator[str]:
+    if fit.curve is not None:
+        yield html.figure(
+            charts.friction(fit.curve, fit.name),
+            f"Line: the law in steady sliding. Dots: {fit.curve.says}.",
+        )
+
+
+def _residuals(fit: "Fitted") -> Iterator[str]:
+    rows = [
+        (t.channel, t.name, number(t.statistic, 3), f"{t.p:.2g}", f"{t.limit:.2g}", _outcome(t))
+        for t in fit.verdict.tests
+    ]
+    kinds = ["good" if t.passed else "doubtful" * t.decides for t in fit.verdict.tests]
+    yield html.table(
+        "Tests", ("channel", "test", "statistic", "p", "limit", "result"), rows, (2, 3, 4), kinds
+    )
+    if fit.noise:
+        units = {signal: e.unit for (_, signal), e in fit.errors.items()}
+        noise = [(n, with_unit(number(s, 4), units.get(n, ""))) for n, s in fit.noise.items()]
+        caption = "Noise by which the signals were weighted"
+        yield html.table(caption, ("signal", "standard deviation"), noise, (1,))
+    for one in fit.series:
+        drawing = charts.lags(one)
+        if drawing:
+            yield html.figure(drawing)
+
+
+def _outcome(test: "Test") -> str:
+    return "passed" if test.passed else ("failed" if test.decides else "no, allowed for")
+
+
+def _starts(fit: "Fitted") -> Iterator[str]:
+    if len(fit.starts) < 2:
+        return
+    yield html.paragraph(
+        f"{best_starts(fit)} of {len(fit.starts)} starts ended at the best minimum."
+    )
+    yield html.figure(charts.waterfall(fit))
+    names = [n for n in fit.starts[0].values if not fit.parameters[n].nuisance]
+    rows = [
+        (f"{s.number}", number(s.above, 3), number(s.cost, 6), f"{s.evaluations}",
+         *(number(s.values.get(n), 4) for n in names),
+         f"{s.status.name} {s.message}".strip())
+        for s in fit.starts
+    ]  # fmt: skip
+    header = ("number", "above the best", "cost", "evaluations", *names, "ended")
+    yield html.table("Starts, best first", header, rows, range(1, 4 + len(names)))
+
+
+def _ranking(ranking: Ranking | None) -> Iterator[str]:
+    rows = [] if ranking is None else list(ranking.to_dict()["rows"])
+    if rows:
+        names = list(rows[0])
+        cells = [[_cell(row.get(name)) for name in names] for row in rows]
+        numbers = [j for j, n in enumerate(names) if isinstance(rows[0][n], int | float)]
+        header = [name.replace("_", " ") for name in names]
+        yield html.table("Laws fitted to the same data, best first", header, cells, numbers)
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return "–"
+    return number(float(value), 4) if isinstance(value, int | float) else str(value)
+
+
+def _findings(fit: "Fitted") -> Iterator[str]:
+    rows = [(fit.records[f.record], f.signal, f.kind, f.sentence, f.severity) for f in fit.findings]
+    kinds = ["bad" if f.severity == "error" else "doubtful" for f in fit.findings]
+    header = ("record", "signal", "kind", "what and where", "severity")
+    yield html.table("Findings of the checks", header, rows, (), kinds)
+
+
+def _made(fit: "Fitted") -> Iterator[str]:
+    yield html.table("", ("", ""), list(fit.made.items()))
+    if fit.law is not None:
+        yield html.heading("The law as Python")
+        yield html.code(source_of(fit.law))

@@ -1,0 +1,110 @@
+"""The pictures of a fit in one figure."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from identification.result.curve import Curve
+from identification.result.series import Series
+from symfric.foundation import checks
+from symfric.foundation.panels import panels, save
+
+if TYPE_CHECKING:
+    from identification.result.fitted import Fitted
+
+SHOWN = 4
+"""Signals that are drawn if none is named; each takes three panels."""
+
+
+def picture(fit: "Fitted", names: Sequence[str] = (), path: str | Path | None = None) -> Figure:
+    """Data and fit, what is left and its correlation, for each signal; friction over velocity.
+
+    Args:
+        fit: what is drawn.
+        names: signals; of all records. None: the first ones.
+        path: image file.
+    """
+    known = list(dict.fromkeys(s.signal for s in fit.series))
+    wanted = checks.names("plot", names, known) or known
+    shown = [s for s in fit.series if s.signal in wanted]
+    if not names:
+        shown = shown[:SHOWN]
+    ordered = [s for s in shown if s.correlation.size]
+    dots = [s for s in shown if not s.ordered and fit.curve is not None]
+    drawn = [s for s in shown if s not in dots]
+    count = (fit.curve is not None) + 2 * len(drawn) + len(ordered) + len(dots)
+    figure, axes = panels(count, width=7.5, height=2.1, shared=False)
+    left = iter(axes)
+    if fit.curve is not None:
+        _curve(next(left), fit.curve, fit.name)
+    for one in shown:
+        if one in drawn:
+            _data(next(left), one)
+        _left(next(left), one)
+        if one in ordered:
+            _lags(next(left), one)
+    word = "" if fit.status.name == "SOLVED" else f": {fit.status.name.lower()}"
+    axes[0].set_title(f"{fit.name}{word}", loc="left")
+    figure.align_ylabels(axes)
+    return save(figure, path)
+
+
+def _legend(axis: Axes, columns: int = 3) -> None:
+    axis.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize="small",
+        ncols=columns, markerscale=2,
+    )  # fmt: skip
+
+
+def _curve(axis: Axes, curve: Curve, name: str) -> None:
+    for line in curve.measured.values():
+        axis.plot(line.t, line.y, ".", color="0.6", ms=1.8, alpha=0.6, rasterized=True)
+    axis.plot([], [], ".", color="0.6", label=curve.says)
+    axis.plot(curve.law.t, curve.law.y, color="C3", lw=1.5, label=name)
+    low, high = limits(curve)
+    axis.set_ylim(low, high)
+    axis.set_xlabel(f"v [{curve.v_unit}]")
+    axis.set_ylabel(f"friction [{curve.F_unit}]")
+    _legend(axis)
+
+
+def limits(curve: Curve) -> tuple[float, float]:
+    """Range of forces that shows the curve and all but the farthest points."""
+    dots = np.concatenate([line.y for line in curve.measured.values()] or [np.zeros(0)])
+    ends = [*np.percentile(dots, [0.2, 99.8])] if dots.size else []
+    low, high = min([*ends, curve.law.y.min()]), max([*ends, curve.law.y.max()])
+    margin = 0.1 * (high - low) or 1.0
+    return float(low - margin), float(high + margin)
+
+
+def _data(axis: Axes, one: Series) -> None:
+    style = "-" if one.ordered else "."
+    axis.plot(one.measured.t, one.measured.y, style, color="0.6", lw=2.2, label="measured")
+    axis.plot(one.predicted.t, one.predicted.y, style, color="C3", lw=0.9, label="fitted")
+    axis.set_ylabel(f"{one.signal} [{one.unit}]")
+    axis.set_xlabel(one.abscissa)
+    axis.text(0.005, 1.02, one.record, transform=axis.transAxes, fontsize="small")
+    _legend(axis)
+
+
+def _left(axis: Axes, one: Series) -> None:
+    axis.plot(one.residual.t, one.residual.y, "-" if one.ordered else ".", color="C0", lw=0.7)
+    axis.axhline(0.0, color="0.4", lw=0.6)
+    axis.set_ylabel(f"fitted - measured [{one.unit}]")
+    axis.set_xlabel(one.abscissa)
+
+
+def _lags(axis: Axes, one: Series) -> None:
+    axis.fill_between(
+        one.lags, one.low, one.high, color="C0", alpha=0.15, lw=0, label="white: 95 %"
+    )
+    axis.vlines(one.lags, 0.0, one.correlation, color="C0", lw=1.2)
+    axis.axhline(0.0, color="0.4", lw=0.6)
+    axis.set_ylim(min(-0.3, 1.1 * one.correlation.min()), 1.0)
+    axis.set_ylabel("autocorrelation")
+    axis.set_xlabel(f"lag [samples], residuals of {one.signal}")
+    _legend(axis)

@@ -1,0 +1,186 @@
+"""A fit as text, 80 columns wide: the verdict first, then what was found and how surely."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import zip_longest
+from math import floor, isfinite, log10
+from textwrap import wrap
+from typing import TYPE_CHECKING
+
+from identification.result.estimate import Errors, Estimate
+
+if TYPE_CHECKING:
+    from identification.result.fitted import Fitted
+
+WIDTH = 80
+CLOSE = 0.9
+"""Magnitude of a correlation of two estimates that is worth a line."""
+SAME = 1.0
+"""Difference of minus twice the log-likelihood below which two starts ended at one minimum."""
+MANY = 12
+"""Start values and dead times that are listed; of more only how many there are."""
+
+
+def text_of(fit: "Fitted") -> str:
+    """The whole report."""
+    blocks = [
+        [f"{fit.name} fitted by {fit.kind}: {fit.status.name}", *_indented(sentences(fit))],
+        [*_head(fit)],
+        [*_parameters(fit)],
+        [*_correlations(fit)],
+        [*errors_table("residuals", fit.errors)],
+        [*errors_table("on other data", fit.validation or {})],
+        [*_data(fit)],
+    ]
+    return "\n\n".join("\n".join(block) for block in blocks if block)
+
+
+def sentences(fit: "Fitted") -> list[str]:
+    """What there is to say of the whole, most important first, each once."""
+    return list(dict.fromkeys([fit.message, *fit.verdict.sentences, *fit.directions]))
+
+
+def number(value: float | None, digits: int = 6) -> str:
+    """So many significant digits; a dash for none."""
+    return "-" if value is None or not isfinite(value) else f"{value:.{digits}g}"
+
+
+def rounded(value: float, error: float | None) -> str:
+    """`value` with the digits that its standard error leaves, two of them uncertain."""
+    if error is None or not isfinite(error) or error <= 0.0 or value == 0.0:
+        return number(value)
+    digits = floor(log10(abs(value))) - floor(log10(error)) + 2
+    return f"{value:.{min(max(digits, 2), 10)}g}"
+
+
+def interval(e: Estimate) -> str:
+    """The 95 % interval, with the digits of the value; "" without one."""
+    if e.low is None or e.high is None:
+        return ""
+    return f"{rounded(e.low, e.standard_error)} ... {rounded(e.high, e.standard_error)}"
+
+
+def percent(value: float | None, digits: int = 2) -> str:
+    """A share in percent without an exponent; "" of none."""
+    if value is None or not isfinite(value):
+        return ""
+    return f"{value:.{digits}g} %" if value < 10.0**digits else f"{value:.0f} %"
+
+
+def unit_of(unit: str) -> str:
+    """A unit as it is written; "" of pure numbers."""
+    return "" if unit == "1" else unit
+
+
+def with_unit(text: str, unit: str) -> str:
+    """A number and its unit, where it has one."""
+    return f"{text} {unit_of(unit)}".rstrip()
+
+
+def remark(e: Estimate) -> str:
+    """Why a parameter is held or has no interval."""
+    return f"held: {e.note}" if e.fixed and e.note else ("held" if e.fixed else e.note)
+
+
+def best_starts(fit: "Fitted") -> int:
+    """How many starts ended at the lowest cost."""
+    return sum(s.above < SAME for s in fit.starts)
+
+
+def correlated(fit: "Fitted", least: float = CLOSE) -> list[tuple[str, str, float]]:
+    """Pairs of estimates with a correlation above `least`, the closest first."""
+    n = len(fit.names)
+    pairs = [
+        (fit.names[i], fit.names[j], float(fit.correlation[i, j]))
+        for i in range(n)
+        for j in range(i)
+        if isfinite(fit.correlation[i, j]) and abs(fit.correlation[i, j]) > least
+    ]
+    return sorted(pairs, key=lambda pair: -abs(pair[2]))
+
+
+def columns(rows: Iterable[Sequence[str]], right: Sequence[int] = ()) -> Iterator[str]:
+    """Lines of padded columns; those in `right` stand at the right."""
+    lines = [list(row) for row in rows]
+    widths = [max(map(len, column)) for column in zip_longest(*lines, fillvalue="")]
+    for line in lines:
+        cells = [
+            cell.rjust(w) if j in right else cell.ljust(w)
+            for j, (cell, w) in enumerate(zip(line, widths, strict=False))
+        ]
+        yield "  ".join(cells).rstrip()
+
+
+def _indented(texts: Iterable[str]) -> Iterator[str]:
+    for text in texts:
+        yield from wrap(text, WIDTH, initial_indent="  ", subsequent_indent="  ")
+
+
+def _head(fit: "Fitted") -> Iterator[str]:
+    """Data, effort, noise."""
+    rows = sum(e.rows for e in fit.errors.values())
+    named = fit.records[:4]
+    more = f" and {len(fit.records) - 4} more" if len(fit.records) > 4 else ""
+    told = f"{', '.join(named)}{more}; {rows} rows, {len(fit.names)} fitted"
+    yield from wrap(f"data    {told}", WIDTH, subsequent_indent=" " * 8)
+    if fit.starts:
+        n = len(fit.starts)
+        reached = f"{best_starts(fit)} of {n} starts at the lowest cost" if n > 1 else "one start"
+        yield f"effort  {reached}, {fit.evaluations} evaluations, {fit.seconds:.3g} s"
+    units = {signal: e.unit for (_, signal), e in fit.errors.items()}
+    noise = [
+        f"{name} {with_unit(number(s, 3), units.get(name, ''))}" for name, s in fit.noise.items()
+    ]
+    if noise:
+        yield from wrap(f"noise   {', '.join(noise)}", WIDTH, subsequent_indent=" " * 8)
+
+
+def _parameters(fit: "Fitted") -> Iterator[str]:
+    asked = {n: e for n, e in fit.parameters.items() if not e.nuisance and not e.fixed}
+    held = {n: e for n, e in fit.parameters.items() if e.fixed}
+    nuisance = {n: e for n, e in fit.parameters.items() if e.nuisance and not e.fixed}
+    if asked:
+        yield from _table("parameter", asked)
+    if held:
+        yield ""
+        rows = [(n, with_unit(number(e.value), e.unit), e.note) for n, e in held.items()]
+        yield from columns([("held", "value", "why"), *rows])
+    if nuisance:
+        yield ""
+        yield from _table("of a record", dict(list(nuisance.items())[:MANY]))
+        if len(nuisance) > MANY:
+            yield f"and {len(nuisance) - MANY} more in fit.parameters"
+
+
+def _table(name: str, estimates: dict[str, Estimate]) -> Iterator[str]:
+    rows = [(name, "value", "unit", "std error", "95 % interval")]
+    for n, e in estimates.items():
+        share = f" ({percent(e.relative_error)})" if percent(e.relative_error) else ""
+        error = "" if e.standard_error is None else f"{e.standard_error:.2g}{share}"
+        value = rounded(e.value, e.standard_error)
+        rows.append((n, value, unit_of(e.unit), error, interval(e) or e.note))
+    return columns(rows)
+
+
+def _correlations(fit: "Fitted") -> Iterator[str]:
+    pairs = correlated(fit)
+    if pairs:
+        yield f"correlation above {CLOSE:g}"
+        yield from columns([(f"  {a}, {b}", f"{c:+.3f}") for a, b, c in pairs[:MANY]])
+        if len(pairs) > MANY:
+            yield f"  and {len(pairs) - MANY} more pairs"
+
+
+def errors_table(title: str, errors: Errors) -> Iterator[str]:
+    """One line for each signal of each record."""
+    if errors:
+        rows = [(title, "signal", "rms", "of the signal", "largest")]
+        for (record, signal), e in errors.items():
+            rms, most = with_unit(number(e.rms, 3), e.unit), with_unit(number(e.largest, 3), e.unit)
+            rows.append((record, signal, rms, percent(e.relative, 3), most))
+        yield from columns(rows)
+
+
+def _data(fit: "Fitted") -> Iterator[str]:
+    if fit.findings:
+        yield "doubtful in the data"
+        yield from _indented(f"{f.severity}: {f.sentence}" for f in fit.findings)
