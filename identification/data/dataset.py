@@ -2,12 +2,16 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import final
+from pathlib import Path
+from typing import Literal, final
 
 from identification.data.frames import ASSUMED, columns_of
+from identification.data.merge import merged
 from identification.data.raw import Wanted, record
 from identification.data.reading import Paths, files, read_records
 from identification.data.record import Record
+from identification.data.resample import delayed, resampled
+from identification.data.text_file import to_csv
 from symfric.foundation import checks
 
 
@@ -180,6 +184,65 @@ class Dataset:
         pairs = list(zip(self.records, cuts, strict=True))
         first = Dataset(tuple(one.at(slice(0, cut)) for one, cut in pairs), self.name)
         return first, Dataset(tuple(one.at(slice(cut, None)) for one, cut in pairs), self.name)
+
+    def resampled(
+        self, step: float | None = None, gap: Literal["split", "refuse"] = "split"
+    ) -> "Dataset":
+        """The data at equal intervals; a record with gaps becomes one for each piece.
+
+        See `identification.data.resample.resampled`.
+        """
+        return Dataset(
+            tuple(p for one in self.records for p in resampled(one, step, gap)), self.name
+        )
+
+    def delayed(self, delays: Mapping[str, float]) -> "Dataset":
+        """The data with signals moved in time [s]: new(t) = old(t - delay), the ends cut."""
+        return self.each(lambda one: delayed(one, delays))
+
+    def merged(
+        self,
+        other: "Dataset",
+        on: tuple[str, str],
+        shift: float | Literal["estimate"] = "estimate",
+        drift: float | Literal["estimate"] = 0.0,
+    ) -> "Dataset":
+        """Two recorders of one experiment as one, record by record, at the times of the first.
+
+        See `identification.data.merge.merged`.
+
+        Args:
+            other: as many records.
+            on: a quantity that both hold, by its name here and there: ("x", "x").
+            shift: what is added to the times of `other` [s].
+            drift: how much faster the clock of the first runs, relative.
+
+        Raises:
+            ValueError: other numbers of records, no common time, a delay that is not determined,
+                clocks that drift.
+        """
+        other = checks.kind(f"data '{self.name}': merged", other, Dataset, "a Dataset")
+        if len(other) != len(self):
+            raise ValueError(
+                f"data '{self.name}': merged: expected {len(self)} records, got {len(other)}"
+            )
+        pairs = zip(self.records, other.records, strict=True)
+        return Dataset(tuple(r for a, b in pairs for r in merged(a, b, on, shift, drift)))
+
+    def to_csv(self, path: str | Path) -> tuple[Path, ...]:
+        """Write every record as CSV with units in the header; `Dataset.read` reads it back.
+
+        Several records are numbered: `run.csv` becomes `run_1.csv`, `run_2.csv`. Controllers are
+        not written.
+
+        Returns:
+            The files.
+        """
+        target = checks.path(f"data '{self.name}': to_csv", path)
+        if len(self) == 1:
+            return (to_csv(self.records[0], target),)
+        names = (target.with_stem(f"{target.stem}_{k}") for k in range(1, len(self) + 1))
+        return tuple(to_csv(one, name) for one, name in zip(self.records, names, strict=True))
 
 
 def _name(names: Sequence[str]) -> str:

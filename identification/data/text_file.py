@@ -10,7 +10,9 @@ from typing import final
 import numpy as np
 
 from identification.data.raw import Array, Column, Raw, label
+from identification.data.record import Record
 from identification.data.units import unit
+from symfric.foundation.files import written
 
 COMMENTS = ("#", "%", "//")
 """What a line begins with that says something about the file."""
@@ -221,3 +223,14 @@ def _column(
             f" ({bad.size} such cells)" if bad.size > 1 else ""
         )
     return values, ""
+
+
+def to_csv(record: Record, path: Path) -> Path:
+    """Write a record with units in its header, and give the path back."""
+    signals = {**({} if record.t is None else {"t": record.t}), **record.signals}
+    with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        units = {key: record.unit(key) for key in signals}
+        writer.writerow(f"{key} [{units[key]}]" if units[key] else key for key in signals)
+        writer.writerows(np.column_stack(list(signals.values())).tolist())
+    return path

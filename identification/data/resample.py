@@ -1,0 +1,137 @@
+"""Records at equal intervals, or with signals moved in time; a gap is never bridged silently."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.data.record import Record
+from symfric.foundation import checks
+
+Array = NDArray[np.float64]
+
+GAP = 5.0
+"""An interval of more than so many median intervals is a gap."""
+SHORTEST = 10
+"""Samples of a piece between two gaps that is kept."""
+
+
+def pieces(record: Record) -> list[slice]:
+    """The samples between the gaps of a record."""
+    intervals = np.diff(record.time)
+    cuts = np.flatnonzero(intervals > GAP * record.median_step) + 1
+    edges = [0, *cuts.tolist(), record.size]
+    return [slice(a, b) for a, b in pairwise(edges)]
+
+
+def check_no_gap(record: Record, where: str) -> None:
+    """Refuse a record with gaps."""
+    parts = pieces(record)
+    if len(parts) > 1:
+        t, k = record.time, parts[0].stop
+        raise ValueError(
+            f"{where}: expected intervals of at most {GAP:g} times the median one, got a gap of "
+            f"{t[k] - t[k - 1]:.4g} s at t = {t[k - 1]:.6g} s ({len(parts) - 1} gaps); "
+            "use gap='split' for a record of each piece"
+        )
+
+
+def resampled(
+    record: Record, step: float | None = None, gap: Literal["split", "refuse"] = "split"
+) -> list[Record]:
+    """Records at equal intervals of `step` [s], one for each piece between gaps.
+
+    Positions by cubic Hermite, everything else by linear interpolation. Nothing is filtered: with
+    a larger step noise is aliased, not averaged. The controller is dropped: its reference belongs
+    to the old samples. Pieces of fewer than 10 samples, old or new, are dropped.
+
+    Args:
+        record: over time.
+        step: default: the median interval.
+        gap: what to do where an interval is longer than 5 times the median one.
+
+    Raises:
+        ValueError: a step that is not positive, a gap with gap="refuse", no piece long enough.
+    """
+    where = f"data '{record.name}': resampled"
+    checks.choice(f"{where}: gap", gap, ("split", "refuse"))
+    step = record.median_step if step is None else step
+    step = checks.number(f"{where}: step", step, unit="s", above=0.0)
+    if gap == "refuse":
+        check_no_gap(record, where)
+    parts = [record.at(part) for part in pieces(record) if part.stop - part.start >= SHORTEST]
+    kept = [_at_step(part, step) for part in parts if part.time[-1] - part.time[0] >= 9 * step]
+    if not kept:
+        raise ValueError(
+            f"{where}: expected a piece of at least {SHORTEST} samples without a gap, got none at "
+            f"a step of {step:g} s"
+        )
+    if len(kept) == 1:
+        return kept
+    return [replace(p, name=f"{record.name} ({p.time[0]:.4g} s ...)") for p in kept]
+
+
+def _at_step(record: Record, step: float) -> Record:
+    t = record.time
+    new = t[0] + step * np.arange(int((t[-1] - t[0]) / step * (1 + 1e-12)) + 1)
+    return replace(
+        record,
+        t=new,
+        signals={key: interpolated(record, key, new) for key in record.signals},
+        loop=None,
+        first_row=0,
+    )
+
+
+def interpolated(record: Record, signal: str, at: Array) -> Array:
+    """A signal at other times: positions by cubic Hermite, everything else linearly."""
+    values = record.signals[signal]
+    if record.units[signal] in ("m", "rad"):
+        return hermite(at, record.time, values)
+    return np.interp(at, record.time, values)
+
+
+def delayed(record: Record, delays: Mapping[str, float]) -> Record:
+    """The record with signals moved in time: new(t) = old(t - delay), the ends cut.
+
+    A recorder that writes the force 2 ms after it acted is put right by {"force": -0.002}.
+
+    Raises:
+        ValueError: an unknown signal, a delay that leaves nothing, a record with gaps.
+    """
+    where = f"data '{record.name}': delayed"
+    given = {
+        record.channel(name): checks.number(f"{where}: {name}", value, unit="s")
+        for name, value in checks.named(where, delays).items()
+    }
+    check_no_gap(record, where)
+    t = record.time
+    late, early = max([0.0, *given.values()]), min([0.0, *given.values()])
+    inside = (t >= t[0] + late) & (t <= t[-1] + early)
+    if np.count_nonzero(inside) < 2:
+        raise ValueError(
+            f"{where}: expected delays shorter than the record of {t[-1] - t[0]:g} s, got "
+            f"{max(late, -early):g} s"
+        )
+    rows = np.flatnonzero(inside)
+    cut = record.at(slice(int(rows[0]), int(rows[-1]) + 1))
+    signals = dict(cut.signals)
+    for name, delay in given.items():
+        signals[name] = interpolated(record, name, cut.time - delay)
+    loop = None if {"x", "force"} & given.keys() else cut.loop
+    return replace(cut, signals=signals, loop=loop)
+
+
+def hermite(at: Array, t: Array, y: Array) -> Array:
+    """Cubic Hermite interpolation with second-order slopes; third order at uneven samples."""
+    if t.size < 3:
+        return np.interp(at, t, y)
+    slope = np.gradient(y, t)
+    k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
+    h = t[k + 1] - t[k]
+    s = (at - t[k]) / h
+    ends = y[k] * (1 + 2 * s) * (1 - s) ** 2 + y[k + 1] * s**2 * (3 - 2 * s)
+    return ends + h * s * (1 - s) * (slope[k] * (1 - s) - slope[k + 1] * s)
