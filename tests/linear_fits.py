@@ -1,12 +1,17 @@
-"""Made-up residuals of linear fits: noise of known colour, and a minimum around it."""
+"""Made-up residuals: noise of known colour, a linear fit of it, and a decay that is fitted."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.residuals.evaluation import Channel
+from identification.residuals.evaluation import Channel, Evaluation
+from identification.solving.descent import descend
+from identification.solving.task import Point, Task, task
 from identification.unknowns.unknown import Unknown
+from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.minimum import Minimum
 
 Array = NDArray[np.float64]
@@ -55,3 +60,57 @@ def fitted(
     return Minimum(
         (channel,), unknowns, names, p, np.eye(k), free, r, J, np.ones(n), r, noise or {},
     )  # fmt: skip
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Decay:
+    """Residuals of a exp(-t / tau) + b, with b seen by a second signal if there is one."""
+
+    t: Array
+    measured: Array
+    second: Array | None = None
+    own: tuple[Unknown, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return ("a", "tau", "b")
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        n = self.t.size
+        first = Channel(0, "x", "m", slice(0, n), self.t, self.measured, {"force": np.sin(self.t)})
+        if self.second is None:
+            return (first,)
+        return first, Channel(0, "y", "m", slice(n, 2 * n), self.t, self.second, {})
+
+    def at(self, values: Array) -> Evaluation | str:
+        a, tau, b = values
+        if not tau > 0:
+            return "tau is not above zero"
+        e = np.exp(-self.t / tau)
+        r = a * e + b - self.measured
+        J = np.column_stack([e, a * e * self.t / tau**2, np.ones_like(e)])
+        if self.second is None:
+            return Evaluation(r, J)
+        own = np.column_stack([0 * e, 0 * e, np.ones_like(e)])
+        return Evaluation(np.concatenate([r, b - self.second]), np.vstack([J, own]))
+
+
+DECAY = (
+    Unknown("a", "m", 1.0),
+    Unknown("tau", "s", 1.0, lower=1e-3, upper=1e3, logarithmic=True),
+    Unknown("b", "m", 0.0),
+)
+
+
+def solved(
+    residuals: Decay, noise: object = "estimate", loss: str = "squares"
+) -> tuple[Task, Point]:
+    """The fit of a decay."""
+    asked = task(residuals, unknowns_of(DECAY, {}, residuals.names), noise, loss)
+    end = descend(asked, asked.unknowns.start)
+    asked = asked.with_noise(end.noise)
+    point = asked.at(end.w)
+    assert isinstance(point, Point)
+    return asked, point

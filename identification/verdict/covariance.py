@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.residuals.evaluation import Array
+from identification.solving.task import Point, Task
 from identification.verdict.combinations import Trace, lost
-from identification.verdict.minimum import Minimum
-from identification.verdict.sandwich import Sandwich, sandwich
+from identification.verdict.minimum import Minimum, minimum, trace
+from identification.verdict.sandwich import sandwich
 
 LEVEL = 0.95
 """Of the intervals."""
@@ -68,7 +69,13 @@ class Covariance:
         return np.divide(self.matrix, both, out=np.full_like(both, np.nan), where=both > 0)
 
 
-def covariance_of(found: Minimum, trace: Trace, inside: Sandwich | None = None) -> Covariance:
+def covariance(task: Task, point: Point) -> Covariance:
+    """Uncertainty of what a task was solved for, see `covariance_of`."""
+    found = minimum(task, point)
+    return covariance_of(found, trace(task, found))
+
+
+def covariance_of(found: Minimum, change: Trace) -> Covariance:
     """Uncertainty of the values at a minimum.
 
     Limits: linear in the values (in logarithms where an unknown is logarithmic), see `profile` for
@@ -77,10 +84,9 @@ def covariance_of(found: Minimum, trace: Trace, inside: Sandwich | None = None) 
 
     Args:
         found: the minimum.
-        trace: how much the weighted residuals change at other values, to find the right words.
-        inside: the sandwich if it is there already.
+        change: how much the weighted residuals change at other values, to find the right words.
     """
-    inside = sandwich(found) if inside is None else inside
+    inside = sandwich(found)
     names, values = found.names, found.values
     moved = found.slope @ inside.null  # values along directions without a trace
     own = [names.index(u.name) for u in found.unknowns]
@@ -97,7 +103,7 @@ def covariance_of(found: Minimum, trace: Trace, inside: Sandwich | None = None) 
             values[own],
             moved[own],
             size[own],
-            lambda some: trace(_spread(found, own, some)),
+            lambda some: change(_spread(found, own, some)),
         )
     )
     at_bound = tuple(u.name for u, held in zip(found.unknowns, found.held, strict=True) if held)

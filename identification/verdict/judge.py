@@ -7,7 +7,7 @@ sensor has, if one is lucky. So
 * dependence on inputs, speed, direction, place or history makes a fit doubtful: the model is wrong;
 * residuals larger than a noise level that was given do, too;
 * colour alone does not: intervals carry it, see `covariance`;
-* a mass at its bound, or residuals as large as the signal, are no physics.
+* errors in the data, a mass at its bound, or residuals as large as the signal are no physics.
 """
 
 from collections.abc import Iterator
@@ -16,13 +16,15 @@ from typing import final
 
 import numpy as np
 
+from identification.data.findings import Findings
 from identification.residuals.evaluation import Channel
+from identification.solving.task import Point, Task
 from identification.verdict.colour import Colour
 from identification.verdict.independence import Dependence, dependences
-from identification.verdict.minimum import Minimum
+from identification.verdict.minimum import Minimum, minimum
 from identification.verdict.order import positions
 from identification.verdict.resolution import resolution
-from identification.verdict.sandwich import Sandwich, sandwich
+from identification.verdict.sandwich import sandwich
 from identification.verdict.whiteness import Whiteness, whiteness
 from symfric.foundation.status import Status
 
@@ -95,9 +97,14 @@ class Verdict:
         return Status.IMPLAUSIBLE if self.nonsense else Status.DOUBTFUL
 
 
-def judged(found: Minimum, inside: Sandwich | None = None) -> Verdict:
-    """The verdict on a minimum; `inside` is its sandwich if it is there already."""
-    inside = sandwich(found) if inside is None else inside
+def judge(task: Task, point: Point, findings: Findings | None = None) -> Verdict:
+    """The verdict on a solved task; errors that were found in its data make it no physics."""
+    return judged(minimum(task, point), findings)
+
+
+def judged(found: Minimum, findings: Findings | None = None) -> Verdict:
+    """The verdict on a minimum."""
+    inside = sandwich(found)
     white = dict[str, Whiteness]()
     tests, effective = list[Test](), dict[str, float]()
     every = list[tuple[Channel, list[Dependence]]]()
@@ -114,7 +121,8 @@ def judged(found: Minimum, inside: Sandwich | None = None) -> Verdict:
     count = sum(len(some) for _, some in every)
     for channel, some in every:
         tests += _independent(found, channel, some, ALARM / max(count, 1))
-    nonsense = (*_unexplained(found), *_no_mass(found))
+    errors = () if findings is None else tuple(e.sentence for e in findings.errors)
+    nonsense = (*errors, *_unexplained(found), *_no_mass(found))
     bounds = tuple(_bounds(found))
     failed = [t for t in tests if not t.passed]
     failed.sort(key=lambda t: (not t.decides, t.p))

@@ -1,6 +1,6 @@
 """The end of a fit as arrays: what tests and intervals are made of."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import final
 
@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.residuals.evaluation import Array, Channel
+from identification.solving.loss import influence
+from identification.solving.task import Point, Task
 from identification.unknowns.unknown import Unknown
 
 
@@ -45,3 +47,37 @@ class Minimum:
         """Name of a channel for a sentence."""
         records = {c.record for c in self.channels}
         return channel.signal if len(records) == 1 else f"{channel.signal}[{channel.record}]"
+
+
+def minimum(task: Task, point: Point) -> Minimum:
+    """The arrays of a solved task.
+
+    The derivative of the influence function psi = rho' r is taken as its mean over a channel
+    (Huber and Ronchetti, Robust Statistics, 2009, section 7.6), which is never negative in effect.
+    """
+    gain = np.ones(point.r.size)
+    if point.loss != "squares":
+        h = 1e-4
+        above, below = (influence(r, point.loss) * r for r in (point.r + h, point.r - h))
+        for channel in task.channels:
+            rows = channel.rows
+            gain[rows] = max(float(np.mean(above[rows] - below[rows])) / (2 * h), 0.05)
+    known = {s: sigma for s, sigma in task.noise.items() if s not in task.estimated}
+    return Minimum(
+        task.channels, task.unknowns.unknowns, task.unknowns.names, point.values, point.slope,
+        task.unknowns.at_bound(point.w), point.weights * point.r, point.J, gain,
+        point.evaluation.r, known,
+    )  # fmt: skip
+
+
+def trace(task: Task, found: Minimum) -> Callable[[Array], float]:
+    """How much weighted residuals change with the values: root of the sum of squares."""
+    sigma = task.sigma
+
+    def change(values: Array) -> float:
+        there = task.residuals.at(values)
+        if isinstance(there, str):
+            return float("inf")
+        return float(np.linalg.norm((there.r - found.raw) / sigma))
+
+    return change

@@ -1,0 +1,139 @@
+"""Excitation by design: a model that carries along what a motion would tell of its parameters.
+
+    S' = df/dx S + df/dp diag(p),           S(0) = dx0/dp diag(p)
+    Y  = dg/dx S + dg/dp diag(p)
+    I' = sum_y Y_y' Y_y / (sigma_y^2 h),    I(0) = 1/prior^2
+
+S are the sensitivities of the states to relative changes of the parameters, Y those of what is
+measured, y = g(x, u, p), every h with noise sigma_y, and I is Fisher's information.
+The smallest relative standard errors that any unbiased estimator can have of white noise are the
+roots of the diagonal of I^-1 (Cramer and Rao). `information`, the logarithm of det I over the
+number of parameters, is an output, so that an optimal control problem can make it large:
+`Problem(Phase(informative(model, ...), T=2.0), -at_end(lambda s: s.information), bounds=...)`.
+Source: Mehra, IEEE Trans. Autom. Control 19(6), 1974; Swevers et al., IEEE Trans. Robotics 13(5),
+1997 (excitation of robots).
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from symfric.foundation import checks
+from symfric.foundation.parameters import Variable
+from symfric.foundation.symbols import starts_of
+from symfric.model import Model, Output, check_model
+
+ERROR = 0.1
+"""Relative standard error from which typical magnitudes of the information are made."""
+
+
+def informative(
+    model: Model,
+    free: Iterable[str],
+    measured: Mapping[str, float],
+    *,
+    step: float,
+    prior: float = 1.0,
+) -> Model:
+    """`model` with sensitivities and information as states, and the output "information".
+
+    Args:
+        model: explicit, without algebraic variables and events, smooth enough to be optimised: the
+            free parameters are among its `p`, where their start values are what one knows before.
+        free: parameters that are to be identified, none of them zero.
+        measured: signal -> standard deviation of its noise in SI units: states or outputs.
+        step: sample time of the measurement [s].
+        prior: relative standard error of what is known before the measurement.
+
+    Limits: noise is white and the start state known; the information is that at the start values of
+    the parameters, so a design for a wide range takes `scenarios` of the problem.
+
+    Raises:
+        ValueError: an unknown parameter or signal, a parameter that is zero, a noise that is not
+            above zero, a model of another kind.
+    """
+    check_model("informative", model)
+    if model.ode is None or model.z or model.events:
+        such = "an explicit model without algebraic variables and events"
+        raise checks.refused("informative", such, model.name)
+    names = checks.names("informative: free", free, [v.name for v in model.p])
+    sigma = checks.named("informative: measured", measured, list(model.signals))
+    levels = [checks.number(f"informative: measured: {n}", s, above=0.0) for n, s in sigma.items()]
+    step = checks.number("informative: step", step, unit="s", above=0.0)
+    known = 1 / checks.number("informative: prior", prior, above=0.0) ** 2
+    p = [next(v for v in model.p if v.name == n) for n in names]
+    zero = [v.name for v in p if checks.as_number(v.start) in (None, 0.0)]
+    if zero:
+        raise checks.refused("informative: free", "start values that are not zero", zero[0])
+    scale = ca.diag(ca.vertcat(*(v.symbol for v in p)))
+    symbols, x = ca.vertcat(*(v.symbol for v in p)), model.vector("x")
+
+    S = [[_sensitivity(state, v) for v in p] for state in model.x]
+    sensitivity = ca.vertcat(*(ca.horzcat(*(v.symbol for v in row)) for row in S))
+    start = ca.jacobian(starts_of(model.x), symbols) @ scale
+    rate = ca.jacobian(model.ode, x) @ sensitivity + ca.jacobian(model.ode, symbols) @ scale
+    y = ca.vertcat(*(model.expression(n) for n in sigma))
+    Y = ca.jacobian(y, x) @ sensitivity + ca.jacobian(y, symbols) @ scale
+    growth = Y.T @ ca.diag(1 / ca.DM(levels) ** 2) @ Y / step
+
+    lower = [(i, j) for i in range(len(p)) for j in range(i + 1)]
+    entries = [_information(names[i], names[j], known * (i == j)) for i, j in lower]
+    information = ca.SX(len(p), len(p))
+    for (i, j), entry in zip(lower, entries, strict=True):
+        information[i, j] = information[j, i] = entry.symbol
+    told = Output(_log_det(information) / len(p), "1", "log det of the information per parameter")
+    flat = [(r, c) for r in range(len(model.x)) for c in range(len(p))]
+    return replace(
+        model,
+        name=f"informative {model.name}",
+        x=(*model.x, *(replace(S[r][c], start=start[r, c]) for r, c in flat), *entries),
+        ode=ca.vertcat(
+            model.ode, *(rate[r, c] for r, c in flat), *(growth[i, j] for i, j in lower)
+        ),
+        xdot=ca.SX(0, 1), residual=ca.SX(0, 1),
+        outputs={**model.outputs, "information": told},
+        holonomic=None, contacts=(), opening=None,
+    )  # fmt: skip
+
+
+def expected_errors(free: Sequence[str], motion: Mapping[str, Any]) -> dict[str, float]:
+    """Relative standard errors that a motion of an informative model makes possible.
+
+    Args:
+        free: its parameters, in the order in which they were given to `informative`.
+        motion: signals of the motion by name, such as a trajectory; their last values count.
+    """
+    I = np.zeros((len(free), len(free)))  # noqa: E741  (the letter of the literature)
+    for i, a in enumerate(free):
+        for j, b in enumerate(free[: i + 1]):
+            I[i, j] = I[j, i] = float(motion[_name(a, b)][-1])
+    return dict(zip(free, np.sqrt(np.diag(np.linalg.inv(I))).tolist(), strict=True))
+
+
+def _sensitivity(state: Variable, p: Variable) -> Variable:
+    doc = f"change of {state.name} with a relative change of {p.name}"
+    return Variable(f"S_{state.name}_{p.name}", state.unit, nominal=state.nominal, doc=doc)
+
+
+def _information(a: str, b: str, start: float) -> Variable:
+    return Variable(_name(a, b), "1", start=start, nominal=1 / ERROR**2, doc="Fisher information")
+
+
+def _name(a: str, b: str) -> str:
+    return f"I_{a}_{b}"
+
+
+def _log_det(A: ca.SX) -> ca.SX:
+    """Log det A of a symmetric positive matrix, by its Cholesky factor."""
+    n = A.shape[0]
+    L, total = ca.SX(n, n), ca.SX(0)
+    for j in range(n):
+        pivot = A[j, j] - sum(L[j, k] ** 2 for k in range(j))
+        L[j, j] = ca.sqrt(pivot)
+        total += ca.log(pivot)
+        for i in range(j + 1, n):
+            L[i, j] = (A[i, j] - sum(L[i, k] * L[j, k] for k in range(j))) / L[j, j]
+    return total

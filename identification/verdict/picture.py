@@ -1,0 +1,52 @@
+"""Pictures of what a fit is worth."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from identification.verdict.whiteness import Whiteness
+from symfric.foundation.panels import panels, save
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from identification.verdict.profile import Profile
+
+
+def plot_profile(found: "Profile", path: str | Path | None = None) -> "Figure":
+    """The rise of the cost over the value, with the limit of 95 %."""
+    figure, (axis,) = panels(1, width=5.5, height=3.2)
+    axis.plot(found.values, found.rise, "o-", ms=4, lw=1.3, label="profile")
+    axis.axhline(found.limit, color="C3", lw=1, ls="--", label="limit of 95 %")
+    axis.plot([found.best], [0.0], "k|", ms=14, label="fit")
+    for end in (found.low, found.high):
+        if end is not None:
+            axis.axvline(end, color="C3", lw=0.8, ls=":")
+    if found.logarithmic and found.values.max() > 5 * found.values.min():
+        axis.set_xscale("log")
+    top = max(1.6 * found.limit, 0.0)
+    axis.set_ylim(min(float(found.rise.min()), 0.0) - 0.05 * top, top)
+    axis.set_xlabel(f"{found.name} [{found.unit}]")
+    axis.set_ylabel("rise of the cost, in variances")
+    axis.set_title("\n".join(found.sentences), fontsize="small", wrap=True)
+    axis.legend(fontsize="small")
+    return save(figure, path)
+
+
+def plot_lags(found: Mapping[str, Whiteness], path: str | Path | None = None) -> "Figure":
+    """Autocorrelations of the residuals of each channel over the lag, with limits of 95 %."""
+    some = {name: w for name, w in found.items() if w.lags.size}
+    figure, axes = panels(max(1, len(some)), width=6.5, height=1.9)
+    for axis, (name, w) in zip(axes, some.items(), strict=False):
+        axis.fill_between(w.lags, w.low, w.high, color="0.85", label="white: 95 %")
+        axis.vlines(w.lags, 0.0, w.correlation, color="C0", lw=1.5)
+        axis.plot(w.lags, w.correlation, "o", color="C0", ms=3)
+        axis.axhline(0.0, color="k", lw=0.6)
+        axis.set_ylim(min(-0.3, float(np.min(w.correlation)) - 0.1), 1.05)
+        axis.set_ylabel(name)
+        axis.legend(fontsize="small", loc="upper right")
+    axes[0].set_title("autocorrelation of the residuals", fontsize="medium")
+    axes[-1].set_xlabel("lag [samples]")
+    return save(figure, path)

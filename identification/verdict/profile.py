@@ -1,0 +1,288 @@
+"""Profile likelihood: how badly the model fits if one value is held elsewhere and the rest adapt.
+
+    rise(c) = min over the others of  [cost(value = c) - cost at the minimum] / (s^2 kappa)
+
+s^2 is the variance of the weighted residuals and kappa the factor by which their colour widens the
+linear interval, so that the interval in which rise <= t^2 (Student's t, 95 %) agrees with that of
+`Covariance` where the model is linear, and is right also where it is not. Noise levels stay those
+of the fit. The value is walked away from its minimum to both sides, each point starting where the
+one before ended.
+Sources: Bates and Watts, Nonlinear Regression Analysis, 1988, chapter 6; Raue et al.,
+Bioinformatics 25(15), 2009.
+"""
+
+from dataclasses import dataclass
+from importlib import import_module
+from math import inf, isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from identification.residuals.evaluation import Array
+from identification.solving.task import Point, Task
+from identification.verdict.covariance import Covariance
+from symfric.foundation import checks
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FARTHEST = 12
+"""Most steps to one side."""
+FLAT = 0.02
+"""Share of the limit below which a profile counts as flat."""
+BLIND = 0.1
+"""First step, over the value, where the linear theory knows none."""
+EVALUATIONS = 30
+"""Of the residuals, for one point."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """The profile of one value.
+
+    Attributes:
+        name, unit: of the value.
+        best: where the fit has it.
+        values: in increasing order, `best` among them, shape (n,).
+        rise: increase of the cost in variances, shape (n,).
+        others: the values of all names at each point, shape (n, k).
+        names: of the columns of `others`.
+        limit: of the rise, at the ends of the 95 % interval.
+        low, high: 95 % interval; None where the limit was not reached.
+        logarithmic: whether steps were taken in the logarithm.
+        sentences: what a reader has to know: open or flat sides, a better minimum.
+    """
+
+    name: str
+    unit: str
+    best: float
+    values: Array
+    rise: Array
+    others: Array
+    names: tuple[str, ...]
+    limit: float
+    low: float | None
+    high: float | None
+    logarithmic: bool
+    sentences: tuple[str, ...]
+
+    def __str__(self) -> str:
+        ends = " to ".join("open" if e is None else f"{e:.4g}" for e in (self.low, self.high))
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return " ".join([f"{self.name}: {self.best:.4g}{unit}, 95 %: {ends}.", *self.sentences])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as plain data, ready for JSON."""
+        arrays = {n: getattr(self, n).tolist() for n in ("values", "rise", "others")}
+        return self.__dict__ | arrays | {n: list(getattr(self, n)) for n in ("names", "sentences")}
+
+    def plot(self, path: str | Path | None = None) -> "Figure":
+        """The rise over the value, with the limit of 95 % and the parabola of the linear theory.
+
+        Args:
+            path: image file.
+        """
+        from identification.verdict.picture import plot_profile  # noqa: PLC0415 (Matplotlib is slow)
+
+        return plot_profile(self, path)
+
+
+def profile(
+    task: Task, point: Point, covariance: Covariance, name: str, points: int = 5
+) -> Profile:
+    """Walk one value away from its minimum until the fit is worse than 95 % allow.
+
+    Args:
+        task, point: the solved task and its minimum.
+        covariance: its linear intervals; they give steps and the limit.
+        name: of the value.
+        points: about how many to each side.
+
+    Raises:
+        ValueError: an unknown name, or a value that was not fitted.
+    """
+    checks.choice("profile: name", name, task.unknowns.fitted)
+    points = checks.count("profile: points", points, least=2)
+    walk = _Walk.of(task, point, covariance, name)
+    down, up = (walk.side(direction, points) for direction in (-1, 1))
+    stations = [*down.stations[::-1], (walk.best, 0.0, point.values), *up.stations]
+    values = np.array([s[0] for s in stations])
+    rise = np.array([s[1] for s in stations])
+    low, high = (_crossing(walk, side.stations) for side in (down, up))
+    said = [*_said(walk, down, low, "below"), *_said(walk, up, high, "above")]
+    if rise.min() < -FLAT * walk.limit:
+        better = float(values[np.argmin(rise)])
+        said.append(f"The model fits better at {name} = {better:.4g}: the fit is no minimum.")
+    return Profile(
+        name, walk.unit, walk.best, values, rise, np.array([s[2] for s in stations]),
+        task.unknowns.names, walk.limit, low, high, walk.logarithmic, tuple(said),
+    )  # fmt: skip
+
+
+Station = tuple[float, float, Array]
+"""Value, rise, all values."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Side:
+    stations: list[Station]
+    why: str
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Walk:
+    """What stays the same along a profile."""
+
+    task: Task
+    point: Point
+    name: str
+    unit: str
+    index: int
+    own: int
+    best: float
+    step: float
+    scale: float
+    limit: float
+    logarithmic: bool
+
+    @staticmethod
+    def of(task: Task, point: Point, covariance: Covariance, name: str) -> "_Walk":
+        from scipy.special import stdtrit  # noqa: PLC0415  (SciPy is loaded by those who fit)
+
+        index, own = task.unknowns.names.index(name), task.unknowns.fitted.index(name)
+        unknown, best = task.unknowns.unknowns[own], float(point.values[index])
+        logarithmic = unknown.logarithmic and best > 0
+        error, white = covariance.standard_errors[index], covariance.white_errors[index]
+        colour = float((error / white) ** 2) if white > 0 and isfinite(error) else 1.0
+        t = float(stdtrit(covariance.freedom[index], 0.975)) if isfinite(error) else 1.96
+        size = abs(best) or unknown.scale
+        step = float(t * error) if isfinite(error) and error > 0 else BLIND * size
+        step = min(step / best, 1.0) if logarithmic else step
+        rows, n = point.r.size, task.unknowns.lower.size
+        variance = max(point.cost / max(rows - n, 1), 1e-300)
+        return _Walk(
+            task, point, name, unknown.unit, index, own, best, step, variance * colour, t**2,
+            logarithmic,
+        )  # fmt: skip
+
+    def at(self, distance: float) -> float:
+        """The value so far away."""
+        return self.best * float(np.exp(distance)) if self.logarithmic else self.best + distance
+
+    def side(self, direction: int, points: int) -> _Side:
+        """Stations on one side, nearest first, until the limit is crossed or nothing goes on."""
+        stations, w = list[Station](), self.point.w
+        distance, step = 0.0, self.step / (points - 1)
+        unknown = self.task.unknowns.unknowns[self.own]
+        for count in range(FARTHEST + points):
+            distance += step
+            c = self.at(direction * distance)
+            if not unknown.lower <= c <= unknown.upper:
+                return _Side(stations, "its bound")
+            try:
+                found = held_at(self.task, w, self.index, self.own, c)
+            except KeyboardInterrupt:
+                return _Side(stations, "an interruption")
+            if isinstance(found, str):
+                return _Side(stations, f"a value with which there is no fit ({found})")
+            w = found.w
+            rise = (found.cost - self.point.cost) / self.scale
+            stations.append((c, rise, found.values))
+            if rise >= self.limit:
+                return _Side(stations, "")
+            if count >= points:  # the linear theory was too short: go faster
+                step *= 1.6
+        return _Side(stations, "the end of the search")
+
+
+def held_at(task: Task, w: Array, index: int, own: int, c: float) -> Point | str:
+    """The minimum over all others with value `index` held at c, from `w`; or why there is none.
+
+    The coordinate of the value is eliminated: w_own solves value(w) = c, and with it the column of
+    the derivatives, J_j - J_own (dvalue/dw_j) / (dvalue/dw_own).
+    """
+    optimize: Any = import_module("scipy.optimize")  # slow to import, and seldom needed
+    box, others = task.unknowns, np.arange(w.size) != own
+    best: list[Point] = []
+    why = [""]
+
+    def at(rest: Array) -> Point | None:
+        whole = w.copy()
+        whole[others] = rest
+        there = _solved(task, whole, index, own, c)
+        if there is None:
+            why[0] = f"{box.fitted[own]} = {c:.4g} is outside its order or its bounds"
+            return None
+        found = task.at(there)
+        if isinstance(found, str):
+            why[0] = found
+            return None
+        if not best or found.cost < best[0].cost:
+            best[:] = [found]
+        return found
+
+    def residuals(rest: Array) -> Array:
+        found = at(rest)
+        if found is None:
+            return np.full(len(box.names) + 1, 1e150 if best else inf)
+        return found.reduced[0]
+
+    def slopes(rest: Array) -> Array:
+        found = at(rest)
+        if found is None:
+            raise ArithmeticError(why[0])
+        J, slope = found.reduced[1], found.slope[index]
+        return J[:, others] - np.outer(J[:, own], slope[others] / slope[own])
+
+    start = np.clip(w[others], box.lower[others], box.upper[others])
+    if not others.any() or at(start) is None:
+        at(start)
+        return best[0] if best else why[0]
+    optimize.least_squares(
+        residuals, start, slopes, bounds=(box.lower[others], box.upper[others]), x_scale="jac",
+        ftol=1e-7, xtol=1e-7, gtol=1e-12, max_nfev=EVALUATIONS,
+    )  # fmt: skip
+    return best[0]
+
+
+def _solved(task: Task, near: Array, index: int, own: int, c: float) -> Array | None:
+    """`near` with the coordinate `own` moved so that the value is c; None outside its box."""
+    box, w = task.unknowns, near.copy()
+    for _ in range(30):
+        miss = c - float(box.values(w)[index])
+        if abs(miss) <= 1e-10 * max(abs(c), 1e-300):
+            break
+        w[own] += max(-1e3, min(1e3, miss / float(box.slope(w)[index, own])))
+    if not box.lower[own] <= w[own] <= box.upper[own]:
+        return None
+    return np.asarray(w, float)
+
+
+def _crossing(walk: _Walk, stations: list[Station]) -> float | None:
+    """Where the root of the rise, nearly straight, meets that of the limit."""
+    last = (walk.best, 0.0)
+    for value, rise, _ in stations:
+        if rise >= walk.limit:
+            a, b = (float(np.sqrt(max(x, 0.0))) for x in (last[1], rise))
+            share = (float(np.sqrt(walk.limit)) - a) / max(b - a, 1e-300)
+            if walk.logarithmic:
+                return float(last[0] * (value / last[0]) ** share)
+            return last[0] + share * (value - last[0])
+        last = (value, rise)
+    return None
+
+
+def _said(walk: _Walk, side: _Side, end: float | None, where: str) -> list[str]:
+    """Why a side is open."""
+    if end is not None:
+        return []
+    if not side.stations:
+        return [f"{walk.name} is open {where}: it meets {side.why} at once."]
+    value, rise, _ = side.stations[-1]
+    how = "flat" if rise < FLAT * walk.limit else "open"
+    share = f"the rise is {100 * max(rise, 0.0) / walk.limit:.0f} % of the limit"
+    return [f"{walk.name} is {how} {where}: at {value:.4g}, near {side.why}, {share}."]

@@ -1,0 +1,94 @@
+"""Verdict and intervals of a task that was solved: a decay with noise."""
+
+import numpy as np
+import pytest
+from linear_fits import STEP, Decay, ar1, solved
+
+from identification.data.findings import Finding, Findings
+from identification.verdict.covariance import covariance
+from identification.verdict.judge import judge
+from identification.verdict.picture import plot_lags
+from identification.verdict.profile import profile
+from symfric.foundation.status import Status
+
+T = STEP * np.arange(300)
+TRUE = 2.0 * np.exp(-T / 1.5) + 0.3
+
+
+def test_right_model_is_good() -> None:
+    task, point = solved(Decay(T, TRUE + 0.02 * ar1(300, 0.0, 1)))
+    verdict = judge(task, point)
+    assert verdict.good
+    assert verdict.status(Status.SOLVED) is Status.SOLVED
+    assert verdict.effective == {"x": 300.0}
+    assert plot_lags(verdict.whiteness).axes
+
+
+def test_coloured_noise_alone_is_not_doubtful_and_widens() -> None:
+    task, point = solved(Decay(T, TRUE + 0.02 * ar1(300, 0.9, 1)))
+    verdict, found = judge(task, point), covariance(task, point)
+    assert verdict.good
+    assert any("coloured" in s for s in verdict.sentences)
+    assert (found.standard_errors > 2 * found.white_errors).all()
+
+
+def test_wrong_model_is_doubtful() -> None:
+    task, point = solved(Decay(T, TRUE + 0.05 * np.sin(T) + 0.02 * ar1(300, 0.0, 1)))
+    verdict = judge(task, point)
+    assert verdict.status(Status.SOLVED) is Status.DOUBTFUL
+    assert verdict.status(Status.MAX_ITERATIONS) is Status.MAX_ITERATIONS
+    assert "depend on force" in verdict.sentences[0]
+
+
+def test_no_physics_is_implausible() -> None:
+    noise = ar1(300, 0.0, 1)
+    task, point = solved(Decay(T, noise))
+    verdict = judge(task, point)
+    assert verdict.status(Status.SOLVED) is Status.IMPLAUSIBLE
+    assert "unexplained" in verdict.sentences[0]
+    task, point = solved(Decay(T, TRUE + 0.02 * noise))
+    error = Finding("frozen", 0, "x", "x stands still.", 1.0, 2.0, "error")
+    warning = Finding("spike", 0, "x", "x jumps.", 1.0, 1.0, "warning")
+    assert judge(task, point, Findings((error,))).nonsense == ("x stands still.",)
+    assert judge(task, point, Findings((warning,))).good
+
+
+@pytest.mark.parametrize("loss", ["squares", "huber", "cauchy"])
+def test_robust_losses_have_the_errors_of_their_influence(loss: str) -> None:
+    """Scatter over seeds, a twentieth of the samples far off."""
+    found, errors = list[float](), list[float]()
+    for seed in range(40):
+        r = np.random.default_rng(1000 + seed)
+        noise = np.where(r.random(300) < 0.05, 20.0, 1.0) * ar1(300, 0.0, seed)
+        task, point = solved(Decay(T, TRUE + 0.01 * noise), loss=loss)
+        found.append(float(point.values[2]))
+        errors.append(float(covariance(task, point).standard_errors[2]))
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(found), rel=0.35)
+
+
+def test_profile_agrees_with_its_linear_interval_where_the_model_is_linear() -> None:
+    task, point = solved(Decay(T, TRUE + 0.02 * ar1(300, 0.9, 1)))
+    linear = covariance(task, point)
+    found = profile(task, point, linear, "b")
+    i = linear.names.index("b")
+    width = (linear.high - linear.low)[i]
+    assert found.low is not None
+    assert found.high is not None
+    assert found.high - found.low == pytest.approx(width, rel=0.15)
+    assert found.sentences == ()
+    assert found.plot().axes
+
+
+def test_profile_is_crooked_where_the_model_is() -> None:
+    """A record of a third of the time constant: it may be far longer, not far shorter."""
+    short = slice(0, 25)
+    task, point = solved(Decay(T[short], TRUE[short] + 0.05 * ar1(25, 0.0, 4)))
+    linear = covariance(task, point)
+    found = profile(task, point, linear, "tau")
+    assert found.high is None
+    assert found.low is not None
+    assert "tau is open above" in found.sentences[0]
+    rise = found.rise[found.values > found.best]
+    assert (np.diff(rise) > -1e-6).all()
+    with pytest.raises(ValueError, match="profile: name"):
+        profile(task, point, linear, "c")
