@@ -10,13 +10,13 @@ import casadi as ca
 
 from symfric.codegen.block import Block
 from symfric.codegen.folding import runtime_parameters
-from symfric.codegen.held_step import force_of_rate, held_step
+from symfric.codegen.held_step import advanced, force_of_rate
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_casadi
 from symfric.foundation.parameters import Variable, check_names, parameters, symbolise
 from symfric.foundation.units import turned
-from symfric.laws import Law, Sum, law_name
-from symfric.laws.base.law import check_law, chosen
+from symfric.laws import Law, law_name
+from symfric.laws.base.law import check_law
 from symfric.model import Output, Variables
 
 STEP_SIZE = 1e-3
@@ -154,7 +154,7 @@ def _step(law: Law, runtime: Variables, h: float | None, where: str) -> Block:
     z = ca.vertcat(*(state.symbol for state in states))
     given = _given(inputs)
     rate = ca.SX(law.rate(v.symbol, N.symbol, z, **given))
-    end, mean, mean_rate = _advanced(law, inputs, z, rate, duration, where)
+    end, mean, mean_rate = advanced(law, v.symbol, N.symbol, z, rate, given, duration, where)
     force, r = force_of_rate(ca.SX(law.force(v.symbol, N.symbol, z, **given)), rate, z)
     mean_force = ca.substitute(force, ca.vertcat(z, r), ca.vertcat(mean, mean_rate))
     return Block(
@@ -167,35 +167,6 @@ def _step(law: Law, runtime: Variables, h: float | None, where: str) -> Block:
         resets={"init_sliding": (ca.SX(law.steady_state(v.symbol, N.symbol)), SLIDING)},
         constants={} if h is None else {"h": float(size.start)},
     )
-
-
-def _advanced(
-    law: Law, inputs: Variables, z: ca.SX, rate: ca.SX, h: ca.SX | float, where: str
-) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """States at the end of the step, their means, and their mean rates; of a sum term by term."""
-    if isinstance(law, Sum):
-        terms = zip(law.laws, law.terms(z), law.terms(rate), strict=True)
-        parts = [
-            _advanced(term, inputs, own, rates, h, where)
-            for term, (_, own), (_, rates) in terms
-            if term.states
-        ]
-        end, mean, mean_rate = (ca.vertcat(*column) for column in zip(*parts, strict=True))
-        return end, mean, mean_rate
-    v, N, given = inputs[0].symbol, inputs[1].symbol, chosen(law, _given(inputs))
-    known = law.held_step(v, N, z, h)
-    if known is not None:
-        end, mean = map(ca.SX, known)
-        return end, mean, (end - z) / h
-    if law.switches(v, N, z, **given):
-        raise ValueError(
-            f"{where}: expected a law without modes, or one that knows its step, got one whose "
-            "modes follow zero crossings within the step; karnopp and leine_switch with "
-            "form = 'original' are functions of v, N and F_e"
-        )
-    rest = ca.SX(law.steady_state(v, N))
-    end, mean, mean_rate = held_step(rate, z, h, rest, where)
-    return end, mean, mean_rate
 
 
 def _check_at_rest(block: Block, where: str) -> None:

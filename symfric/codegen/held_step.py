@@ -1,11 +1,58 @@
 """The states of a law over a step in which velocity and load are held."""
 
+from collections.abc import Mapping
+
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.graph import LEAVES, graph, rebuild
+from symfric.foundation.numeric import Scalar
 from symfric.integrator.methods.exponential import phi1_phi2
+from symfric.laws import Law, Sum
+from symfric.laws.base.law import chosen
+
+
+def advanced(
+    law: Law,
+    v: Scalar,
+    N: Scalar,
+    z: ca.SX,
+    rate: ca.SX,
+    given: Mapping[str, Scalar],
+    h: ca.SX | float,
+    where: str,
+) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """States of a law after a step of `h` [s], their means, and their mean rates.
+
+    With v, N and the further inputs `given` held; of a sum term by term, by what the law knows of
+    its step, else by `held_step`.
+
+    Raises:
+        ValueError: modes that follow zero crossings within the step; as `held_step`.
+    """
+    if isinstance(law, Sum):
+        terms = zip(law.laws, law.terms(z), law.terms(rate), strict=True)
+        parts = [
+            advanced(term, v, N, own, rates, given, h, where)
+            for term, (_, own), (_, rates) in terms
+            if term.states
+        ]
+        end, mean, mean_rate = (ca.vertcat(*column) for column in zip(*parts, strict=True))
+        return end, mean, mean_rate
+    known = law.held_step(v, N, z, h)
+    if known is not None:
+        end, mean = map(ca.SX, known)
+        return end, mean, (end - z) / h
+    if law.switches(v, N, z, **chosen(law, given)):
+        raise ValueError(
+            f"{where}: expected a law without modes, or one that knows its step, got one whose "
+            "modes follow zero crossings within the step; karnopp and leine_switch with "
+            "form = 'original' are functions of v, N and F_e"
+        )
+    rest = ca.SX(law.steady_state(v, N))
+    end, mean, mean_rate = held_step(rate, z, h, rest, where)
+    return end, mean, mean_rate
 
 
 def held_step(rate: ca.SX, z: ca.SX, h: ca.SX | float, rest: ca.SX, where: str) -> list[ca.SX]:

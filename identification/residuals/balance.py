@@ -1,0 +1,277 @@
+"""Balance of forces of any model, with measured motion in the place of unknown motion."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.residuals.imposed import imposed_step
+from identification.residuals.sampled import Equations
+from symfric.foundation.numeric import is_number
+from symfric.foundation.parameters import Variable
+from symfric.foundation.symbols import stacked, starts_of, symbols_of
+from symfric.laws import Law
+from symfric.laws.base.law import check_law
+from symfric.model import Model
+from symfric.model.contact import Contact
+
+Array = NDArray[np.float64]
+
+ALIKE = 1e-6
+"""Part of a direction of force, relative to it, that no other one has as well."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Coordinate:
+    """A degree of freedom as it is measured.
+
+    Attributes:
+        position: state of the model, or None where its equations know the rate only.
+        rate: state of the model.
+        a: symbol of the acceleration.
+    """
+
+    position: Variable | None
+    rate: Variable
+    a: ca.SX
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One balance: the input it is solved for, else the coordinate that nothing drives.
+
+    Attributes:
+        signal: name of the input, or "balance of <rate>".
+        unit: of the input, or of the balance.
+        input: number of the input among those of the model, or None.
+        coordinate: number of the coordinate whose motion explains it.
+        slips: numbers of the contacts whose friction enters it.
+    """
+
+    signal: str
+    unit: str
+    input: int | None
+    coordinate: int
+    slips: tuple[int, ...]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """What inverse dynamics evaluates.
+
+    Attributes:
+        rows: what the rows of `equations` are.
+        slips: sliding velocities of the contacts, SX (contacts, 1) in w, y and p.
+        equations: with w = (positions, rates, accelerations, inputs, time).
+    """
+
+    rows: tuple[Row, ...]
+    slips: ca.SX
+    equations: Equations
+
+
+def coordinates(model: Model, where: str) -> tuple[Coordinate, ...]:
+    """The degrees of freedom of `model`: pairs x' = v, and states that are rates alone.
+
+    Raises:
+        ValueError: an implicit model.
+    """
+    if model.ode is None:
+        raise ValueError(f"{where}: expected explicit equations, got a residual; use Shooting()")
+    if model.holonomic is not None:
+        n, x = model.holonomic.n, model.x
+        return tuple(Coordinate(x[i], x[n + i], model.holonomic.a[i]) for i in range(n))
+    own = {v.name for c in model.contacts for v in c.states}
+    motion = [(k, v) for k, v in enumerate(model.x) if v.name not in own]
+    pairs = {
+        i: j for i, _ in motion for j, v in motion if i != j and ca.is_equal(model.ode[i], v.symbol)
+    }
+    rates = dict.fromkeys(j for j in pairs.values())
+    position = {j: model.x[i] for i, j in pairs.items()}
+    return tuple(
+        Coordinate(position.get(k), v, model.xdot[k])
+        for k, v in motion
+        if k in rates or k not in pairs
+    )
+
+
+def measured(model: Model, found: Sequence[Coordinate]) -> ca.SX:
+    """The symbols w: positions (zero without one), rates, accelerations, inputs, time."""
+    q = [ca.SX.sym("none") if c.position is None else c.position.symbol for c in found]
+    v, a = symbols_of(c.rate for c in found), stacked(c.a for c in found)
+    return ca.vertcat(*q, v, a, model.vector("u"), model.t)
+
+
+def balance(
+    model: Model, names: Sequence[str], found: Sequence[Coordinate], typical: Array, where: str
+) -> Balance:
+    """The balance of forces of `model`, its parameters `names` as unknowns.
+
+        r = u needed for the measured motion - u measured          rows that an input drives
+        r = forces that the measured motion leaves unexplained     the others
+
+    Where each input drives one coordinate of its own, r is its balance over the gain of the input.
+    Else, and in mechanisms with constraints, the inputs are algebraic unknowns beside the
+    multipliers, and as many coordinates as nothing drives bear the rest. States of laws follow the
+    measured sliding velocity (`imposed_step`).
+
+    Args:
+        model: explicit equations or a mechanism.
+        names: of its parameters that are free; the others have their start values.
+        found: `coordinates` of the model.
+        typical: a value of w (`measured`), at which directions of force are compared.
+        where: begins the messages.
+
+    Raises:
+        ValueError: more inputs than the coordinates can bear; law states with modes that only a
+            simulation follows.
+    """
+    put = _Closed(model, [v for v in model.p if v.name not in names])
+    w, z = measured(model, found), stacked(v.symbol for c in model.contacts for v in c.states)
+    p = stacked(v.symbol for v in model.p if v.name in names)
+    e, e_open, g, units = _balances(model, found)
+    e = put(e)
+    gains = -ca.jacobian(e_open, model.vector("u"))
+    forces = stacked(c.force for c in model.contacts)
+    rubs, drives = _pattern(ca.jacobian(e_open, forces)), _pattern(gains)
+    phi = None if model.holonomic is None else model.holonomic.phi
+    y, guess = model.vector("z"), [_number(v.start, v.nominal) for v in model.z]
+    simple = (drives.sum(0) == 1).all() and (drives.sum(1) <= 1).all()
+    if simple and (phi is None or phi.is_empty()):
+        r = [e[i] / gains[i, int(k[0])] if (k := np.flatnonzero(on)).size else e[i]
+             for i, on in enumerate(drives)]  # fmt: skip
+        bearing = [i for i, on in enumerate(drives) if not on.any()]
+        driven = {int(np.flatnonzero(on)[0]): i for i, on in enumerate(drives) if on.any()}
+        order = [*driven.values(), *bearing]
+        rows = put(stacked(r[i] for i in order))
+        inputs: list[int] = list(driven)
+    else:
+        start = np.array([_number(v.start, 1.0) for v in model.p])
+        bearing = _bearing(model, put(gains), w, typical, start, where)
+        needed = ca.SX.sym("needed", len(model.u))
+        rest = ca.SX.sym("rest", len(bearing))
+        selected = ca.DM.eye(len(found))[:, bearing]
+        free = ca.substitute(ca.vertcat(e, put(g)), model.vector("u"), needed)
+        g = free - ca.vertcat(ca.mtimes(selected, rest), ca.SX.zeros(g.numel()))
+        y, guess = ca.vertcat(needed, rest, y), [*[0.0] * (len(model.u) + len(bearing)), *guess]
+        rows = ca.vertcat(needed - model.vector("u"), rest)
+        inputs = list(range(len(model.u)))
+        on = [int(np.flatnonzero(drives[:, k])[0]) if drives[:, k].any() else 0 for k in inputs]
+        order = [*on, *bearing]
+        rubs = np.ones_like(rubs)
+    known = [
+        Row(model.u[k].name, model.u[k].unit, k, i, _true(rubs[i]))
+        for k, i in zip(inputs, order, strict=False)
+    ]
+    rest_of = [
+        Row(f"balance of {found[i].rate.name}", units[i], None, i, _true(rubs[i])) for i in bearing
+    ]
+    steps = _states(model.contacts, w, y, put, where)
+    equations = Equations(w, p, rows, z, y, put(g), *steps, guess=tuple(guess))
+    slips = put(stacked(c.slip for c in model.contacts))
+    return Balance((*known, *rest_of), slips, equations)
+
+
+def _balances(model: Model, found: Sequence[Coordinate]) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
+    """Balances of the coordinates, the same with open contacts, other equations, units."""
+    mechanics, opened = model.holonomic, model.open.holonomic
+    if mechanics is None or opened is None:
+        rates, open_rates = ca.SX(model.ode), ca.SX(model.open.ode)
+        place = {v.name: k for k, v in enumerate(model.x)}
+        at = [place[c.rate.name] for c in found]
+        there = {v.name: k for k, v in enumerate(model.open.x)}
+        a = stacked(c.a for c in found)
+        closed = a - stacked(rates[k] for k in at)
+        bare = a - stacked(open_rates[there[c.rate.name]] for c in found)
+        units = [f"{c.rate.unit}^2" if c.rate.unit.endswith("/s") else "" for c in found]
+        return closed, bare, ca.SX(model.alg), units
+    n, m = mechanics.n, mechanics.phi.numel()
+    units = ["N m" if c.rate.unit.startswith("rad") else "N" for c in found]
+    return mechanics.implicit[:n, 0], opened.implicit[:n, 0], mechanics.implicit[n + m :, 0], units
+
+
+def _states(
+    contacts: Sequence[Contact], w: ca.SX, y: ca.SX, put: "_Closed", where: str
+) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Start, step and later symbols of the states of all laws."""
+    later, h = ca.SX.sym("later", w.numel() + y.numel()), ca.SX.sym("h")
+    now, start, step = ca.vertcat(w, y), list[ca.SX](), list[ca.SX]()
+
+    for c in contacts:
+        if not c.states:
+            continue
+        point = [put(x) for x in (c.slip, c.N, *c.given.values())]
+        then = [ca.substitute(x, now, later) for x in point]
+        names = list(c.given)
+        before, after = ((x[0], x[1], dict(zip(names, x[2:], strict=True))) for x in (point, then))
+        check_law(f"{where}: contact '{c.name}'", c.law)
+        law, symbols = cast(Law, c.law), symbols_of(c.states)
+        start.append(put(ca.SX(law.steady_state(c.slip, c.N))))
+        made = imposed_step(law, symbols, before, after, h, f"{where}: contact '{c.name}'")
+        step.append(put(made))
+    return stacked(start), stacked(step), ca.vertcat(later, h)
+
+
+@final
+class _Closed:
+    """Puts laws in the place of friction forces, and numbers in that of held parameters."""
+
+    def __init__(self, model: Model, held: Sequence[Variable]) -> None:
+        self.force = stacked(c.force for c in model.contacts)
+        self.friction = stacked(c.friction for c in model.contacts)
+        self.held, self.numbers = symbols_of(held), ca.SX(starts_of(held))
+        self.depth = len(model.contacts)
+
+    def __call__(self, expression: ca.SX) -> ca.SX:
+        found = ca.SX(expression)
+        for _ in range(self.depth):
+            if not ca.depends_on(found, self.force):
+                break
+            found = ca.substitute(found, self.force, self.friction)
+        return ca.substitute(found, self.held, self.numbers) if self.held.numel() else found
+
+
+def _bearing(
+    model: Model, gains: ca.SX, w: ca.SX, typical: Array, p: Array, where: str
+) -> list[int]:
+    """Coordinates that bear what neither inputs nor constraints can."""
+    directions = gains
+    if model.holonomic is not None:
+        q = model.vector("x")[: model.holonomic.n, 0]
+        directions = ca.horzcat(directions, ca.jacobian(model.holonomic.phi, q).T)
+    at = ca.Function("directions", [w, model.vector("p")], [ca.densify(directions)])
+    pushes = at(typical, p).full()
+    pushes /= np.maximum(np.linalg.norm(pushes, axis=0), 1e-300)
+    n, count = pushes.shape
+    if count > n or (count and np.linalg.svd(pushes, compute_uv=False)[-1] < ALIKE):
+        raise ValueError(
+            f"{where}: expected inputs that the motion tells apart, got {len(model.u)} inputs and "
+            f"{count - len(model.u)} constraints on {n} coordinates; hold or remove an input"
+        )
+    chosen = list[int]()
+    taken = np.linalg.qr(pushes)[0] if count else np.zeros((n, 0))
+    for _ in range(n - count):
+        k = int(np.argmax(1.0 - np.sum(taken**2, axis=1)))
+        chosen.append(k)
+        new = np.eye(n)[:, k] - taken @ taken[k]
+        taken = np.column_stack([taken, new / np.linalg.norm(new)])
+    return chosen
+
+
+def _pattern(slopes: ca.SX) -> NDArray[np.bool_]:
+    """Where a matrix has entries at all."""
+    return np.array(ca.DM(slopes.sparsity(), 1).full() != 0).reshape(slopes.shape)
+
+
+def _true(row: NDArray[np.bool_]) -> tuple[int, ...]:
+    return tuple(int(k) for k in np.flatnonzero(row))
+
+
+def _number(start: object, otherwise: float) -> float:
+    return float(start) if is_number(start) else otherwise  # type: ignore[arg-type]

@@ -1,0 +1,60 @@
+"""A law with states under imposed velocity and normal force: one step from sample to sample."""
+
+from collections.abc import Mapping
+
+import casadi as ca
+
+from symfric.codegen.held_step import advanced
+from symfric.foundation.numeric import Scalar
+from symfric.laws import Law
+
+
+def imposed_step(
+    law: Law,
+    z: ca.SX,
+    before: tuple[Scalar, Scalar, Mapping[str, Scalar]],
+    after: tuple[Scalar, Scalar, Mapping[str, Scalar]],
+    h: Scalar,
+    where: str,
+) -> ca.SX:
+    """States of `law` one sample later, (nz, 1).
+
+        z' = rate(z, v(t), N(t)),   v, N and further inputs linear between the samples
+
+    Two steps with the mean velocity and load of each held: exact exponentials for bristles, exact
+    event steps for elements that yield, second order elsewhere (`symfric.codegen.held_step`). They
+    meet in the middle, or where the velocity passes through zero, so that no step sees two
+    directions.
+
+    Args:
+        law: with states; its parameters may be symbols.
+        z: SX symbols of its states.
+        before, after: velocity, normal force and further inputs at the two samples.
+        h: sample interval [s].
+        where: begins the message of an error.
+
+    Raises:
+        ValueError: a law whose modes only a simulation can follow, or whose states act on each
+            other in a circle.
+    """
+    v, N, size = (ca.SX.sym(name) for name in ("v", "N", "h"))
+    names = list(before[2])
+    given = {name: ca.SX.sym(name) for name in names}
+    rate = ca.SX(law.rate(v, N, z, **given))
+    end = advanced(law, v, N, z, rate, given, size, where)[0]
+    inner = ca.vertcat(v, N, *given.values())
+
+    first, last = (_stacked(point, names) for point in (before, after))
+    crosses = first[0] * last[0] < 0
+    share = ca.if_else(crosses, first[0] / (first[0] - last[0] + (1 - crosses)), 0.5)
+    middle = first + share * (last - first)
+    middle[0] = ca.if_else(crosses, 0, middle[0])
+    old = ca.vertcat(inner, size)
+    half = ca.substitute(end, old, ca.vertcat((first + middle) / 2, share * h))
+    new = ca.vertcat((middle + last) / 2, (1 - share) * h, half)
+    return ca.substitute(end, ca.vertcat(old, z), new)
+
+
+def _stacked(point: tuple[Scalar, Scalar, Mapping[str, Scalar]], names: list[str]) -> ca.SX:
+    v, N, given = point
+    return ca.vertcat(ca.SX(v), ca.SX(N), *(ca.SX(given[name]) for name in names))

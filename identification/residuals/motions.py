@@ -1,0 +1,209 @@
+"""Measured motion of a model: positions, rates, accelerations and inputs of one record."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.data.record import Record
+from identification.residuals.balance import Balance, Coordinate
+from identification.signals.differentiate import derivatives, uncertain, velocity_noise
+from identification.signals.filters import Decimation, Filter, choose_filter
+from symfric.model import Model
+
+Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
+
+FEWEST = 10
+"""Equations that a signal of a record must leave."""
+
+Raw = tuple[Array | None, Array | None]
+"""Measured position and rate of a coordinate."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What one record says about a model, its disturbed ends cut off.
+
+    Attributes:
+        name: of the record.
+        t: times (n,) [s].
+        step: sample interval [s].
+        w: positions, rates, accelerations, inputs, time, shape (nw, n).
+        inputs: rows of `w` with the inputs.
+        forces: the inputs over the whole record, with its times, for a dead time.
+        noise: standard deviations of the filtered rates.
+        filter: what was used.
+    """
+
+    name: str
+    t: Array
+    step: float
+    w: Array
+    inputs: slice
+    forces: tuple[Array, Array]
+    noise: Array
+    filter: Filter
+
+    def of(self, coordinate: int) -> tuple[Array, Array, Array]:
+        """Position, rate and acceleration of a coordinate."""
+        count = self.noise.size
+        return self.w[coordinate], self.w[count + coordinate], self.w[2 * count + coordinate]
+
+
+def measure(
+    model: Model,
+    found: Sequence[Coordinate],
+    record: Record,
+    called: Mapping[str, str],
+    filter: Filter | None,
+) -> Motion:
+    """Differentiate a record with the channels that the model needs.
+
+    Args:
+        model: its `found` coordinates.
+        record: equally spaced samples.
+        called: name in the model -> channel, where they differ.
+        filter: None: that for the fastest input, without one for the fastest motion.
+
+    Raises:
+        ValueError: missing channels, unequal intervals.
+    """
+    step = record.uniform().step
+    _check_channels(model, found, record, called)
+    forces = [record[called.get(u.name, u.name)] for u in model.u]
+    raw: list[Raw] = []
+    for c in found:
+        names = [None if s is None else called.get(s.name, s.name) for s in (c.position, c.rate)]
+        x, v = (record[n] if n is not None and n in record else None for n in names)
+        raw.append((x, v))
+    chosen = filter or _filter_of(forces, raw, step)
+    motion: list[tuple[Array, Array, Array]] = []
+    noise: list[float] = []
+    for x, v in raw:
+        base = x if x is not None else np.zeros(record.size) if v is None else v
+        motion.append(derivatives(base, v, step, chosen))
+        noise.append(velocity_noise(base, v, step, chosen))
+    cut = chosen.trim(step)
+    inside = slice(cut, max(cut, record.size - cut))
+    rows = [part[k][inside] for k in range(3) for part in motion]
+    inputs = slice(len(rows), len(rows) + len(forces))
+    rows += [signal[inside] for signal in (*forces, record.time)]
+    whole = record.time, np.array(forces).reshape(len(forces), -1)
+    return Motion(
+        record.name, record.time[inside], step, np.vstack(rows), inputs, whole,
+        np.array(noise), chosen,
+    )  # fmt: skip
+
+
+def _check_channels(
+    model: Model, found: Sequence[Coordinate], record: Record, called: Mapping[str, str]
+) -> None:
+    """Refuse a record in which the motion or an input of the model is missing."""
+    known = ca.vertcat(ca.SX(0, 1) if model.ode is None else model.ode, model.alg)
+    missing: list[str] = []
+    for c in found:
+        needed = c.rate if c.position is None else c.position
+        has_rate = called.get(c.rate.name, c.rate.name) in record
+        only_rate = has_rate and not ca.depends_on(known, needed.symbol)
+        if called.get(needed.name, needed.name) not in record and not only_rate:
+            missing.append(called.get(needed.name, needed.name))
+    missing += [n for u in model.u if (n := called.get(u.name, u.name)) not in record]
+    if missing:
+        raise ValueError(
+            f"data '{record.name}': expected channels {', '.join(missing)} for the inverse "
+            f"dynamics of '{model.name}', got {', '.join(record.signals)}; rename columns, or use "
+            "Shooting() for motion that is not measured"
+        )
+
+
+def _filter_of(forces: Sequence[Array], raw: Sequence[Raw], step: float) -> Filter:
+    """The filter for the fastest force; without one, for the fastest motion."""
+    signals = list(forces)
+    for x, v in () if signals else raw:
+        signals += [v] if v is not None else [np.gradient(x, step)] if x is not None else []
+    return max((choose_filter(signal, step) for signal in signals), key=lambda f: f.cutoff)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One record with its decimation.
+
+    Attributes:
+        motion: what was measured.
+        decimation: low pass and thinning of its samples.
+        kept: for each row of the balance the decimated samples in use.
+    """
+
+    motion: Motion
+    decimation: Decimation
+    kept: tuple[Numbers, ...]
+
+    def equations(self, row: int, signals: Array) -> Array:
+        """Columns of `signals`, shape (n, k), thinned to the equations in use."""
+        return self.decimation.columns(signals)[self.kept[row]]
+
+    def times(self, row: int) -> Array:
+        """Times of the equations in use [s]."""
+        return self.decimation.centres(self.motion.t)[self.kept[row]]
+
+
+def piece(made: Balance, motion: Motion, model: Model) -> Piece:
+    """Decide which equations of a record are used.
+
+    Raises:
+        ValueError: too few are left.
+    """
+    n = motion.t.size
+    decimation = Decimation(n, motion.filter.decimation)
+    if not decimation.rows:
+        raise _too_short(motion, "all signals", 0)
+    slow = _slow(made, motion, model)
+    kept: list[Numbers] = []
+    for row in made.rows:
+        unsure = np.zeros(n, bool)
+        for k in row.slips:
+            unsure |= slow[k]
+        kept.append(np.flatnonzero(~decimation.touched(unsure)))
+        if kept[-1].size < FEWEST:
+            raise _too_short(motion, row.signal, kept[-1].size)
+    return Piece(motion, decimation, tuple(kept))
+
+
+def _slow(made: Balance, motion: Motion, model: Model) -> list[NDArray[np.bool_]]:
+    """For each contact the samples at which its law cannot be asked: none for laws with states."""
+    w, p = made.equations.w, made.equations.p
+    count, n = motion.noise.size, motion.t.size
+    start = np.array([float(v.start) for v in model.p if v.symbol.is_leaf() and _in(v.symbol, p)])
+    by_rate = ca.jacobian(made.slips, w[count : 2 * count, 0])
+    at = ca.Function("slips", [w, p], [ca.densify(made.slips), ca.densify(ca.vec(by_rate))])
+    if not model.contacts:
+        return []
+    v, slopes = (part.full() for part in at.map(n)(motion.w, np.repeat(start[:, None], n, axis=1)))
+    shape = (count, len(model.contacts))
+    gains = np.median(np.abs(slopes), axis=1).reshape(shape).T
+    found: list[NDArray[np.bool_]] = []
+    for k, c in enumerate(model.contacts):
+        noise = float(np.linalg.norm(gains[k] * motion.noise))
+        unsure = uncertain(v[k], noise, motion.step, motion.filter)
+        found.append(unsure & (not c.states))
+    return found
+
+
+def _in(symbol: ca.SX, column: ca.SX) -> bool:
+    return any(ca.is_equal(symbol, column[i]) for i in range(column.numel()))
+
+
+def _too_short(motion: Motion, signal: str, left: int) -> ValueError:
+    f = motion.filter
+    limit = "by the data" if f.v_min is None else f"{f.v_min:g} m/s"
+    return ValueError(
+        f"data '{motion.name}': expected at least {FEWEST} equations of {signal} after the filter "
+        f"({f.cutoff:g} Hz, decimation {f.decimation}, v_min {limit}), got {left}; raise the "
+        "cut-off, lower the decimation or v_min in InverseDynamics(filter=Filter(...))"
+    )

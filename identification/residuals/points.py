@@ -1,0 +1,233 @@
+"""Friction forces at given velocities: points of a friction curve, or a record over time."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.data.dataset import Dataset
+from identification.data.record import Record
+from identification.residuals.evaluation import Channel, Evaluation
+from identification.residuals.imposed import imposed_step
+from identification.residuals.sampled import Equations, Sampled
+from identification.unknowns.subject import Subject
+from identification.unknowns.unknown import Unknown
+from symfric.foundation import checks
+from symfric.foundation.parameters import symbolise
+from symfric.foundation.symbols import symbols_of
+from symfric.laws import Law
+from symfric.laws.base.law import FORCE, chosen
+
+Array = NDArray[np.float64]
+
+MODES = ("auto", "steady", "imposed")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Residuals F(v, N) - F_measured of velocities and forces, with or without time.
+
+    A static law is a curve through the points, and so is a law with states in steady sliding. Over
+    time, its states follow the measured velocity instead, z' = rate(z, v(t), N(t)), from steady
+    sliding at the first sample. Points without time at v = 0 exactly are break-away forces: they
+    are compared with the static level of the law.
+
+    Attributes:
+        v, F: channels of the sliding velocity and of the friction force, of one sign in sliding.
+        N: channel of the normal force, or a number [N]; None: the channel "N" where there is one,
+            else the normal force of the fit.
+        weight: channel of weights, such as numbers of samples behind a mean: rows are multiplied by
+            sqrt(weight / mean weight). None: all alike.
+        states: of a law that has some: "steady" sliding, "imposed" velocity over time, or "auto":
+            imposed where every record has a time.
+    """
+
+    v: str = "v"
+    F: str = "F"
+    N: str | float | None = None
+    weight: str | None = None
+    states: str = "auto"
+
+    def __post_init__(self) -> None:
+        for name in ("v", "F"):
+            checks.text(f"Points: {name}", getattr(self, name), "the name of a channel")
+        if self.N is not None and not isinstance(self.N, str):
+            checks.number("Points: N", self.N, unit="N", lower=0.0)
+        if self.weight is not None:
+            checks.text("Points: weight", self.weight, "the name of a channel")
+        checks.choice("Points: states", self.states, MODES)
+
+    def imposed(self, law: Law, data: Dataset) -> bool:
+        """Whether the states of `law` follow the velocity over time."""
+        timed = all(record.t is not None for record in data)
+        if self.states == "imposed" and not timed:
+            raise ValueError(
+                "Points: states: expected records over time for states under imposed velocity, "
+                "got points without time; use states='steady'"
+            )
+        return bool(law.states) and timed and self.states != "steady"
+
+    def prepare(
+        self, subject: Subject, data: Dataset, start: Mapping[str, float] | None = None
+    ) -> "PointRows":
+        """The residuals of `data`.
+
+        Raises:
+            ValueError: a subject without a law, missing channels, a law that needs an applied force
+                or whose static level break-away needs and it does not know.
+        """
+        del start
+        law = subject.law
+        if law is None:
+            raise ValueError("Points: expected a law to fit to points, got a model; give its law")
+        imposed = self.imposed(law, data)
+        load = float(subject.model.u[1].start) if len(subject.model.u) > 1 else 1.0
+        further = [i.name for i in law.inputs]
+        tables = [self._table(record, load, further) for record in data]
+        symbolic, variables = symbolise(law, *subject.names)
+        p = symbols_of(variables)
+        slides = _equations(symbolic, p, imposed).compiled()
+        breaks = None
+        if not imposed and any(table.rest.any() for table in tables):
+            breaks = _break_away(symbolic, p).compiled()
+        return PointRows(subject.names, slides, breaks, tuple(tables), imposed, _unit(data, self.F))
+
+    def _table(self, record: Record, load: float, further: list[str]) -> "Table":
+        v, F = record[self.v], record[self.F]
+        N = self._load(record, load)
+        if (N < 0).any():
+            k = int(np.argmax(N < 0))
+            raise ValueError(
+                f"data '{record.name}': normal force: expected >= 0 N, got {N[k]:g} at "
+                f"{record.place(k)}"
+            )
+        given = [record[name] for name in further]
+        weights = np.ones(v.size)
+        if self.weight is not None:
+            weights = record[self.weight]
+            if (weights < 0).any() or not weights.any():
+                raise ValueError(f"data '{record.name}': weight: expected >= 0 and some > 0")
+            weights = np.sqrt(weights / weights.mean())
+        rest = (v == 0) & (record.t is None)
+        return Table(record.t, np.vstack([v, N, *given]), F, weights, rest)
+
+    def _load(self, record: Record, load: float) -> Array:
+        channel = "N" if self.N is None and "N" in record else self.N
+        if isinstance(channel, str):
+            return record[channel]
+        return np.full(record.size, load if channel is None else float(channel))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Table:
+    """One record: what is imposed (2 + inputs, n), measured forces, weights, break-away points."""
+
+    t: Array | None
+    w: Array
+    F: Array
+    weights: Array
+    rest: NDArray[np.bool_]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PointRows:
+    """Residuals of `Points`; see `Residuals`."""
+
+    names: tuple[str, ...]
+    slides: Sampled
+    breaks: Sampled | None
+    tables: tuple[Table, ...]
+    imposed: bool
+    unit: str
+
+    @property
+    def own(self) -> tuple[Unknown, ...]:
+        """None: nothing belongs to a record."""
+        return ()
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The force of each record."""
+        found, first = list[Channel](), 0
+        for number, table in enumerate(self.tables):
+            v, n = table.w[0], table.F.size
+            found.append(
+                Channel(
+                    number, "F", self.unit, slice(first, first + n),
+                    v if table.t is None else table.t, table.F,
+                    {"v": v, "sign(v)": np.sign(v)}, ordered=table.t is not None,
+                )
+            )  # fmt: skip
+            first += n
+        return tuple(found)
+
+    def at(self, values: Array) -> Evaluation | str:
+        """Residuals weight (F(v, N) - F_measured) [N], and their derivatives."""
+        p = np.asarray(values, float)
+        residuals, slopes = list[Array](), list[Array]()
+        for table in self.tables:
+            found = self._forces(table, p)
+            if isinstance(found, str):
+                return found
+            residuals.append(table.weights * (found[0] - table.F))
+            slopes.append(table.weights[:, None] * found[1])
+        return Evaluation(np.concatenate(residuals), np.vstack(slopes))
+
+    def _forces(self, table: Table, p: Array) -> tuple[Array, Array] | str:
+        """Predicted forces (n,) and their derivatives by p (n, n_p)."""
+        F, J = np.zeros(table.F.size), np.zeros((table.F.size, p.size))
+        h = np.diff(table.t) if table.t is not None and self.imposed else 1.0
+        side = np.sign(table.F)
+        sides = np.vstack([table.w, side])
+        for rows, w, what in (
+            (~table.rest, table.w, self.slides),
+            (table.rest, sides, self.breaks),
+        ):
+            if what is None or not rows.any():
+                continue
+            path = what.along(w[:, rows], h, p)
+            if isinstance(path, str):
+                return path
+            F[rows], J[rows] = path.rows[:, 0], path.slopes[:, 0]
+        return F, J
+
+
+def _equations(law: Law, p: ca.SX, imposed: bool) -> Equations:
+    """The force at one sample; `p` are symbols in `law`."""
+    where = f"Points: {type(law).__name__}"
+    w = ca.SX.sym("w", 2 + len(law.inputs))
+    given = {i.name: w[2 + k] for k, i in enumerate(law.inputs)}
+    v, N = w[0], w[1]
+    if not imposed:
+        z = ca.SX(law.steady_state(v, N)) if law.states else ca.SX(0, 1)
+        return Equations(w, p, ca.SX(law.force(v, N, z, **given)))
+    z, later, h = ca.SX.sym("z", len(law.states)), ca.SX.sym("later", w.numel()), ca.SX.sym("h")
+    then = {i.name: later[2 + k] for k, i in enumerate(law.inputs)}
+    step = imposed_step(law, z, (v, N, given), (later[0], later[1], then), h, where)
+    return Equations(
+        w, p, ca.SX(law.force(v, N, z, **given)), z=z,
+        start=ca.SX(law.steady_state(v, N)), step=step, later=ca.vertcat(later, h),
+    )  # fmt: skip
+
+
+def _break_away(law: Law, p: ca.SX) -> Equations:
+    """The force at which it breaks away, with the side of the pull as last of `w`."""
+    w = ca.SX.sym("w", 3 + len(law.inputs))
+    given = {i.name: w[2 + k] for k, i in enumerate(law.inputs) if i.name != FORCE}
+    side = w[w.numel() - 1]
+    try:
+        levels = [ca.SX(law.static_level(w[1], s, **chosen(law, given))) for s in (1, -1)]
+    except ValueError as error:
+        raise ValueError(f"Points: break-away at v = 0: {error}") from None
+    return Equations(w, p, ca.if_else(side > 0, levels[0], -levels[1]))
+
+
+def _unit(data: Dataset, F: str) -> str:
+    units = {record.unit(F) for record in data if record.unit(F)}
+    return units.pop() if len(units) == 1 else "N"

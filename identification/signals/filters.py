@@ -1,0 +1,172 @@
+"""Zero-phase filtering, differentiation and parallel decimation of sampled signals.
+
+What identification by the inverse model needs: velocity and acceleration from position without a
+phase shift, and one and the same low pass on the measured and on the predicted force.
+Source: Gautier, Janot and Vandanjon, IEEE Trans. Control Syst. Technol. 21(2), 2013 (IDIM-LS).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import ceil, floor, log10
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation import checks
+
+Array = NDArray[np.float64]
+
+LOBES = 3
+"""Zero crossings of the decimation filter on each side: few, so that few rows touch a reversal."""
+PASS = 0.9
+"""Its cut-off (-6 dB) over the Nyquist frequency after decimation."""
+
+
+@final
+@dataclass(frozen=True)
+class Filter:
+    """How positions are smoothed and equations thinned out.
+
+    Attributes:
+        cutoff: cut-off of the low pass on position (and measured velocity) [Hz]; the gain there
+            is 1/2, since the filter runs forward and backward.
+        decimation: every this many samples one equation, after a low pass on all its terms.
+        order: order of the Butterworth filter.
+        v_min: equations of a static law that touch samples slower than this are left out [m/s or
+            rad/s]. Filtering blurs the switch of friction at standstill, which a static law does
+            not describe anyway. None: reversals, and what cannot be told from rest, by the data.
+    """
+
+    cutoff: float
+    decimation: int = 1
+    order: int = 4
+    v_min: float | None = None
+
+    def __post_init__(self) -> None:
+        cutoff = checks.number("Filter: cutoff", self.cutoff, unit="Hz", above=0.0)
+        object.__setattr__(self, "cutoff", cutoff)
+        for name in ("decimation", "order"):
+            whole = checks.count(f"Filter: {name}", getattr(self, name))
+            object.__setattr__(self, name, whole)
+        if self.v_min is not None:
+            v_min = checks.number("Filter: v_min", self.v_min, unit="m/s", lower=0.0)
+            object.__setattr__(self, "v_min", v_min)
+
+    def trim(self, step: float) -> int:
+        """Samples to leave out at each end, where reflection and differences are not the data."""
+        return ceil(5.0 / (self.cutoff * step) - 1e-9)
+
+
+def lowpass(signal: Array, cutoff: float, step: float, order: int = 4) -> Array:
+    """Butterworth low pass applied forward and backward: no phase, gain |H|^2.
+
+        |H|^2 = 1 / (1 + (tan(pi f h) / tan(pi f_c h))^(2 order))
+
+    which is `filtfilt` of the bilinear Butterworth filter. The ends are continued by odd
+    reflection of what is left after subtracting the straight line from end to end.
+
+    Args:
+        signal: samples, shape (n,).
+        cutoff: f_c [Hz], below the Nyquist frequency.
+        step: sample time h [s].
+        order: order of one pass.
+
+    Raises:
+        ValueError: a cut-off at or above the Nyquist frequency.
+    """
+    if not 0 < cutoff * step < 0.5:
+        raise ValueError(
+            f"lowpass: cutoff: expected below the Nyquist frequency {0.5 / step:g} Hz, "
+            f"got {cutoff:g} Hz"
+        )
+    n = signal.size
+    line = np.linspace(signal[0], signal[-1], n)
+    rest = signal - line
+    periodic = np.concatenate([rest, -rest[-2:0:-1]])
+    ratio = np.tan(np.pi * np.fft.rfftfreq(periodic.size)) / np.tan(np.pi * cutoff * step)
+    gain = 1 / (1 + ratio ** (2 * order))
+    return line + np.fft.irfft(np.fft.rfft(periodic) * gain, periodic.size)[:n]
+
+
+def central_difference(signal: Array, step: float) -> Array:
+    """First derivative, second order inside and one-sided at the two ends."""
+    return np.gradient(signal, step)
+
+
+@final
+@dataclass(frozen=True)
+class Decimation:
+    """Linear low pass and thinning of `samples` values to `rows`, without phase shift.
+
+        y = D u,   a sinc filter of 3 lobes under a Hamming window, cut-off 0.9 Nyquist / factor
+
+    Only rows whose window lies inside the data are kept. As D is linear it acts alike on measured
+    force, acceleration and any law, which is what makes the regression unbiased.
+    """
+
+    samples: int
+    factor: int
+
+    @cached_property
+    def taps(self) -> Array:
+        """Weights of one row; they sum to one."""
+        if self.factor == 1:
+            return np.ones(1)
+        k = np.arange(-LOBES * self.factor, LOBES * self.factor + 1)
+        taps = np.sinc(PASS * k / self.factor) * np.hamming(k.size)
+        return taps / taps.sum()
+
+    @property
+    def rows(self) -> int:
+        """Number of values left; zero when the window is longer than the data."""
+        return max(0, (self.samples - self.taps.size) // self.factor + 1)
+
+    def centres(self, samples: NDArray[Any]) -> NDArray[Any]:
+        """The samples in the middle of the rows, shape (rows,)."""
+        half = self.taps.size // 2
+        return samples[half : half + self.rows * self.factor : self.factor]
+
+    def __call__(self, signal: Array) -> Array:
+        """D applied to `signal`, shape (samples,)."""
+        return np.convolve(signal, self.taps, mode="valid")[:: self.factor]
+
+    def columns(self, signals: Array) -> Array:
+        """D applied to each column of `signals`, shape (samples, k); (rows, k)."""
+        if self.factor == 1:
+            return signals
+        windows = np.lib.stride_tricks.sliding_window_view(signals, self.taps.size, axis=0)
+        return windows[:: self.factor] @ self.taps
+
+    def touched(self, samples: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Rows with any of `samples` inside their windows, shape (rows,)."""
+        return np.convolve(samples, np.ones(self.taps.size), mode="valid")[:: self.factor] > 0.5
+
+
+def bandwidth(force: Array, step: float, share: float = 0.999) -> float:
+    """Frequency [Hz] below which `share` of the variance of `force` lies, white noise apart.
+
+    The level of the noise is taken from the upper half of the spectrum (a median, so that lines
+    do not count; the power of white noise has the median ln 2 times its mean).
+    """
+    power = np.abs(np.fft.rfft(force - force.mean())) ** 2
+    frequency = np.fft.rfftfreq(force.size, step)
+    noise = np.median(power[frequency > 0.25 / step]) / np.log(2)
+    total = np.cumsum(power - noise)
+    return float(frequency[np.argmax(total >= share * total.max())])
+
+
+def choose_filter(force: Array, step: float, rows: int = 100) -> Filter:
+    """A filter from the data: the bandwidth f_b of the force decides.
+
+        cut-off 5 f_b (at most half the Nyquist frequency), decimation 0.8 Nyquist / (2 f_b)
+
+    f_b is rounded to one digit. The factors are those of the EMPS reference (there
+    f_b = 20 Hz by hand). The decimation leaves at least `rows` equations where it can.
+    """
+    nyquist = 0.5 / step
+    found = max(bandwidth(force, step), 1 / (force.size * step))
+    digit = 10.0 ** floor(log10(found))
+    f_b = round(found / digit) * digit
+    decimation = min(round(0.4 * nyquist / f_b), force.size // (rows + 4 * LOBES))
+    return Filter(min(5 * f_b, 0.5 * nyquist), max(1, decimation))

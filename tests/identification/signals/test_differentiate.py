@@ -1,0 +1,88 @@
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from identification.data.record import Record
+from identification.signals.differentiate import differentiate, velocity_noise
+from identification.signals.filters import Filter, lowpass
+
+T = np.arange(4001) * 1e-3
+W = 2 * np.pi * 1.5
+UNITS = {"x": "m", "force": "N", "v": "m/s"}
+
+
+def record(**signals: np.ndarray) -> Record:
+    t = signals.pop("t", T)
+    return Record("wave", t, signals, {name: UNITS[name] for name in signals})
+
+
+WAVE = record(x=np.sin(W * T), force=np.cos(W * T))
+
+
+def test_velocity_and_acceleration_of_a_sine() -> None:
+    found = differentiate(WAVE, Filter(100.0, 5))
+    np.testing.assert_allclose(found.v, W * np.cos(W * found.t), atol=1e-4 * W)
+    np.testing.assert_allclose(found.a, -(W**2) * np.sin(W * found.t), atol=1e-3 * W**2)
+
+
+def test_measured_velocity_is_used() -> None:
+    found = differentiate(
+        record(x=WAVE["x"], v=7 * np.cos(W * T), force=WAVE["force"]), Filter(100.0, 5)
+    )
+    np.testing.assert_allclose(found.v, 7 * np.cos(W * found.t), atol=1e-3)
+    np.testing.assert_allclose(found.a, -7 * W * np.sin(W * found.t), atol=1e-2)
+
+
+def test_ends_are_cut_by_five_filter_times() -> None:
+    found = differentiate(WAVE, Filter(100.0, 5))
+    assert (found.t[0], found.t[-1]) == (T[50], T[-51])
+
+
+def test_equations_that_touch_slow_samples_are_left_out() -> None:
+    kept = differentiate(WAVE, Filter(100.0, 5, v_min=0.5))
+    every = differentiate(WAVE, Filter(100.0, 5, v_min=0.0))
+    assert 0 < kept.kept.size < every.kept.size
+    width = kept.decimation.taps.size // 2 * 1e-3
+    nearest = [np.abs(time - kept.t[np.abs(kept.v) < 0.5]).min() for time in kept.times]
+    lost = np.setdiff1d(every.times, kept.times)
+    reached = [np.abs(time - kept.t[np.abs(kept.v) < 0.5]).min() for time in lost]
+    assert min(nearest) > width >= max(reached) - 1e-9
+
+
+def test_reversals_are_left_out_by_the_data() -> None:
+    found = differentiate(WAVE, Filter(100.0, 5))
+    turns = found.t[1:][np.diff(np.sign(found.v)) != 0]
+    assert turns.size >= 10
+    reach = (found.decimation.taps.size // 2 + 5) * 1e-3
+    assert min(np.abs(found.times - turn).min() for turn in turns) > reach - 1.5e-3
+
+
+def test_noise_of_the_velocity_is_that_of_the_filtered_noise() -> None:
+    noise: NDArray[np.float64] = 1e-6 * np.random.default_rng(0).standard_normal(T.size)
+    x: NDArray[np.float64] = np.sin(W * T) + noise
+    filter = Filter(100.0)
+    expected = np.gradient(lowpass(noise, 100.0, 1e-3), 1e-3)[50:-50].std()
+    found = velocity_noise(x, None, 1e-3, filter)
+    assert found == pytest.approx(expected, rel=0.15)
+    measured = velocity_noise(T, np.cos(W * T) + noise, 1e-3, filter)
+    assert measured == pytest.approx(lowpass(noise, 100.0, 1e-3).std(), rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("data", "filter", "message"),
+    [
+        (
+            WAVE,
+            Filter(100.0, 300),
+            r"data 'wave': expected enough samples.*decimation 300.*got 4001",
+        ),
+        (WAVE, Filter(100.0, 5, v_min=99.0), "lower the decimation or v_min"),
+        (WAVE, Filter(1.0, 5), "raise the cut-off"),
+        (record(t=T**1.1, x=WAVE["x"], force=WAVE["force"]), None, "expected equal intervals"),
+    ],
+)
+def test_records_too_short_or_uneven_are_refused(
+    data: Record, filter: Filter | None, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        differentiate(data, filter)

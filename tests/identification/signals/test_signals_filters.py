@@ -1,0 +1,110 @@
+import numpy as np
+import pytest
+
+from identification.signals.filters import (
+    Decimation,
+    Filter,
+    bandwidth,
+    central_difference,
+    choose_filter,
+    lowpass,
+)
+
+
+@pytest.mark.parametrize(("cutoff", "order"), [(100.0, 4), (30.0, 2), (200.0, 3)])
+def test_lowpass_equals_filtfilt_of_scipy(cutoff: float, order: int) -> None:
+    signal = pytest.importorskip("scipy.signal")
+    t = np.arange(4000) * 1e-3
+    x = np.cumsum(np.random.default_rng(0).standard_normal(t.size)) + 3 * t
+    b, a = signal.butter(order, cutoff, fs=1000.0)
+    # with a reflection longer than the impulse response the ends agree too
+    expected = signal.filtfilt(b, a, x, padlen=3000)
+    ours = lowpass(x, cutoff, 1e-3, order)
+    np.testing.assert_allclose(ours, expected, atol=1e-9 * np.ptp(x))
+
+
+def test_lowpass_halves_the_amplitude_at_the_cutoff_without_phase() -> None:
+    t = np.arange(5000) * 1e-3
+    wave = np.sin(2 * np.pi * 50 * t)
+    inside = slice(500, -500)
+    np.testing.assert_allclose(lowpass(wave, 50.0, 1e-3)[inside], wave[inside] / 2, atol=1e-3)
+
+
+def test_lowpass_keeps_a_straight_line() -> None:
+    line = np.linspace(3.0, -2.0, 777)
+    np.testing.assert_allclose(lowpass(line, 10.0, 1e-3), line, atol=1e-13)
+
+
+def test_cutoff_above_nyquist_is_refused() -> None:
+    with pytest.raises(ValueError, match="below the Nyquist frequency 500 Hz, got 600 Hz"):
+        lowpass(np.zeros(100), 600.0, 1e-3)
+
+
+def test_central_difference_is_of_second_order() -> None:
+    def error(n: int) -> float:
+        t = np.linspace(0, 1, n)
+        return float(
+            np.abs(central_difference(np.sin(5 * t), t[1]) - 5 * np.cos(5 * t))[1:-1].max()
+        )
+
+    errors = np.array([error(n) for n in (101, 201, 401)])
+    np.testing.assert_allclose(errors[:-1] / errors[1:], 4.0, rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"cutoff": 0.0}, "cutoff: expected a number > 0"),
+        ({"cutoff": float("nan")}, "cutoff: expected a number > 0"),
+        ({"cutoff": 10.0, "decimation": 0}, "decimation: expected a whole number >= 1, got 0"),
+        ({"cutoff": 10.0, "order": 2.5}, r"order: expected a whole number >= 1, got 2\.5"),
+        ({"cutoff": 10.0, "v_min": -1.0}, r"v_min: expected a number >= 0 \[m/s\], got -1"),
+    ],
+)
+def test_bad_filters_are_refused(arguments: dict[str, float], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Filter(**arguments)  # type: ignore[arg-type]
+
+
+def test_decimation_keeps_lines_and_their_times() -> None:
+    D = Decimation(1000, 10)
+    t = np.arange(1000.0)
+    np.testing.assert_allclose(D(2 * t + 1), 2 * D.centres(t) + 1, rtol=1e-12)
+
+
+def test_decimation_removes_what_would_alias() -> None:
+    D = Decimation(5000, 10)
+    t = np.arange(5000) * 1e-3
+    assert np.abs(D(np.sin(2 * np.pi * 80 * t))).max() < 1e-2
+    assert np.abs(D(np.sin(2 * np.pi * 20.3 * t))).max() == pytest.approx(1.0, abs=2e-2)
+
+
+@pytest.mark.parametrize(("samples", "factor"), [(500, 7), (400, 1), (100, 10)])
+def test_decimation_of_columns_is_that_of_each(samples: int, factor: int) -> None:
+    D = Decimation(samples, factor)
+    signals = np.random.default_rng(1).standard_normal((samples, 3))
+    expected = np.column_stack([D(column) for column in signals.T])
+    np.testing.assert_allclose(D.columns(signals), expected, atol=1e-14)
+
+
+def test_rows_that_touch_a_sample_are_those_it_changes() -> None:
+    D = Decimation(400, 7)
+    marked = np.zeros(400, bool)
+    marked[[90, 201]] = True
+    changed = np.flatnonzero(np.abs(D(marked.astype(float))) > 0)
+    assert set(changed) <= set(np.flatnonzero(D.touched(marked)))
+    assert D.touched(marked).sum() <= changed.size + 4
+
+
+def test_bandwidth_is_the_frequency_that_carries_the_force_not_its_noise() -> None:
+    t = np.arange(10_000) * 1e-3
+    force = np.sin(2 * np.pi * 3 * t) + 0.2 * np.sin(2 * np.pi * 17 * t)
+    noisy = force + 0.3 * np.random.default_rng(0).standard_normal(t.size)
+    assert bandwidth(force, 1e-3) == pytest.approx(17.0, abs=0.1)
+    assert bandwidth(noisy, 1e-3) == pytest.approx(17.0, abs=3.0)
+
+
+def test_filter_follows_the_bandwidth() -> None:
+    t = np.arange(20_000) * 1e-3
+    chosen = choose_filter(np.sin(2 * np.pi * 20 * t), 1e-3)
+    assert (chosen.cutoff, chosen.decimation) == (100.0, 10)

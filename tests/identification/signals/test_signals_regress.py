@@ -1,0 +1,113 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from identification.data.dataset import Dataset
+from identification.data.record import Record
+from identification.signals.differentiate import differentiate
+from identification.signals.filters import Filter
+from identification.signals.regress import LinearFit, linear_regression
+
+PUBLISHED = {
+    "m": (95.1089, 0.1085),
+    "F_v": (203.5034, 1.1460),
+    "F_c": (20.3935, 0.1012),
+    "offset": (-3.1648, 0.0444),
+}
+DIRECTIONS = {
+    "m": (95.154, 0.083),
+    "F_v_pos": (166.71, 1.23),
+    "F_c_pos": (20.144, 0.109),
+    "F_v_neg": (240.42, 1.23),
+    "F_c_neg": (20.628, 0.109),
+}
+
+
+EMPS = Path(__file__).resolve().parents[4] / "shared" / "data" / "EMPS" / "DATA_EMPS.mat"
+
+
+@pytest.fixture(scope="module")
+def emps() -> Record:
+    if not EMPS.is_file():
+        pytest.skip("the EMPS record is not on this machine (../shared/data/EMPS)")
+    return Dataset.read(EMPS).records[0]
+
+
+def published_procedure(data: Record) -> tuple[np.ndarray, np.ndarray, float]:
+    """The reference of the benchmark, written with scipy: estimates, deviations, error [%]."""
+    signal = pytest.importorskip("scipy.signal")
+    low = signal.butter(4, 0.2)
+    thin = signal.cheby1(8, 0.05, 0.08)
+    x = signal.filtfilt(*low, data["x"], padlen=12)
+    v = np.gradient(x, 1e-3)
+    columns = [np.gradient(v, 1e-3), v, np.sign(v), np.ones_like(v), data["force"]]
+    rows = [signal.filtfilt(*thin, c[49:], padlen=24)[1::10] for c in columns]
+    X, y = np.column_stack(rows[:4]), rows[4]
+    beta = np.linalg.lstsq(X, y, rcond=None)[0]
+    error = y - X @ beta
+    deviation = error.std(ddof=1) * np.sqrt(np.diag(np.linalg.inv(X.T @ X)))
+    return beta, deviation, 100 * float(np.linalg.norm(error) / np.linalg.norm(y))
+
+
+def test_the_record_is_read_as_the_published_estimate_needs_it(emps: Record) -> None:
+    beta, deviation, error = published_procedure(emps)
+    np.testing.assert_allclose(beta, [v for v, _ in PUBLISHED.values()], atol=6e-5)
+    np.testing.assert_allclose(deviation, [s for _, s in PUBLISHED.values()], atol=6e-4)
+    assert error == pytest.approx(4.083, abs=1e-3)
+
+
+@pytest.mark.parametrize(("directions", "published"), [(False, PUBLISHED), (True, DIRECTIONS)])
+def test_emps_within_a_published_standard_error(
+    emps: Record, directions: bool, published: dict[str, tuple[float, float]]
+) -> None:
+    found = linear_regression(differentiate(emps, Filter(100.0, 10, v_min=0.0)), directions)
+    for name, (value, error) in published.items():
+        assert abs(found.values[name] - value) < error, name
+        assert found.standard_errors[name] == pytest.approx(error, rel=0.07), name
+    assert found.force_relative == pytest.approx(3.112 if directions else 4.083, rel=0.06)
+
+
+def smooth_motion() -> LinearFit:
+    t = np.arange(20_000) * 1e-3
+    w1, w2 = 2 * np.pi * 0.7, 2 * np.pi * 0.31
+    x = 0.1 * np.sin(w1 * t) + 0.2 * np.cos(w2 * t)
+    v = 0.1 * w1 * np.cos(w1 * t) - 0.2 * w2 * np.sin(w2 * t)
+    a = -0.1 * w1**2 * np.sin(w1 * t) - 0.2 * w2**2 * np.cos(w2 * t)
+    force = 3 * a + 11 * v + 7 * np.sign(v) - 2
+    return linear_regression(differentiate(drive_record(t, x, force), Filter(100.0, 10)))
+
+
+def drive_record(t: np.ndarray, x: np.ndarray, force: np.ndarray) -> Record:
+    return Record("motion", t, {"x": x, "force": force}, {"x": "m", "force": "N"})
+
+
+def test_parameters_of_a_known_motion_come_back() -> None:
+    found = smooth_motion()
+    expected = {"m": 3.0, "F_v": 11.0, "F_c": 7.0, "offset": -2.0}
+    for name, value in expected.items():
+        assert found.values[name] == pytest.approx(value, rel=1e-4), name
+
+
+def test_two_records_are_one_regression() -> None:
+    t = np.arange(4_000) * 1e-3
+    signals = [
+        differentiate(drive_record(t, np.sin(w * t), -2 * w**2 * np.sin(w * t)), Filter(50.0, 5))
+        for w in (3.0, 7.0)
+    ]
+    both = linear_regression(signals)
+    assert both.values["m"] == pytest.approx(2.0, rel=1e-3)
+    with pytest.raises(KeyError):
+        both.values["F_v_pos"]
+
+
+def test_one_direction_tells_no_coulomb_force_from_the_offset() -> None:
+    t = np.arange(5_000) * 1e-3
+    x = t + 0.02 * np.sin(9 * t)
+    found = linear_regression(
+        differentiate(drive_record(t, x, 5 + np.cos(9 * t)), Filter(100.0, 10))
+    )
+    assert found.standard_errors["F_c"] is None
+    assert found.standard_errors["offset"] is None
+    assert found.standard_errors["m"] is not None
+    assert found.values["F_c"] == pytest.approx(found.values["offset"], rel=1e-6)
