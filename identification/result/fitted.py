@@ -19,6 +19,7 @@ from identification.result.series import Series
 from identification.result.stored import read, to_dict
 from identification.result.text import text_of
 from identification.verdict.judge import Verdict
+from identification.verdict.profile import Profile, profile
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Parametric
 from symfric.foundation.status import Status
@@ -130,6 +131,19 @@ class Fitted:
             ValueError: data without the signals of the fit, or a fit from a file.
         """
         return self._alive("validate").errors_on(data)
+
+    def profile(self, name: str, points: int = 5) -> Profile:
+        """How badly the model fits with one parameter held elsewhere, see `verdict.profile`.
+
+        Args:
+            name: of a fitted parameter.
+            points: about how many to each side.
+
+        Raises:
+            ValueError: a parameter that was not fitted, or a fit from a file.
+        """
+        live = self._alive("profile")
+        return profile(live.task, live.point, live.covariance, name, points)
 
     def _alive(self, what: str) -> Live:
         if self.live is None:

@@ -36,7 +36,11 @@ def text_of(fit: "Fitted") -> str:
 
 def sentences(fit: "Fitted") -> list[str]:
     """What there is to say of the whole, most important first, each once."""
-    return list(dict.fromkeys([fit.message, *fit.verdict.sentences, *fit.directions]))
+    said = [*fit.verdict.sentences, *fit.directions]
+    message = fit.message
+    for sentence in said:  # those of the verdict stand in the message, too
+        message = message.replace(sentence, "")
+    return [text for text in dict.fromkeys([" ".join(message.split()), *said]) if text]
 
 
 def number(value: float | None, digits: int = 6) -> str:

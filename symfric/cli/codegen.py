@@ -1,34 +1,43 @@
 """`symfric codegen`: a friction law, or a scene as a plant, as C99, verified on this machine."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, final
 
 import typer
 
+from symfric import Law, any_from_text, law_from_text, with_values
 from symfric.cli import output
 from symfric.cli.options import (
     JsonOption,
-    LawOption,
     SetOption,
-    any_with,
     check_folder,
     check_outputs,
     numbers,
+    with_settings,
 )
-from symfric.cli.run import kind_of, scenes_with
+from symfric.cli.run import kind_of
 from symfric.codegen import Block, Generated, Verification, generate, plant_block, verify
 from symfric.foundation import checks
 from symfric.foundation.compiler import find_compiler
 from symfric.foundation.parameters import check_names, parameters
+from symfric.laws import AnyLaw
+from symfric.scenes import Drive, Scene
 
 REALS = {"double": ("double",), "float": ("float",), "both": ("double", "float")}
 
 
 def codegen(
-    law: LawOption,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")],
+    fit: Annotated[
+        Path | None,
+        typer.Argument(metavar="[FIT.json]", help="What `symfric identify --json` wrote."),
+    ] = None,
+    law: Annotated[
+        str | None,
+        typer.Option("--law", metavar="NAME", help="Friction law, such as lugre; or FIT.json."),
+    ] = None,
     settings: SetOption = None,
     scene: Annotated[
         str | None,
@@ -71,6 +80,7 @@ def codegen(
 
     The C is compiled and compared with CasADi over 20 000 steps. The exit status is 1 where it
     could not be verified, as without a compiler, or differs; the files are written all the same.
+    The law of a fit has the fitted numbers, and so has its drive with `--scene drive`.
 
     Example: symfric codegen --law lugre --out build --step-size 0.001
     """
@@ -82,53 +92,101 @@ def codegen(
     check_outputs(json)
     if compiler is not None:
         find_compiler(checks.text("--compiler", compiler, "a C compiler"))
+    chosen = chosen_law(fit, law)
     adjustable = None
     if scene is not None and turning:
         raise ValueError("--turning: expected with a law only: a scene knows what turns")
     if scene is not None:
-        made = partial(
-            plant,
-            scene,
-            law,
-            numbers("--set", settings),
-            "auto" if method is None else method,
-            name,
-            free,
-        )
+        machine = machine_of(scene, chosen, numbers("--set", settings))
+        made = partial(plant, machine, "auto" if method is None else method, name, free)
         generated, adjustable = generate(made(step_size), out, real=REALS[kind]), made
     elif method is not None:
         raise ValueError("--method: expected with --scene only: the step of a law is exact")
     else:
         generated = generate(
-            any_with(law, settings),
+            with_settings(chosen.law, chosen.text, settings),
             out,
             name=name,
             real=REALS[kind],
             h=step_size,
             free=free,
-            turning=turning,
+            turning=turning or chosen.turning,
         )
     verification = verify(generated, compiler=compiler, adjustable=adjustable)
-    output.emit_json(to_dict(law, generated, verification), json)
+    output.emit_json(to_dict(chosen.text, generated, verification), json)
     if json != "-":
         show_verification(verification)
     output.say_written(*generated.files, json)
+    if chosen.forces and scene is None:
+        names = ", ".join(chosen.forces)
+        output.note(f"{names}: forces, fitted under a load of 1 N; call the C with N = 1")
     if not verification.ok:
         raise typer.Exit(1)
 
 
+@final
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """A law: as a name or out of a fit.
+
+    Attributes:
+        text: what it is called.
+        law: with its numbers.
+        drive: that it was fitted in.
+        forces: coefficients that are forces, as the load was not known.
+    """
+
+    text: str
+    law: AnyLaw
+    drive: Drive | None = None
+    forces: tuple[str, ...] = ()
+
+    @property
+    def turning(self) -> bool:
+        """Whether it was fitted to an axis that turns."""
+        return self.drive is not None and self.drive.turning
+
+
+def chosen_law(fit: Path | None, law: str | None) -> Chosen:
+    """The law of a fit, or the one that a name means.
+
+    Raises:
+        ValueError: both or none, no fit in the file, a fit without a law.
+    """
+    if (fit is None) == (law is None):
+        got = "neither" if fit is None else "both"
+        raise ValueError(f"codegen: expected --law NAME or the file of a fit, got {got}")
+    if fit is None:
+        text = str(law)
+        return Chosen(text, any_from_text(text))
+    from identification.result.fitted import Fitted  # noqa: PLC0415  (SciPy is slow to import)
+
+    found = Fitted.from_json(fit)
+    if found.law is None:
+        raise ValueError(
+            f"fit '{fit}': expected a law, got {found.name}, a model without one or with several, "
+            "or a law of your own; generate it in Python: symfric.codegen.generate(fit.law, out)"
+        )
+    units = {n: p.unit for n, p in parameters(found.law).items()}
+    forces = [n for n, e in found.parameters.items() if units.get(n) == "1" and e.unit != "1"]
+    return Chosen(found.name, found.law, found.drive, tuple(forces))
+
+
+def machine_of(scene: str, chosen: Chosen, values: dict[str, float]) -> Scene:
+    """The scene with the law; of a fitted drive with its mass and offset, too."""
+    kind = kind_of(scene, "--scene")
+    if kind is Drive and chosen.drive is not None:
+        machine: Scene = chosen.drive
+    else:  # a population is refused by its name
+        machine = kind(chosen.law if isinstance(chosen.law, Law) else law_from_text(chosen.text))
+    check_names(f"--set of {scene}", values, parameters(machine))
+    return with_values(machine, values)
+
+
 def plant(
-    scene: str,
-    law: str,
-    values: dict[str, float],
-    method: str,
-    name: str | None,
-    free: list[str] | None,
-    h: float | None = None,
+    machine: Scene, method: str, name: str | None, free: list[str] | None, h: float | None = None
 ) -> Block:
     """The plant of a scene, whose other parameters are listed as constants."""
-    kind_of(scene, "--scene")
-    machine = scenes_with(scene, [law], values)[law]
     block = plant_block(machine.model(free or ()), h=h, method=method, name=name)
     known = {n: float(p.value) for n, p in parameters(machine).items() if n not in (free or ())}
     return replace(block, constants=known | dict(block.constants))

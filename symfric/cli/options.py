@@ -65,12 +65,12 @@ def seconds(option: str, text: str | None) -> list[float]:
 
 def law_with(text: str, settings: Iterable[str] | None) -> Law:
     """The law that `text` names, with the parameters and options of `--set`."""
-    return _set(law_from_text(text), text, settings)
+    return with_settings(law_from_text(text), text, settings)
 
 
 def any_with(text: str, settings: Iterable[str] | None) -> AnyLaw:
     """The law or population that `text` names, with the parameters and options of `--set`."""
-    return _set(any_from_text(text), text, settings)
+    return with_settings(any_from_text(text), text, settings)
 
 
 def all_with(texts: Sequence[str], settings: Iterable[str] | None) -> list[AnyLaw]:
@@ -99,12 +99,13 @@ def all_with(texts: Sequence[str], settings: Iterable[str] | None) -> list[AnyLa
             f"--set {texts[0]}.NAME=VALUE is for one law"
         )
     return [
-        _set(law, text, [f"{name}={value}" for name, value in values.items()])
+        with_settings(law, text, [f"{name}={value}" for name, value in values.items()])
         for (text, law), values in zip(laws, chosen, strict=True)
     ]
 
 
-def _set(law: L, text: str, settings: Iterable[str] | None) -> L:
+def with_settings(law: L, text: str, settings: Iterable[str] | None) -> L:
+    """`law`, called `text`, with the parameters and options of `--set`."""
     given = assignments("--set", settings)
     check_names(f"--set of law {text}", given, [*parameters(law), *options(law)])
     forms = {name: given.pop(name) for name in options(law) if name in given}

@@ -4,6 +4,7 @@ from math import isnan
 
 import numpy as np
 import pytest
+from fits import TRUTH, make, record
 
 from identification.data.dataset import Dataset
 from identification.result.fitted import Fitted
@@ -11,7 +12,6 @@ from identification.result.text import rounded, text_of
 from symfric.foundation.status import Status
 from symfric.laws import Stribeck
 from symfric.model import Model
-from tests.identification.result.made_fit import TRUTH, make, record
 
 
 @pytest.fixture(scope="module")

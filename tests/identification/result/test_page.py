@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fits import make
 
 from identification.data.findings import Finding
 from identification.result.fitted import Fitted
 from identification.result.page import page_of
 from identification.result.series import envelope
-from tests.identification.result.made_fit import make
 
 NASTY = '<img src=x onerror=alert(1)> & "quotes"'
 

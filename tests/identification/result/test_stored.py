@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fits import make
 
 from identification.result.fitted import Fitted
-from tests.identification.result.made_fit import make
 
 
 @pytest.fixture(scope="module")
