@@ -93,6 +93,19 @@ def turning_points(x: Array, dead: float) -> list[int]:
     return found
 
 
+def travelled(measured: Measured, *, dead: float = DEAD) -> Array:
+    """Path [m] since the last reversal at each sample; inf before the first one."""
+    found = np.full(measured.v.size, np.inf)
+    if measured.x is None:
+        return found
+    for record in measured.records:
+        x, path = measured.x[record], found[record]
+        ends = turning_points(x, dead * float(np.ptp(x)))
+        for first, last in pairwise([*ends, x.size]):
+            path[first:last] = np.abs(x[first:last] - x[first])
+    return found
+
+
 def hysteresis(measured: Measured, *, offset: float = 0.0, dead: float = DEAD) -> Hysteresis | None:
     """Stiffness and damping of pre-sliding from the branches after each reversal.
 

@@ -23,6 +23,9 @@ POLISHED = 3
 """Best trials that are improved by nonlinear least squares."""
 PULL = 1e-3
 """Weight of the guess against the points: what they do not tell stays there."""
+HIGHEST = 3.0
+"""Factor by which levels may exceed the guess; a static one exceeds the dynamic one by its guess at
+most, however steep a curve fits the slowest bins."""
 WIDE = 10.0
 """Factor by which velocity scales may leave the speeds of the data."""
 
@@ -76,8 +79,10 @@ def coordinates(curve: LawCurve, guess: Array, speeds: tuple[float, float]) -> C
     for i in np.flatnonzero(logarithmic):
         ends = sorted(velocity(known[i], s) for s in (speeds[0] / WIDE, speeds[1] * WIDE))
         lower[i], upper[i] = np.log([max(ends[0], known[i].lower), min(ends[1], known[i].upper)])
+    for i in np.flatnonzero([p.role == "level" for p in known]):
+        upper[i] = min(upper[i], HIGHEST)
     for high, _, _ in curve.floors:
-        lower[high], upper[high] = (lower[high], upper[high]) if logarithmic[high] else (0, np.inf)
+        lower[high], upper[high] = (lower[high], upper[high]) if logarithmic[high] else (0, 1)
     return Coordinates(curve, scale, logarithmic, lower, upper)
 
 
@@ -117,9 +122,11 @@ def _scales(curve: LawCurve, start: Array, ends: tuple[float, float]) -> Iterato
                 p[i] = velocity(parameter, by_field[parameter.field])
         if _apart(curve, p):
             yield p
-    if not _apart(curve, start) or not fields:
-        return
-    yield start
+    if _apart(curve, start):
+        yield start
+    own = np.array([float(p.value) for p in curve.parameters])
+    if _apart(curve, own):
+        yield own  # for laws whose levels are no forces, such as those of a rope
 
 
 def _apart(curve: LawCurve, p: Array) -> bool:
@@ -147,15 +154,17 @@ def _levels(at: Coordinates, w: Array, F: Array, size: float) -> Array:
         found = w[linear].copy()
         within, rest = (lower[wide], upper[wide]), goal - rows[:, ~wide] @ found[~wide]
         found[wide] = lsq_linear(rows[:, wide], rest, within, method="bvls").x
-        w = w.copy()
-        w[linear] = found
+        trial = w.copy()
+        trial[linear] = found
+        if _cost(at, trial, F, size) > _cost(at, w, F, size):
+            return w
+        w = trial
     return w
 
 
 def _cost(at: Coordinates, w: Array, F: Array, size: float) -> float:
     force = at.curve.at(at.p(w)[0])[0]
-    cost = float(np.sum(((force - F) / size) ** 2)) if np.isfinite(force).all() else np.inf
-    return cost
+    return float(np.sum(((force - F) / size) ** 2)) if np.isfinite(force).all() else np.inf
 
 
 def _polished(at: Coordinates, w: Array, F: Array, size: float) -> Array:

@@ -26,15 +26,15 @@ Array = NDArray[np.float64]
 CANDIDATES = 60
 """Radii of the dense set, by equal factors."""
 MOST = 6000
-"""Samples that are used; of more, every so many and all turning points."""
+"""Samples that are used unless told otherwise."""
 SHORTEST = 1e-4
 """Smallest radius over the travel, unless the steps of the record are larger."""
 SPARE = 4
 """Elements beyond those wanted, which are merged with their neighbours later on."""
 TOLD = 0.1
 """Share of the force that elements must explain."""
-STEPS = 40
-"""Evaluations that improve the radii."""
+STEPS, QUICK = 40, 8
+"""Evaluations that improve the radii, and those of a start."""
 
 
 @final
@@ -93,7 +93,13 @@ def stretches(x: Array, radii: Array) -> tuple[Array, Array]:
 
 
 def fit_elements(
-    measured: Measured, count: int = 10, *, viscous: bool = True, offset: bool = True
+    measured: Measured,
+    count: int = 10,
+    *,
+    viscous: bool = True,
+    offset: bool = True,
+    most: int = MOST,
+    thorough: bool = True,
 ) -> Elements:
     """`count` elements, or fewer where fewer explain the data as well, by least squares.
 
@@ -103,12 +109,14 @@ def fit_elements(
         count: elements wanted.
         viscous: fit sigma_2 >= 0, too.
         offset: fit a constant force, too.
+        most: samples to use; of more, every so many and all turning points.
+        thorough: start from two sets of radii and improve both until nothing changes.
 
     Raises:
         ValueError: no path; nothing moves; no friction that follows the path.
     """
     count = checks.count("fit_elements: count", count)
-    used = _thinned(measured)
+    used = _thinned(measured, most)
     path, beside = _path(used), _beside(used, viscous, offset)
     travel = max(float(np.ptp(path[r])) for r in used.records)
     if not travel > 0:
@@ -124,12 +132,17 @@ def fit_elements(
             f"that elements explain to {100 * (1 - left / np.linalg.norm(used.F)):.0f} %; "
             "is its sign that of the sliding velocity?"
         )
-    more = _improved(used, path, beside, _quantiles(radii, k, count + SPARE), viscous, offset)
+
+    def improved(start: Array, steps: int = STEPS) -> Elements:
+        return _improved(used, path, beside, start, (viscous, offset), steps)
+
+    few = _quantiles(radii, k, count)
+    if not thorough:
+        return improved(few, QUICK)
+    more = improved(_quantiles(radii, k, count + SPARE))
     if more.k.size <= count:
         return more
-    starts = (_merged(more, count), _quantiles(radii, k, count))
-    found = [_improved(used, path, beside, start, viscous, offset) for start in starts]
-    return min(found, key=lambda elements: elements.rms)
+    return min(improved(_merged(more, count)), improved(few), key=lambda found: found.rms)
 
 
 def _path(measured: Measured) -> Array:
@@ -141,9 +154,9 @@ def _path(measured: Measured) -> Array:
     return measured.x
 
 
-def _thinned(measured: Measured) -> Measured:
-    """At most some 6000 samples, the turning points among them."""
-    every = -(-measured.v.size // MOST)
+def _thinned(measured: Measured, most: int) -> Measured:
+    """At most some `most` samples, the turning points among them."""
+    every = -(-measured.v.size // most)
     if every == 1:
         return measured
     path, kept = _path(measured), list[NDArray[np.intp]]()
@@ -199,7 +212,12 @@ def _merged(elements: Elements, count: int) -> Array:
 
 
 def _improved(
-    measured: Measured, path: Array, beside: Array, radii: Array, viscous: bool, offset: bool
+    measured: Measured,
+    path: Array,
+    beside: Array,
+    radii: Array,
+    kinds: tuple[bool, bool],
+    steps: int,
 ) -> Elements:
     """Stiffnesses, log radii and the rest together by a trust region."""
     n, size = radii.size, float(np.abs(measured.F).max())
@@ -227,12 +245,13 @@ def _improved(
         jac=slopes,  # pyright: ignore[reportArgumentType]
         bounds=(low, high),
         x_scale="jac",
-        max_nfev=STEPS,
+        max_nfev=steps,
     )
     radii = np.sort(np.exp(found.x[:n]))
     k, rest = _linear(measured, path, beside, radii)
     error = _stretches(measured, path, radii)[0] @ k + beside @ rest - measured.F
     kept = k * radii > 1e-6 * float(k @ radii)
+    viscous, offset = kinds
     shift = float(rest[-2] - rest[-1]) if offset else 0.0
     rms = float(np.sqrt(np.mean(error**2)))
     return Elements(k[kept], radii[kept], float(rest[0]) if viscous else 0.0, shift, rms)

@@ -8,8 +8,9 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.starts.hysteresis import Hysteresis, hysteresis
+from identification.starts.hysteresis import Hysteresis, hysteresis, travelled
 from identification.starts.law_curve import law_curve, parts
+from identification.starts.law_elements import HEADROOM, carrying, element_values, scaled, shared
 from identification.starts.law_fit import fit_law, velocity
 from identification.starts.measured import Measured
 from identification.starts.stribeck import BINS, Curve, StribeckCurve, binned, fit_curve
@@ -26,8 +27,8 @@ ELASTIC = ("MaxwellSlip", "GMS", "Leuven", "BoucWen", "HaessigFriedland", "Stick
 """Laws whose elements unload elastically; bristles unload at twice their stiffness."""
 DAMPED = 0.6
 """Ratio of bristle damping to sqrt(stiffness mass) where the data do not tell it."""
-HEADROOM = 1.1
-"""What the elements of a law carry together over its static level."""
+BEYOND = 5.0
+"""Paths to zero force behind a reversal after which a body counts as sliding."""
 SPIKE = 0.3
 """Share of the sliding force that bristle damping gives at the largest speed, without a mass."""
 
@@ -40,6 +41,7 @@ class Facts:
     Attributes:
         stribeck: curve through the bins.
         curve: the bins, without mass and offset.
+        friction: the samples without what accelerates the mass.
         reversals: branches after reversals, or None.
         m: moving mass [kg], 0 where the force moves none or its acceleration is not known.
         offset: constant force [N].
@@ -49,6 +51,7 @@ class Facts:
 
     stribeck: StribeckCurve
     curve: Curve
+    friction: Measured
     reversals: Hysteresis | None
     m: float
     offset: float
@@ -82,9 +85,13 @@ def start_values(
     facts = facts_of(replace(measured, N=N), mass="m" in names, offset="offset" in names)
     known = parameters(what)
     values = {n: _guess(known[n], facts, law) for n in names}
+    elements = element_values(law, facts.friction, facts.stribeck, offset=facts.stribeck.offset)
+    values |= {n: value for n, value in elements.items() if n in values}
     mine = [n for n in names if n in parameters(law) and _is_steady(known[n], law)]
     if (curve := law_curve(law, mine, facts.curve.v, N)) is not None:
         values |= fit_law(curve, facts.curve, values)
+    values |= {n: value for n, value in elements.items() if n in values}
+    values |= carrying(law, values)
     return _constructible(what, values)
 
 
@@ -95,21 +102,40 @@ def _is_steady(parameter: Parameter, law: Law) -> bool:
 
 
 def facts_of(measured: Measured, *, mass: bool = False, offset: bool = False) -> Facts:
-    """Levels, stiffness, mass and offset of the data, as far as they tell them."""
+    """Levels, stiffness, mass and offset of the data, as far as they tell them.
+
+    The Stribeck curve is taken twice: of all samples, and, where reversals show how far
+    pre-sliding goes, of those that lie `BEYOND` times as far behind the last reversal.
+    """
     m = _mass(measured) if mass else 0.0
-    F = measured.F if measured.a is None else measured.F - m * measured.a
-    curve = binned(measured.v, F)
+    friction = measured.F if measured.a is None else measured.F - m * measured.a
+    pure = replace(measured, F=friction)
+    slides = np.abs(measured.v) > slowest(measured)
+    curve = binned(measured.v[slides], friction[slides])
     stribeck = fit_curve(curve)
+    reversals = hysteresis(pure, offset=stribeck.offset)
+    if reversals is not None:
+        far = slides & (travelled(pure) > BEYOND * reversals.half)
+        if np.unique(np.sign(measured.v[far])).size == np.unique(np.sign(measured.v[slides])).size:
+            curve = binned(measured.v[far], friction[far])
+            stribeck = fit_curve(curve)
+            reversals = hysteresis(pure, offset=stribeck.offset) or reversals
     shift = stribeck.offset if offset else 0.0
-    return Facts(
-        stribeck,
-        replace(curve, F=curve.F - shift),
-        hysteresis(replace(measured, F=F), offset=stribeck.offset),
-        m,
-        shift,
-        measured.N,
-        measured.fastest,
-    )
+    points = replace(curve, F=curve.F - shift)
+    return Facts(stribeck, points, pure, reversals, m, shift, measured.N, measured.fastest)
+
+
+def slowest(measured: Measured) -> float:
+    """Speed [m/s] below which noise hides the direction: three standard deviations of velocity.
+
+    From second differences of records with times, which smooth motion leaves nearly out; 0 for
+    points without time.
+    """
+    if measured.t is None or measured.v.size < 5:
+        return 0.0
+    bends = np.concatenate([np.diff(measured.v[r], 2) for r in measured.records])
+    noise = 1.4826 * float(np.median(np.abs(bends))) / np.sqrt(6)
+    return min(3 * noise, 0.1 * measured.fastest)
 
 
 def _mass(measured: Measured) -> float:
@@ -132,7 +158,7 @@ def _mass(measured: Measured) -> float:
 def _guess(parameter: Parameter, facts: Facts, law: Law) -> float:
     """Start of one parameter from its role and unit; its own value where nothing is known."""
     value, unit = float(parameter.value), parameter.unit
-    parted = _elements(law) if parameter.field in ("k", "mu", "alpha") else 1
+    parted = shared(parameter, law)
     match parameter.role:
         case "mass" if facts.m > 0:
             return facts.m
@@ -148,7 +174,7 @@ def _guess(parameter: Parameter, facts: Facts, law: Law) -> float:
             return velocity(parameter, facts.stribeck.v_s)
         case "stiffness" if (stiffness := _stiffness(facts, law)) > 0:
             per = facts.N if unit == "1/m" else 1.0
-            share = value / _sum_of(law, parameter.field) if parted > 1 else 1.0
+            share = value / scaled(parameters(law), parameter.field, parted) if parted > 1 else 1.0
             return stiffness / per * share
         case "damping" if (stiffness := _stiffness(facts, law)) > 0:
             return _damping(facts, stiffness) / (facts.N if unit == "s/m" else 1.0)
@@ -174,17 +200,6 @@ def _level(parameter: Parameter, facts: Facts, law: Law) -> float:
     known = [p for p in parameters(law).values() if p.role == "level" and p.field not in upper]
     largest = max(float(p.value) for p in known if p.unit == parameter.unit)
     return sliding / per * (float(parameter.value) / largest if largest > 0 else 1.0)
-
-
-def _elements(law: Law) -> int:
-    """Elements of a law that is made of some, else 1."""
-    return max(len(getattr(part, "elements", "1")) for part in parts(law))
-
-
-def _sum_of(law: Law, field: str) -> float:
-    """Sum of the values of all parameters of one field, of one direction."""
-    same = [float(p.value) for p in parameters(law).values() if p.field == field]
-    return sum(same) * _elements(law) / len(same)
 
 
 def _stiffness(facts: Facts, law: Law) -> float:

@@ -135,7 +135,7 @@ def fit_curve(curve: Curve, *, delta: float | None = None) -> StribeckCurve:
     v_s, best, cost = tried[int(np.argmin([cost for *_, cost in tried]))]
     free = 1 if delta is not None else 2
     if curve.v.size > 3 + free and cost > 1e-12 * np.abs(curve.F).max():
-        low = np.log([speed.min() / 3, 0.3])[:free]
+        low = np.log([speed.min(), 0.3])[:free]
         high = np.log([speed.max() * 3, 6.0])[:free]
 
         def residuals(w: Array) -> Array:
