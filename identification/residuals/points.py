@@ -44,6 +44,8 @@ class Points:
             sqrt(weight / mean weight). None: all alike.
         states: of a law that has some: "steady" sliding, "imposed" velocity over time, or "auto":
             imposed where every record has a time.
+        offset: fit a constant force beside friction, too, such as the zero of a load cell: an own
+            unknown "offset" of all records together. It takes motion in both directions.
     """
 
     v: str = "v"
@@ -51,6 +53,7 @@ class Points:
     N: str | float | None = None
     weight: str | None = None
     states: str = "auto"
+    offset: bool = False
 
     def __post_init__(self) -> None:
         for name in ("v", "F"):
@@ -60,6 +63,7 @@ class Points:
         if self.weight is not None:
             checks.text("Points: weight", self.weight, "the name of a channel")
         checks.choice("Points: states", self.states, MODES)
+        checks.flag("Points: offset", self.offset)
 
     def imposed(self, law: Law, data: Dataset) -> bool:
         """Whether the states of `law` follow the velocity over time."""
@@ -94,7 +98,8 @@ class Points:
         breaks = None
         if not imposed and any(table.rest.any() for table in tables):
             breaks = _break_away(symbolic, p).compiled()
-        return PointRows(subject.names, slides, breaks, tuple(tables), imposed, _unit(data, self.F))
+        unit, shift = _unit(data, self.F), _middle(tables) if self.offset else None
+        return PointRows(subject.names, slides, breaks, tuple(tables), imposed, unit, shift)
 
     def _table(self, record: Record, load: float, further: list[str]) -> "Table":
         v, F = record[self.v], record[self.F]
@@ -139,17 +144,26 @@ class Table:
 class PointRows:
     """Residuals of `Points`; see `Residuals`."""
 
-    names: tuple[str, ...]
+    parameters: tuple[str, ...]
     slides: Sampled
     breaks: Sampled | None
     tables: tuple[Table, ...]
     imposed: bool
     unit: str
+    shift: float | None = None
 
     @property
     def own(self) -> tuple[Unknown, ...]:
-        """None: nothing belongs to a record."""
-        return ()
+        """The offset of the force, where one is asked for."""
+        if self.shift is None:
+            return ()
+        size = max(float(np.abs(table.F).max(initial=0.0)) for table in self.tables)
+        return (Unknown("offset", self.unit, self.shift, scale=size or 1.0, nuisance=True),)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameters of the law, then the offset."""
+        return (*self.parameters, *(unknown.name for unknown in self.own))
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -168,15 +182,17 @@ class PointRows:
         return tuple(found)
 
     def at(self, values: Array) -> Evaluation | str:
-        """Residuals weight (F(v, N) - F_measured) [N], and their derivatives."""
-        p = np.asarray(values, float)
+        """Residuals weight (F(v, N) + offset - F_measured) [N], and their derivatives."""
+        given = np.asarray(values, float)
+        p, shift = given[: len(self.parameters)], given[len(self.parameters) :]
         residuals, slopes = list[Array](), list[Array]()
         for table in self.tables:
             found = self._forces(table, p)
             if isinstance(found, str):
                 return found
-            residuals.append(table.weights * (found[0] - table.F))
-            slopes.append(table.weights[:, None] * found[1])
+            residuals.append(table.weights * (found[0] + shift.sum() - table.F))
+            J = np.hstack([found[1], np.ones((table.F.size, shift.size))])
+            slopes.append(table.weights[:, None] * J)
         return Evaluation(np.concatenate(residuals), np.vstack(slopes))
 
     def _forces(self, table: Table, p: Array) -> tuple[Array, Array] | str:
@@ -226,6 +242,17 @@ def _break_away(law: Law, p: ca.SX) -> Equations:
     except ValueError as error:
         raise ValueError(f"Points: break-away at v = 0: {error}") from None
     return Equations(w, p, ca.if_else(side > 0, levels[0], -levels[1]))
+
+
+def _middle(tables: list[Table]) -> float:
+    """Force half-way between both directions [N]."""
+    v, F = (np.concatenate(part) for part in zip(*((t.w[0], t.F) for t in tables), strict=True))
+    if not v.min() < 0 < v.max():
+        raise ValueError(
+            "Points: offset: expected motion in both directions, got one: an offset cannot be told "
+            "from friction"
+        )
+    return float(np.median(F[v > 0]) + np.median(F[v < 0])) / 2
 
 
 def _unit(data: Dataset, F: str) -> str:

@@ -125,3 +125,19 @@ def test_what_the_data_do_not_hold_is_refused() -> None:
         Points(states="imposed").prepare(one, points(np.zeros(V.size)))
     with pytest.raises(ValueError, match="expected a signal 'force'"):
         Points(F="force").prepare(one, points(np.zeros(V.size)))
+
+
+def test_offset_is_an_unknown_of_its_own() -> None:
+    law = Stribeck()
+    F = steady_force(law, V, 1.0) - 0.3
+    found = subject(law, points=True)
+    rows = Points(offset=True).prepare(found, points(F))
+    assert rows.names == (*found.names, "offset")
+    values = np.append(start(law, found.names), -0.3)
+    assert np.allclose(evaluated(rows, values).r, 0.0, atol=1e-12)
+    check_slopes(rows, values)
+
+
+def test_offset_of_one_way_motion_is_refused() -> None:
+    with pytest.raises(ValueError, match="motion in both directions"):
+        Points(offset=True).prepare(subject("stribeck", points=True), points(V, np.abs(V)))
