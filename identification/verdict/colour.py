@@ -95,13 +95,14 @@ class Colour:
         return inverse / max(self.freedom, 1.0)
 
 
-def colour(r: Array, J: Array, position: Count) -> Colour:
+def colour(r: Array, J: Array, position: Count, *, refine: bool = True) -> Colour:
     """The colour of residuals that a fit with sensitivities J left.
 
     Args:
         r: residuals of one channel in the order of time, shape (n,).
         J: their sensitivities to what was fitted, shape (n, k), of any rank.
         position: neighbours before each row, see `positions`.
+        refine: whether to go on from Burg's coefficients to those of the restricted likelihood.
     """
     basis = span(J)
     n, k = basis.shape
@@ -111,7 +112,7 @@ def colour(r: Array, J: Array, position: Count) -> Colour:
         return Colour(np.zeros(0), found, left, n, found)
     white = _likelihood(np.zeros(0), r, basis, position)[1]
     partial = _burg(r, position, most=int(min(MOST, 10 * np.log10(n), (n - k) // 10)))
-    if 0 < partial.size <= REFINED and k:
+    if refine and 0 < partial.size <= REFINED and k:
         partial = _refined(partial, r, basis, position)
     variance = _likelihood(partial, r, basis, position)[1]
     return Colour(partial, variance, float(n - k), n, white)

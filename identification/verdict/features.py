@@ -12,14 +12,16 @@ residuals; each family is what one kind of error leaves:
 | place | harmonics of the position | ripple, cogging, gravity |
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import final
+from typing import Literal, final
 
 import numpy as np
 
 from identification.residuals.evaluation import Array
 from identification.verdict.order import Count, lagged
+
+Kind = Literal["position", "velocity", ""]
 
 DELAYS = (0, 1, 2, 4, 8, 16, 32)
 """Samples by which a regressor may act late."""
@@ -31,6 +33,16 @@ ROWS_EACH = 12
 """Rows that a column needs at least."""
 MOVING = 1e-3
 """Share of the largest speed below which there is no direction."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Clue:
+    """A signal that residuals may depend on, shape (n,), and what it is."""
+
+    name: str
+    signal: Array
+    kind: Kind = ""
 
 
 @final
@@ -49,40 +61,44 @@ class Family:
     columns: Array
 
 
-def families(regressors: Mapping[str, Array], position: Count) -> Iterator[Family]:
-    """The families that `regressors` give; those with too many columns for the rows are thinned.
-
-    A signal named v or v..., is a velocity, x or x..., a position; of others only the response is
-    looked at.
-    """
+def families(clues: Sequence[Clue], position: Count) -> Iterator[Family]:
+    """The families that `clues` give; those with too many columns for the rows are thinned."""
     n = position.size
-    for name, signal in regressors.items():
-        if np.ptp(signal) > 0 and not _is(name, "x"):
-            delays = DELAYS if position.max(initial=0) > 2 * DELAYS[-1] else DELAYS[:1]
-            columns = np.column_stack([lagged(signal, position, d) for d in delays])
-            yield Family(
-                f"{name} and its past", f"dynamics or a delay from {name} is missing", columns
-            )
-    for name, v in regressors.items():
-        if _is(name, "v") and np.ptp(v) > 0:
-            yield from _of_speed(name, v, n)
+    delays = DELAYS if position.max(initial=0) > 2 * DELAYS[-1] else DELAYS[:1]
+    for clue in clues:
+        name, signal = clue.name, clue.signal
+        if not np.ptp(signal) > 0:
+            continue
+        if clue.kind == "position":
+            yield _of_place(name, signal, n)
+            continue
+        columns = np.column_stack([lagged(signal, position, d) for d in delays])
+        yield Family(f"{name} and its past", f"dynamics or a delay from {name} is missing", columns)
+        if clue.kind == "velocity":
+            yield from _of_speed(name, signal, n)
             if position.any():
-                since = _since_reversal(v, position)
+                since = _since_reversal(signal, position)
                 yield Family(
                     f"the path since {name} last changed its sign",
                     "hysteresis or pre-sliding is not described",
-                    _bins(since, _way(v), max(2, min(BINS, n // (2 * ROWS_EACH)))),
+                    _bins(since, _way(signal), _count(n)),
                 )
-    for name, x in regressors.items():
-        if _is(name, "x") and np.ptp(x) > 0:
-            turns = 2 * np.pi * (x - x.min()) / np.ptp(x)
-            orders = np.arange(1, max(1, min(HARMONICS, n // (2 * ROWS_EACH))) + 1) / 2
-            waves = np.outer(turns, orders)
-            yield Family(
-                f"the place {name}",
-                "something changes along the way: ripple, cogging, a spring, gravity",
-                np.column_stack([np.cos(waves), np.sin(waves)]),
-            )
+
+
+def _of_place(name: str, x: Array, n: int) -> Family:
+    turns = 2 * np.pi * (x - x.min()) / np.ptp(x)
+    orders = np.arange(1, max(1, min(HARMONICS, n // (2 * ROWS_EACH))) + 1) / 2
+    waves = np.outer(turns, orders)
+    return Family(
+        f"the place {name}",
+        "something changes along the way: ripple, cogging, a spring, gravity",
+        np.column_stack([np.cos(waves), np.sin(waves)]),
+    )
+
+
+def _count(n: int) -> int:
+    """Bins each way that n rows allow."""
+    return max(2, min(BINS, n // (2 * ROWS_EACH)))
 
 
 def _of_speed(name: str, v: Array, n: int) -> Iterator[Family]:
@@ -95,13 +111,8 @@ def _of_speed(name: str, v: Array, n: int) -> Iterator[Family]:
     yield Family(
         f"the speed {name}",
         "the friction curve has another shape, such as a Stribeck peak",
-        _bins(np.abs(v), _way(v), max(2, min(BINS, n // (2 * ROWS_EACH)))),
+        _bins(np.abs(v), _way(v), _count(n)),
     )
-
-
-def _is(name: str, kind: str) -> bool:
-    """Whether a signal is a velocity ("v") or a position ("x") by its name."""
-    return name == kind or name.startswith((f"{kind}_", f"{kind}.", f"{kind}["))
 
 
 def _way(v: Array) -> Array:

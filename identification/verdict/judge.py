@@ -19,6 +19,7 @@ import numpy as np
 from identification.data.findings import Findings
 from identification.residuals.evaluation import Channel
 from identification.solving.task import Point, Task
+from identification.verdict.clues import clues_of
 from identification.verdict.colour import Colour
 from identification.verdict.independence import Dependence, dependences
 from identification.verdict.minimum import Minimum, minimum
@@ -116,7 +117,7 @@ def judged(found: Minimum, findings: Findings | None = None) -> Verdict:
         J = (found.J * ~found.held * found.gain[:, None])[channel.rows]
         white[name] = whiteness(r, J, position)
         tests.append(_white(name, white[name], colour))
-        every.append((channel, list(dependences(r, J, colour, channel.regressors, position))))
+        every.append((channel, list(dependences(r, J, colour, clues_of(found, channel), position))))
         tests += _size(found, channel, colour)
     count = sum(len(some) for _, some in every)
     for channel, some in every:

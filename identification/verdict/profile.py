@@ -228,7 +228,7 @@ def held_at(task: Task, w: Array, index: int, own: int, c: float) -> Point | str
     def residuals(rest: Array) -> Array:
         found = at(rest)
         if found is None:
-            return np.full(len(box.names) + 1, 1e150 if best else inf)
+            return np.full(len(box.names) + 1, inf)
         return found.reduced[0]
 
     def slopes(rest: Array) -> Array:
@@ -236,7 +236,7 @@ def held_at(task: Task, w: Array, index: int, own: int, c: float) -> Point | str
         if found is None:
             raise ArithmeticError(why[0])
         J, slope = found.reduced[1], found.slope[index]
-        return J[:, others] - np.outer(J[:, own], slope[others] / slope[own])
+        return J[:, others] - J[:, [own]] * (slope[others] / slope[own])
 
     start = np.clip(w[others], box.lower[others], box.upper[others])
     if not others.any() or at(start) is None:
