@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from identification.data.record import Record
 from identification.result.series import Line
+from identification.signals.differentiate import differentiate
 from symfric.foundation.units import turned
 from symfric.laws import Law
 from symfric.laws.steady import steady_force
@@ -58,8 +59,6 @@ def of_drive(drive: Drive, records: Sequence[Record]) -> Curve:
 
 
 def _frictions(drive: Drive, records: Sequence[Record]) -> Iterator[tuple[str, Line]]:
-    from identification.signals.differentiate import differentiate  # noqa: PLC0415
-
     for record in records:
         if record.t is None or "force" not in record or "x" not in record:
             continue
