@@ -61,7 +61,7 @@ svg .bound { stroke: var(--soft); stroke-dasharray: 4 3; } svg .zero { stroke: v
 svg .window { stroke: var(--line); stroke-dasharray: 2 3; }
 svg .band { fill: var(--band); stroke: none; }
 svg .dots { stroke-linecap: round; stroke-width: 3.2; }
-svg .dots.measured { stroke-width: 2.2; stroke-opacity: .55; }
+svg .dots.measured { stroke-width: 2.4; stroke-opacity: .75; }
 svg .dots.sample { stroke-width: 6; stroke-opacity: 1; }
 svg .dots.good { stroke: var(--good); stroke-width: 7; } svg .dots.bad { stroke: var(--bad);
   stroke-width: 7; } svg .dots.doubtful { stroke: var(--doubtful); stroke-width: 7; }

@@ -28,6 +28,9 @@ from symfric.laws import Law
 from symfric.scenes import Drive
 from symfric.scenes.base import Scene
 
+MOST = 40
+"""Values of which all correlations are kept; of more, start values of records are left out."""
+
 
 def fitted(
     kind: Kind,
@@ -66,6 +69,7 @@ def fitted(
     found = dict(zip(names, point.values.tolist(), strict=True))
     closed = subject.close(found)
     machine = closed.scene
+    shown = _correlated(task, covariance)
     timed = all(r.t is not None for r in data)
     abscissa = "t [s]" if timed else ("v [rad/s]" if data.rotary else "v [m/s]")
     return Fitted(
@@ -73,8 +77,8 @@ def fitted(
         kind=written(kind),
         records=records,
         parameters=_estimates(subject, task, found, covariance),
-        names=covariance.names,
-        correlation=covariance.correlation,
+        names=tuple(covariance.names[i] for i in shown),
+        correlation=covariance.correlation[np.ix_(shown, shown)],
         undetermined=covariance.undetermined,
         directions=covariance.sentences,
         status=status,
@@ -124,6 +128,15 @@ def _estimates(
             note=notes.get(name, tied), nuisance=unknown is not None and unknown.nuisance,
         )  # fmt: skip
     return estimates
+
+
+def _correlated(task: Task, made: Covariance) -> list[int]:
+    """Numbers of the values whose correlation is kept: of many, what is asked for."""
+    every = range(len(made.names))
+    if len(made.names) <= MOST:
+        return list(every)
+    nuisance = set(task.unknowns.nuisance)
+    return [i for i in every if made.names[i] not in nuisance]
 
 
 def _known(value: float) -> float | None:

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+WINDOWS = 60
+"""Beginnings of windows that are drawn."""
 FLOOR = 1e-3
 """Smallest difference that the waterfall shows."""
 
@@ -31,6 +33,9 @@ def _across(one: Series) -> Axis:
 
 
 def _windows(one: Series) -> list[Mark]:
+    """Where windows begin; of many none, they would be a hatching."""
+    if one.breaks.size > WINDOWS:
+        return []
     return [Level("window", float(t), upright=True) for t in one.breaks]
 
 

@@ -48,7 +48,7 @@ class Fitted:
         records: their names.
         parameters: name -> estimate of everything: fitted, held, start values, dead times.
         names, correlation: what was fitted, and the correlation of the estimates, shape (n, n);
-            NaN where one is not determined.
+            NaN where one is not determined. Start values are left out where there are many.
         undetermined: groups of parameters that the data cannot tell apart, and `directions`, the
             same in words.
         status, message: how the fit ended. Only SOLVED says that residuals are what noise leaves.

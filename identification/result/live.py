@@ -1,7 +1,7 @@
 """What only a fit of this process has: its problem, its minimum, its model."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
 from typing import Protocol, final
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.residuals.evaluation import Residuals
+from identification.residuals.inverse import InverseDynamics, InverseRows
 from identification.result.estimate import Errors
 from identification.result.series import error
 from identification.solving.many_starts import best_of, many_starts
@@ -27,9 +28,7 @@ Array = NDArray[np.float64]
 class Kind(Protocol):
     """A kind of residuals: points, inverse dynamics, shooting, closed loop."""
 
-    def prepare(
-        self, subject: Subject, data: Dataset, start: Mapping[str, float] | None = None
-    ) -> Residuals:
+    def prepare(self, subject: Subject, data: Dataset, start: Mapping[str, float]) -> Residuals:
         """The residuals of `subject` on `data`; start values are guessed near `start`."""
         ...
 
@@ -82,7 +81,8 @@ class Live:
         """
         data = checks.kind("validate", data, Dataset, "data, such as Dataset.read('v.csv')")
         start = {n: v for n, v in self.values.items() if n in self.subject.names}
-        residuals = self.kind.prepare(self.subject, data, start)
+        kind = settled(self.kind, self.task.residuals, data)
+        residuals = kind.prepare(self.subject, data, start)
         ties = {name: Tied(Constant(value)) for name, value in start.items()}
         unknowns = unknowns_of(residuals.own, ties, residuals.names)
         signals = {c.signal for c in residuals.channels}
@@ -95,6 +95,17 @@ class Live:
         if isinstance(point, str):
             raise ValueError(f"validate: expected data '{data.name}' that can be compared: {point}")
         return errors_of(residuals, [r.name for r in data], point.evaluation.r)
+
+
+def settled(kind: Kind, residuals: Residuals, data: Dataset) -> Kind:
+    """The kind with the filter that it chose on the data of the fit: other data are seen alike."""
+    if not isinstance(kind, InverseDynamics) or not isinstance(residuals, InverseRows):
+        return kind
+    if kind.filter is not None:
+        return kind
+    motion = residuals.pieces[0].motion
+    thinner = round(motion.filter.decimation * motion.step / data[0].median_step)
+    return replace(kind, filter=replace(motion.filter, decimation=max(1, thinner)))
 
 
 def errors_of(

@@ -9,6 +9,7 @@ from identification.result import charts
 from identification.result.estimate import Errors, Estimate
 from identification.result.law_data import source_of
 from identification.result.text import (
+    MANY,
     best_starts,
     correlated,
     interval,
@@ -92,7 +93,9 @@ def _parameters(fit: "Fitted") -> Iterator[str]:
         "Held", ("parameter", "value", "unit", "why"), held, (1,), ["note"] * len(held)
     )
     nuisance = {n: e for n, e in fitted.items() if e.nuisance}
-    yield _estimates("Of single records: start values, dead times", nuisance)
+    some = dict(list(nuisance.items())[:MANY])
+    more = f", the first {MANY} of {len(nuisance)}" if len(nuisance) > MANY else ""
+    yield _estimates(f"Of single records: start values, dead times{more}", some)
     matrix = [[float(c) if isfinite(c) else None for c in row] for row in fit.correlation]
     shown = [i for i, n in enumerate(fit.names) if not fit.parameters[n].nuisance]
     names = [fit.names[i] for i in shown]

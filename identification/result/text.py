@@ -124,7 +124,8 @@ def _head(fit: "Fitted") -> Iterator[str]:
     rows = sum(e.rows for e in fit.errors.values())
     named = fit.records[:4]
     more = f" and {len(fit.records) - 4} more" if len(fit.records) > 4 else ""
-    told = f"{', '.join(named)}{more}; {rows} rows, {len(fit.names)} fitted"
+    count = sum(not e.fixed for e in fit.parameters.values())
+    told = f"{', '.join(named)}{more}; {rows} rows, {count} fitted"
     yield from wrap(f"data    {told}", WIDTH, subsequent_indent=" " * 8)
     if fit.starts:
         n = len(fit.starts)
