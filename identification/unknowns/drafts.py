@@ -33,6 +33,13 @@ class Wishes:
     fixed: dict[str, float]
     only: bool
 
+    @property
+    def started(self) -> frozenset[str]:
+        """Names whose start is given."""
+        return frozenset(
+            n for n, s in self.free.items() if not isinstance(s, Tied) and s.start is not None
+        )
+
     def check(self, known: Iterable[str]) -> None:
         """Refuse names that are not `known`."""
         problems = list[str]()
@@ -104,12 +111,12 @@ class Limits:
     scale: float
 
 
-def of_parameter(parameter: Parameter, unit: str, v_max: float) -> Limits:
+def of_parameter(parameter: Parameter, unit: str, speeds: roles.Speeds) -> Limits:
     """The limits of a parameter of a law or a scene, by its role."""
     value = float(parameter.value)
     return Limits(
         parameter.name, unit, value, parameter.lower, parameter.upper,
-        roles.window(parameter, v_max), roles.is_logarithmic(parameter),
+        roles.window(parameter, speeds), roles.is_logarithmic(parameter),
         abs(value) or abs(parameter.default) or 1.0,
     )  # fmt: skip
 
@@ -219,7 +226,7 @@ def _put_above(
     a = replace(
         a, lower=max(a.lower, b.lower), upper=min(a.upper, b.upper / (1.01 if strictly else 1.0))
     )
-    given = [_has_start(wished, name) for name in (low, high)]
+    given = [name in wished.started for name in (low, high)]
     if not a.start < b.start:
         if given[1] and not given[0] and b.start > 0:
             a = replace(a, start=b.start / APART)
@@ -227,11 +234,6 @@ def _put_above(
             b = replace(b, start=a.start * APART if a.start > 0 else a.start + b.scale)
     drafts[low] = replace(a, start=_between(a))
     drafts[high] = replace(b, above=low, logarithmic=logarithmic)
-
-
-def _has_start(wished: Wishes, name: str) -> bool:
-    spec = wished.free.get(name)
-    return spec is not None and not isinstance(spec, Tied) and spec.start is not None
 
 
 def _between(unknown: Unknown) -> float:

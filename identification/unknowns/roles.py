@@ -1,8 +1,9 @@
 """Which parameters of a law are fitted, and why the others are not."""
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from math import floor, log10
+from typing import final
 
 import casadi as ca
 import numpy as np
@@ -33,6 +34,8 @@ ALIKE = 1e-7
 """Part of a parameter's effect on the force, relative to it, that no other one has as well."""
 WIDTH, BLEND = 1e-3, 1e-4
 """Smoothing widths over the largest speed in the data; the blend is the narrower one."""
+SMALL = 0.1
+"""The same over the least speed, where the data have one: points at low speeds."""
 SLOWEST, NARROWEST = 2e-3, 1e-5
 """Least velocity scale, and least smoothing width, over the largest speed that data can tell."""
 
@@ -88,12 +91,31 @@ def is_logarithmic(parameter: Parameter) -> bool:
     return parameter.role not in LINEAR or (parameter.role == "level" and parameter.lower > 0)
 
 
-def window(parameter: Parameter, v_max: float) -> tuple[float, float]:
-    """Range in which data with speeds up to `v_max` can tell the parameter, in its unit."""
+@final
+@dataclass(frozen=True)
+class Speeds:
+    """What the data say of speeds [m/s or rad/s]: the largest and the least one, 0 if unknown."""
+
+    largest: float = 0.0
+    least: float = 0.0
+
+    @property
+    def known(self) -> bool:
+        """Whether there are some."""
+        return self.largest > 0 and np.isfinite(self.largest)
+
+    def share(self, of_largest: float, of_least: float = 1.0) -> float:
+        """A share of the largest speed, or of the least one if that is less."""
+        small = of_largest * self.largest
+        return min(small, of_least * self.least) if self.least > 0 else small
+
+
+def window(parameter: Parameter, speeds: Speeds) -> tuple[float, float]:
+    """Range in which data with these speeds can tell the parameter, in its unit."""
     low, high = parameter.lower, parameter.upper
-    if is_velocity(parameter) and v_max > 0 and np.isfinite(v_max):
-        least = (NARROWEST if parameter.role == "width" else SLOWEST) * v_max
-        slow, fast = (least, v_max)
+    if is_velocity(parameter) and speeds.known:
+        slow = speeds.share(NARROWEST if parameter.role == "width" else SLOWEST)
+        fast = speeds.largest
         if parameter.unit in STEEPNESSES:
             slow, fast = 1 / fast, 1 / slow
         low, high = max(low, slow), min(high, fast)
@@ -126,14 +148,14 @@ def has_directions(obj: Parametric) -> bool:
     return any(isinstance(part, Asymmetric) for part in parts(obj))
 
 
-def held_value(parameter: Parameter, v_max: float) -> float:
+def held_value(parameter: Parameter, speeds: Speeds) -> float:
     """Value of a parameter that is not fitted; a width the user changed is kept."""
     value = float(parameter.value)
     if parameter.role != "width" or parameter.unit not in VELOCITIES:
         return value
-    if value != parameter.default or not v_max > 0:
+    if value != parameter.default or not speeds.known:
         return value
-    return one_digit((BLEND if parameter.field == "v_blend" else WIDTH) * v_max)
+    return one_digit(speeds.share(BLEND if parameter.field == "v_blend" else WIDTH, SMALL))
 
 
 def one_digit(value: float) -> float:

@@ -59,6 +59,7 @@ class Subject:
         variables: parameter -> name, unit, bounds and doc, of all that there are.
         guard: function of free values by name that raises ValueError where a law refuses them, and
             returns the law or the machine; free of symbols.
+        started: parameters whose start the user gave.
     """
 
     name: str
@@ -72,6 +73,7 @@ class Subject:
     held: dict[str, float]
     variables: dict[str, Variable]
     guard: Callable[[Mapping[str, float]], Law | Scene | None]
+    started: frozenset[str] = frozenset()
 
     @property
     def drive(self) -> Drive | None:
@@ -102,6 +104,7 @@ def subject(
     moving: bool | None = None,
     turning: bool = False,
     v_max: float = 0.0,
+    v_min: float = 0.0,
 ) -> Subject:
     """Decide what is fitted, and write it with symbols.
 
@@ -115,6 +118,7 @@ def subject(
         moving: the data show how the states of a law change; None: unless they are points.
         turning: positions are angles.
         v_max: largest speed in the data [m/s or rad/s]; 0: unknown.
+        v_min: least speed at which points were taken; 0: nobody knows, or a motion through rest.
 
     Raises:
         ValueError: everything that is wrong with them, in one error.
@@ -135,18 +139,18 @@ def subject(
     elif isinstance(what, Drive):
         turning = what.turning
     moving = not points if moving is None else moving
-    return _of_parts(what, wished, _Setting(load, moving, turning, v_max))
+    return _of_parts(what, wished, _Setting(load, moving, turning, roles.Speeds(v_max, v_min)))
 
 
 @final
 @dataclass(frozen=True)
 class _Setting:
-    """What the data are of: normal force [N], states that move, angles, largest speed."""
+    """What the data are of: normal force [N], states that move, angles, speeds."""
 
     load: float
     moving: bool
     turning: bool
-    v_max: float
+    speeds: roles.Speeds
 
 
 def _of_parts(whole: Scene | Law, wished: Wishes, setting: _Setting) -> Subject:
@@ -162,8 +166,8 @@ def _of_parts(whole: Scene | Law, wished: Wishes, setting: _Setting) -> Subject:
     free = [n for n in known if n not in reasons]
     if not free:
         raise ValueError("Fit: expected at least one free parameter, got all fixed")
-    held = {n: wished.fixed.get(n, roles.held_value(known[n], setting.v_max)) for n in reasons}
-    limits = [of_parameter(known[n], units[n], setting.v_max) for n in free]
+    held = {n: wished.fixed.get(n, roles.held_value(known[n], setting.speeds)) for n in reasons}
+    limits = [of_parameter(known[n], units[n], setting.speeds) for n in free]
     drafts = drafted(limits, wished, held, list(roles.orders(whole)))
     whole = with_values(whole, held | {n: u.start for n, u in drafts.items()})
     symbolic, p = symbolise(whole, *free)
@@ -180,7 +184,7 @@ def _of_parts(whole: Scene | Law, wished: Wishes, setting: _Setting) -> Subject:
         {n: reasons[n] for n in known if n in reasons}, held,
         {n: Variable(n, units[n], q.value, lower=q.lower, upper=q.upper, doc=q.doc)
          for n, q in known.items()},
-        partial(with_values, whole),
+        partial(with_values, whole), wished.started,
     )  # fmt: skip
 
 
@@ -245,7 +249,7 @@ def _of_model(model: Model, wished: Wishes) -> Subject:
     return Subject(
         model.name, tuple(v.name for v in free), replace(model, p=p), guard({}), None,
         tuple(drafts[v.name] for v in free if v.name not in ties), ties, reasons, held,
-        {v.name: v for v in model.p}, guard,
+        {v.name: v for v in model.p}, guard, wished.started,
     )  # fmt: skip
 
 

@@ -1,0 +1,258 @@
+"""Fit a law, a machine or a model to measured data.
+
+    data = Dataset.read("run*.csv", units="rad, N m")
+    fit = Fit(Shooting(windows=4.0), "lugre", data, free={"sigma_0": log(1e3, 1e7)}).solve()
+
+data -> kind of residuals -> unknowns -> weighted least squares from many starts -> verdict -> result
+"""
+
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass, fields, replace
+from time import perf_counter
+from typing import Any, Protocol, final
+
+from identification.data.dataset import Dataset
+from identification.data.findings import Findings
+from identification.first import centre, measured, slowest
+from identification.residuals.evaluation import Residuals
+from identification.residuals.points import Points
+from identification.result.build import fitted
+from identification.result.fitted import Fitted
+from identification.solving.descent import Start
+from identification.solving.loss import THRESHOLD
+from identification.solving.many_starts import Progress, best_of, many_starts
+from identification.solving.scatter import scattered
+from identification.solving.task import Point, Task, task
+from identification.starts.measured import Measured
+from identification.unknowns.subject import Subject, subject
+from identification.unknowns.unknowns import unknowns_of
+from identification.verdict.covariance import covariance
+from identification.verdict.judge import Verdict, judge
+from symfric.foundation import checks
+from symfric.foundation.status import SolveError, Status
+
+OF_KIND = ("x0", "dead_time")
+"""Entries of `free` that belong to the kind of residuals."""
+
+
+class Kind(Protocol):
+    """A kind of residuals: `Points`, `InverseDynamics`, `Shooting`, `ClosedLoop`, or your own."""
+
+    def prepare(
+        self, subject: Subject, data: Dataset, start: Mapping[str, float]
+    ) -> Residuals:
+        """The residuals of `data`; what they need from values, they take at `start`."""
+        ...
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """One question to data.
+
+        minimise over p, sigma   sum_s n_s ln sigma_s^2 + sum_i loss(r_i(p) / sigma_s(i))
+
+    Attributes:
+        kind: what is compared: `Points()`, `InverseDynamics()`, `Shooting()`, `ClosedLoop()`.
+        what: a law or its text ("stribeck", "asymmetric(coulomb+viscous)"), a scene, or a model. A
+            law becomes the friction of a `Drive`.
+        data: one or several records.
+        free: names, or name -> how: a start value, (lower, upper), `log(...)`, `linear(...)`,
+            `above(name)`, `tied(name, factor)`. They are fitted beside what is fitted by its role;
+            of a model all parameters are. "x0" and "dead_time" go to the kind.
+        fixed: name -> value of what is not fitted; "others": all that `free` does not name.
+        normal_force: of a law [N]; with 1 N its coefficients read as forces.
+        noise: "estimate", or signal -> standard deviation [SI]; others are estimated.
+        loss: "squares", or against outliers "huber", "soft_l1", "cauchy", "arctan".
+        starts: most starts; they end early where others cannot matter (see `many_starts`).
+        start: parameter -> value, or "data" (the default), or "law": the values that it has.
+        seed: of the starts after the first.
+        evaluations: of the residuals, allowed to each start.
+
+    Raises:
+        ValueError: bad arguments; from `solve` names and bounds, all in one error.
+    """
+
+    kind: Kind
+    what: Any
+    data: Dataset
+    free: Any = None
+    fixed: Any = None
+    normal_force: float = 1.0
+    noise: Any = "estimate"
+    loss: str = "squares"
+    starts: int = 6
+    start: Any = "data"
+    seed: int = 0
+    evaluations: int = 200
+
+    def __post_init__(self) -> None:
+        problems: list[str] = []
+        for check in (_check_kind, _check_data, _check_loss, _check_counts, _check_start):
+            try:
+                check(self)
+            except ValueError as error:
+                problems.append(str(error))
+        if problems:
+            raise ValueError("; ".join(problems))
+
+    def solve(
+        self,
+        executor: Executor | None = None,
+        progress: Progress | None = None,
+        throw: bool = True,
+    ) -> Fitted:
+        """Fit.
+
+        Args:
+            executor: of `concurrent.futures`, for the starts; the result is the same to the bit.
+            progress: called with a text and the fraction done.
+            throw: raise `SolveError` where the result is no use; its `partial` is the result.
+
+        Raises:
+            ValueError: data or names that cannot be used.
+            SolveError: no start has residuals; with `throw`, also where the fit did not reach a
+                minimum, or data or residuals say that the result is no physics.
+        """
+        begun = perf_counter()
+        throw = checks.flag("Fit: throw", throw)
+        asked = self.prepared()
+        made = asked.task
+        first = scattered(made.unknowns, asked.centre, self.starts, self.seed)
+        starts = many_starts(made, first, executor, progress, self.evaluations)
+        end = best_of(starts)
+        point = made.with_noise(end.noise).at(end.w)
+        if isinstance(point, str):
+            message = f"Fit: {asked.subject.name}: no start has residuals: {point}"
+            raise SolveError(message, Status.NOT_FINITE)
+        return self._result(asked, starts, end, point, throw, perf_counter() - begun)
+
+    def prepared(self) -> "Prepared":
+        """Data checked, subject chosen, residuals made: all but the solution."""
+        kind, free = _to_kind(self.kind, self.free)
+        findings = self.data.check()
+        seen = measured(kind, self.data, self.normal_force)
+        imposed = isinstance(kind, Points) and all(r.t is not None for r in self.data)
+        found = subject(
+            self.what,
+            free=free,
+            fixed=self.fixed,
+            normal_force=self.normal_force,
+            points=isinstance(kind, Points),
+            moving=imposed and kind.states != "steady" if isinstance(kind, Points) else None,
+            turning=self.data.rotary,
+            v_max=0.0 if seen is None else seen.fastest,
+            v_min=slowest(kind, seen),
+        )
+        given = self.start if isinstance(self.start, Mapping) else {}
+        checks.check_names("Fit: start", given, found.names)
+        values = centre(found, None if self.start == "law" else seen, given)
+        residuals = kind.prepare(found, self.data, values)
+        unknowns = unknowns_of(
+            (*found.unknowns, *residuals.own), found.ties, residuals.names, found.held
+        )
+        rows = sum(c.t.size for c in residuals.channels)
+        if rows < len(unknowns.unknowns):
+            raise ValueError(
+                f"Fit: expected at least {len(unknowns.unknowns)} residuals for as many unknowns, "
+                f"got {rows}; fix some, or add data"
+            )
+        made = task(residuals, unknowns, self.noise, self.loss, found.guard)
+        return Prepared(kind, found, findings, made, unknowns.of(values), seen)
+
+    def _result(
+        self, asked: "Prepared", starts: tuple[Start, ...], end: Start, point: Point,
+        throw: bool, seconds: float,
+    ) -> Fitted:  # fmt: skip
+        made = asked.task.with_noise(end.noise)
+        verdict = judge(made, point)
+        status, message = _status(end, verdict, asked.findings)
+        result = fitted(
+            asked.kind, asked.subject, self.data, made, point, starts, verdict,
+            covariance(made, point), tuple(asked.findings), status=status, message=message,
+            seconds=seconds,
+        )  # fmt: skip
+        if throw and not status.ok:
+            raise SolveError(f"Fit: {asked.subject.name}: {result.message}", status, result)
+        return result
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A fit before its solution.
+
+    Attributes:
+        kind: with what `free` said of it.
+        subject: what is fitted.
+        findings: what is doubtful about the data.
+        task: the least-squares problem.
+        centre: coordinates of the first start, shape (n,).
+        seen: velocity and force, where the data have them.
+    """
+
+    kind: Kind
+    subject: Subject
+    findings: Findings
+    task: Task
+    centre: Any
+    seen: Measured | None
+
+
+def _status(end: Start, verdict: Verdict, findings: Findings) -> tuple[Status, str]:
+    """How the fit ended, and what to know about it."""
+    errors = [f.sentence for f in findings.errors]
+    status = verdict.status(end.status)
+    if errors and status is not Status.INTERRUPTED:
+        status = Status.IMPLAUSIBLE
+    said = [*errors, end.message, *verdict.sentences]
+    return status, " ".join(_sentence(text) for text in said if text)
+
+
+def _sentence(text: str) -> str:
+    return text if text.endswith(".") else f"{text[0].upper()}{text[1:]}."
+
+
+def _to_kind(kind: Kind, free: Any) -> tuple[Kind, Any]:
+    """The kind with what `free` says of it, and the rest of `free`."""
+    if not isinstance(free, Mapping):
+        return kind, free
+    given: dict[str, Any] = dict(free)  # pyright: ignore[reportUnknownArgumentType]
+    mine = {name: given.pop(name) for name in OF_KIND if name in given}
+    known = {item.name for item in fields(kind)}  # pyright: ignore[reportArgumentType]
+    for name in mine:
+        if name not in known:
+            raise ValueError(
+                f"Fit: free: expected parameters, got {name}, which {type(kind).__name__} has not; "
+                "Shooting has start values and a dead time"
+            )
+    return (replace(kind, **mine) if mine else kind), given  # pyright: ignore[reportArgumentType, reportUnknownVariableType]
+
+
+def _check_kind(fit: Fit) -> None:
+    if isinstance(fit.kind, type) or not callable(getattr(fit.kind, "prepare", None)):
+        such = "a kind of residuals, such as Points(), InverseDynamics() or Shooting()"
+        raise checks.refused("Fit: kind", such, fit.kind)
+
+
+def _check_data(fit: Fit) -> None:
+    checks.kind("Fit: data", fit.data, Dataset, "data, such as Dataset.read('run.csv')")
+
+
+def _check_loss(fit: Fit) -> None:
+    checks.choice("Fit: loss", fit.loss, THRESHOLD)
+
+
+def _check_counts(fit: Fit) -> None:
+    checks.count("Fit: starts", fit.starts)
+    checks.count("Fit: seed", fit.seed, least=0)
+    checks.count("Fit: evaluations", fit.evaluations, least=2)
+
+
+def _check_start(fit: Fit) -> None:
+    if isinstance(fit.start, str):
+        checks.choice("Fit: start", fit.start, ("data", "law"))
+        return
+    for name, value in checks.named("Fit: start", fit.start).items():
+        checks.number(f"Fit: start: {name}", value)
