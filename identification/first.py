@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from identification.data.dataset import Dataset
+from identification.data.findings import Findings
 from identification.residuals.points import Points
 from identification.signals.differentiate import differentiate
 from identification.starts.measured import Measured
@@ -15,6 +16,20 @@ from symfric.scenes import Drive
 
 FEW = 0.01
 """Share of points whose speed may be any small number, such as noise about rest."""
+
+
+def findings_of(kind: object, data: Dataset) -> Findings:
+    """What is doubtful about the data, for who uses them like this."""
+    check = getattr(data, "check", None)
+    if check is None:
+        return Findings((), data.name)
+    return check() if isinstance(kind, Points) else check(**_roles(kind))
+
+
+def _roles(kind: object) -> dict[str, str]:
+    """Channels of position and force of a drive."""
+    names = {name: getattr(kind, name, name) for name in ("x", "force")}
+    return {name: given if isinstance(given, str) else name for name, given in names.items()}
 
 
 def measured(kind: object, data: Dataset, load: float) -> Measured | None:
@@ -35,11 +50,11 @@ def _of_points(kind: Points, data: Dataset, load: float) -> Measured:
 
 
 def _of_drive(kind: object, data: Dataset, load: float) -> Measured:
-    names = {name: getattr(kind, name, name) for name in ("x", "force")}
-    names = {name: given if isinstance(given, str) else name for name, given in names.items()}
-    each = [differentiate(r, getattr(kind, "filter", None), **names) for r in data]
+    names, chosen = _roles(kind), getattr(kind, "filter", None)
+    each = [differentiate(r, chosen, x=names["x"], force=names["force"]) for r in data]
     v, F, x, t, a = (
-        np.concatenate([getattr(one, name) for one in each]) for name in ("v", "force", "x", "t", "a")
+        np.concatenate([getattr(one, name) for one in each])
+        for name in ("v", "force", "x", "t", "a")
     )
     return Measured(v, F, x=x, t=t, a=a, N=load, breaks=_breaks([one.v.size for one in each]))
 
@@ -68,9 +83,7 @@ def from_data(subject: Subject, seen: Measured | None) -> dict[str, float]:
         return {}
 
 
-def centre(
-    subject: Subject, seen: Measured | None, given: Mapping[str, float]
-) -> dict[str, float]:
+def centre(subject: Subject, seen: Measured | None, given: Mapping[str, float]) -> dict[str, float]:
     """Start value of every free parameter: what the user says, else the data, else the law."""
     values = {u.name: u.start for u in subject.unknowns}
     told = {n: x for n, x in from_data(subject, seen).items() if n not in subject.started}

@@ -3,22 +3,22 @@
     data = Dataset.read("run*.csv", units="rad, N m")
     fit = Fit(Shooting(windows=4.0), "lugre", data, free={"sigma_0": log(1e3, 1e7)}).solve()
 
-data -> kind of residuals -> unknowns -> weighted least squares from many starts -> verdict -> result
+data -> kind of residuals -> unknowns -> least squares from many starts -> verdict -> result
 """
 
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from time import perf_counter
-from typing import Any, Protocol, final
+from typing import Any, final
 
 from identification.data.dataset import Dataset
 from identification.data.findings import Findings
-from identification.first import centre, measured, slowest
-from identification.residuals.evaluation import Residuals
+from identification.first import centre, findings_of, measured, slowest
 from identification.residuals.points import Points
 from identification.result.build import fitted
 from identification.result.fitted import Fitted
+from identification.result.live import Kind
 from identification.solving.descent import Start
 from identification.solving.loss import THRESHOLD
 from identification.solving.many_starts import Progress, best_of, many_starts
@@ -34,16 +34,6 @@ from symfric.foundation.status import SolveError, Status
 
 OF_KIND = ("x0", "dead_time")
 """Entries of `free` that belong to the kind of residuals."""
-
-
-class Kind(Protocol):
-    """A kind of residuals: `Points`, `InverseDynamics`, `Shooting`, `ClosedLoop`, or your own."""
-
-    def prepare(
-        self, subject: Subject, data: Dataset, start: Mapping[str, float]
-    ) -> Residuals:
-        """The residuals of `data`; what they need from values, they take at `start`."""
-        ...
 
 
 @final
@@ -131,7 +121,7 @@ class Fit:
     def prepared(self) -> "Prepared":
         """Data checked, subject chosen, residuals made: all but the solution."""
         kind, free = _to_kind(self.kind, self.free)
-        findings = self.data.check()
+        findings = findings_of(kind, self.data)
         seen = measured(kind, self.data, self.normal_force)
         imposed = isinstance(kind, Points) and all(r.t is not None for r in self.data)
         found = subject(
@@ -166,8 +156,8 @@ class Fit:
         throw: bool, seconds: float,
     ) -> Fitted:  # fmt: skip
         made = asked.task.with_noise(end.noise)
-        verdict = judge(made, point)
-        status, message = _status(end, verdict, asked.findings)
+        verdict = judge(made, point, asked.findings)
+        status, message = _status(end, verdict)
         result = fitted(
             asked.kind, asked.subject, self.data, made, point, starts, verdict,
             covariance(made, point), tuple(asked.findings), status=status, message=message,
@@ -200,14 +190,10 @@ class Prepared:
     seen: Measured | None
 
 
-def _status(end: Start, verdict: Verdict, findings: Findings) -> tuple[Status, str]:
+def _status(end: Start, verdict: Verdict) -> tuple[Status, str]:
     """How the fit ended, and what to know about it."""
-    errors = [f.sentence for f in findings.errors]
-    status = verdict.status(end.status)
-    if errors and status is not Status.INTERRUPTED:
-        status = Status.IMPLAUSIBLE
-    said = [*errors, end.message, *verdict.sentences]
-    return status, " ".join(_sentence(text) for text in said if text)
+    said = [end.message, *verdict.sentences]
+    return verdict.status(end.status), " ".join(_sentence(text) for text in said if text)
 
 
 def _sentence(text: str) -> str:

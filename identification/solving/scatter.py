@@ -59,7 +59,9 @@ def _moved(unknown: Unknown, w: float, share: float, lower: float, upper: float)
     if np.isfinite(lower) and np.isfinite(upper) and not unknown.logarithmic:
         return lower + share * (upper - lower)
     if unknown.logarithmic:
-        return w + side * np.log(REACH) if not np.isfinite(upper) else lower + share * (upper - lower)
+        return (
+            w + side * np.log(REACH) if not np.isfinite(upper) else lower + share * (upper - lower)
+        )
     if lower >= 0 and w > 0:
         return w * REACH**side
     return w + 0.5 * side * abs(w)

@@ -157,7 +157,7 @@ def drafted(
     for unknown in drafts.values():
         problems += _contradictions(unknown)
     refuse(problems)
-    return {n: u if u.above else replace(u, start=_between(u)) for n, u in drafts.items()}
+    return {n: u if u.partner else replace(u, start=_between(u)) for n, u in drafts.items()}
 
 
 def _draft(limits: Limits, spec: Spec, problems: list[str]) -> Unknown:
@@ -220,20 +220,27 @@ def _order(
 def _put_above(
     drafts: dict[str, Unknown], wished: Wishes, low: str, high: str, strictly: bool
 ) -> None:
-    """`high` counted from `low`, their starts in order."""
+    """`high` counted from `low`, their starts in order; where it is bounded, the other way."""
     a, b = drafts[low], drafts[high]
-    logarithmic = strictly and a.logarithmic and b.logarithmic
-    a = replace(
-        a, lower=max(a.lower, b.lower), upper=min(a.upper, b.upper / (1.01 if strictly else 1.0))
-    )
-    given = [name in wished.started for name in (low, high)]
+    asked = wished.free.get(high)
+    if isinstance(asked, Range) and asked.lower > a.lower:
+        # a lower one with an upper bound of its own stays in its box: no coordinate keeps both,
+        # and trials out of order are refused when the law is made
+        if a.upper >= b.upper:
+            first = min(a.start, _between(b))
+            drafts[low] = replace(a, below=high, start=first, logarithmic=False)
+        drafts[high] = replace(b, start=_between(b))
+        return
+    room = 1.01 if strictly else 1.0
+    a = replace(a, lower=max(a.lower, b.lower), upper=min(a.upper, b.upper / room))
     if not a.start < b.start:
-        if given[1] and not given[0] and b.start > 0:
+        if high in wished.started and low not in wished.started and b.start > 0:
             a = replace(a, start=b.start / APART)
         else:
             b = replace(b, start=a.start * APART if a.start > 0 else a.start + b.scale)
     drafts[low] = replace(a, start=_between(a))
-    drafts[high] = replace(b, above=low, logarithmic=logarithmic)
+    both = strictly and a.logarithmic and b.logarithmic
+    drafts[high] = replace(b, above=low, logarithmic=both)
 
 
 def _between(unknown: Unknown) -> float:

@@ -18,6 +18,7 @@ class Unknown:
         scale: typical magnitude; a linear coordinate is value / scale.
         logarithmic: fitted by its logarithm: positive scales of which nobody knows the order.
         above: name of the value that this one does not fall below, or "".
+        below: likewise, of the value that this one does not exceed.
         nuisance: a start value, a dead time: fitted, but not what is asked for.
     """
 
@@ -29,4 +30,10 @@ class Unknown:
     scale: float = 1.0
     logarithmic: bool = False
     above: str = ""
+    below: str = ""
     nuisance: bool = False
+
+    @property
+    def partner(self) -> str:
+        """The value that this one is in order with, or ""."""
+        return self.above or self.below

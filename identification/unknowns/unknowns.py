@@ -5,6 +5,7 @@
     p = low + scale w, w >= 0        not below another value; low + exp(w) where it is logarithmic
     p = low + (upper - low) w        not below another value and not above a bound, 0 <= w <= 1
     p = low (upper / low)^w          likewise, where it is logarithmic, and strictly above
+    p = lower + (high - lower) w     not above another value, 0 <= w <= 1
     p = rule(p)                      tied: no coordinate of its own
 
 A box in w is all that a solver has to keep; orders and ties hold at every trial.
@@ -87,19 +88,18 @@ class Unknowns:
     def of(self, values: Mapping[str, float]) -> Array:
         """Coordinates of `values`, moved inside the box; what is not named is at its start."""
         known = {u.name: u.start for u in self.unknowns} | dict(values)
-        low = {u.above: known[u.above] for u in self.unknowns if u.above in known}
-        if any(u.above and u.above not in known for u in self.unknowns):
-            low = self._lows(known)
-        w = [_coordinate(u, known[u.name], low.get(u.above, 0.0)) for u in self.unknowns]
+        if any(u.partner and u.partner not in known for u in self.unknowns):
+            known = self._with_ties(known) | known
+        w = [_coordinate(u, known[u.name], known.get(u.partner, 0.0)) for u in self.unknowns]
         return self.inside(np.array(w))
 
-    def _lows(self, known: Mapping[str, float]) -> dict[str, float]:
-        """Values that others do not fall below, tied ones among them."""
-        free = [replace(u, above="") for u in self.unknowns]
+    def _with_ties(self, known: Mapping[str, float]) -> dict[str, float]:
+        """Values that others are in order with, tied ones among them."""
+        free = [replace(u, above="", below="") for u in self.unknowns]
         w = np.array([_coordinate(u, known[u.name], 0.0) for u in free])
         for _ in range(2):  # a tied value may follow from one with an order of its own
             found = self.named(self.inside(w))
-            w = np.array([_coordinate(u, known[u.name], found[u.above]) if u.above else w[i]
+            w = np.array([_coordinate(u, known[u.name], found[u.partner]) if u.partner else w[i]
                           for i, u in enumerate(self.unknowns)])  # fmt: skip
         return self.named(self.inside(w))
 
@@ -160,8 +160,11 @@ def _write(
             return False
         return True
     unknown, w = unknowns[name]
-    if unknown.above and unknown.above not in values:
+    if unknown.partner and unknown.partner not in values:
         return False
+    if unknown.below:
+        values[name] = _under(unknown, values[unknown.below], w)
+        return True
     low = values[unknown.above] if unknown.above else ca.SX(0)
     if unknown.above and unknown.upper < inf:
         high = unknown.upper
@@ -169,6 +172,13 @@ def _write(
     else:
         values[name] = low + (ca.exp(w) if unknown.logarithmic else unknown.scale * w)
     return True
+
+
+def _under(unknown: Unknown, high: Any, w: Any) -> Any:
+    """A value that does not exceed `high`."""
+    if unknown.lower > -inf:
+        return unknown.lower + (high - unknown.lower) * w
+    return high - unknown.scale * (1 - w)
 
 
 def _circle(
@@ -186,11 +196,16 @@ def _circle(
             except (KeyError, ValueError) as error:
                 said.append(f"{name} is tied to what is not fitted or leads back to it ({error})")
         else:
-            said.append(f"{name} is above {unknowns[name][0].above}, which is not fitted")
+            said.append(f"{name} is in order with {unknowns[name][0].partner}, which is not")
     return "Fit: free: expected ties and orders that end somewhere, got " + "; ".join(said)
 
 
 def _coordinate(unknown: Unknown, value: float, low: float) -> float:
+    """Coordinate of a value; `low` is that of its partner in an order, if it has one."""
+    if unknown.below:
+        if unknown.lower > -inf:
+            return (value - unknown.lower) / max(low - unknown.lower, 1e-300)
+        return 1 - (low - value) / unknown.scale
     if unknown.above:
         excess = max(value - low, 1e-3 * max(abs(low), 1e-12))
         if unknown.upper < inf and unknown.logarithmic:
@@ -205,6 +220,8 @@ def _coordinate(unknown: Unknown, value: float, low: float) -> float:
 
 def _box(unknown: Unknown) -> tuple[float, float]:
     """Box of the coordinate."""
+    if unknown.below:
+        return (0.0 if unknown.lower > -inf else -inf), 1.0
     if unknown.above:
         if unknown.upper < inf:
             return (STRICTLY if unknown.logarithmic else 0.0), 1.0

@@ -104,6 +104,21 @@ def test_specs_bound_tie_and_order() -> None:
     assert {u.name: u.above for u in ordered.unknowns}["sigma_1"] == "sigma_2"
 
 
+def test_bounds_of_the_upper_one_of_a_pair_leave_the_lower_one_its_range() -> None:
+    for free in ({"mu_s": (2.0, 2.5)}, {"mu_s": (2.0, 2.5), "mu_d": (0.5, 9.0)}):
+        found = subject("stribeck", free=free)
+        at = coordinates(found)
+        rng = np.random.default_rng(0)
+        for _ in range(50):
+            w = at.start + rng.uniform(-3, 3, at.start.size)
+            values = at.named(np.clip(w, at.lower, at.upper))
+            assert 2.0 <= values["mu_s"] <= 2.5
+            assert values["mu_d"] <= values["mu_s"]
+        wanted = {"mu_s": 2.4, "mu_d": 0.7}
+        named = at.named(at.of(wanted))
+        assert {n: named[n] for n in wanted} == pytest.approx(wanted)
+
+
 def test_a_fixed_partner_of_an_order_becomes_a_bound() -> None:
     low = {u.name: u.lower for u in subject("stribeck", fixed={"mu_d": 3.0}).unknowns}
     assert low["mu_s"] == 3.0

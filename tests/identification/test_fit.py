@@ -1,0 +1,139 @@
+"""One question to data: points and motions, bad arguments, other processes, what is kept."""
+
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+
+from identification.data.dataset import Dataset
+from identification.fit import Fit
+from identification.residuals.inverse import InverseDynamics
+from identification.residuals.points import Points
+from identification.residuals.shooting import Shooting
+from identification.unknowns.spec import above, log, tied
+from symfric.foundation.status import SolveError, Status
+from symfric.laws import Coulomb, LuGre, Stribeck, Sum, Viscous
+from symfric.scenes import Drive
+
+TRUTH = {"mu_s": 3.0, "mu_d": 2.0, "v_s": 0.01, "sigma_2": 4.0}
+NOISE = 0.02
+
+
+def points(seed: int = 0, **other: float) -> Dataset:
+    law = Stribeck(**(TRUTH | other), v_eps=1e-5)
+    speeds = np.geomspace(1e-4, 0.3, 60)
+    v = np.concatenate([speeds, -speeds])
+    F = np.array([float(law.force(x, 1.0)) for x in v])
+    noise = NOISE * np.random.default_rng(seed).standard_normal(v.size)
+    return Dataset.of(v=v, F=F + noise, points=True)
+
+
+def test_points_give_the_curve_back_within_their_noise() -> None:
+    fit = Fit(Points(), "stribeck", points()).solve()
+    assert fit.status is Status.SOLVED
+    for name, value in TRUTH.items():
+        found = fit.parameters[name]
+        assert found.standard_error is not None
+        assert abs(found.value - value) < 4 * found.standard_error
+    assert fit.noise["F"] == pytest.approx(NOISE, rel=0.2)
+    assert isinstance(fit.law, Stribeck) and fit.law.mu_s >= fit.law.mu_d
+
+
+def test_points_at_low_speeds_narrow_the_smoothing() -> None:
+    fit = Fit(Points(), "stribeck", points()).solve()
+    assert fit.parameters["v_eps"].value <= 1e-5
+
+
+def test_a_wrong_law_is_doubtful_and_no_error() -> None:
+    fit = Fit(Points(), "coulomb+viscous", points()).solve()
+    assert fit.status is Status.DOUBTFUL
+
+
+def test_specs_reach_the_result() -> None:
+    data = points()
+    fixed = Fit(Points(), "stribeck", data, fixed={"sigma_2": 4.0}).solve()
+    assert fixed.parameters["sigma_2"].fixed
+    bound = Fit(Points(), "stribeck", data, free={"mu_s": (2.0, 2.5)}).solve()
+    assert bound.parameters["mu_s"].value == pytest.approx(2.5, rel=1e-3)
+    rule = tied(lambda p: 1.5 * p["mu_d"])
+    held = Fit(Points(), "stribeck", data, free={"mu_s": rule}).solve()
+    assert held.parameters["mu_s"].value == pytest.approx(1.5 * held.parameters["mu_d"].value)
+    ordered = Fit(Points(), "stribeck", data, free={"mu_s": above("mu_d"), "delta": log(0.5, 5)})
+    assert ordered.solve().parameters["delta"].value == pytest.approx(2.0, rel=0.1)
+
+
+def test_the_same_on_any_executor_to_the_bit() -> None:
+    data = points()
+    here = Fit(Points(), "stribeck", data).solve()
+    with ThreadPoolExecutor(2) as pool:
+        there = Fit(Points(), "stribeck", data).solve(pool)
+    assert [e.value for e in here.parameters.values()] == [
+        e.value for e in there.parameters.values()
+    ]
+
+
+def test_progress_is_told_after_each_start() -> None:
+    told = list[tuple[str, float]]()
+    Fit(Points(), "coulomb+viscous", points(), starts=4).solve(
+        progress=lambda text, done: told.append((text, done))
+    )
+    assert told[0] == ("start 1 of 4", 0.25)
+
+
+def motion(law: Any, m: float = 2.0) -> Dataset:
+    """A drive under a chirp of force, its motion by its own inverse: exact but for sampling."""
+    t = np.arange(0, 4, 1e-3)
+    x = 0.05 * np.sin(2 * np.pi * 0.7 * t) + 0.02 * np.sin(2 * np.pi * 1.9 * t)
+    v, a = np.gradient(x, t), np.gradient(np.gradient(x, t), t)
+    F = np.array([float(law.force(float(s), 1.0)) for s in v])
+    noise = 0.02 * np.random.default_rng(1).standard_normal(t.size)
+    return Dataset.of(t=t, x=x, force=m * a + F + noise)
+
+
+def test_inverse_dynamics_finds_mass_and_friction() -> None:
+    truth = Sum((Coulomb(mu_d=1.5, v_eps=1e-3), Viscous(sigma_2=2.0)))
+    fit = Fit(InverseDynamics(), "coulomb+viscous", motion(truth)).solve(throw=False)
+    assert fit.parameters["m"].value == pytest.approx(2.0, rel=0.01)
+    assert fit.parameters["mu_d"].value == pytest.approx(1.5, rel=0.02)
+    assert fit.parameters["sigma_2"].value == pytest.approx(2.0, rel=0.05)
+
+
+def test_what_the_kind_takes_out_of_free() -> None:
+    with pytest.raises(ValueError, match="dead_time, which Points has not"):
+        Fit(Points(), "stribeck", points(), free={"dead_time": (0.0, 0.1)}).solve()
+    fit = Fit(Shooting(), "lugre", motion(Coulomb(mu_d=1.0)), free={"x0": "given"})
+    assert fit.prepared().task.unknowns.nuisance == ()
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"kind": Points}, "kind"),
+        ({"data": 3, "loss": "hubre", "starts": 0}, "data.*loss.*huber.*starts"),
+        ({"free": {"mu_x": 1.0}}, "mu_x"),
+        ({"start": {"mu_d": "big"}}, "start: mu_d"),
+        ({"start": {"sigma_0": 1.0}}, "start"),
+        ({"noise": {"x": 1.0}}, "noise"),
+        ({"noise": {"F": 0.0}}, "noise: F"),
+        ({"what": Drive(LuGre()).model()}, "parameters"),
+        ({"fixed": dict.fromkeys(TRUTH, 1.0)}, "all fixed"),
+    ],
+)
+def test_bad_arguments_are_refused_in_words(given: dict[str, Any], said: str) -> None:
+    arguments: dict[str, Any] = {"kind": Points(), "what": "stribeck", "data": points()}
+    with pytest.raises(ValueError, match=f"(?s){said}"):
+        Fit(**(arguments | given)).solve()
+
+
+def test_too_few_points_are_refused() -> None:
+    data = Dataset.of(v=[0.1, 0.2, 0.3], F=[1.0, 1.1, 1.2], points=True)
+    with pytest.raises(ValueError, match="at least 4 residuals"):
+        Fit(Points(), "stribeck", data).solve()
+
+
+def test_a_fit_without_an_end_says_so_and_hands_back_what_there_is() -> None:
+    with pytest.raises(SolveError) as caught:
+        Fit(Points(), "stribeck", points(), start="law", starts=1, evaluations=2).solve()
+    assert caught.value.status is Status.MAX_ITERATIONS
+    assert caught.value.partial.parameters["mu_d"].value > 0
