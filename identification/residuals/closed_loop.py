@@ -1,0 +1,382 @@
+"""A drive under its sampled controller, compared with what was measured in the loop.
+
+At each sample the controller sees the simulated motion and gives the command that the drive then
+feels until the next one:
+
+    (s, command)_k = controller(s_(k-1), x_k, reference_k)
+    force_k = gain (command_k + disturbance_k),   m v' = force_k - F(v) - offset
+
+Residuals are those of the position and of the force. The controller holds the motion to the
+reference, so that errors do not drift as they do without it, and the force tells the friction.
+Source of the measure: Janot, Gautier, Brunot, Nonlinear System Identification Benchmarks 2019.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.data.loop import PositionLoop
+from identification.data.record import Record
+from identification.residuals.evaluation import Channel, Evaluation
+from identification.residuals.initial import local, noise_of
+from identification.residuals.stepper import (
+    Chain,
+    Feedback,
+    Mass,
+    Motion,
+    Tangent,
+    why_no_motion,
+)
+from identification.unknowns.unknown import Unknown
+from symfric.foundation import checks
+
+if TYPE_CHECKING:
+    from identification.data.dataset import Dataset
+    from identification.unknowns.subject import Subject
+
+Array = NDArray[np.float64]
+SIGNALS = ("x", "force")
+WHERE = "ClosedLoop"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Controller:
+    """A controller of the user's, called once a sample.
+
+        (state, command) = step(state, measured, reference),   force = gain (command + disturbance)
+
+    Attributes:
+        step: CasADi Function (state (n,), measured (1,) or (2,), reference (r,)) -> (state (n,),
+            command (1,)); measured is the position, or the position and the velocity, of the
+            simulated drive at the sample. Without memory n = 0.
+        reference: channels of the data that it follows.
+        disturbance: channel that is added to the command; None: nothing is.
+        gain: force per command [N or N m per command unit].
+        start: its state at the first sample: numbers, or a Function of the measured quantities;
+            None: zeros.
+    """
+
+    step: ca.Function
+    reference: tuple[str, ...] = ("reference",)
+    disturbance: str | None = None
+    gain: float = 1.0
+    start: Sequence[float] | ca.Function | None = None
+
+    def __post_init__(self) -> None:
+        where = "Controller"
+        step = checks.kind(f"{where}: step", self.step, ca.Function, "a CasADi Function")
+        reference = (self.reference,) if isinstance(self.reference, str) else self.reference
+        names = checks.names(f"{where}: reference", reference)
+        object.__setattr__(self, "reference", tuple(names))
+        object.__setattr__(self, "gain", checks.number(f"{where}: gain", self.gain))
+        sizes = [step.numel_in(i) for i in range(step.n_in())]
+        out = [step.numel_out(i) for i in range(step.n_out())]
+        n = sizes[0] if sizes else 0
+        if len(sizes) != 3 or sizes[1] not in (1, 2) or sizes[2] != len(names) or out != [n, 1]:
+            raise ValueError(
+                f"{where}: step: expected (state, measured of 1 or 2, reference of {len(names)}) "
+                f"-> (state, command of 1), got arguments of {sizes} and results of {out}"
+            )
+        if isinstance(self.start, ca.Function):
+            fits = (self.start.n_in(), self.start.numel_in(0), self.start.numel_out(0))
+            if fits != (1, sizes[1], n):
+                raise ValueError(
+                    f"{where}: start: expected a Function of {sizes[1]} measured quantities that "
+                    f"gives {n}, got one of {fits[1]} that gives {fits[2]}"
+                )
+        elif self.start is not None:
+            start = checks.array(f"{where}: start", self.start)
+            if start.size != n:
+                raise ValueError(f"{where}: start: expected {n} numbers, got {start.size}")
+            object.__setattr__(self, "start", tuple(start.tolist()))
+
+    @property
+    def memory(self) -> int:
+        """Number of its states."""
+        return self.step.numel_in(0)
+
+    @property
+    def seen(self) -> int:
+        """Number of measured quantities."""
+        return self.step.numel_in(1)
+
+    def feedback(self) -> Feedback:
+        """The controller with its slopes; rows hold the references and the disturbance."""
+        s, y, r = self.step.sx_in()
+        after, command = self.step(s, y, r)
+        both = ca.vertcat(after, command)
+        known = ca.Function(
+            "controller", [s, y, r], [both, ca.jacobian(both, s), ca.jacobian(both, y)]
+        )
+
+        def act(state: Sequence[Tangent], row: ca.SX, _: ca.SX) -> tuple[list[Tangent], Any]:
+            seen, memory = state[: self.seen], state[2:]
+            at = [ca.vertcat(*(q.value for q in part)) for part in (memory, seen)]
+            value, by_s, by_y = known(*at, row[: len(self.reference)])
+            slope = _times(by_s, memory) + _times(by_y, seen)
+            new = [Tangent(value[i], slope[i, :]) for i in range(self.memory + 1)]
+            force = self.gain * (new[-1].value + row[len(self.reference)])
+            return [Tangent(force, self.gain * new[-1].slope)], new[:-1]
+
+        return act
+
+    def rows(self, record: Record) -> Array:
+        """References and disturbance at the samples."""
+        columns = [record[name] for name in self.reference]
+        none = np.zeros(record.size)
+        columns.append(none if self.disturbance is None else record[self.disturbance])
+        return np.column_stack(columns)
+
+    def begin(self) -> ca.Function:
+        """(x, v) -> state at the first sample, and its slope."""
+        x = ca.SX.sym("x", 2)
+        if isinstance(self.start, ca.Function):
+            state = self.start(x[: self.seen])
+        else:
+            state = ca.SX(ca.DM(self.start or [0.0] * self.memory))
+        both = ca.vertcat(x, state)
+        return ca.Function("begin", [x], [ca.densify(both), ca.densify(ca.jacobian(both, x))])
+
+
+def _times(slopes: ca.SX, parts: Sequence[Tangent]) -> ca.SX:
+    if not parts:
+        return ca.SX(0)
+    return ca.mtimes(slopes, ca.vertcat(*(part.slope for part in parts)))
+
+
+def position_controller(loop: PositionLoop, step: float) -> Controller:
+    """The controller that a `PositionLoop` describes, at a sample time of `step` [s]."""
+    s, x, r = ca.SX.sym("s", 2), ca.SX.sym("x"), ca.SX.sym("r")
+    mean = (x + s[0]) / 2
+    command = loop.kp * loop.kv * (r - x) - loop.kv * (mean - s[1]) / step
+    command = ca.fmin(ca.fmax(command, -loop.limit), loop.limit)
+    return Controller(
+        ca.Function("position_loop", [s, x, r], [ca.vertcat(x, mean), command]),
+        gain=loop.gain,
+        start=ca.Function("position_start", [x], [ca.vertcat(x, x)]),
+    )
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ClosedLoop:
+    """Simulate the drive under its controller and compare position and force.
+
+    Attributes:
+        loop: the controller; None: that of each record (`Record.loop`).
+        signals: what is compared: "x", "v" and "force".
+        x0: "given": the motion starts at the first measured position, with the velocity of a cubic
+            through the first ones; "estimate": both are unknowns of each record.
+        substeps: implicit steps a sample.
+
+    Limits: the controller sees the simulated position without noise, so that the noise that it
+    feeds back in the experiment stays in the residuals of the force. One mass with a law without
+    states.
+    """
+
+    loop: PositionLoop | Controller | None = None
+    signals: tuple[str, ...] = SIGNALS
+    x0: str = "given"
+    substeps: int = 2
+
+    def __post_init__(self) -> None:
+        loop: object = self.loop
+        if not (loop is None or isinstance(loop, PositionLoop | Controller)):
+            raise checks.refused(f"{WHERE}: loop", "a PositionLoop or a Controller", loop)
+        signals = tuple(checks.names(f"{WHERE}: signals", self.signals))
+        for name in signals:
+            checks.choice(f"{WHERE}: signals", name, ("x", "v", "force"))
+        object.__setattr__(self, "signals", signals)
+        checks.choice(f"{WHERE}: x0", self.x0, ("given", "estimate"))
+        checks.count(f"{WHERE}: substeps", self.substeps)
+
+    def prepare(
+        self, subject: "Subject", data: "Dataset", start: Mapping[str, float] | None = None
+    ) -> "LoopRows":
+        """The residuals of `data`.
+
+        Raises:
+            ValueError: a model that is not one mass with friction without states, a record whose
+                controller is not known, missing channels, unequal intervals.
+        """
+        del start
+        mass = Mass.of(subject.model)
+        if len(mass.inputs) != 1:
+            raise ValueError(
+                f"{WHERE}: model '{subject.model.name}': expected one input, the force, got "
+                f"{', '.join(mass.inputs) or 'none'}"
+            )
+        return LoopRows(
+            subject.names,
+            tuple(self._run(mass, record, k) for k, record in enumerate(data)),
+            self.x0 == "estimate",
+        )
+
+    def _run(self, mass: Mass, record: Record, number: int) -> "Run":
+        loop = record.loop if self.loop is None else self.loop
+        if loop is None:
+            raise ValueError(
+                f"{WHERE}: data '{record.name}': expected a known controller, got none; give "
+                "ClosedLoop(loop=...) or fit Shooting()"
+            )
+        record = record.uniform()
+        if isinstance(loop, PositionLoop):
+            controller = position_controller(loop, record.step)
+            if loop.reference.size != record.size:
+                raise ValueError(
+                    f"{WHERE}: data '{record.name}': expected a reference of {record.size} "
+                    f"samples, got {loop.reference.size}"
+                )
+            given = np.column_stack([loop.reference, loop.disturbance])
+        else:
+            controller, given = loop, loop.rows(record)
+        chain = Chain.of(
+            mass,
+            controller.feedback(),
+            row=given.shape[1],
+            memory=controller.memory,
+            substeps=self.substeps,
+        )
+        rows = np.column_stack([np.full(record.size, record.step), given])
+        measured = {name: record[name] for name in self.signals}
+        units = {name: record.unit(name) for name in self.signals}
+        first = np.array([record["x"][0], _first_velocity(record)])
+        return Run(
+            number, record.name, chain, controller.begin(), rows, record.time, first, measured,
+            units, _regressors(record, given),
+        )  # fmt: skip
+
+
+def _first_velocity(record: Record) -> float:
+    """The first measured velocity, or that of a cubic through the first positions."""
+    if "v" in record:
+        return float(record["v"][0])
+    x = record["x"]
+    return local(record.time, x, 0, noise_of(x)).rate
+
+
+def _regressors(record: Record, given: Array) -> dict[str, Array]:
+    """References, disturbance and velocity, of which right residuals hold no trace."""
+    v = record["v"] if "v" in record else np.gradient(record["x"], record.step)
+    rest = np.abs(v) < 0.01 * np.abs(v).max()
+    found = {"v": v, "sign(v)": np.where(rest, 0.0, np.sign(v))}
+    for i in range(given.shape[1]):
+        name = "disturbance" if i == given.shape[1] - 1 else "reference"
+        column = given[:, i]
+        if np.ptp(column) > 0:
+            found[name if name not in found else f"{name} {i + 1}"] = column
+    return found
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One record with its drive and controller.
+
+    Attributes:
+        number, name: of the record.
+        chain: drive and controller, sample by sample.
+        begin: (x, v) -> all states at the first sample, and their slopes.
+        rows: what the chain takes, shape (n, ...).
+        t: sample times [s].
+        first: measured position and velocity at the first sample.
+        measured: signal -> samples.
+        units: signal -> unit.
+        regressors: for the tests of the residuals.
+    """
+
+    number: int
+    name: str
+    chain: Chain
+    begin: ca.Function
+    rows: Array
+    t: Array
+    first: Array
+    measured: Mapping[str, Array]
+    units: Mapping[str, str]
+    regressors: Mapping[str, Array]
+
+    def motion(self, p: Array, first: Array) -> Motion | str:
+        """The motion from position and velocity `first`."""
+        state, slope = (np.asarray(a.full()) for a in self.begin(first))
+        slopes = np.hstack([np.zeros((len(state), p.size)), slope])
+        motion = self.chain(self.rows, p, state.ravel(), slopes)
+        why = why_no_motion(motion)
+        return f"data '{self.name}': {why}" if why else motion
+
+    def signal(self, motion: Motion, name: str) -> tuple[Array, Array]:
+        """A simulated signal (n,) and its slopes (n, parameters + 2)."""
+        if name == "force":
+            return motion.inputs[:, 0], motion.input_slopes[:, 0]
+        k = ("x", "v").index(name)
+        return motion.states[:-1, k], motion.slopes[:-1, k]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class LoopRows:
+    """Residuals of `ClosedLoop`; see `Residuals`."""
+
+    parameters: tuple[str, ...]
+    runs: tuple[Run, ...]
+    estimated: bool
+
+    @cached_property
+    def own(self) -> tuple[Unknown, ...]:
+        """Position and velocity at the start of each record, where they are fitted."""
+        if not self.estimated:
+            return ()
+        found = list[Unknown]()
+        for run in self.runs:
+            unit = run.units.get("x", "m")
+            for name, value, of in zip("xv", run.first, (unit, f"{unit}/s"), strict=True):
+                scale = max(abs(float(value)), 1e-3)
+                start = f"x0.{name}[{run.number}]"
+                found.append(Unknown(start, of, float(value), scale=scale, nuisance=True))
+        return tuple(found)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameters of the model, then start values."""
+        return (*self.parameters, *(unknown.name for unknown in self.own))
+
+    @cached_property
+    def channels(self) -> tuple[Channel, ...]:
+        """Each signal of each record."""
+        found, first = list[Channel](), 0
+        for run in self.runs:
+            for name, y in run.measured.items():
+                rows = slice(first, first := first + y.size)
+                unit = run.units[name]
+                found.append(Channel(run.number, name, unit, rows, run.t, y, run.regressors))
+        return tuple(found)
+
+    def at(self, values: Array) -> Evaluation | str:
+        """Simulated minus measured signals, and their derivatives."""
+        given = np.asarray(values, dtype=float)
+        count = len(self.parameters)
+        r, J = list[Array](), list[Array]()
+        for k, run in enumerate(self.runs):
+            mine = count + 2 * k
+            first = given[mine : mine + 2] if self.estimated else run.first
+            motion = run.motion(given[:count], first)
+            if isinstance(motion, str):
+                return motion
+            for name, y in run.measured.items():
+                value, slope = run.signal(motion, name)
+                whole = np.zeros((y.size, given.size))
+                whole[:, :count] = slope[:, :count]
+                if self.estimated:
+                    whole[:, mine : mine + 2] = slope[:, count:]
+                r.append(value - y)
+                J.append(whole)
+        return Evaluation(np.concatenate(r), np.vstack(J))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {field.name: getattr(self, field.name) for field in fields(self)}

@@ -1,0 +1,181 @@
+import pickle
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from identification.data.dataset import Dataset
+from identification.data.loop import PositionLoop
+from identification.data.record import Record
+from identification.residuals import stepper
+from identification.residuals.closed_loop import ClosedLoop, Controller, LoopRows
+from identification.solving.descent import descend
+from identification.solving.task import task
+from identification.unknowns.subject import Subject, subject
+from identification.unknowns.unknowns import unknowns_of
+from symfric import Coulomb, LuGre, Stribeck, Sum, Viscous
+from symfric.scenes import Drive
+
+N, STEP = 1500, 1e-3
+T = np.arange(N) * STEP
+REFERENCE = 0.02 * np.sin(2 * np.pi * T)
+PULSE = np.where(np.arange(N) == 700, 3.0, 0.0)
+LOOP = PositionLoop(60.0, 200.0, 30.0, 10.0, REFERENCE, PULSE)
+TRUE = {"m": 95.0, "mu_d": 20.0, "sigma_2": 200.0, "offset": -3.0}
+
+
+@pytest.fixture(autouse=True)
+def _no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Short runs are not worth a compiler, and have the same bits without it."""
+    monkeypatch.setattr(stepper, "find_compiler", lambda: None)
+
+
+def by_hand(substeps: int = 100) -> tuple[np.ndarray, np.ndarray]:
+    """The loop step by step, with the impulse clamp of dry friction."""
+    x = v = x_last = mean_last = 0.0
+    h = STEP / substeps
+    positions, forces = [], []
+    for k in range(N):
+        mean = (x + x_last) / 2
+        u = LOOP.kp * LOOP.kv * (REFERENCE[k] - x) - LOOP.kv * (mean - mean_last) / STEP
+        x_last, mean_last = x, mean
+        force = LOOP.gain * (float(np.clip(u, -10, 10)) + PULSE[k])
+        positions.append(x)
+        forces.append(force)
+        for _ in range(substeps):
+            free = v + h * (force + 3.0 - 200.0 * v) / 95.0
+            new = np.sign(free) * max(abs(free) - h * 20.0 / 95.0, 0.0)
+            x += h * (v + new) / 2
+            v = new
+    return np.array(positions), np.array(forces)
+
+
+def of(values: dict[str, float], names: tuple[str, ...]) -> np.ndarray:
+    return np.array([values[name] for name in names])
+
+
+@pytest.fixture(scope="module")
+def data() -> Dataset:
+    x, force = by_hand()
+    units = {"x": "m", "force": "N"}
+    return Dataset((Record("hand", T, {"x": x, "force": force}, units, loop=LOOP),), "hand")
+
+
+@pytest.fixture(scope="module")
+def drive() -> Subject:
+    law = Sum((Coulomb(20.0, 1e-8), Viscous(200.0)))
+    return subject(Drive(law, m=95.0, N=1.0, offset=-3.0), free=["offset"], fixed={"v_eps": 1e-8})
+
+
+@pytest.fixture(scope="module")
+def rows(data: Dataset, drive: Subject) -> LoopRows:
+    return ClosedLoop().prepare(drive, data)
+
+
+def test_residuals_vanish_at_the_impulse_clamp(rows: LoopRows) -> None:
+    found = rows.at(of(TRUE, rows.names))
+    assert not isinstance(found, str)
+    x, force = (found.r[c.rows] for c in rows.channels)
+    assert [c.signal for c in rows.channels] == ["x", "force"]
+    assert np.abs(x).max() < 5e-4 * 0.02
+    assert np.linalg.norm(force) < 0.01 * np.linalg.norm(rows.channels[1].measured)
+
+
+def test_disturbance_enters_after_the_limit(rows: LoopRows) -> None:
+    force = rows.runs[0].motion(of(TRUE, rows.names), np.zeros(2))
+    assert not isinstance(force, str)
+    u = force.inputs[:, 0]
+    assert np.abs(np.delete(u, 700)).max() <= 300.0 + 1e-9
+    assert u[700] - u[699] == pytest.approx(90.0, abs=15.0)
+
+
+def test_slopes_are_those_of_finite_differences(data: Dataset, drive: Subject) -> None:
+    rows = ClosedLoop(x0="estimate", signals=("x", "v", "force")).prepare(drive, with_v(data))
+    assert rows.names[-2:] == ("x0.x[0]", "x0.v[0]")
+    at = of(TRUE | {"x0.x[0]": 1e-3, "x0.v[0]": 0.05}, rows.names)
+    base = rows.at(at)
+    assert not isinstance(base, str)
+    for i, value in enumerate(at):
+        h = 1e-6 * max(0.1, abs(value))
+        sides = [rows.at(at + d * np.eye(at.size)[i]) for d in (h, -h)]
+        assert not isinstance(sides[0], str)
+        assert not isinstance(sides[1], str)
+        slope = (sides[0].r - sides[1].r) / (2 * h)
+        for c in rows.channels:
+            size = np.abs(base.J[c.rows, i]).max()
+            assert np.abs(slope - base.J[:, i])[c.rows].max() <= 1e-5 * size + 1e-8
+
+
+def with_v(data: Dataset) -> Dataset:
+    x = data[0]["x"]
+    signals = {**data[0].signals, "v": np.gradient(x, STEP)}
+    return Dataset((replace(data[0], signals=signals, units={**data[0].units, "v": "m/s"}),), "v")
+
+
+def test_a_fit_finds_the_drive_of_the_other_simulation(rows: LoopRows, drive: Subject) -> None:
+    unknowns = unknowns_of([*drive.unknowns, *rows.own], drive.ties, rows.names, drive.held)
+    start = {"m": 80.0, "mu_d": 12.0, "sigma_2": 260.0, "offset": 0.0}
+    end = descend(task(rows, unknowns), unknowns.of(start))
+    found = dict(zip(rows.names, unknowns.values(end.w), strict=True))
+    assert end.evaluations <= 12
+    for name, value in TRUE.items():
+        assert found[name] == pytest.approx(value, rel=5e-3), name
+
+
+def test_a_controller_of_ones_own_is_the_same_loop(data: Dataset, drive: Subject) -> None:
+    s, x, r = ca.SX.sym("s", 2), ca.SX.sym("x"), ca.SX.sym("r")
+    mean = (x + s[0]) / 2
+    command = LOOP.kp * LOOP.kv * (r - x) - LOOP.kv * (mean - s[1]) / STEP
+    command = ca.fmin(ca.fmax(command, -LOOP.limit), LOOP.limit)
+    step = ca.Function("mine", [s, x, r], [ca.vertcat(x, mean), command])
+    start = ca.Function("start", [x], [ca.vertcat(x, x)])
+    controller = Controller(step, ("goal",), "pulse", gain=LOOP.gain, start=start)
+    signals = {**data[0].signals, "goal": REFERENCE, "pulse": PULSE}
+    units = {**data[0].units, "goal": "m", "pulse": "1"}
+    mine = Dataset((Record("mine", T, signals, units),), "mine")
+    rows = ClosedLoop(controller).prepare(drive, mine)
+    known = ClosedLoop().prepare(drive, data)
+    found, other = (r.at(of(TRUE, r.names)) for r in (rows, known))
+    assert not isinstance(found, str)
+    assert not isinstance(other, str)
+    np.testing.assert_allclose(found.r, other.r, atol=1e-12)
+    np.testing.assert_allclose(found.J, other.J, atol=1e-9)
+
+
+def test_residuals_go_to_other_processes(rows: LoopRows) -> None:
+    at = of(TRUE, rows.names)
+    one, two = (r.at(at) for r in (rows, pickle.loads(pickle.dumps(rows))))
+    assert not isinstance(one, str)
+    assert not isinstance(two, str)
+    np.testing.assert_array_equal(one.J, two.J)
+
+
+def test_a_law_with_states_is_refused(data: Dataset) -> None:
+    machine = subject(Drive(LuGre(), m=95.0, N=1.0))
+    with pytest.raises(ValueError, match="a friction law without states"):
+        ClosedLoop().prepare(machine, data)
+
+
+def test_a_record_without_controller_is_refused(data: Dataset, drive: Subject) -> None:
+    bare = Dataset((replace(data[0], loop=None),), "bare")
+    with pytest.raises(ValueError, match="expected a known controller, got none"):
+        ClosedLoop().prepare(drive, bare)
+
+
+def test_a_controller_of_another_shape_is_refused() -> None:
+    s, x, r = ca.SX.sym("s", 2), ca.SX.sym("x", 3), ca.SX.sym("r")
+    step = ca.Function("three", [s, x, r], [s, r])
+    with pytest.raises(ValueError, match="measured of 1 or 2"):
+        Controller(step)
+    with pytest.raises(ValueError, match="signals"):
+        ClosedLoop(signals=("x", "a"))
+
+
+def test_a_motion_that_is_not_finite_is_said(data: Dataset) -> None:
+    machine = subject(Drive(Stribeck(mu_s=22.0, mu_d=20.0), m=95.0, N=1.0))
+    rows = ClosedLoop().prepare(machine, data)
+    values = np.full(len(rows.names), np.nan)
+    found = rows.at(values)
+    assert isinstance(found, str)
+    assert found.startswith("data 'hand': ")
