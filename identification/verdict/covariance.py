@@ -143,7 +143,7 @@ def _intervals(found: Minimum, error: Array, freedom: Array) -> tuple[Array, Arr
     for unknown in found.unknowns:
         i = found.names.index(unknown.name)
         if unknown.logarithmic and found.values[i] > 0 and np.isfinite(reach[i]):
-            factor = np.exp(min(reach[i] / found.values[i], 700.0))
+            factor = np.exp(min(reach[i] / found.values[i], 300.0))
             low[i], high[i] = found.values[i] / factor, found.values[i] * factor
     return low, high
 

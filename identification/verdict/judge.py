@@ -33,7 +33,7 @@ ALARM = 0.02
 """Chance of a false alarm over all tests of a fit."""
 WHITE = 0.05
 """Level of the test for white noise of one channel, which decides nothing."""
-SHARE = 0.01
+SHARE = 0.05
 """Share of the variance of the residuals from which on a dependence counts."""
 UNEXPLAINED = 0.7
 """Residuals over the spread of the signal from which on a model says next to nothing."""
@@ -150,9 +150,9 @@ def _white(name: str, found: Whiteness, colour: Colour) -> Test:
 def _independent(
     found: Minimum, channel: Channel, some: list[Dependence], limit: float
 ) -> Iterator[Test]:
-    """One test a family; what cannot be told from rounding or is a hundredth does not count."""
+    """One test a family; what cannot be told from rounding or is a small share does not count."""
     name, unit = found.label(channel), channel.unit
-    fine = resolution(channel.measured)
+    fine = resolution(channel.measured, channel.unit)
     level = _level(found, channel)
     for d in some:
         size = d.size * level
@@ -185,7 +185,7 @@ def _size(found: Minimum, channel: Channel, colour: Colour) -> Iterator[Test]:
     rms = float(np.sqrt(np.mean(found.raw[channel.rows] ** 2)))
     free = max(colour.effective * colour.freedom / colour.rows, 1.0)
     p = float(chdtrc(free, free * (rms / sigma) ** 2))
-    passed = p >= ALARM / len(found.channels) or rms <= resolution(channel.measured)
+    passed = p >= ALARM / len(found.channels) or rms <= resolution(channel.measured, channel.unit)
     text = (
         f"The residuals of {name} are {rms:.2g} {channel.unit}, {rms / sigma:.2g} times the noise "
         f"that was given."

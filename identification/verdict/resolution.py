@@ -6,16 +6,21 @@ from identification.residuals.evaluation import Array
 
 ROUNDING = 1e-6
 """Share of the range of a signal that simulations and interpolation may be off."""
+BALANCE = 1e-3
+"""The same of a force: filtered and differentiated motions give none that is more exact."""
+FORCES = ("N", "N m")
 
 
-def resolution(measured: Array) -> float:
+def resolution(measured: Array, unit: str) -> float:
     """Root mean square of the errors of rounding and of simulation, in the unit of the signal.
 
     A signal is rounded if its values are multiples of the smallest step between two of them.
     """
     values = np.unique(measured)
     reach = float(values[-1] - values[0])
-    floor = ROUNDING * max(reach, 1e-3 * float(np.abs(values).max()))
+    floor = (BALANCE if unit in FORCES else ROUNDING) * max(
+        reach, 1e-3 * float(np.abs(values).max())
+    )
     steps = np.diff(values)
     steps = steps[steps > 1e-9 * reach]
     if not steps.size:
