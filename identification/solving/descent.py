@@ -21,7 +21,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.solving.noise import change, levels, objective
+from identification.solving.noise import LEAST, change, levels, objective
 from identification.solving.task import Point, Task
 from symfric.foundation.status import Status
 
@@ -179,9 +179,12 @@ def _renew(search: _Search) -> float:
 
 
 def variance(task: Task, point: Point) -> float:
-    """Variance of the weighted residuals, at least that of the noise."""
+    """Variance of the weighted residuals: of given noise at least 1, else what is left."""
     freedom = max(1, point.sigma.size - point.w.size)
-    return max(1.0, point.cost / freedom)
+    least = 1.0
+    if set(task.noise) == set(task.estimated):
+        least = max((LEAST * task.spread(s) / task.noise[s]) ** 2 for s in task.noise)
+    return max(least, point.cost / freedom)
 
 
 def remaining(task: Task, point: Point) -> float:

@@ -26,8 +26,9 @@ from symfric.foundation.numeric import evaluate_all
 
 Array = NDArray[np.float64]
 
-DECADES = 12.0
-"""Decades about its start that a logarithmic value without bounds may go."""
+DECADES = 6.0
+"""Decades from its start beyond which a bound of a logarithmic value is none for the solver, whose
+steps feel bounds from afar; who makes the law checks it."""
 MARGIN = 1e-3
 """Distance of a start to its bounds, over theirs or over one."""
 STRICTLY = 1e-4
@@ -228,11 +229,10 @@ def _box(unknown: Unknown) -> tuple[float, float]:
         if not unknown.logarithmic:
             return 0.0, inf
     if unknown.logarithmic:
-        reach = float(np.log(10.0)) * DECADES
-        first = float(np.log(max(unknown.start, 1e-300)))
+        if unknown.above:
+            return -inf, inf
+        reach, first = float(np.log(10.0)) * DECADES, float(np.log(max(unknown.start, 1e-300)))
         low = float(np.log(unknown.lower)) if unknown.lower > 0 else -inf
         high = float(np.log(unknown.upper)) if unknown.upper < inf else inf
-        if unknown.above:
-            low, high = -inf, inf
-        return max(low, first - reach), min(high, first + reach)
+        return (low if low > first - reach else -inf), (high if high < first + reach else inf)
     return unknown.lower / unknown.scale, unknown.upper / unknown.scale
