@@ -91,6 +91,16 @@ def rates(model: Model) -> dict[str, str]:
     return found
 
 
+def hidden(model: Model) -> set[str]:
+    """States whose value within a motion only the data can tell.
+
+    Not those that a law keeps of its contact, and not those that events set.
+    """
+    own = {v.name for contact in model.contacts for v in contact.states}
+    reset = {name for event in model.events for name in event.reset}
+    return {v.name for v in model.x} - own - reset
+
+
 @final
 @dataclass(frozen=True)
 class Begin:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from identification.residuals.delays import DEAD_TIME, delayed
 from identification.residuals.evaluation import Channel
-from identification.residuals.initial import Begin, Sensed, noise_of
+from identification.residuals.initial import Begin, Sensed, hidden, noise_of
 from identification.residuals.portable import plain
 from identification.residuals.shots import Drives, Shot, Shots
 from identification.residuals.windows import cut
@@ -44,6 +44,7 @@ class Preparation:
         self.values = {v.name: float(start.get(v.name, v.start)) for v in model.p}
         self.records = list(data)
         self.states = [v.name for v in model.x]
+        self.hidden = sorted(hidden(model))
         self.signals = self._signals()
         self.inputs = self._inputs()
         self._check_x0()
@@ -197,18 +198,24 @@ class Preparation:
     ) -> tuple[dict[str, float], dict[str, int]]:
         """Start values that are held, and columns of those that are estimated."""
         given = self.kind.x0
-        if given == "given":
+        if given == "given" and k == 0:
             return {}, {}
         begin = sensed.at(k)
+        if k > 0:  # what the model says of the start says nothing of a time in between
+            begin |= {n: Begin(None) for n in self.hidden if n not in begin}
         held, free = dict[str, float](), dict[str, int]()
         for v in self.model.x:
-            wish = None if isinstance(given, str) else given.get(v.name)
+            wish = None if isinstance(given, str) or k > 0 else given.get(v.name)
             here = begin.get(v.name, None if wish is None else Begin(None))
             if wish is not None and not isinstance(wish, str):
                 held[v.name] = float(np.ravel(wish)[number if np.ndim(wish) else 0])
-            elif here is not None and not here.estimated and wish is None:
-                held[v.name] = here.value or 0.0
-            elif here is not None:
+            elif here is None:
+                continue
+            elif (
+                here.value is not None and wish is None and (not here.estimated or given == "data")
+            ):
+                held[v.name] = here.value
+            else:
                 free[v.name] = self.first + len(self.own)
                 self.own.append(self._unknown(v, here, label, begin))
         return held, free

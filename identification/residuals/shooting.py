@@ -37,8 +37,10 @@ class Shooting:
         x0: "estimate": start values of states that are measured, or are rates of measured ones, are
             unknowns of their own, "x0.v[2]" of record 2, "x0.v[2,3]" of its window 3, and so is the
             bristle of a law with one; the many of others start in steady sliding or, where the
-            contact rests, unstrained; other states as the model says. "given": all as the model
-            says. Or state -> number, numbers (one a record) or "estimate"; others as "estimate".
+            contact rests, unstrained; other states as the model says at the start of a record, and
+            unknown at that of later windows. "data": those that the data tell are held there.
+            "given": records start as the model says. Or, of records, state -> number, numbers (one
+            a record) or "estimate"; others as "estimate".
         inputs: input of the model -> channel, or an input as `simulate` takes it (a number,
             samples, a function of time); by default the channel of the same name.
         interpolation: of sampled inputs: "linear" for a measured one, "hold" for one that a
@@ -76,7 +78,7 @@ class Shooting:
             seconds = checks.number(f"{where}: windows", windows, unit="s", above=0.0)
             object.__setattr__(self, "windows", seconds)
         if isinstance(self.x0, str):
-            checks.choice(f"{where}: x0", self.x0, ("estimate", "given"))
+            checks.choice(f"{where}: x0", self.x0, ("estimate", "data", "given"))
         else:
             object.__setattr__(self, "x0", checks.named(f"{where}: x0", self.x0))
         checks.choice(f"{where}: interpolation", self.interpolation, INTERPOLATIONS)

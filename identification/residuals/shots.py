@@ -18,6 +18,9 @@ Array = NDArray[np.float64]
 
 METHOD = "radau5"
 """What `simulate` takes for derivatives; without them it would take another one."""
+LEAST_STEPS, STEPS = 20_000, 50
+"""Steps that a simulation may take, in all and for each sample: with values far off, a motion may
+take a million, and is no way to go on."""
 LISTED = 6
 """Values that a sentence about a failure shows."""
 
@@ -176,6 +179,7 @@ class Shots:
             t_eval=shot.t,
             method=METHOD,
             backend=self.backend,
+            max_steps=LEAST_STEPS + STEPS * shot.t.size,
             sensitivities=names,
             throw=False,
         )
