@@ -1,6 +1,6 @@
 """Elements of a law that is made of some (GMS, Maxwell-slip, Leuven) from measured hysteresis."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -39,7 +39,7 @@ def element_names(law: Law) -> dict[str, tuple[str, ...]]:
 
 
 def element_values(
-    law: Law, measured: Measured, curve: StribeckCurve, *, offset: float
+    law: Law, measured: Measured, curve: StribeckCurve, *, offset: float, free: Collection[str]
 ) -> dict[str, float]:
     """Stiffness and level of each element of `law`, the one that slips first in front.
 
@@ -52,6 +52,8 @@ def element_values(
         measured: friction alone, with positions or times.
         curve: its Stribeck curve.
         offset: constant force [N] beside friction.
+        free: names that are asked for. Shares alpha_i count by their ratios alone; where some are
+            held, the others stand in the right ratio to the first one of them.
     """
     names = element_names(law)
     if not names or measured.x is None:
@@ -75,7 +77,12 @@ def element_values(
     k, levels = _as_many(found, count)
     total = float(levels.sum())
     carried = HEADROOM * curve.F_S / total if falls else 1.0
-    each = {"k": k, "alpha": levels / total, "mu": carried * levels / measured.N}
+    shares = levels / total
+    held = [(i, n) for i, n in enumerate(names.get("alpha", ())) if n not in free]
+    if held:
+        i, name = held[0]
+        shares = shares / shares[i] * float(parameters(law)[name].value)
+    each = {"k": k, "alpha": shares, "mu": carried * levels / measured.N}
     return {n: float(x) for f, own in names.items() for n, x in zip(own, each[f], strict=True)}
 
 

@@ -47,6 +47,8 @@ class Elements:
         radii: paths after which an element slips [m], shape (n,).
         sigma_2: viscous coefficient [N s/m].
         offset: constant force [N].
+        loaded: state at the first sample: all elements slipping forwards (1), backwards (-1), or
+            none loaded (0).
         rms: root mean square error [N] over the samples that were used.
     """
 
@@ -54,6 +56,7 @@ class Elements:
     radii: Array
     sigma_2: float
     offset: float
+    loaded: int
     rms: float
 
     @property
@@ -71,18 +74,18 @@ class Elements:
         return np.minimum(x[:, None], self.radii) @ self.k
 
     def force(self, measured: Measured) -> Array:
-        """The force [N] along a record that begins without load."""
-        path = _path(measured)
-        e = np.concatenate([stretches(path[r], self.radii)[0] for r in measured.records])
+        """The force [N] along records that begin as `loaded` says."""
+        e = _stretches(measured, _path(measured), self.radii, self.loaded)[0]
         return e @ self.k + self.sigma_2 * measured.v + self.offset
 
 
-def stretches(x: Array, radii: Array) -> tuple[Array, Array]:
-    """Stretch e of each element along the path `x`, from e = 0, and de/dr.
+def stretches(x: Array, radii: Array, loaded: int = 0) -> tuple[Array, Array]:
+    """Stretch e of each element along the path `x`, from e = r `loaded`, and de/dr.
 
     e <- clip(e + dx, -r, r), exact for any dx in one direction; shapes (samples, radii).
     """
     e, slope = np.zeros((x.size, radii.size)), np.zeros((x.size, radii.size))
+    e[0], slope[0] = loaded * radii, loaded
     now, moved = e[0].copy(), slope[0].copy()
     for i, dx in enumerate(np.diff(x), start=1):
         free = now + dx
@@ -104,8 +107,8 @@ def fit_elements(
     """`count` elements, or fewer where fewer explain the data as well, by least squares.
 
     Args:
-        measured: with positions or times. The record begins without load; what it says before
-            its second turning point is wrong otherwise, which a long record forgets.
+        measured: with positions or times. The record begins without load, or in sliding one way
+            or the other: what explains it best.
         count: elements wanted.
         viscous: fit sigma_2 >= 0, too.
         offset: fit a constant force, too.
@@ -122,10 +125,9 @@ def fit_elements(
     if not travel > 0:
         raise ValueError("fit_elements: expected a position that moves, got the same everywhere")
     radii = np.geomspace(_shortest(path, travel), travel / 2, CANDIDATES)
-    dense = np.column_stack([_stretches(used, path, radii)[0], beside])
-    scale = np.maximum(np.linalg.norm(dense, axis=0), 1e-300)
-    w, left = nnls(dense / scale, used.F)
-    k = w[:CANDIDATES] / scale[:CANDIDATES]
+    trials = [(*_dense(used, path, beside, radii, loaded), loaded) for loaded in (0, 1, -1)]
+    w, left, loaded = min(trials, key=lambda trial: trial[1])
+    k = w[:CANDIDATES]
     if not k.any() or left > (1 - TOLD) * np.linalg.norm(used.F):
         raise ValueError(
             "fit_elements: expected a force that grows along the path after each reversal, got one "
@@ -134,7 +136,7 @@ def fit_elements(
         )
 
     def improved(start: Array, steps: int = STEPS) -> Elements:
-        return _improved(used, path, beside, start, (viscous, offset), steps)
+        return _improved(used, path, beside, start, (viscous, offset, loaded), steps)
 
     few = _quantiles(radii, k, count)
     if not thorough:
@@ -143,6 +145,16 @@ def fit_elements(
     if more.k.size <= count:
         return more
     return min(improved(_merged(more, count)), improved(few), key=lambda found: found.rms)
+
+
+def _dense(
+    measured: Measured, path: Array, beside: Array, radii: Array, loaded: int
+) -> tuple[Array, float]:
+    """Coefficients of a dense set of radii and of the rest, and the norm of the error."""
+    X = np.column_stack([_stretches(measured, path, radii, loaded)[0], beside])
+    scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+    w, left = nnls(X / scale, measured.F)
+    return w / scale, float(left)
 
 
 def _path(measured: Measured) -> Array:
@@ -184,8 +196,8 @@ def _shortest(path: Array, travel: float) -> float:
     return min(max(SHORTEST * travel, step), travel / 4)
 
 
-def _stretches(measured: Measured, path: Array, radii: Array) -> tuple[Array, Array]:
-    found = [stretches(path[r], radii) for r in measured.records]
+def _stretches(measured: Measured, path: Array, radii: Array, loaded: int) -> tuple[Array, Array]:
+    found = [stretches(path[r], radii, loaded) for r in measured.records]
     return np.vstack([e for e, _ in found]), np.vstack([slope for _, slope in found])
 
 
@@ -216,23 +228,25 @@ def _improved(
     path: Array,
     beside: Array,
     radii: Array,
-    kinds: tuple[bool, bool],
+    kinds: tuple[bool, bool, int],
     steps: int,
 ) -> Elements:
     """Stiffnesses, log radii and the rest together by a trust region."""
+    viscous, offset, loaded = kinds
     n, size = radii.size, float(np.abs(measured.F).max())
-    k, rest = _linear(measured, path, beside, radii)
+    w = _dense(measured, path, beside, radii, loaded)[0]
+    k, rest = w[:n], w[n:]
 
     def split(w: Array) -> tuple[Array, Array, Array]:
         return np.exp(w[:n]), w[n : 2 * n] * size / np.exp(w[:n]), w[2 * n :]
 
     def residuals(w: Array) -> Array:
         r, k, rest = split(w)
-        return (_stretches(measured, path, r)[0] @ k + beside @ rest - measured.F) / size
+        return (_stretches(measured, path, r, loaded)[0] @ k + beside @ rest - measured.F) / size
 
     def slopes(w: Array) -> Array:
         r, k, _ = split(w)
-        e, moved = _stretches(measured, path, r)
+        e, moved = _stretches(measured, path, r, loaded)
         by_radius = (moved * r - e) * k  # at constant k r
         return np.hstack([by_radius, e / r * size, beside]) / size
 
@@ -248,18 +262,9 @@ def _improved(
         max_nfev=steps,
     )
     radii = np.sort(np.exp(found.x[:n]))
-    k, rest = _linear(measured, path, beside, radii)
-    error = _stretches(measured, path, radii)[0] @ k + beside @ rest - measured.F
+    w, left = _dense(measured, path, beside, radii, loaded)
+    k, rest = w[:n], w[n:]
     kept = k * radii > 1e-6 * float(k @ radii)
-    viscous, offset = kinds
     shift = float(rest[-2] - rest[-1]) if offset else 0.0
-    rms = float(np.sqrt(np.mean(error**2)))
-    return Elements(k[kept], radii[kept], float(rest[0]) if viscous else 0.0, shift, rms)
-
-
-def _linear(measured: Measured, path: Array, beside: Array, radii: Array) -> tuple[Array, Array]:
-    """Stiffnesses and the rest for given radii."""
-    X = np.column_stack([_stretches(measured, path, radii)[0], beside])
-    scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
-    w = nnls(X / scale, measured.F)[0] / scale
-    return w[: radii.size], w[radii.size :]
+    rms = left / float(np.sqrt(measured.F.size))
+    return Elements(k[kept], radii[kept], float(rest[0]) if viscous else 0.0, shift, loaded, rms)

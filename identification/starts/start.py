@@ -85,7 +85,8 @@ def start_values(
     facts = facts_of(replace(measured, N=N), mass="m" in names, offset="offset" in names)
     known = parameters(what)
     values = {n: _guess(known[n], facts, law) for n in names}
-    elements = element_values(law, facts.friction, facts.stribeck, offset=facts.stribeck.offset)
+    shift = facts.stribeck.offset
+    elements = element_values(law, facts.friction, facts.stribeck, offset=shift, free=names)
     values |= {n: value for n, value in elements.items() if n in values}
     mine = [n for n in names if n in parameters(law) and _is_steady(known[n], law)]
     if (curve := law_curve(law, mine, facts.curve.v, N)) is not None:
@@ -181,7 +182,8 @@ def _guess(parameter: Parameter, facts: Facts, law: Law) -> float:
         case "length" if (stiffness := _stiffness(facts, law)) > 0:
             return 0.3 * facts.stribeck.F_C / stiffness
         case "time" if unit == "N/s" and facts.reversals is not None:
-            return facts.stribeck.F_C * facts.stribeck.v_s / facts.reversals.half
+            level = facts.stribeck.F_C or facts.stribeck.F_S
+            return level * facts.stribeck.v_s / facts.reversals.half
         case _:
             return value
 
