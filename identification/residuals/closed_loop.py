@@ -186,7 +186,7 @@ class ClosedLoop:
     substeps: int = 2
 
     def __post_init__(self) -> None:
-        loop: object = self.loop
+        loop: Any = self.loop
         if not (loop is None or isinstance(loop, PositionLoop | Controller)):
             raise checks.refused(f"{WHERE}: loop", "a PositionLoop or a Controller", loop)
         signals = tuple(checks.names(f"{WHERE}: signals", self.signals))

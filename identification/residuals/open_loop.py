@@ -25,6 +25,9 @@ Hold = Literal["linear", "held"]
 HOLDS: tuple[Hold, ...] = ("linear", "held")
 """Between two samples an input is linear (the step takes its mean), or held from the first one."""
 
+KEY = "identification.sampled"
+"""Of the chain in the memory of a model."""
+
 __all__ = ["HOLDS", "Hold", "sampled_motion", "why_not_sampled"]
 
 
@@ -42,7 +45,7 @@ def sampled_motion(
         p: values of `model.p`.
         start: position and velocity at t[0].
         hold: what inputs do between samples: "linear", or "held" as a digital amplifier does.
-        substeps: steps a sample.
+        substeps: equal steps a sample, each with the mean of the input over it.
 
     Returns:
         A `Motion`: states (n, 2) and slopes (n, 2, parameters + 2), the last two by the start.
@@ -51,25 +54,58 @@ def sampled_motion(
         ValueError: a model that is none of these, or arrays that do not fit.
     """
     checks.choice("sampled_motion: hold", hold, HOLDS)
-    chain = _chain(model, substeps)
+    chain = _chain(model)
     u = np.asarray(inputs, dtype=float).reshape(t.size, -1)
     if u.shape[1] != chain.inputs or np.size(p) != len(model.p) or np.size(start) != 2:
         raise ValueError(
             f"sampled_motion of '{model.name}': expected {chain.inputs} inputs, {len(model.p)} "
             f"parameters and a start of 2, got {u.shape[1]}, {np.size(p)} and {np.size(start)}"
         )
-    between = u[:-1] if hold == "held" else (u[1:] + u[:-1]) / 2
+    instants = refined(t, substeps)
+    columns = [means(t, column, instants, hold == "held") for column in u.T]
+    between = np.array(columns).reshape(len(columns), instants.size - 1).T
+    motion = stepped(model, instants, between, np.asarray(p, float), np.asarray(start, float))
+    return motion if isinstance(motion, str) else motion.every(substeps)
+
+
+def refined(t: Array, substeps: int) -> Array:
+    """The instants `t` with `substeps` equal steps from each to the next."""
+    shares = np.arange(substeps) / substeps
+    return np.append((t[:-1, None] + np.diff(t)[:, None] * shares).ravel(), t[-1])
+
+
+def stepped(model: Model, t: Array, between: Array, p: Array, start: Array) -> Motion | str:
+    """`sampled_motion` with the mean inputs from each instant to the next, (n - 1, inputs)."""
+    chain = _chain(model)
     rows = np.column_stack([np.diff(t), between])
-    start_slopes = np.hstack([np.zeros((2, len(model.p))), np.eye(2)])
-    motion = chain(rows, np.asarray(p, dtype=float), np.asarray(start, dtype=float), start_slopes)
+    start_slopes = np.hstack([np.zeros((2, p.size)), np.eye(2)])
+    motion = chain(rows, p, start, start_slopes)
     return why_no_motion(motion) or motion
 
 
-def _chain(model: Model, substeps: int) -> Chain:
+def means(t: Array, samples: Array, at: Array, held: bool) -> Array:
+    """Mean of a sampled input from each of the instants `at` to the next one.
+
+    Args:
+        t: sample times [s], shape (n,).
+        samples: shape (n,); constant before the first and after the last one.
+        at: instants [s], shape (k,).
+        held: samples are held until the next one; else linear between them.
+    """
+    k = np.clip(np.searchsorted(t, at, "right") - 1, 0, t.size - 2)
+    dt = np.diff(t)
+    rise = np.zeros_like(dt) if held else np.diff(samples) / dt
+    whole = np.concatenate([[0.0], np.cumsum(dt * (samples[:-1] + rise * dt / 2))])
+    s = np.clip(at, t[0], t[-1]) - t[k]
+    outside = np.minimum(at - t[0], 0) * samples[0] + np.maximum(at - t[-1], 0) * samples[-1]
+    integral = whole[k] + s * (samples[k] + rise[k] * s / 2) + outside
+    return np.diff(integral) / np.diff(at)
+
+
+def _chain(model: Model) -> Chain:
     """The chain of a model, built once."""
-    key = f"identification.sampled.{substeps}"
-    if key not in model.memory:
+    if KEY not in model.memory:
         mass = Mass.of(model)
         count = len(mass.inputs)
-        model.memory[key] = Chain.of(mass, given_inputs(count), row=count, substeps=substeps)
-    return cast(Chain, model.memory[key])
+        model.memory[KEY] = Chain.of(mass, given_inputs(count), row=count, substeps=1)
+    return cast(Chain, model.memory[KEY])

@@ -11,6 +11,12 @@ from identification.residuals.delays import DEAD_TIME, delayed
 from identification.residuals.evaluation import Channel
 from identification.residuals.initial import Begin, Sensed, hidden, noise_of
 from identification.residuals.portable import plain
+from identification.residuals.sampled_shots import (
+    SHARE,
+    SUBSTEPS,
+    choose_substeps,
+    why_not,
+)
 from identification.residuals.shots import Drives, Shot, Shots
 from identification.residuals.windows import cut
 from identification.unknowns.unknown import Unknown
@@ -81,7 +87,8 @@ class Preparation:
             model, names, tuple(self.own), tuple(channels), tuple(pieces), tau,  # type: ignore
             self.kind.rtol or RTOLS[-1], backend,
         )  # fmt: skip
-        if self.kind.rtol is None:
+        shots = replace(shots, substeps=self._substeps(shots))
+        if self.kind.rtol is None and not shots.substeps:
             shots = replace(shots, rtol=self._rtol(shots))
         return shots
 
@@ -245,6 +252,26 @@ class Preparation:
             row += t.size
 
     # ---- how exactly
+
+    def _substeps(self, shots: Shots) -> int:
+        """Steps a sample of the sampled engine; 0 where `simulate` runs."""
+        engine = self.kind.engine
+        why = "" if engine == "simulate" else why_not(self.model, list(self.signals), self.inputs)
+        if engine == "sampled" and why:
+            raise ValueError(f"Shooting: engine: model '{self.model.name}': {why}")
+        wanted = self.kind.rtol is None and bool(self.model.contacts)
+        if engine == "simulate" or why or (engine == "auto" and not wanted):
+            return 0
+        values = np.array([*self.values.values(), *(u.start for u in self.own)])
+        tolerable = list[tuple[slice, float]]()
+        for c in shots.channels:
+            noise, share = noise_of(c.measured), SHARE * float(np.std(c.measured))
+            exact = BIAS * noise / np.sqrt(shots.rows)  # as `_rtol` asks of `simulate`
+            tolerable.append((c.rows, exact if engine == "auto" else max(noise, share)))
+        found = choose_substeps(lambda n: replace(shots, substeps=n).predicted(values), tolerable)
+        if found is None:
+            return 0 if engine == "auto" else SUBSTEPS[-1]
+        return found
 
     def _rtol(self, shots: Shots) -> float:
         """The loosest tolerance whose error biases no estimate by a tenth of its standard error.

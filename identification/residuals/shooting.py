@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from identification.unknowns.subject import Subject
 
 INTERPOLATIONS = ("linear", "hold")
+ENGINES = ("auto", "simulate", "sampled")
 
 
 @final
@@ -49,6 +50,10 @@ class Shooting:
             between these bounds, as "dead_time". Needs linear inputs; a held input is about a
             linear one that comes half a sample later.
         every: compare every this many samples; inputs are sampled in full.
+        engine: "simulate" takes any model; "sampled" steps one mass under friction without states,
+            such as a `Drive` with a static law, from sample to sample (`stepper`), some hundred
+            times faster and right to 1e-5 of the signals or to their noise; "auto": the latter
+            where it is for the model and as right as `simulate` has to be (`rtol`).
         rtol: of the simulation; None: the loosest of 1e-6, 1e-7, 1e-8 whose error moves no estimate
             by more than a tenth of its standard error.
 
@@ -68,6 +73,7 @@ class Shooting:
     dead_time: float | tuple[float, float] = 0.0
     every: int = 1
     rtol: float | None = None
+    engine: str = "auto"
 
     def __post_init__(self) -> None:
         where = "Shooting"
@@ -83,6 +89,7 @@ class Shooting:
             object.__setattr__(self, "x0", checks.named(f"{where}: x0", self.x0))
         checks.choice(f"{where}: interpolation", self.interpolation, INTERPOLATIONS)
         object.__setattr__(self, "every", checks.count(f"{where}: every", self.every))
+        checks.choice(f"{where}: engine", self.engine, ENGINES)
         if self.rtol is not None:
             checks.number(f"{where}: rtol", self.rtol, above=0.0, upper=0.1)
         self._check_dead_time()

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from identification.residuals.delays import DEAD_TIME, RATE, rate
 from identification.residuals.evaluation import Channel, Evaluation
 from identification.residuals.portable import packed, unpacked
+from identification.residuals.sampled_shots import SampledRun, sampled_run
 from identification.unknowns.unknown import Unknown
 from symfric.integrator import Hold, Input, Linear, Trajectory, simulate
 from symfric.model import Model
@@ -97,6 +98,7 @@ class Shots:
         shots: the simulations.
         dead_time: of the inputs [s]; None: it is the first of the own unknowns.
         rtol, backend: as `simulate` takes them.
+        substeps: steps a sample of the sampled engine; 0: `simulate` runs.
     """
 
     model: Model
@@ -107,6 +109,7 @@ class Shots:
     dead_time: float | None
     rtol: float
     backend: str
+    substeps: int = 0
 
     def __getstate__(self) -> dict[str, Any]:
         state = {item.name: getattr(self, item.name) for item in fields(self)}
@@ -163,16 +166,22 @@ class Shots:
                 found[place] = run[s]
         return found
 
-    def _run(self, shot: Shot, values: Array, names: tuple[str, ...]) -> Trajectory | str:
+    def _run(
+        self, shot: Shot, values: Array, names: tuple[str, ...]
+    ) -> Trajectory | SampledRun | str:
         """The motion of one window; why there is none."""
         estimated = self.dead_time is None
         tau = float(values[len(self.parameters)]) if self.dead_time is None else self.dead_time
         begin = float(shot.t[0])
+        x0 = {**shot.held, **{state: float(values[i]) for state, i in shot.free.items()}}
+        if self.substeps:
+            p = np.append(values[: len(self.parameters)], [0.0] * estimated)  # rate of a dead time
+            return sampled_run(self.model, shot, x0, p, tau, self.substeps)
         run = simulate(
             self.model,
             shot.end,
             t_start=begin,
-            x0={**shot.held, **{state: float(values[i]) for state, i in shot.free.items()}},
+            x0=x0,
             u=shot.drives.over(begin, shot.end, tau, estimated),
             p={name: float(values[i]) for i, name in enumerate(self.parameters)},
             rtol=self.rtol,

@@ -253,6 +253,12 @@ class Motion:
     input_slopes: Array
     gap: float
 
+    def every(self, k: int) -> "Motion":
+        """The motion at every k-th instant, and the inputs that begin there."""
+        return Motion(
+            self.states[::k], self.slopes[::k], self.inputs[::k], self.input_slopes[::k], self.gap
+        )
+
 
 @final
 @dataclass(frozen=True, eq=False)

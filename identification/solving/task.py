@@ -127,7 +127,9 @@ class Task:
             return f"with {_shown(names, values)}: a value is not finite"
         if self.guard is not None:
             try:
-                self.guard(dict(zip(names, values.tolist(), strict=True)))
+                own = {u.name for u in self.residuals.own}
+                given = zip(names, values.tolist(), strict=True)
+                self.guard({name: value for name, value in given if name not in own})
             except ValueError as error:
                 return f"with {_shown(names, values)}: {error}"
         found = self.residuals.at(values)
