@@ -9,13 +9,6 @@ STYLE = """
   --panel: #1d242c; --line: #3a4550; --grid: #28313a; --measured: #7d8b99; --predicted: #ff8066;
   --residual: #6fb3ec; --second: #c09be8; --good: #62c983; --doubtful: #e8b04a; --bad: #ff8a80;
   --band: #6fb3ec2b; } }
-@media print { :root { color-scheme: light; --ink: #000; --soft: #444; --paper: #fff;
-  --panel: #fff; --line: #999; --grid: #ddd; --measured: #8a949e; --predicted: #b3261e;
-  --residual: #1f5f99; --second: #6a3f93; --good: #145c2e; --doubtful: #7a4d00; --bad: #9c1c15;
-  --band: #2b6ca322; } main { max-width: none; padding: 0; } nav { display: none; }
-  svg.chart { min-width: 0; break-inside: avoid; }
-  tr { break-inside: avoid; } h2 { break-after: avoid; }
-  .wide { overflow: visible; } }
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--paper); color: var(--ink);
   font: 15px/1.5 system-ui, "Segoe UI", "Helvetica Neue", "DejaVu Sans", Arial, sans-serif; }
@@ -67,4 +60,11 @@ svg .dots.good { stroke: var(--good); stroke-width: 7; } svg .dots.bad { stroke:
   stroke-width: 7; } svg .dots.doubtful { stroke: var(--doubtful); stroke-width: 7; }
 footer { margin-top: 3rem; color: var(--soft); font-size: .85rem; }
 code { font-size: .9em; overflow-wrap: anywhere; white-space: pre-wrap; }
+@media print { :root { color-scheme: light; --ink: #000; --soft: #444; --paper: #fff;
+  --panel: #fff; --line: #999; --grid: #ddd; --measured: #8a949e; --predicted: #b3261e;
+  --residual: #1f5f99; --second: #6a3f93; --good: #145c2e; --doubtful: #7a4d00; --bad: #9c1c15;
+  --band: #2b6ca322; } main { max-width: none; padding: 0; } nav { display: none; }
+  svg.chart { min-width: 0; break-inside: avoid; }
+  tr { break-inside: avoid; } h2 { break-after: avoid; }
+  .wide { overflow: visible; } table { font-size: .78rem; } }
 """

@@ -87,7 +87,7 @@ def _parameters(fit: "Fitted") -> Iterator[str]:
         "Fitted, with 95 % intervals", {n: e for n, e in fitted.items() if not e.nuisance}
     )
     held = [
-        (n, number(e.value), unit_of(e.unit), e.note) for n, e in fit.parameters.items() if e.fixed
+        (n, number(e.value), _unit(e.unit), e.note) for n, e in fit.parameters.items() if e.fixed
     ]
     yield html.table(
         "Held", ("parameter", "value", "unit", "why"), held, (1,), ["note"] * len(held)
@@ -110,7 +110,7 @@ def _parameters(fit: "Fitted") -> Iterator[str]:
 def _estimates(caption: str, estimates: dict[str, Estimate]) -> str:
     header = ["parameter", "value", "unit", "standard error", "", "95 % interval", "if white"]
     rows = [
-        [n, rounded(e.value, e.standard_error), unit_of(e.unit), number(e.standard_error, 2),
+        [n, rounded(e.value, e.standard_error), _unit(e.unit), number(e.standard_error, 2),
          percent(e.relative_error), interval(e), number(e.white_error, 2)]
         for n, e in estimates.items()
     ]  # fmt: skip
@@ -119,6 +119,11 @@ def _estimates(caption: str, estimates: dict[str, Estimate]) -> str:
         header.append("note")
         rows = [[*row, note] for row, note in zip(rows, notes, strict=True)]
     return html.table(caption, header, rows, (1, 3, 4, 5, 6), ["note"] * len(rows) * any(notes))
+
+
+def _unit(unit: str) -> str:
+    """A unit that stays on one line."""
+    return unit_of(unit).replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _errors(caption: str, errors: Errors, records: Sequence[str]) -> str:
@@ -181,13 +186,18 @@ def _starts(fit: "Fitted") -> Iterator[str]:
     yield html.figure(charts.waterfall(fit))
     names = [n for n in fit.starts[0].values if not fit.parameters[n].nuisance]
     rows = [
-        (f"{s.number}", number(s.above, 3), number(s.cost, 6), f"{s.evaluations}",
+        (f"{s.number}", above(s.above), number(s.cost, 6), f"{s.evaluations}",
          *(number(s.values.get(n), 4) for n in names),
          f"{s.status.name} {s.message}".strip())
         for s in fit.starts
     ]  # fmt: skip
     header = ("number", "above the best", "cost", "evaluations", *names, "ended")
     yield html.table("Starts, best first", header, rows, range(1, 4 + len(names)))
+
+
+def above(value: float) -> str:
+    """How far a start ended from the best one; rounding is nothing."""
+    return "0" if abs(value) < 1e-6 else number(value, 3)
 
 
 def _ranking(ranking: Ranking | None) -> Iterator[str]:
@@ -207,14 +217,14 @@ def _cell(value: object) -> str:
 
 
 def _findings(fit: "Fitted") -> Iterator[str]:
-    rows = [(fit.records[f.record], f.signal, f.kind, f.sentence, f.severity) for f in fit.findings]
-    kinds = ["bad" if f.severity == "error" else "doubtful" for f in fit.findings]
-    header = ("record", "signal", "kind", "what and where", "severity")
-    yield html.table("Findings of the checks", header, rows, (), kinds)
+    rows = [(fit.records[f.record], f.signal, f.kind, f.severity, f.sentence) for f in fit.findings]
+    header = ("record", "signal", "kind", "severity", "what and where")
+    yield html.table("Findings of the checks", header, rows, (), ["note"] * len(rows))
 
 
 def _made(fit: "Fitted") -> Iterator[str]:
-    yield html.table("", ("", ""), list(fit.made.items()))
+    made = [(name, text) for name, text in fit.made.items() if text]
+    yield html.table("Call and versions", ("what", ""), made)
     if fit.law is not None:
         yield html.heading("The law as Python")
         yield html.code(source_of(fit.law))

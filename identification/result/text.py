@@ -186,6 +186,9 @@ def errors_table(title: str, errors: Errors) -> Iterator[str]:
 
 
 def _data(fit: "Fitted") -> Iterator[str]:
+    several = len(fit.records) > 1
     if fit.findings:
         yield "doubtful in the data"
-        yield from _indented(f"{f.severity}: {f.sentence}" for f in fit.findings)
+        for f in fit.findings:
+            where = f"{fit.records[f.record]}: " if several else ""
+            yield from _indented([f"{f.severity}: {where}{f.sentence}"])
