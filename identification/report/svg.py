@@ -5,7 +5,7 @@ the frame. Coordinates are rounded to a tenth of a pixel and points that fall to
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import final
@@ -64,13 +64,21 @@ class Path(Mark):
         return self.entry
 
     def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
-        """A polyline."""
-        at = _places(x, y, width, height, self.x, self.y)
-        if not at.size:
-            return ""
-        kept = np.concatenate([[True], (np.diff(at, axis=0) != 0).any(axis=1)])
-        points = " ".join(f"{a:g},{b:g}" for a, b in at[kept])
-        return f'<polyline class="{self.kind}" points="{points}"/>'
+        """A polyline for each run of finite points."""
+        bad = np.flatnonzero(~np.isfinite(self.y))
+        runs = [_places(x, y, width, height, *run) for run in self._runs(bad)]
+        return "".join(f'<polyline class="{self.kind}" points="{_points(at)}"/>' for at in runs)
+
+    def _runs(self, bad: NDArray[np.intp]) -> Iterator[tuple[Array, Array]]:
+        for xs, ys in zip(np.split(self.x, bad), np.split(self.y, bad), strict=True):
+            if np.isfinite(ys).any():
+                yield xs, ys
+
+
+def _points(at: Array) -> str:
+    """Points of a polyline, those that fall together once."""
+    kept = np.concatenate([[True], (np.diff(at, axis=0) != 0).any(axis=1)])
+    return " ".join(f"{a:g},{b:g}" for a, b in at[kept])
 
 
 @final

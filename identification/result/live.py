@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import nan
-from typing import Protocol, final
+from typing import Any, Protocol, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,7 +97,7 @@ class Live:
         return errors_of(residuals, [r.name for r in data], point.evaluation.r)
 
 
-def settled(kind: Kind, residuals: Residuals, data: Dataset) -> Kind:
+def settled(kind: Any, residuals: Any, data: Dataset) -> Kind:
     """The kind with the filter that it chose on the data of the fit: other data are seen alike."""
     if not isinstance(kind, InverseDynamics) or not isinstance(residuals, InverseRows):
         return kind

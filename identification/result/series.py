@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 MOST = 2000
 """Points of a line: more than a screen has columns of pixels for both ends of each."""
+GAP = 3.0
+"""Usual steps of time that are a gap."""
 LEAST = 300
 TOGETHER = 24_000
 """Points of one kind of line over all channels: many channels are drawn coarser."""
@@ -73,12 +75,26 @@ def envelope(t: Array, y: Array, most: int = MOST) -> Line:
     t, y = t[finite], y[finite]
     if y.size <= most:
         return Line(t, y)
-    edges = np.linspace(0, y.size, (most - 2) // 2 + 1).astype(int)
+    edges = np.linspace(0, y.size, max(1, (most - 2) // 2) + 1).astype(int)
     spans = list(pairwise(edges.tolist()))
     low = [a + int(np.argmin(y[a:b])) for a, b in spans]
     high = [a + int(np.argmax(y[a:b])) for a, b in spans]
     kept = np.unique([0, *low, *high, y.size - 1])
     return Line(t[kept], y[kept])
+
+
+def cut_envelope(t: Array, y: Array, most: int = MOST) -> Line:
+    """The same of a signal over time, with a NaN in every gap: no line is drawn across it."""
+    steps = np.diff(t)
+    gaps = np.flatnonzero(steps > GAP * np.median(steps)) + 1 if steps.size else steps.astype(int)
+    if not 0 < gaps.size <= most // 10:
+        return envelope(t, y, most)
+    lines: list[Line] = []
+    for a, b in pairwise([0, *gaps.tolist(), t.size]):
+        lines.append(envelope(t[a:b], y[a:b], max(4, most * (b - a) // t.size)))
+        lines.append(Line(np.array([t[b - 1]]), np.array([nan])))
+    lines.pop()
+    return Line(*(np.concatenate([getattr(line, name) for line in lines]) for name in ("t", "y")))
 
 
 def series(
@@ -96,6 +112,7 @@ def series(
     """
     order = slice(None) if channel.ordered else np.argsort(channel.t, kind="stable")
     t, measured, left = channel.t[order], channel.measured[order], r[channel.rows][order]
+    line = cut_envelope if channel.ordered else envelope
     return Series(
         record=record,
         signal=channel.signal,
@@ -103,9 +120,9 @@ def series(
         abscissa=abscissa,
         ordered=channel.ordered,
         rows=left.size,
-        measured=envelope(t, measured, most),
-        predicted=envelope(t, measured + left, most),
-        residual=envelope(t, left, most),
+        measured=line(t, measured, most),
+        predicted=line(t, measured + left, most),
+        residual=line(t, left, most),
         breaks=channel.t[list(channel.breaks)],
         lags=white.lags,
         correlation=white.correlation,

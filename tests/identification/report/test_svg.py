@@ -48,6 +48,13 @@ def test_points_stand_where_their_numbers_say() -> None:
     assert found == [f"0,{h:g} {w / 2:g},{h / 2:g} {w:g},0"]
 
 
+def test_a_missing_number_parts_a_line() -> None:
+    y = np.array([0.0, 1.0, np.nan, 1.0, 0.0, np.nan, np.nan])
+    line = Path("line", np.arange(7.0), y)
+    drawn = line.draw(Axis("x", "", 0.0, 6.0), Axis("y", "", 0.0, 1.0), 60.0, 10.0)
+    assert findall(r'points="([^"]*)"', drawn) == ["0,10 10,0", "30,0 40,10"]
+
+
 def test_a_logarithmic_axis_has_its_decades() -> None:
     axis = around("cost", "", [np.array([1e-3, 1.0, 0.0, -2.0, np.nan])], logarithmic=True)
     assert 0 < axis.low < 1e-3 < 1.0 < axis.high

@@ -10,7 +10,7 @@ from fits import make
 from identification.data.findings import Finding
 from identification.result.fitted import Fitted
 from identification.result.page import page_of
-from identification.result.series import envelope
+from identification.result.series import cut_envelope, envelope
 
 NASTY = '<img src=x onerror=alert(1)> & "quotes"'
 
@@ -102,6 +102,16 @@ def test_no_spike_is_lost_and_the_ends_stay() -> None:
     assert (np.diff(line.t) > 0).all()
     few = envelope(t[:10], np.where(t[:10] == 3, np.nan, y[:10]), 500)
     assert few.t.size == 9
+
+
+def test_no_line_is_drawn_across_a_gap() -> None:
+    t = np.concatenate([np.arange(0, 1, 1e-3), np.arange(3, 4, 1e-3)])
+    line = cut_envelope(t, np.ones(t.size), 400)
+    (gap,) = np.flatnonzero(np.isnan(line.y))
+    assert line.t.size <= 402
+    assert line.t[gap - 1] == t[999]
+    assert line.t[gap + 1] == 3.0
+    assert not np.isnan(cut_envelope(t[:1000], t[:1000], 400).y).any()
 
 
 def test_the_picture_has_units_on_every_axis(fit: Fitted, tmp_path: Path) -> None:
