@@ -32,6 +32,7 @@ from identification.verdict.judge import Verdict, judge
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 
+MOST_STARTS = 10_000
 OF_KIND = ("x0", "dead_time")
 """Entries of `free` that belong to the kind of residuals."""
 
@@ -231,7 +232,7 @@ def _check_loss(fit: Fit) -> None:
 
 
 def _check_counts(fit: Fit) -> None:
-    checks.count("Fit: starts", fit.starts)
+    checks.count("Fit: starts", fit.starts, most=MOST_STARTS)
     checks.count("Fit: seed", fit.seed, least=0)
     checks.count("Fit: evaluations", fit.evaluations, least=2)
 

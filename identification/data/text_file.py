@@ -219,7 +219,7 @@ def _column(
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
         place = f"row {numbers[int(bad[0])]}"
-        return values, f"{place}: expected a finite number, got {cells[int(bad[0])]}" + (
+        return values, f"{place}: expected a finite number, got {cells[int(bad[0])][:40]}" + (
             f" ({bad.size} such cells)" if bad.size > 1 else ""
         )
     return values, ""

@@ -26,6 +26,7 @@ from symfric.foundation.status import Status
 from symfric.laws import Law
 from symfric.model import Model
 from symfric.scenes import Drive
+from symfric.scenes.base import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -110,15 +111,15 @@ class Fitted:
 
     @property
     def model(self) -> Model:
-        """The model with the fitted numbers.
+        """The model with the fitted numbers; yours keeps its parameters, which start at them.
 
         Raises:
             ValueError: of a fit from a file, unless it is one of a drive.
         """
+        if isinstance(self.machine, Scene):
+            return self.machine.model()
         if self.live is not None:
             return self.live.model
-        if self.drive is not None:
-            return self.drive.model()
         raise ValueError(
             f"fit of {self.name}: expected one of this process, or of a drive, got one from a "
             "file, which holds no equations; close your model with fit.values"

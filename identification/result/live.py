@@ -97,7 +97,7 @@ class Live:
         return errors_of(residuals, [r.name for r in data], point.evaluation.r)
 
 
-def settled(kind: Any, residuals: Any, data: Dataset) -> Kind:
+def settled(kind: Any, residuals: Any, data: Dataset) -> Any:
     """The kind with the filter that it chose on the data of the fit: other data are seen alike."""
     if not isinstance(kind, InverseDynamics) or not isinstance(residuals, InverseRows):
         return kind

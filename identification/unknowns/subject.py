@@ -88,10 +88,21 @@ class Subject:
         """
         mine = {n: float(values[n]) for n in self.names}
         p = tuple(replace(v, start=mine.get(v.name, v.start)) for v in self.model.p)
-        whole, model = self.guard(mine), replace(self.model, p=p)
+        whole, model = self.guard(mine), restarted(self.model, p)
         if isinstance(whole, Scene):
             return Closed(whole.law, whole, model)
         return Closed(whole, None, model)
+
+
+def restarted(model: Model, p: Variables) -> Model:
+    """The same model with other starts of its parameters, also where its contacts are open."""
+    opening = None if model.opening is None else partial(_open, model.opening, p)
+    return replace(model, p=p, opening=opening)
+
+
+def _open(opening: Callable[[], Model], p: Variables) -> Model:
+    made, known = opening(), {v.name: v for v in p}
+    return replace(made, p=tuple(known.get(v.name, v) for v in made.p))
 
 
 def subject(

@@ -23,7 +23,7 @@ USAGE_ERROR = cast("type[typer.BadParameter]", typer.BadParameter.__mro__[2])
 COMMANDS = {
     "laws": "List the friction laws, or show one in full.",
     "run": "Simulate SCENE with a friction law.",
-    "identify": "Identify mass, offset and friction of a drive.",
+    "identify": "Fit friction laws to measured data, and say what they are worth.",
     "codegen": "Write a friction law or a plant as C99, and verify it.",
     "ocp": "Solve an optimal control problem and check it.",
     "demo": "Simulate, identify, optimise and generate C.",

@@ -7,12 +7,15 @@ from typing import Annotated, Any
 
 import typer
 
-from identification import Dataset, Identification, identify, read_data, synthetic_drive_data
+from identification.data.dataset import Dataset
+from identification.data.synthetic import synthetic_drive_data
+from identification.fit import Fit
+from identification.residuals.inverse import InverseDynamics
+from identification.result.fitted import Fitted
 from ocp import Free, Solution, rest_to_rest, solve
 from symfric import ALL_LAWS, LuGre, simulate
 from symfric.cli import output
 from symfric.cli.codegen import show_verification
-from symfric.cli.identify import show_identification
 from symfric.cli.options import check_folder
 from symfric.cli.run import show_trajectory
 from symfric.codegen import generate, verify
@@ -70,7 +73,7 @@ def demo(
     output.note("3/4 optimal moves of the identified drive")
     chapters.append(optimal_moves(out / "optimal_move", found[0]))
     output.note("4/4 C for embedded controllers")
-    chapters.append(generated_c(out / "c", found[0].fitted_law))
+    chapters.append(generated_c(out / "c", law_of(found[0])))
     write_text(out / "README.md", index(out, chapters))
     summary = {c.title: c.numbers for c in chapters}
     write_text(out / "summary.json", json.dumps(output.plain(summary), indent=2) + "\n")
@@ -83,7 +86,7 @@ def load_records(data: Path | None) -> tuple[tuple[Dataset, Dataset], tuple[str,
     """Two records, the laws to identify from them, and where they come from."""
     folder = data or (STAGE if STAGE.is_dir() else None)
     if folder is not None:
-        one, other = (read_data(folder / name) for name in RECORDS)
+        one, other = (Dataset.read(folder / name) for name in RECORDS)
         laws = ("coulomb+viscous", "asymmetric(coulomb+viscous)")
         return (one, other), laws, f"the measured EMPS stage in {folder}"
     other = synthetic_drive_data(seed=1, speeds=(0.003, 0.02, 0.09))
@@ -116,55 +119,66 @@ def stick_slip(folder: Path) -> Chapter:
     )
 
 
-def identified(records: tuple[Dataset, Dataset], law: str) -> Identification:
+def identified(records: tuple[Dataset, Dataset], law: str) -> Fitted:
     """The drive identified from the first record, with errors on both."""
     with output.progress(f"identify {law}") as tell:
-        found = identify(
-            records[0],
-            law,
-            validate=records[1],
-            progress=lambda _, fraction: tell(fraction),
+        fit = Fit(InverseDynamics(), law, records[0]).solve(
+            progress=lambda _, fraction: tell(fraction)
         )
-    show_identification(found)
-    output.show()
+    found = replace(fit, validation=fit.validate(records[1]))
+    typer.echo(f"{found}\n")
     return found
 
 
+def law_of(found: Fitted) -> Law:
+    """The identified law."""
+    if found.law is None:
+        raise ValueError(f"demo: expected a law, got none from {found.name}")
+    return found.law
+
+
 def identification(
-    folder: Path, found: list[Identification], origin: str, records: tuple[Dataset, Dataset]
+    folder: Path, found: list[Fitted], origin: str, records: tuple[Dataset, Dataset]
 ) -> Chapter:
-    """Reports, numbers and pictures; the records too where they were simulated."""
+    """Pages, numbers and pictures; the records too where they were simulated."""
     files: list[Path] = []
-    for result in found:
-        stem = result.law.replace("+", "_").replace("(", "_").replace(")", "")
-        report, numbers, picture = (folder / f"{stem}.{kind}" for kind in ("md", "json", "png"))
-        write_text(report, result.report())
-        result.to_json(numbers)
-        result.plot(picture)
-        files += [report, numbers, picture]
-    if not records[0].benchmark:
+    for fit in found:
+        stem = fit.name.replace("+", "_").replace("(", "_").replace(")", "")
+        page, numbers, picture = (folder / f"{stem}.{kind}" for kind in ("html", "json", "png"))
+        fit.report(page)
+        fit.to_json(numbers)
+        fit.plot(picture)
+        files += [page, numbers, picture]
+    if "simulated" in origin:
         for name, record in zip(("record", "validation"), records, strict=True):
-            record.to_csv(folder / f"{name}.csv")
-            files.append(folder / f"{name}.csv")
+            files += record.to_csv(folder / f"{name}.csv")
     return Chapter(
         "Identification of a positioning drive",
         f"Mass, offset and friction from {origin}.",
         tuple(files),
-        {result.law: result.to_dict() for result in found} | {"data": origin},
+        {fit.name: numbers_of(fit) for fit in found} | {"data": origin},
     )
 
 
-def optimal_moves(folder: Path, found: Identification) -> Chapter:
+def numbers_of(fit: Fitted) -> dict[str, Any]:
+    """The key numbers of a fit."""
+    data = fit.to_dict()
+    return {
+        name: data[name] for name in ("status", "message", "parameters", "errors", "validation")
+    }
+
+
+def optimal_moves(folder: Path, found: Fitted) -> Chapter:
     """The fastest move of the drive, and the one of least effort in half as much time again.
 
     The speed is bounded by the largest one in the record: beyond it friction is a guess.
     """
     from ocp.result.picture import plot_solutions  # noqa: PLC0415  (matplotlib is slow)
 
-    speed = float(abs(found.signals.v).max())
+    speed = 0.1 if found.curve is None else float(abs(found.curve.law.t).max())
 
     def move(T: float | Free) -> Solution:
-        problem = rest_to_rest(found.drive.model(), DISTANCE, T, limit=LIMIT)
+        problem = rest_to_rest(found.model, DISTANCE, T, limit=LIMIT)
         bounded = replace(problem, bounds={**problem.bounds, "v": (-speed, speed)})
         return solve(bounded, intervals=100)
 

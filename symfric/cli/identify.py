@@ -1,120 +1,202 @@
-"""`symfric identify`: mass, offset and friction of a drive from a measured record."""
+"""`symfric identify`: friction laws fitted to measured data, with what they are worth."""
 
+from collections.abc import Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, final
 
 import typer
 
-from identification import Errors, Identification, read_data
-from identification import identify as identify_drive
-from symfric import SolveError, law_from_text
+from identification.data.dataset import Dataset
+from identification.first import findings_of
+from identification.fit import Fit
+from identification.result.fitted import Fitted
+from identification.verdict.profile import Profile
+from symfric import SolveError
 from symfric.cli import output
-from symfric.cli.options import (
-    JsonOption,
-    LawOption,
-    PlotOption,
-    assignments,
-    check_outputs,
-    numbers,
-)
-from symfric.foundation.files import write_text
+from symfric.cli.fitting import KINDS, free_in, kind_of, laws_in, reading
+from symfric.cli.options import JsonOption, PlotOption, check_outputs, numbers
+from symfric.foundation import checks
+from symfric.foundation.parameters import check_names
+
+MOST_JOBS = 256
 
 
 def identify(
     data: Annotated[
-        Path,
-        typer.Argument(metavar="DATA", help="CSV with columns t [s], x [m], force [N]; or .mat."),
+        list[str],
+        typer.Argument(metavar="DATA", help="CSV, .mat or .npy; each file a record."),
     ],
-    law: LawOption,
+    law: Annotated[
+        str,
+        typer.Option("--law", metavar="NAME", help="Friction law, such as coulomb+viscous."),
+    ],
     validate: Annotated[
-        Path | None, typer.Option("--validate", metavar="DATA2", help="Record for errors only.")
+        list[str] | None,
+        typer.Option("--validate", metavar="DATA", help="Record for errors only; may be repeated."),
+    ] = None,
+    kind: Annotated[
+        str, typer.Option("--kind", help="; ".join(f"{n}: {t}" for n, t in KINDS.items()) + ".")
+    ] = "inverse",
+    windows: Annotated[
+        str | None,
+        typer.Option("--windows", metavar="SECONDS|choose", help="Length of simulated pieces."),
+    ] = None,
+    columns: Annotated[
+        list[str] | None,
+        typer.Option("--column", metavar="SIGNAL=NAME", help="Column of a signal; all: t,x,-,F."),
+    ] = None,
+    units: Annotated[
+        list[str] | None,
+        typer.Option("--unit", metavar="SIGNAL=UNIT", help='Unit of a column; or all: "rad, N m".'),
+    ] = None,
+    step: Annotated[
+        float | None, typer.Option("--step", help="Sample time [s] of files without one.")
+    ] = None,
+    variable: Annotated[
+        str | None, typer.Option("--variable", help="Struct or matrix in a .mat file.")
     ] = None,
     normal_force: Annotated[
         float,
-        typer.Option(
-            "--normal-force",
-            help="Normal force [N]; with 1 the coefficients are forces in newtons.",
-        ),
+        typer.Option("--normal-force", help="Normal force [N]; with 1 coefficients are forces."),
     ] = 1.0,
-    columns: Annotated[
-        list[str] | None,
-        typer.Option("--column", metavar="SIGNAL=NAME", help="Column of t, x, force or v."),
-    ] = None,
     fixed: Annotated[
         list[str] | None, typer.Option("--fix", metavar="NAME=VALUE", help="Hold a parameter.")
     ] = None,
     free: Annotated[
-        list[str] | None, typer.Option("--free", metavar="NAME", help="Fit this one, too.")
+        list[str] | None,
+        typer.Option(
+            "--free",
+            metavar="NAME[=HOW]",
+            help="Fit this one, too; HOW: START, LOW:HIGH, log(LOW,HIGH), above(NAME), tied(NAME).",
+        ),
     ] = None,
-    folds: Annotated[
-        int, typer.Option("--folds", help="Pieces for cross-validation; 0 leaves it out.")
-    ] = 0,
+    noise: Annotated[
+        list[str] | None,
+        typer.Option("--noise", metavar="SIGNAL=VALUE", help="Noise level; default estimated."),
+    ] = None,
+    loss: Annotated[
+        str, typer.Option("--loss", help="squares; against outliers huber, soft_l1, cauchy.")
+    ] = "squares",
+    starts: Annotated[int, typer.Option("--starts", help="Most starts.")] = 6,
+    jobs: Annotated[int, typer.Option("--jobs", help="Processes for the starts.")] = 1,
+    profiles: Annotated[
+        list[str] | None,
+        typer.Option("--profile", metavar="NAME", help="Interval by profile likelihood."),
+    ] = None,
     report: Annotated[
-        Path | None, typer.Option("--report", metavar="FILE.md", help="Write the full report.")
+        Path | None, typer.Option("--report", metavar="FILE.html", help="Write one page of it all.")
     ] = None,
     plot: PlotOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Identify mass, offset and friction of a drive.
+    """Fit friction laws to measured data, and say what they are worth.
 
-    From measured force and position, with uncertainty and errors on a second record.
+    Prints the verdict of the residuals, parameters with 95 % intervals and what the data do not
+    tell. The exit status is 1 where data or residuals say that the result is no physics.
 
-    Example: symfric identify record.csv --law asymmetric(coulomb+viscous) --plot friction.png
+    Example: symfric identify run*.csv --law stribeck --validate v.csv --report out.html
     """
     check_outputs(report, json, picture=plot)
-    names, chosen = assignments("--column", columns), law_from_text(law)
-    records = [read_data(path, names) for path in (data, validate) if path is not None]
-    with output.progress(f"identify {law}") as tell:
-        found = identify_drive(
-            records[0],
-            chosen,
-            validate=records[1] if validate else None,
-            normal_force=normal_force,
-            free=free or (),
-            fixed=numbers("--fix", fixed),
-            folds=folds,
-            throw=False,
-            progress=lambda _, fraction: tell(fraction),
-        )
+    laws, chosen = laws_in(law), kind_of(kind, windows)
+    if len(laws) > 1:
+        raise ValueError(f"--law: expected one law, got {law}")
+    read = reading(columns, units, step, variable, kind == "points")
+    asked: dict[str, Any] = {
+        "free": free_in(free),
+        "fixed": numbers("--fix", fixed) or None,
+        "normal_force": normal_force,
+        "noise": numbers("--noise", noise) or "estimate",
+        "loss": loss,
+        "starts": starts,
+    }
+    workers = checks.count("--jobs", jobs, most=MOST_JOBS)
+    records = read.read(data)
+    other = read.read(validate) if validate else None
+    question = Fit(chosen, laws[0], records, **asked)
+    if profiles:
+        check_names("--profile", profiles, question.prepared().task.unknowns.fitted)
+    with output.progress(f"identify {law}") as tell, _executor(workers) as executor:
+        fit = question.solve(executor, progress=lambda _, fraction: tell(fraction), throw=False)
+    found = judged(fit, other, profiles or ())
     if report:
-        write_text(report, found.report())
+        found.fit.report(report)
     if plot:
-        found.plot(plot)
+        found.fit.plot(plot)
     output.emit_json(found.to_dict(), json)
     if json != "-":
-        show_identification(found)
+        show(found)
     output.say_written(report, plot, json)
-    if not found.status.ok:
-        raise SolveError(f"identify {law}: {found.message}", found.status, found)
+    refuse(found)
 
 
-def show_identification(found: Identification) -> None:
-    """Print what was fitted with its 95 % interval, what was held, and the errors."""
-    unit_load = float(found.drive.N) == 1.0
-    shown = found.parameters | (found.levels if unit_load else {})
-    output.show_table(
-        ["parameter", "value", "std. error", "95 % +-", "unit", "note"],
-        [
-            (
-                name,
-                e.value,
-                "" if e.standard_error is None else f"{e.standard_error:.3g}",
-                "" if e.half_width is None else f"{e.half_width:.3g}",
-                e.unit,
-                f"held: {e.note}" if e.fixed else e.note,
-            )
-            for name, e in shown.items()
-        ],
-        title=f"{found.law} from {found.errors.data}",
-    )
-    output.show()
-    records = [("estimation", found.errors), ("validation", found.validation)]
-    output.show_table(
-        ["errors", "force [%]", "force [N]", "position, no feedback [mm]"],
-        [(name, *_errors(e)) for name, e in records if e is not None],
-    )
-    output.show(f"\n{found.message} {found.iterations} iterations.")
+@final
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What there is to show.
+
+    Attributes:
+        fit: with its errors on other data.
+        profiles: that were asked for.
+        failed: why other data or profiles could not be had.
+    """
+
+    fit: Fitted
+    profiles: tuple[Profile, ...] = ()
+    failed: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """What `--json` holds: the fit, which `Fitted.from_json` reads, and more."""
+        more = {"profiles": [p.to_dict() for p in self.profiles]} if self.profiles else {}
+        return self.fit.to_dict() | more
 
 
-def _errors(e: Errors) -> tuple[str, str, str]:
-    return f"{e.force_relative:.3g}", f"{e.force_rms:.3g}", f"{1e3 * e.position_rms:.3g}"
+def judged(fit: Fitted, other: Dataset | None, names: Sequence[str]) -> Found:
+    """The fit on other data, and profiles; what fails is told, and the rest is kept."""
+    failed: list[str] = []
+    profiles: list[Profile] = []
+    if other is not None:
+        failed += [
+            f"--validate: {f.sentence}"
+            for f in findings_of(fit.live.kind if fit.live else None, other).errors
+        ]
+        try:
+            fit = replace(fit, validation=fit.validate(other))
+        except ValueError as error:
+            failed.append(str(error))
+    for name in names:
+        try:
+            profiles.append(fit.profile(name))
+        except ValueError as error:
+            failed.append(str(error))
+    return Found(fit, tuple(profiles), tuple(failed))
+
+
+def show(found: Found) -> None:
+    """Print the fit, and profiles below it."""
+    typer.echo(str(found.fit))
+    for profile in found.profiles:
+        typer.echo("")
+        output.show(str(profile))
+
+
+def refuse(found: Found) -> None:
+    """Raise where the result is no physics, or where something could not be done.
+
+    Raises:
+        SolveError: the fit did not end well.
+        ValueError: it did, but other data or profiles were of no use.
+    """
+    fit = found.fit
+    if not fit.status.ok:
+        said = next((f.sentence for f in fit.findings if f.severity == "error"), "")
+        why = said or next(iter(fit.verdict.nonsense), "") or fit.message
+        raise SolveError(f"identify {fit.name}: {fit.status.name.lower()}: {why}", fit.status, fit)
+    if found.failed:
+        raise ValueError("; ".join(found.failed))
+
+
+def _executor(jobs: int) -> AbstractContextManager[Executor | None]:
+    return nullcontext() if jobs == 1 else ProcessPoolExecutor(jobs)

@@ -142,6 +142,12 @@ def test_a_model_keeps_orders_and_gives_its_law() -> None:
     assert [v.start for v in closed.model.p] == [0.4, 0.3, 2e5]
 
 
+def test_an_opened_model_starts_at_what_was_found_too() -> None:
+    found = subject(Rabinowicz(LuGre()).model(free=["mu_s", "mu_d"]))
+    model = found.close({"mu_s": 0.4, "mu_d": 0.3}).model
+    assert [v.start for v in model.open.p if v.name in found.names] == [0.4, 0.3]
+
+
 def test_what_processes_need_pickles() -> None:
     for what in ("gms", Rabinowicz(GMS()).model(free=["mu_d", "k_1"])):
         found = subject(what)
