@@ -74,7 +74,14 @@ class Live:
         return dict(zip(names, self.point.values.tolist(), strict=True))
 
     def errors_on(self, data: Dataset) -> Errors:
-        """What the parameters leave of other data, whose own start values are estimated there.
+        """What the parameters leave of other data, see `left_on`."""
+        residuals, r = self.left_on(data)
+        return errors_of(residuals, [r.name for r in data], r)
+
+    def left_on(self, data: Dataset) -> tuple[Residuals, Array]:
+        """Residuals of other data with these parameters, and their values [SI].
+
+        Start values of the other data are estimated there.
 
         Raises:
             ValueError: data without the signals of the fit, or that cannot be simulated.
@@ -94,7 +101,7 @@ class Live:
         point = task.at(w)
         if isinstance(point, str):
             raise ValueError(f"validate: expected data '{data.name}' that can be compared: {point}")
-        return errors_of(residuals, [r.name for r in data], point.evaluation.r)
+        return residuals, point.evaluation.r
 
 
 def settled(kind: Any, residuals: Any, data: Dataset) -> Any:

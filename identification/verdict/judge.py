@@ -137,13 +137,16 @@ def _white(name: str, found: Whiteness, colour: Colour) -> Test:
             name, "whiteness", 0.0, 1.0, WHITE, True, False, f"{name}: not ordered in time."
         )
     passed = found.p >= WHITE
-    first = float(found.correlation[0])
-    text = (
-        f"The residuals of {name} look like white noise."
-        if passed
-        else f"The residuals of {name} are coloured (correlation {first:.2f} of neighbours): "
-        f"{colour.rows} samples count as {colour.effective:.0f}; the intervals allow for it."
-    )
+    text = f"The residuals of {name} look like white noise."
+    if not passed:
+        k = int(np.argmax(np.abs(found.correlation)))
+        most = f"correlation {found.correlation[k]:.2f} over {found.lags[k]:.0f} samples"
+        text = f"The residuals of {name} are not white ({most})"
+        text += (
+            f": {colour.rows} of them count as {colour.effective:.0f}; the intervals allow for it."
+            if colour.order
+            else ", too little to matter for the intervals."
+        )
     return Test(name, "whiteness", found.statistic, found.p, WHITE, passed, False, text)
 
 

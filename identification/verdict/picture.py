@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 from identification.verdict.whiteness import Whiteness
@@ -50,3 +51,43 @@ def plot_lags(found: Mapping[str, Whiteness], path: str | Path | None = None) ->
     axes[0].set_title("autocorrelation of the residuals", fontsize="medium")
     axes[-1].set_xlabel("lag [samples]")
     return save(figure, path)
+
+
+def plot_ranking(found: Mapping[str, Any], path: str | Path | None = None) -> "Figure":
+    """Errors and BIC of several laws, a bar for each, the best one on top."""
+    rows = [row for row in found["rows"] if row["status"]]
+    figure, (errors, criterion) = plt.subplots(
+        1, 2, figsize=(8.5, 1.2 + 0.42 * max(1, len(rows))), sharey=True, layout="constrained"
+    )
+    places = np.arange(len(rows))[::-1]
+    for shift, key, label, colour in (
+        (0.2, "validation [%]", "not fitted to", "C0"), (-0.2, "fit [%]", "fitted to", "0.7"),
+    ):  # fmt: skip
+        values = [row[key] or 0.0 for row in rows]
+        errors.barh(places + shift, values, height=0.38, color=colour, label=label)
+    errors.set_yticks(
+        places,
+        labels=[f"{row['law']}\n{row['parameters']} par., {_operations(row)}" for row in rows],
+    )
+    errors.set_xlabel("rms error over the spread [%]")
+    errors.legend(fontsize="small")
+    colours = ["C2" if row["status"] == "SOLVED" else "C1" for row in rows]
+    criterion.barh(places, [row["BIC"] or 0.0 for row in rows], height=0.5, color=colours)
+    for place, row in zip(places, rows, strict=True):
+        criterion.annotate(
+            row["status"],
+            (0.0, place),
+            (4, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize="small",
+        )
+    criterion.set_xlabel("BIC over that of the best")
+    for axis in (errors, criterion):
+        axis.grid(alpha=0.3, axis="x")
+    figure.suptitle(f"{found['data']}: {found['how']}", fontsize="medium")
+    return save(figure, path)
+
+
+def _operations(row: Mapping[str, Any]) -> str:
+    return "no law" if row["operations"] is None else f"{row['operations']} op."

@@ -28,7 +28,7 @@ def test_coloured_noise_alone_is_not_doubtful_and_widens() -> None:
     task, point = solved(Decay(T, TRUE + 0.02 * ar1(300, 0.9, 1)))
     verdict, found = judge(task, point), covariance(task, point)
     assert verdict.good
-    assert any("coloured" in s for s in verdict.sentences)
+    assert any("not white" in s for s in verdict.sentences)
     assert (found.standard_errors > 2 * found.white_errors).all()
 
 

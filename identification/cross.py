@@ -1,0 +1,209 @@
+"""What a model says of data that it was not fitted to: by records, or by blocks of time with gaps.
+
+Each fold is left out once, the model is fitted to the rest, and what it leaves of the fold counts.
+Neighbouring samples share noise and motion; so folds are whole records or blocks of time, and the
+rest keeps a distance from them.
+Source: Burman, Chow and Nolan, Biometrika 81(2), 1994 (blocks with gaps).
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import nan
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.data.dataset import Dataset
+from identification.data.record import Record
+from identification.fit import Fit
+from identification.residuals.evaluation import Residuals
+from identification.result.fitted import Fitted
+from symfric.foundation import checks
+from symfric.foundation.status import SolveError
+
+Array = NDArray[np.float64]
+
+GAP = 0.05
+"""Share of a block that is left out between it and the rest."""
+LEAST = 20
+"""Samples of a piece that is worth fitting."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Left:
+    """What a model leaves of one signal of one record that it was not fitted to.
+
+    Attributes:
+        record: its name.
+        signal, unit: of the signal.
+        t: times of the residuals [s]; of points, velocities.
+        r: predicted - measured [SI], shape of t.
+        spread: standard deviation of the measured signal [SI].
+    """
+
+    record: str
+    signal: str
+    unit: str
+    t: Array
+    r: Array
+    spread: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class CrossValidation:
+    """Errors on what was left out.
+
+    Attributes:
+        left: of all folds.
+        folds: number of folds that could be fitted and compared.
+        failed: why others could not.
+        by: "records", "blocks of time" or "points".
+    """
+
+    left: tuple[Left, ...]
+    folds: int
+    failed: tuple[str, ...]
+    by: str
+
+    @property
+    def relative(self) -> float:
+        """Root mean square error over the spread of the signals [%]; NaN without folds."""
+        return relative(self.left)
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Signal -> root mean square error [SI]."""
+        signals = dict.fromkeys(part.signal for part in self.left)
+        return {s: _rms([p.r for p in self.left if p.signal == s]) for s in signals}
+
+    def __str__(self) -> str:
+        each = ", ".join(f"{s} {value:.3g}" for s, value in self.rms.items())
+        text = f"{self.folds} folds by {self.by}: {self.relative:.3g} % of the spread ({each} rms)"
+        return "\n".join([text, *self.failed])
+
+
+def cross_validate(
+    fit: Fit, folds: int = 4, start: Mapping[str, float] | None = None
+) -> CrossValidation:
+    """Fit to all but one part of the data, again and again, and look at that part.
+
+    Args:
+        fit: the question; its data are divided.
+        folds: number of parts: groups of records where there are as many records, else blocks of
+            time of each record, of points every so many.
+        start: values from which the parts are fitted, from one start each: those of a fit to
+            all data; None: as `fit` says.
+
+    Raises:
+        ValueError: fewer than two folds.
+    """
+    folds = checks.count("cross_validate: folds", folds, least=2)
+    parts, by = _divided(fit.data, folds)
+    if start is not None:
+        fit = replace(fit, start=dict(start), starts=1)
+    left, failed = list[Left](), list[str]()
+    for number, (rest, part) in enumerate(parts):
+        try:
+            left += left_of(replace(fit, data=rest).solve(throw=False), part)
+        except (ValueError, SolveError) as error:
+            failed.append(f"fold {number + 1}: {error}")
+    return CrossValidation(tuple(left), len(parts) - len(failed), tuple(failed), by)
+
+
+def left_of(fit: Fitted, data: Dataset) -> list[Left]:
+    """What a fit leaves of other data.
+
+    Raises:
+        ValueError: data that cannot be compared, or a fit from a file.
+    """
+    if fit.live is None:
+        raise checks.refused("validate", "a fit of this process", "one from a file")
+    residuals, r = fit.live.left_on(data)
+    return list(_parts(residuals, [record.name for record in data], r))
+
+
+def _parts(residuals: Residuals, names: Sequence[str], r: Array) -> Iterator[Left]:
+    for c in residuals.channels:
+        spread = float(np.std(c.measured)) or float(np.abs(c.measured).max(initial=0.0)) or 1.0
+        yield Left(names[c.record], c.signal, c.unit, c.t, r[c.rows], spread)
+
+
+def relative(left: Sequence[Left]) -> float:
+    """Root mean square error over the spread of each signal [%], all signals alike; NaN of none."""
+    signals = dict.fromkeys(part.signal for part in left)
+    each = list[float]()
+    for s in signals:
+        some = [part for part in left if part.signal == s]
+        rows = [part.r.size for part in some]
+        spread = np.sqrt(np.average([part.spread**2 for part in some], weights=rows))
+        each.append(_rms([part.r for part in some]) / float(spread))
+    return 100 * float(np.sqrt(np.mean(np.square(each)))) if each else nan
+
+
+def shared(many: Sequence[Sequence[Left]]) -> list[list[Left]]:
+    """The same with the times that all have: laws without states leave out what is near rest."""
+    common: dict[tuple[str, str], Array] = {}
+    for left in many:
+        for part in left:
+            key = (part.record, part.signal)
+            common[key] = np.intersect1d(common.get(key, part.t), part.t)
+    return [[_at(part, common[part.record, part.signal]) for part in left] for left in many]
+
+
+def _at(part: Left, times: Array) -> Left:
+    there = np.isin(part.t, times)
+    if not there.any():  # nothing is shared: each as it is
+        return part
+    return replace(part, t=part.t[there], r=part.r[there])
+
+
+def _rms(parts: Sequence[Array]) -> float:
+    r = np.concatenate(parts)
+    return float(np.sqrt(np.mean(r**2))) if r.size else nan
+
+
+def _divided(data: Dataset, folds: int) -> tuple[list[tuple[Dataset, Dataset]], str]:
+    """(rest, part) of each fold, and what the parts are."""
+    if len(data) >= folds:
+        groups = [data.records[k::folds] for k in range(folds)]
+        outside = [tuple(r for r in data if r not in group) for group in groups]
+        pairs = zip(outside, groups, strict=True)
+        return [(_named(data, rest), _named(data, part)) for rest, part in pairs], "records"
+    if all(record.t is None for record in data):
+        found = [_strided(data, k, folds) for k in range(folds)]
+        return found, "points"
+    return [_blocked(data, k, folds) for k in range(folds)], "blocks of time"
+
+
+def _named(data: Dataset, records: Sequence[Record]) -> Dataset:
+    return Dataset(tuple(records), data.name)
+
+
+def _strided(data: Dataset, k: int, folds: int) -> tuple[Dataset, Dataset]:
+    rest = tuple(r.at(np.arange(r.size) % folds != k) for r in data)
+    return _named(data, rest), _named(data, [r.at(np.arange(r.size) % folds == k) for r in data])
+
+
+def _blocked(data: Dataset, k: int, folds: int) -> tuple[Dataset, Dataset]:
+    """Block k of each record, and what lies before and behind it at a distance."""
+    rest, part = list[Record](), list[Record]()
+    for record in data:
+        first, last = (round(j * record.size / folds) for j in (k, k + 1))
+        gap = round(GAP * (last - first))
+        part.append(record.at(slice(first, last)))
+        for side, rows in (
+            ("before", slice(0, max(0, first - gap))),
+            ("after", slice(last + gap, None)),
+        ):
+            piece_rows = range(record.size)[rows]
+            if len(piece_rows) >= LEAST:
+                rest.append(replace(record.at(rows), name=f"{record.name} {side}"))
+    if not rest:
+        raise ValueError(
+            f"cross_validate: expected records of at least {2 * LEAST} samples, got data "
+            f"'{data.name}'; take fewer folds"
+        )
+    return _named(data, rest), _named(data, part)

@@ -1,0 +1,325 @@
+"""Several laws on one data set: which one says most, how surely, and at what cost.
+
+    validation   root mean square error on data that were not fitted, over the spread of the signals
+    AICc         n ln(mean square) + 2 k n / (n - k - 1)
+    BIC          n ln(mean square) + k ln n
+
+n is the effective number of samples, by the colour that the best law leaves in each signal; it is
+the same for all laws. With the number of rows instead, coloured residuals make any further
+parameter look certain. All laws are compared at the times that all of them describe.
+Source: Burnham and Anderson, Model Selection and Multimodel Inference, 2002.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from math import inf, isfinite, nan
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from identification.cross import CrossValidation, Left, cross_validate, left_of, relative, shared
+from identification.data.dataset import Dataset
+from identification.fit import Fit
+from identification.residuals.inverse import InverseDynamics
+from identification.result.fitted import Fitted
+from identification.result.live import Kind
+from identification.solving.many_starts import Progress
+from symfric.foundation import checks
+from symfric.foundation.status import SolveError
+from symfric.laws import Law
+from symfric.laws.cost import cost
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One law of a ranking.
+
+    Attributes:
+        law: as it was called.
+        status: how its fit ended; "" where it could not be fitted.
+        validation: error on data that were not fitted [%], NaN without.
+        fitted: the same on the data of the fit [%].
+        aicc, bic: over those of the best law.
+        parameters: number of fitted ones, start values apart.
+        operations: instructions of force and rate; None of a model without a law.
+        seconds: of the fit.
+        sentence: what speaks against it, or why it could not be fitted.
+        fit: the result; None where there is none.
+    """
+
+    law: str
+    status: str
+    validation: float
+    fitted: float
+    aicc: float
+    bic: float
+    parameters: int
+    operations: int | None
+    seconds: float
+    sentence: str
+    fit: Fitted | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data; numbers that are none are None."""
+        named: dict[str, Any] = {
+            "law": self.law, "status": self.status, "validation [%]": self.validation,
+            "fit [%]": self.fitted, "AICc": self.aicc, "BIC": self.bic,
+            "parameters": self.parameters, "operations": self.operations,
+            "seconds": self.seconds, "sentence": self.sentence,
+        }  # fmt: skip
+        return {
+            n: None if isinstance(v, float) and not isfinite(v) else v for n, v in named.items()
+        }
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Ranking:
+    """Laws, the one that predicts best first; those that could not be fitted last.
+
+    Attributes:
+        rows: of the laws.
+        data: name of the data.
+        how: what the validation error is of.
+        effective: samples that the residuals count as, of all signals together.
+    """
+
+    rows: tuple[Row, ...]
+    data: str
+    how: str
+    effective: float
+
+    @property
+    def best(self) -> Fitted:
+        """The fit of the first law.
+
+        Raises:
+            ValueError: no law could be fitted.
+        """
+        if not self.rows or self.rows[0].fit is None:
+            raise ValueError(f"select: no law could be fitted to data '{self.data}'")
+        return self.rows[0].fit
+
+    def __getitem__(self, law: str) -> Row:
+        """The row of a law by its name."""
+        checks.choice("select: law", law, [row.law for row in self.rows])
+        return next(row for row in self.rows if row.law == law)
+
+    def __str__(self) -> str:
+        wide = max([len(row.law) for row in self.rows], default=4)
+        lines = [f"laws on {self.data}: {self.how}; {self.effective:.0f} effective samples"]
+        lines.append(
+            f"{'law':{wide}}  {'validation':>10}  {'fit':>8}  {'AICc':>8}  {'BIC':>8}  "
+            f"{'par.':>4}  {'op.':>4}  status"
+        )
+        for row in self.rows:
+            if row.fit is None:
+                lines.append(f"{row.law:{wide}}  not fitted: {row.sentence}")
+                continue
+            operations = "-" if row.operations is None else str(row.operations)
+            lines.append(
+                f"{row.law:{wide}}  {_percent(row.validation):>10}  {_percent(row.fitted):>8}  "
+                f"{_number(row.aicc):>8}  {_number(row.bic):>8}  {row.parameters:>4}  "
+                f"{operations:>4}  {row.status}"
+            )
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but the fits as plain data."""
+        return {
+            "data": self.data, "how": self.how, "effective": self.effective,
+            "rows": [row.to_dict() for row in self.rows],
+        }  # fmt: skip
+
+    def plot(self, path: str | Path | None = None) -> "Figure":
+        """Errors on data that were and were not fitted, and criteria, a bar for each law.
+
+        Args:
+            path: image file.
+        """
+        from identification.verdict.picture import plot_ranking  # noqa: PLC0415 (Matplotlib is slow)
+
+        return plot_ranking(self.to_dict(), path)
+
+
+def select(
+    laws: Iterable[Any] | Mapping[str, Any],
+    data: Dataset,
+    kind: Kind | None = None,
+    validate: Dataset | None = None,
+    *,
+    folds: int = 4,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+    **fit: Any,
+) -> Ranking:
+    """Fit several laws to the same data and rank them by what they say of other data.
+
+    Args:
+        laws: texts, laws, scenes or models, or name -> one of them.
+        data: to fit to.
+        kind: of residuals; `InverseDynamics()` if none.
+        validate: other data; None: cross-validation.
+        folds: of the cross-validation; 0: none, the ranking is by BIC.
+        executor: for the starts of each law.
+        progress: called with a text and the fraction done.
+        fit: further arguments of `Fit`, the same for all laws.
+
+    A law that cannot be fitted has a row that says why.
+
+    Raises:
+        ValueError: no laws, or arguments that no law could be fitted with.
+    """
+    named = _named(laws)
+    checks.kind("select: data", data, Dataset, "data, such as Dataset.read('run.csv')")
+    folds = checks.count("select: folds", folds, least=0)
+    asked: Any = InverseDynamics() if kind is None else kind
+    tried = list[_Tried]()
+    for number, (name, what) in enumerate(named.items()):
+        if progress is not None:
+            progress(name, number / len(named))
+        one = Fit(asked, what, data, **fit)
+        tried.append(_try(name, one, validate, folds, executor))
+    if progress is not None:
+        progress("ranked", 1.0)
+    how = f"validation on {validate.name}" if validate is not None else "no validation"
+    crossed = next((t.crossed for t in tried if t.crossed is not None), None)
+    if crossed is not None:
+        how = f"validation by {folds} folds ({crossed.by})"
+    return _ranked(tried, data.name, how)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """What came of one law."""
+
+    name: str
+    why: str = ""
+    fit: Fitted | None = None
+    inside: Sequence[Left] = ()
+    outside: Sequence[Left] = ()
+    crossed: CrossValidation | None = None
+
+
+def _named(laws: Iterable[Any] | Mapping[str, Any]) -> dict[str, Any]:
+    if isinstance(laws, Mapping):
+        return {str(name): what for name, what in laws.items()}
+    if isinstance(laws, str):
+        raise checks.refused("select: laws", "a list of laws", laws, "['stribeck', 'lugre']")
+    found: dict[str, Any] = {}
+    for what in laws:
+        name = what if isinstance(what, str) else getattr(what, "name", type(what).__name__)
+        found[name if name not in found else f"{name} {len(found) + 1}"] = what
+    if not found:
+        raise checks.refused("select: laws", "at least one law", laws)
+    return found
+
+
+def _try(
+    name: str, asked: Fit, validate: Dataset | None, folds: int, executor: Executor | None
+) -> _Tried:
+    """Fit and validate one law; what stands in the way is kept as a sentence."""
+    try:
+        found = asked.solve(executor=executor, throw=False)
+    except (ValueError, SolveError) as error:
+        return _Tried(name, str(error))
+    live = found.live
+    if live is None:
+        return _Tried(name, "the result has no residuals")
+    made = _Tried(name, fit=found, inside=left_of(found, asked.data))
+    try:
+        if validate is not None:
+            return replace(made, outside=left_of(found, validate))
+        if folds:
+            start = {n: v for n, v in live.values.items() if n in live.subject.names}
+            crossed = cross_validate(asked, folds, start)
+            return replace(
+                made, outside=crossed.left, crossed=crossed, why=" ".join(crossed.failed)
+            )
+    except ValueError as error:
+        return replace(made, why=str(error))
+    return made
+
+
+def _ranked(tried: Sequence[_Tried], data: str, how: str) -> Ranking:
+    good = [t for t in tried if t.fit is not None]
+    inside, outside = shared([t.inside for t in good]), shared([t.outside for t in good])
+    effective = _effective(good, inside)
+    n = sum(effective.values())
+    aicc, bic = list[float](), list[float]()
+    for t, left in zip(good, inside, strict=True):
+        k = _count(t)
+        fits = sum(effective[s] * np.log(max(ms, 1e-300)) for s, ms in _mean_squares(left).items())
+        aicc.append(float(fits) + (2 * k * n / (n - k - 1) if n > k + 1 else inf))
+        bic.append(float(fits) + k * float(np.log(n)))
+    first = min(aicc, default=0.0), min(bic, default=0.0)
+    rows = [
+        _row(t, relative(out), relative(ins), _over(a, first[0]), _over(b, first[1]))
+        for t, ins, out, a, b in zip(good, inside, outside, aicc, bic, strict=True)
+    ]
+    rows.sort(key=lambda row: (row.validation if isfinite(row.validation) else inf, row.bic))
+    lost = [_lost(t) for t in tried if t.fit is None]
+    return Ranking((*rows, *lost), data, how, n)
+
+
+def _over(value: float, best: float) -> float:
+    return value - best if isfinite(best) else nan
+
+
+def _lost(t: _Tried) -> Row:
+    return Row(t.name, "", nan, nan, nan, nan, 0, None, 0.0, t.why, None)
+
+
+def _row(t: _Tried, validation: float, fitted: float, aicc: float, bic: float) -> Row:
+    fit = t.fit
+    if fit is None:
+        raise ValueError(f"select: {t.name}: {t.why}")
+    operations = cost(fit.law).value if isinstance(fit.law, Law) else None
+    sentence = " ".join([*fit.verdict.sentences[:1], t.why]).strip()
+    return Row(
+        t.name, fit.status.name, validation, fitted, aicc, bic, _count(t), operations, fit.seconds,
+        sentence, fit,
+    )  # fmt: skip
+
+
+def _count(t: _Tried) -> int:
+    """Fitted parameters that are asked for."""
+    live = None if t.fit is None else t.fit.live
+    return 0 if live is None else sum(not u.nuisance for u in live.task.unknowns.unknowns)
+
+
+def _mean_squares(left: Sequence[Left]) -> dict[str, float]:
+    signals = dict.fromkeys(part.signal for part in left)
+    return {
+        s: float(np.mean(np.concatenate([p.r for p in left if p.signal == s]) ** 2))
+        for s in signals
+    }
+
+
+def _effective(good: Sequence[_Tried], inside: Sequence[Sequence[Left]]) -> dict[str, float]:
+    """Signal -> independent samples in what the law leaves that leaves least of it."""
+    found: dict[str, tuple[float, float]] = {}
+    for t, left in zip(good, inside, strict=True):
+        counts: dict[str, float] = {}
+        for label, n in () if t.fit is None else t.fit.verdict.effective.items():
+            signal = label.split("[")[0]
+            counts[signal] = counts.get(signal, 0.0) + n
+        for signal, ms in _mean_squares(left).items():
+            if ms < found.get(signal, (inf, 0.0))[0]:
+                found[signal] = (ms, counts.get(signal, 1.0))
+    return {signal: n for signal, (_, n) in found.items()}
+
+
+def _percent(value: float) -> str:
+    return f"{value:.3g} %" if isfinite(value) else "-"
+
+
+def _number(value: float) -> str:
+    return f"{value:.1f}" if isfinite(value) else "-"

@@ -1,0 +1,100 @@
+"""Cross-validation and ranking of laws on points of a Stribeck curve."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from identification.cross import Left, cross_validate, relative, shared
+from identification.data.dataset import Dataset
+from identification.fit import Fit
+from identification.residuals.points import Points
+from identification.select import Ranking, select
+from symfric import Stribeck
+from symfric.laws import steady_force
+
+LAW = Stribeck(mu_s=6.0, mu_d=4.0, v_s=0.02, v_eps=1e-4, sigma_2=8.0)
+
+
+def points(seed: int, noise: float = 0.05, n: int = 160) -> Dataset:
+    r = np.random.default_rng(seed)
+    v = r.choice([-1, 1], n) * np.geomspace(2e-3, 0.3, n)
+    F = np.asarray(steady_force(LAW, v, 1.0)) + noise * r.standard_normal(n)
+    return Dataset.of(v=v, F=F, units={"v": "m/s", "F": "N"}, points=True, name=f"points {seed}")
+
+
+@pytest.fixture(scope="module")
+def ranking() -> Ranking:
+    laws = ["coulomb", "coulomb+viscous", "stribeck", "stribek"]
+    return select(laws, points(1), Points(), starts=2)
+
+
+def test_the_true_law_is_first_and_the_unknown_one_last(ranking: Ranking) -> None:
+    assert [row.law for row in ranking.rows] == [
+        "stribeck",
+        "coulomb+viscous",
+        "coulomb",
+        "stribek",
+    ]
+    first = ranking.rows[0]
+    assert first.status == "SOLVED"
+    assert first.aicc == first.bic == 0.0
+    assert first.validation == pytest.approx(100 * 0.05 / np.std(points(1)[0]["F"]), rel=0.3)
+    assert ranking["coulomb"].status == "DOUBTFUL"
+    assert ranking["coulomb"].bic > 100
+    assert ranking.best.law is not None
+    assert "stribeck" in ranking.rows[-1].sentence
+
+
+def test_ranking_prints_plots_and_is_plain_data(ranking: Ranking) -> None:
+    text = str(ranking)
+    assert "4 folds (points)" in text
+    assert "not fitted" in text.splitlines()[-1]
+    rows = ranking.to_dict()["rows"]
+    assert rows[0]["operations"] > rows[2]["operations"]
+    assert rows[-1]["validation [%]"] is None
+    assert ranking.plot().axes
+
+
+def test_other_data_take_the_place_of_folds() -> None:
+    found = select({"mine": LAW}, points(1), Points(), points(2), starts=1)
+    assert found.how == "validation on points 2"
+    assert found.rows[0].validation == pytest.approx(found.rows[0].fitted, rel=0.2)
+
+
+def test_records_are_left_out_whole() -> None:
+    data = points(1) + points(2) + points(3)
+    found = cross_validate(Fit(Points(), "coulomb", data, starts=1), folds=3)
+    assert found.by == "records"
+    assert found.folds == 3
+    assert {part.record for part in found.left} == {"points 1", "points 2", "points 3"}
+    assert found.relative == pytest.approx(100 * found.rms["F"] / np.std(data[0]["F"]), rel=0.02)
+
+
+def test_blocks_of_time_keep_a_distance() -> None:
+    from identification.cross import _divided  # noqa: PLC0415  # pyright: ignore
+
+    t = np.arange(400) * 1e-3
+    data = Dataset.of(t=t, x=np.sin(t), force=np.cos(t), units="m, N")
+    parts, by = _divided(data, 4)
+    assert by == "blocks of time"
+    rest, part = parts[1]
+    assert part[0].size == 100
+    assert [r.size for r in rest] == [95, 195]
+
+
+def test_errors_are_compared_where_all_have_some() -> None:
+    def left(times: Sequence[float]) -> list[Left]:
+        t = np.array(times, float)
+        return [Left("a", "F", "N", t, t, 2.0)]
+
+    first, second = shared([left([1, 2, 3]), left([2, 3, 4])])
+    np.testing.assert_array_equal(first[0].t, second[0].t)
+    assert relative(first) == pytest.approx(100 * np.sqrt(6.5) / 2)
+    assert np.isnan(relative([]))
+
+
+@pytest.mark.parametrize("laws", ["stribeck", []])
+def test_bad_laws_are_refused(laws: object) -> None:
+    with pytest.raises(ValueError, match="select: laws"):
+        select(laws, points(1), Points())  # pyright: ignore
