@@ -5,11 +5,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, final
 
+from identification.data.check import check
+from identification.data.findings import Findings
 from identification.data.frames import ASSUMED, columns_of
 from identification.data.merge import merged
 from identification.data.raw import Wanted, record
 from identification.data.reading import Paths, files, read_records
 from identification.data.record import Record
+from identification.data.repair import scaled, unwrapped, without_spikes
 from identification.data.resample import delayed, resampled
 from identification.data.text_file import to_csv
 from symfric.foundation import checks
@@ -154,6 +157,23 @@ class Dataset:
         """The data with every record changed."""
         return Dataset(tuple(map(change, self.records)), self.name)
 
+    def check(self, **roles: str) -> Findings:
+        """What is doubtful about the data, each with its place; printable.
+
+        An error means that no fit of these data as they are can be physics; a warning, that some
+        numbers cannot be told or are worse than they look. Every signal is searched for clipping,
+        spikes and frozen stretches; those with a part in the drive are held against each other:
+        sign and delay of force against motion, exchanged columns, standstill, one-way motion, too
+        little excitation, wraps, drift, units.
+
+        Args:
+            roles: signals that are not called by their part: `check(x="theta", force="tau_1")`.
+
+        Limits: a force with a wrong gain, units that are wrong in a consistent way, a load that
+        changed between records leave no trace in the data alone.
+        """
+        return check(self.name, self.records, roles)
+
     def between(self, begin: float, end: float) -> "Dataset":
         """The samples of each record with begin <= t <= end [s]."""
         return self.each(lambda one: one.between(begin, end))
@@ -165,6 +185,20 @@ class Dataset:
     def renamed(self, names: Mapping[str, str]) -> "Dataset":
         """The data with other names of signals: {"old": "new"}."""
         return self.each(lambda one: one.renamed(names))
+
+    def without_spikes(self) -> "Dataset":
+        """The data with samples far off their neighbours replaced by a line between those."""
+        return self.each(without_spikes)
+
+    def unwrapped(self, periods: Mapping[str, float]) -> "Dataset":
+        """The data with signals counted modulo a period counted through: {"x": 6.2832}."""
+        return self.each(lambda one: unwrapped(one, periods))
+
+    def scaled(
+        self, factors: Mapping[str, float], units: Mapping[str, str] | None = None
+    ) -> "Dataset":
+        """The data with signals times factors: {"force": -1}; `units` where they change."""
+        return self.each(lambda one: scaled(one, factors, units))
 
     def split(self, share: float = 0.5) -> "tuple[Dataset, Dataset]":
         """The first `share` of the samples of each record, and the rest: to fit and to validate.

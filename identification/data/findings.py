@@ -42,10 +42,12 @@ class Findings:
     Attributes:
         items: the findings.
         name: of the data.
+        records: names of the records.
     """
 
     items: tuple[Finding, ...]
     name: str = "data"
+    records: tuple[str, ...] = ()
 
     def __iter__(self) -> Iterator[Finding]:
         return iter(self.items)
@@ -76,8 +78,13 @@ class Findings:
         """All in lines."""
         if not self.items:
             return f"{self.name}: nothing doubtful found"
-        lines = [f"  {f.severity}: {f.sentence}" for f in self.items]
+        lines = [f"  {f.severity}: {self._record(f)}{f.sentence}" for f in self.items]
         return "\n".join([f"{self.name}:", *lines])
+
+    def _record(self, finding: Finding) -> str:
+        """The record of a finding, where there are several."""
+        several = len(self.records) > 1
+        return f"{self.records[finding.record]}: " if several else ""
 
     def __str__(self) -> str:
         return self.text
