@@ -1,24 +1,78 @@
-"""Identify friction: of a drive from force and position, of any model from its motion."""
+"""Identify friction from measured data: one `Fit` of any law, machine or model, and its verdict.
 
-from identification.old.data import Dataset as Dataset
-from identification.old.errors import ClosedLoopErrors as ClosedLoopErrors
-from identification.old.errors import Errors as Errors
-from identification.old.errors import evaluate as evaluate
-from identification.old.filters import Filter as Filter
-from identification.old.filters import central_difference as central_difference
-from identification.old.filters import lowpass as lowpass
-from identification.old.identify import identify as identify
-from identification.old.loop import PositionLoop as PositionLoop
-from identification.old.loop import closed_loop as closed_loop
-from identification.old.motion import MotionFit as MotionFit
-from identification.old.motion import identify_motion as identify_motion
-from identification.old.read import read_data as read_data
-from identification.old.regress import LinearFit as LinearFit
-from identification.old.regress import linear_regression as linear_regression
-from identification.old.result import Estimate as Estimate
-from identification.old.result import Identification as Identification
-from identification.old.signals import MotionSignals as MotionSignals
-from identification.old.signals import differentiate as differentiate
-from identification.old.stepper import Motion as Motion
-from identification.old.stepper import open_loop as open_loop
-from identification.old.synthetic import synthetic_drive_data as synthetic_drive_data
+data = Dataset.read("run*.csv")
+fit = Fit(InverseDynamics(), "stribeck", data).solve()
+print(fit)
+fit.report("fit.html")
+"""
+
+from typing import TYPE_CHECKING
+
+from symfric.foundation.fronts import hand_out
+
+if TYPE_CHECKING:
+    from identification.data.dataset import Dataset as Dataset
+    from identification.data.findings import Finding as Finding
+    from identification.data.findings import Findings as Findings
+    from identification.data.loop import PositionLoop as PositionLoop
+    from identification.data.record import Record as Record
+    from identification.data.synthetic import synthetic_drive_data as synthetic_drive_data
+    from identification.fit import Fit as Fit
+    from identification.residuals.closed_loop import ClosedLoop as ClosedLoop
+    from identification.residuals.closed_loop import Controller as Controller
+    from identification.residuals.inverse import InverseDynamics as InverseDynamics
+    from identification.residuals.points import Points as Points
+    from identification.residuals.shooting import Shooting as Shooting
+    from identification.result.estimate import Estimate as Estimate
+    from identification.result.fitted import Fitted as Fitted
+    from identification.signals.differentiate import MotionSignals as MotionSignals
+    from identification.signals.differentiate import differentiate as differentiate
+    from identification.signals.filters import Filter as Filter
+    from identification.signals.filters import central_difference as central_difference
+    from identification.signals.filters import lowpass as lowpass
+    from identification.signals.regress import LinearFit as LinearFit
+    from identification.signals.regress import linear_regression as linear_regression
+    from identification.starts.break_away import break_away as break_away
+    from identification.starts.hysteresis import hysteresis as hysteresis
+    from identification.starts.maxwell_slip import fit_elements as fit_elements
+    from identification.starts.measured import Measured as Measured
+    from identification.starts.six_steps import six_steps as six_steps
+    from identification.starts.start import start_values as start_values
+    from identification.starts.stribeck import binned as binned
+    from identification.starts.stribeck import fit_curve as fit_curve
+    from identification.unknowns.spec import above as above
+    from identification.unknowns.spec import linear as linear
+    from identification.unknowns.spec import log as log
+    from identification.unknowns.spec import tied as tied
+    from identification.verdict.design import expected_errors as expected_errors
+    from identification.verdict.design import informative as informative
+else:
+    hand_out(
+        __name__,
+        {
+            "identification.data.dataset": "Dataset",
+            "identification.data.findings": "Finding Findings",
+            "identification.data.loop": "PositionLoop",
+            "identification.data.record": "Record",
+            "identification.data.synthetic": "synthetic_drive_data",
+            "identification.fit": "Fit",
+            "identification.residuals.closed_loop": "ClosedLoop Controller",
+            "identification.residuals.inverse": "InverseDynamics",
+            "identification.residuals.points": "Points",
+            "identification.residuals.shooting": "Shooting",
+            "identification.result.estimate": "Estimate",
+            "identification.result.fitted": "Fitted",
+            "identification.signals.differentiate": "MotionSignals differentiate",
+            "identification.signals.filters": "Filter central_difference lowpass",
+            "identification.signals.regress": "LinearFit linear_regression",
+            "identification.starts.break_away": "break_away",
+            "identification.starts.hysteresis": "hysteresis",
+            "identification.starts.maxwell_slip": "fit_elements",
+            "identification.starts.measured": "Measured",
+            "identification.starts.six_steps": "six_steps",
+            "identification.starts.start": "start_values",
+            "identification.starts.stribeck": "binned fit_curve",
+            "identification.unknowns.spec": "above linear log tied",
+            "identification.verdict.design": "expected_errors informative",
+        },
+    )

@@ -108,6 +108,8 @@ class Fit:
         """
         begun = perf_counter()
         throw = checks.flag("Fit: throw", throw)
+        if progress is not None:
+            checks.function("Fit: progress", progress, "a function of a text and a fraction")
         asked = self.prepared()
         made = asked.task
         first = scattered(made.unknowns, asked.centre, self.starts, self.seed)

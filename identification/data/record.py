@@ -55,6 +55,8 @@ class Record:
         for key, values in checks.named(f"{where}: signals", self.signals).items():
             signals[key] = self._column(key, values)
         units = checks.named(f"{where}: units", self.units, signals)
+        for unit in units.values():
+            checks.kind(f"{where}: units", unit, str, "SI units, such as 'm'")
         object.__setattr__(self, "signals", signals)
         object.__setattr__(self, "units", {key: units.get(key, "") for key in signals})
         if self.t is not None:

@@ -70,8 +70,9 @@ class InverseDynamics:
         if self.filter is not None:
             checks.kind(f"{WHERE}: filter", self.filter, Filter, "a filter, such as Filter(100.0)")
         if self.dead_time is not None:
-            low, high = (checks.number(f"{WHERE}: dead_time", b, unit="s") for b in self.dead_time)
-            if not low < high:
+            pair = checks.many(f"{WHERE}: dead_time", self.dead_time, "bounds (low, high) [s]")
+            bounds = [checks.number(f"{WHERE}: dead_time", b, unit="s") for b in pair]
+            if len(bounds) != 2 or not bounds[0] < bounds[1]:
                 raise checks.refused(f"{WHERE}: dead_time", "bounds in order", self.dead_time)
 
     def prepare(

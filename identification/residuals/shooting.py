@@ -83,9 +83,13 @@ class Shooting:
         elif windows is not None:
             seconds = checks.number(f"{where}: windows", windows, unit="s", above=0.0)
             object.__setattr__(self, "windows", seconds)
+        self._check_names()
         if isinstance(self.x0, str):
             checks.choice(f"{where}: x0", self.x0, ("estimate", "data", "given"))
         else:
+            such = "'estimate', 'given', or values by state"
+            if self.x0 is None:  # pyright: ignore[reportUnnecessaryComparison]
+                raise checks.refused(f"{where}: x0", such, self.x0)
             object.__setattr__(self, "x0", checks.named(f"{where}: x0", self.x0))
         checks.choice(f"{where}: interpolation", self.interpolation, INTERPOLATIONS)
         object.__setattr__(self, "every", checks.count(f"{where}: every", self.every))
@@ -94,10 +98,20 @@ class Shooting:
             checks.number(f"{where}: rtol", self.rtol, above=0.0, upper=0.1)
         self._check_dead_time()
 
+    def _check_names(self) -> None:
+        where, signals = "Shooting: signals", self.signals
+        if isinstance(signals, Mapping):
+            for channel in checks.named(where, signals).values():
+                checks.text(where, channel, "signal -> name of a channel")
+        elif signals is not None:
+            checks.names(where, signals)
+        if self.inputs is not None:
+            checks.named("Shooting: inputs", self.inputs)
+
     def _check_dead_time(self) -> None:
         where, given = "Shooting: dead_time", self.dead_time
         bounds = given if isinstance(given, tuple) else (given,)
-        if len(bounds) > 2:
+        if len(bounds) > 2 or (isinstance(given, tuple) and len(bounds) < 2):
             raise checks.refused(where, "seconds, or (low, high) to estimate it between", given)
         numbers = tuple(checks.number(where, x, unit="s", lower=0.0) for x in bounds)
         if len(numbers) == 2 and numbers[0] >= numbers[1]:

@@ -21,7 +21,8 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.starts.stribeck import Curve, StribeckCurve, binned
+from identification.starts.stribeck import Curve, StribeckCurve, binned, samples
+from symfric.foundation import checks
 from symfric.laws.static.exponential import SteadyStateLuGre
 
 Array = NDArray[np.float64]
@@ -103,8 +104,9 @@ def six_steps(v: Array, F: Array, *, unstable: float = 0.0) -> SixSteps:
     Raises:
         ValueError: fewer than four speeds, or forces that point forward.
     """
-    side = np.sign(np.asarray(v, dtype=float))
-    curve = binned(np.abs(v), side * np.asarray(F, dtype=float))
+    velocity, friction = samples("six_steps", v, F)
+    unstable = checks.number("six_steps: unstable", unstable, unit="m/s", lower=0.0)
+    curve = binned(np.abs(velocity), np.sign(velocity) * friction)
     if curve.v.size < LEAST or curve.F.min() <= 0:
         raise ValueError(
             f"six_steps: expected at least {LEAST} speeds and forces with the sign of the velocity,"

@@ -44,6 +44,20 @@ class Curve:
         return bool(self.v.min() < 0 < self.v.max())
 
 
+def samples(where: str, v: object, F: object) -> tuple[Array, Array]:
+    """Velocities and forces as columns of one length.
+
+    Raises:
+        ValueError: they are none.
+    """
+    speed, force = (checks.array(f"{where}: {n}", x) for n, x in (("v", v), ("F", F)))
+    if speed.shape != force.shape:
+        raise ValueError(
+            f"{where}: expected as many forces as velocities, got {force.size} and {speed.size}"
+        )
+    return speed, force
+
+
 def binned(v: Array, F: Array, *, bins: int = BINS, slowest: float = SLOWEST) -> Curve:
     """Medians over bins of speed, spaced by equal factors, each direction apart.
 
@@ -59,11 +73,12 @@ def binned(v: Array, F: Array, *, bins: int = BINS, slowest: float = SLOWEST) ->
         ValueError: nothing moves.
     """
     bins = checks.count("binned: bins", bins, least=3)
-    fastest = float(np.abs(v).max(initial=0.0))
-    moving = np.abs(v) > slowest * fastest
+    speed, force = samples("binned", v, F)
+    fastest = float(np.abs(speed).max(initial=0.0))
+    moving = np.abs(speed) > slowest * fastest
     if not moving.any():
         raise ValueError("binned: expected samples that move, got velocity 0 everywhere")
-    return _binned(v[moving], F[moving], bins, fastest)
+    return _binned(speed[moving], force[moving], bins, fastest)
 
 
 def _binned(v: Array, F: Array, bins: int, fastest: float) -> Curve:

@@ -56,6 +56,7 @@ def log(lower: float, upper: float, start: float | None = None) -> Range:
         ValueError: bounds that are not positive or not in order, a start outside them.
     """
     low = checks.number("log: lower", lower, above=0.0)
+    checks.number("log: upper", upper, above=low)
     return _range("log", low, upper, start, True)
 
 

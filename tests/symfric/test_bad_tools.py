@@ -1,11 +1,10 @@
-"""Bad Python input at optimal control, identification and C."""
+"""Bad Python input at optimal control and C."""
 
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import casadi as ca
-import numpy as np
 import pytest
 from bad_values import (
     INF,
@@ -13,10 +12,8 @@ from bad_values import (
     Door,
     Thing,
     choice,
-    count,
     flag,
     function,
-    names,
     number,
     path,
     refuses_all,
@@ -26,14 +23,6 @@ from bad_values import (
 
 import ocp
 import symfric as sf
-from identification import (
-    Dataset,
-    Filter,
-    identify,
-    identify_motion,
-    read_data,
-    synthetic_drive_data,
-)
 from symfric.codegen import generate, law_block, plant_block, verify
 from symfric.laws import BrownMcPhee, Coulomb, LuGre, Stribeck
 
@@ -206,107 +195,6 @@ def doors_of_control() -> Iterator[Door]:
     )
 
 
-def doors_of_identification() -> Iterator[Door]:
-    data = synthetic_drive_data()
-    yield Door(
-        "identify",
-        identify,
-        {"data": data, "law": "coulomb+viscous"},
-        {
-            "data": thing(Dataset, np.zeros((100, 3))),
-            "law": [*thing(Coulomb), LuGre(), "", "lugre", "coulomb+"],
-            "validate": thing()[1:],
-            "normal_force": number(0.0, -1.0),
-            "free": names("mu_d")[:-3],
-            "fixed": values("m"),
-            "filter": thing(Filter)[1:],
-            "folds": [*number(), 1, -1, 2.5],
-            "throw": flag(),
-            "progress": function(),
-        },
-    )
-    model = sf.rabinowicz(BrownMcPhee(), free=["mu_d"])
-    t = np.linspace(0.0, 0.05, 6)
-    good = {"model": model, "t": t, "measured": {"x": np.linspace(0.0, 5e-3, 6)}, "iterations": 1}
-    yield Door(
-        "identify_motion",
-        identify_motion,
-        good,
-        {
-            "model": thing(BrownMcPhee()),
-            "t": [
-                None,
-                3.0,
-                "abc",
-                [],
-                [0.0],
-                [[0.0]],
-                t[::-1],
-                t[:-1],
-                np.full(6, NAN),
-                Thing(),
-                1j,
-            ],
-            "measured": [
-                None,
-                3,
-                {},
-                {"nonsense": t},
-                {"x": 3.0},
-                {"x": t[:-1]},
-                {"x": t * NAN},
-                {"x": None},
-                {"x": "abc"},
-                {"x": [[1.0]]},
-                {3: t},
-                Thing(),
-                [t],
-            ],
-            "free": [*names("mu_d")[:-1], []],
-            "p": values("mu_d", {"mu_d": -1.0}),
-            "x0": values("v"),
-            "u": values("nothing"),
-            "rtol": number(0.0, -1.0, 1.0),
-            "iterations": count(),
-            "throw": flag(),
-        },
-    )
-    columns: dict[str, Any] = {"name": "d", "t": data.t, "x": data.x, "force": data.force}
-    bad = [None, 3.0, "abc", [], {}, Thing(), [[1.0]], data.t[:-1], data.t * NAN, 1j, ["a"] * 60]
-    yield Door(
-        "Dataset",
-        Dataset,
-        columns,
-        {
-            "t": [*bad, data.t[::-1], data.t * 0],
-            "x": bad,
-            "force": bad,
-            "v": bad[1:],
-        },
-    )
-    yield Door(
-        "Filter",
-        Filter,
-        {"cutoff": 10.0},
-        {
-            "cutoff": number(0.0, -1.0),
-            "decimation": count(),
-            "order": count(),
-            "v_min": number(-1.0),
-        },
-    )
-    yield Door("Dataset.resampled", data.resampled, {}, {"step": number(0.0, -1.0, optional=True)})
-    yield Door(
-        "read_data",
-        read_data,
-        {"path": "a.csv"},
-        {
-            "path": [None, 3, "", b"x", Thing(), [], "nothing.csv", ".", "a\0b"],
-            "columns": [3, "x", {"nonsense": "x"}, {"x": 3}, Thing()],
-        },
-    )
-
-
 def doors_of_code() -> Iterator[Door]:
     yield Door(
         "generate",
@@ -347,7 +235,6 @@ def doors_of_code() -> Iterator[Door]:
 
 DOORS = {
     "control": doors_of_control,
-    "identification": doors_of_identification,
     "code": doors_of_code,
 }
 

@@ -8,7 +8,7 @@ import numpy as np
 
 import ocp
 import symfric as sf
-from identification import identify, identify_motion, synthetic_drive_data
+from identification import Dataset, Fit, InverseDynamics, Shooting, synthetic_drive_data
 from symfric.codegen import law_block, plant_block
 from symfric.figures import compare
 from symfric.multibody import (
@@ -137,12 +137,10 @@ def test_every_kind_of_number_is_taken_by_the_tools() -> None:
         assert float(plant_block(model, h=kind(0.5)).constants["h"]) == 0.5
         assert compare([sf.Coulomb()], N=kind(2.0)).curves
     for kind in KINDS[:2]:
-        found = identify(
-            data, "coulomb+viscous", normal_force=kind(2.0), fixed={"offset": kind(0.0)}
-        )
-        assert found.status.ok
-        fit = identify_motion(belt, kind_of(kind, t), {"x": truth["x"]}, x0={"v": kind(0.5)})
-        assert fit.status.ok
+        held = {"normal_force": kind(2.0), "fixed": {"offset": kind(0.0)}}
+        assert Fit(InverseDynamics(), "coulomb+viscous", data, **held).solve().status.ok
+        rows = Dataset.of(t=kind_of(kind, t), x=kind_of(kind, truth["x"]), units="m")
+        assert Fit(Shooting(x0={"v": kind(0.5)}), belt, rows).solve().status.ok
 
 
 def kind_of(kind: Callable[[float], Any], t: Any) -> Any:
