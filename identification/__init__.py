@@ -1,9 +1,10 @@
 """Identify friction from measured data: one `Fit` of any law, machine or model, and its verdict.
 
-data = Dataset.read("run*.csv")
-fit = Fit(InverseDynamics(), "stribeck", data).solve()
-print(fit)
-fit.report("fit.html")
+    data = Dataset.read("run*.csv")
+    fit = Fit(InverseDynamics(), "stribeck", data).solve()
+    print(fit)
+
+Other kinds of residuals: `Points`, `Shooting`, `ClosedLoop`.
 """
 
 from typing import TYPE_CHECKING

@@ -149,7 +149,6 @@ FLOORS: dict[str, set[str]] = {
         "identification.verdict",
         "identification.report",
     },
-    "identification.old": {"symfric"},
     "identification": {"symfric"},
 }
 """Folder -> folders it may import (CONVENTIONS, section 8). A folder stands for its rooms,

@@ -1,1 +1,0 @@
-"""The pipelines before `Fit`: they go when it has taken over."""
