@@ -17,6 +17,7 @@ from identification.data.findings import Findings
 from identification.first import centre, findings_of, measured, slowest
 from identification.residuals.points import Points
 from identification.result.build import fitted
+from identification.result.calls import written
 from identification.result.fitted import Fitted
 from identification.result.live import Kind
 from identification.solving.descent import Start
@@ -164,7 +165,7 @@ class Fit:
         result = fitted(
             asked.kind, asked.subject, self.data, made, point, starts, verdict,
             covariance(made, point), tuple(asked.findings), status=status, message=message,
-            seconds=seconds,
+            seconds=seconds, call=f"{written(self)}.solve()",
         )  # fmt: skip
         if throw and not status.ok:
             raise SolveError(f"Fit: {asked.subject.name}: {result.message}", status, result)

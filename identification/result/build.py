@@ -2,7 +2,6 @@
 
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, fields, is_dataclass
 from math import isfinite
 
 import casadi as ca
@@ -10,6 +9,7 @@ import numpy as np
 
 from identification.data.dataset import Dataset
 from identification.data.findings import Finding
+from identification.result.calls import written
 from identification.result.curve import Curve, of_drive, of_points
 from identification.result.estimate import Errors, Estimate
 from identification.result.fitted import Fitted, Tried
@@ -202,18 +202,6 @@ def _curve(
         for c in task.residuals.channels
     }
     return of_points(law, load, points, data.rotary)
-
-
-def written(kind: object) -> str:
-    """A kind of residuals as Python, without what is left as it is by default."""
-    if not is_dataclass(kind):
-        return type(kind).__name__
-    given = [
-        f"{item.name}={getattr(kind, item.name)!r}"
-        for item in fields(kind)
-        if item.default is MISSING or getattr(kind, item.name) is not item.default
-    ]
-    return f"{type(kind).__name__}({', '.join(given)})"
 
 
 def _made(call: str, kind: str) -> dict[str, str]:
