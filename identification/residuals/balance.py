@@ -198,8 +198,8 @@ def _balances(model: Model, found: Sequence[Coordinate]) -> tuple[ca.SX, ca.SX, 
 
 def _states(
     contacts: Sequence[Contact], w: ca.SX, y: ca.SX, put: "_Closed", where: str
-) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Start, step and later symbols of the states of all laws."""
+) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+    """Start, step, later symbols and sample interval of the states of all laws."""
     later, h = ca.SX.sym("later", w.numel() + y.numel()), ca.SX.sym("h")
     now, start, step = ca.vertcat(w, y), list[ca.SX](), list[ca.SX]()
 
@@ -215,7 +215,7 @@ def _states(
         start.append(put(ca.SX(law.steady_state(c.slip, c.N))))
         made = imposed_step(law, symbols, before, after, h, f"{where}: contact '{c.name}'")
         step.append(put(made))
-    return stacked(start), stacked(step), ca.vertcat(later, h)
+    return stacked(start), stacked(step), later, h
 
 
 @final

@@ -1,12 +1,13 @@
 """A law with states under imposed velocity and normal force: one step from sample to sample."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import casadi as ca
 
 from symfric.codegen.held_step import advanced
 from symfric.foundation.numeric import Scalar
-from symfric.laws import Law
+from symfric.laws import GMS, Law
 
 
 def imposed_step(
@@ -24,7 +25,8 @@ def imposed_step(
     Two steps with the mean velocity and load of each held: exact exponentials for bristles, exact
     event steps for elements that yield, second order elsewhere (`symfric.codegen.held_step`). They
     meet in the middle, or where the velocity passes through zero, so that no step sees two
-    directions.
+    directions. The smooth form of GMS takes the step of its event form, which slips later by up to
+    the share rho of the limit.
 
     Args:
         law: with states; its parameters may be symbols.
@@ -34,14 +36,13 @@ def imposed_step(
         where: begins the message of an error.
 
     Raises:
-        ValueError: a law whose modes only a simulation can follow, or whose states act on each
-            other in a circle.
+        ValueError: a law whose modes or states act on each other: only a simulation follows.
     """
     v, N, size = (ca.SX.sym(name) for name in ("v", "N", "h"))
     names = list(before[2])
     given = {name: ca.SX.sym(name) for name in names}
     rate = ca.SX(law.rate(v, N, z, **given))
-    end = advanced(law, v, N, z, rate, given, size, where)[0]
+    end = _held(law, v, N, z, rate, given, size, where)
     inner = ca.vertcat(v, N, *given.values())
 
     first, last = (_stacked(point, names) for point in (before, after))
@@ -53,6 +54,28 @@ def imposed_step(
     half = ca.substitute(end, old, ca.vertcat((first + middle) / 2, share * h))
     new = ca.vertcat((middle + last) / 2, (1 - share) * h, half)
     return ca.substitute(end, ca.vertcat(old, z), new)
+
+
+def _held(
+    law: Law,
+    v: ca.SX,
+    N: ca.SX,
+    z: ca.SX,
+    rate: ca.SX,
+    given: Mapping[str, ca.SX],
+    h: ca.SX,
+    where: str,
+) -> ca.SX:
+    """States after a step with everything held."""
+    if isinstance(law, GMS) and law.form != "event":
+        law = replace(law, form="event")
+    try:
+        return advanced(law, v, N, z, rate, given, h, where)[0]
+    except ValueError:
+        raise ValueError(
+            f"{where}: expected a law with a step for imposed velocity, got {type(law).__name__}, "
+            "whose modes or states act on each other; use Shooting(), which simulates"
+        ) from None
 
 
 def _stacked(point: tuple[Scalar, Scalar, Mapping[str, Scalar]], names: list[str]) -> ca.SX:

@@ -228,7 +228,7 @@ def _equations(law: Law, p: ca.SX, imposed: bool) -> Equations:
     step = imposed_step(law, z, (v, N, given), (later[0], later[1], then), h, where)
     return Equations(
         w, p, ca.SX(law.force(v, N, z, **given)), z=z,
-        start=ca.SX(law.steady_state(v, N)), step=step, later=ca.vertcat(later, h),
+        start=ca.SX(law.steady_state(v, N)), step=step, later=later, h=h,
     )  # fmt: skip
 
 

@@ -1,11 +1,15 @@
 """Equations evaluated at the samples of a record, with exact derivatives by the parameters."""
 
-from dataclasses import dataclass, field
-from typing import final
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
+
+from symfric.foundation.compiler import CompileError, find_compiler
+from symfric.integrator.compiled.columns import Columns
 
 Array = NDArray[np.float64]
 
@@ -29,7 +33,7 @@ class Equations:
     Attributes:
         w, z, y, p: SX symbols of what is measured, of states of laws, of unknowns, of parameters.
         rows, g, start: SX expressions in them.
-        step: SX expression in z, w, y, p and `later`: the symbols of w_{k+1}, y_{k+1} and h.
+        step: SX expression in z, w, y, p, `h` and `later`, the symbols of w_{k+1} and y_{k+1}.
         guess: values of y to start from, shape (ny,).
     """
 
@@ -42,47 +46,47 @@ class Equations:
     start: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
     step: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
     later: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    h: ca.SX = field(default_factory=lambda: ca.SX.sym("h"))
     guess: tuple[float, ...] = ()
 
     def compiled(self) -> "Sampled":
         """The same as Functions, which can be evaluated and pickled."""
-        arguments = [self.w, self.z, self.y, self.p]
-        names = ["w", "z", "y", "p"]
-        along = ca.vertcat(self.z, self.y, self.p)
+        here, along = ca.vertcat(self.w, self.y), ca.vertcat(self.z, self.y, self.p)
 
         def with_slopes(name: str, of: ca.SX) -> ca.Function:
             slopes = ca.vec(ca.densify(ca.jacobian(of, along)))
-            return ca.Function(name, arguments, [ca.densify(of), slopes], names, [name, "slopes"])
+            return ca.Function(f"sampled_{name}", [here, self.z, self.p], [ca.densify(of), slopes])
 
         return Sampled(
             with_slopes("rows", self.rows),
             with_slopes("g", self.g),
             with_slopes("start", self.start),
-            self._step(),
-            self._tangent(),
+            *self._steps(here),
             (self.w.numel(), self.z.numel(), self.y.numel(), self.p.numel()),
             np.array(self.guess, float),
         )
 
-    def _step(self) -> ca.Function:
-        return ca.Function("step", [self.z, self.w, self.y, self.later, self.p], [self.step])
+    def _steps(self, here: ca.SX) -> tuple[ca.Function, ca.Function]:
+        """The step, and the same with the derivatives S of the states by p.
 
-    def _tangent(self) -> ca.Function:
-        """The step with the derivatives S of the states by p, Y and Y_later those of y."""
-        nz, ny, count = self.z.numel(), self.y.numel(), self.p.numel()
+        Those of y are Y at the sample and Y_later at the next one.
+        """
+        nw, nz, ny, count = (x.numel() for x in (self.w, self.z, self.y, self.p))
+        later = self.later if nz else ca.SX.sym("later", nw + ny)
         S, Y, Y_later = (ca.SX.sym(n, k, count) for n, k in (("S", nz), ("Y", ny), ("Yl", ny)))
-        nw = self.w.numel()
-        later_y = self.later[nw : nw + ny, 0] if nz else self.y
         slope = (
             ca.mtimes(ca.jacobian(self.step, self.z), S)
             + ca.jacobian(self.step, self.p)
             + ca.mtimes(ca.jacobian(self.step, self.y), Y)
-            + ca.mtimes(ca.jacobian(self.step, later_y), Y_later)
+            + ca.mtimes(ca.jacobian(self.step, later[nw:, 0]), Y_later)
         )
-        state, given = ca.vertcat(self.z, ca.vec(S)), [self.w, self.y, self.later]
-        further = [ca.vec(Y), ca.vec(Y_later)]
+        both = ca.vertcat(self.z, ca.vec(S))
         new = ca.vertcat(self.step, ca.vec(ca.densify(slope)))
-        return ca.Function("tangent", [state, *given, *further, self.p], [new])
+        given, further = [here, later, self.h], [ca.vec(Y), ca.vec(Y_later), self.p]
+        return (
+            ca.Function("sampled_step", [self.z, *given, self.p], [ca.densify(self.step)]),
+            ca.Function("sampled_tangent", [both, *given, *further], [ca.densify(new)]),
+        )
 
 
 @final
@@ -91,8 +95,8 @@ class Path:
     """What was found along a record of n samples.
 
     Attributes:
-        rows: (n, m), and their derivatives by p, (n, m, n_p).
-        slopes: see rows.
+        rows: (n, m).
+        slopes: their derivatives by p, (n, m, n_p).
     """
 
     rows: Array
@@ -102,7 +106,11 @@ class Path:
 @final
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """`Equations` as Functions of numbers; sizes are those of w, z, y and p."""
+    """`Equations` as Functions of numbers; sizes are those of w, z, y and p.
+
+    Laws with states run in compiled code where there is a compiler, all else in CasADi's virtual
+    machine; both give the same bits.
+    """
 
     rows: ca.Function
     g: ca.Function
@@ -111,6 +119,25 @@ class Sampled:
     tangent: ca.Function
     sizes: tuple[int, int, int, int]
     guess: Array
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields; a copy compiles or loads for itself."""
+        return {item.name: getattr(self, item.name) for item in fields(self)}
+
+    @cached_property
+    def _columns(self) -> dict[str, Columns]:
+        chained = {"step": True, "tangent": True}
+        names = ("rows", "g", "start", "step", "tangent")
+        return {n: Columns(getattr(self, n), chained.get(n, False)) for n in names}
+
+    def _run(self, name: str, rows: list[Any], first: Array | None = None) -> list[Array]:
+        columns = self._columns[name]
+        if self.sizes[1] and name != "start" and find_compiler() is not None:
+            try:
+                return columns(rows, first, "compiled")
+            except CompileError:  # a broken compiler is no reason not to evaluate
+                pass
+        return columns(rows, first, "vm")
 
     def along(self, w: Array, h: float | Array, p: Array) -> Path | str:
         """Rows at all samples of a record and their derivatives by p; a sentence if there are none.
@@ -121,7 +148,7 @@ class Sampled:
             p: parameters, shape (n_p,).
         """
         n, (_, nz, ny, _) = w.shape[1], self.sizes
-        z, y = np.zeros((nz, n)), np.repeat(self.guess[:, None], n, axis=1)
+        w, z, y = w.T, np.zeros((n, nz)), np.repeat(self.guess[None, :], n, axis=0)
         for _ in range(ROUNDS if nz and ny else 1):
             old = y
             if ny:
@@ -135,29 +162,30 @@ class Sampled:
                 break
         else:
             return "friction and the reactions that press it did not settle"
-        Z, Y = self._tangents(w, z, y, h, p)
-        r, at = self._at(self.rows, w, z, y, p)
+        dz, dy = self._tangents(w, z, y, h, p)
+        r, at = self._at("rows", w, z, y, p)
         slopes = at[:, :, nz + ny :].copy()
-        slopes += at[:, :, :nz] @ Z + at[:, :, nz : nz + ny] @ Y
+        if nz:
+            slopes += at[:, :, :nz] @ dz
+        if ny:
+            slopes += at[:, :, nz : nz + ny] @ dy
         if not (np.isfinite(r).all() and np.isfinite(slopes).all()):
             return "the friction law is not finite at some samples"
         return Path(r, slopes)
 
-    def _at(self, f: ca.Function, w: Array, z: Array, y: Array, p: Array) -> tuple[Array, Array]:
+    def _at(self, name: str, w: Array, z: Array, y: Array, p: Array) -> tuple[Array, Array]:
         """Values (n, m) and slopes (n, m, k) of a function at all samples."""
-        n = w.shape[1]
-        mapped = f.map(f"{f.name()}_{n}", "serial", n, [3], [])
-        value, slopes = (part.full() for part in mapped(w, z, y, p))
-        m = value.shape[0]
-        return value.T, slopes.T.reshape(n, -1, m).transpose(0, 2, 1)
+        n = w.shape[0]
+        value, slopes = self._run(name, [np.hstack([w, y]), z, _same(p, n)])
+        return value, slopes.reshape(n, -1, value.shape[1]).transpose(0, 2, 1)
 
     def _solve(self, w: Array, z: Array, y: Array, p: Array) -> Array | str:
         """Algebraic unknowns of all samples by Newton's method."""
         nz, ny = self.sizes[1:3]
         for _ in range(NEWTON):
-            g, slopes = self._at(self.g, w, z, y, p)
+            g, slopes = self._at("g", w, z, y, p)
             try:
-                way = np.linalg.solve(slopes[:, :, nz : nz + ny], g[:, :, None])[:, :, 0].T
+                way = np.linalg.solve(slopes[:, :, nz : nz + ny], g[:, :, None])[:, :, 0]
             except np.linalg.LinAlgError:
                 return "reactions cannot be told from the motion at some samples"
             if not np.isfinite(way).all():
@@ -168,24 +196,22 @@ class Sampled:
         return "the reactions were not found by Newton's method at some samples"
 
     def _states(self, w: Array, y: Array, h: float | Array, p: Array) -> Array:
-        """States of the laws along the record, (nz, n)."""
-        n = w.shape[1]
-        z = np.empty((self.sizes[1], n))
-        z[:, :1] = self.start(w[:, :1], 0, y[:, :1], p)[0].full()
-        later = np.vstack([w[:, 1:], y[:, 1:], np.broadcast_to(h, n - 1)])
-        walk = self.step.mapaccum(f"walk_{n}", n - 1)
-        z[:, 1:] = walk(z[:, 0], w[:, :-1], y[:, :-1], later, p).full()
-        return z
+        """States of the laws along the record, (n, nz)."""
+        n = w.shape[0]
+        here, steps = np.hstack([w, y]), np.broadcast_to(h, n - 1).reshape(-1, 1)
+        first = self._at("start", w[:1], np.zeros((1, self.sizes[1])), y[:1], p)[0]
+        given = [here[:-1], here[1:], np.ascontiguousarray(steps), _same(p, n - 1)]
+        return np.vstack([first, self._run("step", given, first[0])[0]])
 
     def _tangents(
         self, w: Array, z: Array, y: Array, h: float | Array, p: Array
     ) -> tuple[Array, Array]:
         """Derivatives of states (n, nz, n_p) and of unknowns (n, ny, n_p) by the parameters."""
-        n, (_, nz, ny, count) = w.shape[1], self.sizes
+        n, (_, nz, ny, count) = w.shape[0], self.sizes
         dz, dy = np.zeros((n, nz, count)), np.zeros((n, ny, count))
         by_z, by_p = np.zeros((n, ny, nz)), np.zeros((n, ny, count))
         if ny:
-            slopes = self._at(self.g, w, z, y, p)[1]
+            slopes = self._at("g", w, z, y, p)[1]
             known = np.concatenate([slopes[:, :, :nz], slopes[:, :, nz + ny :]], axis=2)
             found = -np.linalg.solve(slopes[:, :, nz : nz + ny], known)
             by_z, by_p = found[:, :, :nz], found[:, :, nz:]
@@ -197,18 +223,26 @@ class Sampled:
                 break
         return dz, dy
 
-    def _tangent(self, w: Array, z: Array, y: Array, Y: Array, h: float | Array, p: Array) -> Array:
-        """Derivatives of the states by the parameters, those of y being Y."""
-        n, (_, nz, ny, count) = w.shape[1], self.sizes
-        _, first = self._at(self.start, w[:, :1], z[:, :1], y[:, :1], p)
-        S = first[0, :, nz + ny :] + first[0, :, nz : nz + ny] @ Y[0]
-        flat = Y.transpose(2, 1, 0).reshape(count * ny, n)
-        later = np.vstack([w[:, 1:], y[:, 1:], np.broadcast_to(h, n - 1)])
-        walk = self.tangent.mapaccum(f"tangents_{n}", n - 1)
-        start = np.concatenate([z[:, 0], S.T.ravel()])
-        given = w[:, :-1], y[:, :-1], later, flat[:, :-1], flat[:, 1:]
-        states = np.hstack([start[:, None], walk(start, *given, p).full()])
-        return states[nz:].T.reshape(n, count, nz).transpose(0, 2, 1)
+    def _tangent(
+        self, w: Array, z: Array, y: Array, dy: Array, h: float | Array, p: Array
+    ) -> Array:
+        """Derivatives of the states by the parameters, those of y being dy."""
+        n, (_, nz, ny, count) = w.shape[0], self.sizes
+        first = self._at("start", w[:1], z[:1], y[:1], p)[1][0]
+        S = first[:, nz + ny :] + first[:, nz : nz + ny] @ dy[0]
+        here, steps = np.hstack([w, y]), np.broadcast_to(h, n - 1).reshape(-1, 1)
+        flat = np.ascontiguousarray(dy.transpose(0, 2, 1)).reshape(n, count * ny)
+        given = [
+            here[:-1], here[1:], np.ascontiguousarray(steps), flat[:-1], flat[1:], _same(p, n - 1),
+        ]  # fmt: skip
+        start = np.concatenate([z[0], S.T.ravel()])
+        both = np.vstack([start[None, :], self._run("tangent", given, start)[0]])
+        return both[:, nz:].reshape(n, count, nz).transpose(0, 2, 1)
+
+
+def _same(p: Array, n: int) -> tuple[Array, NDArray[np.intp]]:
+    """One row for all samples."""
+    return p[None, :], np.zeros(n, np.intp)
 
 
 def _settled(old: Array, new: Array) -> bool:
