@@ -182,7 +182,7 @@ def _balances(model: Model, found: Sequence[Coordinate]) -> tuple[ca.SX, ca.SX, 
     """Balances of the coordinates, the same with open contacts, other equations, units."""
     mechanics, opened = model.holonomic, model.open.holonomic
     if mechanics is None or opened is None:
-        rates, open_rates = ca.SX(model.ode), ca.SX(model.open.ode)
+        rates, open_rates = cast(ca.SX, model.ode), cast(ca.SX, model.open.ode)
         place = {v.name: k for k, v in enumerate(model.x)}
         at = [place[c.rate.name] for c in found]
         there = {v.name: k for k, v in enumerate(model.open.x)}

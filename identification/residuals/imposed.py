@@ -4,10 +4,17 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
 from symfric.codegen.held_step import advanced
 from symfric.foundation.numeric import Scalar
 from symfric.laws import GMS, Law
+
+Array = NDArray[np.float64]
+
+NEAR_REST = 0.05
+"""First velocity, over the usual one, below which a record starts at rest."""
 
 
 def imposed_step(
@@ -81,3 +88,11 @@ def _held(
 def _stacked(point: tuple[Scalar, Scalar, Mapping[str, Scalar]], names: list[str]) -> ca.SX:
     v, N, given = point
     return ca.vertcat(ca.SX(v), ca.SX(N), *(ca.SX(given[name]) for name in names))
+
+
+def moving_start(v: Array) -> float:
+    """Velocity from which states start in steady sliding: the first one, 0 where it is near rest.
+
+    A bristle that has slid far is bent fully at the smallest speed; at rest it is taken as relaxed.
+    """
+    return float(v[0]) if abs(v[0]) > NEAR_REST * float(np.sqrt(np.mean(v**2))) else 0.0

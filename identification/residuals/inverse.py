@@ -138,9 +138,13 @@ class InverseRows:
         """Parameters of the model, then dead times."""
         return (*self.parameters, *(unknown.name for unknown in self.own))
 
-    @cached_property
+    @property
     def channels(self) -> tuple[Channel, ...]:
         """Each balance of each record."""
+        return self._channels
+
+    @cached_property
+    def _channels(self) -> tuple[Channel, ...]:
         found, first = list[Channel](), 0
         for number, part in enumerate(self.pieces):
             for k, row in enumerate(self.rows):
@@ -177,7 +181,7 @@ class InverseRows:
         residuals, slopes = list[Array](), list[Array]()
         for number, part in enumerate(self.pieces):
             w, rates = self._shifted(part.motion, float(delays[number]) if delays.size else None)
-            path = self.sampled.along(w, part.motion.step, p)
+            path = self.sampled.along(w, part.motion.step, p, part.motion.begin)
             if isinstance(path, str):
                 return f"data '{part.motion.name}': {path}"
             for k, row in enumerate(self.rows):
@@ -194,8 +198,8 @@ class InverseRows:
         """`w` with the force that acts, u(t - delay), and du/dt there (inputs, n)."""
         if delay is None:
             return motion.w, np.zeros((0, 0))
-        spline: Any = CubicSpline(motion.forces[0], motion.forces[1], axis=1)
-        at = np.clip(motion.t - delay, motion.forces[0][0], motion.forces[0][-1])
+        spline: Any = CubicSpline(motion.t, motion.w[motion.inputs], axis=1)
+        at = np.clip(motion.t - delay, motion.t[0], motion.t[-1])
         w = motion.w.copy()
         w[motion.inputs] = spline(at)
         return w, np.asarray(spline(at, 1))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from identification.data.record import Record
 from identification.residuals.balance import Balance, Coordinate
+from identification.residuals.imposed import moving_start
 from identification.signals.differentiate import derivatives, uncertain, velocity_noise
 from identification.signals.filters import Decimation, Filter, choose_filter
 from symfric.model import Model
@@ -27,7 +28,7 @@ Raw = tuple[Array | None, Array | None]
 @final
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What one record says about a model, its disturbed ends cut off.
+    """What one record says about a model.
 
     Attributes:
         name: of the record.
@@ -35,7 +36,7 @@ class Motion:
         step: sample interval [s].
         w: positions, rates, accelerations, inputs, time, shape (nw, n).
         inputs: rows of `w` with the inputs.
-        forces: the inputs over the whole record, with its times, for a dead time.
+        inside: samples that the ends of the filter do not disturb.
         noise: standard deviations of the filtered rates.
         filter: what was used.
     """
@@ -45,9 +46,16 @@ class Motion:
     step: float
     w: Array
     inputs: slice
-    forces: tuple[Array, Array]
+    inside: slice
     noise: Array
     filter: Filter
+
+    @property
+    def begin(self) -> Array:
+        """The first sample, with rates near rest at rest."""
+        first, count = self.w[:, 0].copy(), self.noise.size
+        first[count : 2 * count] = [moving_start(v) for v in self.w[count : 2 * count]]
+        return first
 
     def of(self, coordinate: int) -> tuple[Array, Array, Array]:
         """Position, rate and acceleration of a coordinate."""
@@ -90,14 +98,12 @@ def measure(
         noise.append(velocity_noise(base, v, step, chosen))
     cut = chosen.trim(step)
     inside = slice(cut, max(cut, record.size - cut))
-    rows = [part[k][inside] for k in range(3) for part in motion]
+    rows = [part[k] for k in range(3) for part in motion]
     inputs = slice(len(rows), len(rows) + len(forces))
-    rows += [signal[inside] for signal in (*forces, record.time)]
-    whole = record.time, np.array(forces).reshape(len(forces), -1)
+    rows += [*forces, record.time]
     return Motion(
-        record.name, record.time[inside], step, np.vstack(rows), inputs, whole,
-        np.array(noise), chosen,
-    )  # fmt: skip
+        record.name, record.time, step, np.vstack(rows), inputs, inside, np.array(noise), chosen
+    )
 
 
 def _check_channels(
@@ -146,11 +152,11 @@ class Piece:
 
     def equations(self, row: int, signals: Array) -> Array:
         """Columns of `signals`, shape (n, k), thinned to the equations in use."""
-        return self.decimation.columns(signals)[self.kept[row]]
+        return self.decimation.columns(signals[self.motion.inside])[self.kept[row]]
 
     def times(self, row: int) -> Array:
         """Times of the equations in use [s]."""
-        return self.decimation.centres(self.motion.t)[self.kept[row]]
+        return self.decimation.centres(self.motion.t[self.motion.inside])[self.kept[row]]
 
 
 def piece(made: Balance, motion: Motion, model: Model) -> Piece:
@@ -159,7 +165,7 @@ def piece(made: Balance, motion: Motion, model: Model) -> Piece:
     Raises:
         ValueError: too few are left.
     """
-    n = motion.t.size
+    n = motion.t[motion.inside].size
     decimation = Decimation(n, motion.filter.decimation)
     if not decimation.rows:
         raise _too_short(motion, "all signals", 0)
@@ -168,7 +174,7 @@ def piece(made: Balance, motion: Motion, model: Model) -> Piece:
     for row in made.rows:
         unsure = np.zeros(n, bool)
         for k in row.slips:
-            unsure |= slow[k]
+            unsure |= slow[k][motion.inside]
         kept.append(np.flatnonzero(~decimation.touched(unsure)))
         if kept[-1].size < FEWEST:
             raise _too_short(motion, row.signal, kept[-1].size)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from identification.data.dataset import Dataset
 from identification.data.record import Record
 from identification.residuals.evaluation import Channel, Evaluation
-from identification.residuals.imposed import imposed_step
+from identification.residuals.imposed import imposed_step, moving_start
 from identification.residuals.sampled import Equations, Sampled
 from identification.unknowns.subject import Subject
 from identification.unknowns.unknown import Unknown
@@ -207,11 +207,16 @@ class PointRows:
         ):
             if what is None or not rows.any():
                 continue
-            path = what.along(w[:, rows], h, p)
+            path = what.along(w[:, rows], h, p, self._begin(w[:, rows]))
             if isinstance(path, str):
                 return path
             F[rows], J[rows] = path.rows[:, 0], path.slopes[:, 0]
         return F, J
+
+    def _begin(self, w: Array) -> Array:
+        first = w[:, 0].copy()
+        first[0] = moving_start(w[0]) if self.imposed else w[0, 0]
+        return first
 
 
 def _equations(law: Law, p: ca.SX, imposed: bool) -> Equations:

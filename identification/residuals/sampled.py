@@ -139,16 +139,18 @@ class Sampled:
                 pass
         return columns(rows, first, "vm")
 
-    def along(self, w: Array, h: float | Array, p: Array) -> Path | str:
+    def along(self, w: Array, h: float | Array, p: Array, begin: Array | None = None) -> Path | str:
         """Rows at all samples of a record and their derivatives by p; a sentence if there are none.
 
         Args:
             w: measured, shape (nw, n).
+            begin: measured, for the start of the states, shape (nw,); None: the first sample.
             h: sample interval [s], one or (n - 1,); not used without states.
             p: parameters, shape (n_p,).
         """
         n, (_, nz, ny, _) = w.shape[1], self.sizes
         w, z, y = w.T, np.zeros((n, nz)), np.repeat(self.guess[None, :], n, axis=0)
+        first = w[0] if begin is None else begin
         for _ in range(ROUNDS if nz and ny else 1):
             old = y
             if ny:
@@ -157,12 +159,12 @@ class Sampled:
                     return found
                 y = found
             if nz:
-                z = self._states(w, y, h, p)
+                z = self._states(w, y, h, p, first)
             if not (nz and ny) or _settled(old, y):
                 break
         else:
             return "friction and the reactions that press it did not settle"
-        dz, dy = self._tangents(w, z, y, h, p)
+        dz, dy = self._tangents(w, z, y, h, p, first)
         r, at = self._at("rows", w, z, y, p)
         slopes = at[:, :, nz + ny :].copy()
         if nz:
@@ -195,16 +197,16 @@ class Sampled:
                 return y
         return "the reactions were not found by Newton's method at some samples"
 
-    def _states(self, w: Array, y: Array, h: float | Array, p: Array) -> Array:
+    def _states(self, w: Array, y: Array, h: float | Array, p: Array, begin: Array) -> Array:
         """States of the laws along the record, (n, nz)."""
         n = w.shape[0]
         here, steps = np.hstack([w, y]), np.broadcast_to(h, n - 1).reshape(-1, 1)
-        first = self._at("start", w[:1], np.zeros((1, self.sizes[1])), y[:1], p)[0]
+        first = self._at("start", begin[None], np.zeros((1, self.sizes[1])), y[:1], p)[0]
         given = [here[:-1], here[1:], np.ascontiguousarray(steps), _same(p, n - 1)]
         return np.vstack([first, self._run("step", given, first[0])[0]])
 
     def _tangents(
-        self, w: Array, z: Array, y: Array, h: float | Array, p: Array
+        self, w: Array, z: Array, y: Array, h: float | Array, p: Array, begin: Array
     ) -> tuple[Array, Array]:
         """Derivatives of states (n, nz, n_p) and of unknowns (n, ny, n_p) by the parameters."""
         n, (_, nz, ny, count) = w.shape[0], self.sizes
@@ -218,17 +220,24 @@ class Sampled:
         for _ in range(ROUNDS if nz and ny else 1):
             old, dy = dy, by_z @ dz + by_p
             if nz:
-                dz = self._tangent(w, z, y, dy, h, p)
+                dz = self._tangent(w, z, y, dy, h, p, begin)
             if not (nz and ny) or _settled(old, dy):
                 break
         return dz, dy
 
     def _tangent(
-        self, w: Array, z: Array, y: Array, dy: Array, h: float | Array, p: Array
+        self,
+        w: Array,
+        z: Array,
+        y: Array,
+        dy: Array,
+        h: float | Array,
+        p: Array,
+        begin: Array,
     ) -> Array:
         """Derivatives of the states by the parameters, those of y being dy."""
         n, (_, nz, ny, count) = w.shape[0], self.sizes
-        first = self._at("start", w[:1], z[:1], y[:1], p)[1][0]
+        first = self._at("start", begin[None], z[:1], y[:1], p)[1][0]
         S = first[:, nz + ny :] + first[:, nz : nz + ny] @ dy[0]
         here, steps = np.hstack([w, y]), np.broadcast_to(h, n - 1).reshape(-1, 1)
         flat = np.ascontiguousarray(dy.transpose(0, 2, 1)).reshape(n, count * ny)

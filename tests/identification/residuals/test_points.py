@@ -62,9 +62,9 @@ def test_the_normal_force_is_a_channel_a_number_or_that_of_the_fit() -> None:
         F = steady_force(one.law, V, load)
         r = evaluated(Points(N=channel).prepare(one, points(F)), values).r
         np.testing.assert_allclose(r, 0.0, atol=1e-12)
-    F = np.array([one.law.force(v, n) for v, n in zip(V, N, strict=True)])
+    forces = np.array([one.law.force(v, n) for v, n in zip(V, N, strict=True)])
     units = {"v": "m/s", "F": "N", "N": "N"}
-    data = Dataset.of(v=V, F=F, points=True, N=N, units=units)
+    data = Dataset.of(v=V, F=forces, points=True, N=N, units=units)
     np.testing.assert_allclose(evaluated(Points().prepare(one, data), values).r, 0.0, atol=1e-12)
 
 

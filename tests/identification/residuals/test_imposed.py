@@ -1,0 +1,83 @@
+import casadi as ca
+import numpy as np
+import pytest
+
+from identification.data.dataset import Dataset
+from identification.residuals.points import Points
+from identification.unknowns.subject import subject
+from symfric import GMS, BoucWen, Dahl, LuGre, law_from_text, simulate
+from symfric.foundation.parameters import Variable, parameters
+from symfric.integrator import Linear
+from symfric.laws import Law
+from symfric.model import Model, Output
+
+T = np.linspace(0.0, 1.0, 801)
+V = 5e-2 * np.sin(2 * np.pi * 1.4 * T) + 2e-2 * np.sin(2 * np.pi * 6.2 * T)
+
+
+def under(law: Law) -> Model:
+    """The law alone, its velocity an input."""
+    v = Variable("v", "m/s")
+    states = tuple(Variable(s.name, s.unit, nominal=s.nominal) for s in law.states)
+    z = ca.vertcat(*(s.symbol for s in states))
+    force = Output(ca.SX(law.force(v.symbol, 1.0, z)), "N", "friction force")
+    rate = ca.SX(law.rate(v.symbol, 1.0, z))
+    return Model(name="imposed", x=states, u=(v,), ode=rate, outputs={"F": force})
+
+
+def error(law: Law, t: np.ndarray = T, v: np.ndarray = V) -> float:
+    """Root mean square error of the force under imposed velocity over that of the force."""
+    one = subject(law, points=True, moving=True)
+    data = Dataset.of(t=t, v=v, F=np.zeros(t.size), units={"v": "m/s", "F": "N"})
+    rows = Points().prepare(one, data)
+    known = parameters(one.law) if one.law is not None else {}
+    found = rows.at(np.array([float(known[n].value) for n in one.names]))
+    assert not isinstance(found, str)
+    numeric = one.law
+    assert isinstance(numeric, Law)
+    F = simulate(under(numeric), t[-1], u={"v": Linear(t, v)}, t_eval=t, rtol=1e-9)["F"]
+    return float(np.linalg.norm(found.r - F) / np.linalg.norm(F))
+
+
+SOFT = LuGre(mu_s=0.4, mu_d=0.3, v_s=0.02, sigma_0=500.0, sigma_1=0.5, sigma_2=0.5)
+
+
+@pytest.mark.parametrize(
+    ("law", "limit"),
+    [
+        (SOFT, 3e-5),
+        (LuGre(mu_s=0.4, mu_d=0.3, v_s=0.02, sigma_0=1e5, sigma_1=50.0), 2e-3),
+        (Dahl(mu_d=0.1, sigma_0=1e3), 1e-6),
+        (BoucWen(), 1e-2),
+        (GMS(), 2e-2),
+        (law_from_text("maxwell_slip"), 5e-3),
+        (law_from_text("rate_and_state"), 1e-3),
+    ],
+)
+def test_a_law_under_imposed_velocity_is_the_law_simulated(law: Law, limit: float) -> None:
+    assert error(law) < limit
+
+
+def test_the_step_is_of_second_order_in_the_sample_time() -> None:
+    def velocity(t: np.ndarray) -> np.ndarray:
+        return 0.05 * (1.2 + np.sin(2 * np.pi * 1.4 * t))
+
+    def force(n: int) -> np.ndarray:
+        t = np.linspace(0.0, 1.0, n)
+        one = subject(SOFT, points=True, moving=True)
+        zero = Dataset.of(t=t, v=velocity(t), F=0 * t, units={"v": "m/s", "F": "N"})
+        rows = Points().prepare(one, zero)
+        known = parameters(SOFT)
+        found = rows.at(np.array([float(known[n].value) for n in one.names]))
+        assert not isinstance(found, str)
+        return found.r[:: (n - 1) // 50]
+
+    finest = force(6401)
+    errors = np.array([np.abs(force(n) - finest).max() for n in (101, 201, 401)])
+    assert (np.log2(errors[:-1] / errors[1:]) > 1.8).all()
+
+
+@pytest.mark.parametrize("text", ["armstrong", "leuven"])
+def test_laws_that_only_a_simulation_follows_are_refused(text: str) -> None:
+    with pytest.raises(ValueError, match=r"act on each other; use Shooting\(\)"):
+        error(law_from_text(text))

@@ -1,0 +1,188 @@
+import pickle
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from identification.data.dataset import Dataset
+from identification.residuals.evaluation import Evaluation, Residuals
+from identification.residuals.inverse import InverseDynamics
+from identification.signals.filters import Filter
+from identification.unknowns.subject import Subject, subject
+from symfric import LuGre, Stribeck, rabinowicz, simulate
+from symfric.foundation.parameters import with_values
+from symfric.integrator import Linear
+from symfric.scenes.drive import Drive
+from symfric.scenes.four_bar import FourBar
+
+Array = NDArray[np.float64]
+PLAIN = Filter(60.0, 4)
+T = np.linspace(0.0, 3.0, 3001)
+
+
+def evaluated(rows: Residuals, values: Array) -> Evaluation:
+    found = rows.at(values)
+    assert not isinstance(found, str), found
+    return found
+
+
+def starts(one: Subject) -> Array:
+    known = {v.name: float(v.start) for v in one.model.p}
+    return np.array([known[n] for n in one.names])
+
+
+def check_slopes(rows: Residuals, values: Array, rtol: float = 1e-5) -> None:
+    J = evaluated(rows, values).J
+    for k, x in enumerate(values):
+        d = 1e-5 * max(abs(x), 1e-4)
+        up, down = values.copy(), values.copy()
+        up[k] += d
+        down[k] -= d
+        expected = (evaluated(rows, up).r - evaluated(rows, down).r) / (2 * d)
+        np.testing.assert_allclose(J[:, k], expected, atol=rtol * max(np.abs(J[:, k]).max(), 1e-3))
+
+
+def moved(drive: Drive, t: Array = T, turning: bool = False) -> Dataset:
+    """A drive that follows two sines exactly: the force is what its balance needs."""
+    w1, w2 = 2 * np.pi * 0.9, 2 * np.pi * 0.37
+    x = 0.05 * np.sin(w1 * t) + 0.1 * np.cos(w2 * t)
+    v = 0.05 * w1 * np.cos(w1 * t) - 0.1 * w2 * np.sin(w2 * t)
+    a = -0.05 * w1**2 * np.sin(w1 * t) - 0.1 * w2**2 * np.cos(w2 * t)
+    force = drive.m * a + drive.law.force(v, drive.N) + drive.offset
+    units = {"x": "rad", "force": "N m"} if turning else {"x": "m", "force": "N"}
+    return Dataset.of(t=t, x=x, force=force, units=units)
+
+
+DRIVE = Drive(Stribeck(mu_s=3.0, mu_d=2.0, v_s=0.02, sigma_2=5.0), m=4.0, N=1.0, offset=-0.5)
+FREE = ["m", "offset", "mu_s", "mu_d", "v_s", "sigma_2"]
+
+
+def test_a_drive_leaves_nothing_at_the_true_values() -> None:
+    rows = InverseDynamics(filter=PLAIN).prepare(subject(DRIVE, free=FREE), moved(DRIVE))
+    values = starts(subject(DRIVE, free=FREE))
+    found = evaluated(rows, values)
+    (channel,) = rows.channels
+    assert (channel.signal, channel.unit) == ("force", "N")
+    assert np.abs(found.r).max() < 2e-3 * np.abs(channel.measured).max()
+    check_slopes(rows, values * 1.1)
+
+
+def test_records_stand_below_each_other_with_their_own_filters() -> None:
+    one = subject(DRIVE, free=FREE)
+    long, short = moved(DRIVE), moved(DRIVE, np.linspace(0.0, 2.0, 1001))
+    rows = InverseDynamics().prepare(one, long + short)
+    values = starts(one) * 1.2
+    alone = [evaluated(InverseDynamics().prepare(one, d), values).r for d in (long, short)]
+    both = evaluated(rows, values).r
+    np.testing.assert_array_equal(both, np.concatenate(alone))
+    assert [c.record for c in rows.channels] == [0, 1]
+    assert rows.channels[1].rows == slice(alone[0].size, both.size)
+
+
+def test_equations_at_reversals_are_left_out_of_static_laws_only() -> None:
+    every = InverseDynamics(filter=Filter(60.0, 4, v_min=0.0))
+    data = moved(DRIVE)
+    static = InverseDynamics(filter=PLAIN).prepare(subject(DRIVE, free=FREE), data)
+    whole = every.prepare(subject(DRIVE, free=FREE), data)
+    law = LuGre(mu_s=3.0, mu_d=2.0, v_s=0.02, sigma_0=1e4, sigma_1=10.0)
+    dynamic = InverseDynamics(filter=PLAIN).prepare(subject(Drive(law, N=1.0)), data)
+    sizes = [r.channels[0].t.size for r in (static, whole, dynamic)]
+    assert sizes[0] < sizes[1] == sizes[2]
+    assert len(static.channels[0].breaks) >= 3
+    assert whole.channels[0].breaks == ()
+
+
+def test_a_drive_that_turns_has_its_units() -> None:
+    drive = with_values(DRIVE, {"m": 0.3})
+    one = subject(drive.law, turning=True)
+    rows = InverseDynamics(filter=PLAIN).prepare(one, moved(drive, turning=True))
+    assert rows.channels[0].unit == "N m"
+
+
+def test_states_of_a_law_follow_the_measured_velocity() -> None:
+    law = LuGre(mu_s=3.0, mu_d=2.0, v_s=0.02, sigma_0=2e3, sigma_1=10.0, sigma_2=5.0)
+    drive = Drive(law, m=4.0, N=1.0)
+    force = 8 * np.sin(2 * np.pi * 1.1 * T) + 6 * np.sin(2 * np.pi * 0.4 * T)
+    run = simulate(drive.model(), T[-1], u={"force": Linear(T, force)}, t_eval=T, rtol=1e-9)
+    data = Dataset.of(t=T, x=run["x"], force=force, units={"x": "m", "force": "N"})
+    one = subject(drive, free=["m", "mu_s", "mu_d", "v_s", "sigma_0", "sigma_1", "sigma_2"])
+    rows = InverseDynamics(filter=Filter(100.0, 4)).prepare(one, data)
+    values = starts(one)
+    r = evaluated(rows, values).r
+    assert np.sqrt(np.mean(r**2)) < 5e-3 * np.sqrt(np.mean(force**2))
+    check_slopes(rows, values * 1.05)
+
+
+def test_the_dead_time_of_the_force_is_an_own_unknown() -> None:
+    t = np.linspace(0.0, 3.0, 3001)
+    late = moved(DRIVE, t + 4e-3)[0]["force"]
+    data = Dataset.of(t=t, x=moved(DRIVE)[0]["x"], force=late, units={"x": "m", "force": "N"})
+    one = subject(DRIVE, free=FREE)
+    rows = InverseDynamics(filter=PLAIN, dead_time=(0.0, 0.02)).prepare(one, data)
+    assert [u.name for u in rows.own] == ["dead_time[0]"]
+    assert rows.names == (*one.names, "dead_time[0]")
+    right, wrong = (np.append(starts(one), d) for d in (4e-3, 0.0))
+    sizes = [np.median(np.abs(evaluated(rows, values).r)) for values in (right, wrong)]
+    assert sizes[0] < 0.02 * sizes[1]
+    check_slopes(rows, np.append(starts(one), 2.3e-3))
+
+
+def test_motion_without_force_is_balanced_by_itself() -> None:
+    model = rabinowicz(Stribeck(mu_s=0.15, mu_d=0.1, v_s=0.05), free=["mu_d"], v_belt=0.3)
+    run = simulate(model, 3.0, t_eval=T, rtol=1e-9, x0={"x": 0.4})
+    data = Dataset.of(t=T, x=run["x"], units={"x": "m"})
+    rows = InverseDynamics(filter=Filter(60.0, 4)).prepare(subject(model), data)
+    (channel,) = rows.channels
+    assert (channel.signal, channel.unit) == ("balance of v", "m/s^2")
+    values = starts(subject(model))
+    a = channel.regressors["a"]
+    assert np.abs(evaluated(rows, values).r).max() < 5e-3 * np.abs(a).max()
+    check_slopes(rows, values)
+
+
+@pytest.mark.slow
+def test_friction_of_a_loop_is_balanced_at_its_input() -> None:
+    """A four-bar has one input and constraints: reactions are solved for at every sample."""
+    model = FourBar(Stribeck(mu_s=0.15, mu_d=0.1, v_s=0.2)).model(["mu_d"])
+    run = simulate(model, 1.0, t_eval=np.linspace(0, 1, 1001), rtol=1e-9)
+    signals = {v.name: run[v.name] for v in model.x[: model.holonomic.n]}  # type: ignore[union-attr]
+    units = {v.name: v.unit for v in model.x}
+    data = Dataset.of({"t": run.t, **signals}, units={n: units[n] for n in signals})
+    one = subject(model)
+    rows = InverseDynamics(filter=Filter(80.0, 4)).prepare(one, data)
+    values = starts(one)
+    sizes = [np.sqrt(np.mean(evaluated(rows, values * s).r ** 2)) for s in (1.0, 1.5)]
+    assert sizes[0] < 0.05 * sizes[1]
+    check_slopes(rows, values)
+
+
+def test_residuals_pickle() -> None:
+    one = subject(DRIVE, free=FREE)
+    rows = InverseDynamics(filter=PLAIN).prepare(one, moved(DRIVE))
+    values = starts(one) * 1.1
+    again = pickle.loads(pickle.dumps(rows))
+    np.testing.assert_array_equal(evaluated(again, values).r, evaluated(rows, values).r)
+
+
+def test_missing_channels_are_named() -> None:
+    data = Dataset.of(t=T, x=np.sin(T), units={"x": "m"})
+    with pytest.raises(ValueError, match="expected channels force for the inverse dynamics"):
+        InverseDynamics().prepare(subject(DRIVE), data)
+
+
+def test_records_too_short_for_the_filter_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"equations of (force|all signals) after the filter"):
+        InverseDynamics(filter=Filter(60.0, 300)).prepare(subject(DRIVE), moved(DRIVE))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"force": 3}, "InverseDynamics: force: expected"),
+        ({"filter": 10.0}, "InverseDynamics: filter: expected a filter"),
+        ({"dead_time": (0.1, 0.0)}, "dead_time: expected bounds in order"),
+    ],
+)
+def test_bad_arguments_are_refused(arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        InverseDynamics(**arguments)  # type: ignore[arg-type]
