@@ -32,6 +32,8 @@ GAIN, NEAR = 1e-6, 1e-2
 standard error)."""
 FAR = 15.0
 """Longest step that is believed in: of a logarithmic coordinate a factor of three million."""
+NOWHERE = 1e-13
+"""Largest change of a coordinate that is no step."""
 ROUNDS = 12
 """Times that noise levels are estimated anew."""
 SETTLED = 0.02
@@ -90,7 +92,7 @@ class _Search:
         for known in (self.best, self.last):
             if isinstance(known, Point) and np.array_equal(known.w, w):
                 return known
-        if self.left <= 0:
+        if self.left <= 0 or not self._far_enough(w):
             raise _EndedError
         self.left -= 1
         self.last = self.task.at(w)
@@ -102,6 +104,10 @@ class _Search:
         if self.last.cost < self.best.cost:
             self.best = self.last
         return self.last
+
+    def _far_enough(self, w: Array) -> bool:
+        """Whether a trial differs from the best point; not if failures shrank the region to it."""
+        return bool(np.abs(w - self.best.w).max() > NOWHERE)  # False of NaN, too
 
     def residuals(self, w: Array) -> Array:
         """Reduced residuals; where there are none, infinite ones, at which the step shrinks."""
@@ -124,10 +130,11 @@ class _Search:
         optimize: Any = import_module("scipy.optimize")  # slow to import, and seldom needed
         box = self.task.unknowns
         try:
-            optimize.least_squares(
-                self.residuals, self.best.w, self.slopes, bounds=(box.lower, box.upper),
-                x_scale="jac", ftol=1e-15, xtol=1e-12, gtol=1e-15, max_nfev=self.left + 9,
-            )  # fmt: skip
+            with np.errstate(all="ignore"):  # of a region without size; see `_far_enough`
+                optimize.least_squares(
+                    self.residuals, self.best.w, self.slopes, bounds=(box.lower, box.upper),
+                    x_scale="jac", ftol=1e-15, xtol=1e-12, gtol=1e-15, max_nfev=self.left + 9,
+                )  # fmt: skip
         except _EndedError:
             pass
         except KeyboardInterrupt:

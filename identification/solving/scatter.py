@@ -62,6 +62,8 @@ def _moved(unknown: Unknown, w: float, share: float, lower: float, upper: float)
         return (
             w + side * np.log(REACH) if not np.isfinite(upper) else lower + share * (upper - lower)
         )
+    if unknown.above:
+        return w + side * np.log(REACH)
     if lower >= 0 and w > 0:
         return w * REACH**side
     return w + 0.5 * side * abs(w)

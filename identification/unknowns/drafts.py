@@ -240,7 +240,7 @@ def _put_above(
             b = replace(b, start=a.start * APART if a.start > 0 else a.start + b.scale)
     drafts[low] = replace(a, start=_between(a))
     both = strictly and a.logarithmic and b.logarithmic
-    drafts[high] = replace(b, above=low, logarithmic=both)
+    drafts[high] = replace(b, above=low, logarithmic=both, scale=abs(b.start) or b.scale)
 
 
 def _between(unknown: Unknown) -> float:

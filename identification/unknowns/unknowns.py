@@ -2,7 +2,8 @@
 
     p = scale w                      linear
     p = exp(w)                       logarithmic: positive scales
-    p = low + scale w, w >= 0        not below another value; low + exp(w) where it is logarithmic
+    p = low + s (exp(w) - 1), w >= 0 not below another value: linear near it, logarithmic beyond s,
+                                     a tenth of its scale; low + exp(w) where it is logarithmic
     p = low + (upper - low) w        not below another value and not above a bound, 0 <= w <= 1
     p = low (upper / low)^w          likewise, where it is logarithmic, and strictly above
     p = lower + (high - lower) w     not above another value, 0 <= w <= 1
@@ -29,6 +30,9 @@ Array = NDArray[np.float64]
 DECADES = 6.0
 """Decades from its start beyond which a bound of a logarithmic value is none for the solver, whose
 steps feel bounds from afar; who makes the law checks it."""
+NEAR = 0.1
+"""Excess over a lower value, over the scale, up to which it is fitted by its value: the excess of
+static friction and the velocity at which it falls trade along a line of their logarithms."""
 MARGIN = 1e-3
 """Distance of a start to its bounds, over theirs or over one."""
 STRICTLY = 1e-4
@@ -170,6 +174,8 @@ def _write(
     if unknown.above and unknown.upper < inf:
         high = unknown.upper
         values[name] = low * (high / low) ** w if unknown.logarithmic else low + (high - low) * w
+    elif unknown.above and not unknown.logarithmic:
+        values[name] = low + NEAR * unknown.scale * (ca.exp(w) - 1)
     else:
         values[name] = low + (ca.exp(w) if unknown.logarithmic else unknown.scale * w)
     return True
@@ -213,7 +219,9 @@ def _coordinate(unknown: Unknown, value: float, low: float) -> float:
             return float(np.log(1 + excess / low) / np.log(max(unknown.upper / low, 1 + 1e-12)))
         if unknown.upper < inf:
             return excess / max(unknown.upper - low, 1e-300)
-        return float(np.log(excess)) if unknown.logarithmic else excess / unknown.scale
+        if unknown.logarithmic:
+            return float(np.log(excess))
+        return float(np.log1p(excess / (NEAR * unknown.scale)))
     if unknown.logarithmic:
         return float(np.log(max(value, 1e-300)))
     return value / unknown.scale

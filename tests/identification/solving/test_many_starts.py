@@ -230,3 +230,27 @@ def test_white_residuals_end_the_starts_and_wrong_models_go_on() -> None:
     wrong.y += 0.1 * np.sin(wrong.t)
     at = problem(wrong)
     assert len(many_starts(at, starts(at))) == 3
+
+
+def test_residuals_that_exist_only_at_the_start_end_there(recwarn: pytest.WarningsRecorder) -> None:
+    data = decay()
+    at = problem(data)
+    first = at.unknowns.start
+    data.limit = float(at.unknowns.values(first)[1])  # every trial with a larger b fails
+
+    class Alone:
+        """Residuals at one place."""
+
+        names, own, channels = data.names, data.own, data.channels
+        calls = 0
+
+        def at(self, values: Array) -> Evaluation | str:
+            self.calls += 1
+            here = np.array_equal(values, at.unknowns.values(first))
+            return data.at(values) if here else "nothing here"
+
+    alone = Alone()
+    end = descend(task(alone, at.unknowns), first)
+    assert end.status is Status.NO_DESCENT and "nothing here" in end.message
+    assert alone.calls < 80
+    assert not recwarn.list
