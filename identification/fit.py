@@ -15,6 +15,7 @@ from typing import Any, final
 from identification.data.dataset import Dataset
 from identification.data.findings import Findings
 from identification.first import centre, findings_of, measured, slowest
+from identification.residuals.evaluation import Residuals
 from identification.residuals.points import Points
 from identification.result.build import fitted
 from identification.result.calls import written
@@ -143,6 +144,13 @@ class Fit:
         checks.check_names("Fit: start", given, found.names)
         values = centre(found, None if self.start == "law" else seen, given)
         residuals = kind.prepare(found, self.data, values)
+        made = self._task(residuals, found)
+        easier = tuple(self._task(r, found) for r in getattr(residuals, "easier", ()))
+        made = replace(made, easier=easier)
+        return Prepared(kind, found, findings, made, made.unknowns.of(values), seen)
+
+    def _task(self, residuals: Residuals, found: Subject) -> Task:
+        """The least-squares problem of residuals."""
         unknowns = unknowns_of(
             (*found.unknowns, *residuals.own), found.ties, residuals.names, found.held
         )
@@ -152,8 +160,7 @@ class Fit:
                 f"Fit: expected at least {len(unknowns.unknowns)} residuals for as many unknowns, "
                 f"got {rows}; fix some, or add data"
             )
-        made = task(residuals, unknowns, self.noise, self.loss, found.guard)
-        return Prepared(kind, found, findings, made, unknowns.of(values), seen)
+        return task(residuals, unknowns, self.noise, self.loss, found.guard)
 
     def _result(
         self, asked: "Prepared", starts: tuple[Start, ...], end: Start, point: Point,

@@ -18,7 +18,7 @@ from identification.residuals.sampled_shots import (
     why_not,
 )
 from identification.residuals.shots import Drives, Shot, Shots
-from identification.residuals.windows import cut
+from identification.residuals.windows import cut, turnaround
 from identification.unknowns.unknown import Unknown
 from symfric.foundation import checks
 from symfric.foundation.compiler import find_compiler
@@ -35,6 +35,10 @@ RTOLS, FINEST = (1e-6, 1e-7, 1e-8), 1e-9
 """Tolerances to choose from, and that of what they are compared with."""
 BIAS = 0.1
 """Standard errors by which the simulation may move an estimate."""
+LEAST_WINDOWS, FEWEST_SAMPLES = 5, 20
+"""Windows of a record for starts far off, and samples of each window."""
+MOST_STARTS = 60
+"""Start values of such windows: more make steps slow, and a part of the data is enough."""
 NOISELESS = 1e-9
 """Noise over the size of a signal below which it has none."""
 
@@ -44,9 +48,10 @@ class Preparation:
     """One set of residuals being made of a kind, a model and data."""
 
     def __init__(
-        self, kind: "Shooting", model: Model, data: "Dataset", start: Mapping[str, float]
-    ) -> None:
-        self.kind, self.model = kind, model
+        self, kind: "Shooting", model: Model, data: "Dataset", start: Mapping[str, float],
+        every: int = 1,
+    ) -> None:  # fmt: skip
+        self.kind, self.model, self.every = kind, model, every
         self.values = {v.name: float(start.get(v.name, v.start)) for v in model.p}
         self.records = list(data)
         self.states = [v.name for v in model.x]
@@ -91,6 +96,25 @@ class Preparation:
         if self.kind.rtol is None and not shots.substeps:
             shots = replace(shots, rtol=self._rtol(shots))
         return shots
+
+    def easier(self) -> tuple[float, int] | None:
+        """Length of windows [s] that hardly part from the data, and every which of them is enough.
+
+        None where the windows are as short already.
+        """
+        spans = [float(r.time[-1] - r.time[0]) for r in self.records]
+        found = [
+            min(turnaround(r.time, r[c]), span / LEAST_WINDOWS)
+            for r, span in zip(self.records, spans, strict=True)
+            for c in self.signals.values()
+            if c in r
+        ]
+        least = FEWEST_SAMPLES * max(r.median_step for r in self.records)
+        length = max(float(np.median(found)), least)
+        if (self.kind.seconds or max(spans)) < 2 * length:
+            return None
+        count = sum(max(1, round(span / length)) for span in spans)
+        return length, max(1, count * len(self.states) // MOST_STARTS)
 
     # ---- what is compared, and what drives
 
@@ -176,6 +200,7 @@ class Preparation:
             )
         sensed = Sensed.of(self.model, t, {s: y for s, y in measured.items() if s in self.states})
         windows = cut(t, self.kind.seconds, sensed.speed if sensed.slips else None)
+        windows = windows[:: self.every]
         every = self.kind.every
         looks = [np.arange(w.start, w.stop, every) for w in windows]
         total = sum(look.size for look in looks)

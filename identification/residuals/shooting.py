@@ -8,7 +8,7 @@ several bodies, friction from reactions, laws by modes.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, final
 
 from identification.residuals.preparation import Preparation
@@ -148,4 +148,11 @@ class Shooting:
         Raises:
             ValueError: names that model or data do not have, windows that are too short.
         """
-        return Preparation(self, subject.model, data, start).shots()
+        preparation = Preparation(self, subject.model, data, start)
+        shots, easier = preparation.shots(), preparation.easier()
+        if easier is None:
+            return shots
+        length, every = easier
+        kind = replace(self, windows=length, rtol=shots.rtol)
+        other = Preparation(kind, subject.model, data, start, every).shots()
+        return replace(shots, easier=(other,))

@@ -99,6 +99,7 @@ class Shots:
         dead_time: of the inputs [s]; None: it is the first of the own unknowns.
         rtol, backend: as `simulate` takes them.
         substeps: steps a sample of the sampled engine; 0: `simulate` runs.
+        easier: the same data in short windows, for starts far off.
     """
 
     model: Model
@@ -110,6 +111,7 @@ class Shots:
     rtol: float
     backend: str
     substeps: int = 0
+    easier: "tuple[Shots, ...]" = ()
 
     def __getstate__(self) -> dict[str, Any]:
         state = {item.name: getattr(self, item.name) for item in fields(self)}

@@ -1,6 +1,5 @@
 """Where a record is cut, so that a simulation starts again from the data."""
 
-from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -49,9 +48,12 @@ def _fastest(t: Array, speed: Array, middle: float, reach: float) -> int:
     return int(a + np.argmax(np.abs(speed[a : max(b, a + 1)])))
 
 
-def ladder(shortest: float, longest: float) -> Iterator[float]:
-    """Lengths to try [s], each half the one before, from the longest down."""
-    length = longest
-    while length >= shortest:
-        yield length
-        length /= 2
+def turnaround(t: Array, y: Array) -> float:
+    """How long [s] a signal takes for a turn: the period, where it is a sine.
+
+    That is six times the delay after which it differs by its standard deviation.
+    """
+    size, lag = float(np.std(y)), 1
+    while lag < y.size // 2 and np.sqrt(np.mean((y[lag:] - y[:-lag]) ** 2)) < size:
+        lag = max(lag + 1, int(1.2 * lag))
+    return 6 * lag * float(t[-1] - t[0]) / (t.size - 1)

@@ -16,7 +16,8 @@ from threading import get_ident
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.solving.descent import Start, descend
+from identification.solving.descent import Start
+from identification.solving.easier import descend_by_way
 from identification.solving.reduce import square
 from identification.solving.task import Point, Task
 from symfric.foundation.status import Status
@@ -82,7 +83,7 @@ def _in_turn(
     """Results in the order of the numbers."""
     if executor is None:
         for number, w in enumerate(starts):
-            yield descend(task, w, number, evaluations)
+            yield descend_by_way(task, w, number, evaluations)
         return
     packed = pickle.dumps(task)
     waiting: list[Future[Start]] = [
@@ -98,7 +99,7 @@ def _in_turn(
 
 
 def _descend_packed(packed: bytes, w: Array, number: int, evaluations: int) -> Start:
-    return descend(_unpacked(packed, get_ident()), w, number, evaluations)
+    return descend_by_way(_unpacked(packed, get_ident()), w, number, evaluations)
 
 
 @lru_cache(maxsize=4)

@@ -91,6 +91,7 @@ class Task:
         estimated: signals whose noise level is estimated.
         loss: "squares", or a robust one: "huber", "soft_l1", "cauchy", "arctan".
         guard: raises ValueError at values (by name) that cannot be.
+        easier: problems of the same parameters by whose way starts far off go.
     """
 
     residuals: Residuals
@@ -99,6 +100,7 @@ class Task:
     estimated: tuple[str, ...] = ()
     loss: str = "squares"
     guard: Guard | None = None
+    easier: "tuple[Task, ...]" = ()
 
     @property
     def channels(self) -> Sequence[Channel]:
