@@ -34,7 +34,8 @@ def clues_of(found: Minimum, channel: Channel) -> list[Clue]:
 def _kind(name: str) -> Kind:
     """What a regressor is by its name."""
     stem = name.replace(".", "_").replace("[", "_").split("_")[0]
-    return "velocity" if stem == "v" else "position" if stem == "x" else ""
+    kinds: dict[str, Kind] = {"x": "position", "v": "velocity", "a": "acceleration"}
+    return kinds.get(stem, "")
 
 
 def _same_times(one: Channel, other: Channel) -> bool:

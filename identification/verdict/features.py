@@ -21,7 +21,7 @@ import numpy as np
 from identification.residuals.evaluation import Array
 from identification.verdict.order import Count, lagged
 
-Kind = Literal["position", "velocity", ""]
+Kind = Literal["position", "velocity", "acceleration", ""]
 
 DELAYS = (0, 1, 2, 4, 8, 16, 32)
 """Samples by which a regressor may act late."""
@@ -54,11 +54,13 @@ class Family:
         what: what they are functions of, for a sentence: "the residuals of x depend on ...".
         hint: what such a dependence means.
         columns: shape (n, q).
+        smoothed: whether they come from a signal that had to be smoothed, which leaves traces.
     """
 
     what: str
     hint: str
     columns: Array
+    smoothed: bool = False
 
 
 def families(clues: Sequence[Clue], position: Count) -> Iterator[Family]:
@@ -73,7 +75,8 @@ def families(clues: Sequence[Clue], position: Count) -> Iterator[Family]:
             yield _of_place(name, signal, n)
             continue
         columns = np.column_stack([lagged(signal, position, d) for d in delays])
-        yield Family(f"{name} and its past", f"dynamics or a delay from {name} is missing", columns)
+        hint = f"dynamics or a delay from {name} is missing"
+        yield Family(f"{name} and its past", hint, columns, clue.kind == "acceleration")
         if clue.kind == "velocity":
             yield from _of_speed(name, signal, n)
             if position.any():

@@ -45,6 +45,7 @@ class Dependence:
         p: the chance of a larger F without dependence.
         size: root mean square of the part of the residuals that the family explains, in their unit.
         share: its square over that of the residuals.
+        smoothed: see `Family`.
     """
 
     what: str
@@ -54,6 +55,7 @@ class Dependence:
     p: float
     size: float
     share: float
+    smoothed: bool
 
 
 def dependences(
@@ -88,8 +90,9 @@ def dependences(
                 found = _added(r, basis, columns, other.partial, position) or found
         share = found.size**2 / power
         yield Dependence(
-            family.what, family.hint, found.statistic, found.q, found.p, found.size, share
-        )
+            family.what, family.hint, found.statistic, found.q, found.p, found.size, share,
+            family.smoothed,
+        )  # fmt: skip
 
 
 @final

@@ -10,7 +10,7 @@ sensor has, if one is lucky. So
 * errors in the data, a mass at its bound, or residuals as large as the signal are no physics.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import final
 
@@ -35,8 +35,12 @@ WHITE = 0.05
 """Level of the test for white noise of one channel, which decides nothing."""
 SHARE = 0.05
 """Share of the variance of the residuals from which on a dependence counts."""
+SMOOTHED = 5e-3
+"""Share of the range of a signal that the smoothing of an acceleration may leave of its own."""
 UNEXPLAINED = 0.7
 """Residuals over the spread of the signal from which on a model says next to nothing."""
+CHANCE = 10.0
+"""What a model explains, over what as many free numbers explain of noise, that is no chance."""
 INERTIA = ("kg", "kg m^2")
 
 
@@ -123,7 +127,7 @@ def judged(found: Minimum, findings: Findings | None = None) -> Verdict:
     for channel, some in every:
         tests += _independent(found, channel, some, ALARM / max(count, 1))
     errors = () if findings is None else tuple(e.sentence for e in findings.errors)
-    nonsense = (*errors, *_unexplained(found), *_no_mass(found))
+    nonsense = (*errors, *_unexplained(found, effective), *_no_mass(found))
     bounds = tuple(_bounds(found))
     failed = [t for t in tests if not t.passed]
     failed.sort(key=lambda t: (not t.decides, t.p))
@@ -159,7 +163,8 @@ def _independent(
     level = _level(found, channel)
     for d in some:
         size = d.size * level
-        passed = d.p >= limit or size <= fine or d.share < SHARE
+        least = SMOOTHED * float(np.ptp(channel.measured)) if d.smoothed else fine
+        passed = d.p >= limit or size <= least or d.share < SHARE
         text = (
             f"The residuals of {name} depend on {d.what}: {size:.2g} {unit} of them, "
             f"{100 * min(d.share, 1.0):.0f} % of their variance ({d.hint})."
@@ -196,14 +201,20 @@ def _size(found: Minimum, channel: Channel, colour: Colour) -> Iterator[Test]:
     yield Test(name, "size", rms / sigma, p, ALARM / len(found.channels), passed, True, text)
 
 
-def _unexplained(found: Minimum) -> Iterator[str]:
-    """Signals of which a model leaves nearly everything."""
-    signals = dict.fromkeys(c.signal for c in found.channels)
-    for signal in signals:
+def _unexplained(found: Minimum, effective: Mapping[str, float]) -> Iterator[str]:
+    """Signals of which a model leaves nearly everything.
+
+    Of a signal that is mostly noise a right model leaves much; but what it explains is many times
+    the share k / n_eff that any k numbers explain of n_eff independent samples.
+    """
+    for signal in dict.fromkeys(c.signal for c in found.channels):
         some = [c for c in found.channels if c.signal == signal]
         left = sum(float(np.sum(found.raw[c.rows] ** 2)) for c in some)
         there = sum(float(np.sum((c.measured - c.measured.mean()) ** 2)) for c in some)
-        if there > 0 and left > UNEXPLAINED**2 * there:
+        by_chance = (~found.held).sum() / sum(effective[found.label(c)] for c in some)
+        if not there > 0 or left <= UNEXPLAINED**2 * there:
+            continue
+        if 1 - left / there < CHANCE * by_chance:
             yield (
                 f"The model leaves {100 * np.sqrt(left / there):.0f} % of {signal} unexplained: "
                 "another model, another column, another sign or another unit is needed."
