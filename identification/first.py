@@ -20,10 +20,10 @@ FEW = 0.01
 
 def findings_of(kind: object, data: Dataset) -> Findings:
     """What is doubtful about the data, for who uses them like this."""
-    check = getattr(data, "check", None)
-    if check is None:
-        return Findings((), data.name)
-    return check() if isinstance(kind, Points) else check(**_roles(kind))
+    if isinstance(kind, Points):
+        return data.check()
+    called = {part: name for part, name in _roles(kind).items() if any(name in r for r in data)}
+    return data.check(**called)
 
 
 def _roles(kind: object) -> dict[str, str]:

@@ -61,7 +61,7 @@ class Fit:
         starts: most starts; they end early where others cannot matter (see `many_starts`).
         start: parameter -> value, or "data" (the default), or "law": the values that it has.
         seed: of the starts after the first.
-        evaluations: of the residuals, allowed to each start.
+        evaluations: of the residuals, allowed to each start, and as many again to the best one.
 
     Raises:
         ValueError: bad arguments; from `solve` names and bounds, all in one error.
@@ -78,7 +78,7 @@ class Fit:
     starts: int = 6
     start: Any = "data"
     seed: int = 0
-    evaluations: int = 200
+    evaluations: int = 120
 
     def __post_init__(self) -> None:
         problems: list[str] = []

@@ -14,6 +14,7 @@ Source: M. A. Branch, T. F. Coleman, Y. Li, SIAM J. Sci. Comput. 21, 1999; J. No
 Numerical Optimization, 2nd ed., 2006, chapter 10.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any, final
@@ -26,6 +27,8 @@ from identification.solving.task import Point, Task
 from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
+
+Tell = Callable[[int], None]
 
 GAIN, NEAR = 1e-6, 1e-2
 """Fall of the cost over the variance: of a minimum, and of an end that is near enough (a tenth of a
@@ -87,6 +90,7 @@ class _Search:
     costs: list[float] = field(default_factory=list[float])
     last: Point | str = ""
     interrupted: bool = False
+    tell: Tell | None = None
 
     def at(self, w: Array) -> Point | str:
         for known in (self.best, self.last):
@@ -95,6 +99,8 @@ class _Search:
         if self.left <= 0 or not self._far_enough(w):
             raise _EndedError
         self.left -= 1
+        if self.tell is not None:
+            self.tell(len(self.costs) + 1)
         self.last = self.task.at(w)
         if isinstance(self.last, str):
             self.why = self.last
@@ -141,21 +147,24 @@ class _Search:
             self.interrupted = True
 
 
-def descend(task: Task, w0: Array, number: int = 0, evaluations: int = 200) -> Start:
+def descend(
+    task: Task, w0: Array, number: int = 0, evaluations: int = 200, tell: Tell | None = None
+) -> Start:
     """Go from `w0` to a minimum, noise levels estimated on the way where nobody gave them.
+
+    `tell` is called with the number of each evaluation before it.
 
     Returns what was reached in any case: after an interruption or where the start has no residuals,
     too; `status` and `message` say so.
     """
     try:
         first = task.at(task.unknowns.inside(w0))
+        status = Status.NOT_FINITE
     except KeyboardInterrupt:
-        first = "interrupted by the user before the first residuals"
+        first, status = "interrupted by the user before the first residuals", Status.INTERRUPTED
     if isinstance(first, str):
-        return Start(
-            number, w0, w0, np.inf, Status.NOT_FINITE, first, 1, task.noise, np.inf, (np.inf,)
-        )
-    search = _Search(task, first, evaluations - 1, costs=[first.cost])
+        return Start(number, w0, w0, np.inf, status, first, 1, task.noise, np.inf, (np.inf,))
+    search = _Search(task, first, evaluations - 1, costs=[first.cost], tell=tell)
     if task.estimated:
         _renew(search)
     for count in range(ROUNDS if task.estimated else 1):

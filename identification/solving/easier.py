@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.solving.descent import Start, descend
+from identification.solving.descent import Start, Tell, descend
 from identification.solving.task import Task
 from symfric.foundation.status import Status
 
@@ -23,19 +23,21 @@ ENOUGH = 40
 """Evaluations on an easier problem: it need not end at its minimum."""
 
 
-def descend_by_way(task: Task, w0: Array, number: int, evaluations: int) -> Start:
+def descend_by_way(
+    task: Task, w0: Array, number: int, evaluations: int, tell: Tell | None = None
+) -> Start:
     """`descend`, for all but the first start by way of the easier problems of the task."""
     w, spent = w0, 0
     for other in task.easier if number else ():
         shared = set(task.unknowns.fitted) & set(other.unknowns.fitted)
         here = _parameters(task, w, shared)
-        end = descend(other, other.unknowns.of(here), number, min(evaluations, ENOUGH))
+        end = descend(other, other.unknowns.of(here), number, min(evaluations, ENOUGH), tell)
         spent += end.evaluations
         if end.status is Status.INTERRUPTED:
             return replace(end, w0=w0, w=w, cost=np.inf, objective=np.inf)
         if np.isfinite(end.cost):
             w = task.unknowns.of(_parameters(other, end.w, shared))
-    found = descend(task, w, number, evaluations)
+    found = descend(task, w, number, evaluations, tell)
     return replace(found, w0=w0, evaluations=found.evaluations + spent)
 
 

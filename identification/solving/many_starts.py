@@ -16,7 +16,7 @@ from threading import get_ident
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.solving.descent import Start
+from identification.solving.descent import Start, Tell, descend
 from identification.solving.easier import descend_by_way
 from identification.solving.reduce import square
 from identification.solving.task import Point, Task
@@ -39,7 +39,7 @@ def many_starts(
     starts: Sequence[Array],
     executor: Executor | None = None,
     progress: Progress | None = None,
-    evaluations: int = 200,
+    evaluations: int = 120,
     agree: int = AGREE,
 ) -> tuple[Start, ...]:
     """Descend from each of `starts`, shape (n,) each.
@@ -47,8 +47,9 @@ def many_starts(
     Args:
         task: the problem; for an executor it must pickle.
         executor: threads or processes, or None: one after the other here.
-        progress: called after each start.
-        evaluations: of the residuals, allowed to each start.
+        progress: called after each start; without an executor also before each evaluation.
+        evaluations: of the residuals, allowed to each start; where the best has used them up, it
+            gets as many again.
         agree: starts that must find the same minimum for an early end; 0: all starts are made.
 
     Returns:
@@ -56,7 +57,7 @@ def many_starts(
         was finished until then, and where the interrupted one stood.
     """
     done: list[Start] = []
-    found = _in_turn(task, starts, executor, evaluations)
+    found = _in_turn(task, starts, executor, progress, evaluations)
     try:
         for start in found:
             done.append(start)
@@ -69,7 +70,21 @@ def many_starts(
             raise
     finally:
         found.close()
+    if done and done[-1].status is not Status.INTERRUPTED:
+        _go_on(task, done, evaluations)
     return tuple(_alike(done))
+
+
+def _go_on(task: Task, done: list[Start], evaluations: int) -> None:
+    """More evaluations for the best of those `done`, if it has used its own up."""
+    best = best_of(done)
+    if best.status is not Status.MAX_ITERATIONS:
+        return
+    more = descend(task, best.w, best.number, evaluations)
+    if more.objective <= best.objective:
+        spent = best.evaluations + more.evaluations
+        evidence = best.evidence + more.evidence
+        done[done.index(best)] = replace(more, w0=best.w0, evaluations=spent, evidence=evidence)
 
 
 def best_of(starts: Sequence[Start]) -> Start:
@@ -78,12 +93,17 @@ def best_of(starts: Sequence[Start]) -> Start:
 
 
 def _in_turn(
-    task: Task, starts: Sequence[Array], executor: Executor | None, evaluations: int
+    task: Task,
+    starts: Sequence[Array],
+    executor: Executor | None,
+    progress: Progress | None,
+    evaluations: int,
 ) -> Generator[Start]:
     """Results in the order of the numbers."""
     if executor is None:
         for number, w in enumerate(starts):
-            yield descend_by_way(task, w, number, evaluations)
+            tell = None if progress is None else _telling(progress, number, len(starts))
+            yield descend_by_way(task, w, number, evaluations, tell)
         return
     packed = pickle.dumps(task)
     waiting: list[Future[Start]] = [
@@ -96,6 +116,15 @@ def _in_turn(
     finally:
         for future in waiting:
             future.cancel()
+
+
+def _telling(progress: Progress, number: int, count: int) -> Tell:
+    """What tells each evaluation of one start."""
+
+    def tell(evaluation: int) -> None:
+        progress(f"start {number + 1} of {count}, evaluation {evaluation}", number / count)
+
+    return tell
 
 
 def _descend_packed(packed: bytes, w: Array, number: int, evaluations: int) -> Start:

@@ -78,7 +78,9 @@ def test_progress_is_told_after_each_start() -> None:
     Fit(Points(), "coulomb+viscous", points(), starts=4).solve(
         progress=lambda text, done: told.append((text, done))
     )
-    assert told[0] == ("start 1 of 4", 0.25)
+    assert told[0] == ("start 1 of 4, evaluation 2", 0.0)
+    assert ("start 1 of 4", 0.25) in told
+    assert [done for _, done in told] == sorted(done for _, done in told)
 
 
 def motion(law: Any, m: float = 2.0) -> Dataset:

@@ -201,6 +201,9 @@ def test_evaluations_are_counted_and_limited() -> None:
     end = descend(at, at.unknowns.start, evaluations=3)
     assert end.status is Status.MAX_ITERATIONS
     assert end.evaluations == data.calls == 3
+    (more,) = many_starts(at, [at.unknowns.start], evaluations=3)
+    assert 3 < more.evaluations <= 6
+    assert more.cost < end.cost
 
 
 def test_an_interruption_keeps_the_best_so_far() -> None:
