@@ -60,6 +60,14 @@ def out_and_back_is_the_motion_known_on_paper(printed: str, folder: Path) -> Non
     assert abs(found - exact) < 1e-3 * exact
 
 
+def friction_of_each_joint_is_found(printed: str, folder: Path) -> None:
+    """Coefficients and payload to 2 %; viscosities hardly matter there."""
+    pairs = re.findall(r"^(mu_\w+|payload): ([\d.]+), put in ([\d.]+)", printed, re.M)
+    assert len(pairs) == 4
+    for name, found, true in pairs:
+        assert abs(float(found) / float(true) - 1) < 0.02, name
+
+
 LONG = (
     "arm_to_a_place",
     "co_design",
@@ -71,6 +79,7 @@ LONG = (
 """Whole solves of several seconds; `tests/examples/test_motions.py` looks at their problems."""
 
 SAYS = dict.fromkeys(LONG, motion_is_verified) | {
+    "identify_arm": friction_of_each_joint_is_found,
     "out_and_back": out_and_back_is_the_motion_known_on_paper,
     "mpc_drive": drives_get_there_and_the_c_is_verified,
     "learn_drive": drive_has_learnt_to_stop,

@@ -132,7 +132,9 @@ def _filter_of(forces: Sequence[Array], raw: Sequence[Raw], step: float) -> Filt
     signals = list(forces)
     for x, v in () if signals else raw:
         signals += [v] if v is not None else [np.gradient(x, step)] if x is not None else []
-    return max((choose_filter(signal, step) for signal in signals), key=lambda f: f.cutoff)
+    positions = [x for x, _ in raw if x is not None]
+    each = (choose_filter(signal, step, positions) for signal in signals)
+    return max(each, key=lambda f: f.cutoff)
 
 
 @final

@@ -124,9 +124,9 @@ def uncertain(v: Array, noise: float, step: float, filter: Filter) -> Mask:
     return np.convolve(slow, np.ones(2 * around + 1), mode="same") > 0.5
 
 
-def filter_of(record: Record, force: str = "force") -> Filter:
-    """The filter chosen from the force of a record."""
-    return choose_filter(record[force], record.uniform().step)
+def filter_of(record: Record, force: str = "force", x: str = "x") -> Filter:
+    """The filter chosen from force and position of a record."""
+    return choose_filter(record[force], record.uniform().step, [record[x]])
 
 
 def differentiate(
@@ -149,7 +149,7 @@ def differentiate(
         ValueError: unequal intervals, a cut-off above the Nyquist frequency, too short a record.
     """
     step = record.uniform().step
-    chosen = filter or filter_of(record, force)
+    chosen = filter or filter_of(record, force, x)
     v = v or ("v" if "v" in record else None)
     measured = record[x], None if v is None else record[v]
     motion = derivatives(*measured, step, chosen)

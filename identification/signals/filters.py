@@ -5,6 +5,7 @@ phase shift, and one and the same low pass on the measured and on the predicted 
 Source: Gautier, Janot and Vandanjon, IEEE Trans. Control Syst. Technol. 21(2), 2013 (IDIM-LS).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil, floor, log10
@@ -21,6 +22,8 @@ LOBES = 3
 """Zero crossings of the decimation filter on each side: few, so that few rows touch a reversal."""
 PASS = 0.9
 """Its cut-off (-6 dB) over the Nyquist frequency after decimation."""
+ABOVE = 4.0
+"""Power over that of the noise from which on a motion is known."""
 
 
 @final
@@ -156,17 +159,39 @@ def bandwidth(force: Array, step: float, share: float = 0.999) -> float:
     return float(frequency[np.argmax(total >= share * total.max())])
 
 
-def choose_filter(force: Array, step: float, rows: int = 100) -> Filter:
-    """A filter from the data: the bandwidth f_b of the force decides.
+def position_band(x: Array, step: float) -> float:
+    """Frequency [Hz] from which on the motion does not stand out of the noise of its position.
+
+    Where the spectrum under a Hann window, averaged over 1 Hz, is for the last time `ABOVE` times
+    the noise, whose level is that of its upper half. Beyond it an acceleration is noise.
+    """
+    rest = x - np.linspace(x[0], x[-1], x.size)
+    power = np.abs(np.fft.rfft(rest * np.hanning(x.size))) ** 2
+    frequency = np.fft.rfftfreq(x.size, step)
+    noise = np.median(power[power.size // 2 :]) / np.log(2)
+    width = max(9, 2 * round(0.5 * x.size * step) + 1)
+    smooth = np.convolve(power, np.ones(width) / width, mode="same")
+    known = np.flatnonzero(smooth > ABOVE * noise)
+    return float(frequency[max(1, known[-1])] if known.size else frequency[1])
+
+
+def choose_filter(
+    force: Array, step: float, positions: Sequence[Array] = (), rows: int = 100
+) -> Filter:
+    """A filter from the data: the bandwidth f_b of the force decides, and f_a of the positions.
 
         cut-off 5 f_b (at most half the Nyquist frequency), decimation 0.8 Nyquist / (2 f_b)
 
-    f_b is rounded to one digit. The factors are those of the EMPS reference (there
-    f_b = 20 Hz by hand). The decimation leaves at least `rows` equations where it can.
+    f_b is rounded to one digit. The factors are those of the EMPS reference (there f_b = 20 Hz by
+    hand). f_a is the median of `position_band`: f_b is at most f_a, and the cut-off of the
+    decimation, 0.9 Nyquist / decimation, too, since noise in the acceleration lowers the mass. The
+    decimation leaves at least `rows` equations where it can.
     """
     nyquist = 0.5 / step
-    found = max(bandwidth(force, step), 1 / (force.size * step))
+    known = float(np.median([position_band(x, step) for x in positions] or [nyquist]))
+    found = max(min(bandwidth(force, step), known), 1 / (force.size * step))
     digit = 10.0 ** floor(log10(found))
     f_b = round(found / digit) * digit
-    decimation = min(round(0.4 * nyquist / f_b), force.size // (rows + 4 * LOBES))
+    wanted = max(round(0.4 * nyquist / f_b), round(PASS * nyquist / known))
+    decimation = min(wanted, force.size // (rows + 4 * LOBES))
     return Filter(min(5 * f_b, 0.5 * nyquist), max(1, decimation))

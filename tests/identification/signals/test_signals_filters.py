@@ -8,6 +8,7 @@ from identification.signals.filters import (
     central_difference,
     choose_filter,
     lowpass,
+    position_band,
 )
 
 
@@ -108,3 +109,21 @@ def test_filter_follows_the_bandwidth() -> None:
     t = np.arange(20_000) * 1e-3
     chosen = choose_filter(np.sin(2 * np.pi * 20 * t), 1e-3)
     assert (chosen.cutoff, chosen.decimation) == (100.0, 10)
+
+
+def test_the_motion_ends_where_its_noise_begins() -> None:
+    t = np.arange(10_000) * 1e-3
+    noise = np.random.default_rng(0).standard_normal(t.size)
+    x = np.sin(2 * np.pi * 1.3 * t) + 1e-3 * np.sin(2 * np.pi * 30 * t)
+    assert position_band(x + 1e-7 * noise, 1e-3) > 29.0
+    assert position_band(x + 1e-1 * noise, 1e-3) < 5.0
+
+
+def test_noise_of_the_position_narrows_the_filter() -> None:
+    t = np.arange(20_000) * 1e-3
+    noise = np.random.default_rng(0).standard_normal(t.size)
+    force, x = np.sin(2 * np.pi * 20 * t), np.sin(2 * np.pi * 2 * t)
+    wide, narrow = (choose_filter(force, 1e-3, [x + s * noise]) for s in (0.0, 1e-2))
+    assert (wide.cutoff, wide.decimation) == (100.0, 10)
+    assert narrow.cutoff < wide.cutoff
+    assert narrow.decimation > wide.decimation
