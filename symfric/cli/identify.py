@@ -192,7 +192,7 @@ def refuse(found: Found) -> None:
     fit = found.fit
     if not fit.status.ok:
         said = next((f.sentence for f in fit.findings if f.severity == "error"), "")
-        why = said or next(iter(fit.verdict.nonsense), "") or fit.message
+        why = said or next(iter(fit.verdict.nonsense), "") or fit.status.value
         raise SolveError(f"identify {fit.name}: {fit.status.name.lower()}: {why}", fit.status, fit)
     if found.failed:
         raise ValueError("; ".join(found.failed))
