@@ -27,12 +27,14 @@ from identification.result.fitted import Fitted
 from identification.result.live import Kind
 from identification.solving.many_starts import Progress
 from symfric.foundation import checks
-from symfric.foundation.status import SolveError
+from symfric.foundation.status import SolveError, Status
 from symfric.laws import Law
 from symfric.laws.cost import cost
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+INTERRUPTED = "interrupted by the user"
 
 
 @final
@@ -171,7 +173,8 @@ def select(
         progress: called with a text and the fraction done.
         fit: further arguments of `Fit`, the same for all laws.
 
-    A law that cannot be fitted has a row that says why.
+    A law that cannot be fitted has a row that says why; after Ctrl-C those that were fitted are
+    ranked, and the row of the others says so.
 
     Raises:
         ValueError: no laws, or arguments that no law could be fitted with.
@@ -185,7 +188,15 @@ def select(
         if progress is not None:
             progress(name, number / len(named))
         one = Fit(asked, what, data, **fit)
-        tried.append(_try(name, one, validate, folds, executor))
+        try:
+            tried.append(_try(name, one, validate, folds, executor))
+        except KeyboardInterrupt:  # what was fitted before is ranked
+            if not tried:
+                raise
+            tried.append(_Tried(name, INTERRUPTED))
+        if tried[-1].ended:
+            tried += [_Tried(left, INTERRUPTED) for left in [*named][number + 1 :]]
+            break
     if progress is not None:
         progress("ranked", 1.0)
     how = f"validation on {validate.name}" if validate is not None else "no validation"
@@ -206,6 +217,12 @@ class _Tried:
     inside: Sequence[Left] = ()
     outside: Sequence[Left] = ()
     crossed: CrossValidation | None = None
+
+    @property
+    def ended(self) -> bool:
+        """Whether the user ended it."""
+        stopped = self.fit is not None and self.fit.status is Status.INTERRUPTED
+        return stopped or self.why == INTERRUPTED
 
 
 def _named(laws: Iterable[Any] | Mapping[str, Any]) -> dict[str, Any]:

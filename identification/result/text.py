@@ -60,13 +60,21 @@ def interval(e: Estimate) -> str:
     """The 95 % interval, with the digits of the value; "" without one."""
     if e.low is None or e.high is None:
         return ""
-    return f"{rounded(e.low, e.standard_error)} ... {rounded(e.high, e.standard_error)}"
+    return f"{_end(e.low, e)} ... {_end(e.high, e)}"
+
+
+def _end(value: float, e: Estimate) -> str:
+    """An end of an interval: with few digits where it is of another order than the value."""
+    far = not 1e-2 * abs(e.value) < abs(value) < 1e2 * abs(e.value)
+    return number(value, 3) if far and e.value else rounded(value, e.standard_error)
 
 
 def percent(value: float | None, digits: int = 2) -> str:
     """A share in percent without an exponent; "" of none."""
     if value is None or not isfinite(value):
         return ""
+    if value > 1e4:
+        return "> 10000 %"
     return f"{value:.{digits}g} %" if value < 10.0**digits else f"{value:.0f} %"
 
 

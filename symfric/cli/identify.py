@@ -13,8 +13,9 @@ from identification.data.dataset import Dataset
 from identification.first import findings_of
 from identification.fit import Fit
 from identification.result.fitted import Fitted
+from identification.select import INTERRUPTED, Ranking, select
 from identification.verdict.profile import Profile
-from symfric import SolveError
+from symfric import SolveError, Status
 from symfric.cli import output
 from symfric.cli.fitting import KINDS, free_in, kind_of, laws_in, reading
 from symfric.cli.options import JsonOption, PlotOption, check_outputs, numbers
@@ -31,7 +32,7 @@ def identify(
     ],
     law: Annotated[
         str,
-        typer.Option("--law", metavar="NAME", help="Friction law, such as coulomb+viscous."),
+        typer.Option("--law", metavar="NAME[,NAME]", help="Friction law; several are ranked."),
     ],
     validate: Annotated[
         list[str] | None,
@@ -97,12 +98,10 @@ def identify(
     Prints the verdict of the residuals, parameters with 95 % intervals and what the data do not
     tell. The exit status is 1 where data or residuals say that the result is no physics.
 
-    Example: symfric identify run*.csv --law stribeck --validate v.csv --report out.html
+    Example: symfric identify run*.csv --law stribeck,lugre --validate v.csv --report out.html
     """
     check_outputs(report, json, picture=plot)
     laws, chosen = laws_in(law), kind_of(kind, windows)
-    if len(laws) > 1:
-        raise ValueError(f"--law: expected one law, got {law}")
     read = reading(columns, units, step, variable, kind == "points")
     asked: dict[str, Any] = {
         "free": free_in(free),
@@ -115,14 +114,20 @@ def identify(
     workers = checks.count("--jobs", jobs, most=MOST_JOBS)
     records = read.read(data)
     other = read.read(validate) if validate else None
-    question = Fit(chosen, laws[0], records, **asked)
     if profiles:
-        check_names("--profile", profiles, question.prepared().task.unknowns.fitted)
+        one = Fit(chosen, laws[0], records, **asked).prepared()
+        check_names("--profile", profiles, one.task.unknowns.fitted)
     with output.progress(f"identify {law}") as tell, _executor(workers) as executor:
-        fit = question.solve(executor, progress=lambda _, fraction: tell(fraction), throw=False)
-    found = judged(fit, other, profiles or ())
+        how: dict[str, Any] = {"executor": executor, "progress": lambda _, done: tell(done)}
+        if len(laws) > 1:
+            ranking = select(laws, records, chosen, other, **how, **asked)
+            fit = ranking.best
+        else:
+            ranking = None
+            fit = Fit(chosen, laws[0], records, **asked).solve(**how, throw=False)
+    found = judged(fit, other, profiles or (), ranking)
     if report:
-        found.fit.report(report)
+        found.fit.report(report, found.ranking)
     if plot:
         found.fit.plot(plot)
     output.emit_json(found.to_dict(), json)
@@ -140,20 +145,28 @@ class Found:
     Attributes:
         fit: with its errors on other data.
         profiles: that were asked for.
+        ranking: of several laws, whose best one the fit is.
         failed: why other data or profiles could not be had.
     """
 
     fit: Fitted
     profiles: tuple[Profile, ...] = ()
+    ranking: Ranking | None = None
     failed: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """What `--json` holds: the fit, which `Fitted.from_json` reads, and more."""
-        more = {"profiles": [p.to_dict() for p in self.profiles]} if self.profiles else {}
+        more: dict[str, Any] = {}
+        if self.profiles:
+            more["profiles"] = [p.to_dict() for p in self.profiles]
+        if self.ranking is not None:
+            more["ranking"] = self.ranking.to_dict()
         return self.fit.to_dict() | more
 
 
-def judged(fit: Fitted, other: Dataset | None, names: Sequence[str]) -> Found:
+def judged(
+    fit: Fitted, other: Dataset | None, names: Sequence[str], ranking: Ranking | None
+) -> Found:
     """The fit on other data, and profiles; what fails is told, and the rest is kept."""
     failed: list[str] = []
     profiles: list[Profile] = []
@@ -171,11 +184,13 @@ def judged(fit: Fitted, other: Dataset | None, names: Sequence[str]) -> Found:
             profiles.append(fit.profile(name))
         except ValueError as error:
             failed.append(str(error))
-    return Found(fit, tuple(profiles), tuple(failed))
+    return Found(fit, tuple(profiles), ranking, tuple(failed))
 
 
 def show(found: Found) -> None:
-    """Print the fit, and profiles below it."""
+    """Print the ranking, the fit of the best law, and profiles."""
+    if found.ranking is not None:
+        typer.echo(f"{found.ranking}\n")
     typer.echo(str(found.fit))
     for profile in found.profiles:
         typer.echo("")
@@ -194,6 +209,9 @@ def refuse(found: Found) -> None:
         said = next((f.sentence for f in fit.findings if f.severity == "error"), "")
         why = said or next(iter(fit.verdict.nonsense), "") or fit.status.value
         raise SolveError(f"identify {fit.name}: {fit.status.name.lower()}: {why}", fit.status, fit)
+    ranked = () if found.ranking is None else found.ranking.rows
+    if any(INTERRUPTED in row.sentence for row in ranked):
+        raise SolveError(f"identify: {INTERRUPTED}; the laws before are ranked", Status.INTERRUPTED)
     if found.failed:
         raise ValueError("; ".join(found.failed))
 

@@ -7,8 +7,9 @@ import pytest
 from fits import TRUTH, make, record
 
 from identification.data.dataset import Dataset
+from identification.result.estimate import Estimate
 from identification.result.fitted import Fitted
-from identification.result.text import rounded, text_of
+from identification.result.text import interval, percent, rounded, text_of
 from symfric.foundation.status import Status
 from symfric.laws import Stribeck
 from symfric.model import Model
@@ -112,6 +113,12 @@ def test_the_text_fits_80_columns_and_holds_every_number(good: Fitted, wrong: Fi
                 line.split()[:2] == [name, rounded(e.value, e.standard_error)]
                 for line in text.splitlines()
             )
+
+
+def test_what_is_not_told_has_a_short_interval() -> None:
+    e = Estimate(8.2e-12, "N", 2.5, low=4.2e-142, high=1.593819374e119)
+    assert interval(e) == "4.2e-142 ... 1.59e+119"
+    assert percent(e.relative_error) == "> 10000 %"
 
 
 @pytest.mark.parametrize(

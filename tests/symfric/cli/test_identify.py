@@ -109,6 +109,29 @@ def test_the_text_fits_80_columns_and_files_are_written(
     assert float(back.drive.m) == back.values["m"]
 
 
+def test_several_laws_are_ranked_and_the_best_one_is_told(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = [
+        "identify",
+        str(folder / "one.csv"),
+        "--law",
+        "viscous,coulomb+viscous",
+        "--starts",
+        "1",
+    ]
+    line += ["--validate", str(folder / "two.csv"), "--report", str(tmp_path / "r.html")]
+    assert main([*line, "--json", str(tmp_path / "r.json")]) == 0
+    out, _ = capsys.readouterr()
+    assert max(map(len, out.splitlines())) <= 80
+    assert [row.split()[0] for row in out.splitlines()[2:4]] == ["coulomb+viscous", "viscous"]
+    assert "coulomb+viscous fitted by" in out
+    assert "Ranking of laws" in (tmp_path / "r.html").read_text()
+    stored = json.loads((tmp_path / "r.json").read_text())
+    assert [row["law"] for row in stored["ranking"]["rows"]] == ["coulomb+viscous", "viscous"]
+    assert Fitted.from_json(tmp_path / "r.json").name == "coulomb+viscous"
+
+
 def test_no_physics_is_an_error_and_everything_is_written_all_the_same(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
