@@ -68,10 +68,35 @@ def friction_of_each_joint_is_found(printed: str, folder: Path) -> None:
         assert abs(float(found) / float(true) - 1) < 0.02, name
 
 
+def told(printed: str, name: str) -> tuple[float, float]:
+    """Value and standard error of a parameter in the table of a fit."""
+    number = r"(-?[\d.]+(?:e[-+]?\d+)?)"
+    value, error = re.findall(rf"^{name} +{number} .*? {number} \(", printed, re.MULTILINE)[-1]
+    return float(value), float(error)
+
+
+def friction_of_the_swings_is_found(printed: str, folder: Path) -> None:
+    for name, truth in {"w": 6.1, "c": 0.05, "d": 0.02, "e": 0.03}.items():
+        value, error = told(printed, name)
+        assert abs(value - truth) < max(5 * error, 0.01 * truth)
+    (off,) = re.findall(r"off by ([\d.]+) mrad", printed)
+    assert float(off) < 0.6  # a line over the root of 12 is 0.44 mrad
+
+
+def friction_of_the_guide_is_found(printed: str, folder: Path) -> None:
+    for name, truth in {"C_e": 180.0, "e_1": 0.01, "mu": 0.05, "sigma_v": 1500.0}.items():
+        value, error = told(printed, name)
+        assert abs(value - truth) < 5 * error < 0.1 * truth
+    assert "quarter_car_simple fitted by Shooting(x0='given'): DOUBTFUL" in printed
+    assert "quarter_car_general fitted by Shooting(x0='given'): SOLVED" in printed
+
+
 LONG = (
     "arm_to_a_place",
     "co_design",
     "crank_start_up",
+    "identify_pendulum",
+    "identify_quarter_car",
     "quarter_car_profile",
     "swing_up",
     "through_a_spring",
@@ -80,6 +105,8 @@ LONG = (
 
 SAYS = dict.fromkeys(LONG, motion_is_verified) | {
     "identify_arm": friction_of_each_joint_is_found,
+    "identify_pendulum": friction_of_the_swings_is_found,
+    "identify_quarter_car": friction_of_the_guide_is_found,
     "out_and_back": out_and_back_is_the_motion_known_on_paper,
     "mpc_drive": drives_get_there_and_the_c_is_verified,
     "learn_drive": drive_has_learnt_to_stop,

@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 ENOUGH = 40
 """Evaluations on an easier problem: it need not end at its minimum."""
+REACH = 100.0
+"""Largest factor by which it may change a positive value."""
 
 
 def descend_by_way(
@@ -31,7 +33,8 @@ def descend_by_way(
     for other in task.easier if number else ():
         shared = set(task.unknowns.fitted) & set(other.unknowns.fitted)
         here = _parameters(task, w, shared)
-        end = descend(other, other.unknowns.of(here), number, min(evaluations, ENOUGH), tell)
+        first = other.unknowns.of(here)
+        end = descend(_near(other, first), first, number, min(evaluations, ENOUGH), tell)
         spent += end.evaluations
         if end.status is Status.INTERRUPTED:
             return replace(end, w0=w0, w=w, cost=np.inf, objective=np.inf)
@@ -39,6 +42,19 @@ def descend_by_way(
             w = task.unknowns.of(_parameters(other, end.w, shared))
     found = descend(task, w, number, evaluations, tell)
     return replace(found, w0=w0, evaluations=found.evaluations + spent)
+
+
+def _near(task: Task, w: Array) -> Task:
+    """The problem with logarithmic values within a factor of `REACH` of those at `w`.
+
+    Parts of a record may be fitted as well by something that vanishes or grows without bound.
+    """
+    box = task.unknowns
+    free = np.array([np.log(REACH) if u.logarithmic else np.inf for u in box.unknowns])
+    near = replace(
+        box, lower=np.maximum(box.lower, w - free), upper=np.minimum(box.upper, w + free)
+    )
+    return replace(task, unknowns=near)
 
 
 def _parameters(task: Task, w: Array, shared: set[str]) -> dict[str, float]:

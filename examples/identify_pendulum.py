@@ -1,0 +1,70 @@
+"""Friction of a pendulum from its free swings: four records, released somewhere, one fit.
+
+    phi'' = -w^2 sin phi - c sign(phi') - d phi' - e |phi'| phi'
+
+An encoder of 4096 lines reads the angle at 100 Hz. Nobody knows where and how fast the pendulum was
+when a recording began, so each record has its own start values; Coulomb, viscous and air friction
+and the natural frequency are common to all. Swings from small angles tell dry friction from that of
+the air, which those from large angles cannot. A fifth record, which no fit has seen, is the judge.
+
+    python examples/identify_pendulum.py [OUT]
+"""
+
+import sys
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+
+from identification import Dataset, Fit, Shooting
+from symfric import Model, Variable, simulate
+
+TRUTH = {"w": 6.1, "c": 0.05, "d": 0.02, "e": 0.03}
+RELEASED = (1.2, 0.8, 0.4, 0.2, 0.6)  # rad
+LINE = 2 * np.pi / 4096
+T = np.linspace(0.0, 12.0, 1201)
+
+
+def pendulum() -> Model:
+    """Angle from hanging; dry friction changes its sign within 1 mrad/s."""
+    phi = Variable("phi", "rad", nominal=0.1)
+    rate = Variable("rate", "rad/s", nominal=0.5)
+    w = Variable("w", "rad/s", start=5.0, lower=0.0, doc="natural frequency")
+    c = Variable("c", "rad/s^2", start=0.1, lower=0.0, doc="dry friction over inertia")
+    d = Variable("d", "1/s", start=0.1, lower=0.0, doc="viscous friction over inertia")
+    e = Variable("e", "1/rad", start=0.1, lower=0.0, doc="friction of the air over inertia")
+    v = rate.symbol
+    size = ca.sqrt(v**2 + 1e-6)
+    brake = c.symbol * v / size + d.symbol * v + e.symbol * size * v
+    swing = -(w.symbol**2) * ca.sin(phi.symbol) - brake
+    return Model("pendulum", x=(phi, rate), p=(w, c, d, e), ode=ca.vertcat(v, swing))
+
+
+def recorded(model: Model) -> Dataset:
+    """Swings as the encoder sees them; recording begins a while after the release."""
+    records: list[Dataset] = []
+    for k, angle in enumerate(RELEASED):
+        late = 0.13 + 0.1 * k
+        run = simulate(model, 12.0 + late, x0={"phi": angle}, p=TRUTH, t_eval=T + late, rtol=1e-9)
+        seen = LINE * np.round(run["phi"] / LINE)
+        records.append(Dataset.of(t=T, phi=seen, units={"phi": "rad"}, name=f"swing {k}"))
+    return sum(records[1:], records[0])
+
+
+def main(out: Path) -> None:
+    """Fit four swings, predict the fifth."""
+    model = pendulum()
+    data = recorded(model)
+    swings, other = Dataset(data.records[:4], "swings"), Dataset(data.records[4:], "other")
+    fit = Fit(Shooting(), model, swings).solve()
+    sys.stdout.write(f"{fit}\n")
+    for (record, signal), error in fit.validate(other).items():
+        off, line = 1e3 * error.rms, 1e3 * LINE
+        sys.stdout.write(f"{record}, {signal}: off by {off:.2f} mrad; a line is {line:.2f} mrad\n")
+    fit.plot(out / "pendulum.png")
+
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+    folder.mkdir(parents=True, exist_ok=True)
+    main(folder)
