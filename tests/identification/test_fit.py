@@ -1,6 +1,6 @@
 """One question to data: points and motions, bad arguments, other processes, what is kept."""
 
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -65,12 +65,13 @@ def test_specs_reach_the_result() -> None:
 
 def test_the_same_on_any_executor_to_the_bit() -> None:
     data = points()
-    here = Fit(Points(), "stribeck", data).solve()
-    with ThreadPoolExecutor(2) as pool:
-        there = Fit(Points(), "stribeck", data).solve(pool)
-    assert [e.value for e in here.parameters.values()] == [
-        e.value for e in there.parameters.values()
-    ]
+    asked = Fit(Points(), "stribeck", data, free={"mu_s": tied(lambda p: 1.5 * p["mu_d"])})
+    here = asked.solve()
+    with ThreadPoolExecutor(2) as threads, ProcessPoolExecutor(1) as processes:
+        for executor in (threads, processes):
+            there = asked.solve(executor)
+            for one, other in zip(here.parameters.values(), there.parameters.values(), strict=True):
+                assert one.value == other.value
 
 
 def test_progress_is_told_after_each_start() -> None:

@@ -1,0 +1,46 @@
+"""Starts around a centre: inside the box, in every stratum, the same for the same seed."""
+
+import numpy as np
+
+from identification.solving.scatter import REACH, scattered
+from identification.unknowns.unknown import Unknown
+from identification.unknowns.unknowns import Unknowns, unknowns_of
+
+UNKNOWNS = [
+    Unknown("k", "N/m", 1e5, 1e-12, logarithmic=True, scale=1e5),
+    Unknown("c", "N s/m", 30.0, 10.0, 100.0, logarithmic=True),
+    Unknown("level", "N", 2.0, 0.0, scale=2.0),
+    Unknown("offset", "N", -0.5),
+    Unknown("peak", "N", 3.0, 0.0, scale=3.0, above="level"),
+    Unknown("x0.x[0]", "m", 0.3, nuisance=True),
+    Unknown("dead_time", "s", 0.01, 0.0, 0.02, scale=0.02, nuisance=True),
+]
+
+
+def box() -> Unknowns:
+    return unknowns_of(UNKNOWNS, {}, [u.name for u in UNKNOWNS])
+
+
+def test_starts_stay_in_the_box_and_cover_what_is_bounded() -> None:
+    at = box()
+    starts = scattered(at, at.start, 21, seed=3)
+    values = [at.named(w) for w in starts]
+    assert len(starts) == 21
+    assert (starts[0] == at.start).all()
+    for w, v in zip(starts, values, strict=True):
+        assert np.all(w >= at.lower) and np.all(w <= at.upper)
+        assert 1e5 / REACH * 0.99 <= v["k"] <= 1e5 * REACH * 1.01
+        assert v["peak"] >= v["level"]
+        assert abs(v["x0.x[0]"] - 0.3) < 1e-12
+    for name, low, high in (("c", 10.0, 100.0), ("dead_time", 0.0, 0.02)):
+        found = np.array([v[name] for v in values[1:]])
+        share = np.log(found / low) / np.log(high / low) if name == "c" else found / high
+        strata = np.floor(np.clip(share, 0, 1 - 1e-9) * 20).astype(int)
+        assert len(set(strata.tolist())) >= 19  # one a stratum, but for the margin of the box
+
+
+def test_the_same_seed_gives_the_same_starts() -> None:
+    at = box()
+    one, same, other = (scattered(at, at.start, 5, seed=s) for s in (1, 1, 2))
+    assert all((a == b).all() for a, b in zip(one, same, strict=True))
+    assert any((a != b).any() for a, b in zip(one, other, strict=True))
