@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from symfric.foundation.fronts import hand_out
 
 if TYPE_CHECKING:
+    from identification.cross import cross_validate as cross_validate
     from identification.data.dataset import Dataset as Dataset
     from identification.data.findings import Finding as Finding
     from identification.data.findings import Findings as Findings
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from identification.residuals.shooting import Shooting as Shooting
     from identification.result.estimate import Estimate as Estimate
     from identification.result.fitted import Fitted as Fitted
+    from identification.select import select as select
     from identification.signals.differentiate import MotionSignals as MotionSignals
     from identification.signals.differentiate import differentiate as differentiate
     from identification.signals.filters import Filter as Filter
@@ -56,6 +58,7 @@ else:
             "identification.data.loop": "PositionLoop",
             "identification.data.record": "Record",
             "identification.data.synthetic": "synthetic_drive_data",
+            "identification.cross": "cross_validate",
             "identification.fit": "Fit",
             "identification.residuals.closed_loop": "ClosedLoop Controller",
             "identification.residuals.inverse": "InverseDynamics",
@@ -63,6 +66,7 @@ else:
             "identification.residuals.shooting": "Shooting",
             "identification.result.estimate": "Estimate",
             "identification.result.fitted": "Fitted",
+            "identification.select": "select",
             "identification.signals.differentiate": "MotionSignals differentiate",
             "identification.signals.filters": "Filter central_difference lowpass",
             "identification.signals.regress": "LinearFit linear_regression",
