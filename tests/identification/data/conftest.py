@@ -8,12 +8,17 @@ from identification.data.dataset import Dataset
 from identification.data.synthetic import synthetic_drive_data
 
 SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
-EMPS = SHARED / "EMPS"
 
 
 @pytest.fixture(scope="session")
-def emps_files() -> Dataset:
-    files = [EMPS / "DATA_EMPS.mat", EMPS / "DATA_EMPS_PULSES.mat"]
+def shared_data() -> Path:
+    """The folder of measured data, which may be missing."""
+    return SHARED
+
+
+@pytest.fixture(scope="session")
+def emps_files(shared_data: Path) -> Dataset:
+    files = [shared_data / "EMPS" / name for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat")]
     if not all(file.is_file() for file in files):
         pytest.skip("the EMPS records are not on this machine (../shared/data/EMPS)")
     return Dataset.read(files)
