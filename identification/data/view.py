@@ -36,7 +36,8 @@ class View:
     @classmethod
     def of(cls, record: Record, number: int, roles: Mapping[str, str]) -> "View":
         """The view of a record; `roles` names signals that are not called by their part."""
-        given = checks.named("check", roles, ROLES)
+        named = checks.named("check", roles, ROLES)
+        given = {role: name for role, name in named.items() if role != name or name in record}
         found = {role: role for role in ROLES if role in record.signals}
         found |= {role: record.channel(name) for role, name in given.items()}
         return cls(record, number, found)
