@@ -10,6 +10,7 @@ from identification.data.check_frozen import of_frozen
 from identification.data.check_jumps import of_jumps
 from identification.data.check_motion import of_motion
 from identification.data.check_points import of_points
+from identification.data.check_residue import of_residue
 from identification.data.check_resolution import of_resolution
 from identification.data.check_spikes import of_spikes
 from identification.data.check_times import of_times
@@ -63,5 +64,7 @@ def _of_record(view: View) -> Iterator[Finding]:
         yield from (f for f in of_motion(view, model) if f.kind == "one-way")
         yield from of_excitation(view, model)
         yield from of_resolution(view, model)
-        yield from of_drift(view, model)
-        yield from of_dead_time(view, model)
+        free = rough_model(view, curve=True)
+        yield from of_drift(view, model, free)
+        yield from of_dead_time(view, model, free)
+        yield from of_residue(view, free)

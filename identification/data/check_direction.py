@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from identification.data.findings import Finding
-from identification.data.rough import Rough, rough_model
+from identification.data.rough import Rough, one_way, rough_model
 from identification.data.view import View
 
 SURE = 5.0
@@ -37,8 +37,7 @@ def of_direction(view: View, model: Rough | None) -> Iterator[Finding]:
             "error",
         )
         return
-    way = [float(np.sum(np.maximum(side * model.v, 0.0))) for side in (1, -1)]
-    both = min(way) > 0.1 * max(way)
+    both = not one_way(model)
     _, level, viscous, *_ = model.values
     moved = np.sum(np.abs(model.v[model.moving]))
     put_in = level * moved + viscous * np.sum(model.v**2)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from identification.data.findings import Finding
-from identification.data.rough import Rough, explained_when_late, rough_model
+from identification.data.rough import Rough, explained_when_late, one_way
 from identification.data.view import View
 
 LARGE = 0.12
@@ -17,13 +17,11 @@ BETTER = 0.88
 """Unexplained part that a delay leaves, over that without it, from which on it is told."""
 
 
-def of_drift(view: View, model: Rough | None) -> Iterator[Finding]:
+def of_drift(view: View, model: Rough | None, free: Rough | None) -> Iterator[Finding]:
     """A force that follows the time beside what a rough drive needs."""
     if model is None or not model.clean or model.explained < 0.5:
         return
-    way = [float(np.sum(np.maximum(side * model.v, 0.0))) for side in (1, -1)]
-    free = rough_model(view, curve=True)
-    if free is None or min(way) < 0.1 * max(way):
+    if free is None or one_way(model):
         return
     rise, sure = float(free.values[-1]), free.sure(-1)
     spread = float(np.ptp(np.quantile(model.force, (0.25, 0.75))))
@@ -39,11 +37,10 @@ def of_drift(view: View, model: Rough | None) -> Iterator[Finding]:
         )
 
 
-def of_dead_time(view: View, model: Rough | None) -> Iterator[Finding]:
+def of_dead_time(view: View, model: Rough | None, free: Rough | None) -> Iterator[Finding]:
     """A force that explains the motion better when it is moved in time."""
     if model is None or not model.clean or model.explained < 0.5 or abs(model.sure(0)) < 5:
         return
-    free = rough_model(view, curve=True)
     if free is None:
         return
     best, left = 0, 1 - free.explained

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from identification.data.findings import Finding
-from identification.data.rough import Rough
+from identification.data.rough import Rough, one_way
 from identification.data.view import Array, View, count_of
 
 MOVED = 6.0
@@ -71,9 +71,8 @@ def _white(x: Array) -> float:
 
 
 def _one_way(view: View, model: Rough) -> Iterator[Finding]:
-    way = [float(np.sum(np.maximum(side * model.v, 0.0))) for side in (1, -1)]
-    if min(way) <= ONE_WAY * max(way):
-        direction = "forwards" if way[0] > way[1] else "backwards"
+    if one_way(model, ONE_WAY):
+        direction = "forwards" if model.v.sum() > 0 else "backwards"
         yield view.finding(
             "one-way",
             view.name("x"),

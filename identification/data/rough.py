@@ -138,6 +138,20 @@ def explained_when_late(model: Rough, late: float) -> float:
     return _explained(A, b, values)
 
 
+def with_column(model: Rough, column: Array) -> tuple[float, float]:
+    """Value and standard error of one more column, shape (rows,)."""
+    every = max(1, int(2 * model.width))
+    A = np.column_stack([model.columns, column])[::every]
+    values, errors = _robust(A, model.force[::every])
+    return float(values[-1]), float(errors[-1])
+
+
+def one_way(model: Rough, share: float = 0.1) -> bool:
+    """Whether the drive goes back less than a share of its way."""
+    way = [float(np.sum(np.maximum(side * model.v, 0.0))) for side in (1, -1)]
+    return min(way) <= share * max(way)
+
+
 def _explained(A: Array, b: Array, values: Array) -> float:
     """Share of the variance of `b` that a regression explains; farthest samples count less."""
 

@@ -58,6 +58,10 @@ FAULTS: dict[str, tuple[Spoil, str, str, str]] = {
     "one way": (lambda t, x, f: (t[:850], x[:850], f[:850]), "warning", "one-way", "x"),
     "late force": (lambda t, x, f: (t[8:], x[8:], f[:-8]), "warning", "delay", "force"),
     "drifting force": (lambda t, x, f: (t, x, f + 4 * t), "warning", "drift", "force"),
+    "slow hum": (
+        lambda t, x, f: (t, x, f + 10 * np.sin(2 * t)), "warning", "hum", "force"),
+    "gain that differs by the sign": (
+        lambda t, x, f: (t, x, np.where(f > 0, 1.3, 1.0) * f), "warning", "unequal", "force"),
     "coarse encoder": (
         lambda t, x, f: (t, 1e-3 * np.round(x / 1e-3), f), "warning", "resolution", "x"),
     "coarse force": (

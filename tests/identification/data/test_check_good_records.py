@@ -55,7 +55,8 @@ def test_laws(law: str) -> None:
     silent(synthetic_drive_data(law_from_text(law), normal_force=20.0, speeds=(0.004, 0.02, 0.08)))
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
 def test_sensors(seed: int) -> None:
     speeds = (0.004, 0.02, 0.08)
     data = synthetic_drive_data(seed=seed, speeds=speeds, force_noise=5.0, position_noise=1e-6)

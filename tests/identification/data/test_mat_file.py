@@ -175,7 +175,7 @@ def test_damaged_bytes_are_a_sentence_and_never_a_crash(tmp_path: Path) -> None:
         (nested, {}),
     ):
         whole = saved(content, **options)
-        for _ in range(40):
+        for _ in range(25):
             bad = bytearray(whole)
             for place in rng.integers(0, len(bad), 8):
                 bad[place] = rng.integers(0, 256)
@@ -183,4 +183,4 @@ def test_damaged_bytes_are_a_sentence_and_never_a_crash(tmp_path: Path) -> None:
                 read(tmp_path, bytes(bad[: rng.integers(1, len(bad) + 1)]))
             except ValueError:
                 told += 1
-    assert told > 100
+    assert told > 60
