@@ -25,6 +25,7 @@ class Axis:
         name, unit: what is drawn; the label is "name [unit]".
         low, high: its range, low < high; with `logarithmic` 0 < low.
         logarithmic: by decades.
+        whole: ticks at whole numbers only.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Axis:
     low: float
     high: float
     logarithmic: bool = False
+    whole: bool = False
 
     def at(self, values: Array) -> Array:
         """Where `values` stand between low (0) and high (1)."""
@@ -61,6 +63,8 @@ class Axis:
         rough = (self.high - self.low) / most
         decade = 10.0 ** floor(log10(rough))
         step = next(s * decade for s in STEPS if s * decade >= 0.999 * rough)
+        if self.whole:
+            step = max(1.0, ceil(step))
         first, last = ceil(self.low / step - 1e-9), floor(self.high / step + 1e-9)
         digits = max(6, ceil(log10(max(abs(self.low), abs(self.high)) / step)) + 1)
         unit = 10.0**self.power

@@ -34,9 +34,14 @@ def written(value: object) -> str:
         own = getattr(value, item.name)
         if item.default is MISSING:
             given.append(written(own))
-        elif own is not item.default:
+        elif own is not item.default and not _same(own, item.default):
             given.append(f"{item.name}={written(own)}")
     return f"{type(value).__name__}({', '.join(given)})"
+
+
+def _same(value: object, default: object) -> bool:
+    plain = (str, int, float, tuple)
+    return isinstance(value, plain) and isinstance(default, plain) and value == default
 
 
 def _rule(rule: Range | Above | Tied) -> str:

@@ -71,7 +71,7 @@ def lags(one: Series) -> str:
     """Autocorrelation of the residuals with the limits of white ones; "" without order."""
     if not one.correlation.size:
         return ""
-    x = Axis("lag", "samples", 0.0, float(one.lags.max()) + 0.5)
+    x = Axis("lag", "samples", 0.0, float(one.lags.max()) + 0.5, whole=True)
     y = around("autocorrelation", "", [one.correlation, one.low, one.high, np.array([0.0, 1.0])])
     marks = [
         Band("band", float(np.min(one.low)), float(np.max(one.high))),
@@ -109,8 +109,8 @@ def waterfall(fit: "Fitted") -> str:
     same = above < SAME
     shown = np.maximum(above, FLOOR)
     numbers = np.arange(1.0, above.size + 1)
-    x = Axis("start, best first", "", 0.5, above.size + 0.5)
-    name = "-2 log likelihood above the best"
+    x = Axis("start, best first", "", 0.5, above.size + 0.5, whole=True)
+    name = "-2 ln L above the best"
     y = around(name, "", [shown, np.array([FLOOR, 10.0])], logarithmic=True)
     marks: list[Mark] = [
         Level("bound", SAME),

@@ -203,11 +203,13 @@ def above(value: float) -> str:
 def _ranking(ranking: Ranking | None) -> Iterator[str]:
     rows = [] if ranking is None else list(ranking.to_dict()["rows"])
     if rows:
-        names = list(rows[0])
+        names = [name for name in rows[0] if name != "sentence"]
         cells = [[_cell(row.get(name)) for name in names] for row in rows]
-        numbers = [j for j, n in enumerate(names) if isinstance(rows[0][n], int | float)]
-        header = [name.replace("_", " ") for name in names]
-        yield html.table("Laws fitted to the same data, best first", header, cells, numbers)
+        texts = [n for n in names if any(isinstance(row.get(n), str) for row in rows)]
+        numbers = [j for j, n in enumerate(names) if n not in texts]
+        yield html.table("Laws fitted to the same data, best first", names, cells, numbers)
+        said = [(row["law"], row.get("sentence")) for row in rows]
+        yield html.bullets(f"{law}: {sentence}" for law, sentence in said if sentence)
 
 
 def _cell(value: object) -> str:

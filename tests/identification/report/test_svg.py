@@ -74,6 +74,10 @@ def test_ticks_are_few_round_and_distinct(low: float, high: float) -> None:
     assert all(axis.low <= value <= axis.high for value, _ in ticks)
 
 
+def test_ticks_of_counts_are_whole() -> None:
+    assert [label for _, label in Axis("n", "", 0.5, 3.5, whole=True).ticks(9)] == ["1", "2", "3"]
+
+
 def test_small_and_large_numbers_give_their_power_to_the_label() -> None:
     assert Axis("x", "m", -3e-7, 4e-7).label == "x [10⁻⁹ m]"
     assert Axis("F", "N", 0.0, 2e6).label == "F [10⁶ N]"
