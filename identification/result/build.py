@@ -24,6 +24,7 @@ from identification.verdict.judge import Verdict
 from symfric import __version__
 from symfric.foundation.parameters import parameters
 from symfric.foundation.status import Status
+from symfric.foundation.units import turned
 from symfric.laws import Law
 from symfric.scenes import Drive
 from symfric.scenes.base import Scene
@@ -76,7 +77,7 @@ def fitted(
         name=subject.name,
         kind=written(kind),
         records=records,
-        parameters=_estimates(subject, task, found, covariance),
+        parameters=_estimates(subject, task, found, covariance, data.rotary),
         names=tuple(covariance.names[i] for i in shown),
         correlation=covariance.correlation[np.ix_(shown, shown)],
         undetermined=covariance.undetermined,
@@ -101,7 +102,7 @@ def fitted(
 
 
 def _estimates(
-    subject: Subject, task: Task, found: Mapping[str, float], made: Covariance
+    subject: Subject, task: Task, found: Mapping[str, float], made: Covariance, turning: bool
 ) -> dict[str, Estimate]:
     """Every parameter in the order of the subject, then what belongs to records."""
     own = {u.name: u for u in (*task.unknowns.unknowns, *task.residuals.own)}
@@ -117,15 +118,17 @@ def _estimates(
         unit = unknown.unit if unknown else subject.variables[name].unit
         if name not in found:
             held, note = float(subject.held[name]), subject.reasons.get(name, "")
-            unit = _in_forces(subject, name, unit)
+            unit = _in_forces(subject, name, unit, turning)
             estimates[name] = Estimate(held, unit, fixed=True, note=note)
             continue
         i = made.names.index(name)
-        tied = "tied" if name in subject.ties else ""
+        other = "tied" if name in subject.ties else ""
+        if not other and _known(errors[i]) is None:
+            other = "not told by the data"
         estimates[name] = Estimate(
-            found[name], _in_forces(subject, name, unit),
+            found[name], _in_forces(subject, name, unit, turning),
             _known(errors[i]), _known(made.low[i]), _known(made.high[i]), _known(white[i]),
-            note=notes.get(name, tied), nuisance=unknown is not None and unknown.nuisance,
+            note=notes.get(name, other), nuisance=unknown is not None and unknown.nuisance,
         )  # fmt: skip
     return estimates
 
@@ -143,13 +146,13 @@ def _known(value: float) -> float | None:
     return float(value) if isfinite(value) else None
 
 
-def _in_forces(subject: Subject, name: str, unit: str) -> str:
+def _in_forces(subject: Subject, name: str, unit: str, turning: bool) -> str:
     """The unit of a coefficient under a load of 1 N, which is a force then."""
     whole = subject.scene or subject.law
     known = {} if whole is None else parameters(whole)
     if load_of(subject) != 1.0 or name not in known or not is_coefficient(known[name]):
         return unit
-    return "N m" if subject.drive is not None and subject.drive.turning else "N"
+    return turned("N") if turning else "N"
 
 
 def load_of(subject: Subject) -> float | None:

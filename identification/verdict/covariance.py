@@ -121,7 +121,7 @@ def covariance_of(found: Minimum, change: Trace) -> Covariance:
 def _sensitivity(found: Minimum, own: list[int]) -> Array:
     """Norm of dr/dvalue of unknowns with the others held; of tied ones the inverse value, (k,)."""
     size = 1 / np.maximum(np.abs(found.values), 1e-300)
-    alone = np.linalg.norm(found.J @ np.linalg.inv(found.slope[own]), axis=0)
+    alone = np.linalg.norm(found.J @ _inverse(found.slope[own]), axis=0)
     for i, s in zip(own, alone, strict=True):
         size[i] = s if s > 0 else size[i]
     return size
@@ -129,10 +129,17 @@ def _sensitivity(found: Minimum, own: list[int]) -> Array:
 
 def _spread(found: Minimum, own: list[int], some: Array) -> Array:
     """All values where those of the unknowns are `some`: tied ones follow in first order."""
-    w = np.linalg.solve(found.slope[own], some - found.values[own])
+    w = _inverse(found.slope[own]) @ (some - found.values[own])
     there = found.values + found.slope @ w
     there[own] = some
     return there
+
+
+def _inverse(slope: Array) -> Array:
+    """dw/dvalues, shape (n, n); zero of a coordinate without effect, such as exp(-800)."""
+    size = np.abs(slope).max(axis=1)
+    size[size == 0.0] = 1.0
+    return np.linalg.pinv(slope / size[:, None]) / size
 
 
 def _intervals(found: Minimum, error: Array, freedom: Array) -> tuple[Array, Array]:

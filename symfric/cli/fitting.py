@@ -18,7 +18,7 @@ from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
 
 KINDS = {
-    "points": "forces at given velocities",
+    "points": "forces F at velocities v, over a time where --column t=NAME or --step says so",
     "inverse": "the force that the measured motion needs",
     "shooting": "simulated motion",
     "loop": "simulated motion under the controller of the record",
@@ -57,13 +57,14 @@ def reading(
 ) -> Reading:
     """The texts of --column and --unit: SIGNAL=NAME, repeated, or all columns in their order.
 
+    Points have a time where a column t or a step is given.
+
     Raises:
         ValueError: some of both, or a name without a value.
     """
-    return Reading(
-        _named_or_all("--column", columns, "x=pos", "t,x,-,force"),
-        _units(units), step, variable, points,
-    )  # fmt: skip
+    named = _named_or_all("--column", columns, "x=pos", "t,x,-,force")
+    timed = step is not None or (named is not None and "t" in named)
+    return Reading(named, _units(units), step, variable, points and not timed)
 
 
 def _named_or_all(
