@@ -179,9 +179,10 @@ def descend(
             break
     status, message = _verdict(search)
     end = search.best
+    w = np.maximum(end.w, task.unknowns.floor)
     return Start(
-        number, w0, end.w, end.cost, status, message, evaluations - search.left,
-        search.task.noise, objective(search.task, end), tuple(search.costs),
+        number, w0, w, end.cost, status, message, evaluations - search.left, search.task.noise,
+        objective(search.task, end), tuple(search.costs),
     )  # fmt: skip
 
 

@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 DECADES = 6.0
 """Decades from its start beyond which a bound of a logarithmic value is none for the solver, whose
 steps feel bounds from afar; who makes the law checks it."""
+VANISHED = 12.0
+"""Decades below its start at which a logarithmic value that wants to be nothing is at its bound."""
 NEAR = 0.1
 """Excess over a lower value, over the scale, up to which it is fitted by its value: the excess of
 static friction and the velocity at which it falls trade along a line of their logarithms."""
@@ -116,7 +118,18 @@ class Unknowns:
     def at_bound(self, w: Array) -> NDArray[np.bool_]:
         """Which of the unknowns stand at a bound, shape (n,)."""
         near = AT_BOUND * np.minimum(1.0, self.upper - self.lower)
-        return (w - self.lower < near) | (self.upper - w < near)
+        return (w - np.maximum(self.lower, self.floor) < near) | (self.upper - w < near)
+
+    @property
+    def floor(self) -> Array:
+        """Coordinates below which a logarithmic value is as good as nothing, shape (n,).
+
+        The search does not know them, since its steps feel bounds from afar.
+        """
+        sizes = [u.scale if u.above else u.start for u in self.unknowns]
+        open_ = [u.logarithmic and not u.below for u in self.unknowns] & np.isinf(self.lower)
+        first = np.log(np.where(open_, sizes, 1.0)) - VANISHED * np.log(10.0)
+        return np.where(open_, first, -np.inf)
 
 
 def unknowns_of(
