@@ -1,9 +1,9 @@
 """Friction in the joints of an arm under gravity, from angles and torques of two recorded motions.
 
-Each joint has its own law, and its bearing carries the weight and the reactions of all links beyond
-it: the normal force of the shoulder depends on what the elbow does. Nothing of that is measured.
-The balance of forces is solved for the reactions at every sample, friction included, and what is
-left of the torques is minimised over coefficients of friction, viscosities and the payload.
+Each joint has its own law, and its bearing carries the reactions of all links beyond it: the normal
+force of the shoulder depends on what the elbow does. Nothing of that is measured. The balance
+of forces is solved for the reactions at every sample, friction included, and what is left of the
+torques is minimised over coefficients of friction, viscosities and the payload.
 
 The records are simulated here, with the servo as springs and dampers in the joints: encoders with
 1e-5 rad of noise, torques with 0.05 N m.
@@ -12,20 +12,21 @@ The records are simulated here, with the servo as springs and dampers in the joi
 """
 
 import sys
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
 from identification import Dataset, Fit, InverseDynamics
-from symfric import Linear, simulate
+from symfric import simulate
+from symfric.foundation.numeric import cos, sin
 from symfric.foundation.parameters import Variable
 from symfric.laws import Coulomb, Sum, Viscous
 from symfric.model import Model
 from symfric.multibody import JointFriction, JointSpringDamper, Mechanism, Revolute
-
-Array = NDArray[np.float64]
 
 UP, SIDE = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)
 JOINTS = {"base": UP, "shoulder": SIDE, "elbow": SIDE}
@@ -38,7 +39,7 @@ STIFFNESS, DAMPING = 4000.0, 120.0  # N m/rad, N m s/rad of the servo
 
 
 def arm(servo: bool) -> Model:
-    """Three links of 0.4 m with a payload; the torques are inputs, on top of a servo or alone."""
+    """Three links with a payload; the torques are inputs, on top of a servo or alone."""
     p = {n: Variable(n, UNITS[n.split("_")[0]], start=x, lower=0.0) for n, x in TRUE.items()}
     m = Mechanism("arm", gravity=(0.0, 0.0, -9.81))
     m.frame("ground.tip", at=(0.0, 0.0, 0.5), z=UP)
@@ -64,19 +65,21 @@ def recorded(seed: int, duration: float = 6.0, rate: float = 400.0) -> Dataset:
     """Angles and torques while every joint follows sines, with noise."""
     rng = np.random.default_rng(seed)
     t = np.arange(round(duration * rate) + 1) / rate
-    servo, wanted = dict[str, Linear](), dict[str, tuple[Array, Array]]()
-    for name in JOINTS:
-        q, rate_of = np.zeros_like(t), np.zeros_like(t)
-        for w, size in zip(2 * np.pi * rng.uniform(0.15, 0.6, 3), (0.5, 0.3, 0.2), strict=True):
-            q += size * (1 - np.cos(w * t))
-            rate_of += size * w * np.sin(w * t)
-        wanted[name] = q, rate_of
-        servo[f"tau_{name}"] = Linear(t, STIFFNESS * q + DAMPING * rate_of)
+    waves = {name: 2 * np.pi * rng.uniform(0.15, 0.6, 3) for name in JOINTS}
+
+    def pull(t: Any, name: str) -> Any:
+        """What the servo adds to -STIFFNESS q - DAMPING q' [N m]."""
+        return sum(
+            size * (STIFFNESS * (1 - cos(w * t)) + DAMPING * w * sin(w * t))
+            for w, size in zip(waves[name], (0.5, 0.3, 0.2), strict=True)
+        )
+
+    servo = {f"tau_{name}": partial(pull, name=name) for name in JOINTS}
     run = simulate(arm(servo=True), duration, u=servo, t_eval=t, rtol=1e-7)
-    signals: dict[str, Array] = {}
-    for name, (q, rate_of) in wanted.items():
+    signals = dict[str, NDArray[np.float64]]()
+    for name in JOINTS:
         angle, speed = run[f"q_{name}"], run[f"q_{name}_rate"]
-        torque = STIFFNESS * (q - angle) + DAMPING * (rate_of - speed)
+        torque = pull(t, name) - STIFFNESS * angle - DAMPING * speed
         signals[f"q_{name}"] = angle + 1e-5 * rng.standard_normal(t.size)
         signals[f"tau_{name}"] = torque + 0.05 * rng.standard_normal(t.size)
     units = {n: "rad" if n.startswith("q") else "N m" for n in signals}
@@ -88,8 +91,7 @@ def main(out: Path) -> None:
     start = {n: 2.0 * x for n, x in TRUE.items()}
     data = recorded(1) + recorded(2)
     found = Fit(InverseDynamics(), arm(servo=False), data, free=start).solve()
-    console = Console()
-    console.print(str(found))
+    (console := Console()).print(str(found))
     for name, true in TRUE.items():
         console.print(f"{name}: {found.values[name]:.4g}, put in {true:g}")
     found.plot(out / "identify_arm.png")
