@@ -5,8 +5,7 @@ force of the shoulder depends on what the elbow does. Nothing of that is measure
 of forces is solved for the reactions at every sample, friction included, and what is left of the
 torques is minimised over coefficients of friction, viscosities and the payload.
 
-The records are simulated here, with the servo as springs and dampers in the joints: encoders with
-1e-5 rad of noise, torques with 0.05 N m.
+The records are simulated, servos as springs and dampers: noise of 1e-5 rad and 0.05 N m.
 
     python examples/identify_arm.py [OUT]
 """

@@ -12,7 +12,7 @@ from symfric.foundation.parameters import check_names
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-CASES = ("lugre", "coverage", "emps", "franka", "starts", "gms", "files")
+CASES = ("lugre", "coverage", "emps", "laws", "franka", "starts", "gms", "files")
 """Modules `symfric.bench.identification_<case>`, each with `measure(quick) -> rows`."""
 Tell = Callable[[str, float], None]
 
