@@ -174,7 +174,9 @@ def _residuals(fit: "Fitted") -> Iterator[str]:
 
 
 def _outcome(test: "Test") -> str:
-    return "passed" if test.passed else ("failed" if test.decides else "no, allowed for")
+    if test.passed:
+        return "passed" if test.p >= test.limit else "too small to count"
+    return "failed" if test.decides else "no, allowed for"
 
 
 def _starts(fit: "Fitted") -> Iterator[str]:

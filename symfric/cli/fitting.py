@@ -100,13 +100,16 @@ def laws_in(text: str) -> list[str]:
     return laws
 
 
-def kind_of(name: str, windows: str | None) -> Any:
-    """The kind of residuals; `windows` [s] or "choose" of simulated motions."""
+def kind_of(name: str, windows: str | None, free: dict[str, Any]) -> Any:
+    """The kind of residuals; `windows` [s] or "choose" of simulated motions.
+
+    Of points an `offset` among `free` is taken out of it: a constant force beside friction.
+    """
     check_names("--kind", [name], KINDS)
     if windows is not None and name != "shooting":
         raise ValueError(f"--windows: expected with --kind shooting only, got --kind {name}")
     if name == "points":
-        return Points()
+        return Points(offset="offset" in free and free.pop("offset") is None)
     if name == "inverse":
         return InverseDynamics()
     if name == "loop":
@@ -115,7 +118,7 @@ def kind_of(name: str, windows: str | None) -> Any:
     return Shooting(windows=length)
 
 
-def free_in(texts: Iterable[str] | None) -> dict[str, Any] | None:
+def free_in(texts: Iterable[str] | None) -> dict[str, Any]:
     """Parameters that are fitted, and how: see `free_one`."""
     found: dict[str, Any] = {}
     for text in texts or ():
@@ -123,7 +126,7 @@ def free_in(texts: Iterable[str] | None) -> dict[str, Any] | None:
         if not name or name in found or (equals and not how):
             raise checks.refused("--free", "NAME or NAME=HOW, every name once", text)
         found[name] = free_one(name, how)
-    return found or None
+    return found
 
 
 def free_one(name: str, how: str) -> Any:

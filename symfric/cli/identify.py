@@ -101,10 +101,11 @@ def identify(
     Example: symfric identify run*.csv --law stribeck,lugre --validate v.csv --report out.html
     """
     check_outputs(report, json, picture=plot)
-    laws, chosen = laws_in(law), kind_of(kind, windows)
+    laws, wishes = laws_in(law), free_in(free)
+    chosen = kind_of(kind, windows, wishes)
     read = reading(columns, units, step, variable, kind == "points")
     asked: dict[str, Any] = {
-        "free": free_in(free),
+        "free": wishes or None,
         "fixed": numbers("--fix", fixed) or None,
         "normal_force": normal_force,
         "noise": numbers("--noise", noise) or "estimate",

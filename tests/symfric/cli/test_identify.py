@@ -35,7 +35,7 @@ def points(path: Path) -> None:
     """A friction curve in mm/s and kN, headed by names that nobody knows."""
     rng = np.random.default_rng(0)
     v = np.concatenate([-np.geomspace(1, 200, 30), np.geomspace(1, 200, 30)])
-    F = np.sign(v) * 15.0 + 0.08 * v + 0.1 * rng.standard_normal(v.size)
+    F = 3.0 + np.sign(v) * 15.0 + 0.08 * v + 0.1 * rng.standard_normal(v.size)
     lines = [f"{a},{b / 1e3}" for a, b in zip(v.tolist(), F.tolist(), strict=True)]
     path.write_text("\n".join(["speed,load", *lines]) + "\n")
 
@@ -80,12 +80,13 @@ def test_points_of_a_curve_with_columns_and_units_of_the_call(
     line = [
         "identify", str(folder / "points.csv"), "--law", "coulomb+viscous", "--kind", "points",
         "--column", "v=speed", "--column", "F=load", "--unit", "v=mm/s", "--unit", "F=kN",
-        "--json", "-",
+        "--free", "offset", "--json", "-",
     ]  # fmt: skip
     assert main(line) == 0
     parameters = json.loads(capsys.readouterr().out)["parameters"]
     assert parameters["mu_d"]["value"] == pytest.approx(15.0, abs=0.1)
     assert parameters["sigma_2"]["value"] == pytest.approx(80.0, abs=1.0)
+    assert parameters["offset"]["value"] == pytest.approx(3.0, abs=0.1)
 
 
 def test_the_text_fits_80_columns_and_files_are_written(
