@@ -91,10 +91,20 @@ def friction_of_the_guide_is_found(printed: str, folder: Path) -> None:
     assert "quarter_car_general fitted by Shooting(x0='given'): SOLVED" in printed
 
 
+def drive_is_found_in_its_loop(printed: str, folder: Path) -> None:
+    """Of the measured drive what the best simulation reaches; of a simulated one the noise."""
+    error = re.findall(r"closed loop, other record: x ([\d.]+) %, force ([\d.]+) %", printed)
+    measured = "simulated records" not in printed
+    assert float(error[0][0]) <= (1.4e-3 if measured else 1e-3)
+    assert float(error[0][1]) <= (4.65 if measured else 3.0)
+    assert printed.count(" mm\n") == 4
+
+
 LONG = (
     "arm_to_a_place",
     "co_design",
     "crank_start_up",
+    "identify_emps",
     "identify_pendulum",
     "identify_quarter_car",
     "quarter_car_profile",
@@ -104,6 +114,7 @@ LONG = (
 """Whole solves of several seconds; `tests/examples/test_motions.py` looks at their problems."""
 
 SAYS = dict.fromkeys(LONG, motion_is_verified) | {
+    "identify_emps": drive_is_found_in_its_loop,
     "identify_arm": friction_of_each_joint_is_found,
     "identify_pendulum": friction_of_the_swings_is_found,
     "identify_quarter_car": friction_of_the_guide_is_found,

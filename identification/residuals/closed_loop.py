@@ -13,7 +13,6 @@ Source of the measure: Janot, Gautier, Brunot, Nonlinear System Identification B
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, final
 
 import casadi as ca
@@ -58,8 +57,8 @@ class Controller:
         reference: channels of the data that it follows.
         disturbance: channel that is added to the command; None: nothing is.
         gain: force per command [N or N m per command unit].
-        start: its state at the first sample: numbers, or a Function of the measured quantities;
-            None: zeros.
+        start: its state before the first sample: numbers, or a Function of (x, v) there; None:
+            zeros.
     """
 
     step: ca.Function
@@ -85,10 +84,10 @@ class Controller:
             )
         if isinstance(self.start, ca.Function):
             fits = (self.start.n_in(), self.start.numel_in(0), self.start.numel_out(0))
-            if fits != (1, sizes[1], n):
+            if fits != (1, 2, n):
                 raise ValueError(
-                    f"{where}: start: expected a Function of {sizes[1]} measured quantities that "
-                    f"gives {n}, got one of {fits[1]} that gives {fits[2]}"
+                    f"{where}: start: expected a Function of (x, v), 2 numbers, that gives {n}, "
+                    f"got one of {fits[1]} that gives {fits[2]}"
                 )
         elif self.start is not None:
             start = checks.array(f"{where}: start", self.start)
@@ -137,7 +136,7 @@ class Controller:
         """(x, v) -> state at the first sample, and its slope."""
         x = ca.SX.sym("x", 2)
         if isinstance(self.start, ca.Function):
-            state = self.start(x[: self.seen])
+            state = self.start(x)
         else:
             state = ca.SX(ca.DM(self.start or [0.0] * self.memory))
         both = ca.vertcat(x, state)
@@ -151,7 +150,12 @@ def _times(slopes: ca.SX, parts: Sequence[Tangent]) -> ca.SX:
 
 
 def position_controller(loop: PositionLoop, step: float) -> Controller:
-    """The controller that a `PositionLoop` describes, at a sample time of `step` [s]."""
+    """The controller that a `PositionLoop` describes, at a sample time of `step` [s].
+
+    Before the first sample the drive has moved with the velocity that it has there.
+    """
+    xv = ca.SX.sym("xv", 2)
+    before = ca.vertcat(xv[0] - step * xv[1], xv[0] - 1.5 * step * xv[1])
     s, x, r = ca.SX.sym("s", 2), ca.SX.sym("x"), ca.SX.sym("r")
     mean = (x + s[0]) / 2
     command = loop.kp * loop.kv * (r - x) - loop.kv * (mean - s[1]) / step
@@ -159,7 +163,7 @@ def position_controller(loop: PositionLoop, step: float) -> Controller:
     return Controller(
         ca.Function("position_loop", [s, x, r], [ca.vertcat(x, mean), command]),
         gain=loop.gain,
-        start=ca.Function("position_start", [x], [ca.vertcat(x, x)]),
+        start=ca.Function("position_start", [xv], [before]),
     )
 
 
@@ -327,7 +331,7 @@ class LoopRows:
     runs: tuple[Run, ...]
     estimated: bool
 
-    @cached_property
+    @property
     def own(self) -> tuple[Unknown, ...]:
         """Position and velocity at the start of each record, where they are fitted."""
         if not self.estimated:
@@ -346,7 +350,7 @@ class LoopRows:
         """Parameters of the model, then start values."""
         return (*self.parameters, *(unknown.name for unknown in self.own))
 
-    @cached_property
+    @property
     def channels(self) -> tuple[Channel, ...]:
         """Each signal of each record."""
         found, first = list[Channel](), 0

@@ -82,6 +82,16 @@ def test_residuals_vanish_at_the_impulse_clamp(rows: LoopRows) -> None:
     assert np.linalg.norm(force) < 0.01 * np.linalg.norm(rows.channels[1].measured)
 
 
+def test_a_record_may_begin_in_motion(data: Dataset, drive: Subject) -> None:
+    """The controller remembers the velocity that the drive has: no kick at the cut."""
+    part = Dataset((data[0].at(slice(1000, None)),), "part")
+    rows = ClosedLoop().prepare(drive, part)
+    found = rows.at(of(TRUE, rows.names))
+    assert not isinstance(found, str)
+    force = rows.channels[1]
+    assert np.abs(found.r[force.rows]).max() < 0.05 * np.abs(force.measured).max()
+
+
 def test_disturbance_enters_after_the_limit(rows: LoopRows) -> None:
     force = rows.runs[0].motion(of(TRUE, rows.names), np.zeros(2))
     assert not isinstance(force, str)
@@ -129,7 +139,9 @@ def test_a_controller_of_ones_own_is_the_same_loop(data: Dataset, drive: Subject
     command = LOOP.kp * LOOP.kv * (r - x) - LOOP.kv * (mean - s[1]) / STEP
     command = ca.fmin(ca.fmax(command, -LOOP.limit), LOOP.limit)
     step = ca.Function("mine", [s, x, r], [ca.vertcat(x, mean), command])
-    start = ca.Function("start", [x], [ca.vertcat(x, x)])
+    xv = ca.SX.sym("xv", 2)
+    before = ca.vertcat(xv[0] - STEP * xv[1], xv[0] - 1.5 * STEP * xv[1])
+    start = ca.Function("start", [xv], [before])
     controller = Controller(step, ("goal",), "pulse", gain=LOOP.gain, start=start)
     signals = {**data[0].signals, "goal": REFERENCE, "pulse": PULSE}
     units = {**data[0].units, "goal": "m", "pulse": "1"}
@@ -168,6 +180,10 @@ def test_a_controller_of_another_shape_is_refused() -> None:
     step = ca.Function("three", [s, x, r], [s, r])
     with pytest.raises(ValueError, match="measured of 1 or 2"):
         Controller(step)
+    x = ca.SX.sym("x")
+    step = ca.Function("one", [s, x, r], [s, r])
+    with pytest.raises(ValueError, match="a Function of"):
+        Controller(step, start=ca.Function("start", [x], [ca.vertcat(x, x)]))
     with pytest.raises(ValueError, match="signals"):
         ClosedLoop(signals=("x", "a"))
 
