@@ -68,18 +68,27 @@ def many_starts(
     except KeyboardInterrupt:
         if not done:
             raise
+        _mark_interrupted(done)
     finally:
         found.close()
-    if done and done[-1].status is not Status.INTERRUPTED:
+    if all(start.status is not Status.INTERRUPTED for start in done):
         _go_on(task, done, evaluations)
     return tuple(_alike(done))
+
+
+def _mark_interrupted(done: list[Start]) -> None:
+    """Say so of the best start, unless it is at a minimum."""
+    best = best_of(done)
+    if not best.status.ok:
+        said = f"interrupted by the user after {len(done)} starts; the best so far"
+        done[done.index(best)] = replace(best, status=Status.INTERRUPTED, message=said)
 
 
 def _go_on(task: Task, done: list[Start], evaluations: int) -> None:
     """More evaluations for the best of those `done`, if it has used its own up."""
     best = best_of(done)
     if best.status is not Status.MAX_ITERATIONS:
-        return
+        return  # at a minimum, or nowhere
     more = descend(task, best.w, best.number, evaluations)
     if more.objective <= best.objective:
         spent = best.evaluations + more.evaluations

@@ -215,6 +215,21 @@ def test_an_interruption_keeps_the_best_so_far() -> None:
     assert end.cost < np.inf and data.calls == 5
 
 
+def test_an_interruption_between_starts_is_said_of_the_best() -> None:
+    at = problem(decay())
+    bad = at.unknowns.of({"a": 1.0, "b": 1e3, "c": 0.0})
+
+    def interrupt(text: str, done: float) -> None:
+        del text
+        if done >= 0.5:
+            raise KeyboardInterrupt
+
+    first = many_starts(at, [bad, bad], progress=interrupt)
+    assert [s.status for s in first] == [Status.INTERRUPTED]
+    good = many_starts(at, [at.unknowns.start, bad], progress=interrupt, agree=0)
+    assert [s.status for s in good] == [Status.SOLVED]
+
+
 def test_any_executor_gives_the_same_bits() -> None:
     at = problem(decay(other=1.0))
     here = many_starts(at, starts(at), agree=0)
