@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from identification.signals.filters import Filter as Filter
     from identification.signals.filters import central_difference as central_difference
     from identification.signals.filters import lowpass as lowpass
+    from identification.signals.plateaus import plateaus as plateaus
     from identification.signals.regress import LinearFit as LinearFit
     from identification.signals.regress import linear_regression as linear_regression
     from identification.starts.break_away import break_away as break_away
@@ -69,6 +70,7 @@ else:
             "identification.select": "select",
             "identification.signals.differentiate": "MotionSignals differentiate",
             "identification.signals.filters": "Filter central_difference lowpass",
+            "identification.signals.plateaus": "plateaus",
             "identification.signals.regress": "LinearFit linear_regression",
             "identification.starts.break_away": "break_away",
             "identification.starts.hysteresis": "hysteresis",
