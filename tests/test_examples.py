@@ -100,6 +100,17 @@ def drive_is_found_in_its_loop(printed: str, folder: Path) -> None:
     assert printed.count(" mm\n") == 4
 
 
+def friction_is_found_in_every_file(printed: str, folder: Path) -> None:
+    """Nine formats, one law: every parameter to 3 %, and nothing wrong with the data."""
+    rows = [[c.strip() for c in line.split("│")[1:-1]] for line in printed.splitlines()]
+    truth, *found = [row for row in rows if row]
+    assert len(found) == 9
+    for row in found:
+        assert row[2] == "nothing", row
+        for value, true in zip(row[3:], truth[3:], strict=True):
+            assert abs(float(value) / float(true) - 1) < 0.03, row
+
+
 LONG = (
     "arm_to_a_place",
     "co_design",
@@ -107,6 +118,7 @@ LONG = (
     "identify_emps",
     "identify_pendulum",
     "identify_quarter_car",
+    "identify_raw_files",
     "quarter_car_profile",
     "swing_up",
     "through_a_spring",
@@ -117,6 +129,7 @@ SAYS = dict.fromkeys(LONG, motion_is_verified) | {
     "identify_emps": drive_is_found_in_its_loop,
     "identify_arm": friction_of_each_joint_is_found,
     "identify_pendulum": friction_of_the_swings_is_found,
+    "identify_raw_files": friction_is_found_in_every_file,
     "identify_quarter_car": friction_of_the_guide_is_found,
     "out_and_back": out_and_back_is_the_motion_known_on_paper,
     "mpc_drive": drives_get_there_and_the_c_is_verified,

@@ -14,7 +14,9 @@ SURE = 4.5
 LAGS = (-20, -10, -5, -3, -2, -1, 1, 2, 3, 5, 10, 20)
 """Delays that are tried, in samples."""
 BETTER = 0.88
-"""Unexplained part that a delay leaves, over that without it, from which on it is told."""
+"""Unexplained part that a delay leaves, over that without it, from which on it is told ..."""
+WORSE = 1.05
+"""... where the same lead leaves more."""
 
 
 def of_drift(view: View, model: Rough | None, free: Rough | None) -> Iterator[Finding]:
@@ -43,12 +45,10 @@ def of_dead_time(view: View, model: Rough | None, free: Rough | None) -> Iterato
         return
     if free is None:
         return
-    best, left = 0, 1 - free.explained
-    for lag in LAGS:
-        unexplained = 1 - explained_when_late(free, lag * model.step)
-        if unexplained < left:
-            best, left = lag, unexplained
-    if left < BETTER * (1 - free.explained) and abs(best) > 1:
+    now = max(1 - free.explained, 1e-9)
+    left = {lag: (1 - explained_when_late(free, lag * model.step)) / now for lag in LAGS}
+    best = min(left, key=lambda lag: left[lag])
+    if left[best] < BETTER and left[-best] > WORSE and abs(best) > 1:
         name = view.name("force")
         word = "late" if best > 0 else "early"
         yield view.finding(
