@@ -87,8 +87,8 @@ def test_errors_in_the_data_stand_first() -> None:
 
 
 def test_a_page_of_long_records_stays_small() -> None:
-    short, long = (len(page_of(make(records=1, starts=1, n=n))) for n in (4_000, 40_000))
-    assert long < 1.3 * short < 300_000
+    short, long = (len(page_of(make(records=1, starts=1, n=n))) for n in (3_000, 12_000))
+    assert long < 1.3 * short < 250_000
 
 
 def test_no_spike_is_lost_and_the_ends_stay() -> None:
@@ -115,13 +115,12 @@ def test_no_line_is_drawn_across_a_gap() -> None:
 
 
 def test_the_picture_has_units_on_every_axis(fit: Fitted, tmp_path: Path) -> None:
-    figure = fit.plot()
+    figure = fit.plot(tmp_path / "fit.svg")
     labels = [axis.get_ylabel() for axis in figure.axes]
     assert labels[0] == "friction [N]"
     assert labels.count("force [N]") == 2
     assert labels.count("autocorrelation") == 2
     assert figure.axes[0].get_xlabel() == "v [m/s]"
-    fit.plot(tmp_path / "fit.svg", ["force"])
     assert (tmp_path / "fit.svg").read_text().startswith("<?xml")
     with pytest.raises(ValueError, match="force"):
         fit.plot(names=["forc"])
