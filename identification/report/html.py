@@ -47,6 +47,12 @@ def code(text: str) -> str:
     return f"<pre><code>{escape(text)}</code></pre>" if text else ""
 
 
+def details(summary: str, *parts: str) -> str:
+    """What is shown on request."""
+    inside = "".join(parts)
+    return f"<details><summary>{escape(summary)}</summary>{inside}</details>" if inside else ""
+
+
 def heading(text: str) -> str:
     """A heading inside a section."""
     return f"<h3>{escape(text)}</h3>"

@@ -60,15 +60,22 @@ class Axis:
         """Round values inside the range and their labels."""
         if self.logarithmic:
             return self._decades(most)
-        rough = (self.high - self.low) / most
-        decade = 10.0 ** floor(log10(rough))
-        step = next(s * decade for s in STEPS if s * decade >= 0.999 * rough)
-        if self.whole:
-            step = max(1.0, ceil(step))
+        step = self._step(most)
         first, last = ceil(self.low / step - 1e-9), floor(self.high / step + 1e-9)
         digits = max(6, ceil(log10(max(abs(self.low), abs(self.high)) / step)) + 1)
         unit = 10.0**self.power
         return [(k * step, f"{k * step / unit:.{digits}g}") for k in range(first, last + 1)]
+
+    def _step(self, most: int) -> float:
+        """The coarsest round step that has about `most` ticks, and three at least."""
+        rough = (self.high - self.low) / most
+        decade = 10.0 ** floor(log10(rough))
+        steps = [s * d for d in (decade / 10, decade) for s in STEPS[:-1]] + [10 * decade]
+        coarse = next(s for s in steps if s >= 0.999 * rough)
+        if self.whole:
+            return max(1.0, ceil(coarse))
+        finer = [s for s in steps if s <= coarse and self.high // s - -(-self.low // s) >= 2]
+        return finer[-1] if finer else coarse
 
     def _decades(self, most: int) -> list[tuple[float, str]]:
         first, last = ceil(log10(self.low) - 1e-9), floor(log10(self.high) + 1e-9)

@@ -58,6 +58,7 @@ svg .dots.measured { stroke-width: 2.4; stroke-opacity: .75; }
 svg .dots.sample { stroke-width: 6; stroke-opacity: 1; }
 svg .dots.good { stroke: var(--good); stroke-width: 7; } svg .dots.bad { stroke: var(--bad);
   stroke-width: 7; } svg .dots.doubtful { stroke: var(--doubtful); stroke-width: 7; }
+details { margin: .4rem 0; } summary { cursor: pointer; color: var(--soft); }
 footer { margin-top: 3rem; color: var(--soft); font-size: .85rem; }
 code { font-size: .9em; overflow-wrap: anywhere; white-space: pre-wrap; }
 @media print { :root { color-scheme: light; --ink: #000; --soft: #444; --paper: #fff;

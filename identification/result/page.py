@@ -12,6 +12,7 @@ from identification.result.text import (
     MANY,
     best_starts,
     correlated,
+    count_of,
     interval,
     number,
     percent,
@@ -131,7 +132,7 @@ def _errors(caption: str, errors: Errors, records: Sequence[str]) -> str:
     rows = [
         (f"[{records.index(record)}] {record}" if several and record in records else record,
          signal, with_unit(number(e.rms, 3), e.unit), percent(e.relative, 3),
-         with_unit(number(e.largest, 3), e.unit), f"{e.rows}", number(e.effective, 3))
+         with_unit(number(e.largest, 3), e.unit), f"{e.rows}", count_of(e.effective))
         for (record, signal), e in errors.items()
     ]  # fmt: skip
     header = ("record", "signal", "rms", "of the signal", "largest", "rows", "independent rows")
@@ -154,14 +155,13 @@ def _friction(fit: "Fitted") -> Iterator[str]:
 
 
 def _residuals(fit: "Fitted") -> Iterator[str]:
-    rows = [
-        (t.channel, t.name, number(t.statistic, 3), f"{t.p:.2g}", f"{t.limit:.2g}", _outcome(t))
-        for t in fit.verdict.tests
-    ]
-    kinds = ["good" if t.passed else "doubtful" * t.decides for t in fit.verdict.tests]
-    yield html.table(
-        "Tests", ("channel", "test", "statistic", "p", "limit", "result"), rows, (2, 3, 4), kinds
-    )
+    tests = fit.verdict.tests
+    missed = [t for t in tests if not t.passed]
+    if missed:
+        yield _tests("Tests that were not passed", missed)
+    else:
+        yield html.paragraph(f"All {len(tests)} tests were passed.")
+    yield html.details(f"All {len(tests)} tests", _tests("Tests of the residuals", tests))
     if fit.noise:
         units = {signal: e.unit for (_, signal), e in fit.errors.items()}
         noise = [(n, with_unit(number(s, 4), units.get(n, ""))) for n, s in fit.noise.items()]
@@ -171,6 +171,16 @@ def _residuals(fit: "Fitted") -> Iterator[str]:
         drawing = charts.lags(one)
         if drawing:
             yield html.figure(drawing)
+
+
+def _tests(caption: str, tests: "Sequence[Test]") -> str:
+    rows = [
+        (t.channel, t.name, number(t.statistic, 3), f"{t.p:.2g}", f"{t.limit:.2g}", _outcome(t))
+        for t in tests
+    ]
+    kinds = ["good" if t.passed else "doubtful" * t.decides for t in tests]
+    header = ("channel", "test", "statistic", "p", "limit", "result")
+    return html.table(caption, header, rows, (2, 3, 4), kinds)
 
 
 def _outcome(test: "Test") -> str:

@@ -69,7 +69,7 @@ def _curve(axis: Axes, curve: Curve, name: str) -> None:
     axis.set_ylim(low, high)
     axis.set_xlabel(f"v [{curve.v_unit}]")
     axis.set_ylabel(f"friction [{curve.F_unit}]")
-    _legend(axis)
+    axis.legend(loc="upper left", fontsize="small", markerscale=2)
 
 
 def limits(curve: Curve) -> tuple[float, float]:

@@ -48,6 +48,11 @@ def number(value: float | None, digits: int = 6) -> str:
     return "-" if value is None or not isfinite(value) else f"{value:.{digits}g}"
 
 
+def count_of(value: float) -> str:
+    """About so many; a dash for nobody knows."""
+    return f"{value:.0f}" if value >= 10.0 else number(value, 2)
+
+
 def rounded(value: float, error: float | None) -> str:
     """`value` with the digits that its standard error leaves, two of them uncertain."""
     if error is None or not isfinite(error) or error <= 0.0 or value == 0.0:

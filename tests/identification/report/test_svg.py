@@ -63,12 +63,15 @@ def test_a_logarithmic_axis_has_its_decades() -> None:
     np.testing.assert_allclose(middle, 0.5)
 
 
-@pytest.mark.parametrize(("low", "high"), [(-3e-7, 4e-7), (0.0, 1e6), (2.0, 2.0 + 1e-9)])
+@pytest.mark.parametrize(
+    ("low", "high"), [(-3e-7, 4e-7), (0.0, 1e6), (2.0, 2.0 + 1e-9), (-8.5e-4, 8.6e-4)]
+)
 def test_ticks_are_few_round_and_distinct(low: float, high: float) -> None:
     axis = around("x", "m", [np.array([low, high])])
     ticks = axis.ticks()
     labels = [label for _, label in ticks]
-    assert 2 <= len(ticks) <= 8
+    assert 3 <= len(ticks) <= 8
+    assert 3 <= len(axis.ticks(3)) <= 5
     assert len(set(labels)) == len(labels)
     assert max(map(len, labels)) <= 12
     assert all(axis.low <= value <= axis.high for value, _ in ticks)
