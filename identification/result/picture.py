@@ -48,7 +48,7 @@ def picture(fit: "Fitted", names: Sequence[str] = (), path: str | Path | None = 
         if one in ordered:
             _lags(next(left), one)
     word = "" if fit.status.name == "SOLVED" else f": {fit.status.name.lower()}"
-    axes[0].set_title(f"{fit.name}{word}", loc="left")
+    figure.suptitle(f"{fit.name}{word}", x=0.01, ha="left", fontsize="large")
     figure.align_ylabels(axes)
     return save(figure, path)
 
