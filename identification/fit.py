@@ -129,10 +129,12 @@ class Fit:
         findings = findings_of(kind, self.data)
         seen = measured(kind, self.data, self.normal_force)
         imposed = isinstance(kind, Points) and all(r.t is not None for r in self.data)
+        given: Mapping[str, float] = self.start if isinstance(self.start, Mapping) else {}
         found = subject(
             self.what,
             free=free,
             fixed=self.fixed,
+            start=given,
             normal_force=self.normal_force,
             points=isinstance(kind, Points),
             moving=imposed and kind.states != "steady" if isinstance(kind, Points) else None,
@@ -140,7 +142,6 @@ class Fit:
             v_max=0.0 if seen is None else seen.fastest,
             v_min=slowest(kind, seen),
         )
-        given = self.start if isinstance(self.start, Mapping) else {}
         checks.check_names("Fit: start", given, found.names)
         values = centre(found, None if self.start == "law" else seen, given)
         residuals = kind.prepare(found, self.data, values)

@@ -27,11 +27,15 @@ class Wishes:
         free: name -> spec.
         fixed: name -> value.
         only: whether nothing else than `free` is fitted.
+        names: all that was named, by where.
+        problems: what is wrong with the specs and values.
     """
 
     free: dict[str, Spec]
     fixed: dict[str, float]
     only: bool
+    names: dict[str, tuple[str, ...]]
+    problems: tuple[str, ...] = ()
 
     @property
     def started(self) -> frozenset[str]:
@@ -41,22 +45,22 @@ class Wishes:
         )
 
     def check(self, known: Iterable[str]) -> None:
-        """Refuse names that are not `known`."""
+        """Refuse names that are not `known`, and all else that is wrong, in one error."""
         problems = list[str]()
-        names = list(known)
-        for where, given in (("free", self.free), ("fixed", self.fixed)):
+        everything = list(known)
+        for where, given in self.names.items():
             try:
-                checks.check_names(where, given, names)
+                checks.check_names(where, given, everything)
             except ValueError as error:
                 problems.append(str(error))
-        refuse(problems)
+        refuse([*problems, *self.problems])
 
 
-def wishes(free: object, fixed: object) -> Wishes:
-    """What `free` and `fixed` of a fit say.
+def wishes(free: object, fixed: object, start: Iterable[str] = ()) -> Wishes:
+    """What `free` and `fixed` of a fit say, and the names in `start`; `Wishes.check` refuses.
 
     Raises:
-        ValueError: all that is wrong with them.
+        ValueError: what is neither names nor values by name.
     """
     if free is None or isinstance(free, Mapping):
         given: dict[str, Any] = checks.named("Fit: free", free)
@@ -79,8 +83,8 @@ def wishes(free: object, fixed: object) -> Wishes:
         except ValueError as error:
             problems.append(str(error))
     problems += [f"{n}: expected free or fixed, got both" for n in given if n in numbers]
-    refuse(problems)
-    return Wishes(specs, held, only)
+    names = {"free": tuple(given), "fixed": tuple(numbers), "start": tuple(start)}
+    return Wishes(specs, held, only, names, tuple(problems))
 
 
 def refuse(problems: Sequence[str]) -> None:

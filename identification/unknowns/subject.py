@@ -1,6 +1,6 @@
 """What is fitted: a law, a machine or a model, with its free parameters as symbols."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import final
@@ -110,6 +110,7 @@ def subject(
     *,
     free: object = None,
     fixed: object = None,
+    start: Iterable[str] = (),
     normal_force: float = 1.0,
     points: bool = False,
     moving: bool | None = None,
@@ -124,6 +125,7 @@ def subject(
             model, of which all parameters are free.
         free: names, or name -> spec, fitted beside those that are by their role; specs say how.
         fixed: name -> value of what is not fitted; "others": all that `free` does not name.
+        start: names of parameters whose start is given elsewhere, to be checked with the others.
         normal_force: N of a law [N]; with 1 N coefficients read as forces.
         points: the data are forces at given velocities, not a motion.
         moving: the data show how the states of a law change; None: unless they are points.
@@ -134,7 +136,7 @@ def subject(
     Raises:
         ValueError: everything that is wrong with them, in one error.
     """
-    wished = wishes(free, fixed)
+    wished = wishes(free, fixed, start)
     if isinstance(what, Model):
         return _of_model(what, wished)
     if isinstance(what, str):

@@ -115,6 +115,10 @@ def test_what_the_kind_takes_out_of_free() -> None:
         ({"kind": Points}, "kind"),
         ({"data": 3, "loss": "hubre", "starts": 0}, "data.*loss.*huber.*starts"),
         ({"free": {"mu_x": 1.0}}, "mu_x"),
+        (
+            {"free": {"mu_x": 1.0, "v_s": (2, 1)}, "fixed": {"v_y": 1.0}, "start": {"m_z": 1.0}},
+            "mu_x.*v_y.*m_z.*v_s: expected lower < upper",
+        ),
         ({"start": {"mu_d": "big"}}, "start: mu_d"),
         ({"start": {"sigma_0": 1.0}}, "start"),
         ({"noise": {"x": 1.0}}, "noise"),
