@@ -115,6 +115,7 @@ LONG = (
     "arm_to_a_place",
     "co_design",
     "crank_start_up",
+    "identify_arm",
     "identify_emps",
     "identify_pendulum",
     "identify_quarter_car",

@@ -5,9 +5,11 @@ import pytest
 
 from identification.data.dataset import Dataset
 from identification.data.record import Record
+from identification.data.synthetic import synthetic_drive_data
 from identification.signals.differentiate import differentiate
 from identification.signals.filters import Filter
 from identification.signals.regress import LinearFit, linear_regression
+from symfric.laws import Coulomb
 
 PUBLISHED = {
     "m": (95.1089, 0.1085),
@@ -87,6 +89,19 @@ def test_parameters_of_a_known_motion_come_back() -> None:
     expected = {"m": 3.0, "F_v": 11.0, "F_c": 7.0, "offset": -2.0}
     for name, value in expected.items():
         assert found.values[name] == pytest.approx(value, rel=1e-4), name
+
+
+def test_equations_at_reversals_would_bend_the_mass() -> None:
+    law = Coulomb(mu_d=20.0, v_eps=1e-5)
+    (record,) = synthetic_drive_data(
+        law, speeds=(0.02, 0.1), dwell=0.4, position_noise=0.0, force_noise=0.0
+    )
+    off = [
+        abs(linear_regression(differentiate(record, Filter(100.0, 10, v_min=v))).values["m"] - 95.0)
+        for v in (None, 0.0)
+    ]
+    assert off[0] < 0.01
+    assert off[1] > 10 * off[0]
 
 
 def test_two_records_are_one_regression() -> None:
