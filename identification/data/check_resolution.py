@@ -18,7 +18,8 @@ def of_resolution(view: View, model: Rough | None) -> Iterator[Finding]:
     """Forces of few levels, positions of few counts at the speeds of the record."""
     force = view.signal("force")
     if force is not None and np.ptp(force) > 0:
-        step, spread = count_of(force), float(np.ptp(np.quantile(force, (0.01, 0.99))))
+        usual = float(np.ptp(np.quantile(force, (0.01, 0.99))))
+        step, spread = count_of(force), usual or float(np.ptp(force))
         if step > COARSE * spread:
             name = view.name("force")
             yield view.finding(

@@ -204,8 +204,9 @@ def _robust(A: Array, b: Array) -> tuple[Array, Array]:
         root = np.sqrt(weight)
         values, *_ = np.linalg.lstsq(B * root[:, None], b * root, rcond=1e-10)
         residual = b - B @ values
-        sigma = 1.4826 * float(np.median(np.abs(residual))) + 1e-300
-        weight = np.minimum(1.0, HUBER * sigma / (np.abs(residual) + 1e-300))
+        least = 1e-12 * float(np.abs(b).max()) + 1e-200
+        sigma = max(1.4826 * float(np.median(np.abs(residual))), least)
+        weight = 1 / np.maximum(1.0, np.abs(residual) / (HUBER * sigma))
     root = np.sqrt(weight)
     inverse = np.linalg.pinv((B * root[:, None]).T @ (B * root[:, None]), rcond=1e-10)
     rest = b - B @ values

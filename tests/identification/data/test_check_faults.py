@@ -177,3 +177,27 @@ def test_findings_print_and_count(stage_data: Dataset) -> None:
     assert "error: data: force brakes the motion that it drives" in str(found)
     assert found[0].to_dict()["kind"] == "sign"
     assert "nothing doubtful found" in str(stage_data.check())
+
+
+def test_odd_signals_are_checked_without_a_crash() -> None:
+    """Steps, noise, ramps and constants of any size and length; warnings of NumPy are errors."""
+    rng = np.random.default_rng(1)
+    forms: list[Callable[[Array], Array]] = [
+        lambda t: 0 * t + 3,
+        lambda t: rng.standard_normal(t.size),
+        lambda t: np.cumsum(rng.standard_normal(t.size)),
+        lambda t: np.sign(np.sin(20 * t)),
+        lambda t: np.round(5 * np.sin(9 * t)),
+        lambda t: np.where(rng.random(t.size) < 0.01, 1e6, 0.0),
+        lambda t: np.exp(-5 * t) * np.cos(40 * t),
+        lambda t: t,
+    ]
+    for _ in range(80):
+        n = int(rng.choice([2, 3, 8, 20, 50, 60, 100, 300]))
+        t = np.cumsum(rng.random(n) ** rng.integers(0, 3) + 1e-6)
+        t, u = t * 10.0 ** rng.integers(-6, 4), t / t[-1]
+        x, force, v = (
+            forms[rng.integers(len(forms))](u) * 10.0 ** rng.integers(-9, 9) for _ in range(3)
+        )
+        found = Dataset.of(t=t, x=x, force=force, v=v).check()
+        assert all(f.begin <= f.end for f in found)
