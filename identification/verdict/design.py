@@ -16,7 +16,7 @@ Source: Mehra, IEEE Trans. Autom. Control 19(6), 1974; Swevers et al., IEEE Tran
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
@@ -26,8 +26,13 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import starts_of
 from symfric.model import Model, Output, check_model
 
-ERROR = 0.1
-"""Relative standard error from which typical magnitudes of the information are made."""
+
+class Motion(Protocol):
+    """Signals by name, such as a trajectory."""
+
+    def __getitem__(self, name: str, /) -> Any:
+        """All values of a signal over time."""
+        ...
 
 
 def informative(
@@ -37,6 +42,7 @@ def informative(
     *,
     step: float,
     prior: float = 1.0,
+    aim: float = 1e-2,
 ) -> Model:
     """`model` with sensitivities and information as states, and the output "information".
 
@@ -47,6 +53,8 @@ def informative(
         measured: signal -> standard deviation of its noise in SI units: states or outputs.
         step: sample time of the measurement [s].
         prior: relative standard error of what is known before the measurement.
+        aim: relative standard error that is hoped for; it scales the information, without which an
+            optimiser goes nowhere.
 
     Limits: noise is white and the start state known; the information is that at the start values of
     the parameters, so a design for a wide range takes `scenarios` of the problem.
@@ -64,6 +72,7 @@ def informative(
     levels = [checks.number(f"informative: measured: {n}", s, above=0.0) for n, s in sigma.items()]
     step = checks.number("informative: step", step, unit="s", above=0.0)
     known = 1 / checks.number("informative: prior", prior, above=0.0) ** 2
+    most = 1 / checks.number("informative: aim", aim, above=0.0) ** 2
     p = [next(v for v in model.p if v.name == n) for n in names]
     zero = [v.name for v in p if checks.as_number(v.start) in (None, 0.0)]
     if zero:
@@ -80,7 +89,7 @@ def informative(
     growth = Y.T @ ca.diag(1 / ca.DM(levels) ** 2) @ Y / step
 
     lower = [(i, j) for i in range(len(p)) for j in range(i + 1)]
-    entries = [_information(names[i], names[j], known * (i == j)) for i, j in lower]
+    entries = [_information(names[i], names[j], known * (i == j), most) for i, j in lower]
     information = ca.SX(len(p), len(p))
     for (i, j), entry in zip(lower, entries, strict=True):
         information[i, j] = information[j, i] = entry.symbol
@@ -99,12 +108,12 @@ def informative(
     )  # fmt: skip
 
 
-def expected_errors(free: Sequence[str], motion: Mapping[str, Any]) -> dict[str, float]:
+def expected_errors(free: Sequence[str], motion: Motion) -> dict[str, float]:
     """Relative standard errors that a motion of an informative model makes possible.
 
     Args:
         free: its parameters, in the order in which they were given to `informative`.
-        motion: signals of the motion by name, such as a trajectory; their last values count.
+        motion: of the informative model; the last values count.
     """
     I = np.zeros((len(free), len(free)))  # noqa: E741  (the letter of the literature)
     for i, a in enumerate(free):
@@ -118,8 +127,8 @@ def _sensitivity(state: Variable, p: Variable) -> Variable:
     return Variable(f"S_{state.name}_{p.name}", state.unit, nominal=state.nominal, doc=doc)
 
 
-def _information(a: str, b: str, start: float) -> Variable:
-    return Variable(_name(a, b), "1", start=start, nominal=1 / ERROR**2, doc="Fisher information")
+def _information(a: str, b: str, start: float, nominal: float) -> Variable:
+    return Variable(_name(a, b), "1", start=start, nominal=nominal, doc="Fisher information")
 
 
 def _name(a: str, b: str) -> str:
