@@ -24,16 +24,24 @@ APART = ("law", "machine", "live")
 
 
 def to_dict(fit: "Fitted") -> dict[str, Any]:
-    """Everything but `live`; the law as its text and as data that make it again."""
+    """Everything but `live`; the law as its text and as data that make it again, and the drive."""
     data = {f.name: plain(getattr(fit, f.name)) for f in fields(fit) if f.name not in APART}
     return {
         "file": FILE,
         "format": FORMAT,
         **data,
         "law": None if fit.law is None else law_name(fit.law),
-        "law_data": None if fit.law is None else to_data(fit.law),
-        "machine": None if fit.machine is None else to_data(fit.machine),
+        "law_data": _data(fit.law),
+        "machine": _data(fit.drive),
     }
+
+
+def _data(held: Parametric | None) -> dict[str, Any] | None:
+    """A law or a drive as data; None of a class of your own that holds more than numbers."""
+    try:
+        return None if held is None else to_data(held)
+    except ValueError:
+        return None
 
 
 def read(kind: "type[Fitted]", path: str | Path, own: Mapping[str, type[Parametric]] | None) -> Any:

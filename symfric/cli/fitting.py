@@ -109,7 +109,10 @@ def kind_of(name: str, windows: str | None, free: dict[str, Any]) -> Any:
     if windows is not None and name != "shooting":
         raise ValueError(f"--windows: expected with --kind shooting only, got --kind {name}")
     if name == "points":
-        return Points(offset="offset" in free and free.pop("offset") is None)
+        offset = "offset" in free
+        if free.pop("offset", None) is not None:
+            raise ValueError("--free offset: expected no more than its name with --kind points")
+        return Points(offset=offset)
     if name == "inverse":
         return InverseDynamics()
     if name == "loop":

@@ -1,6 +1,6 @@
 """`symfric identify`: friction laws fitted to measured data, with what they are worth."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
@@ -119,7 +119,7 @@ def identify(
         one = Fit(chosen, laws[0], records, **asked).prepared()
         check_names("--profile", profiles, one.task.unknowns.fitted)
     with output.progress(f"identify {law}") as tell, _executor(workers) as executor:
-        how: dict[str, Any] = {"executor": executor, "progress": lambda _, done: tell(done)}
+        how: dict[str, Any] = {"executor": executor, "progress": _told(tell)}
         if len(laws) > 1:
             ranking = select(laws, records, chosen, other, **how, **asked)
             fit = ranking.best
@@ -215,6 +215,14 @@ def refuse(found: Found) -> None:
         raise SolveError(f"identify: {INTERRUPTED}; the laws before are ranked", Status.INTERRUPTED)
     if found.failed:
         raise ValueError("; ".join(found.failed))
+
+
+def _told(tell: Callable[[float], None]) -> Callable[[str, float], None]:
+    def advance(text: str, done: float) -> None:
+        del text
+        tell(done)
+
+    return advance
 
 
 def _executor(jobs: int) -> AbstractContextManager[Executor | None]:

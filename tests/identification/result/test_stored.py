@@ -1,6 +1,7 @@
 """A fit through a file and back."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 from fits import make
 
 from identification.result.fitted import Fitted
+from symfric.laws import Stribeck
+from symfric.scenes import Rabinowicz
 
 
 @pytest.fixture(scope="module")
@@ -89,6 +92,15 @@ def test_a_damaged_part_is_refused(key: str, file: Path) -> None:
     file.write_text(json.dumps(data))
     with pytest.raises(ValueError, match="expected what fit"):
         Fitted.from_json(file)
+
+
+def test_a_fit_of_another_machine_is_stored_with_its_law(fit: Fitted, tmp_path: Path) -> None:
+    other = replace(fit, machine=Rabinowicz(Stribeck()), live=None)
+    other.to_json(tmp_path / "other.json")
+    back = Fitted.from_json(tmp_path / "other.json")
+    assert back.machine is None
+    assert repr(back.law) == repr(fit.law)
+    assert [v.name for v in other.model.x] == ["x", "v"]
 
 
 def test_a_law_of_an_unknown_class_leaves_the_rest(file: Path) -> None:

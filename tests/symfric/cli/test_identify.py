@@ -160,6 +160,7 @@ def test_no_physics_is_an_error_and_everything_is_written_all_the_same(
         (["--law", "coulomb", "--free", "mu_d=log(1)"], "log(lower, upper)"),
         (["--law", "coulomb", "--free", "mu_d=around(1)"], "expected one of log"),
         (["--law", "coulomb", "--free", "mu_d=2:1"], "lower < upper"),
+        (["--law", "coulomb", "--kind", "points", "--free", "offset=1"], "--free offset"),
         (["--law", "coulomb", "--loss", "cube"], "loss"),
         (["--law", "coulomb", "--starts", "0"], "starts"),
         (["--law", "coulomb", "--jobs", "0"], "--jobs"),
