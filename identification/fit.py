@@ -12,16 +12,20 @@ from dataclasses import dataclass, fields, replace
 from time import perf_counter
 from typing import Any, final
 
+import numpy as np
+
 from identification.data.dataset import Dataset
 from identification.data.findings import Findings
 from identification.first import centre, findings_of, measured, slowest
+from identification.residuals.choice import choose
 from identification.residuals.evaluation import Residuals
 from identification.residuals.points import Points
+from identification.residuals.shooting import Shooting
 from identification.result.build import fitted
 from identification.result.calls import written
 from identification.result.fitted import Fitted
 from identification.result.live import Kind
-from identification.solving.descent import Start
+from identification.solving.descent import Start, descend
 from identification.solving.loss import THRESHOLD
 from identification.solving.many_starts import Progress, best_of, many_starts
 from identification.solving.scatter import scattered
@@ -35,6 +39,8 @@ from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 
 MOST_STARTS = 10_000
+QUICK = 40
+"""Evaluations of a fit that only helps to choose a setting."""
 OF_KIND = ("x0", "dead_time")
 """Entries of `free` that belong to the kind of residuals."""
 
@@ -144,11 +150,19 @@ class Fit:
         )
         checks.check_names("Fit: start", given, found.names)
         values = centre(found, None if self.start == "law" else seen, given)
+        if isinstance(kind, Shooting) and kind.windows == "choose":
+            kind = choose(kind, found, self.data, self._quickly)
         residuals = kind.prepare(found, self.data, values)
         made = self._task(residuals, found)
         easier = tuple(self._task(r, found) for r in getattr(residuals, "easier", ()))
         made = replace(made, easier=easier)
         return Prepared(kind, found, findings, made, made.unknowns.of(values), seen)
+
+    def _quickly(self, kind: Kind, data: Dataset) -> dict[str, float] | None:
+        """Values of a fit to other data, from one start and without a verdict."""
+        asked = replace(self, kind=kind, data=data).prepared()
+        end = descend(asked.task, asked.centre, 0, min(self.evaluations, QUICK))
+        return asked.task.unknowns.named(end.w) if np.isfinite(end.cost) else None
 
     def _task(self, residuals: Residuals, found: Subject) -> Task:
         """The least-squares problem of residuals."""

@@ -34,7 +34,7 @@ class Shooting:
         windows: None: each record is simulated from its start; a length [s]: it is cut into windows
             of about that length, each with its own start values, so that motions that part from the
             measured ones do not drift away; "choose": the length that predicts best on the data at
-            hand (`windows.choose`).
+            hand (`residuals.choice`).
         x0: "estimate": start values of states that are measured, or are rates of measured ones, are
             unknowns of their own, "x0.v[2]" of record 2, "x0.v[2,3]" of its window 3, and so is the
             bristle of a law with one; the many of others start in steady sliding or, where the
@@ -138,7 +138,7 @@ class Shooting:
         """
         if isinstance(self.windows, str):
             raise ValueError(
-                "Shooting: windows: expected a length [s] by now, got 'choose'; see windows.choose"
+                "Shooting: windows: expected a length [s] by now, got 'choose', which Fit does"
             )
         return self.windows
 
