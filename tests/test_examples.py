@@ -111,12 +111,36 @@ def friction_is_found_in_every_file(printed: str, folder: Path) -> None:
             assert abs(float(value) / float(true) - 1) < 0.03, row
 
 
+def memory_explains_more_than_a_bristle(printed: str, folder: Path) -> None:
+    """On the second half of the measured record, or of the one that GMS made up."""
+    left = dict(re.findall(r"(LuGre|GMS): ([\d.]+) N m on the second half", printed))
+    assert float(left["GMS"]) < float(left["LuGre"]) < 0.06
+
+
+def elements_say_what_another_path_does(printed: str, folder: Path) -> None:
+    (share,) = re.findall(r"another path: ([\d.]+) of the noise", printed)
+    assert float(share) < 0.5
+
+
+def what_points_cannot_tell_is_said(printed: str, folder: Path) -> None:
+    """The pilot study tells five parameters, the main study not the viscous one."""
+    pilot, main = printed.split("main study in six steps")
+    truth = {"F_S": 4.4861, "F_C": 2.5498, "v_s": 0.0012, "sigma_2": 230.0, "delta": 2.0}
+    found = dict(re.findall(r"^(\w+) +([\d.]+) ", pilot.split("at once")[1], re.MULTILINE))
+    assert all(abs(float(found[name]) / value - 1) < 0.05 for name, value in truth.items())
+    assert "not determined" not in pilot and "hardly told" not in pilot
+    assert "sigma_2 is not determined" in main
+    assert "sigma_2 is hardly told" in main
+
+
 LONG = (
     "arm_to_a_place",
     "co_design",
     "crank_start_up",
     "identify_arm",
     "identify_emps",
+    "identify_franka",
+    "identify_gms",
     "identify_pendulum",
     "identify_quarter_car",
     "identify_raw_files",
@@ -128,6 +152,9 @@ LONG = (
 
 SAYS = dict.fromkeys(LONG, motion_is_verified) | {
     "identify_emps": drive_is_found_in_its_loop,
+    "identify_franka": memory_explains_more_than_a_bristle,
+    "identify_gms": elements_say_what_another_path_does,
+    "identify_laminator": what_points_cannot_tell_is_said,
     "identify_arm": friction_of_each_joint_is_found,
     "identify_pendulum": friction_of_the_swings_is_found,
     "identify_raw_files": friction_is_found_in_every_file,

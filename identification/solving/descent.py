@@ -33,6 +33,8 @@ Tell = Callable[[int], None]
 GAIN, NEAR = 1e-6, 1e-2
 """Fall of the cost over the variance: of a minimum, and of an end that is near enough (a tenth of a
 standard error)."""
+KINKS = 1.0
+"""Fall that derivatives promise and no step finds: kinks of a law that switches between samples."""
 FAR = 15.0
 """Longest step that is believed in: of a logarithmic coordinate a factor of three million."""
 NOWHERE = 1e-13
@@ -235,4 +237,7 @@ def _verdict(search: _Search) -> tuple[Status, str]:
         return Status.MAX_ITERATIONS, f"a step would still gain {fall:.3g} of the variance"
     if search.why:
         return Status.NO_DESCENT, f"the last trial that failed: {search.why}"
-    return Status.NO_DESCENT, f"a step should gain {fall:.3g} of the variance, and none does"
+    said = f"a step should gain {fall:.3g} of the variance, and none does"
+    if fall <= KINKS:
+        return Status.ACCEPTABLE, f"{said}: less than a standard error, as where a law has kinks"
+    return Status.NO_DESCENT, said

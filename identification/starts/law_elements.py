@@ -19,6 +19,10 @@ FIELDS = ("k", "mu", "alpha")
 """Fields of an element: stiffness, friction coefficient or share."""
 MOST = 1500
 """Samples that are enough for a start."""
+SLOW = 0.75
+"""Share of the static level that friction keeps, by the median, in a record of pre-sliding."""
+LEAST = 0.05
+"""Least share of it that a force is divided by."""
 APART = 1.25
 """Radii over those of the element that is split where fewer explain the data than the law has."""
 HEADROOM = 1.1
@@ -61,17 +65,12 @@ def element_values(
     falls = "mu_s" in parameters(law)
     viscous = any(p.role == "viscous" for p in parameters(law).values())
     force = measured.F - offset
+    friction = replace(measured, F=force, a=None)
     if falls:
-        sliding = np.abs(curve.force(measured.v) - curve.sigma_2 * measured.v)
-        top = max(curve.F_S, float(sliding.max()))
-        fallen = np.where(sliding > 0, sliding, top) / top
-        force = (force - curve.sigma_2 * measured.v) / np.maximum(fallen, 0.05)
+        friction = _as_if_slow(friction, curve)
     count = len(next(iter(names.values())))
     try:
-        friction = replace(measured, F=force, a=None)
-        found = fit_elements(
-            friction, count, viscous=viscous and not falls, most=MOST, thorough=False
-        )
+        found = fit_elements(friction, count, viscous=viscous and not falls, most=MOST)
     except ValueError:
         return {}  # no hysteresis in these data: what the law has is as good
     k, levels = _as_many(found, count)
@@ -84,6 +83,22 @@ def element_values(
         shares = shares / shares[i] * float(parameters(law)[name].value)
     each = {"k": k, "alpha": shares, "mu": carried * levels / measured.N}
     return {n: float(x) for f, own in names.items() for n, x in zip(own, each[f], strict=True)}
+
+
+def _as_if_slow(friction: Measured, curve: StribeckCurve) -> Measured:
+    """Forces over the Stribeck curve, times its top; slow records alone where there are some."""
+    side = np.where(friction.v == 0, 1.0, np.sign(friction.v))
+    sliding = np.abs(curve.force(np.where(friction.v == 0, side * 1e-300, friction.v)))
+    sliding = np.maximum(sliding - curve.sigma_2 * np.abs(friction.v), 0.0)
+    share = np.maximum(sliding / max(curve.F_S, float(sliding.max())), LEAST)
+    force = (friction.F - curve.sigma_2 * friction.v) / share
+    slow = [r for r in friction.records if float(np.median(share[r])) > SLOW]
+    kept = slow or list(friction.records)
+    rows = np.concatenate([np.arange(r.start, r.stop) for r in kept])
+    breaks = tuple(np.cumsum([r.stop - r.start for r in kept])[:-1].tolist())
+    path = None if friction.x is None else friction.x[rows]
+    t = None if friction.t is None else friction.t[rows]
+    return Measured(friction.v[rows], force[rows], path, t, None, friction.N, breaks)
 
 
 def carrying(law: Law, values: Mapping[str, float]) -> dict[str, float]:

@@ -1,0 +1,98 @@
+"""Generalised Maxwell-slip friction with ten elements from hysteresis and sliding.
+
+A slide moves for half a minute by some micrometres, with turns inside turns, and for four seconds
+up to five times the Stribeck velocity; the force has 1 % of noise. The elements start from a convex
+problem (which springs and sliders explain the force along the path), levels and Stribeck velocity
+from bins of the fast record; then both records are fitted together under the measured velocity,
+with all stiffnesses and shares free. Shares count by their ratios alone, so one of them is held.
+Elements begin to slip between samples: the residuals have kinks, at which a descent may stop a
+little short of the minimum, which the status of the fit then says.
+Judged by another path: how far the fitted law is from the true one, in units of the noise.
+
+    python examples/identify_gms.py [OUT]
+
+Source of levels, lag and Stribeck velocity: Lampaert, Al-Bender, Swevers, Phys. Conf. 2003.
+"""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+
+from identification.data.dataset import Dataset
+from identification.fit import Fit
+from identification.residuals.points import Points
+from symfric import GMS, Element
+from symfric.laws import Law
+
+Array = NDArray[np.float64]
+
+COUNT, NOISE, UM = 10, 0.01, 1e-6
+KNOWN = {"mu_s": 1.05, "mu_d": 0.2, "v_s": 98 * UM, "delta": 0.78, "C": 24.0}
+
+
+def true_law() -> GMS:
+    """Ten elements that slip between 0.1 and 10 um."""
+    rng = np.random.default_rng(3)
+    radii = np.sort(np.geomspace(8e-8, 9e-6, COUNT) * np.exp(0.25 * rng.standard_normal(COUNT)))
+    shares = rng.uniform(0.5, 1.5, COUNT) / COUNT
+    elements = (Element(1.05 * a / r, a) for a, r in zip(shares.tolist(), radii, strict=True))
+    return GMS(elements=tuple(elements), form="event", **KNOWN)
+
+
+def forces(law: Law, t: Array, x: Array) -> Array:
+    """Force along a path that goes straight from sample to sample, after sliding."""
+    v = np.diff(x) / np.diff(t)
+    z: Any = law.steady_state(float(v[0]), 1.0)
+    found = [law.force(float(v[0]), 1.0, z)]
+    for speed, h in zip(v.tolist(), np.diff(t).tolist(), strict=True):
+        step: Any = law.held_step(speed, 1.0, z, h)
+        z = np.asarray(step[0], float).ravel()
+        found.append(law.force(speed, 1.0, z))
+    return np.array(found, float)
+
+
+def slow(*turns: tuple[float, float]) -> tuple[Array, Array]:
+    """Half a minute of sines of the given amplitudes [um] and frequencies [Hz]."""
+    t = np.arange(0.0, 30.0, 0.02)
+    return t, UM * np.sum([a * np.sin(2 * np.pi * f * t) for a, f in turns], axis=0)
+
+
+def record(law: Law, path: tuple[Array, Array], name: str, seed: int) -> Dataset:
+    """Velocity and noisy force along a path."""
+    t, x = path
+    F = forces(law, t, x) + NOISE * np.random.default_rng(seed).standard_normal(t.size)
+    return Dataset.of(t=t, v=np.gradient(x, t), F=F, units={"v": "m/s", "F": "N"}, name=name)
+
+
+def main(out: Path) -> None:
+    """Make the records, fit, print, and leave a picture and a page in `out`."""
+    out.mkdir(parents=True, exist_ok=True)
+    law, t = true_law(), np.arange(0.0, 4.0, 4e-3)
+    fast = t, 80 * UM * np.sin(2 * np.pi * t) * np.sin(0.25 * np.pi * t + 0.5)
+    data = record(law, slow((5, 0.05), (2, 0.13), (1, 0.31)), "slow", 0)
+    data += record(law, fast, "fast", 1)
+
+    ten = GMS(elements=tuple(Element(1e5, 1 / COUNT) for _ in range(COUNT)), form="event")
+    shares = [f"alpha_{i}" for i in range(1, COUNT)]
+    free = ["delta", "C", *(f"k_{i}" for i in range(1, COUNT + 1)), *shares]
+    fixed = {"sigma_2": 0.0, f"alpha_{COUNT}": 1 / COUNT}
+    fit = Fit(Points(), ten, data, free=free, fixed=fixed, starts=3, evaluations=120).solve(
+        throw=False
+    )
+    fit.plot(out / "gms.png")
+
+    if fit.law is None:
+        raise SystemExit("no law came out of the fit")
+    path = slow((4, 0.07), (3, 0.11), (0.7, 0.43))
+    wrong = forces(fit.law, *path) - forces(law, *path)
+    console = Console(soft_wrap=True, highlight=False)
+    console.print(str(fit), markup=False)
+    console.print(f"another path: {np.sqrt(np.mean(wrong**2)) / NOISE:.3f} of the noise")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "out"))
