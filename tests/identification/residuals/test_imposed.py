@@ -81,3 +81,18 @@ def test_the_step_is_of_second_order_in_the_sample_time() -> None:
 def test_laws_that_only_a_simulation_follows_are_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r"act on each other; use Shooting\(\)"):
         error(law_from_text(text))
+
+
+def test_compiled_code_and_virtual_machine_give_the_same_bits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    one = subject(SOFT, points=True, moving=True)
+    data = Dataset.of(t=T, v=V, F=np.zeros(T.size), units={"v": "m/s", "F": "N"})
+    values = np.array([float(parameters(SOFT)[n].value) for n in one.names])
+    found: list[bytes] = []
+    for compiler in ("", "no-such-compiler"):
+        monkeypatch.setenv("CC", compiler)
+        end = Points().prepare(one, data).at(values)
+        assert not isinstance(end, str)
+        found.append(end.r.tobytes() + end.J.tobytes())
+    assert found[0] == found[1]
