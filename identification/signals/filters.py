@@ -169,7 +169,7 @@ def position_band(x: Array, step: float) -> float:
     power = np.abs(np.fft.rfft(rest * np.hanning(x.size))) ** 2
     frequency = np.fft.rfftfreq(x.size, step)
     noise = np.median(power[power.size // 2 :]) / np.log(2)
-    width = max(9, 2 * round(0.5 * x.size * step) + 1)
+    width = min(max(9, 2 * round(0.5 * x.size * step) + 1), power.size)
     smooth = np.convolve(power, np.ones(width) / width, mode="same")
     known = np.flatnonzero(smooth > ABOVE * noise)
     return float(frequency[max(1, known[-1])] if known.size else frequency[1])

@@ -127,3 +127,9 @@ def test_noise_of_the_position_narrows_the_filter() -> None:
     assert (wide.cutoff, wide.decimation) == (100.0, 10)
     assert narrow.cutoff < wide.cutoff
     assert narrow.decimation > wide.decimation
+
+
+def test_band_of_a_position_sampled_slower_than_once_a_second() -> None:
+    """An average over 1 Hz is wider than the whole spectrum then."""
+    for step in (1.0, 1e3):
+        assert 0 < position_band(np.sin(0.01 * np.arange(500)), step) <= 0.5 / step
