@@ -11,7 +11,7 @@ open loop    laws and window lengths: fitted to three of four blocks, a candidat
              mean square error decides. The force is held for a sample, as the amplifier does.
 
 What was learnt about the open loop. Symmetric friction predicts left-out blocks to 2.9 mm at best,
-friction with two directions to 1.8-2.2 mm at every window length from 1 to 6 s: the direction
+friction with two directions to 1.7-2.2 mm at every window length from 1 to 6 s: the direction
 matters, the length hardly. Neither does a Stribeck part, a quadratic one, a slope along the way or
 a 2.5 mm ripple (1.9-2.1 mm), though the residuals see the place; nor start values held at the data
 (1.8 mm), nor a mean over shifted windows (1.9 mm).
@@ -20,9 +20,11 @@ On the other record these equally good candidates lie between 5.4 and 14 mm, the
 windows at 8 to 12 mm, because friction is another one there: fitted alike, in windows of 1 s, it is
 1.1 N (3 %) larger at 0.1 m/s. Along the estimation record it falls by 0.3 N, as of a drive that
 warms up. An offset of 0.04 N moves the end by a millimetre. So the estimation record cannot say
-which candidate will be best there; that the rule lands at 5.4 to 5.8 mm, by the details of the
-integration, is luck, and so is any better number that a choice on this record could give. The
-structure suffices: fitted to the pulses themselves it leaves 0.7 mm.
+which candidate will be best there. The first list of lengths that was tried (round numbers) gave
+windows of 2 s and 5.8 mm; halves of the record, as `Shooting(windows="choose")` takes them, give
+1.55 s, as good on left-out blocks (1.7 to 1.9 mm by how these begin), and 7.9 mm. Both rows are
+shown: the goal is not reached, and a number below it would be luck. The structure suffices: fitted
+to the pulses themselves it leaves 0.7 mm.
 """
 
 from collections.abc import Iterator, Sequence
@@ -54,8 +56,10 @@ FOLDER = Path(__file__).parents[3] / "shared" / "data" / "EMPS"
 ESTIMATION, VALIDATION = "DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"
 LAWS = ("coulomb+viscous", "asymmetric(coulomb+viscous)")
 WIDTHS = {LAWS[0]: ["v_eps"], LAWS[1]: ["v_eps_pos", "v_eps_neg"]}
-LENGTHS, QUICK = (1.0, 2.0, 4.0, 8.0), (2.0, 4.0)
-"""Windows to choose from [s]."""
+HALVES, ROUND = (12.42, 6.21, 3.105, 1.5525, 0.77625), (1.0, 2.0, 3.0, 4.0, 6.0, 12.0)
+"""Windows to choose from [s]: halves, quarters ... of the record, and round numbers."""
+QUICK = slice(1, 4)
+"""Those of either that a quick measurement takes."""
 BLOCKS = 4
 LEFT_OUT, TRIM = 20, 50
 """Samples left out of the open-loop error at the start, and of the others at both ends."""
@@ -178,16 +182,29 @@ def measure(quick: bool) -> Iterator[Row]:
     note = f"{chosen.law}{widths}: {chosen.error:.2f} % of the force in the half left out"
     yield Row("emps", "closed loop x [%]", errors["x"], 1.4e-3, "<=", seconds, note)
     yield Row("emps", "closed loop force [%]", errors["force"], 4.65, "<=", seconds, note)
+    laws, some = (LAWS[1:], QUICK) if quick else (LAWS, slice(None))
+    rows = [
+        _open_row("", data, other, HALVES[some], laws),
+        _open_row(", round windows", data, other, ROUND[some], laws[-1:]),
+    ]
+    yield from rows
+    neural = "open loop, neural record [mm]"
+    yield replace(rows[0], what=neural, goal=2.64, seconds=0.0, note="stretch goal")
+    yield _speed(data, LAWS[1])
+
+
+def _open_row(
+    what: str, data: Dataset, other: Dataset, lengths: Sequence[float], laws: Sequence[str]
+) -> Row:
+    """Choose by `data`, judge by `other`."""
     began = process_time()
-    chosen = open_loop(data, QUICK if quick else LENGTHS, LAWS[1:] if quick else LAWS)
+    chosen = open_loop(data, lengths, laws)
     value = 1e3 * free_run(chosen.fit(data).model, other[0])
     note = (
         f"{chosen.law} in windows of {chosen.kind.windows:g} s, {1e3 * chosen.error:.2f} mm on the "
         "blocks left out; the other record has 3 % more friction"
     )
-    yield Row("emps", "open loop [mm]", value, 5.5, "<=", process_time() - began, note)
-    yield Row("emps", "open loop, neural record [mm]", value, 2.64, "<=", 0.0, "stretch goal")
-    yield _speed(data, LAWS[1])
+    return Row("emps", f"open loop{what} [mm]", value, 5.5, "<=", process_time() - began, note)
 
 
 def _speed(data: Dataset, law: str) -> Row:

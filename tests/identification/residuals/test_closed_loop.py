@@ -31,7 +31,7 @@ def _no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stepper, "find_compiler", lambda: None)
 
 
-def by_hand(substeps: int = 100) -> tuple[np.ndarray, np.ndarray]:
+def by_hand(substeps: int = 50) -> tuple[np.ndarray, np.ndarray]:
     """The loop step by step, with the impulse clamp of dry friction."""
     x = v = x_last = mean_last = 0.0
     h = STEP / substeps
