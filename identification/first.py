@@ -26,6 +26,14 @@ def findings_of(kind: object, data: Dataset) -> Findings:
     return data.check(**called)
 
 
+def explained(error: ValueError, findings: Findings) -> ValueError:
+    """The error of residuals that could not be made, behind what is wrong with the data."""
+    if not findings.errors:
+        return error
+    sentence = findings.errors[0].sentence.rstrip(".")
+    return ValueError(f"data '{findings.name}': {sentence}; then {error}")
+
+
 def _roles(kind: object) -> dict[str, str]:
     """Channels of position and force of a drive."""
     names = {name: getattr(kind, name, name) for name in ("x", "force")}

@@ -16,7 +16,7 @@ import numpy as np
 
 from identification.data.dataset import Dataset
 from identification.data.findings import Findings
-from identification.first import centre, findings_of, measured, slowest
+from identification.first import centre, explained, findings_of, measured, slowest
 from identification.residuals.choice import choose
 from identification.residuals.evaluation import Residuals
 from identification.residuals.points import Points
@@ -150,9 +150,12 @@ class Fit:
         )
         checks.check_names("Fit: start", given, found.names)
         values = centre(found, None if self.start == "law" else seen, given)
-        if isinstance(kind, Shooting) and kind.windows == "choose":
-            kind = choose(kind, found, self.data, self._quickly)
-        residuals = kind.prepare(found, self.data, values)
+        try:
+            if isinstance(kind, Shooting) and kind.windows == "choose":
+                kind = choose(kind, found, self.data, self._quickly)
+            residuals = kind.prepare(found, self.data, values)
+        except ValueError as error:
+            raise explained(error, findings) from None
         made = self._task(residuals, found)
         easier = tuple(self._task(r, found) for r in getattr(residuals, "easier", ()))
         made = replace(made, easier=easier)

@@ -148,6 +148,19 @@ def test_no_physics_is_an_error_and_everything_is_written_all_the_same(
     assert 'class="verdict bad"' in page.read_text()
 
 
+def test_where_nothing_can_be_fitted_the_data_are_the_reason(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    good = record(1)[0]
+    swapped = Dataset.of(t=good.time, x=1e-3 * good["force"], force=1e3 * good["x"], name="swapped")
+    swapped.to_csv(tmp_path / "swapped.csv")
+    line = ["identify", str(tmp_path / "swapped.csv"), "--law", "coulomb+viscous"]
+    assert main([*line, "--json", str(tmp_path / "fit.json")]) != 0
+    out, err = capsys.readouterr()
+    assert "columns are exchanged" in " ".join((out + err).split())
+    assert err.splitlines()[-1].startswith("symfric: ")
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
