@@ -3,7 +3,7 @@
     p = scale w                      linear
     p = exp(w)                       logarithmic: positive scales
     p = low + s (exp(w) - 1), w >= 0 not below another value: linear near it, logarithmic beyond s,
-                                     a tenth of its scale; low + exp(w) where it is logarithmic
+                                     twice its scale; low + exp(w) where it is logarithmic
     p = low + (upper - low) w        not below another value and not above a bound, 0 <= w <= 1
     p = low (upper / low)^w          likewise, where it is logarithmic, and strictly above
     p = lower + (high - lower) w     not above another value, 0 <= w <= 1
@@ -32,7 +32,7 @@ DECADES = 6.0
 steps feel bounds from afar; who makes the law checks it."""
 VANISHED = 12.0
 """Decades below its start at which a logarithmic value that wants to be nothing is at its bound."""
-NEAR = 0.1
+NEAR = 2.0
 """Excess over a lower value, over the scale, up to which it is fitted by its value: the excess of
 static friction and the velocity at which it falls trade along a line of their logarithms."""
 MARGIN = 1e-3
