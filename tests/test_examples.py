@@ -133,12 +133,23 @@ def what_points_cannot_tell_is_said(printed: str, folder: Path) -> None:
     assert "sigma_2 is hardly told" in main
 
 
+def optimised_motion_tells_more(printed: str, folder: Path) -> None:
+    """Every parameter more surely than by the best sine of the same limits."""
+    rows = [line for line in printed.splitlines() if "best sine" in line or "optimised" in line]
+    sine, best = ([float(x) for x in re.findall(r"\d+\.\d+", row)] for row in rows)
+    assert len(sine) == len(best) == 5
+    assert all(b < s for s, b in zip(sine[:4], best[:4], strict=True))
+    assert best[4] > sine[4] + 0.3
+    assert "SOLVED" in printed or "ACCEPTABLE" in printed
+
+
 LONG = (
     "arm_to_a_place",
     "co_design",
     "crank_start_up",
     "identify_arm",
     "identify_emps",
+    "identify_excitation",
     "identify_franka",
     "identify_gms",
     "identify_pendulum",
@@ -155,6 +166,7 @@ SAYS = dict.fromkeys(LONG, motion_is_verified) | {
     "identify_franka": memory_explains_more_than_a_bristle,
     "identify_gms": elements_say_what_another_path_does,
     "identify_laminator": what_points_cannot_tell_is_said,
+    "identify_excitation": optimised_motion_tells_more,
     "identify_arm": friction_of_each_joint_is_found,
     "identify_pendulum": friction_of_the_swings_is_found,
     "identify_raw_files": friction_is_found_in_every_file,
