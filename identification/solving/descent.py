@@ -179,13 +179,28 @@ def descend(
         fall = remaining(search.task, search.best)
         if settled and (fall <= GAIN * variance(search.task, search.best) or count):
             break
+    spent = evaluations - search.left + _back(search)
     status, message = _verdict(search)
     end = search.best
-    w = np.maximum(end.w, task.unknowns.floor)
     return Start(
-        number, w0, w, end.cost, status, message, evaluations - search.left, search.task.noise,
+        number, w0, end.w, end.cost, status, message, spent, search.task.noise,
         objective(search.task, end), tuple(search.costs),
     )  # fmt: skip
+
+
+def _back(search: _Search) -> int:
+    """Values that are as good as nothing or as infinite, at numbers one can read, if that is free.
+
+    Returns the evaluations that it took.
+    """
+    box, old = search.task.unknowns, search.best
+    w = np.clip(old.w, box.floor, box.ceiling)
+    if np.array_equal(w, old.w):
+        return 0
+    there = search.task.at(w)
+    if isinstance(there, Point) and there.cost - old.cost <= NEAR * variance(search.task, old):
+        search.best = there
+    return 1
 
 
 def _renew(search: _Search) -> float:

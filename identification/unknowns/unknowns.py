@@ -31,7 +31,9 @@ DECADES = 6.0
 """Decades from its start beyond which a bound of a logarithmic value is none for the solver, whose
 steps feel bounds from afar; who makes the law checks it."""
 VANISHED = 12.0
-"""Decades below its start at which a logarithmic value that wants to be nothing is at its bound."""
+"""Decades from its start at which a value that wants to be nothing or infinite is at its bound."""
+WITHIN = 1e-6
+"""Relative distance to a bound of a value that is taken back to it: rounding must not pass it."""
 NEAR = 2.0
 """Excess over a lower value, over the scale, up to which it is fitted by its value: the excess of
 static friction and the velocity at which it falls trade along a line of their logarithms."""
@@ -118,7 +120,8 @@ class Unknowns:
     def at_bound(self, w: Array) -> NDArray[np.bool_]:
         """Which of the unknowns stand at a bound, shape (n,)."""
         near = AT_BOUND * np.minimum(1.0, self.upper - self.lower)
-        return (w - np.maximum(self.lower, self.floor) < near) | (self.upper - w < near)
+        low, high = np.maximum(self.lower, self.floor), np.minimum(self.upper, self.ceiling)
+        return (w - low < near) | (high - w < near)
 
     @property
     def floor(self) -> Array:
@@ -126,10 +129,35 @@ class Unknowns:
 
         The search does not know them, since its steps feel bounds from afar.
         """
-        sizes = [u.scale if u.above else u.start for u in self.unknowns]
-        open_ = [u.logarithmic and not u.below for u in self.unknowns] & np.isinf(self.lower)
-        first = np.log(np.where(open_, sizes, 1.0)) - VANISHED * np.log(10.0)
+        open_ = self._scales & np.isinf(self.lower)
+        least = np.array([0.0 if u.above else u.lower for u in self.unknowns])
+        first = np.log(self._sizes) - VANISHED * np.log(10.0)
+        known = np.log(np.where(least > 0, least, 1.0)) + WITHIN
+        first = np.where(least > 0, np.maximum(first, known), first)
         return np.where(open_, first, -np.inf)
+
+    @property
+    def ceiling(self) -> Array:
+        """Coordinates above which a value is as good as infinite, shape (n,); see `floor`."""
+        reach = VANISHED * np.log(10.0)
+        most = np.array([np.inf if u.above else u.upper for u in self.unknowns])
+        known = np.log(np.where((most > 0) & (most < np.inf), most, 1.0)) - WITHIN
+        first = np.log(self._sizes) + reach
+        first = np.where((most > 0) & (most < np.inf), np.minimum(first, known), first)
+        excess = np.array([bool(u.above) and not u.logarithmic for u in self.unknowns], dtype=bool)
+        found = np.where(excess, reach, np.where(self._scales, first, np.inf))
+        return np.where(np.isinf(self.upper), found, np.inf)
+
+    @property
+    def _scales(self) -> NDArray[np.bool_]:
+        """What has the logarithm of a value or an excess as coordinate, shape (n,)."""
+        return np.array([u.logarithmic and not u.below for u in self.unknowns], dtype=bool)
+
+    @property
+    def _sizes(self) -> Array:
+        """Size of what is logarithmic at its start; one of others, shape (n,)."""
+        sizes = np.array([u.scale if u.above else u.start for u in self.unknowns])
+        return np.where(self._scales, sizes, 1.0)
 
 
 def unknowns_of(

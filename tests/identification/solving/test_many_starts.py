@@ -272,3 +272,34 @@ def test_residuals_that_exist_only_at_the_start_end_there(recwarn: pytest.Warnin
     assert end.status is Status.NO_DESCENT and "nothing here" in end.message
     assert alone.calls < 80
     assert not recwarn.list
+
+
+@dataclass(eq=False)
+class Rigid:
+    """Residuals of 1 - 1 / k, of data that lie a little above one: the stiffer the better."""
+
+    y: Array
+
+    names: ClassVar[tuple[str, ...]] = ("k",)
+    own: ClassVar[tuple[Unknown, ...]] = ()
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        n = self.y.size
+        return (Channel(0, "x", "m", slice(0, n), 0.1 * np.arange(n), self.y, {}),)
+
+    def at(self, values: Array) -> Evaluation | str:
+        (k,) = values
+        return Evaluation(1 - 1 / k - self.y, np.full((self.y.size, 1), 1 / k**2))
+
+
+def test_a_value_that_drifts_off_ends_at_a_number_one_can_read() -> None:
+    data = Rigid(1.002 + 0.01 * np.random.default_rng(1).standard_normal(200))
+    for upper, end in ((np.inf, 2e12), (1e10, 1e10)):
+        k = Unknown("k", "1", 2.0, lower=0.0, upper=upper, logarithmic=True)
+        made = task(data, unknowns_of((k,), {}, data.names))
+        found = descend(made, made.unknowns.of({"k": 1e14}) + 300.0)
+        assert found.status is Status.SOLVED
+        assert made.unknowns.values(found.w)[0] == pytest.approx(end, rel=1e-5)
+        assert made.unknowns.values(found.w)[0] < upper
+        assert made.unknowns.at_bound(found.w).all()
