@@ -11,6 +11,7 @@ from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.points import Points
 from identification.result.fitted import Fitted
+from identification.select import Ranking, select
 from identification.starts.maxwell_slip import fit_elements
 from identification.starts.measured import Measured
 from symfric import GMS, Element, MaxwellSlip, Slider
@@ -53,6 +54,28 @@ def measure(quick: bool) -> Iterator[Row]:
     for name, true in (("mu_s", 1.05), ("v_s", 98 * MICRO), ("C", 24.0)):
         off = 100 * abs(fit.parameters[name].value / true - 1)
         yield Row("gms", f"error of {name} [%]", off, 10.0, "<=", 0.0)
+    begun = process_time()
+    ranking = ranked()
+    gms, lugre = (ranking[name].validation for name in ("gms", "lugre"))
+    yield Row(
+        "gms", "GMS data: error of LuGre on another path over that of GMS", lugre / gms, 1.0, ">=",
+        process_time() - begun, f"LuGre is called {ranking['lugre'].status}",
+    )  # fmt: skip
+
+
+def ranked() -> Ranking:
+    """GMS with equal shares and LuGre on data of four unequal elements, judged on another path."""
+    law, rng = _true(4), np.random.default_rng(0)
+    slow, fast, other = (
+        _record(law, path, name, rng)
+        for path, name in (
+            (_slow("hysteresis", 0.04), "hysteresis"),
+            (_fast(4e-3), "sliding"),
+            (_slow("other", 0.04), "other path"),
+        )
+    )
+    laws = {"lugre": "lugre", "gms": GMS(form="event")}
+    return select(laws, slow + fast, Points(), validate=other, starts=2, evaluations=60)
 
 
 def _true(count: int) -> GMS:
@@ -96,6 +119,13 @@ def forces(law: Law, t: Array, x: Array) -> Array:
     return np.array(found)
 
 
+def _record(law: Law, path: tuple[Array, Array], name: str, rng: np.random.Generator) -> Dataset:
+    """Velocity and noisy force along a path."""
+    t, x = path
+    F = forces(law, t, x) + NOISE * rng.standard_normal(t.size)
+    return Dataset.of(t=t, v=np.gradient(x, t), F=F, units={"v": "m/s", "F": "N"}, name=name)
+
+
 def _elements(law: GMS, path: tuple[Array, Array], rng: np.random.Generator) -> float:
     """Error over the noise of elements found from a record of the same elements without fall."""
     t, x = path
@@ -112,12 +142,9 @@ def _fitted(
 ) -> Fitted:
     """Everything from the data's own start; the share of the strongest element is held."""
     records = [
-        Dataset.of(
-            t=t, v=np.gradient(x, t), F=forces(law, t, x) + NOISE * rng.standard_normal(t.size),
-            units={"v": "m/s", "F": "N"}, name=name,
-        )
-        for (t, x), name in zip(paths, ("hysteresis", "sliding"), strict=True)
-    ]  # fmt: skip
+        _record(law, path, name, rng)
+        for path, name in zip(paths, ("hysteresis", "sliding"), strict=True)
+    ]
     data = records[0] + records[1]
     t, x = paths[0]
     slow = Measured(np.gradient(x, t), records[0][0]["F"], x, t)
