@@ -7,6 +7,7 @@ from mutants.beside import BESIDE
 from mutants.derivatives import DERIVATIVES
 from mutants.dry import DRY
 from mutants.ensembles import ENSEMBLES
+from mutants.fits import FITS
 from mutants.mutant import Mutant
 from mutants.plants import PLANTS
 from mutants.solvers import RESULTS, SOLVERS
@@ -339,6 +340,6 @@ LEFT_OUT = (
 )  # fmt: skip
 
 MUTANTS = (
-    *CONTROLLERS, *EVENT, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
+    *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
     *BESIDE, *CACHES, *DRY, *ENSEMBLES, *LEFT_OUT, *DERIVATIVES, *PLANTS, *RESULTS, *SOLVERS,
 )  # fmt: skip

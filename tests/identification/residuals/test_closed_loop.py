@@ -195,3 +195,15 @@ def test_a_motion_that_is_not_finite_is_said(data: Dataset) -> None:
     found = rows.at(values)
     assert isinstance(found, str)
     assert found.startswith("data 'hand': ")
+
+
+def test_every_record_has_its_own_start(data: Dataset, drive: Subject) -> None:
+    both = Dataset((data[0].at(slice(0, 40)), data[0].at(slice(200, 240))), "both")
+    rows = ClosedLoop(x0="estimate").prepare(drive, both)
+    assert rows.names[-4:] == ("x0.x[0]", "x0.v[0]", "x0.x[1]", "x0.v[1]")
+    found = rows.at(np.array([*of(TRUE, rows.names[:-4]), *(u.start for u in rows.own)]))
+    assert not isinstance(found, str)
+    own = [found.J[c.rows, -4:] for c in rows.channels if c.signal == "x"]
+    np.testing.assert_allclose([part[0] for part in own], np.eye(4)[[0, 2]])
+    assert not own[0][:, 2:].any()
+    assert not own[1][:, :2].any()

@@ -9,6 +9,7 @@ from symfric import GMS, BoucWen, Dahl, LuGre, law_from_text, simulate
 from symfric.foundation.parameters import Variable, parameters
 from symfric.integrator import Linear
 from symfric.laws import Law
+from symfric.laws.steady import steady_force
 from symfric.model import Model, Output
 
 T = np.linspace(0.0, 1.0, 801)
@@ -96,3 +97,13 @@ def test_compiled_code_and_virtual_machine_give_the_same_bits(
         assert not isinstance(end, str)
         found.append(end.r.tobytes() + end.J.tobytes())
     assert found[0] == found[1]
+
+
+def test_a_record_that_begins_in_motion_begins_in_steady_sliding() -> None:
+    one = subject(SOFT, points=True, moving=True)
+    v = np.full(50, 0.05)
+    data = Dataset.of(t=T[:50], v=v, F=0 * v, units={"v": "m/s", "F": "N"})
+    values = np.array([float(parameters(SOFT)[n].value) for n in one.names])
+    found = Points().prepare(one, data).at(values)
+    assert not isinstance(found, str)
+    np.testing.assert_allclose(found.r, steady_force(SOFT, v, 1.0), rtol=1e-9)

@@ -186,3 +186,11 @@ def test_records_too_short_for_the_filter_are_refused() -> None:
 def test_bad_arguments_are_refused(arguments: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         InverseDynamics(**arguments)  # type: ignore[arg-type]
+
+
+def test_every_record_has_its_dead_time() -> None:
+    rows = InverseDynamics(filter=PLAIN, dead_time=(0.0, 0.02)).prepare(
+        subject(DRIVE, free=["m"], fixed="others"), moved(DRIVE) + moved(DRIVE)
+    )
+    assert rows.names == ("m", "dead_time[0]", "dead_time[1]")
+    check_slopes(rows, np.array([4.0, 1e-3, 2.3e-3]))

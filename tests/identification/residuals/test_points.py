@@ -7,7 +7,7 @@ from identification.data.dataset import Dataset
 from identification.residuals.evaluation import Evaluation, Residuals
 from identification.residuals.points import Points
 from identification.unknowns.subject import subject
-from symfric import LuGre, Stribeck, law_from_text
+from symfric import Asymmetric, LuGre, Stribeck, law_from_text
 from symfric.foundation.parameters import parameters
 from symfric.laws import Law
 from symfric.laws.steady import steady_force
@@ -141,3 +141,11 @@ def test_offset_is_an_unknown_of_its_own() -> None:
 def test_offset_of_one_way_motion_is_refused() -> None:
     with pytest.raises(ValueError, match="motion in both directions"):
         Points(offset=True).prepare(subject("stribeck", points=True), points(V, np.abs(V)))
+
+
+def test_break_away_of_each_direction_has_its_own_level() -> None:
+    law = Asymmetric(Stribeck(mu_s=3.0, mu_d=2.0), Stribeck(mu_s=5.0, mu_d=4.0))
+    one = subject(law, points=True)
+    rows = Points().prepare(one, points(np.array([1.0, -1.0]), np.zeros(2)))
+    r = evaluated(rows, start(law, one.names)).r
+    np.testing.assert_allclose(r, [3.0 - 1.0, -5.0 + 1.0], atol=1e-12)

@@ -191,3 +191,8 @@ def test_coordinates_and_rates_of_a_mechanism() -> None:
     data = Dataset.of(t=t, phi=run["phi"], units={"phi": "rad"})
     found = Shooting().prepare(subject(scene, free=["mu_d"], fixed="others"), data, {"mu_d": 0.2})
     assert [u.name for u in found.own] == ["x0.phi[0]", "x0.phi_rate[0]"]
+
+
+def test_only_the_first_window_starts_where_the_model_says() -> None:
+    found = shots(Shooting(windows=0.5, x0="given"), slide())
+    assert found.names[2:] == ("x0.x[0,1]", "x0.v[0,1]")

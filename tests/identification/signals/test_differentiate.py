@@ -25,6 +25,14 @@ def test_velocity_and_acceleration_of_a_sine() -> None:
     np.testing.assert_allclose(found.a, -(W**2) * np.sin(W * found.t), atol=1e-3 * W**2)
 
 
+def test_acceleration_falls_short_by_a_twelfth_of_the_square() -> None:
+    """Of a sine with w h = 0.2: 1 - (w h)^2 / 12; a difference of differences loses a third."""
+    w = 200.0
+    fast = differentiate(record(x=np.sin(w * T), force=WAVE["force"]), Filter(400.0))
+    size = np.sqrt(2 * np.mean(fast.a**2)) / w**2
+    assert 1 - size == pytest.approx(0.2**2 / 12, rel=0.1)
+
+
 def test_measured_velocity_is_used() -> None:
     found = differentiate(
         record(x=WAVE["x"], v=7 * np.cos(W * T), force=WAVE["force"]), Filter(100.0, 5)

@@ -7,11 +7,13 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from identification.residuals.evaluation import Channel, Evaluation
 from identification.solving.descent import descend
 from identification.solving.loss import THRESHOLD, shaped
-from identification.solving.many_starts import best_of, many_starts
+from identification.solving.many_starts import best_of, is_white, many_starts
+from identification.solving.noise import objective
 from identification.solving.reduce import triangle
 from identification.solving.task import Point, Task, task
 from identification.unknowns.unknown import Unknown
@@ -303,3 +305,66 @@ def test_a_value_that_drifts_off_ends_at_a_number_one_can_read() -> None:
         assert made.unknowns.values(found.w)[0] == pytest.approx(end, rel=1e-5)
         assert made.unknowns.values(found.w)[0] < upper
         assert made.unknowns.at_bound(found.w).all()
+
+
+def test_noise_levels_count_what_the_fit_has_taken() -> None:
+    """Nine samples and three unknowns: without it the mean variance would be two thirds."""
+    found = list[float]()
+    for seed in range(60):
+        at = problem(decay(seed, n=9))
+        found.append(descend(at, at.unknowns.start).noise["y"])
+    assert np.mean(np.square(found)) == pytest.approx(1e-4, rel=0.15)
+
+
+def test_the_objective_is_that_of_the_likelihood() -> None:
+    at = problem(decay(other=1.0), noise={"y": 0.02, "z": 3.0})
+    point = at.at(at.unknowns.start)
+    assert isinstance(point, Point)
+    r = point.evaluation.r
+    parts = zip((r[:400], r[400:]), (0.02, 3.0), strict=True)
+    expected = -2 * sum(float(norm.logpdf(part, scale=s).sum()) for part, s in parts)
+    assert objective(at, point) + 800 * np.log(2 * np.pi) == pytest.approx(expected)
+
+
+def test_noise_that_skips_its_neighbours_is_not_white() -> None:
+    for lag in (1, 2, 4):
+        data, e = decay(), np.random.default_rng(1).standard_normal(410)
+        data.y = data.y + 0.05 * (e[:400] + e[lag : 400 + lag])
+        at = problem(data)
+        point = at.at(descend(at, at.unknowns.start).w)
+        assert isinstance(point, Point)
+        assert not is_white(at, point)
+
+
+def test_at_a_bound_nothing_is_left_to_gain() -> None:
+    box = [UNKNOWNS[0], UNKNOWNS[1], Unknown("c", "m", 0.0, -1.0, 0.2)]
+    at = task(decay(), unknowns_of(box, {}, Decay.names))  # pyright: ignore[reportArgumentType]
+    end = descend(at, at.unknowns.start)
+    assert end.status is Status.SOLVED
+    assert at.unknowns.at_bound(end.w).tolist() == [False, False, True]
+
+
+@dataclass(eq=False)
+class Wells:
+    """(p^2 - 1, p - 1) over twenty times, with a wave that nothing explains: minima near -1, 1."""
+
+    names: ClassVar[tuple[str, ...]] = ("p",)
+    own: ClassVar[tuple[Unknown, ...]] = ()
+    wave: ClassVar[Array] = 0.3 * np.sin(np.arange(40.0))
+    channels: ClassVar[tuple[Channel, ...]] = (
+        Channel(0, "y", "m", slice(0, 40), np.arange(40.0), wave, {}),
+    )
+
+    def at(self, values: Array) -> Evaluation | str:
+        (p,) = values
+        first, one = np.arange(40) < 20, np.ones(40)
+        r = np.where(first, p**2 - 1, 0.2 * (p - 1)) - self.wave
+        return Evaluation(r, np.where(first, 2 * p * one, 0.2 * one)[:, None])
+
+
+def test_only_starts_that_end_in_the_lowest_minimum_agree() -> None:
+    at = task(Wells(), unknowns_of([Unknown("p", "m", 2.0)], {}, ("p",)), {"y": 0.1})  # pyright: ignore[reportArgumentType]
+    done = many_starts(at, [np.array([p]) for p in (-2.0, 2.0, -2.0, 2.0, 2.0, 2.0)])
+    assert [s.status for s in done] == [Status.SOLVED] * 5
+    assert [bool(s.w[0] > 0) for s in done] == [False, True, False, True, True]
+    assert done[0].cost > done[1].cost + 1

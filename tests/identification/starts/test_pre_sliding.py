@@ -99,3 +99,23 @@ def test_ramps_of_one_rate_say_nothing_about_it() -> None:
 def test_record_without_rest_is_refused() -> None:
     with pytest.raises(ValueError, match="expected a rest"):
         break_away(Measured(1 + 0.1 * T, np.ones(T.size), t=T))
+
+
+@pytest.mark.parametrize("loaded", [1, -1])
+def test_a_record_may_begin_with_all_elements_slipping(loaded: int) -> None:
+    radii, k = np.array([3e-7, 2.9e-6]), np.array([9e5, 8e4])
+    measured = Measured(V, stretches(X, radii, loaded)[0] @ k, X, T)
+    found = fit_elements(measured, 2, offset=False, viscous=False)
+    assert found.loaded == loaded
+    assert np.allclose(found.radii, radii, rtol=1e-3)
+
+
+def test_only_the_last_rise_tells_the_rate_of_a_ramp() -> None:
+    """The force rises, gives way to a quarter, and rises again at another rate."""
+    h = 1e-3
+    rises = [*np.arange(0.0, 1.2, 50 * h), *np.arange(0.4, 2.0, 2 * h)]
+    F = np.array([*rises, *[1.2] * 50])
+    v = np.array([0.0] * len(rises) + [0.1] * 50)
+    t = h * np.arange(F.size, dtype=np.float64)
+    (event,) = break_away(Measured(v, F, t=t)).events
+    assert event.rate == pytest.approx(2.0, rel=1e-6)

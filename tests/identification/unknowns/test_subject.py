@@ -99,9 +99,21 @@ def test_specs_bound_tie_and_order() -> None:
     assert values["m"] == pytest.approx(2.5)
     by_name = {u.name: u for u in at.unknowns}
     assert (by_name["sigma_0"].lower, by_name["sigma_0"].upper) == (1e3, 1e7)
+    other = subject("lugre", free={"offset": log(1e-3, 10), "sigma_0": linear(1.0, 1e7)})
+    scales = {u.name: u.logarithmic for u in other.unknowns}
+    assert scales["offset"] and not scales["sigma_0"]
     assert by_name["mu_s"].above == "mu_d"
     ordered = subject("lugre", free={"sigma_1": above("sigma_2")})
     assert {u.name: u.above for u in ordered.unknowns}["sigma_1"] == "sigma_2"
+
+
+def test_a_tied_value_is_a_multiple_of_its_partner() -> None:
+    found = subject("stribeck", free={"mu_s": tied("mu_d", 1.2)})
+    at = coordinates(found)
+    values = at.named(at.of({"mu_d": 3.0}))
+    assert values["mu_s"] == pytest.approx(3.6)
+    i, j = at.names.index("mu_s"), at.names.index("mu_d")
+    assert at.slope(at.start)[i] == pytest.approx(1.2 * at.slope(at.start)[j])
 
 
 def test_bounds_of_the_upper_one_of_a_pair_leave_the_lower_one_its_range() -> None:

@@ -37,3 +37,9 @@ def test_a_value_goes_back_to_the_far_bound_that_its_law_has() -> None:
     low, high = made.values(made.floor)[0], made.values(made.ceiling)[0]
     assert 1e-12 < low < 1.001e-12
     assert 0.999e6 < high < 1e6
+
+
+def test_both_ends_of_a_box_are_bounds() -> None:
+    made = unknowns_of((Unknown("a", "m", 2.0, 1.0, 3.0), Unknown("b", "m", 0.0)), {}, ("a", "b"))
+    for value, there in ((1.0, True), (2.0, False), (3.0, True)):
+        assert made.at_bound(np.array([value, 0.0])).tolist() == [there, False]

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linear_fits import ar1, coulomb, fitted
+from scipy.stats import t as student
 
 from identification.unknowns.unknown import Unknown
 from identification.verdict.covariance import Covariance, covariance_of
@@ -98,3 +99,10 @@ def test_few_effective_samples_are_said() -> None:
 
 def replace_unknown(name: str, *, logarithmic: bool) -> Unknown:
     return Unknown(name, "m/s", 1.0, lower=0.0, logarithmic=logarithmic)
+
+
+def test_intervals_are_those_of_student() -> None:
+    found = covariance("a b", (2.0, 5.0), C, V)
+    reach = student.ppf(0.975, found.freedom) * found.standard_errors
+    np.testing.assert_allclose(found.high - [2.0, 5.0], reach)
+    np.testing.assert_allclose([2.0, 5.0] - found.low, reach)

@@ -72,3 +72,13 @@ def test_whiteness_keeps_its_level_in_short_records() -> None:
     coloured = fitted(J, ar1(n, 0.9, 1), regressors={}).r
     assert whiteness(ar1(400, 0.5, 1), np.ones((400, 1)), np.arange(400)).p < 1e-6
     assert whiteness(coloured, J, np.zeros(n, dtype=int)).lags.size == 0
+
+
+def test_coloured_residuals_are_as_large_as_their_noise() -> None:
+    """The mean square of 200 samples of AR(1) 0.95 scatters as that of few independent ones."""
+    J, level = coulomb(200), 1 / np.sqrt(1 - 0.95**2)
+    failed = 0
+    for seed in range(60):
+        found = judged(fitted(J, ar1(200, 0.95, seed), noise={"force": level}))
+        failed += any(t.name == "size" and not t.passed for t in found.tests)
+    assert failed <= 2
