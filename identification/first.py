@@ -67,6 +67,21 @@ def _of_drive(kind: object, data: Dataset, load: float) -> Measured:
     return Measured(v, F, x=x, t=t, a=a, N=load, breaks=_breaks([one.v.size for one in each]))
 
 
+def strongest(
+    kind: object, data: Dataset, seen: Measured | None, mass: float | None
+) -> float | None:
+    """Largest force on the friction of points or of a drive [N]; None where nobody knows it.
+
+    In sliding it is F - m a, at rest F. Not known of points with a measured normal force.
+    """
+    loaded = isinstance(kind, Points) and (kind.N is not None or any("N" in r for r in data))
+    if seen is None or loaded:
+        return None
+    if seen.a is None or mass is None:
+        return float(np.abs(seen.F).max())
+    return float(max(np.abs(seen.F).max(), np.abs(seen.F - mass * seen.a).max()))
+
+
 def slowest(kind: object, seen: Measured | None) -> float:
     """Speed [m/s] above which nearly all points lie that are not at rest; 0 for motions."""
     if seen is None or not isinstance(kind, Points):

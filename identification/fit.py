@@ -16,16 +16,16 @@ import numpy as np
 
 from identification.data.dataset import Dataset
 from identification.data.findings import Findings
-from identification.first import centre, explained, findings_of, measured, slowest
+from identification.first import centre, explained, findings_of, measured, slowest, strongest
 from identification.residuals.choice import choose
 from identification.residuals.evaluation import Residuals
 from identification.residuals.points import Points
 from identification.residuals.shooting import Shooting
-from identification.result.build import fitted
+from identification.result.build import fitted, levels_of
 from identification.result.calls import written
 from identification.result.fitted import Fitted
 from identification.result.live import Kind
-from identification.solving.descent import Start, descend
+from identification.solving.descent import Start, descend, remaining
 from identification.solving.loss import THRESHOLD
 from identification.solving.many_starts import Progress, best_of, many_starts
 from identification.solving.scatter import scattered
@@ -186,10 +186,11 @@ class Fit:
     ) -> Fitted:  # fmt: skip
         made = asked.task.with_noise(end.noise)
         verdict = judge(made, point, asked.findings)
-        status, message = _status(end, verdict)
+        status, message = _status(end, verdict, remaining(made, point) / max(point.cost, 1e-300))
+        levels = levels_of(asked.subject, asked.strongest(point, self.data), self.data.rotary)
         result = fitted(
             asked.kind, asked.subject, self.data, made, point, starts, verdict,
-            covariance(made, point), tuple(asked.findings), status=status, message=message,
+            covariance(made, point, levels), tuple(asked.findings), status=status, message=message,
             seconds=seconds, call=f"{written(self)}.solve()",
         )  # fmt: skip
         if throw and not status.ok:
@@ -218,11 +219,21 @@ class Prepared:
     centre: Any
     seen: Measured | None
 
+    def strongest(self, point: Point, data: Dataset) -> float | None:
+        """Largest force on the friction in the data, with the mass at `point`."""
+        found = dict(zip(self.task.residuals.names, point.values.tolist(), strict=True))
+        drive = self.subject.drive
+        mass = None if drive is None else float(found.get("m", drive.m))
+        return strongest(self.kind, data, self.seen, mass)
 
-def _status(end: Start, verdict: Verdict) -> tuple[Status, str]:
-    """How the fit ended, and what to know about it."""
-    said = [end.message, *verdict.sentences]
-    return verdict.status(end.status), " ".join(_sentence(text) for text in said if text)
+
+def _status(end: Start, verdict: Verdict, gain: float) -> tuple[Status, str]:
+    """How the fit ended, and what to know about it; `gain` see `Verdict.status`."""
+    status, message = verdict.status(end.status, gain), end.message
+    if status is Status.DOUBTFUL and not end.status.ok:
+        message = f"The search was not finished, so that a better fit may be near: {message}"
+    said = [message, *verdict.sentences]
+    return status, " ".join(_sentence(text) for text in said if text)
 
 
 def _sentence(text: str) -> str:

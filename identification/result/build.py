@@ -21,6 +21,7 @@ from identification.unknowns.roles import is_coefficient
 from identification.unknowns.subject import Subject
 from identification.verdict.covariance import Covariance
 from identification.verdict.judge import Verdict
+from identification.verdict.levels import Levels
 from symfric import __version__
 from symfric.foundation.parameters import parameters
 from symfric.foundation.status import Status
@@ -107,7 +108,7 @@ def _estimates(
     """Every parameter in the order of the subject, then what belongs to records."""
     own = {u.name: u for u in (*task.unknowns.unknowns, *task.residuals.own)}
     errors, white = made.standard_errors, made.white_errors
-    notes = dict.fromkeys(made.at_bound, "at its bound")
+    notes = dict(made.notes) | dict.fromkeys(made.at_bound, "at its bound")
     for group in made.undetermined:
         for name in group:
             others = ", ".join(n for n in group if n != name)
@@ -153,6 +154,21 @@ def _in_forces(subject: Subject, name: str, unit: str, turning: bool) -> str:
     if load_of(subject) != 1.0 or name not in known or not is_coefficient(known[name]):
         return unit
     return turned("N") if turning else "N"
+
+
+def levels_of(subject: Subject, largest: float | None, turning: bool) -> Levels | None:
+    """The friction levels of a law under a known load; None where there are other forces, too."""
+    whole, load = subject.drive or subject.law, load_of(subject)
+    if whole is None or load is None or largest is None or subject.law is None:
+        return None
+    if subject.law.inputs:
+        return None  # its levels are by loads of which the friction alone says nothing
+    force = turned("N") if turning else "N"
+    levels = {n: p for n, p in parameters(whole).items() if p.role == "level"}
+    loads = {n: load if is_coefficient(p) else 1.0 for n, p in levels.items()}
+    return Levels(
+        {n: loads[n] for n, p in levels.items() if p.unit in ("1", force)}, largest, force
+    )
 
 
 def load_of(subject: Subject) -> float | None:

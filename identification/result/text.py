@@ -16,6 +16,8 @@ CLOSE = 0.9
 """Magnitude of a correlation of two estimates that is worth a line."""
 SAME = 1.0
 """Difference of minus twice the log-likelihood below which two starts ended at one minimum."""
+NOTHING = 1e8
+"""Ratio of the ends of an interval, of what is tied to a value that is lost, that says nothing."""
 MANY = 12
 """Start values and dead times that are listed; of more only how many there are."""
 
@@ -65,6 +67,8 @@ def interval(e: Estimate) -> str:
     """The 95 % interval, with the digits of the value; "" without one."""
     if e.low is None or e.high is None:
         return ""
+    if e.high > NOTHING * e.low > 0.0:
+        return "not told"
     return f"{_end(e.low, e)} ... {_end(e.high, e)}"
 
 

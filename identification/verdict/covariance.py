@@ -1,7 +1,7 @@
 """Uncertainty of what was fitted: covariance, 95 % intervals, what is not told, in words."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import final
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from identification.residuals.evaluation import Array
 from identification.solving.task import Point, Task
 from identification.verdict.combinations import Trace, lost
+from identification.verdict.levels import Levels
 from identification.verdict.minimum import Minimum, minimum, trace
 from identification.verdict.sandwich import sandwich
 
@@ -19,6 +20,14 @@ TOGETHER = 0.98
 """Correlation from which on two estimates are said to go together."""
 FEW = 3.0
 """Effective samples for each unknown below which intervals cannot be relied on."""
+HARDLY = 0.5
+"""Standard error over the value from which on it is said to be hardly told."""
+DECADES = 8.0
+"""Length of the interval of a logarithmic value from which on it is none."""
+WIDE = 1e4
+"""The same of other values, over the value and its usual magnitude."""
+LOST, BEYOND = "not told: its effect is lost in the noise", "not told: far above all forces"
+"""Why a value has no interval."""
 
 
 @final
@@ -38,6 +47,7 @@ class Covariance:
             group of one has no influence at all.
         effective: number of independent samples of each channel, by its name.
         sentences: what is not told or hardly told.
+        notes: name of a value without an interval, for what is no group or bound -> why.
     """
 
     names: tuple[str, ...]
@@ -50,6 +60,7 @@ class Covariance:
     undetermined: tuple[tuple[str, ...], ...]
     effective: dict[str, float]
     sentences: tuple[str, ...]
+    notes: Mapping[str, str] = field(default_factory=dict[str, str])
 
     @property
     def standard_errors(self) -> Array:
@@ -69,13 +80,13 @@ class Covariance:
         return np.divide(self.matrix, both, out=np.full_like(both, np.nan), where=both > 0)
 
 
-def covariance(task: Task, point: Point) -> Covariance:
+def covariance(task: Task, point: Point, levels: Levels | None = None) -> Covariance:
     """Uncertainty of what a task was solved for, see `covariance_of`."""
     found = minimum(task, point)
-    return covariance_of(found, trace(task, found))
+    return covariance_of(found, trace(task, found), levels)
 
 
-def covariance_of(found: Minimum, change: Trace) -> Covariance:
+def covariance_of(found: Minimum, change: Trace, levels: Levels | None = None) -> Covariance:
     """Uncertainty of the values at a minimum.
 
     Limits: linear in the values (in logarithms where an unknown is logarithmic), see `profile` for
@@ -85,6 +96,7 @@ def covariance_of(found: Minimum, change: Trace) -> Covariance:
     Args:
         found: the minimum.
         change: how much the weighted residuals change at other values, to find the right words.
+        levels: friction levels among the values; those far above every force get no interval.
     """
     inside = sandwich(found)
     names, values = found.names, found.values
@@ -114,8 +126,38 @@ def covariance_of(found: Minimum, change: Trace) -> Covariance:
         tuple(tuple(names[own[i]] for i in g.members) for g in groups),
         effective, tuple(g.sentence for g in groups),
     )  # fmt: skip
-    said = (*made.sentences, *_weak(found, made), *_few(found, effective))
-    return replace(made, sentences=said)
+    far = {} if levels is None else dict(levels.beyond(dict(zip(names, values, strict=True))))
+    gone = dict(_gone(found, made))
+    weak = _weak(found, made, (*far, *gone))
+    said = (*made.sentences, *far.values(), *gone.values(), *weak, *_few(found, effective))
+    notes = dict.fromkeys(gone, LOST) | dict.fromkeys(far, BEYOND)
+    return replace(_without(made, notes), sentences=tuple(s for s in said if s), notes=notes)
+
+
+def _without(made: Covariance, notes: Collection[str]) -> Covariance:
+    """The same without the intervals of what `notes` names."""
+    out = np.array([name in notes for name in made.names], dtype=bool)
+    matrix, white = made.matrix.copy(), made.white.copy()
+    for C in (matrix, white):
+        C[out, :] = C[:, out] = np.nan
+    low, high = (np.where(out, np.nan, end) for end in (made.low, made.high))
+    return replace(made, matrix=matrix, white=white, low=low, high=high)
+
+
+def _gone(found: Minimum, made: Covariance) -> Iterator[tuple[str, str]]:
+    """Names of the values that could be nearly anything, with a sentence of those asked for."""
+    known = {u.name: u for u in found.unknowns}
+    for name, value, low, high in zip(made.names, found.values, made.low, made.high, strict=True):
+        unknown = known.get(name)
+        if unknown is None or np.isnan(high - low):
+            continue
+        if unknown.logarithmic and low > 0:
+            gone = high / low > 10**DECADES
+        else:
+            gone = high - low > WIDE * max(abs(value), abs(unknown.scale))
+        if gone:
+            said = f"{name} is not told: what it does to what was measured is lost in the noise."
+            yield name, "" if unknown.nuisance else said
 
 
 def _sensitivity(found: Minimum, own: list[int]) -> Array:
@@ -155,14 +197,16 @@ def _intervals(found: Minimum, error: Array, freedom: Array) -> tuple[Array, Arr
     return low, high
 
 
-def _weak(found: Minimum, made: Covariance) -> Iterator[str]:
-    """What is told, but hardly."""
+def _weak(found: Minimum, made: Covariance, told_of: Collection[str]) -> Iterator[str]:
+    """What is told, but hardly, beside what there are sentences of."""
     error, correlation = made.standard_errors, made.correlation
     told: NDArray[np.bool_] = np.isfinite(error)
     nuisance = {u.name for u in found.unknowns if u.nuisance}
     units = {u.name: u.unit for u in found.unknowns}
     for i, name in enumerate(made.names):
-        if not told[i] or name in nuisance or not error[i] > abs(found.values[i]):
+        if not told[i] or name in nuisance or name in told_of:
+            continue
+        if not error[i] > HARDLY * abs(found.values[i]):
             continue
         unit = units.get(name, "1")
         unit = "" if unit == "1" else f" {unit}"

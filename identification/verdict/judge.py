@@ -12,6 +12,7 @@ sensor has, if one is lucky. So
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from math import inf
 from typing import final
 
 import numpy as np
@@ -42,6 +43,9 @@ UNEXPLAINED = 0.7
 CHANCE = 10.0
 """What a model explains, over what as many free numbers explain of noise, that is no chance."""
 INERTIA = ("kg", "kg m^2")
+NEARLY = 0.1
+"""Share of the cost that a step may still gain of an unfinished search whose residuals fail tests:
+they do not fail them for want of that step."""
 
 
 @final
@@ -95,9 +99,20 @@ class Verdict:
         """Whether nothing speaks against the model."""
         return not self.nonsense and all(t.passed for t in self.tests if t.decides)
 
-    def status(self, solved: Status) -> Status:
-        """How the fit ended, if the solver ended so."""
-        if not solved.ok or self.good:
+    def status(self, solved: Status, gain: float = inf) -> Status:
+        """How the fit ended, if the solver ended so.
+
+        Args:
+            solved: of the solver.
+            gain: share of the cost that a step promises where the solver ran out of evaluations. Of
+                little, a model that fails its tests is doubtful as one at a minimum; one that
+                passes them, or far from a minimum, is unfinished and nothing else.
+        """
+        if self.good:
+            return solved
+        if solved is Status.MAX_ITERATIONS and gain < NEARLY and not self.nonsense:
+            return Status.DOUBTFUL
+        if not solved.ok:
             return solved
         return Status.IMPLAUSIBLE if self.nonsense else Status.DOUBTFUL
 

@@ -14,6 +14,7 @@ from identification.residuals.shooting import Shooting
 from identification.unknowns.spec import above, log, tied
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import Coulomb, LuGre, Stribeck, Sum, Viscous
+from symfric.laws.steady import steady_force
 from symfric.scenes import Drive
 
 TRUTH = {"mu_s": 3.0, "mu_d": 2.0, "v_s": 0.01, "sigma_2": 4.0}
@@ -144,3 +145,19 @@ def test_a_fit_without_an_end_says_so_and_hands_back_what_there_is() -> None:
         Fit(Points(), "stribeck", points(), start="law", starts=1, evaluations=2).solve()
     assert caught.value.status is Status.MAX_ITERATIONS
     assert caught.value.partial.parameters["mu_d"].value > 0
+
+
+def test_a_static_level_that_no_point_comes_near_is_not_told() -> None:
+    """Points from twice the Stribeck velocity on: the level is read off a curve far beyond them."""
+    v = np.linspace(0.02, 0.2, 200)
+    v = np.concatenate([-v, v])
+    for mu_s, note in ((5.0, "not told: far above all forces"), (0.15, "")):
+        F = steady_force(Stribeck(mu_s=mu_s, mu_d=0.1, v_s=0.01), v, 1.0)
+        F = F + 1e-4 * np.random.default_rng(0).standard_normal(v.size)
+        data = Dataset.of(v=v, F=F, points=True, units={"v": "m/s", "F": "N"})
+        fit = Fit(Points(), "stribeck", data).solve()
+        found = fit.parameters["mu_s"]
+        assert found.note == note
+        assert (found.standard_error is None) == bool(note)
+        assert ("mu_s is not told: no friction force" in str(fit)) == bool(note)
+        assert fit.parameters["mu_d"].standard_error

@@ -2,7 +2,7 @@
 
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -296,7 +296,7 @@ class Rigid:
 
 
 def test_a_value_that_drifts_off_ends_at_a_number_one_can_read() -> None:
-    data = Rigid(1.002 + 0.01 * np.random.default_rng(1).standard_normal(200))
+    data: Any = Rigid(1.002 + 0.01 * np.random.default_rng(1).standard_normal(200))
     for upper, end in ((np.inf, 2e12), (1e10, 1e10)):
         k = Unknown("k", "1", 2.0, lower=0.0, upper=upper, logarithmic=True)
         made = task(data, unknowns_of((k,), {}, data.names))

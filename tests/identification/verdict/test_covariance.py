@@ -9,6 +9,7 @@ from scipy.stats import t as student
 
 from identification.unknowns.unknown import Unknown
 from identification.verdict.covariance import Covariance, covariance_of
+from identification.verdict.levels import Levels
 from identification.verdict.minimum import Minimum
 
 N = 400
@@ -79,6 +80,42 @@ def test_bounds_count_as_known_and_logarithms_keep_their_sign() -> None:
     assert found.low[0] > 0
     assert found.low[0] * found.high[0] == pytest.approx(0.25)
     assert found.sentences[0].startswith("v_s is hardly told: between ")
+
+
+def test_half_of_itself_is_hardly_told() -> None:
+    made = fitted(C[:, None], ar1(N, 0.0, 1), unknowns("F_C"))
+    (error,) = covariance_of(made, lambda _: 0.0).standard_errors
+    for share, told in ((0.45, True), (0.55, False)):
+        found = covariance_of(replace(made, values=np.array([error / share])), lambda _: 0.0)
+        assert (found.sentences == ()) == told
+        assert told or found.sentences[0].startswith("F_C is hardly told: between ")
+
+
+@pytest.mark.parametrize("logarithmic", [True, False])
+def test_what_could_be_nearly_anything_has_no_interval(logarithmic: bool) -> None:
+    """A stiffness between 2e-164 and 7e+96 is none; its neighbour keeps its interval."""
+    both = (Unknown("k", "N/m", 1.0, lower=0.0, logarithmic=logarithmic), *unknowns("b"))
+    made = fitted(np.column_stack([1e-5 * C, V]), ar1(N, 0.0, 1), both)
+    found = covariance_of(replace(made, values=np.array([0.5, 3.0])), lambda _: 0.0)
+    for lost in (found.standard_errors, found.white_errors, found.low, found.high):
+        assert np.isnan(lost).tolist() == [True, False]
+    assert set(found.notes) == {"k"}
+    assert [s for s in found.sentences if "k " in s] == [
+        "k is not told: what it does to what was measured is lost in the noise."
+    ]
+
+
+def test_a_level_far_above_every_force_is_not_told() -> None:
+    """However small its formal error is; a level near the forces is told, a mass is no level."""
+    J = np.column_stack([C, V, np.gradient(V)])
+    made = fitted(J, ar1(N, 0.0, 1), unknowns("mu_s", "mu_d", "m"))
+    made = replace(made, values=np.array([253.0, 0.2, 900.0]))
+    found = covariance_of(made, lambda _: 0.0, Levels({"mu_s": 2.0, "mu_d": 2.0}, 0.6))
+    assert np.isnan(found.standard_errors).tolist() == [True, False, False]
+    assert found.sentences[0] == (
+        "mu_s is not told: no friction force in the data comes near 506 N, the largest is 0.6 N."
+    )
+    assert "mu_s is hardly" not in " ".join(found.sentences)
 
 
 def test_tied_values_follow() -> None:

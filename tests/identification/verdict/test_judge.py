@@ -20,6 +20,7 @@ def test_right_model_is_good() -> None:
     verdict = judge(task, point)
     assert verdict.good
     assert verdict.status(Status.SOLVED) is Status.SOLVED
+    assert verdict.status(Status.MAX_ITERATIONS, gain=0.05) is Status.MAX_ITERATIONS
     assert verdict.effective == {"x": 300.0}
     assert plot_lags(verdict.whiteness).axes
 
@@ -37,6 +38,9 @@ def test_wrong_model_is_doubtful() -> None:
     verdict = judge(task, point)
     assert verdict.status(Status.SOLVED) is Status.DOUBTFUL
     assert verdict.status(Status.MAX_ITERATIONS) is Status.MAX_ITERATIONS
+    assert verdict.status(Status.MAX_ITERATIONS, gain=0.05) is Status.DOUBTFUL
+    assert verdict.status(Status.MAX_ITERATIONS, gain=0.5) is Status.MAX_ITERATIONS
+    assert verdict.status(Status.NO_DESCENT, gain=0.05) is Status.NO_DESCENT
     assert "depend on force" in verdict.sentences[0]
 
 
