@@ -73,6 +73,9 @@ def revived(kind: Any, data: Any) -> Any:
         ValueError, TypeError, KeyError: data that `plain` did not write of such a value.
     """
     origin, inner = get_origin(kind), get_args(kind)
+    meant = getattr(origin or kind, "__value__", None)  # NDArray is an alias since NumPy 2.5
+    if meant is not None:
+        return revived(meant, data)
     if kind is Any or origin is Literal:
         return data
     if origin in (Union, UnionType):
