@@ -237,6 +237,7 @@ def _put_above(
         return
     room = 1.01 if strictly else 1.0
     a = replace(a, lower=max(a.lower, b.lower), upper=min(a.upper, b.upper / room))
+    a = replace(a, start=_between(a))
     if not a.start < b.start:
         if high in wished.started and low not in wished.started and b.start > 0:
             a = replace(a, start=b.start / APART)

@@ -187,3 +187,9 @@ def test_errors_say_all_at_once(what: object, given: dict[str, object], said: st
     with pytest.raises(ValueError, match=said):
         found = subject(what, **given)  # pyright: ignore[reportArgumentType]
         coordinates(found)
+
+
+def test_bounds_of_the_lower_level_take_the_upper_one_along() -> None:
+    starts = {u.name: u.start for u in subject("stribeck", free={"mu_d": (5.0, 15.0)}).unknowns}
+    assert 5.0 <= starts["mu_d"] <= 15.0
+    assert starts["mu_s"] > starts["mu_d"]
