@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, final
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +23,7 @@ from identification.residuals.windows import cut, turnaround
 from identification.unknowns.unknown import Unknown
 from symfric.foundation import checks
 from symfric.foundation.compiler import find_compiler
+from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Variable
 from symfric.model import Model
 
@@ -58,6 +60,7 @@ class Preparation:
         self.hidden = sorted(hidden(model))
         self.signals = self._signals()
         self.inputs = self._inputs()
+        self.timeless = self._timeless()
         self._check_x0()
         self.own = list[Unknown]()
         self.first = len(model.p)
@@ -170,6 +173,15 @@ class Preparation:
             self._same_unit(where, name, units[name], source)
         return found
 
+    def _timeless(self) -> bool:
+        """Whether the motion is the same at any time, so that no step need resolve 1e9 s."""
+        given = [u for u in self.inputs.values() if not isinstance(u, str)]
+        model, outputs = self.model, [self.model.outputs[n].expression for n in self.signals
+                                      if n in self.model.outputs]  # fmt: skip
+        equations = [e for e in (model.ode, model.alg, model.residual, *outputs) if e is not None]
+        timed = ca.depends_on(ca.veccat(*map(ca.SX, equations)), model.t)
+        return not timed and not model.events and all(map(is_number, given))
+
     def _check_x0(self) -> None:
         if isinstance(self.kind.x0, str):
             return
@@ -191,7 +203,8 @@ class Preparation:
 
     def _cut(self, number: int, record: "Record", row: int) -> Iterator[Shot]:
         """The windows of one record; residuals begin at `row`, a signal after the other."""
-        t = record.time
+        origin = float(record.time[0]) if self.timeless else 0.0
+        t = record.time - origin
         measured = {s: record[c] for s, c in self.signals.items() if c in record}
         if not measured:
             raise ValueError(
@@ -220,8 +233,8 @@ class Preparation:
             held, free = self._start(number, sensed, int(look[0]), label)
             last = windows[w].stop - 1
             yield Shot(
-                record.name, t[look], float(t[last]), {s: y[look] for s, y in measured.items()},
-                places, drives, held, free,
+                record.name, origin, t[look], float(t[last]),
+                {s: y[look] for s, y in measured.items()}, places, drives, held, free,
             )  # fmt: skip
             done += look.size
 
@@ -265,7 +278,7 @@ class Preparation:
     def _channels(
         self, number: int, record: "Record", pieces: Sequence[Shot], row: int
     ) -> Iterator[Channel]:
-        t = np.concatenate([piece.t for piece in pieces])
+        t = np.concatenate([piece.origin + piece.t for piece in pieces])
         breaks = tuple(np.cumsum([piece.t.size for piece in pieces])[:-1].tolist())
         inputs = {n: np.interp(t, record.time, record[c])
                   for n, c in self.inputs.items() if isinstance(c, str)}  # fmt: skip

@@ -32,7 +32,7 @@ class Drives:
     """Inputs of one record.
 
     Attributes:
-        t: sample times [s], shape (n,).
+        t: sample times from the origin of the shots [s], shape (n,).
         sampled: input -> samples, shape (n,).
         others: input -> what `simulate` takes.
         held: samples are held until the next one; else linear between them.
@@ -66,6 +66,7 @@ class Shot:
 
     Attributes:
         record: its name.
+        origin: time of the record from which the others are counted [s].
         t: times that are compared [s], shape (m,); the simulation starts at the first.
         end: last time that is simulated [s].
         measured: signal -> values at `t`.
@@ -76,6 +77,7 @@ class Shot:
     """
 
     record: str
+    origin: float
     t: Array
     end: float
     measured: Mapping[str, Array]
@@ -204,5 +206,8 @@ class Shots:
         shown = zip(self.parameters[:LISTED], values, strict=False)
         there = ", ".join(f"{name} = {x:.5g}" for name, x in shown)
         more = ", ..." if len(self.parameters) > LISTED else ""
-        where = "" if shot is None else f"'{shot.record}' from t = {shot.t[0]:g} s "
-        return f"{where}with {there}{more}: {why}"
+        where = (
+            "" if shot is None else f"'{shot.record}' from t = {shot.origin + shot.t[0]:.12g} s "
+        )
+        counted = "" if shot is None or not shot.origin else " (t from the start of the record)"
+        return f"{where}with {there}{more}: {why}{counted}"

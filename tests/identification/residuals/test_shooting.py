@@ -1,10 +1,12 @@
 """Simulated motions against measured ones: rows, names, exact derivatives, start values."""
 
 import pickle
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from casadi import SX
 
 from identification.data.dataset import Dataset
 from identification.residuals.evaluation import Evaluation
@@ -63,6 +65,24 @@ def test_at_the_truth_only_the_noise_is_left() -> None:
     assert found.names == ("m", "mu_d")
     assert [c.record for c in found.channels] == [0, 1]
     assert np.std(r) == pytest.approx(1e-5, rel=0.1)
+
+
+def test_a_clock_that_began_long_ago_changes_nothing() -> None:
+    since = 1e9
+    late = slide().each(lambda r: replace(r, t=since + r.time))
+    found, usual = shots(Shooting(), late), shots(Shooting(), slide())
+    r, expected = good(found.at(start(found))).r, good(usual.at(start(usual))).r
+    assert r == pytest.approx(expected, abs=1e-6)  # such a time is right to 1.2e-7 s
+    assert found.channels[0].t[0] == since
+
+
+def test_a_model_that_depends_on_time_sees_that_of_the_record() -> None:
+    x, a, t = Variable("x", "m"), Variable("a", "m/s", start=1.0), SX.sym("t")
+    ramp = Model(name="ramp", x=(x,), p=(a,), ode=a.symbol * t, t=t)
+    data = Dataset.of(t=T + 2, x=((T + 2) ** 2 - 4) / 2, units={"x": "m"})
+    made = subject(ramp)
+    found = Shooting(x0="given").prepare(made, data, {"a": 1.0})
+    assert np.abs(good(found.at(np.array([1.0]))).r).max() < 1e-6
 
 
 def test_derivatives_by_parameters_starts_and_dead_time() -> None:
