@@ -33,7 +33,9 @@ class Points:
 
     A static law is a curve through the points, and so is a law with states in steady sliding. Over
     time, its states follow the measured velocity instead, z' = rate(z, v(t), N(t)), from steady
-    sliding at the first sample. Points without time at v = 0 exactly are break-away forces: they
+    sliding at the first sample, or relaxed where that is slower than a twentieth of the usual
+    speed. A record that begins slowly and loaded is modelled wrongly until it has slid once; the
+    verdict says so where it shows. Points without time at v = 0 exactly are break-away forces: they
     are compared with the static level of the law.
 
     Attributes:

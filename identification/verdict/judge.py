@@ -20,6 +20,7 @@ import numpy as np
 from identification.data.findings import Findings
 from identification.residuals.evaluation import Channel
 from identification.solving.task import Point, Task
+from identification.verdict.beginning import beginnings
 from identification.verdict.clues import clues_of
 from identification.verdict.colour import Colour
 from identification.verdict.independence import Dependence, dependences
@@ -146,7 +147,7 @@ def judged(found: Minimum, findings: Findings | None = None) -> Verdict:
     bounds = tuple(_bounds(found))
     failed = [t for t in tests if not t.passed]
     failed.sort(key=lambda t: (not t.decides, t.p))
-    said = (*nonsense, *(t.sentence for t in failed), *bounds)
+    said = (*nonsense, *beginnings(found), *(t.sentence for t in failed), *bounds)
     return Verdict(tuple(tests), effective, white, nonsense, said)
 
 
