@@ -286,7 +286,7 @@ JUDGED = (
     Mutant(
         "a mass at its lower bound is physics", VERDICT + "judge.py",
         "if held and unknown.unit in INERTIA and near:", "if False:",
-        (*T_JUDGE, f"{TESTS}test_bad_fits.py"),
+        T_JUDGE,
     ),
     Mutant(
         "intervals hold 90 %", VERDICT + "covariance.py",

@@ -368,3 +368,12 @@ def test_only_starts_that_end_in_the_lowest_minimum_agree() -> None:
     assert [s.status for s in done] == [Status.SOLVED] * 5
     assert [bool(s.w[0] > 0) for s in done] == [False, True, False, True, True]
     assert done[0].cost > done[1].cost + 1
+
+
+def test_the_end_is_the_best_trial_wherever_the_search_stops() -> None:
+    at = problem(decay(), noise={"y": 0.01})
+    first = at.unknowns.of({"a": 20.0, "b": 0.5, "c": -5.0})
+    ends = [descend(at, first, evaluations=n) for n in range(3, 8)]
+    assert any(end.evidence[-1] > min(end.evidence) for end in ends)
+    for end in ends:
+        assert end.cost == min(end.evidence)

@@ -81,3 +81,18 @@ def test_forward_forces_are_refused() -> None:
     v = mm_min(10)
     with pytest.raises(ValueError, match="forces with the sign of the velocity"):
         six_steps(v, -PILOT.force(v))
+
+
+def test_of_few_points_the_best_curve_that_was_tried_is_taken() -> None:
+    v = 1e-3 * np.array([1.0, 2.0, 4.0, 8.0, 16.0])
+    found = fit_curve(binned(v, StribeckCurve(3.0, 2.0, 4e-3, 2.0, 5.0, 0.0, 0.0).force(v)))
+    assert found.delta == 2.0
+    assert abs(np.log(found.v_s / 4e-3)) < np.log(16) / 23  # one of 24 that were tried
+    assert found.rms < 0.02
+
+
+def test_exponent_hardly_feels_an_error_where_the_force_has_not_fallen_yet() -> None:
+    v = 1e-3 * np.array([0.01, 0.25, *np.arange(0.4, 1.65, 0.1), 2.0, 3.0, 4.0, 5.0, 6.0])
+    F = StribeckCurve(4.0, 2.0, 1e-3, 2.0, 10.0, 0.0, 0.0).force(v)
+    F[1] -= 0.06  # half of what the force has fallen there
+    assert abs(six_steps(v, F).values["delta"] - 2) < 0.05

@@ -1,12 +1,15 @@
 """Verdict and intervals of a task that was solved: a decay with noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from linear_fits import STEP, Decay, ar1, solved
+from linear_fits import STEP, Decay, ar1, coulomb, fitted, solved
 
 from identification.data.findings import Finding, Findings
+from identification.unknowns.unknown import Unknown
 from identification.verdict.covariance import covariance
-from identification.verdict.judge import judge
+from identification.verdict.judge import judge, judged
 from identification.verdict.picture import plot_lags
 from identification.verdict.profile import profile
 from symfric.foundation.status import Status
@@ -96,3 +99,16 @@ def test_profile_is_crooked_where_the_model_is() -> None:
     assert (np.diff(rise) > -1e-6).all()
     with pytest.raises(ValueError, match="profile: name"):
         profile(task, point, linear, "c")
+
+
+def test_no_mass_is_no_physics() -> None:
+    names = (("m", "kg"), ("c", "N"), ("d", "N s/m"), ("offset", "N"))
+    unknowns = tuple(Unknown(n, unit, 1.0, 0.0, 5.0) for n, unit in names)
+    J = coulomb(300)
+    made = fitted(J, J @ [2.0, 3.0, 1.0, 0.5] + ar1(300, 0.0, 1), unknowns)
+    held = np.array([True, False, False, False])
+    least, most = (replace(made, values=made.values * 0 + m, held=held) for m in (0.0, 5.0))
+    assert "m is at its lower bound, 0 kg" in judged(least).nonsense[0]
+    assert judged(most).nonsense == judged(made).nonsense == ()
+    other = replace(least, held=np.array([False, True, False, False]))
+    assert judged(other).nonsense == ()

@@ -60,3 +60,11 @@ def test_windows_share_the_noise_of_time() -> None:
     jumped = replace(channel, t=np.where(channel.t < 0.5, channel.t, channel.t + 0.2))
     assert positions(jumped, across_windows=True)[25] == 0
     assert places(jumped)[25] == 35
+
+
+def test_freedom_of_a_mean_is_that_of_its_estimated_correlation() -> None:
+    """Var of s^2 / (1 - phi)^2, of which s has n degrees and phi the variance (1 - phi^2) / n."""
+    n = 2000
+    found = sandwich(fitted(np.ones((n, 1)), ar1(n, 0.9, 3)))
+    (phi,) = found.colours[0].phi
+    assert found.freedom[0] == pytest.approx(n / (1 + 2 * (1 + phi) / (1 - phi)), rel=0.05)
