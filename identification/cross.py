@@ -8,7 +8,7 @@ Source: Burman, Chow and Nolan, Biometrika 81(2), 1994 (blocks with gaps).
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import nan
+from math import isfinite, nan
 from typing import final
 
 import numpy as np
@@ -28,6 +28,8 @@ GAP = 0.05
 """Share of a block that is left out between it and the rest."""
 LEAST = 20
 """Samples of a piece that is worth fitting."""
+DIVERGED = 1e3
+"""Error [%] from which on a number says no more than that what was predicted ran away."""
 
 
 @final
@@ -81,7 +83,9 @@ class CrossValidation:
 
     def __str__(self) -> str:
         each = ", ".join(f"{s} {value:.3g}" for s, value in self.rms.items())
-        text = f"{self.folds} folds by {self.by}: {self.relative:.3g} % of the spread ({each} rms)"
+        text = (
+            f"{self.folds} folds by {self.by}: {percent(self.relative)} of the spread ({each} rms)"
+        )
         return "\n".join([text, *self.failed])
 
 
@@ -141,6 +145,13 @@ def relative(left: Sequence[Left]) -> float:
         spread = np.sqrt(np.average([part.spread**2 for part in some], weights=rows))
         each.append(_rms([part.r for part in some]) / float(spread))
     return 100 * float(np.sqrt(np.mean(np.square(each)))) if each else nan
+
+
+def percent(value: float) -> str:
+    """An error [%] in words."""
+    if value > DIVERGED:
+        return "diverged"
+    return f"{value:.3g} %" if isfinite(value) else "-"
 
 
 def shared(many: Sequence[Sequence[Left]]) -> list[list[Left]]:

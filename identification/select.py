@@ -19,7 +19,16 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from identification.cross import CrossValidation, Left, cross_validate, left_of, relative, shared
+from identification.cross import (
+    DIVERGED,
+    CrossValidation,
+    Left,
+    cross_validate,
+    left_of,
+    percent,
+    relative,
+    shared,
+)
 from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.inverse import InverseDynamics
@@ -45,7 +54,8 @@ class Row:
     Attributes:
         law: as it was called.
         status: how its fit ended; "" where it could not be fitted.
-        validation: error on data that were not fitted [%], NaN without.
+        validation: error on data that were not fitted [%], NaN without, infinite where what was
+            predicted ran away (`DIVERGED`); in plain data None.
         fitted: the same on the data of the fit [%].
         aicc, bic: over those of the best law.
         parameters: number of fitted ones, start values apart.
@@ -126,7 +136,7 @@ class Ranking:
                 continue
             operations = "-" if row.operations is None else str(row.operations)
             lines.append(
-                f"{row.law:{wide}}  {_percent(row.validation):>10}  {_percent(row.fitted):>8}  "
+                f"{row.law:{wide}}  {percent(row.validation):>10}  {percent(row.fitted):>8}  "
                 f"{_number(row.aicc):>8}  {_number(row.bic):>8}  {row.parameters:>4}  "
                 f"{operations:>4}  {row.status}"
             )
@@ -299,10 +309,12 @@ def _row(t: _Tried, validation: float, fitted: float, aicc: float, bic: float) -
     if fit is None:
         raise ValueError(f"select: {t.name}: {t.why}")
     operations = cost(fit.law).value if isinstance(fit.law, Law) else None
-    sentence = " ".join([*fit.verdict.sentences[:1], t.why]).strip()
+    away = validation > DIVERGED
+    far = f"On data that were not fitted its error exceeds {DIVERGED:g} %." if away else ""
+    sentence = " ".join(s for s in (*fit.verdict.sentences[:1], far, t.why) if s)
     return Row(
-        t.name, fit.status.name, validation, fitted, aicc, bic, _count(t), operations, fit.seconds,
-        sentence, fit,
+        t.name, fit.status.name, inf if away else validation, fitted, aicc, bic, _count(t),
+        operations, fit.seconds, sentence, fit,
     )  # fmt: skip
 
 
@@ -332,10 +344,6 @@ def _effective(good: Sequence[_Tried], inside: Sequence[Sequence[Left]]) -> dict
             if ms < found.get(signal, (inf, 0.0))[0]:
                 found[signal] = (ms, counts.get(signal, 1.0))
     return {signal: n for signal, (_, n) in found.items()}
-
-
-def _percent(value: float) -> str:
-    return f"{value:.3g} %" if isfinite(value) else "-"
 
 
 def _number(value: float) -> str:

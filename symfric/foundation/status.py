@@ -14,7 +14,7 @@ class Status(Enum):
         "Events pile up without time advancing (Zeno); give the model a mode in which the contact "
         "rests."
     )
-    INTERRUPTED = "Interrupted by the user; the result reaches up to the last time stored."
+    INTERRUPTED = "Interrupted by the user; the result is what was reached by then."
     MAX_STEPS = (
         "The maximum number of steps was used up; loosen rtol, raise max_steps or look for a "
         "discontinuity."

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from identification.cross import Left, cross_validate, relative, shared
+from identification.cross import Left, cross_validate, percent, relative, shared
 from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.points import Points
@@ -54,6 +54,20 @@ def test_ranking_prints_plots_and_is_plain_data(ranking: Ranking) -> None:
     assert rows[0]["operations"] > rows[2]["operations"]
     assert rows[-1]["validation [%]"] is None
     assert ranking.plot().axes
+
+
+def test_a_prediction_that_ran_away_is_no_number() -> None:
+    small = points(2)
+    tiny = Dataset.of(
+        v=small[0]["v"], F=1e-9 * small[0]["F"], units={"v": "m/s", "F": "N"}, points=True
+    )
+    found = select({"mine": LAW}, points(1), Points(), tiny, starts=1)
+    (row,) = found.rows
+    assert "diverged" in str(found)
+    assert "e+" not in str(found)
+    assert "not fitted its error exceeds 1000 %" in row.sentence
+    assert row.to_dict()["validation [%]"] is None
+    assert percent(4.56789) == "4.57 %"
 
 
 def test_other_data_take_the_place_of_folds() -> None:

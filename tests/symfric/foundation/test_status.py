@@ -12,6 +12,10 @@ def test_value_is_a_sentence(status: Status) -> None:
     assert len(status.value) < 160
 
 
+def test_interruption_is_said_of_runs_and_fits_alike() -> None:
+    assert "time" not in Status.INTERRUPTED.value
+
+
 def test_results_that_met_their_tolerances_can_be_used() -> None:
     assert {Status.SUCCESS, Status.SOLVED, Status.ACCEPTABLE} <= {s for s in Status if s.ok}
 
