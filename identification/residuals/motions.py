@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from identification.data.record import Record
 from identification.residuals.balance import Balance, Coordinate
 from identification.residuals.imposed import moving_start
-from identification.signals.differentiate import derivatives, uncertain, velocity_noise
+from identification.signals.differentiate import derivatives, uncertain
 from identification.signals.filters import Decimation, Filter, choose_filter
+from identification.signals.velocity import Velocity
 from symfric.model import Model
 
 Array = NDArray[np.float64]
@@ -89,13 +90,13 @@ def measure(
         names = [None if s is None else called.get(s.name, s.name) for s in (c.position, c.rate)]
         x, v = (record[n] if n is not None and n in record else None for n in names)
         raw.append((x, v))
-    chosen = filter or _filter_of(forces, raw, step)
+    told = [Velocity.of(x, v, step) for x, v in raw]
+    chosen = filter or _filter_of(forces, raw, told, step)
     motion: list[tuple[Array, Array, Array]] = []
     noise: list[float] = []
-    for x, v in raw:
-        base = x if x is not None else np.zeros(record.size) if v is None else v
-        motion.append(derivatives(base, v, step, chosen))
-        noise.append(velocity_noise(base, v, step, chosen))
+    for (x, v), velocity in zip(raw, told, strict=True):
+        motion.append(derivatives(x, v, step, chosen, velocity))
+        noise.append(velocity.deviation(chosen, step))
     cut = chosen.trim(step)
     inside = slice(cut, max(cut, record.size - cut))
     rows = [part[k] for k in range(3) for part in motion]
@@ -127,13 +128,15 @@ def _check_channels(
         )
 
 
-def _filter_of(forces: Sequence[Array], raw: Sequence[Raw], step: float) -> Filter:
+def _filter_of(
+    forces: Sequence[Array], raw: Sequence[Raw], told: Sequence[Velocity], step: float
+) -> Filter:
     """The filter for the fastest force; without one, for the fastest motion."""
     signals = list(forces)
     for x, v in () if signals else raw:
         signals += [v] if v is not None else [np.gradient(x, step)] if x is not None else []
-    positions = [x for x, _ in raw if x is not None]
-    each = (choose_filter(signal, step, positions) for signal in signals)
+    bands = [t.band(x, v, step) for t, (x, v) in zip(told, raw, strict=True)]
+    each = (choose_filter(signal, step, bands) for signal in signals)
     return max(each, key=lambda f: f.cutoff)
 
 

@@ -16,6 +16,7 @@ from identification.signals.filters import (
     choose_filter,
     lowpass,
 )
+from identification.signals.velocity import Velocity
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -67,44 +68,36 @@ class MotionSignals:
 
 
 def derivatives(
-    x: Array, v: Array | None, step: float, filter: Filter
+    x: Array | None, v: Array | None, step: float, filter: Filter, told: Velocity
 ) -> tuple[Array, Array, Array]:
     """Filtered position, velocity and acceleration, each shape (n,).
 
     Central differences of the filtered position; the acceleration is its second difference over
     two steps, whose gain falls short of one by (w h)^2 / 12 only. A measured velocity is filtered
-    and differentiated once.
+    and differentiated once. Of two, velocity and acceleration are mixed as `told` says.
 
     Args:
-        x: position, samples.
+        x: position, samples; None: it is not measured (zeros are returned).
         v: measured velocity, or None.
         step: sample interval [s].
         filter: cut-off and order.
+        told: `Velocity.of(x, v, step)`.
     """
-    x = lowpass(x, filter.cutoff, step, filter.order)
+    one: list[Array] = []
+    other: list[Array] = []
+    if x is not None:
+        x = lowpass(x, filter.cutoff, step, filter.order)
+        a = np.empty_like(x)
+        a[1:-1] = (x[2:] - 2 * x[1:-1] + x[:-2]) / step**2
+        a[0], a[-1] = a[1], a[-2]
+        one = [central_difference(x, step), a]
     if v is not None:
         v = lowpass(v, filter.cutoff, step, filter.order)
-        return x, v, central_difference(v, step)
-    a = np.zeros_like(x)
-    a[1:-1] = (x[2:] - 2 * x[1:-1] + x[:-2]) / step**2
-    return x, central_difference(x, step), a
-
-
-def velocity_noise(x: Array, v: Array | None, step: float, filter: Filter) -> float:
-    """Standard deviation of the noise of the filtered velocity [m/s], white on x (or v).
-
-    The level on x is that of the upper half of its spectrum, where no motion is.
-    """
-    measured = x if v is None else v
-    rest = measured - np.linspace(measured[0], measured[-1], measured.size)
-    power = np.abs(np.fft.rfft(rest * np.hanning(rest.size))) ** 2 / (0.375 * rest.size)
-    level = float(np.median(power[power.size // 2 :])) / np.log(2)
-    frequency = np.linspace(0.0, 0.5, 1001)[1:-1]
-    ratio = np.tan(np.pi * frequency) / np.tan(np.pi * filter.cutoff * step)
-    gain = 1 / (1 + ratio ** (2 * filter.order))
-    if v is None:
-        gain *= np.sin(2 * np.pi * frequency) / step
-    return float(np.sqrt(level * np.mean(gain**2)))
+        other = [v, central_difference(v, step)]
+    if one and other:
+        one = [told.mixed(by_x, by_v) for by_x, by_v in zip(one, other, strict=True)]
+    velocity, acceleration = one or other
+    return np.zeros_like(velocity) if x is None else x, velocity, acceleration
 
 
 def uncertain(v: Array, noise: float, step: float, filter: Filter) -> Mask:
@@ -124,9 +117,16 @@ def uncertain(v: Array, noise: float, step: float, filter: Filter) -> Mask:
     return np.convolve(slow, np.ones(2 * around + 1), mode="same") > 0.5
 
 
-def filter_of(record: Record, force: str = "force", x: str = "x") -> Filter:
-    """The filter chosen from force and position of a record."""
-    return choose_filter(record[force], record.uniform().step, [record[x]])
+def filter_of(record: Record, force: str = "force", x: str = "x", v: str | None = None) -> Filter:
+    """The filter chosen from force, position and velocity of a record; see `differentiate`."""
+    step, (position, velocity) = record.uniform().step, _measured(record, x, v)
+    told = Velocity.of(position, velocity, step)
+    return choose_filter(record[force], step, [told.band(position, velocity, step)])
+
+
+def _measured(record: Record, x: str, v: str | None) -> tuple[Array, Array | None]:
+    v = v or ("v" if "v" in record else None)
+    return record[x], None if v is None else record[v]
 
 
 def differentiate(
@@ -143,17 +143,18 @@ def differentiate(
         record: equally spaced samples.
         filter: cut-off and decimation; `filter_of(record)` if none is given.
         force, x: names of the channels.
-        v: channel of a measured velocity; "v" is used where the record has it.
+        v: channel of a measured velocity, mixed with that of the position as `Velocity` says;
+            None: "v" where the record has it.
 
     Raises:
         ValueError: unequal intervals, a cut-off above the Nyquist frequency, too short a record.
     """
     step = record.uniform().step
-    chosen = filter or filter_of(record, force, x)
-    v = v or ("v" if "v" in record else None)
-    measured = record[x], None if v is None else record[v]
-    motion = derivatives(*measured, step, chosen)
-    slow = uncertain(motion[1], velocity_noise(*measured, step, chosen), step, chosen)
+    chosen = filter or filter_of(record, force, x, v)
+    measured = _measured(record, x, v)
+    told = Velocity.of(*measured, step)
+    motion = derivatives(*measured, step, chosen, told)
+    slow = uncertain(motion[1], told.deviation(chosen, step), step, chosen)
     cut = chosen.trim(step)
     inside = slice(cut, max(cut, record.size - cut))
     x_, v_, a_ = (signal[inside] for signal in motion)

@@ -60,6 +60,11 @@ class Filter:
         """Samples to leave out at each end, where reflection and differences are not the data."""
         return ceil(5.0 / (self.cutoff * step) - 1e-9)
 
+    def gain(self, frequency: Array, step: float) -> Array:
+        """|H|^2 of the low pass at frequencies below 1/2, cycles per sample; see `lowpass`."""
+        ratio = np.tan(np.pi * frequency) / np.tan(np.pi * self.cutoff * step)
+        return 1 / (1 + ratio ** (2 * self.order))
+
 
 def lowpass(signal: Array, cutoff: float, step: float, order: int = 4) -> Array:
     """Butterworth low pass applied forward and backward: no phase, gain |H|^2.
@@ -159,36 +164,60 @@ def bandwidth(force: Array, step: float, share: float = 0.999) -> float:
     return float(frequency[np.argmax(total >= share * total.max())])
 
 
+def spectrum(signal: Array) -> Array:
+    """Power of a signal under a Hann window; that of white noise is its variance, shape (n//2+1,).
+
+    For a signal that ends elsewhere than it began take `without_line` of it.
+    """
+    return np.abs(np.fft.rfft(signal * np.hanning(signal.size))) ** 2 / (0.375 * signal.size)
+
+
+def without_line(signal: Array) -> Array:
+    """A signal less the straight line from its first to its last sample."""
+    return signal - np.linspace(signal[0], signal[-1], signal.size)
+
+
+def noise_level(power: Array) -> float:
+    """Power of the white noise in a spectrum, from its upper half, where no motion is.
+
+    By the median, so that lines do not count: that of white noise is ln 2 times the mean.
+    """
+    return float(np.median(power[power.size // 2 :])) / float(np.log(2))
+
+
 def position_band(x: Array, step: float) -> float:
     """Frequency [Hz] from which on the motion does not stand out of the noise of its position.
 
-    Where the spectrum under a Hann window, averaged over 1 Hz, is for the last time `ABOVE` times
-    the noise, whose level is that of its upper half. Beyond it an acceleration is noise.
+    Its level is that of the upper half of the spectrum. Beyond it an acceleration is noise.
     """
-    rest = x - np.linspace(x[0], x[-1], x.size)
-    power = np.abs(np.fft.rfft(rest * np.hanning(x.size))) ** 2
-    frequency = np.fft.rfftfreq(x.size, step)
-    noise = np.median(power[power.size // 2 :]) / np.log(2)
-    width = min(max(9, 2 * round(0.5 * x.size * step) + 1), power.size)
+    power = spectrum(without_line(x))
+    return band_above(power, np.full(power.size, noise_level(power)), step)
+
+
+def band_above(power: Array, noise: Array, step: float) -> float:
+    """Where a spectrum, averaged over 1 Hz, is for the last time `ABOVE` times its noise [Hz]."""
+    samples = 2 * (power.size - 1)
+    frequency = np.linspace(0.0, 0.5 / step, power.size)
+    width = min(max(9, 2 * round(0.5 * samples * step) + 1), power.size)
     smooth = np.convolve(power, np.ones(width) / width, mode="same")
     known = np.flatnonzero(smooth > ABOVE * noise)
     return float(frequency[max(1, known[-1])] if known.size else frequency[1])
 
 
 def choose_filter(
-    force: Array, step: float, positions: Sequence[Array] = (), rows: int = 100
+    force: Array, step: float, bands: Sequence[float] = (), rows: int = 100
 ) -> Filter:
-    """A filter from the data: the bandwidth f_b of the force decides, and f_a of the positions.
+    """A filter from the data: the bandwidth f_b of the force decides, and f_a of the motion.
 
         cut-off 5 f_b (at most half the Nyquist frequency), decimation 0.8 Nyquist / (2 f_b)
 
     f_b is rounded to one digit. The factors are those of the EMPS reference (there f_b = 20 Hz by
-    hand). f_a is the median of `position_band`: f_b is at most f_a, and the cut-off of the
-    decimation, 0.9 Nyquist / decimation, too, since noise in the acceleration lowers the mass. The
-    decimation leaves at least `rows` equations where it can.
+    hand). f_a is the median of `bands`, up to which each coordinate is known: f_b is at most f_a,
+    and the cut-off of the decimation, 0.9 Nyquist / decimation, too, since noise in the
+    acceleration lowers the mass. The decimation leaves at least `rows` equations where it can.
     """
     nyquist = 0.5 / step
-    known = float(np.median([position_band(x, step) for x in positions] or [nyquist]))
+    known = float(np.median([*bands] or [nyquist]))
     found = max(min(bandwidth(force, step), known), 1 / (force.size * step))
     digit = 10.0 ** floor(log10(found))
     f_b = round(found / digit) * digit

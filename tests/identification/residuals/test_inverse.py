@@ -92,6 +92,22 @@ def test_equations_at_reversals_are_left_out_of_static_laws_only() -> None:
     assert whole.channels[0].breaks == ()
 
 
+def test_a_noisy_velocity_beside_the_position_spoils_nothing() -> None:
+    data, one = moved(DRIVE), subject(DRIVE, free=FREE)
+    noise = np.random.default_rng(0).standard_normal((2, T.size))
+    x = data[0]["x"] + 1e-6 * noise[0]
+    signals = {"t": T, "x": x, "force": data[0]["force"]}
+    units = {"x": "m", "force": "N"}
+    alone = Dataset.of(signals, units=units)
+    signals["v"] = np.gradient(data[0]["x"], T) + 0.1 * noise[1]
+    both = Dataset.of(signals, units={**units, "v": "m/s"})
+    sizes = [
+        np.std(evaluated(InverseDynamics(filter=PLAIN).prepare(one, d), starts(one)).r)
+        for d in (alone, both)
+    ]
+    assert sizes[1] < 1.1 * sizes[0]
+
+
 def test_a_drive_that_turns_has_its_units() -> None:
     drive = with_values(DRIVE, {"m": 0.3})
     one = subject(drive.law, turning=True)

@@ -3,8 +3,9 @@ import pytest
 from numpy.typing import NDArray
 
 from identification.data.record import Record
-from identification.signals.differentiate import differentiate, velocity_noise
+from identification.signals.differentiate import differentiate
 from identification.signals.filters import Filter, lowpass
+from identification.signals.velocity import Velocity
 
 T = np.arange(4001) * 1e-3
 W = 2 * np.pi * 1.5
@@ -34,11 +35,10 @@ def test_acceleration_falls_short_by_a_twelfth_of_the_square() -> None:
 
 
 def test_measured_velocity_is_used() -> None:
-    found = differentiate(
-        record(x=WAVE["x"], v=7 * np.cos(W * T), force=WAVE["force"]), Filter(100.0, 5)
-    )
-    np.testing.assert_allclose(found.v, 7 * np.cos(W * found.t), atol=1e-3)
-    np.testing.assert_allclose(found.a, -7 * W * np.sin(W * found.t), atol=1e-2)
+    x: NDArray[np.float64] = WAVE["x"] + 1e-3 * np.random.default_rng(0).standard_normal(T.size)
+    found = differentiate(record(x=x, v=W * np.cos(W * T), force=WAVE["force"]), Filter(100.0, 5))
+    np.testing.assert_allclose(found.v, W * np.cos(W * found.t), atol=1e-3)
+    np.testing.assert_allclose(found.a, -(W**2) * np.sin(W * found.t), atol=1e-2)
 
 
 def test_ends_are_cut_by_five_filter_times() -> None:
@@ -70,9 +70,9 @@ def test_noise_of_the_velocity_is_that_of_the_filtered_noise() -> None:
     x: NDArray[np.float64] = np.sin(W * T) + noise
     filter = Filter(100.0)
     expected = np.gradient(lowpass(noise, 100.0, 1e-3), 1e-3)[50:-50].std()
-    found = velocity_noise(x, None, 1e-3, filter)
+    found = Velocity.of(x, None, 1e-3).deviation(filter, 1e-3)
     assert found == pytest.approx(expected, rel=0.15)
-    measured = velocity_noise(T, np.cos(W * T) + noise, 1e-3, filter)
+    measured = Velocity.of(None, np.cos(W * T) + noise, 1e-3).deviation(filter, 1e-3)
     assert measured == pytest.approx(lowpass(noise, 100.0, 1e-3).std(), rel=0.15)
 
 

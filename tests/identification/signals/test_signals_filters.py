@@ -123,7 +123,9 @@ def test_noise_of_the_position_narrows_the_filter() -> None:
     t = np.arange(20_000) * 1e-3
     noise = np.random.default_rng(0).standard_normal(t.size)
     force, x = np.sin(2 * np.pi * 20 * t), np.sin(2 * np.pi * 2 * t)
-    wide, narrow = (choose_filter(force, 1e-3, [x + s * noise]) for s in (0.0, 1e-2))
+    wide, narrow = (
+        choose_filter(force, 1e-3, [position_band(x + s * noise, 1e-3)]) for s in (0.0, 1e-2)
+    )
     assert (wide.cutoff, wide.decimation) == (100.0, 10)
     assert narrow.cutoff < wide.cutoff
     assert narrow.decimation > wide.decimation
