@@ -40,8 +40,8 @@ class Fitted:
     """The result of a fit.
 
     `print(fit)` is a report of a page; `fit.report("out.html")` one with pictures; `fit.plot()` the
-    pictures alone. Of a fit that was read from a file, `live` is None and the model of a machine
-    that is no `Drive` is absent.
+    pictures alone. Of a fit from a file or a pickle, `live` is None and the model of a machine that
+    is no `Drive` is absent.
 
     Attributes:
         name: of the law or the model.
@@ -65,7 +65,7 @@ class Fitted:
         machine: the drive or scene with them; None of a law alone or a model.
         seconds, evaluations: of all starts together.
         made: versions and how it was called.
-        live: what only a fit of this process has; None from a file.
+        live: what only a fit of this process has; None from a file or a pickle.
     """
 
     name: str
@@ -95,6 +95,10 @@ class Fitted:
 
     def __str__(self) -> str:
         return text_of(self)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without `live`, whose symbols no pickle takes."""
+        return {**self.__dict__, "live": None}
 
     def __repr__(self) -> str:
         return f"<Fitted {self.name}: {self.status.name}>"
@@ -149,8 +153,8 @@ class Fitted:
     def _alive(self, what: str) -> Live:
         if self.live is None:
             raise ValueError(
-                f"fit of {self.name}: {what}: expected a fit of this process, got one from a file, "
-                "which holds no data; fit again"
+                f"fit of {self.name}: {what}: expected a fit of this process, got one from a file "
+                "or a pickle, which holds no data; fit again"
             )
         return self.live
 
