@@ -5,15 +5,21 @@ from dataclasses import MISSING, fields, is_dataclass
 from math import inf
 from typing import Any
 
+import numpy as np
+
 from identification.data.dataset import Dataset
 from identification.unknowns.spec import Above, Range, Tied
 from symfric.foundation.parameters import Parametric
 from symfric.model import Model
 
+SHOWN = 6
+"""Numbers of an array that are written out."""
+
 
 def written(value: object) -> str:
     """Python that says `value`, without what is as by default; data and models by a name.
 
+    Long arrays are three dots.
     Fields without a default stand first, without their names.
     """
     if isinstance(value, Dataset):
@@ -22,6 +28,8 @@ def written(value: object) -> str:
         return value.name
     if isinstance(value, Range | Above | Tied):
         return _rule(value)
+    if isinstance(value, np.ndarray) and value.size > SHOWN:
+        return "..."
     if isinstance(value, Mapping):
         items: Mapping[Any, Any] = value  # pyright: ignore[reportUnknownVariableType]
         return f"{{{', '.join(f'{k!r}: {written(v)}' for k, v in items.items())}}}"

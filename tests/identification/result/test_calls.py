@@ -1,5 +1,6 @@
 """Calls as Python: evaluated, they give what they were made of."""
 
+import numpy as np
 import pytest
 
 from identification.data.dataset import Dataset
@@ -8,7 +9,7 @@ from identification.residuals.inverse import InverseDynamics
 from identification.residuals.shooting import Shooting
 from identification.result.calls import written
 from identification.unknowns.spec import above, linear, log, tied
-from symfric import LuGre, rabinowicz
+from symfric import Linear, LuGre, rabinowicz
 
 DATA = Dataset.of(t=[0.0, 1.0, 2.0], x=[0.0, 1.0, 0.0], force=[0.0, 1.0, 0.0])
 NAMES = {
@@ -31,6 +32,11 @@ NAMES = {
 def test_what_is_written_is_what_was_called(text: str) -> None:
     made = eval(text, {**NAMES, "data": DATA})
     assert written(made) == text
+
+
+def test_long_arrays_are_three_dots() -> None:
+    kind = Shooting(inputs={"force": Linear(np.arange(50.0), np.zeros(50))})
+    assert written(kind) == "Shooting(inputs={'force': Linear(..., ...)})"
 
 
 def test_models_and_functions_have_their_names() -> None:
