@@ -26,6 +26,8 @@ DECADES = 8.0
 """Length of the interval of a logarithmic value from which on it is none."""
 WIDE = 1e4
 """The same of other values, over the value and its usual magnitude."""
+ROUNDING = 1e-14
+"""Slope of a value over its largest one, up to which it is the rounding of none."""
 LOST, BEYOND = "not told: its effect is lost in the noise", "not told: far above all forces"
 """Why a value has no interval."""
 
@@ -104,7 +106,8 @@ def covariance_of(found: Minimum, change: Trace, levels: Levels | None = None) -
     own = [names.index(u.name) for u in found.unknowns]
     size = _sensitivity(found, own)
     wanders = np.abs(moved * size[:, None]).max(axis=1, initial=0.0) > 1e-4
-    fixed = ~np.any((found.slope != 0) & ~found.held, axis=1)
+    size_of = np.abs(found.slope)  # one at an upper bound moves with its partner by rounding alone
+    fixed = ~np.any((size_of > ROUNDING * size_of.max(axis=1, keepdims=True)) & ~found.held, axis=1)
     matrix, white = inside.coloured.copy(), inside.white.copy()
     for C in (matrix, white):
         C[wanders | fixed, :] = C[:, wanders | fixed] = np.nan

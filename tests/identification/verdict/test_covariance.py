@@ -8,6 +8,7 @@ from linear_fits import ar1, coulomb, fitted
 from scipy.stats import t as student
 
 from identification.unknowns.unknown import Unknown
+from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.covariance import Covariance, covariance_of
 from identification.verdict.levels import Levels
 from identification.verdict.minimum import Minimum
@@ -143,3 +144,18 @@ def test_intervals_are_those_of_student() -> None:
     reach = student.ppf(0.975, found.freedom) * found.standard_errors
     np.testing.assert_allclose(found.high - [2.0, 5.0], reach)
     np.testing.assert_allclose([2.0, 5.0] - found.low, reach)
+
+
+def test_a_level_at_its_upper_bound_has_no_interval() -> None:
+    above = Unknown("mu_s", "N", 24.0, upper=24.0, above="mu_d")
+    made = unknowns_of((Unknown("mu_d", "N", 8.9), above), {}, ("mu_s", "mu_d"))
+    w = np.array([8.9, 1.0 - 2e-16])  # at its bound but for rounding
+    values, slope = (np.asarray(a) for a in made.function(w))
+    J = np.column_stack([C, V]) @ slope
+    at = fitted(J, ar1(N, 0.0, 1), made.unknowns)
+    at = replace(at, names=made.names, values=values.ravel(), slope=slope,
+                 held=np.array([False, True]))  # fmt: skip
+    found = covariance_of(at, lambda there: 1.0)
+    assert found.at_bound == ("mu_s",)
+    assert np.isnan(found.standard_errors[0])
+    assert np.isfinite(found.standard_errors[1])
