@@ -208,7 +208,7 @@ def _counts(solver: ca.Function) -> dict[str, int]:
 def _dense(system: System, inputs: InputData, p: Array, grid: Array, y: Array) -> Dense:
     """Cubic interpolation of the rates' columns on the grid, linear of the algebraic ones."""
     if grid.size < 2:
-        return Dense(grid, grid + 1e-300, y.T, y.T, np.zeros((1, 2, system.n)))
+        return Dense(grid, np.nextafter(grid, np.inf), y.T, y.T, np.zeros((1, 2, system.n)))
     d = np.vstack([np.tile(p[:, None], (1, grid.size)), inputs.values[:, inputs.interval(grid)]])
     f = ca.Function("f", [system.y, system.d], [system.f])
     slope = f.map(grid.size)(y, d).full()

@@ -100,7 +100,7 @@ class Run:
         if found:
             return found
         at, y = np.array([self.t]), self.y[None]
-        return [Dense(at, at + 1e-300, y, y, np.zeros((1, 0, n)))]
+        return [Dense(at, np.nextafter(at, np.inf), y, y, np.zeros((1, 0, n)))]
 
     @cached_property
     def dense(self) -> Dense:

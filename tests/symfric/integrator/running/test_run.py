@@ -185,3 +185,12 @@ def test_measured_error_does_not_share_the_mistakes_of_the_run() -> None:
     assert runs[0].final["x"] - runs[1].final["x"] > 1.0
     assert runs[0].statistics.error > 0.5
     assert runs[1].statistics.error < 1e-5
+
+
+def test_a_run_without_a_step_has_its_start_at_any_time() -> None:
+    run = simulate(
+        Model(name="no way", x=(x,), ode=1 / (x.symbol - 1)), 2.0, t_start=1.0, t_eval=[1.0, 2.0],
+        throw=False,
+    )  # fmt: skip
+    assert not run.status.ok
+    assert run["x"] == pytest.approx([1.0])
