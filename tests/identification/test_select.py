@@ -112,3 +112,14 @@ def test_errors_are_compared_where_all_have_some() -> None:
 def test_bad_laws_are_refused(laws: object) -> None:
     with pytest.raises(ValueError, match="select: laws"):
         select(laws, points(1), Points())  # pyright: ignore
+
+
+def test_criteria_are_those_of_the_errors_and_the_numbers_of_parameters(ranking: Ranking) -> None:
+    first, other = ranking["stribeck"], ranking["coulomb"]
+    n, better = ranking.effective, 2 * np.log(other.fitted / first.fitted)
+    fewer = first.parameters - other.parameters
+    assert n == 160 and fewer == 3
+    assert other.bic == pytest.approx(n * better - fewer * np.log(n))
+    k, m = first.parameters, other.parameters
+    cost = 2 * k * n / (n - k - 1) - 2 * m * n / (n - m - 1)
+    assert other.aicc == pytest.approx(n * better - cost)

@@ -341,4 +341,44 @@ FIRST = (
     ),
 )  # fmt: skip
 
-FITS = (*MEASURED, *COORDINATES, *KINDS, *MINIMA, *JUDGED, *STORED, *FIRST)
+COMPARED = (
+    Mutant(
+        "a parameter costs half of what it should", "identification/select.py",
+        "k * float(np.log(n))", "k * float(np.log(n)) / 2", (f"{TESTS}test_select.py",),
+    ),
+    Mutant(
+        "noise under a robust loss is that of its outliers", SOLVING + "noise.py",
+        "NORMAL * float(np.median(np.abs(r)))", "float(np.std(r))", T_STARTS,
+    ),
+    Mutant(
+        "the sampled engine takes inputs early", RESIDUALS + "sampled_shots.py",
+        "instants - tau)", "instants + tau)", (f"{TESTS}residuals/test_sampled_shots.py",),
+    ),
+    Mutant(
+        "the largest error is the largest above", RESULT + "series.py",
+        "float(np.abs(left).max(initial=0.0))", "float(left.max(initial=0.0))", T_FITTED,
+    ),
+    Mutant(
+        "noise counts to the bandwidth of a force", SIGNALS + "filters.py",
+        "np.cumsum(power - noise)", "np.cumsum(power)", T_FILTERS,
+    ),
+    Mutant(
+        "what stands at a bound widens the intervals of others", VERDICT + "sandwich.py",
+        "free = ~found.held\n    size", "free = ~found.held | True\n    size", T_SANDWICH,
+    ),
+    Mutant(
+        "outliers tell as much as other samples", VERDICT + "minimum.py",
+        "gain[rows] = max(float(np.mean(above[rows] - below[rows])) / (2 * h), 0.05)",
+        "gain[rows] = 1.0", T_JUDGE,
+    ),
+    Mutant(
+        "a dependence counts however small it is", VERDICT + "judge.py",
+        " or d.share < SHARE", "", T_JUDGE,
+    ),
+    Mutant(
+        "a signal that is mostly noise is no physics", VERDICT + "judge.py",
+        "if 1 - left / there < CHANCE * by_chance:", "if True:", T_JUDGE,
+    ),
+)  # fmt: skip
+
+FITS = (*MEASURED, *COORDINATES, *KINDS, *MINIMA, *JUDGED, *STORED, *FIRST, *COMPARED)

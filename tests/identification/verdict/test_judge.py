@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from linear_fits import STEP, Decay, ar1, coulomb, fitted, solved
+from linear_fits import STEP, Decay, ar1, coulomb, fitted, motion, solved
 
 from identification.data.findings import Finding, Findings
+from identification.solving.loss import THRESHOLD
 from identification.unknowns.unknown import Unknown
 from identification.verdict.covariance import covariance
 from identification.verdict.judge import judge, judged
+from identification.verdict.minimum import minimum
 from identification.verdict.picture import plot_lags
 from identification.verdict.profile import profile
 from symfric.foundation.status import Status
@@ -112,3 +114,29 @@ def test_no_mass_is_no_physics() -> None:
     assert judged(most).nonsense == judged(made).nonsense == ()
     other = replace(least, held=np.array([False, True, False, False]))
     assert judged(other).nonsense == ()
+
+
+def test_outliers_tell_nothing_of_where_the_others_lie() -> None:
+    """Of Huber's loss the influence function rises for as many as lie within its threshold."""
+    noise = ar1(300, 0.0, 1) + np.where(np.arange(300) % 10 == 0, 20.0, 0.0)
+    task, point = solved(Decay(T, TRUE + 0.01 * noise), loss="huber")
+    inside = np.abs(point.r) < THRESHOLD["huber"]
+    assert 0.5 < np.mean(inside) < 0.9
+    np.testing.assert_allclose(minimum(task, point).gain, np.mean(inside), atol=0.01)
+
+
+def test_a_right_model_of_a_noisy_signal_is_physics() -> None:
+    J = coulomb(1000)
+    right = J @ [2.0, 3.0, 1.0, 0.5]
+    level = 2 * np.std(right)
+    found = judged(fitted(J, right + level * ar1(1000, 0.0, 1)))
+    assert found.good
+
+
+def test_a_twentieth_of_the_variance_is_no_other_model() -> None:
+    J, m = coulomb(1500), motion(1500)
+    right = J @ [2.0, 3.0, 1.0, 0.5] + ar1(1500, 0.0, 1)
+    little, much = (judged(fitted(J, right + a * np.roll(m["force"], 8))) for a in (0.25, 1.0))
+    assert little.good
+    assert any(t.decides and t.p < t.limit for t in little.tests)
+    assert not much.good

@@ -68,3 +68,12 @@ def test_freedom_of_a_mean_is_that_of_its_estimated_correlation() -> None:
     found = sandwich(fitted(np.ones((n, 1)), ar1(n, 0.9, 3)))
     (phi,) = found.colours[0].phi
     assert found.freedom[0] == pytest.approx(n / (1 + 2 * (1 + phi) / (1 - phi)), rel=0.05)
+
+
+def test_what_a_bound_holds_counts_as_known() -> None:
+    J = coulomb(400)
+    made = fitted(J, ar1(400, 0.0, 3))
+    held = sandwich(replace(made, held=np.array([False, False, False, True])))
+    expected = held.colours[0].white * np.linalg.inv(J[:, :3].T @ J[:, :3])
+    np.testing.assert_allclose(held.white[:3, :3], expected, rtol=1e-9)
+    assert not held.white[3].any()
