@@ -28,6 +28,8 @@ WIDE = 1e4
 """The same of other values, over the value and its usual magnitude."""
 ROUNDING = 1e-14
 """Slope of a value over its largest one, up to which it is the rounding of none."""
+CLEAN = 1e-13
+"""Entry of an inverse over its largest one that is rounding: what has no effect keeps none."""
 LOST, BEYOND = "not told: its effect is lost in the noise", "not told: far above all forces"
 """Why a value has no interval."""
 
@@ -184,7 +186,9 @@ def _inverse(slope: Array) -> Array:
     """dw/dvalues, shape (n, n); zero of a coordinate without effect, such as exp(-800)."""
     size = np.abs(slope).max(axis=1)
     size[size == 0.0] = 1.0
-    return np.linalg.pinv(slope / size[:, None]) / size
+    inverse = np.linalg.pinv(slope / size[:, None])
+    inverse[np.abs(inverse) < CLEAN * np.abs(inverse).max(initial=0.0)] = 0.0
+    return inverse / size
 
 
 def _intervals(found: Minimum, error: Array, freedom: Array) -> tuple[Array, Array]:

@@ -159,3 +159,21 @@ def test_a_level_at_its_upper_bound_has_no_interval() -> None:
     assert found.at_bound == ("mu_s",)
     assert np.isnan(found.standard_errors[0])
     assert np.isfinite(found.standard_errors[1])
+
+
+def test_a_level_whose_excess_has_no_effect_does_not_borrow_the_error_of_the_lower_one() -> None:
+    """A record that only slides: 0.344 +- 2e-7 N was said of a static level of 0.15 N."""
+    both = (
+        Unknown("mu_s", "N", 0.15, above="mu_d", scale=0.15),
+        Unknown("mu_d", "N", 0.1, lower=1e-9, logarithmic=True),
+        Unknown("k", "N/m", 1e5, lower=1e-9, logarithmic=True),
+    )
+    made = unknowns_of(both, {}, ("mu_s", "mu_d", "k"))
+    w = np.array([0.594978404, -2.30258449, 9.6])
+    values, slope = made.values(w), made.slope(w)
+    J = np.column_stack([0 * C, 3e7 * C, 10.0 * V]) @ slope
+    at = fitted(J, ar1(N, 0.0, 1), both)
+    at = replace(at, values=values, slope=slope)
+    found = covariance_of(at, lambda there: 1.0)
+    assert np.isnan(found.standard_errors).tolist() == [True, False, False]
+    assert found.sentences[0] == "mu_s has no influence on what was measured."
