@@ -19,6 +19,7 @@ T_FAULTS = (f"{TESTS}data/test_check_faults.py",)
 T_GOOD = (f"{TESTS}data/test_check_good_records.py",)
 T_FILTERS = (f"{TESTS}signals/test_signals_filters.py",)
 T_DIFFERENTIATE = (f"{TESTS}signals/test_differentiate.py",)
+T_VELOCITY = (f"{TESTS}signals/test_velocity.py",)
 T_REGRESS = (f"{TESTS}signals/test_signals_regress.py",)
 T_UNKNOWNS = (f"{TESTS}unknowns/test_unknowns.py",)
 T_SUBJECT = (f"{TESTS}unknowns/test_subject.py",)
@@ -88,10 +89,16 @@ MEASURED = (
         "around = ceil(0.5 / (filter.cutoff * step))", "around = 0", T_DIFFERENTIATE,
     ),
     Mutant(
-        "noise of the velocity is that of a difference without low pass",
-        SIGNALS + "differentiate.py",
-        "gain *= np.sin(2 * np.pi * frequency) / step",
-        "gain = np.sin(2 * np.pi * frequency) / step", T_DIFFERENTIATE,
+        "noise of the velocity is that before the low pass", SIGNALS + "velocity.py",
+        "np.mean(gain**2 * self.noise[inside])", "np.mean(self.noise[inside])", T_VELOCITY,
+    ),
+    Mutant(
+        "the noisier one of two velocities weighs more", SIGNALS + "velocity.py",
+        "weight = np.divide(of_x, both", "weight = np.divide(of_v, both", T_VELOCITY,
+    ),
+    Mutant(
+        "a difference of positions falls short of nothing", SIGNALS + "velocity.py",
+        "lost = 1 - np.sinc(2 * frequency)", "lost = 0 * frequency", T_VELOCITY,
     ),
     Mutant(
         "Coulomb friction and offset are one column", SIGNALS + "regress.py",
