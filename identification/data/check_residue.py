@@ -12,6 +12,10 @@ LINE = 0.45
 """Share of what is left that lies in one line of its spectrum: a hum."""
 LOUD = 0.02
 """Its amplitude over the spread of the force from which on it is told."""
+PERIODS, CLEAR, ANSWER = 8, 20.0, 0.01
+"""A line of the velocity: periods in the record, power over that beside it, share of all power."""
+HARMONICS = (1, 2)
+"""Of an excitation, that friction may leave in the force."""
 UNEQUAL, SURE = 0.04, 6.0
 """Difference of the mass between both directions, relative, and in standard errors."""
 
@@ -32,7 +36,8 @@ def _hum(view: View, free: Rough) -> Iterator[Finding]:
     k = int(np.argmax(power[2:])) + 2
     share = float(power[max(k - 2, 0) : k + 3].sum() / (power.sum() + 1e-300))
     size = 2 * float(np.sqrt(power[k])) / float(window.sum())
-    if share > LINE and size > LOUD * float(np.ptp(np.quantile(free.force, (0.25, 0.75)))):
+    loud = size > LOUD * float(np.ptp(np.quantile(free.force, (0.25, 0.75))))
+    if share > LINE and loud and not any(_answered(free, round(k / n)) for n in HARMONICS):
         name = view.name("force")
         yield view.finding(
             "hum",
@@ -42,6 +47,21 @@ def _hum(view: View, free: Rough) -> Iterator[Finding]:
             "what is left: the mains, or a motion that the position does not show.",
             "warning",
         )
+
+
+def _answered(free: Rough, k: int) -> bool:
+    """Whether the velocity has a line of its own at bin k: an excitation, no hum.
+
+    Not asked of less than `PERIODS` periods, where a line cannot be told from a move; so a slow
+    excitation that only bends bristles can still be called a hum.
+    """
+    if k < PERIODS:
+        return False
+    power = np.abs(np.fft.rfft((free.v - free.v.mean()) * np.hanning(free.v.size))) ** 2
+    line = power[k - 2 : k + 3]
+    beside = np.concatenate([power[k // 2 : k - 3], power[k + 4 : 2 * k]])
+    out = float(line.max()) > CLEAR * float(np.median(beside))
+    return out and float(line.sum()) > ANSWER * float(power.sum())
 
 
 def _unequal(view: View, free: Rough) -> Iterator[Finding]:

@@ -60,6 +60,10 @@ FAULTS: dict[str, tuple[Spoil, str, str, str]] = {
     "drifting force": (lambda t, x, f: (t, x, f + 4 * t), "warning", "drift", "force"),
     "slow hum": (
         lambda t, x, f: (t, x, f + 10 * np.sin(2 * t)), "warning", "hum", "force"),
+    "hum of 8.5 Hz": (
+        lambda t, x, f: (t, x, f + 5 * np.sin(17 * np.pi * t)), "warning", "hum", "force"),
+    "hum of the mains": (
+        lambda t, x, f: (t, x, f + 20 * np.sin(100 * np.pi * t)), "warning", "hum", "force"),
     "gain that differs by the sign": (
         lambda t, x, f: (t, x, np.where(f > 0, 1.3, 1.0) * f), "warning", "unequal", "force"),
     "coarse encoder": (
@@ -101,7 +105,7 @@ def test_places_are_told(stage_data: Dataset) -> None:
     assert only(FAULTS["position glitch"][0], "glitch")[:2] == (0.8, 0.8)
     assert only(FAULTS["lost counts"][0], "jump")[:2] == pytest.approx((2.0, 2.001))
     assert only(FAULTS["gap"][0], "gap")[:2] == pytest.approx((0.999, 1.5))
-    assert "by about 0.01 s" in only(FAULTS["late force"][0], "delay")[2]
+    assert "by about 0.007 s (7 samples)" in only(FAULTS["late force"][0], "delay")[2]
 
 
 def test_repairs_undo_what_was_found(stage_data: Dataset) -> None:

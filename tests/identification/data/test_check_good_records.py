@@ -2,13 +2,16 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 
 from identification.data.dataset import Dataset
 from identification.data.synthetic import synthetic_drive_data
-from symfric import BrownMcPhee, law_from_text, rabinowicz, simulate
+from symfric import BrownMcPhee, LuGre, law_from_text, rabinowicz, simulate
+from symfric.scenes import Drive
 
 RNG = np.random.default_rng(0)
 
@@ -116,3 +119,28 @@ def test_motions() -> None:
         except AssertionError as error:
             error.add_note(name)
             raise
+
+
+def shaken(frequency: float, slow: float = 0.0, hum: float = 0.0) -> Dataset:
+    """A growing sine of force that shakes bristles by micrometres; a sensor that hums at 50 Hz."""
+    law = LuGre(mu_s=15.0, mu_d=10.0, sigma_0=1e6, sigma_1=2e3, sigma_2=0.0, v_s=1e-3)
+    t = np.arange(0.0, 4.0, 1e-3)
+
+    def push(t: Any, sin: Any = ca.sin) -> Any:
+        return 3.5 * t * sin(2 * np.pi * frequency * t) + slow * sin(2 * np.pi * 0.1 * t)
+
+    model = Drive(law, m=95.0, N=1.0).model()
+    x = simulate(model, 4.0, u={"force": push}, t_eval=t, rtol=1e-8)["x"]
+    assert np.ptp(x) < 1e-3
+    force = push(t, np.sin) + hum * np.sin(2 * np.pi * 50 * t)
+    return Dataset.of(t=t, x=noisy(x, 1e-9), force=noisy(force, 0.01))
+
+
+@pytest.mark.parametrize(("frequency", "slow"), [(8.0, 0.0), (8.0, 2.0), (20.0, 0.0)])
+def test_an_excitation_is_no_hum(frequency: float, slow: float) -> None:
+    assert "hum" not in shaken(frequency, slow).check().kinds
+
+
+def test_a_hum_beside_an_excitation_is_told() -> None:
+    (hum,) = (f for f in shaken(20.0, hum=5.0).check() if f.kind == "hum")
+    assert "49.9 Hz" in hum.sentence
