@@ -57,6 +57,9 @@ def sandwich(found: Minimum) -> Sandwich:
     kept = s > RANK * max(float(s[0]) if s.size else 0.0, 1e-300)
     inverse = (Vt[kept].T / s[kept] ** 2) @ Vt[kept]
     bread = scaled @ (inverse @ (found.slope / size).T)  # (rows, k)
+    reach = np.abs(bread).max(axis=0, initial=0.0)
+    reach = np.where(reach > 0, reach, 1.0)  # variances of variances would overflow
+    bread = bread / reach
     felt = scaled * found.gain[:, None]
     k = len(found.names)
     coloured, white, spread = np.zeros((k, k)), np.zeros((k, k)), np.zeros(k)
@@ -71,6 +74,8 @@ def sandwich(found: Minimum) -> Sandwich:
     total = np.diag(coloured) ** 2
     freedom = 2 * np.divide(total, spread, where=spread > 0, out=np.ones(k))
     null = _rest(Vt[kept], found.held) / size[:, None]
+    back = np.outer(reach, reach)
+    coloured, white = back * coloured, back * white
     return Sandwich(coloured, white, np.maximum(freedom, 1.0), null, size, tuple(colours))
 
 

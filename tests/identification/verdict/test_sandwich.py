@@ -42,6 +42,16 @@ def test_coloured_covariance_is_that_of_its_autocovariance() -> None:
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.9])
+def test_values_of_any_size_keep_their_freedom(rho: float) -> None:
+    """Squares of their variances would overflow, or vanish."""
+    made = fitted(coulomb(300), ar1(300, rho, 3))
+    size = np.array([1e90, 1.0, 1e-90, 1e-3])
+    found, large = (sandwich(replace(made, slope=k * made.slope)) for k in (1.0, size[:, None]))
+    np.testing.assert_allclose(large.freedom, found.freedom, rtol=1e-12)
+    np.testing.assert_allclose(large.coloured, np.outer(size, size) * found.coloured, rtol=1e-12)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.9])
 def test_intervals_cover(rho: float) -> None:
     seeds, J = 100, coulomb(200)
     inside = np.zeros(4)
