@@ -4,8 +4,10 @@ The stage is that of `synthetic_drive_data`, 95 kg with Stribeck friction, moved
 Every file is written from the same record, so that what a fit says can be held against the truth.
 
 What a file cannot show, marked `hidden`: a force times a constant (a wrong gain, kN for N), times
-or positions times a constant within what machines do, a velocity that is consistent with them. Such
-files are answered with numbers that are right for what they say.
+or positions times a constant within what machines do, a velocity that is consistent with them, a
+gain of the force that differs by its sign by up to 15 % (1.1 for one sign is answered with a mass
+of 99.9 kg and an offset of -1.7 N, without a word; 1.2 is told). Such files are answered with
+numbers that are right for what they say.
 """
 
 from collections.abc import Callable, Iterator, Mapping
