@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from identification.data.synthetic import synthetic_drive_data, trapezoids
-from symfric import LuGre
+from symfric import Hold, law_from_text, simulate
+from symfric.scenes import Drive
 
 
 def test_reference_returns_and_reaches_its_speeds() -> None:
@@ -38,6 +39,41 @@ def test_noise_is_seeded_and_of_the_size_asked_for() -> None:
     assert np.abs(record(3) - record(4)).max() > 0.5
 
 
-def test_dynamic_laws_are_refused() -> None:
-    with pytest.raises(ValueError, match="expected a static law, got LuGre with states"):
-        synthetic_drive_data(LuGre())
+def test_forces_of_a_sensor_are_means_of_commands() -> None:
+    sensor, command = (
+        synthetic_drive_data(speeds=(0.05,), force_noise=0.0, force=force)[0]["force"]
+        for force in ("sensor", "command")
+    )
+    np.testing.assert_array_equal(sensor[1:], (command[1:] + command[:-1]) / 2)
+    assert sensor[0] == command[0]
+    with pytest.raises(ValueError, match="expected one of sensor, command, got mean"):
+        synthetic_drive_data(force="mean")  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize("law", ["stribeck", "lugre"])
+def test_motion_is_that_of_the_recorded_command(law: str) -> None:
+    """One simulation over the whole record, by another method, finds the same positions."""
+    friction = law_from_text(law)
+    record = synthetic_drive_data(
+        friction, normal_force=20.0, speeds=(0.02,), dwell=0.2, force="command",
+        position_noise=0.0, force_noise=0.0,
+    )[0]  # fmt: skip
+    model = Drive(friction, m=95.0, N=20.0, offset=-3.0).model()
+    held = {"force": Hold(record.time, record["force"])}
+    motion = simulate(
+        model, record.time[-1], u=held, t_eval=record.time, rtol=1e-9, method="radau5"
+    )
+    np.testing.assert_allclose(motion["x"], record["x"], atol=2e-10)
+
+
+def test_controller_sees_the_motion() -> None:
+    """The command is that of `PositionLoop` for the recorded positions."""
+    record = synthetic_drive_data(
+        speeds=(0.05,), force="command", position_noise=0.0, force_noise=0.0
+    )[0]
+    loop, x = record.loop, record["x"]
+    assert loop is not None
+    mean = (x + np.append(0.0, x[:-1])) / 2
+    rate = np.diff(mean, prepend=0.0) / record.step
+    command = loop.kp * loop.kv * (loop.reference - x) - loop.kv * rate
+    np.testing.assert_allclose(record["force"], command, atol=1e-9)
