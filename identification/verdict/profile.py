@@ -13,7 +13,7 @@ Bioinformatics 25(15), 2009.
 
 from dataclasses import dataclass
 from importlib import import_module
-from math import inf, isfinite
+from math import ceil, inf, isfinite, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
@@ -69,9 +69,17 @@ class Profile:
     sentences: tuple[str, ...]
 
     def __str__(self) -> str:
-        ends = " to ".join("open" if e is None else f"{e:.4g}" for e in (self.low, self.high))
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        return " ".join([f"{self.name}: {self.best:.4g}{unit}, 95 %: {ends}.", *self.sentences])
+        ends = [e for e in (self.low, self.high) if e is not None]
+        near = [abs(e - self.best) for e in ends if e != self.best]
+        width = min(near, default=0.0)
+        digits = ceil(log10(abs(self.best) / width)) + 3 if width and self.best else 4
+        best, *sides = (
+            "open" if x is None else f"{x:.{min(max(digits, 4), 12)}g}"
+            for x in (self.best, self.low, self.high)
+        )
+        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        said = f"{self.name}: {best}{unit}, 95 %: {' to '.join(sides)}."
+        return " ".join([said, *self.sentences])
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain data, ready for JSON."""

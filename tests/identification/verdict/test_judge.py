@@ -13,7 +13,7 @@ from identification.verdict.covariance import covariance
 from identification.verdict.judge import judge, judged
 from identification.verdict.minimum import minimum
 from identification.verdict.picture import plot_lags
-from identification.verdict.profile import profile
+from identification.verdict.profile import Profile, profile
 from symfric.foundation.status import Status
 
 T = STEP * np.arange(300)
@@ -140,3 +140,9 @@ def test_a_twentieth_of_the_variance_is_no_other_model() -> None:
     assert little.good
     assert any(t.decides and t.p < t.limit for t in little.tests)
     assert not much.good
+
+
+def test_a_narrow_profile_shows_the_digits_that_tell_its_ends_apart() -> None:
+    none = np.zeros(0)
+    made = Profile("k", "N/m", 4e9, none, none, none, (), 4.0, 3.99979e9, 4.00022e9, False, ())
+    assert str(made) == "k: 4e+09 N/m, 95 %: 3.99979e+09 to 4.00022e+09."
