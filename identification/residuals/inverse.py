@@ -103,7 +103,7 @@ class InverseDynamics:
         made = balance(model, subject.names, found, typical, where)
         if self.dead_time is not None:
             _check_dead_time(made, model, where)
-        pieces = tuple(piece(made, motion, model) for motion in motions)
+        pieces = tuple(piece(made, motion, model, self.filter is None) for motion in motions)
         return InverseRows(
             subject.names, made.equations.compiled(), made.rows, pieces, self.dead_time
         )

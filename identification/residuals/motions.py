@@ -1,7 +1,7 @@
 """Measured motion of a model: positions, rates, accelerations and inputs of one record."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import final
 
 import casadi as ca
@@ -19,8 +19,8 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 
-FEWEST = 10
-"""Equations that a signal of a record must leave."""
+FEWEST, ENOUGH = 10, 100
+"""Equations that a signal must leave, and that it is to leave where the filter is changed."""
 
 Raw = tuple[Array | None, Array | None]
 """Measured position and rate of a coordinate."""
@@ -164,25 +164,46 @@ class Piece:
         return self.decimation.centres(self.motion.t[self.motion.inside])[self.kept[row]]
 
 
-def piece(made: Balance, motion: Motion, model: Model) -> Piece:
+def piece(made: Balance, motion: Motion, model: Model, adapts: bool = False) -> Piece:
     """Decide which equations of a record are used.
+
+    Args:
+        made, motion, model: what they are of.
+        adapts: the filter is not the user's; where it leaves too few equations, as of a motion
+            that often turns round, they are thinned less.
 
     Raises:
         ValueError: too few are left.
     """
+    slow = _slow(made, motion, model)
+    found = _piece(made, motion, slow)
+    if adapts and _fewest(found) < FEWEST:
+        while _fewest(found) < ENOUGH and found.motion.filter.decimation > 1:
+            less = replace(motion.filter, decimation=found.motion.filter.decimation // 2)
+            found = _piece(made, replace(motion, filter=less), slow)
+    if not found.decimation.rows:
+        raise _too_short(found.motion, "all signals", 0)
+    for row, kept in zip(made.rows, found.kept, strict=True):
+        if kept.size < FEWEST:
+            raise _too_short(found.motion, row.signal, kept.size)
+    return found
+
+
+def _fewest(found: Piece) -> int:
+    return min((kept.size for kept in found.kept), default=FEWEST)
+
+
+def _piece(made: Balance, motion: Motion, slow: Sequence[NDArray[np.bool_]]) -> Piece:
+    """The equations whose low pass touches no `slow` sample."""
     n = motion.t[motion.inside].size
     decimation = Decimation(n, motion.filter.decimation)
-    if not decimation.rows:
-        raise _too_short(motion, "all signals", 0)
-    slow = _slow(made, motion, model)
     kept: list[Numbers] = []
     for row in made.rows:
         unsure = np.zeros(n, bool)
         for k in row.slips:
             unsure |= slow[k][motion.inside]
-        kept.append(np.flatnonzero(~decimation.touched(unsure)))
-        if kept[-1].size < FEWEST:
-            raise _too_short(motion, row.signal, kept[-1].size)
+        some = np.flatnonzero(~decimation.touched(unsure)) if decimation.rows else np.zeros(0, int)
+        kept.append(some)
     return Piece(motion, decimation, tuple(kept))
 
 

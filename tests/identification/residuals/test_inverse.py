@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from identification.data.dataset import Dataset
 from identification.residuals.evaluation import Evaluation, Residuals
 from identification.residuals.inverse import InverseDynamics
+from identification.residuals.motions import ENOUGH
 from identification.signals.filters import Filter
 from identification.unknowns.subject import Subject, subject
 from symfric import LuGre, Stribeck, rabinowicz, simulate
@@ -178,6 +179,15 @@ def test_residuals_pickle() -> None:
     values = starts(one) * 1.1
     again = pickle.loads(pickle.dumps(rows))
     np.testing.assert_array_equal(evaluated(again, values).r, evaluated(rows, values).r)
+
+
+def test_a_motion_that_often_turns_round_is_thinned_less() -> None:
+    t = np.linspace(0.0, 20.0, 20_001)
+    data = moved(DRIVE, t)
+    noise = np.random.default_rng(0).standard_normal((2, t.size))
+    signals = {"x": data[0]["x"] + 1e-6 * noise[0], "force": data[0]["force"] + 0.05 * noise[1]}
+    rows = InverseDynamics().prepare(subject(DRIVE), Dataset.of(t=t, **signals))
+    assert rows.channels[0].t.size >= ENOUGH
 
 
 def test_missing_channels_are_named() -> None:
