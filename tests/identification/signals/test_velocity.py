@@ -53,6 +53,19 @@ def test_a_velocity_that_contradicts_the_position_does_not_count(v: Array) -> No
     assert off(x, v + 1e-3 * noise(1))[0] < 1.1 * off(x, None)[0]
 
 
+def test_of_a_fast_motion_the_difference_of_positions_is_not_believed() -> None:
+    """At w h = 0.19 it falls short by (w h)^2 / 6, and not the measured velocity too far."""
+    w = 2 * np.pi * 30
+    x, v = np.sin(w * T), w * (np.cos(w * T) + 1e-3 * noise(1))
+    mixed, alone = (
+        float(np.std((derivatives(x, y, STEP, Filter(200.0), Velocity.of(x, y, STEP))[1]
+                      - w * np.cos(w * T))[INSIDE]))
+        for y in (v, None)
+    )  # fmt: skip
+    assert alone > 0.9 * w * (w * STEP) ** 2 / 6 / np.sqrt(2)
+    assert mixed < 0.3 * alone
+
+
 def test_a_velocity_made_from_the_position_is_as_noisy() -> None:
     x = X + 1e-5 * noise(0)
     v = np.convolve(np.gradient(x, STEP), np.ones(5) / 5, mode="same")
