@@ -54,6 +54,9 @@ def columns_of(name: str, frame: object, arrays: Mapping[str, object]) -> tuple[
 
 def _column(where: str, key: str, values: object) -> Column:
     name, said = label(key)
+    if isinstance(values, np.ma.MaskedArray):  # what is masked was not measured
+        masked: Any = values  # pyright: ignore[reportUnknownVariableType]
+        values = masked.astype(float).filled(np.nan) if masked.dtype.kind in "iuf" else masked
     try:
         found = np.asarray(values)
     except (ValueError, TypeError):

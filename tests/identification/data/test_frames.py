@@ -57,3 +57,12 @@ def test_frames_are_taken_by_their_columns() -> None:
 def test_what_is_none_is_told(frame: Any, arrays: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Dataset.of(frame, **arrays)
+
+
+def test_masked_samples_were_not_measured() -> None:
+    with pytest.raises(
+        ValueError, match=r"column 'x', sample 1: expected a finite number, got nan"
+    ):
+        Dataset.of(t=[0, 1, 2], x=np.ma.array([1, 2, 3], mask=[0, 1, 0]))
+    whole = Dataset.of(t=[0, 1, 2], x=np.ma.array([1, 2, 3]))
+    assert whole[0]["x"].tolist() == [1.0, 2.0, 3.0]
