@@ -12,7 +12,7 @@ Source: Burnham and Anderson, Model Selection and Multimodel Inference, 2002.
 
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from math import inf, isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 INTERRUPTED = "interrupted by the user"
+OWN = ("kind", "what", "data")
+"""Arguments of a fit that `select` gives itself."""
 
 
 @final
@@ -192,6 +194,7 @@ def select(
     named = _named(laws)
     checks.kind("select: data", data, Dataset, "data, such as Dataset.read('run.csv')")
     folds = checks.count("select: folds", folds, least=0)
+    checks.check_names("select", fit, [f.name for f in fields(Fit) if f.name not in OWN])
     asked: Any = InverseDynamics() if kind is None else kind
     tried = list[_Tried]()
     for number, (name, what) in enumerate(named.items()):
@@ -211,6 +214,8 @@ def select(
         progress("ranked", 1.0)
     how = f"validation on {validate.name}" if validate is not None else "no validation"
     crossed = next((t.crossed for t in tried if t.crossed is not None), None)
+    if crossed is None and validate is None and folds > 1:
+        how = f"no validation, although {folds} folds were asked for"
     if crossed is not None:
         how = f"validation by {folds} folds ({crossed.by})"
     return _ranked(tried, data.name, how)

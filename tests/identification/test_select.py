@@ -114,6 +114,11 @@ def test_bad_laws_are_refused(laws: object) -> None:
         select(laws, points(1), Points())  # pyright: ignore
 
 
+def test_misspelt_arguments_are_refused_in_a_sentence() -> None:
+    with pytest.raises(ValueError, match=r"select: expected one of .*start.*, got begins"):
+        select(["stribeck"], points(1), Points(), begins=3)
+
+
 def test_criteria_are_those_of_the_errors_and_the_numbers_of_parameters(ranking: Ranking) -> None:
     first, other = ranking["stribeck"], ranking["coulomb"]
     n, better = ranking.effective, 2 * np.log(other.fitted / first.fitted)
@@ -123,3 +128,8 @@ def test_criteria_are_those_of_the_errors_and_the_numbers_of_parameters(ranking:
     k, m = first.parameters, other.parameters
     cost = 2 * k * n / (n - k - 1) - 2 * m * n / (n - m - 1)
     assert other.aicc == pytest.approx(n * better - cost)
+
+
+def test_folds_that_are_too_short_are_said() -> None:
+    found = select(["coulomb"], points(1), Points(), starts=1, folds=1000)
+    assert found.how == "no validation, although 1000 folds were asked for"
