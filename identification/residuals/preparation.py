@@ -25,6 +25,7 @@ from symfric.foundation import checks
 from symfric.foundation.compiler import find_compiler
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Variable
+from symfric.integrator import Hold, Linear
 from symfric.model import Model
 
 if TYPE_CHECKING:
@@ -163,6 +164,7 @@ class Preparation:
         found = {name: given.get(name, name) for name in units}
         for name, source in found.items():
             if not isinstance(source, str):
+                self._check_span(f"{where}: {name}", source)
                 continue
             lacking = [record.name for record in self.records if source not in record]
             if lacking:
@@ -181,6 +183,20 @@ class Preparation:
         equations = [e for e in (model.ode, model.alg, model.residual, *outputs) if e is not None]
         timed = ca.depends_on(ca.veccat(*map(ca.SX, equations)), model.t)
         return not timed and not model.events and all(map(is_number, given))
+
+    def _check_span(self, where: str, source: object) -> None:
+        """Refuse samples that end before a record does: what holds then is nobody's measurement."""
+        if not isinstance(source, Hold | Linear):
+            return
+        t = np.ravel(np.asarray(source.t, dtype=float))
+        slack = float(np.median(np.diff(t))) if t.size > 1 else np.inf  # one number holds always
+        for record in self.records:
+            first, last = record.time[0], record.time[-1]
+            if first < t[0] - slack or last > t[-1] + slack:
+                raise ValueError(
+                    f"{where}: expected samples over {first:g} ... {last:g} s, the time of "
+                    f"'{record.name}', got {t[0]:g} ... {t[-1]:g} s"
+                )
 
     def _check_x0(self) -> None:
         if isinstance(self.kind.x0, str):

@@ -216,3 +216,10 @@ def test_coordinates_and_rates_of_a_mechanism() -> None:
 def test_only_the_first_window_starts_where_the_model_says() -> None:
     found = shots(Shooting(windows=0.5, x0="given"), slide())
     assert found.names[2:] == ("x0.x[0,1]", "x0.v[0,1]")
+
+
+def test_samples_that_end_before_the_record_are_refused() -> None:
+    short = Linear(T[:100], FORCE[:100])
+    with pytest.raises(ValueError, match=r"inputs: force: expected samples over 0 ... 1 s"):
+        shots(Shooting(inputs={"force": short}), slide())
+    assert shots(Shooting(inputs={"force": Linear(T[::5], FORCE[::5])}), slide()).rows == T.size
