@@ -269,7 +269,7 @@ def _try(
     try:
         if validate is not None:
             return replace(made, outside=left_of(found, validate))
-        if folds:
+        if folds and found.status is not Status.INTERRUPTED:
             start = {n: v for n, v in live.values.items() if n in live.subject.names}
             crossed = cross_validate(asked, folds, start)
             return replace(

@@ -1,6 +1,7 @@
 """Cross-validation and ranking of laws on points of a Stribeck curve."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from identification.fit import Fit
 from identification.residuals.points import Points
 from identification.select import Ranking, select
 from symfric import Stribeck
+from symfric.foundation.status import Status
 from symfric.laws import steady_force
 
 LAW = Stribeck(mu_s=6.0, mu_d=4.0, v_s=0.02, v_eps=1e-4, sigma_2=8.0)
@@ -133,3 +135,13 @@ def test_criteria_are_those_of_the_errors_and_the_numbers_of_parameters(ranking:
 def test_folds_that_are_too_short_are_said() -> None:
     found = select(["coulomb"], points(1), Points(), starts=1, folds=1000)
     assert found.how == "no validation, although 1000 folds were asked for"
+
+
+def test_an_interrupted_fit_is_not_validated_at_length(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(self: Fit, **_: object) -> object:
+        return replace(solve(self, throw=False), status=Status.INTERRUPTED)
+
+    solve = Fit.solve
+    monkeypatch.setattr(Fit, "solve", interrupted)
+    found = select(["coulomb"], points(1), Points(), starts=1)
+    assert np.isnan(found["coulomb"].validation)
