@@ -60,7 +60,7 @@ def test_it_asks_for_these_libraries_only(wheel: ZipFile) -> None:
         for line in lines
         if line.startswith("Requires-Dist:") and "extra ==" not in line
     }
-    assert needed == {"casadi", "numpy", "matplotlib", "typer", "rich"}
+    assert needed == {"casadi", "numpy", "scipy", "matplotlib", "typer", "rich"}
 
 
 def test_it_cannot_be_uploaded_by_accident_and_installs_the_command(wheel: ZipFile) -> None:
