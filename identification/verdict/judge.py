@@ -199,14 +199,17 @@ def _level(found: Minimum, channel: Channel) -> float:
 
 
 def _size(found: Minimum, channel: Channel, colour: Colour) -> Iterator[Test]:
-    """Residuals against a noise level that is known: chi2 with the effective number of samples."""
+    """Residuals against a noise level that is known: chi2 with the effective number of samples.
+
+    Outliers count as much as the loss lets them: it was chosen because they are there.
+    """
     from scipy.special import chdtrc  # noqa: PLC0415  (SciPy is loaded by those who fit)
 
     sigma = found.noise.get(channel.signal)
     if sigma is None:
         return
     name = found.label(channel)
-    rms = float(np.sqrt(np.mean(found.raw[channel.rows] ** 2)))
+    rms = sigma * float(np.sqrt(np.mean(found.r[channel.rows] ** 2)))
     free = max(colour.effective * colour.freedom / colour.rows, 1.0)
     p = float(chdtrc(free, free * (rms / sigma) ** 2))
     passed = p >= ALARM / len(found.channels) or rms <= resolution(channel.measured, channel.unit)

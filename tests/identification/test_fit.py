@@ -161,3 +161,14 @@ def test_a_static_level_that_no_point_comes_near_is_not_told() -> None:
         assert (found.standard_error is None) == bool(note)
         assert ("mu_s is not told: no friction force" in str(fit)) == bool(note)
         assert fit.parameters["mu_d"].standard_error
+
+
+def test_outliers_that_the_loss_allows_for_do_not_make_given_noise_too_small() -> None:
+    rng = np.random.default_rng(0)
+    v = np.tile(np.linspace(0.01, 0.2, 100), 2) * np.repeat([1.0, -1.0], 100)
+    F = 5.0 * np.sign(v) + 8.0 * v + 0.05 * rng.standard_normal(v.size)
+    F[rng.choice(v.size, 20, replace=False)] += rng.choice([-2.0, 2.0], 20)
+    data = Dataset.of(v=v, F=F, units={"v": "m/s", "F": "N"}, points=True)
+    for loss, status in (("huber", Status.SOLVED), ("squares", Status.DOUBTFUL)):
+        fit = Fit(Points(), "coulomb+viscous", data, noise={"F": 0.05}, loss=loss)
+        assert fit.solve(throw=False).status is status, loss
