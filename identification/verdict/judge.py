@@ -209,7 +209,9 @@ def _size(found: Minimum, channel: Channel, colour: Colour) -> Iterator[Test]:
     if sigma is None:
         return
     name = found.label(channel)
-    rms = sigma * float(np.sqrt(np.mean(found.r[channel.rows] ** 2)))
+    robust = bool((found.gain[channel.rows] != 1.0).any())
+    left = sigma * found.r[channel.rows] if robust else found.raw[channel.rows]
+    rms = float(np.sqrt(np.mean(left**2)))
     free = max(colour.effective * colour.freedom / colour.rows, 1.0)
     p = float(chdtrc(free, free * (rms / sigma) ** 2))
     passed = p >= ALARM / len(found.channels) or rms <= resolution(channel.measured, channel.unit)
