@@ -42,6 +42,8 @@ CLASSES = {
 }
 """Kinds of matrices that hold no numbers for us, in words."""
 HEADER, OLD_HEADER = 128, 20
+HDF5 = b"\x89HDF"
+"""How a file of version 7.3 without a MATLAB header begins."""
 LARGEST = 2**29
 """Bytes that a compressed element may unfold to."""
 DEEPEST = 20
@@ -58,6 +60,8 @@ def variables(content: bytes) -> dict[str, Node]:
         NotImplementedError: a file of version 7.3, which is HDF5.
         ValueError: no MATLAB file, or a damaged one.
     """
+    if content.startswith(HDF5):
+        raise NotImplementedError
     order = {b"IM": "<", b"MI": ">"}.get(content[126:HEADER])
     if order is not None:
         if int.from_bytes(content[124:126], "little" if order == "<" else "big") >> 8 == 2:

@@ -19,7 +19,6 @@ from identification.data.record import Record
 
 EMPS = ("t", "qm", "vir", "gtau")
 """Variables that tell an EMPS file."""
-HDF5 = b"\x89HDF"
 
 Node = Any
 """An array, a text, a dict of nodes (struct), or a list of nodes (struct array, cell)."""
@@ -202,10 +201,7 @@ def _is_matrix(value: Node) -> bool:
 
 def _load(file: Path) -> dict[str, Node]:
     try:
-        content = file.read_bytes()
-        if content.startswith(HDF5):
-            raise NotImplementedError
-        loaded = variables(content)
+        loaded = variables(file.read_bytes())
     except NotImplementedError:
         raise ValueError(
             f"read '{file.name}': expected a MATLAB file of version 7 or older, got version 7.3 "
