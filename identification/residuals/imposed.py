@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.codegen.held_step import advanced
+from symfric.codegen.blocks.held_step import advanced
 from symfric.foundation.numeric import Scalar
 from symfric.laws import GMS, Law
 
@@ -30,10 +30,10 @@ def imposed_step(
         z' = rate(z, v(t), N(t)),   v, N and further inputs linear between the samples
 
     Two steps with the mean velocity and load of each held: exact exponentials for bristles, exact
-    event steps for elements that yield, second order elsewhere (`symfric.codegen.held_step`). They
-    meet in the middle, or where the velocity passes through zero, so that no step sees two
-    directions. The smooth form of GMS takes the step of its event form, which slips later by up to
-    the share rho of the limit.
+    event steps for elements that yield, second order elsewhere
+    (`symfric.codegen.blocks.held_step`). They meet in the middle, or where the velocity passes
+    through zero, so that no step sees two directions. The smooth form of GMS takes the step of its
+    event form, which slips later by up to the share rho of the limit.
 
     Args:
         law: with states; its parameters may be symbols.

@@ -19,7 +19,7 @@ from ocp.mpc.session import Session
 from ocp.mpc.source import timed
 from ocp.mpc.to_c import GeneratedController, write_c
 from ocp.text.problem import Problem
-from symfric.codegen.block import KEYWORDS
+from symfric.codegen.blocks.block import KEYWORDS
 from symfric.foundation import checks
 from symfric.model import Model
 

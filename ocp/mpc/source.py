@@ -16,9 +16,9 @@ from ocp.mpc.design import Control, Design
 from ocp.mpc.gauss_newton import ARMIJO, PLAIN, ROUNDING, CycleStatus
 from ocp.mpc.interior_point import AWAY, BACK, CLOSE
 from ocp.mpc.program_in_c import PROGRAM
-from symfric.codegen.c99 import DOUBLE, TRANSCENDENTAL, macro
-from symfric.codegen.emitter import emit
-from symfric.codegen.source import folded
+from symfric.codegen.writing.text import folded
+from symfric.emitter.c99 import DOUBLE, TRANSCENDENTAL, macro
+from symfric.emitter.emit import emit
 from symfric.foundation.graph import graph
 from symfric.foundation.parameters import Variable
 

@@ -12,8 +12,8 @@ from ocp.mpc.design import Design
 from ocp.mpc.engines import InC, InVm
 from ocp.mpc.source import header, source
 from ocp.mpc.sweeps import Given
-from symfric.codegen.c99 import TRANSCENDENTAL
-from symfric.codegen.compiler import compile_object, needed_symbols
+from symfric.codegen.running.compiler import compile_object, needed_symbols
+from symfric.emitter.c99 import TRANSCENDENTAL
 from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError, find_compiler
 from symfric.foundation.files import write_text

@@ -19,7 +19,7 @@ SEARCH = "symfric/integrator/running/search.py"
 CROSSINGS = "symfric/integrator/running/crossings.py"
 RUN = "symfric/integrator/running/run.py"
 INITIAL = "symfric/integrator/equations/initial.py"
-EMITTER = "symfric/codegen/emitter.py"
+EMITTER = "symfric/emitter/emit.py"
 COLLOCATION = "ocp/transcription/collocation.py"
 
 LOOP = "symfric/integrator/running/loop.py"
@@ -28,7 +28,7 @@ T_STEP = ("tests/symfric/integrator/step/test_attempt.py",)
 T_WATCH = ("tests/symfric/integrator/step/test_watch.py",)
 T_SIMULATE = ("tests/symfric/integrator/test_simulate.py",)
 T_EVENTS = ("tests/symfric/integrator/running/test_events.py",)
-T_EMITTER = ("tests/symfric/codegen/test_emitter.py",)
+T_EMITTER = ("tests/symfric/emitter/test_emit.py",)
 T_SOLVE = ("tests/ocp/test_solve.py",)
 T_SHARPEN = ("tests/ocp/friction/test_sharpen.py",)
 
@@ -182,13 +182,13 @@ EMIT = (
         "if not value.logical:\n        return value", "if True:\n        return value", T_EMITTER,
     ),
     Mutant(
-        "a parameter that spares a function stays variable", "symfric/codegen/folding.py",
-        ">= least", ">= 0", ("tests/symfric/codegen/test_folding.py",),
+        "a parameter that spares a function stays variable", "symfric/codegen/blocks/folding.py",
+        ">= least", ">= 0", ("tests/symfric/codegen/blocks/test_folding.py",),
     ),
     Mutant(
-        "a held step goes beyond its place of rest", "symfric/codegen/held_step.py",
+        "a held step goes beyond its place of rest", "symfric/codegen/blocks/held_step.py",
         "ca.logic_and(ratio > 0, ratio < 1)", "ca.logic_and(ratio > 0, ratio < 0)",
-        ("tests/symfric/codegen/test_held_step.py",),
+        ("tests/symfric/codegen/blocks/test_held_step.py",),
     ),
 )  # fmt: skip
 

@@ -1,0 +1,1 @@
+"""What becomes a block: laws, models, populations, mechanisms."""

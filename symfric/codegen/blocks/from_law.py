@@ -1,0 +1,191 @@
+"""A friction law as a block: one stateless function, or a step of its states for held inputs."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, replace
+from inspect import getdoc
+from re import sub
+from typing import Any
+
+import casadi as ca
+
+from symfric.codegen.blocks.block import Block
+from symfric.codegen.blocks.folding import runtime_parameters
+from symfric.codegen.blocks.held_step import advanced, force_of_rate
+from symfric.foundation import checks
+from symfric.foundation.numeric import is_casadi
+from symfric.foundation.parameters import Variable, check_names, parameters, symbolise
+from symfric.foundation.units import turned
+from symfric.laws import Law, law_name
+from symfric.laws.base.law import check_law
+from symfric.model import Output, Variables
+
+STEP_SIZE = 1e-3
+"""Default of the parameter h [s]."""
+
+FORCE = "friction force, opposes the motion"
+SLIDING = "Initial state of long sliding at the given inputs, to start while the machine moves."
+
+
+def law_block(
+    law: Law,
+    *,
+    name: str | None = None,
+    h: float | None = None,
+    free: Sequence[str] | None = None,
+    turning: bool = False,
+) -> Block:
+    """The discrete-time block of `law` with inputs v, N, those of the law, and output F.
+
+    A law without states becomes F(v, N). A law with states makes a step with v and N held, however
+    large its rates times h are (for LuGre sigma_0 |v| h / g is often far above 2, where explicit
+    Euler diverges). Where the rates are affine in the states, each by itself,
+    dz/dt = a(v, N) - lambda(v, N) z, the step is exact:
+
+        phi1(x) = (exp(x) - 1) / x,   phi2(x) = (phi1(x) - 1) / x,   x = -lambda h
+        r  = phi1(x) (a - lambda z)          mean rate over the step
+        z+ = z + h r
+        zm = z + h phi2(x) (a - lambda z)    mean state over the step
+        F  = force(v, N, zm)                 mean force over the step, with r for the rate in it
+
+    Otherwise (elasto-plastic, Bouc-Wen, Maxwell-slip, Dahl's law with n != 1 and others) lambda is
+    the derivative at z and the step ends at the place of rest, if it gets there: of second order,
+    and bounded for every h. So is the force where it is not affine in the states. The event forms
+    of Maxwell-slip, reset integrator and GMS know their steps exactly.
+
+    F h is the impulse and F v h the work of the step. The bristle damping sees r = (z+ - z) / h,
+    which is bounded by the bristle's travel, and not the rate at one instant, which after a jump is
+    as large as v. Feed the mean velocity of the step, such as the encoder increment over h; with
+    the velocity at its beginning the error is of first order in h.
+
+    Initial states: zero (a machine at rest, bristles relaxed), or by the reset `init_sliding` those
+    of long sliding at v, N (a controller that starts while the machine moves).
+
+    Args:
+        law: a law whose parameters are numbers.
+        name: C identifier; default the name of the law.
+        h: step size [s] as a constant; without it h is a parameter, by default 1 ms. A law without
+            states has no step size.
+        free: parameters that stay variable at run time, the others become constants; default see
+            `runtime_parameters`. Parameters without effect never appear.
+        turning: the contact turns: the same C, with units rad/s and N m in its texts.
+
+    Raises:
+        ValueError: symbols in the law; names in `free` that are unknown, repeated or without
+            effect; states that act on each other in a circle (Leuven, smooth GMS) or
+            are not affine and depend on others (Armstrong); modes that follow zero crossings of v
+            within the step (exact Coulomb, Karnopp and Leine by events); a force that is not finite
+            at rest (a smoothing width of 0 left variable).
+    """
+    check_law("codegen", law)
+    where = f"codegen '{law_name(law)}'"
+    checks.flag(f"{where}: turning", turning)
+    free = None if free is None else checks.names(f"{where}: free", free)
+    if name is not None:
+        checks.text(f"{where}: name", name, "a C identifier")
+    known = parameters(law)
+    symbols = [p.name for p in known.values() if is_casadi(p.value)]
+    if symbols:
+        raise ValueError(f"{where}: expected numbers as parameters, got symbols {symbols}")
+    check_names(where, free or (), known)
+    names = runtime_parameters(law) if free is None else free
+    step_variable(where, h)  # asked for in a law without steps, too
+    symbolic, runtime = symbolise(law, *names)
+    block = _step(symbolic, runtime, h, where) if law.states else _function(symbolic, runtime)
+    idle = [p.name for p in runtime if not ca.depends_on(block.everything, p.symbol)]
+    if idle and free is not None:
+        raise ValueError(
+            f"{where}: free: expected parameters that have an effect, got {', '.join(idle)}; "
+            "the values of the other parameters switch them off"
+        )
+    block = replace(
+        block,
+        name=name or sub(r"\W+", "_", law_name(law)).strip("_"),
+        doc="\n\n".join(dict.fromkeys(_documents(law))),
+        parameters=tuple(p for p in block.parameters if p.name not in idle),
+        constants={p.name: float(p.value) for p in known.values() if p.name not in names}
+        | dict(block.constants),
+    )
+    _check_at_rest(block, where)
+    return in_turning(block) if turning else block
+
+
+def in_turning(block: Block) -> Block:
+    """The block with the units of a contact that turns."""
+    groups: dict[str, Any] = {
+        group: tuple(replace(v, unit=turned(v.unit)) for v in getattr(block, group))
+        for group in ("states", "inputs", "parameters")
+    }
+    outputs = {n: replace(o, unit=turned(o.unit)) for n, o in block.outputs.items()}
+    doc = f"{block.doc}\n\nFor a contact that turns: read rad for m, N m for N."
+    return replace(block, **groups, outputs=outputs, doc=doc)
+
+
+def step_variable(where: str, h: float | None) -> Variable:
+    """The parameter h [s], which starts at the step size given, by default 1 ms."""
+    start = STEP_SIZE if h is None else checks.number(f"{where}: h", h, unit="s", above=0.0)
+    return Variable("h", "s", start=start, lower=0.0, doc="step size")
+
+
+def _inputs(law: Law) -> Variables:
+    return (
+        Variable("v", "m/s", doc="sliding velocity"),
+        Variable("N", "N", nominal=10.0, lower=0.0, doc="normal force"),
+        *(Variable(i.name, i.unit, nominal=i.nominal, doc=i.doc) for i in law.inputs),
+    )
+
+
+def _given(inputs: Variables) -> dict[str, ca.SX]:
+    """Symbols of what stands behind v and N."""
+    return {variable.name: variable.symbol for variable in inputs[2:]}
+
+
+def _function(law: Law, runtime: Variables) -> Block:
+    v, N, *_ = inputs = _inputs(law)
+    force = law.force(v.symbol, N.symbol, ca.SX(0, 1), **_given(inputs))
+    return Block("F", inputs=inputs, parameters=runtime, outputs={"F": Output(force, "N", FORCE)})
+
+
+def _step(law: Law, runtime: Variables, h: float | None, where: str) -> Block:
+    v, N, *_ = inputs = _inputs(law)
+    states = tuple(Variable(s.name, s.unit, nominal=s.nominal) for s in law.states)
+    size = step_variable(where, h)
+    duration = size.symbol if h is None else float(size.start)
+
+    z = ca.vertcat(*(state.symbol for state in states))
+    given = _given(inputs)
+    rate = ca.SX(law.rate(v.symbol, N.symbol, z, **given))
+    end, mean, mean_rate = advanced(law, v.symbol, N.symbol, z, rate, given, duration, where)
+    force, r = force_of_rate(ca.SX(law.force(v.symbol, N.symbol, z, **given)), rate, z)
+    mean_force = ca.substitute(force, ca.vertcat(z, r), ca.vertcat(mean, mean_rate))
+    return Block(
+        "F",
+        states=states,
+        inputs=inputs,
+        parameters=runtime + ((size,) if h is None else ()),
+        next=end,
+        outputs={"F": Output(mean_force, "N", FORCE + ", mean over the step")},
+        resets={"init_sliding": (ca.SX(law.steady_state(v.symbol, N.symbol)), SLIDING)},
+        constants={} if h is None else {"h": float(size.start)},
+    )
+
+
+def _check_at_rest(block: Block, where: str) -> None:
+    """A division by zero at rest must show here and not on the machine."""
+    values = [[v.start for v in group] for group in (block.states, block.parameters)]
+    rest = [0.0 if v.name == "v" else v.nominal for v in block.inputs]
+    _, force = block.step(*values, rest)
+    if not force.is_regular():
+        raise ValueError(
+            f"{where}: expected a finite force at rest, got {float(force)}; "
+            "keep a smoothing width of 0 constant (leave it out of free)"
+        )
+
+
+def _documents(law: Law) -> Iterator[str]:
+    """The docstring of the law and of those that it holds."""
+    yield getdoc(type(law)) or type(law).__name__
+    for item in fields(law):
+        value = getattr(law, item.name)
+        for inner in value if isinstance(value, tuple) else (value,):
+            if isinstance(inner, Law):
+                yield from _documents(inner)

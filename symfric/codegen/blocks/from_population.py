@@ -1,0 +1,55 @@
+"""One contact of a population as a block; the population is a loop over an array of them."""
+
+from inspect import getdoc
+
+import casadi as ca
+
+from symfric.codegen.blocks.block import Block
+from symfric.codegen.blocks.from_law import STEP_SIZE, step_variable
+from symfric.foundation import checks
+from symfric.foundation.parameters import Variable, parameters
+from symfric.laws import Population, law_name
+from symfric.model import Output
+
+LOOP = """One contact. The friction force of the population is the sum of F over an array of states,
+all with the same v and N, each with the random number r of its own in [-1, 1]. `Population.begin`
+gives states and r of a seed as arrays; {redrawn}."""
+
+
+def contact_block(law: Population, *, name: str | None = None, h: float | None = None) -> Block:
+    """The discrete-time block of one contact of `law` with inputs v, N, r and its force F.
+
+    The step is that of `Population.advance`, so that a loop in C over what `Population.begin`
+    returns follows NumPy to rounding. Keep |v| h below `Population.step`.
+
+    Args:
+        law: a population; its numbers are constants of the block.
+        name: C identifier; default the name of the population.
+        h: step size [s] as a constant; without it h is a parameter, by default 1 ms.
+
+    Raises:
+        ValueError: a step size <= 0.
+    """
+    where = f"codegen '{law_name(law)}'"
+    if name is not None:
+        checks.text(f"{where}: name", name, "a C identifier")
+    states = tuple(Variable(s.name, s.unit, nominal=s.nominal) for s in law.states)
+    v = Variable("v", "m/s", nominal=law.step / STEP_SIZE, doc="sliding velocity")
+    N = Variable("N", "N", nominal=10.0, lower=0.0, doc="normal force of all contacts")
+    r = Variable("r", "1", nominal=0.5, doc="random number of the contact, -1 to 1")
+    size = step_variable(where, h)
+    duration = size.symbol if h is None else float(h)
+    z = ca.vertcat(*(state.symbol for state in states))
+    rows = ca.SX(law.contact(z, r.symbol, v.symbol * duration, duration, N.symbol))
+    redrawn = "draw r anew at every step" if law.redraws else "r stays the same at all steps"
+    constants = {p.name: float(p.value) for p in parameters(law).values()}
+    return Block(
+        name or law_name(law),
+        doc=f"{getdoc(type(law))}\n\n{LOOP.format(redrawn=redrawn)}",
+        states=states,
+        inputs=(v, N, r),
+        parameters=(size,) if h is None else (),
+        next=rows[: len(states)],
+        outputs={"F": Output(rows[len(states)], "N", "friction force of this contact")},
+        constants=constants | ({} if h is None else {"h": float(h)}),
+    )

@@ -1,0 +1,1 @@
+"""What lies in an output folder: C, test vectors, unit test, build files, loaders, manifest."""

@@ -1,0 +1,150 @@
+"""Files of generated C: header and source a floating point type, and a manifest."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, final
+
+from symfric.codegen.blocks.block import Block
+from symfric.codegen.blocks.from_law import law_block
+from symfric.codegen.blocks.from_population import contact_block
+from symfric.codegen.writing.header import header
+from symfric.codegen.writing.layout import members, prefix
+from symfric.codegen.writing.routines import routines
+from symfric.codegen.writing.source import source
+from symfric.emitter.c99 import REALS, Real
+from symfric.foundation import checks
+from symfric.foundation.files import write_text
+from symfric.foundation.parameters import check_names
+from symfric.laws import AnyLaw, Population
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Generated:
+    """What `generate` wrote.
+
+    Attributes:
+        block: what the C computes.
+        folder: where the files are.
+        reals: floating point types, by name.
+        files: all files, the manifest last.
+        manifest: content of manifest.json.
+    """
+
+    block: Block
+    folder: Path
+    reals: tuple[str, ...]
+    files: tuple[Path, ...]
+    manifest: Mapping[str, Any]
+
+    def header(self, real: str) -> Path:
+        """The header file of the type `real`."""
+        return self.folder / f"{prefix(self.block, REALS[real])}.h"
+
+    def source(self, real: str) -> Path:
+        """The source file of the type `real`."""
+        return self.folder / f"{prefix(self.block, REALS[real])}.c"
+
+
+def generate(
+    law: AnyLaw | Block,
+    out: str | Path,
+    *,
+    name: str | None = None,
+    real: str | Sequence[str] = ("double", "float"),
+    h: float | None = None,
+    free: Sequence[str] | None = None,
+    turning: bool = False,
+) -> Generated:
+    """Write a friction law, or any block, as C99.
+
+    For each type `NAME_f64.h`, `NAME_f64.c` (float: `f32`), and `manifest.json` with names, units,
+    sizes and operation counts. The C allocates nothing, includes only math.h and stdbool.h, has no
+    data but the constant defaults, and compiles without warnings under -Wall -Wextra -Wpedantic
+    -Wconversion -Wdouble-promotion, also as C++. The C of several blocks may share a folder and
+    a program; the manifest is then that of the last one.
+
+    Args:
+        law: a friction law, see `law_block`; a population, see `contact_block`; or a block.
+        out: folder, made where it is missing; files of the same names are replaced.
+        name: C identifier; default the name of the law.
+        real: "double", "float" or both.
+        h: step size [s] as a constant instead of a parameter (laws with states).
+        free: parameters that stay variable at run time; default see `runtime_parameters`. Those of
+            a population are constants.
+        turning: the law is that of a contact that turns: rad/s and N m in its texts.
+
+    Raises:
+        ValueError: bad input, a law that has no step, an operation that C99 lacks, a
+            constant outside the range of float.
+    """
+    several = (real,) if isinstance(real, str) else checks.many("codegen: real", real, "types")
+    check_names("codegen: real", several, REALS)
+    names = tuple(dict.fromkeys(several))
+    folder = checks.path("codegen: out", out)
+    if not names:
+        raise ValueError("codegen: real: expected double, float or both, got none")
+    if isinstance(law, Block):
+        if name is not None or h is not None or free is not None or turning:
+            raise ValueError(
+                "codegen: expected name, h, free and turning with a law only, got a block"
+            )
+        block = law
+    elif isinstance(law, Population):
+        if free:
+            raise ValueError(f"codegen: free: expected none with a population, got {free}")
+        if turning:
+            raise ValueError("codegen: turning: expected a law, got a population, which slides")
+        block = contact_block(law, name=name, h=h)
+    else:
+        block = law_block(law, name=name, h=h, free=free, turning=turning)
+    texts: dict[str, str] = {}
+    for kind in (REALS[n] for n in names):
+        texts[f"{prefix(block, kind)}.h"] = header(block, kind)
+        texts[f"{prefix(block, kind)}.c"] = source(block, kind)
+    manifest = _manifest(block, [REALS[n] for n in names])
+    texts["manifest.json"] = json.dumps(manifest, indent=2) + "\n"
+    for file, text in texts.items():
+        write_text(folder / file, text)
+    return Generated(block, folder, names, tuple(folder / file for file in texts), manifest)
+
+
+def _manifest(block: Block, reals: Sequence[Real]) -> dict[str, Any]:
+    return {
+        "name": block.name,
+        "model": block.fingerprint,
+        "symfric": version("symfric"),
+        "casadi": version("casadi"),
+        "states": [{"name": v.name, "unit": v.unit, "start": float(v.start)} for v in block.states],
+        "parameters": [
+            {"name": v.name, "unit": v.unit, "default": float(v.start), "doc": v.doc}
+            for v in block.parameters
+        ],
+        "inputs": [{"name": v.name, "unit": v.unit, "doc": v.doc} for v in block.inputs],
+        "outputs": [
+            {"name": name, "unit": output.unit, "doc": output.doc}
+            for name, output in block.outputs.items()
+        ],
+        "constants": dict(block.constants),
+        "real": {real.name: _described(block, real) for real in reals},
+    }
+
+
+def _described(block: Block, real: Real) -> dict[str, Any]:
+    name = prefix(block, real)
+    return {
+        "header": f"{name}.h",
+        "source": f"{name}.c",
+        "bytes": {group: real.size * len(rows) for group, rows in members(block).items()},
+        "functions": {
+            routine.name: {
+                "prototype": f"{' '.join(routine.head.split())};",
+                "operations": routine.operations,
+                "calls": dict(sorted(routine.calls.items())),
+            }
+            for routine in routines(block, real)
+        },
+    }

@@ -1,0 +1,1 @@
+"""Proof that generated C computes what CasADi computes."""

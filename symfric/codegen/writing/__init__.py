@@ -1,0 +1,1 @@
+"""Header and source file of a block."""

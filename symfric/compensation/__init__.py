@@ -1,0 +1,1 @@
+"""Friction compensators and observers as blocks, and their proof in closed loop."""

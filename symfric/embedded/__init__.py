@@ -1,0 +1,1 @@
+"""Generated C on Cortex-M cores: cross-compiled, run under QEMU, measured."""

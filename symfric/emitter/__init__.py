@@ -1,0 +1,1 @@
+"""CasADi graphs as statements of C: for controllers, FMUs and graphics processors."""

@@ -1,0 +1,1 @@
+"""Functional Mock-up Units of models: the adaptive step in C, without CasADi at run time."""

@@ -1,0 +1,1 @@
+"""The adaptive attempt on a graphics processor, one member a thread."""
