@@ -138,7 +138,10 @@ def _described(block: Block, real: Real) -> dict[str, Any]:
     return {
         "header": f"{name}.h",
         "source": f"{name}.c",
-        "bytes": {group: real.size * len(rows) for group, rows in members(block).items()},
+        "bytes": {
+            group: real.size * sum(row.count for row in rows)
+            for group, rows in members(block).items()
+        },
         "functions": {
             routine.name: {
                 "prototype": f"{' '.join(routine.head.split())};",

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from textwrap import wrap
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.writing.layout import members, prefix
+from symfric.codegen.writing.layout import Member, members, prefix
 from symfric.codegen.writing.routines import routines
 from symfric.codegen.writing.text import WIDTH, banner, block_comment, comment
 from symfric.emitter.c99 import Real
@@ -36,11 +36,12 @@ extern "C" {{
 """
 
 
-def _struct(name: str, rows: Sequence[tuple[str, str, str]], real: Real) -> str:
-    width = max(len(member) for member, _, _ in rows) + 1
+def _struct(name: str, rows: Sequence[Member], real: Real) -> str:
+    width = max(len(row.declared) for row in rows) + 1
     lines = "".join(
-        f"    {real.name} {member + ';':<{width}} /* {comment(f'{text} [{unit}]'.strip())} */\n"
-        for member, unit, text in rows
+        f"    {real.name} {row.declared + ';':<{width}} "
+        f"/* {comment(f'{row.doc} [{row.unit}]'.strip())} */\n"
+        for row in rows
     )
     return f"typedef struct {{\n{lines}}} {name};\n\n"
 

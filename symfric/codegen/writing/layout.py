@@ -4,10 +4,53 @@ Names begin with block and type: struct types `NAME_f32_state_t` (likewise param
 parameters `NAME_f32_default`, functions `NAME_f32_init`, `NAME_f32_step`; `f64` for double, so that
 both types live in one program. Nothing is allocated and no data but the constant defaults exist,
 so one block serves any number of joints.
+
+Numbers of alike elements that stand next to each other, such as the states F_1 ... F_10, are one
+array member, `float F[10]`. In memory a struct is the flat column of the block's variables.
 """
+
+from dataclasses import dataclass
+from typing import final
 
 from symfric.codegen.blocks.block import Block
 from symfric.emitter.c99 import Real
+
+
+@final
+@dataclass(frozen=True)
+class Member:
+    """One member of a struct.
+
+    Attributes:
+        name: C identifier.
+        unit: of each number.
+        doc: what it is, "" where nobody has said.
+        first: row of its first number in the flat struct.
+        size: 0 for a single number, else how many an array holds.
+    """
+
+    name: str
+    unit: str
+    doc: str
+    first: int
+    size: int = 0
+
+    @property
+    def declared(self) -> str:
+        """As in a declaration: `F[10]`."""
+        return f"{self.name}[{self.size}]" if self.size else self.name
+
+    @property
+    def count(self) -> int:
+        """How many numbers it holds."""
+        return max(self.size, 1)
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Its numbers as C writes them: `F[0]`, `F[1]`, ..."""
+        if not self.size:
+            return (self.name,)
+        return tuple(f"{self.name}[{i}]" for i in range(self.size))
 
 
 def prefix(block: Block, real: Real) -> str:
@@ -15,11 +58,20 @@ def prefix(block: Block, real: Real) -> str:
     return f"{block.name}_{real.suffix}"
 
 
-def members(block: Block) -> dict[str, list[tuple[str, str, str]]]:
-    """Struct -> (name, unit, text) of its members; empty structs are left out."""
+def members(block: Block) -> dict[str, tuple[Member, ...]]:
+    """Struct -> its members; empty structs are left out."""
     variables = {"state": block.states, "param": block.parameters, "in": block.inputs}
-    found = {group: [(v.name, v.unit, v.doc) for v in of] for group, of in variables.items()}
-    found["out"] = [(name, output.unit, output.doc) for name, output in block.outputs.items()]
+    flat = {group: [(v.name, v.unit, v.doc) for v in of] for group, of in variables.items()}
+    flat["out"] = [(name, output.unit, output.doc) for name, output in block.outputs.items()]
     if block.is_function:
-        del found["in"], found["out"]
-    return {group: rows for group, rows in found.items() if rows}
+        del flat["in"], flat["out"]
+    return {
+        group: tuple(Member(*row, first=i) for i, row in enumerate(rows))
+        for group, rows in flat.items()
+        if rows
+    }
+
+
+def places(block: Block, group: str) -> tuple[str, ...]:
+    """The numbers of a struct in the block's order, as C writes them behind `state->`."""
+    return tuple(place for member in members(block).get(group, ()) for place in member.places)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from symfric.codegen.blocks.block import GROUPS, Block
-from symfric.codegen.writing.layout import members, prefix
+from symfric.codegen.writing.layout import members, places, prefix
 from symfric.codegen.writing.text import WIDTH
 from symfric.emitter.c99 import Real
 from symfric.emitter.emit import emit
@@ -54,8 +54,8 @@ def routines(block: Block, real: Real) -> tuple[Routine, ...]:
         (shown,) = block.outputs
         doc = f"{shown} [{output.unit}]: {output.doc}".rstrip(": ") + "."
         return (_routine(block, real, name, doc, block.step, [[], ["return {};"]]),)
-    store = [f"state->{v.name} = {{}};" for v in block.states]
-    show = [f"out->{output} = {{}};" for output in block.outputs]
+    store = [f"state->{place} = {{}};" for place in places(block, "state")]
+    show = [f"out->{place} = {{}};" for place in places(block, "out")]
     found = [
         _routine(block, real, f"{name}_{reset}", doc, block.reset(reset), [store])
         for reset, (_, doc) in block.resets.items()
@@ -69,7 +69,10 @@ def routines(block: Block, real: Real) -> tuple[Routine, ...]:
 
 def _init(block: Block, real: Real) -> Routine:
     name = prefix(block, real)
-    values = tuple(f"state->{v.name} = {real.literal(float(v.start))};" for v in block.states)
+    values = tuple(
+        f"state->{place} = {real.literal(float(v.start))};"
+        for place, v in zip(places(block, "state"), block.states, strict=True)
+    )
     doc = "Initial state; call it before the first step."
     return Routine(f"{name}_init", "void", (f"{name}_state_t *state",), doc, values, Counter(), 0)
 
@@ -88,7 +91,7 @@ def _routine(
     scalars = block.is_function
     used = sorted(node.entry for node in source.nodes if node.op == ca.OP_INPUT)
     loads = [
-        f"const {real.name} {groups[i][j].name} = {GROUPS[i]}->{groups[i][j].name};"
+        f"const {real.name} {groups[i][j].name} = {GROUPS[i]}->{places(block, GROUPS[i])[j]};"
         for i, j in used
         if not (scalars and GROUPS[i] == "in")
     ]
