@@ -47,6 +47,7 @@ FLOORS: dict[str, set[str]] = {
     "symfric.integrator.step": {
         "symfric.foundation",
         "symfric.model",
+        "symfric.emitter",
         "symfric.integrator.equations",
         "symfric.integrator.methods",
     },
