@@ -1,0 +1,179 @@
+"""What a step of a block costs on a Cortex-M core, and whether it gives what the host gives."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from math import inf, isfinite, nan
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.codegen.blocks.block import Block
+from symfric.codegen.kit.generate import Generated, generate
+from symfric.codegen.running.compiler import link_program
+from symfric.codegen.running.runner import program, run_c, run_vm
+from symfric.embedded.cores import CORES, Core
+from symfric.embedded.inputs import day
+from symfric.embedded.qemu import Said, built, ran
+from symfric.embedded.subjects import BY, by_casadi, own
+from symfric.embedded.tools import Absent, Tools, find_tools
+from symfric.emitter.c99 import REALS
+from symfric.foundation import checks
+from symfric.foundation.compiler import find_compiler
+from symfric.foundation.files import write_text
+
+Array = NDArray[np.float64]
+
+STEPS = 400
+
+MEASURED = "measured"
+
+
+@final
+@dataclass(frozen=True)
+class Measured:
+    """One block on one core.
+
+    Attributes:
+        block, real, core, by: what was measured; see `CORES` and `BY`.
+        status: "measured", or a sentence that says what is absent; the numbers are NaN then.
+        average, maximum: instructions of a step, the call included.
+        text: bytes of code and constants of the block.
+        library: bytes of the functions of libm and libgcc that are linked for it.
+        data: bytes of RAM for an instance: states and, so that they can be changed, parameters.
+        stack: bytes of stack that the call uses at most, library included.
+        error: largest difference from CasADi's double from the same states, relative to the peak
+            of each signal.
+        equal: share of numbers with the bits of the host's C; NaN where it was not compared.
+        finite: whether all numbers are.
+    """
+
+    block: str
+    real: str
+    core: str
+    by: str = BY[0]
+    status: str = MEASURED
+    average: float = nan
+    maximum: float = nan
+    text: float = nan
+    library: float = nan
+    data: float = nan
+    stack: float = nan
+    error: float = nan
+    equal: float = nan
+    finite: bool = False
+
+    @property
+    def ok(self) -> bool:
+        """Whether it was measured and all numbers are finite."""
+        return self.status == MEASURED and self.finite
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything by name; what was not measured is None."""
+        return {
+            name: None if isinstance(value, float) and not isfinite(value) else value
+            for name, value in asdict(self).items()
+        }
+
+
+def measure(
+    block: Block,
+    real: str = "float",
+    core: str = "m4f",
+    *,
+    by: str = "symfric",
+    flags: Sequence[str] = ("-O2",),
+    steps: int = STEPS,
+    options: Mapping[str, Any] | None = None,
+    tools: Tools | Absent | None = None,
+) -> Measured:
+    """Cross-compile a step of `block`, run it under QEMU and compare it with the host.
+
+    QEMU counts instructions exactly; it knows no cycles. The inputs are those of `day`. Nothing
+    fuses multiply and add (-ffp-contract=off).
+
+    Args:
+        real: "float" or "double".
+        core: one of `CORES`: "m0plus", "m3", "m4f", "m7".
+        by: who writes the C, one of `BY`.
+        flags: of the compiler, such as -Os.
+        steps: how many, up to 4000.
+        options: of `generate`, such as {"guards": False}; for our own C.
+        tools: what `find_tools` found.
+
+    Returns:
+        The numbers; where a tool is absent its name and package stand in `status`.
+
+    Raises:
+        ValueError: an unknown name; too many steps.
+        CompileError: the compiler refuses the code, or the program fails under QEMU.
+    """
+    where = "embedded"
+    checks.kind(where, block, Block, "law_block(LuGre())")
+    for what, value, known in (("real", real, REALS), ("core", core, CORES), ("by", by, BY)):
+        checks.choice(f"{where}: {what}", value, known)
+    checks.count(f"{where}: steps", steps, least=1, most=4000)
+    if options and by != "symfric":
+        raise ValueError(f"{where}: options: expected none with the C of CasADi, got {options}")
+    found = find_tools() if tools is None else tools
+    if isinstance(found, Absent):
+        return Measured(block.name, real, core, by, f"skipped: {found.advice}")
+    inputs = day(block, steps)
+    with TemporaryDirectory(prefix="symfric-") as name:
+        folder = Path(name)
+        made = generate(block, folder, real=real, **(options or {}))
+        if by == "symfric":
+            subject = own(made, real)
+        else:
+            subject = by_casadi(block, real, folder, functions_of_float=by != "casadi")
+        image = built(subject, (real, inputs, _columns(block)), CORES[core], found, flags)
+        said = ran(image, CORES[core], found)
+        equal = _equal(made, real, inputs, said.rows) if by == "symfric" else nan
+    return _measured(block, real, CORES[core], by, inputs, said, equal)
+
+
+def _columns(block: Block) -> int:
+    return len(block.states) + len(block.outputs)
+
+
+def _measured(
+    block: Block, real: str, core: Core, by: str, inputs: Array, said: Said, equal: float
+) -> Measured:
+    expected = run_vm(block, REALS[real], inputs, said.rows[:, : len(block.states)])
+    return Measured(
+        block.name,
+        real,
+        core.name,
+        by,
+        average=float(said.instructions.mean()),
+        maximum=float(said.instructions.max()),
+        text=said.text,
+        library=said.library,
+        data=said.data,
+        stack=said.stack,
+        error=_error(said.rows, expected[:, : _columns(block)]),
+        equal=equal,
+        finite=bool(np.isfinite(said.rows).all()),
+    )
+
+
+def _error(a: Array, b: Array) -> float:
+    """Largest difference of a column relative to its peak in `b`."""
+    peak = np.abs(b).max(axis=0, initial=0.0)
+    ratio = np.abs(a - b).max(axis=0, initial=0.0) / np.where(peak > 0.0, peak, 1.0)
+    return float(np.where(np.isnan(ratio), inf, ratio).max(initial=0.0))
+
+
+def _equal(generated: Generated, real: str, inputs: Array, rows: Array) -> float:
+    """Share of numbers with the bits that the host's compiler gives; NaN without one."""
+    compiler = find_compiler()
+    if compiler is None:
+        return nan
+    folder, kind = generated.folder, REALS[real]
+    write_text(folder / "main.c", program(generated.block, kind))
+    parts = [folder / "main.c", generated.source(real)]
+    link_program(compiler, parts, folder, folder / "main")
+    host = run_c(generated.block, kind, folder / "main", inputs)[:, : rows.shape[1]]
+    return float((host == rows).mean())

@@ -1,0 +1,96 @@
+"""Instructions, bytes and results of C on Cortex-M cores under QEMU."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from cortex import on_target
+
+from symfric import Dahl, LuGre, VelocityBased
+from symfric.codegen import Block, law_block
+from symfric.embedded import CORES, measure
+from symfric.embedded.inputs import day
+from symfric.embedded.tools import Absent, find_tools
+from symfric.foundation.parameters import Variable
+from symfric.model import Output
+
+
+def sum_of_squares(count: int) -> Block:
+    """`count` multiplications and count - 1 additions."""
+    inputs = tuple(Variable(f"x_{i}", "1", symbol=ca.SX.sym(f"x_{i}")) for i in range(count))
+    total = ca.sumsqr(ca.vertcat(*(v.symbol for v in inputs)))
+    return Block("squares", inputs=inputs, outputs={"y": Output(total, "1", "sum")})
+
+
+@on_target
+def test_instructions_are_counted_one_by_one():
+    """Ten more terms are ten loads, multiplications and additions, or at most a little more."""
+    ten, twenty = (measure(sum_of_squares(n), steps=10) for n in (10, 20))
+    assert 30.0 <= twenty.average - ten.average <= 60.0
+    assert twenty.maximum - twenty.average < 1.0  # no branches: every step costs the same
+
+
+@on_target
+@pytest.mark.parametrize("core", CORES)
+def test_every_core_gives_what_the_host_gives(core):
+    found = measure(law_block(VelocityBased()), core=core, steps=100)
+    assert found.ok
+    assert found.error < 1e-6
+    assert found.equal > 0.9
+    assert found.text > 0
+    assert found.stack > 0
+
+
+@on_target
+def test_double_has_the_bits_of_the_host():
+    found = measure(law_block(Dahl()), "double", "m7", steps=100)
+    assert (found.error, found.equal) == (0.0, 1.0)
+
+
+@on_target
+@pytest.mark.heavy
+def test_casadi_calls_functions_of_double():
+    block = law_block(LuGre())
+    own, mapped, raw = (
+        measure(block, by=by, steps=100)
+        for by in ("symfric", "casadi, functions of float", "casadi")
+    )
+    assert own.average < mapped.average < raw.average
+    assert own.error < 1e-6
+    assert own.error == pytest.approx(raw.error, rel=2.0)
+    assert np.isnan(raw.equal)  # it has no program for the host here
+
+
+@on_target
+@pytest.mark.heavy
+def test_states_are_carried_and_bytes_counted():
+    found = measure(law_block(LuGre()), steps=100)
+    assert found.data == 4 * (1 + len(law_block(LuGre()).parameters))
+    assert found.error < 1e-6
+
+
+def test_absent_tools_are_named():
+    found = measure(law_block(LuGre()), tools=Absent(("qemu-system-arm",)))
+    assert not found.ok
+    assert found.status.startswith("skipped: qemu-system-arm not found; on Debian")
+    assert found.to_dict()["average"] is None
+
+
+def test_nothing_in_path_is_no_error(monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    found = find_tools()
+    assert isinstance(found, Absent)
+    assert found.names == ("arm-none-eabi-gcc", "newlib for arm-none-eabi", "qemu-system-arm")
+    assert "gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm" in found.advice
+
+
+@pytest.mark.parametrize("wrong", [{"core": "m5"}, {"real": "half"}, {"by": "hand"}, {"steps": 0}])
+def test_unknown_names_are_refused(wrong):
+    with pytest.raises(ValueError, match="embedded: "):
+        measure(law_block(LuGre()), **wrong)
+
+
+def test_a_day_has_steps_of_the_load():
+    v, N = day(law_block(LuGre()), 400).T
+    assert (v == 0).sum() == 80
+    assert N.max() / N.min() > 80
+    assert (np.abs(N[1:] / N[:-1]) > 10).any()
