@@ -1,7 +1,7 @@
 """The operations of a CasADi function as a graph in which equal parts are one node."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 
@@ -128,7 +128,22 @@ def _without_unused(nodes: Sequence[Node], results: Sequence[tuple[int, ...]]) -
     )
 
 
-def rebuild(source: Graph, arguments: Sequence[ca.SX], replace: Mapping[int, ca.SX]) -> list[ca.SX]:
+def merged(source: Graph, instead: Mapping[int, int]) -> Graph:
+    """The graph in which every user of a node takes the earlier node `instead` of it."""
+    builder = _Builder()
+    number: list[int] = []
+    for i, node in enumerate(source.nodes):
+        if i in instead:
+            number.append(number[instead[i]])
+        else:
+            args = tuple(number[j] for j in node.args)
+            number.append(builder.add(replace(node, args=args)))
+    return _without_unused(builder.nodes, [tuple(number[i] for i in r) for r in source.results])
+
+
+def rebuild(
+    source: Graph, arguments: Sequence[ca.SX], replacing: Mapping[int, ca.SX]
+) -> list[ca.SX]:
     """The results as columns of new expressions in `arguments`, with some nodes replaced.
 
     This is how a part of an expression is substituted that is not a symbol.
@@ -136,8 +151,8 @@ def rebuild(source: Graph, arguments: Sequence[ca.SX], replace: Mapping[int, ca.
     found: list[ca.SX] = []
     for i, node in enumerate(source.nodes):
         args = [found[j] for j in node.args]
-        if i in replace:
-            found.append(replace[i])
+        if i in replacing:
+            found.append(replacing[i])
         elif node.op == ca.OP_INPUT:
             found.append(arguments[node.entry[0]][node.entry[1]])
         elif node.op == ca.OP_CONST:
