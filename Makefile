@@ -1,4 +1,4 @@
-# make demo, test, check, stress, mutants: each makes its own virtual environment .venv when there is
+# make demo, test, check, stress, mutants, embedded: each makes its own virtual environment .venv when there is
 # none. PYTHON=... chooses the interpreter (3.11 or newer). make newest: the fast half of the tests on
 # the newest interpreter there is, with the newest NumPy, in .venv-newest.
 
@@ -8,7 +8,7 @@ VENV := .venv
 ONE_THREAD := OPENBLAS_NUM_THREADS=1
 BIN := $(VENV)/bin
 
-.PHONY: demo test newest check stress mutants clean
+.PHONY: demo test newest check stress mutants embedded clean
 
 demo: $(VENV)/.runtime
 	$(BIN)/symfric demo --out out
@@ -34,6 +34,10 @@ stress: $(VENV)/.test
 
 mutants: $(VENV)/.test
 	$(BIN)/python tests/mutants/run.py
+
+# Needs arm-none-eabi-gcc, its newlib and qemu-system-arm; says which of them are absent, and ends well.
+embedded: $(VENV)/.runtime
+	$(BIN)/symfric bench embedded
 
 check: $(VENV)/.dev
 	$(BIN)/ruff check .

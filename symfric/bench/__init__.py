@@ -2,6 +2,10 @@
 
 from symfric.bench.calls import CallBenchmark as CallBenchmark
 from symfric.bench.calls import bench_calls as bench_calls
+from symfric.bench.codegen import CodegenBenchmark as CodegenBenchmark
+from symfric.bench.codegen import bench_codegen as bench_codegen
+from symfric.bench.embedded import EmbeddedBenchmark as EmbeddedBenchmark
+from symfric.bench.embedded import bench_embedded as bench_embedded
 from symfric.bench.ensemble import EnsembleRow as EnsembleRow
 from symfric.bench.identification import IdentificationBenchmark as IdentificationBenchmark
 from symfric.bench.identification import bench_identification as bench_identification

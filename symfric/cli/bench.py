@@ -19,8 +19,10 @@ SUBJECTS = (
     "regularisation",
     "ocp",
     "identification",
+    "codegen",
+    "embedded",
 )
-TABLES = ("calls", "ensemble")
+TABLES = ("calls", "ensemble", "embedded")
 """Subjects without a picture."""
 
 
@@ -50,7 +52,9 @@ def bench(
     accelerations against law, step and transition velocity. regularisation: error of smooth laws
     against dry friction, over their width or stiffness. ocp: optimal control from many starts,
     whether it lands, large programs, controllers; beside CasADi's Opti and rockit. identification:
-    fits from many starts and noises, their intervals, measured machines, damaged files.
+    fits from many starts and noises, their intervals, measured machines, damaged files. codegen:
+    generated C beside its goals and CasADi's own. embedded: its instructions and bytes on Cortex-M
+    cores, under QEMU.
 
     Example: symfric bench multibody --plot bench.png --csv runs.csv
     """

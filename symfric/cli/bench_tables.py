@@ -9,6 +9,8 @@ if TYPE_CHECKING:
     from symfric.bench import (
         Benchmark,
         CallBenchmark,
+        CodegenBenchmark,
+        EmbeddedBenchmark,
         IdentificationBenchmark,
         IvpBenchmark,
         LaneBenchmark,
@@ -276,6 +278,33 @@ def identification(result: "IdentificationBenchmark") -> None:
             for r in result.rows
         ],
         "Identification beside its goals",
+    )  # fmt: skip
+
+
+def codegen(result: "CodegenBenchmark") -> None:
+    """A table a section, and its notes."""
+    for name, section in result.sections.items():
+        if section.rows:
+            rows = [[c if isinstance(c, str) else _known(c, 4) for c in r] for r in section.rows]
+            output.show_table(section.head, rows, section.title)
+        for note in section.notes:
+            output.show(f"{name}: {note}")
+
+
+def embedded(result: "EmbeddedBenchmark") -> None:
+    """Instructions and bytes, block by block and core by core."""
+    if result.advice:
+        output.show(f"embedded: skipped, {result.advice}")
+    output.show_table(
+        ["block", "core", "average", "max", "text", "data", "stack", "error", "bits"],
+        [
+            [r.block, r.core if r.real == "float" else f"{r.core} {r.real}", round(r.average),
+             round(r.maximum), round(r.text), round(r.data), round(r.stack), _known(r.error, 2),
+             f"{r.equal:.0%}" if r.equal == r.equal else ""]
+            for r in result.rows
+        ],
+        "gcc -O2 under QEMU, float: instructions of a step (average, maximum), bytes, largest "
+        "difference from CasADi over the peak, share of numbers with the bits of the host's C",
     )  # fmt: skip
 
 

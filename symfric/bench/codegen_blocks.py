@@ -1,0 +1,53 @@
+"""The blocks that generated code is measured on."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import final
+
+from symfric.codegen import Block, law_block, plant_block
+from symfric.laws import GMS, BrownMcPhee, LuGre, MaxwellSlip, VelocityBased
+from symfric.laws.dynamic.gms import Element
+from symfric.scenes import rabinowicz
+
+TEN = tuple(Element(5e4 * 2.0**-i, 0.1) for i in range(10))
+"""Elements of a tenth of the friction each, of stiffnesses over three decades."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A block with its goals on a Cortex-M4F in float.
+
+    Attributes:
+        make: makes the block.
+        options: of `generate`.
+        goals: field of `Measured` -> at most.
+    """
+
+    name: str
+    make: Callable[[], Block]
+    goals: Mapping[str, float]
+    options: Mapping[str, object] = field(default_factory=dict[str, object])
+
+
+def _gms() -> Block:
+    return law_block(GMS(elements=TEN, form="event"), name="gms10")
+
+
+def _maxwell() -> Block:
+    return law_block(MaxwellSlip(form="event"), name="maxwell4")
+
+
+def _rabinowicz(method: str, name: str) -> Callable[[], Block]:
+    return lambda: plant_block(rabinowicz(BrownMcPhee()), h=1e-4, method=method, name=name)
+
+
+def cases() -> Iterator[Case]:
+    """Laws, and Rabinowicz's stick-slip test as a plant by backward Euler and by rodas3."""
+    yield Case("Brown-McPhee", lambda: law_block(BrownMcPhee()), {"average": 75})
+    yield Case("LuGre", lambda: law_block(LuGre()), {"average": 165})
+    yield Case("GMS(10)", _gms, {"average": 550, "text": 800, "stack": 100})
+    yield Case("Maxwell(4)", _maxwell, {"average": 180})
+    yield Case("velocity based", lambda: law_block(VelocityBased()), {"average": 50})
+    yield Case("Rabinowicz, Euler", _rabinowicz("backward_euler", "belt_euler"), {"average": 325})
+    yield Case("Rabinowicz, rodas3", _rabinowicz("rodas3", "belt_rodas3"), {})

@@ -1,0 +1,57 @@
+from math import nan
+
+import pytest
+from cortex import on_target
+
+from symfric.bench import codegen, codegen_blocks, codegen_cores, embedded
+from symfric.bench.codegen import CodegenBenchmark, bench_codegen
+from symfric.bench.codegen_section import Goal, Section
+from symfric.bench.embedded import bench_embedded
+from symfric.embedded import Absent
+
+
+def few(monkeypatch, module) -> None:
+    first = next(codegen_blocks.cases())
+    monkeypatch.setattr(module, "cases", lambda: iter([first]))
+
+
+@on_target
+def test_a_row_has_our_c_beside_that_of_casadi(monkeypatch):
+    few(monkeypatch, codegen_cores)
+    (row,) = codegen_cores.measure(quick=False).to_dict()["rows"]
+    assert row["average"] < row["f"] < row["casadi"]
+    assert row["met"] == "yes"
+
+
+@on_target
+def test_every_core_is_measured(monkeypatch):
+    few(monkeypatch, embedded)
+    rows = bench_embedded().rows
+    assert [(r.core, r.real) for r in rows] == list(embedded.TARGETS)
+    assert all(r.ok for r in rows)
+    assert max(r.error for r in rows) < 1e-6
+
+
+@pytest.mark.parametrize("module", [codegen_cores, embedded])
+def test_absent_tools_are_named_and_nothing_fails(module, monkeypatch):
+    monkeypatch.setattr(module, "find_tools", lambda: Absent(("qemu-system-arm",)))
+    if module is embedded:
+        assert "apt-get" in bench_embedded().advice
+    else:
+        assert "apt-get" in module.measure(quick=True).notes[0]
+
+
+def test_goals_are_met_on_their_own_side_and_never_by_a_number_that_is_not_there(tmp_path):
+    goals = [Goal("a", 1.0, 2.0), Goal("b", 1.0, 2.0, ">="), Goal("c", nan, 2.0)]
+    assert [goal.met for goal in goals] == [True, False, False]
+    section = Section("title", ("name", "x"), (("a", 1.0), ("c", nan)), goals)
+    result = CodegenBenchmark({"made up": section})
+    assert result.to_dict()["made up"]["rows"][1] == {"name": "c", "x": None}
+    bars = result.plot(tmp_path / "goals.png").axes[0].patches
+    assert [bar.get_width() < 0 for bar in bars] == [True, False]
+
+
+def test_unknown_sections_are_refused():
+    assert "cores" in codegen.SECTIONS
+    with pytest.raises(ValueError, match="sections"):
+        bench_codegen(sections=("nonsense",))
