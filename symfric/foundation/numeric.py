@@ -80,6 +80,8 @@ asin = _dispatch("asin", "arcsin")
 tanh = _dispatch("tanh")
 asinh = _dispatch("asinh", "arcsinh")
 expm1 = _dispatch("expm1")
+both = _dispatch("logic_and", "logical_and")
+either = _dispatch("logic_or", "logical_or")
 
 _erf_of_numbers = np.vectorize(erf_of_float, otypes=[float])
 

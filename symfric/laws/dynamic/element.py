@@ -1,6 +1,8 @@
 """The elastoplastic element that hysteresis laws are built of."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import final
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, sqrt
@@ -64,16 +66,59 @@ def spent(f: Callable[[Scalar], Scalar], v: Vectors, t: Vectors, r: Vectors) -> 
     return (v * t) * (back + (f(x) - back) * along(t, e)) * e
 
 
-def stretched(F: Scalar, dF: Scalar, limit: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """An element with the load F, to which dF is added evenly over a step, up to +-limit.
+@final
+@dataclass(frozen=True, eq=False)
+class Held:
+    """What a step h [s] with held velocity and load does to every element of a law.
 
-    Its load at the end and in the mean of the step, and whether it slips then.
+        way = v h,   s = sign(v)
+
+    Attributes:
+        still: whether nothing moves.
+        some: `way`, or where nothing moves a number to divide by.
     """
-    ahead = smooth.sign(dF, 0.0)
-    slips = smooth.choose(ahead == 0, 0.0, ahead * (F + dF) >= limit)
-    end = smooth.choose(slips, ahead * limit, F + dF)
-    share = smooth.clip((end - F) / smooth.choose(ahead == 0, 1.0, dF), 0.0, 1.0)
-    return end, end - (end - F) * share / 2, slips
+
+    way: Scalar
+    s: Scalar
+    still: Scalar
+    some: Scalar
+
+    @classmethod
+    def over(cls, v: Scalar, h: Scalar) -> "Held":
+        """A step of `h` [s] at the velocity `v`."""
+        way, still = v * h, v == 0
+        return cls(way, smooth.sign(v, 0.0), still, smooth.choose(still, h, way))
+
+    def stretched(
+        self, F: Scalar, k: Scalar, limit: Scalar, slips: Scalar, slipped: tuple[Scalar, Scalar]
+    ) -> tuple[Scalar, Scalar, Scalar]:
+        """An element with the load F and the stiffness k, that slips at +-limit.
+
+        Its load at the end and in the mean of the step, and whether it slips at its end:
+
+            slips     all along:  F+ and mean as given in `slipped`
+            reaches   the limit:  F+ = s limit,    mean = F+ - (F+ - F)^2 / (2 k way)
+            sticks:               F+ = F + k way,  mean = F + k way / 2
+
+        The load rises evenly, so that what the limit cuts off the mean is a triangle.
+        """
+        goal, tried = self.s * limit, F + k * self.way
+        reaches = self.s * tried >= limit
+        gap = smooth.choose(reaches, goal - F, k * self.some)
+        cut = goal - gap * (gap / (k * self.some)) / 2
+        end = smooth.choose(reaches, goal, tried)
+        mean = smooth.choose(reaches, cut, F + k * self.way / 2)
+        mode = smooth.choose(reaches, 1.0, 0.0)
+        return (
+            smooth.choose(slips, slipped[0], end),
+            smooth.choose(slips, slipped[1], mean),
+            smooth.choose(slips, 1.0, mode),
+        )
+
+    def yielded(self, F: Scalar, k: Scalar, limit: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+        """The same of an element that stays at its limit as long as it slips."""
+        goal = self.s * limit
+        return self.stretched(F, k, limit, self.s * F >= limit, (goal, goal))
 
 
 def yielding(v: Scalar, r: Scalar, n: Scalar, v_eps: Scalar, r_eps: Scalar) -> Scalar:

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from symfric.foundation.numeric import Scalar, column, exp
+from symfric.foundation.numeric import Scalar, both, column, either, expm1
 from symfric.foundation.parameters import Parametric, option, param
 from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, Law, State, Switch
-from symfric.laws.dynamic.element import ahead, check_elements, stretched
+from symfric.laws.dynamic.element import Held, ahead, check_elements
 
 
 @final
@@ -110,8 +110,11 @@ class GMS(Law):
 
     def shares(self) -> list[Scalar]:
         """The alpha_i, divided by their sum."""
-        total = sum((e.alpha for e in self.elements[1:]), start=self.elements[0].alpha)
+        total = self._total()
         return [e.alpha / total for e in self.elements]
+
+    def _total(self) -> Scalar:
+        return sum((e.alpha for e in self.elements[1:]), start=self.elements[0].alpha)
 
     def _direction(self, v: Scalar) -> Scalar:
         return smooth.sign(v, 0.0 if self.form == "event" else self.v_eps)
@@ -157,20 +160,19 @@ class GMS(Law):
         """Exact in the event form: stick up to the limit, or exponential slip towards it."""
         if self.form == "smooth":
             return None
-        count, g, direction = len(self.elements), self.level(v, N), self._direction(v)
+        count, g, held = len(self.elements), self.level(v, N), Held.over(v, h)
         x = -self.C * h / g
-        ends: list[Scalar] = []
-        means: list[Scalar] = []
-        modes: list[Scalar] = []
-        for i, (e, alpha) in enumerate(zip(self.elements, self.shares(), strict=True)):
-            F, p, limit = z[i], z[count + i], alpha * g
-            end, mean, reached = stretched(F, e.k * v * h, limit)
-            load = direction * F
-            slips = smooth.choose(load >= limit, direction * direction, p * (load > 0))
-            goal, beyond = limit * direction, F - limit * direction
-            ends.append(smooth.choose(slips, goal + beyond * exp(x), end))
-            means.append(smooth.choose(slips, goal + beyond * smooth.phi1(x), mean))
-            modes.append(smooth.choose(v == 0, p, smooth.choose(slips, 1.0, reached)))
+        left, left_in_mean = 1 + expm1(x), smooth.phi1(x)
+        share = g / self._total()
+        parts: list[tuple[Scalar, Scalar, Scalar]] = []
+        for i, e in enumerate(self.elements):
+            F, p, limit = z[i], z[count + i], e.alpha * share
+            load, goal = held.s * F, held.s * limit
+            slips = either(load >= limit, both(p > 0.5, load > 0))
+            slipped = goal + (F - goal) * left, goal + (F - goal) * left_in_mean
+            end, mean, mode = held.stretched(F, e.k, limit, slips, slipped)
+            parts.append((end, mean, smooth.choose(held.still, p, mode)))
+        ends, means, modes = zip(*parts, strict=True)
         return column(*ends, *modes), column(*means, *modes)
 
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:

@@ -8,7 +8,7 @@ from symfric.foundation.numeric import Scalar, column
 from symfric.foundation.parameters import option, param
 from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, Law, State, Switch
-from symfric.laws.dynamic.element import stretched, yielding
+from symfric.laws.dynamic.element import Held, yielding
 
 
 @final
@@ -111,8 +111,9 @@ class HaessigFriedland(Law):
         """Exact in the event form; the mode counts as that at the end of the step."""
         if self.form == "smooth":
             return None
-        end, mean, slips = stretched(z[0], v * h, self.mu_d * N / self.sigma_0)
-        slip = smooth.choose(v == 0, z[1], slips)
+        held = Held.over(v, h)
+        end, mean, mode = held.yielded(z[0], 1.0, self.mu_d * N / self.sigma_0)
+        slip = smooth.choose(held.still, z[1], mode)
         return column(end, slip), column(mean, slip)
 
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:

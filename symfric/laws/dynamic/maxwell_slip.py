@@ -7,7 +7,7 @@ from symfric.foundation.numeric import Scalar, column
 from symfric.foundation.parameters import Parametric, option, param
 from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, Law, State, Switch
-from symfric.laws.dynamic.element import check_elements, stretched, yielding
+from symfric.laws.dynamic.element import Held, check_elements, yielding
 
 
 @final
@@ -132,10 +132,13 @@ class MaxwellSlip(Law):
         """Exact in the event form."""
         if self.form == "smooth":
             return None
-        count = len(self.elements)
-        parts = [stretched(z[i], e.k * v * h, e.mu * N) for i, e in enumerate(self.elements)]
-        modes = [smooth.choose(v == 0, z[count + i], part[2]) for i, part in enumerate(parts)]
-        return column(*(p[0] for p in parts), *modes), column(*(p[1] for p in parts), *modes)
+        count, held = len(self.elements), Held.over(v, h)
+        parts: list[tuple[Scalar, Scalar, Scalar]] = []
+        for i, e in enumerate(self.elements):
+            end, mean, mode = held.yielded(z[i], e.k, e.mu * N)
+            parts.append((end, mean, smooth.choose(held.still, z[count + i], mode)))
+        ends, means, modes = zip(*parts, strict=True)
+        return column(*ends, *modes), column(*means, *modes)
 
     def update(self, F: Scalar, dx: Scalar, N: Scalar) -> Scalar:
         """The spring forces after the slip `dx` [m] in one direction, exactly."""
