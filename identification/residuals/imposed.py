@@ -77,7 +77,7 @@ def _held(
     if isinstance(law, GMS) and law.form != "event":
         law = replace(law, form="event")
     try:
-        return advanced(law, v, N, z, rate, given, h, where)[0]
+        return advanced(law, v, N, z, rate, given, h, where).end
     except ValueError:
         raise ValueError(
             f"{where}: expected a law with a step for imposed velocity, got {type(law).__name__}, "

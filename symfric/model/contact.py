@@ -122,7 +122,7 @@ class Contact:
         return tuple(
             Variable(
                 self._called(s.name), self.unit(s.unit), start=start[i], nominal=s.nominal,
-                doc="internal friction state",
+                doc=s.doc or "internal friction state",
             )
             for i, s in enumerate(self.law.states)
         )  # fmt: skip

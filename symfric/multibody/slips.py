@@ -128,6 +128,7 @@ def _states(contact: Contact, begin: ca.SX) -> Variables:
             contact.unit(s.unit),
             start=begin[i],
             nominal=s.nominal,
+            doc=s.doc,
             kind=kinds.FRICTION_STATE,
         )
         for i, s in enumerate(contact.law.states)

@@ -116,7 +116,13 @@ def friction_states(law: Law, v: Scalar, N: Scalar) -> tuple[Variables, ca.SX]:
     """The internal states of `law` as model variables, starting in steady sliding at `v`."""
     start = ca.SX(law.steady_state(ca.SX(v), N))
     variables = tuple(
-        Variable(s.name, s.unit, start=start[i], nominal=s.nominal, doc="internal friction state")
+        Variable(
+            s.name,
+            s.unit,
+            start=start[i],
+            nominal=s.nominal,
+            doc=s.doc or "internal friction state",
+        )
         for i, s in enumerate(law.states)
     )
     return variables, symbols_of(variables)

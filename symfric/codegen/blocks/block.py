@@ -42,7 +42,7 @@ class Block:
 
     Attributes:
         name: C identifier that the names of its types and functions begin with.
-        doc: text for the header.
+        doc: what it is, one line or a few.
         states, inputs, parameters: named variables; `start` is the value after initialisation and
             the default of a parameter.
         next: SX (n, 1), the states after the step.
@@ -50,6 +50,11 @@ class Block:
         resets: further initialisations by name: the states, SX (n, 1), as functions of inputs and
             parameters, and what they are for.
         constants: numbers folded into the expressions, by name, for the header.
+        equations: formulas that the block solves, line by line, as in a paper.
+        discretisation: how a step solves them, in words and formulas, line by line.
+        use: what to feed in and what each result is good for, a sentence each.
+        limits: what is not valid, a sentence each.
+        sources: of the formulas, one each.
 
     Raises:
         ValueError: all problems at once: names that are repeated or no C identifiers, start values
@@ -65,6 +70,11 @@ class Block:
     outputs: Mapping[str, Output] = field(default_factory=dict[str, Output])
     resets: Mapping[str, tuple[ca.SX, str]] = field(default_factory=dict[str, tuple[ca.SX, str]])
     constants: Mapping[str, float] = field(default_factory=dict[str, float])
+    equations: str = ""
+    discretisation: str = ""
+    use: tuple[str, ...] = ()
+    limits: tuple[str, ...] = ()
+    sources: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         problems = [*self._name_problems(), *self._shape_problems()]
@@ -119,6 +129,12 @@ class Block:
         """(state, param, in) -> (state_next, out), all columns."""
         results = ca.SX(0, 1), *(ca.SX(output.expression) for output in self.outputs.values())
         return self._function("step", {"state_next": self.next, "out": ca.vertcat(*results)})
+
+    @property
+    def sample_time(self) -> float | None:
+        """The step size h [s], a constant or the default of a parameter; None if it has none."""
+        starts = {v.name: float(v.start) for v in self.parameters}
+        return starts.get("h", self.constants.get("h"))
 
     @property
     def is_function(self) -> bool:

@@ -1,13 +1,62 @@
-"""Which parameters of a law stay variable at run time, and which become constants of the code."""
+"""Which parameters stay variable at run time, and which become constants of the code."""
 
 from collections.abc import Sequence
 
 import casadi as ca
 
 from symfric.emitter.c99 import TRANSCENDENTAL
+from symfric.foundation import checks
 from symfric.foundation.graph import graph
-from symfric.foundation.parameters import parameters, with_values
+from symfric.foundation.parameters import Parametric, parameters, with_values
 from symfric.laws import Law
+
+Fold = bool | Sequence[str] | None
+"""What becomes a constant: True for all, names, or None for what selects a cheaper form only."""
+
+
+def variable(
+    obj: Parametric, free: Sequence[str] | None, fold: Fold
+) -> tuple[tuple[str, ...], list[str]]:
+    """The parameters of a law or a machine that stay variable at run time, and what is wrong.
+
+    Args:
+        obj: a law, or a machine with one in its field `law`.
+        free: these stay variable and no others; None where `fold` says.
+        fold: True for constants only, names that become constants beside those that select a
+            cheaper form (`runtime_parameters`), None for the latter alone.
+
+    Returns:
+        Names in the order of `parameters`, and a sentence for each problem.
+    """
+    problems: list[str] = []
+    if free is not None and fold is not None:
+        problems.append(f"fold: expected none beside free, which folds all others, got {fold!r}")
+    if fold is False:
+        problems.append("fold: expected True, names, or None for the default, got False")
+    known, given = parameters(obj), {"free": free, "fold": None if fold in (True, False) else fold}
+    chosen: dict[str, tuple[str, ...]] = {}
+    for what, names in given.items():
+        try:
+            chosen[what] = () if names is None else checks.names(what, names, known)
+        except ValueError as error:
+            problems.append(str(error))
+    if problems or free is not None:
+        return chosen.get("free", ()), problems
+    kept = () if fold is True else _worth_it(obj)
+    return tuple(name for name in kept if name not in chosen["fold"]), []
+
+
+def _worth_it(obj: Parametric) -> tuple[str, ...]:
+    """`runtime_parameters` of a law; of a machine its own parameters and those of its law."""
+    if isinstance(obj, Law):
+        return runtime_parameters(obj)
+    names, law = tuple(parameters(obj)), getattr(obj, "law", None)
+    if not isinstance(law, Law):
+        return names
+    kept, inner = runtime_parameters(law), tuple(parameters(law))
+    own = len(names) - len(inner)
+    folded = {name for name, of_law in zip(names[own:], inner, strict=True) if of_law not in kept}
+    return tuple(name for name in names if name not in folded)
 
 
 def runtime_parameters(law: Law) -> tuple[str, ...]:

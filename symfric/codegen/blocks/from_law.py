@@ -1,19 +1,20 @@
 """A friction law as a block: one stateless function, or a step of its states for held inputs."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import fields, replace
-from inspect import getdoc
+from collections.abc import Sequence
+from dataclasses import replace
 from re import sub
 from typing import Any
 
 import casadi as ca
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.blocks.folding import runtime_parameters
+from symfric.codegen.blocks.discretisation import of_law
+from symfric.codegen.blocks.folding import Fold, variable
 from symfric.codegen.blocks.held_step import advanced, force_of_rate
+from symfric.codegen.blocks.law_text import LawText, texts
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_casadi
-from symfric.foundation.parameters import Variable, check_names, parameters, symbolise
+from symfric.foundation.parameters import Variable, parameters, symbolise
 from symfric.foundation.units import turned
 from symfric.laws import Law, law_name
 from symfric.laws.base.law import check_law
@@ -23,6 +24,20 @@ STEP_SIZE = 1e-3
 """Default of the parameter h [s]."""
 
 FORCE = "friction force, opposes the motion"
+SIGN = (
+    "Sign: F has the sign of v in steady sliding and opposes the motion: m dv/dt = F_applied - F. "
+    "v is the velocity of the moving side relative to the base side."
+)
+MEAN_VELOCITY = (
+    "v is the mean velocity over the step: the increment of an encoder over h, or what is planned "
+    "for it. With the velocity at one instant the error is of first order in h."
+)
+WHICH_FORCE = (
+    "F is the mean over the step: F h is its impulse. A force that is held over the step wants it: "
+    "feed-forward from the velocity that is planned for the step to come. F_end is the force at "
+    "the end of the step, to be compared with a measured one, and half a step newer: feed-forward "
+    "from the increment of the step that is over wants it."
+)
 SLIDING = "Initial state of long sliding at the given inputs, to start while the machine moves."
 
 
@@ -32,6 +47,7 @@ def law_block(
     name: str | None = None,
     h: float | None = None,
     free: Sequence[str] | None = None,
+    fold: Fold = None,
     turning: bool = False,
 ) -> Block:
     """The discrete-time block of `law` with inputs v, N, those of the law, and output F.
@@ -65,30 +81,34 @@ def law_block(
         name: C identifier; default the name of the law.
         h: step size [s] as a constant; without it h is a parameter, by default 1 ms. A law without
             states has no step size.
-        free: parameters that stay variable at run time, the others become constants; default see
-            `runtime_parameters`. Parameters without effect never appear.
+        free: parameters that stay variable at run time, all others become constants.
+        fold: True makes all parameters constants (not h), names these. Those whose value selects a
+            cheaper form are constants in any case, see `runtime_parameters`. Parameters without
+            effect never appear.
         turning: the contact turns: the same C, with units rad/s and N m in its texts.
 
     Raises:
-        ValueError: symbols in the law; names in `free` that are unknown, repeated or without
-            effect; states that act on each other in a circle (Leuven, smooth GMS) or
-            are not affine and depend on others (Armstrong); modes that follow zero crossings of v
-            within the step (exact Coulomb, Karnopp and Leine by events); a force that is not finite
-            at rest (a smoothing width of 0 left variable).
+        ValueError: symbols in the law; names in `free` or `fold` that are unknown, repeated or, in
+            `free`, without effect; both of them; a step size of a law without states; states that
+            act on each other in a circle (Leuven, smooth GMS) or are not affine and depend on
+            others (Armstrong); modes that follow zero crossings of v within the step (exact
+            Coulomb, Karnopp and Leine by events); a force that is not finite at rest (a smoothing
+            width of 0 left variable).
     """
     check_law("codegen", law)
     where = f"codegen '{law_name(law)}'"
     checks.flag(f"{where}: turning", turning)
-    free = None if free is None else checks.names(f"{where}: free", free)
     if name is not None:
         checks.text(f"{where}: name", name, "a C identifier")
     known = parameters(law)
     symbols = [p.name for p in known.values() if is_casadi(p.value)]
     if symbols:
         raise ValueError(f"{where}: expected numbers as parameters, got symbols {symbols}")
-    check_names(where, free or (), known)
-    names = runtime_parameters(law) if free is None else free
-    step_variable(where, h)  # asked for in a law without steps, too
+    names, problems = variable(law, free, fold)
+    if h is not None and not law.states:
+        problems.append(f"h: expected none for a law without states, which has no step, got {h!r}")
+    if problems:
+        raise ValueError(f"{where}: {'; '.join(problems)}")
     symbolic, runtime = symbolise(law, *names)
     block = _step(symbolic, runtime, h, where) if law.states else _function(symbolic, runtime)
     idle = [p.name for p in runtime if not ca.depends_on(block.everything, p.symbol)]
@@ -100,7 +120,7 @@ def law_block(
     block = replace(
         block,
         name=name or sub(r"\W+", "_", law_name(law)).strip("_"),
-        doc="\n\n".join(dict.fromkeys(_documents(law))),
+        **_described(law),
         parameters=tuple(p for p in block.parameters if p.name not in idle),
         constants={p.name: float(p.value) for p in known.values() if p.name not in names}
         | dict(block.constants),
@@ -142,30 +162,38 @@ def _given(inputs: Variables) -> dict[str, ca.SX]:
 def _function(law: Law, runtime: Variables) -> Block:
     v, N, *_ = inputs = _inputs(law)
     force = law.force(v.symbol, N.symbol, ca.SX(0, 1), **_given(inputs))
-    return Block("F", inputs=inputs, parameters=runtime, outputs={"F": Output(force, "N", FORCE)})
+    outputs = {"F": Output(force, "N", FORCE)}
+    return Block("F", inputs=inputs, parameters=runtime, outputs=outputs, use=(SIGN,))
 
 
 def _step(law: Law, runtime: Variables, h: float | None, where: str) -> Block:
     v, N, *_ = inputs = _inputs(law)
-    states = tuple(Variable(s.name, s.unit, nominal=s.nominal) for s in law.states)
+    states = tuple(Variable(s.name, s.unit, nominal=s.nominal, doc=s.doc) for s in law.states)
     size = step_variable(where, h)
     duration = size.symbol if h is None else float(size.start)
 
     z = ca.vertcat(*(state.symbol for state in states))
     given = _given(inputs)
     rate = ca.SX(law.rate(v.symbol, N.symbol, z, **given))
-    end, mean, mean_rate = advanced(law, v.symbol, N.symbol, z, rate, given, duration, where)
+    step = advanced(law, v.symbol, N.symbol, z, rate, given, duration, where)
     force, r = force_of_rate(ca.SX(law.force(v.symbol, N.symbol, z, **given)), rate, z)
-    mean_force = ca.substitute(force, ca.vertcat(z, r), ca.vertcat(mean, mean_rate))
+    of_step = ca.vertcat(z, r)
+    mean = ca.substitute(force, of_step, ca.vertcat(step.mean, step.mean_rate))
+    outputs = {"F": Output(mean, "N", f"{FORCE}, mean over the step")}
+    if ca.depends_on(force, of_step):
+        end = ca.substitute(force, of_step, ca.vertcat(step.end, step.end_rate))
+        outputs["F_end"] = Output(end, "N", f"{FORCE}, at the end of the step")
     return Block(
         "F",
         states=states,
         inputs=inputs,
         parameters=runtime + ((size,) if h is None else ()),
-        next=end,
-        outputs={"F": Output(mean_force, "N", FORCE + ", mean over the step")},
+        next=step.end,
+        outputs=outputs,
         resets={"init_sliding": (ca.SX(law.steady_state(v.symbol, N.symbol)), SLIDING)},
         constants={} if h is None else {"h": float(size.start)},
+        discretisation=of_law(step.kinds, "F_end" in outputs),
+        use=(SIGN, MEAN_VELOCITY, *([WHICH_FORCE] if "F_end" in outputs else [])),
     )
 
 
@@ -173,19 +201,25 @@ def _check_at_rest(block: Block, where: str) -> None:
     """A division by zero at rest must show here and not on the machine."""
     values = [[v.start for v in group] for group in (block.states, block.parameters)]
     rest = [0.0 if v.name == "v" else v.nominal for v in block.inputs]
-    _, force = block.step(*values, rest)
-    if not force.is_regular():
+    _, forces = block.step(*values, rest)
+    if not forces.is_regular():
         raise ValueError(
-            f"{where}: expected a finite force at rest, got {float(force)}; "
+            f"{where}: expected a finite force at rest, got {float(forces[0])}; "
             "keep a smoothing width of 0 constant (leave it out of free)"
         )
 
 
-def _documents(law: Law) -> Iterator[str]:
-    """The docstring of the law and of those that it holds."""
-    yield getdoc(type(law)) or type(law).__name__
-    for item in fields(law):
-        value = getattr(law, item.name)
-        for inner in value if isinstance(value, tuple) else (value,):
-            if isinstance(inner, Law):
-                yield from _documents(inner)
+def _described(law: Law) -> dict[str, Any]:
+    """What docstrings say of the law and of those that it holds, for the data sheet."""
+    found = texts(law)
+    several = len(found) > 1
+    return {
+        "doc": "\n".join(text.title for text in found),
+        "equations": "\n\n".join(_titled(text) if several else text.equations for text in found),
+        "limits": tuple(dict.fromkeys(limit for text in found for limit in text.limits)),
+        "sources": tuple(text.source for text in found if text.source),
+    }
+
+
+def _titled(text: LawText) -> str:
+    return f"{text.title}\n{text.equations}".rstrip()

@@ -1,15 +1,19 @@
 """A model as a block: a plant that advances by fixed steps."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Protocol
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
+from symfric.codegen.blocks.discretisation import of_method
+from symfric.codegen.blocks.folding import Fold, variable
 from symfric.codegen.blocks.from_law import step_variable
 from symfric.foundation import checks
-from symfric.foundation.parameters import Variable
+from symfric.foundation.parameters import Parametric, Variable, parameters
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.system import System, system
@@ -19,10 +23,24 @@ from symfric.integrator.step.attempt import build_fixed
 from symfric.model import Model, Output, Variables, check_model
 
 
+class Machine(Protocol):
+    """What writes a model with parameters of its own as symbols: a scene."""
+
+    def model(self, free: Iterable[str] = ()) -> Model:
+        """The model with those in `free` as symbols."""
+        ...
+
+
 def plant_block(
-    model: Model, *, h: float | None = None, method: str = "auto", name: str | None = None
+    model: Model | Machine,
+    *,
+    h: float | None = None,
+    method: str = "auto",
+    name: str | None = None,
+    free: Sequence[str] | None = None,
+    fold: Fold = None,
 ) -> Block:
-    """The discrete-time block of a model: states, inputs and outputs by their names.
+    """The discrete-time block of a model or a scene: states, inputs and outputs by their names.
 
     A step integrates over h with the inputs held; the outputs are those at its end. Algebraic
     variables, and time where the equations depend on it, are states of the block, too. Initial
@@ -50,18 +68,36 @@ def plant_block(
     which is why mechanisms with friction use it unless told otherwise. Compare with `simulate`.
     The exponential method is explicit in what couples the equations, and for ODEs only.
 
+    All parameters of a scene and of its law can be changed at run time, but for those whose value
+    selects a cheaper form of the law (`runtime_parameters`). Operations of a step with all of them
+    constants, by default, and with every one variable:
+
+        drive / rabinowicz / four_mass / arm, BrownMcPhee     0   0   0
+        drive / rabinowicz / four_mass / arm, LuGre           0   0   0
+
     Args:
-        model: without events; the parameters in `model.p` stay variable at run time.
+        model: without events; a model, whose parameters in `model.p` stay variable at run time, or
+            a scene.
         h: step size [s] as a constant; without it h is a parameter, by default 1 ms.
         method: one of `METHODS`, see `simulate` and `flow`; "auto" is backward_euler for mechanisms
             with friction, else rodas3.
         name: C identifier; default the name of the model.
+        free, fold: parameters of a scene that stay variable, and no others, or that become
+            constants, as in `law_block`.
 
     Raises:
         ValueError: unknown method, or one for ODEs only with a DAE; events; a step size <= 0; start
             values without consistent algebraic ones; outputs that depend on time where the
             equations do not.
     """
+    constants: dict[str, float] = {}
+    if not isinstance(model, Model):
+        model, constants = _opened(model, free, fold)
+    elif free is not None or fold is not None:
+        raise ValueError(
+            "codegen: free, fold: expected with a scene only, got a model; "
+            "its parameters are model.p"
+        )
     check_model("codegen", model)
     where = f"codegen '{model.name}'"
     if name is not None:
@@ -80,14 +116,45 @@ def plant_block(
     following = build_fixed(whole, METHODS[method])(whole.y, duration, whole.d)
     return Block(
         name or model.name,
-        doc=_described(model, method),
+        doc=f"Plant '{model.name}': the machine with its friction, to simulate it in real time.",
         states=_states(model, whole, where),
         inputs=model.u,
         parameters=model.p + ((size,) if h is None else ()),
         next=following,
         outputs=_outputs(model, whole, following, where),
-        constants={} if h is None else {"h": float(h)},
+        constants=constants | ({} if h is None else {"h": float(h)}),
+        discretisation=of_method(METHODS[method], whole.n > whole.nx),
+        use=USE,
+        limits=LIMITS,
+        sources=(METHODS[method].source,),
     )
+
+
+USE = (
+    "Inputs are held over the step: they are the mean over it. Outputs and states are those at the "
+    "end of the step.",
+    "Friction forces oppose the motion of the moving side relative to the base side.",
+    "Start values are consistent with the default parameters and inputs: they do not follow what "
+    "is changed at run time. Give others to the initialisation.",
+)
+LIMITS = (
+    "Fixed steps have no error control: where h does not resolve the transition of friction "
+    "between rest and sliding no method is accurate, and explicit ones may grow without bound.",
+    "Friction that jams (self-locking) is not seen.",
+)
+
+
+def _opened(
+    machine: Machine, free: Sequence[str] | None, fold: Fold
+) -> tuple[Model, dict[str, float]]:
+    """The model of a scene with its variable parameters, and those that are constants."""
+    if not (isinstance(machine, Parametric) and hasattr(machine, "model")):
+        raise checks.refused("codegen", "a model, or a scene such as Rabinowicz(LuGre())", machine)
+    names, problems = variable(machine, free, fold)
+    if problems:
+        raise ValueError(f"codegen '{type(machine).__name__}': {'; '.join(problems)}")
+    folded = {n: float(p.value) for n, p in parameters(machine).items() if n not in names}
+    return machine.model(names), folded
 
 
 def _held(model: Model) -> System:
@@ -127,11 +194,3 @@ def _outputs(model: Model, whole: System, following: ca.SX, where: str) -> dict[
         return replace(output, expression=expression)
 
     return {name: at_end(output) for name, output in model.outputs.items()}
-
-
-def _described(model: Model, method: str) -> str:
-    used = METHODS[method]
-    return (
-        f"Plant '{model.name}' in fixed steps of the {used.name} method (order {used.order}), "
-        f"inputs held\nover the step, outputs at its end.\n\nSource of the method: {used.source}."
-    )

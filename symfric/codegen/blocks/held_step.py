@@ -1,6 +1,8 @@
 """The states of a law over a step in which velocity and load are held."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import final
 
 import casadi as ca
 import numpy as np
@@ -8,9 +10,30 @@ from numpy.typing import NDArray
 
 from symfric.foundation.graph import LEAVES, graph, rebuild
 from symfric.foundation.numeric import Scalar
-from symfric.integrator.methods.exponential import phi1_phi2
+from symfric.integrator.methods.exponential import exp_phi1_phi2
 from symfric.laws import Law, Sum
 from symfric.laws.base.law import chosen
+
+EXACT, EVENT, SECOND = "exact", "event", "second order"
+"""How a step is made: the exponential of an affine rate, corners solved for, linearised rates."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What a step of h [s] makes of the states of a law, columns.
+
+    Attributes:
+        end, mean: the states after it, and their mean over it.
+        mean_rate, end_rate: their rates, likewise.
+        kinds: how it is made: EXACT, EVENT, SECOND, each at most once.
+    """
+
+    end: ca.SX
+    mean: ca.SX
+    mean_rate: ca.SX
+    end_rate: ca.SX
+    kinds: tuple[str, ...]
 
 
 def advanced(
@@ -22,8 +45,8 @@ def advanced(
     given: Mapping[str, Scalar],
     h: ca.SX | float,
     where: str,
-) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """States of a law after a step of `h` [s], their means, and their mean rates.
+) -> Step:
+    """States of a law after a step of `h` [s], their means, and their rates.
 
     With v, N and the further inputs `given` held; of a sum term by term, by what the law knows of
     its step, else by `held_step`.
@@ -38,12 +61,11 @@ def advanced(
             for term, (_, own), (_, rates) in terms
             if term.states
         ]
-        end, mean, mean_rate = (ca.vertcat(*column) for column in zip(*parts, strict=True))
-        return end, mean, mean_rate
+        return _stacked(parts)
     known = law.held_step(v, N, z, h)
     if known is not None:
         end, mean = map(ca.SX, known)
-        return end, mean, (end - z) / h
+        return Step(end, mean, (end - z) / h, ca.substitute(rate, z, end), (EVENT,))
     if law.switches(v, N, z, **chosen(law, given)):
         raise ValueError(
             f"{where}: expected a law without modes, or one that knows its step, got one whose "
@@ -51,12 +73,22 @@ def advanced(
             "form = 'original' are functions of v, N and F_e"
         )
     rest = ca.SX(law.steady_state(v, N))
-    end, mean, mean_rate = held_step(rate, z, h, rest, where)
-    return end, mean, mean_rate
+    return held_step(rate, z, h, rest, where)
 
 
-def held_step(rate: ca.SX, z: ca.SX, h: ca.SX | float, rest: ca.SX, where: str) -> list[ca.SX]:
-    """States after a step of h [s], their means and mean rates over it, columns.
+def _stacked(parts: Sequence[Step]) -> Step:
+    """The states of several terms below each other."""
+
+    def column(name: str) -> ca.SX:
+        return ca.vertcat(*(getattr(part, name) for part in parts))
+
+    kinds = tuple(dict.fromkeys(kind for part in parts for kind in part.kinds))
+    columns = (column(name) for name in ("end", "mean", "mean_rate", "end_rate"))
+    return Step(*columns, kinds=kinds)
+
+
+def held_step(rate: ca.SX, z: ca.SX, h: ca.SX | float, rest: ca.SX, where: str) -> Step:
+    """States after a step of h [s], their means over it, and their rates, columns.
 
     Each state by itself, those that others need first, with the means of these: exact where the
     rate is affine in its own state and does not depend on others; otherwise
@@ -65,7 +97,9 @@ def held_step(rate: ca.SX, z: ca.SX, h: ca.SX | float, rest: ca.SX, where: str) 
         z+ = z + s dz,   mean z = z + s [(1 - s) dz + s m]
 
     of second order (Rosenbrock-Euler, exponential). s = min(1, (rest - z)/dz) ends the way where
-    the state comes to rest, which the solution cannot pass and the linearised one may.
+    the state comes to rest, which the solution cannot pass and the linearised one may. The rate at
+    the end is exp(J h) f where it is affine, without the difference of large numbers that it is in
+    fast sliding, else the rate at z+.
 
     Args:
         rate: of the states `z`.
@@ -77,20 +111,26 @@ def held_step(rate: ca.SX, z: ca.SX, h: ca.SX | float, rest: ca.SX, where: str) 
     """
     count = z.numel()
     means, rates = [z[i] for i in range(count)], [z[i] for i in range(count)]
+    last, kinds = [z[i] for i in range(count)], dict[str, None]()
     pattern = ca.DM(ca.jacobian(rate, z).sparsity(), 1).full() != 0
     for i in _order(pattern, where):
+        alone = set(pattern[i].nonzero()[0].tolist()) <= {i}
         others = [means[j] if j != i else z[i] for j in range(count)]
         f = ca.substitute(rate[i], z, ca.vertcat(*others))
         slope = ca.jacobian(f, z[i])
-        phi1, phi2 = phi1_phi2(h * ca.densify(slope))
+        growth, phi1, phi2 = exp_phi1_phi2(h * ca.densify(slope))
         rates[i], bend = phi1 * f, phi2 * f
+        last[i], kind = growth * f, EXACT if alone else SECOND
         if ca.depends_on(slope, z[i]):
-            if pattern[i].sum() > 1:
+            if not alone:
                 raise ValueError(f"{where}: {_expected('depend on others')}")
             s = _share(h * rates[i], rest[i] - z[i])
             rates[i], bend = s * rates[i], s * ((1 - s) * rates[i] + s * bend)
+            last[i], kind = ca.substitute(f, z[i], z[i] + h * rates[i]), SECOND
         means[i] = z[i] + h * bend
-    return [z + h * ca.vertcat(*rates), ca.vertcat(*means), ca.vertcat(*rates)]
+        kinds[kind] = None
+    columns = (ca.vertcat(*rows) for rows in (means, rates, last))
+    return Step(z + h * ca.vertcat(*rates), *columns, kinds=tuple(kinds))
 
 
 def _share(way: ca.SX, gap: ca.SX) -> ca.SX:

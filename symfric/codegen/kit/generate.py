@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, final
 
 from symfric.codegen.blocks.block import Block
+from symfric.codegen.blocks.folding import Fold
 from symfric.codegen.blocks.from_law import law_block
 from symfric.codegen.blocks.from_population import contact_block
 from symfric.codegen.writing.header import header
@@ -57,6 +58,7 @@ def generate(
     real: str | Sequence[str] = ("double", "float"),
     h: float | None = None,
     free: Sequence[str] | None = None,
+    fold: Fold = None,
     turning: bool = False,
 ) -> Generated:
     """Write a friction law, or any block, as C99.
@@ -73,8 +75,9 @@ def generate(
         name: C identifier; default the name of the law.
         real: "double", "float" or both.
         h: step size [s] as a constant instead of a parameter (laws with states).
-        free: parameters that stay variable at run time; default see `runtime_parameters`. Those of
-            a population are constants.
+        free, fold: parameters that stay variable at run time, or become constants, see `law_block`;
+            by default they are fields of a struct with a constant default beside it. Those of a
+            population are constants.
         turning: the law is that of a contact that turns: rad/s and N m in its texts.
 
     Raises:
@@ -87,20 +90,8 @@ def generate(
     folder = checks.path("codegen: out", out)
     if not names:
         raise ValueError("codegen: real: expected double, float or both, got none")
-    if isinstance(law, Block):
-        if name is not None or h is not None or free is not None or turning:
-            raise ValueError(
-                "codegen: expected name, h, free and turning with a law only, got a block"
-            )
-        block = law
-    elif isinstance(law, Population):
-        if free:
-            raise ValueError(f"codegen: free: expected none with a population, got {free}")
-        if turning:
-            raise ValueError("codegen: turning: expected a law, got a population, which slides")
-        block = contact_block(law, name=name, h=h)
-    else:
-        block = law_block(law, name=name, h=h, free=free, turning=turning)
+    given = {"name": name, "h": h, "free": free, "fold": fold, "turning": turning or None}
+    block = _block(law, {option: value for option, value in given.items() if value is not None})
     texts: dict[str, str] = {}
     for kind in (REALS[n] for n in names):
         texts[f"{prefix(block, kind)}.h"] = header(block, kind)
@@ -110,6 +101,22 @@ def generate(
     for file, text in texts.items():
         write_text(folder / file, text)
     return Generated(block, folder, names, tuple(folder / file for file in texts), manifest)
+
+
+def _block(law: AnyLaw | Block, options: dict[str, Any]) -> Block:
+    """The block of a law with the `options` that were given, all of which must apply."""
+    allowed = ("name", "h", "free", "fold", "turning")
+    what = "a law"
+    if isinstance(law, Block):
+        allowed, what = (), "a block, which has its own"
+    elif isinstance(law, Population):
+        allowed, what = ("name", "h"), "a population, whose numbers are constants and which slides"
+    wrong = [option for option in options if option not in allowed]
+    if wrong:
+        raise ValueError(f"codegen: {', '.join(wrong)}: expected with a law only, got {what}")
+    if isinstance(law, Block):
+        return law
+    return (contact_block if isinstance(law, Population) else law_block)(law, **options)  # pyright: ignore[reportArgumentType]
 
 
 def _manifest(block: Block, reals: Sequence[Real]) -> dict[str, Any]:

@@ -1,10 +1,13 @@
 """The source file of a block."""
 
+from collections.abc import Sequence
+
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.writing.layout import prefix
+from symfric.codegen.writing.layout import members, prefix
 from symfric.codegen.writing.routines import routines
-from symfric.codegen.writing.text import banner, block_comment, folded
+from symfric.codegen.writing.text import banner, block_comment, comment, folded
 from symfric.emitter.c99 import TRANSCENDENTAL, Real, macro
+from symfric.foundation.parameters import Variable
 
 
 def source(block: Block, real: Real) -> str:
@@ -32,13 +35,28 @@ def source(block: Block, real: Real) -> str:
 
 
 def _defaults(block: Block, real: Real) -> str:
-    if not block.parameters:
-        return ""
+    """The constants: default parameters and start values."""
     name = prefix(block, real)
-    values = [f"{real.literal(float(p.start))}," for p in block.parameters]
-    width = max(map(len, values))
-    rows = "".join(
-        f"    {value:<{width}} /* {p.name} [{p.unit}] */\n"
-        for value, p in zip(values, block.parameters, strict=True)
+    return _constant(f"{name}_param_t {name}_default", "param", block.parameters, block, real) + (
+        _constant(f"{name}_state_t {name}_start", "state", block.states, block, real)
     )
-    return f"const {name}_param_t {name}_default = {{\n{rows}}};\n\n"
+
+
+def _constant(
+    declared: str, group: str, variables: Sequence[Variable], block: Block, real: Real
+) -> str:
+    """A constant struct with the start value of every variable; arrays in braces of their own."""
+    if not variables:
+        return ""
+    rows: list[tuple[str, str]] = []
+    for member in members(block)[group]:
+        values = [v.start for v in variables[member.first : member.first + member.count]]
+        text = ", ".join(real.literal(float(value)) for value in values)
+        rows.append(
+            (f"{{{text}}}," if member.size else f"{text},", f"{member.name} [{member.unit}]")
+        )
+    width = max(len(text) for text, _ in rows)
+    lines = "".join(
+        folded(f"{text:<{width}} /* {comment(name)} */", "    ") + "\n" for text, name in rows
+    )
+    return f"const {declared} = {{\n{lines}}};\n\n"

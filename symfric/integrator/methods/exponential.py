@@ -21,12 +21,22 @@ def phi1_phi2(x: ca.SX) -> tuple[ca.SX, ca.SX]:
     dz/dt = a + b z over a step: z(h) = z + h phi1(b h) dz/dt, mean z = z + h phi2(b h) dz/dt.
     One series serves both: phi1 = 1 + x phi2.
     """
+    _, phi1, phi2 = exp_phi1_phi2(x)
+    return phi1, phi2
+
+
+def exp_phi1_phi2(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Exp and the functions of `phi1_phi2` with one call for all; exp is 0 far below zero.
+
+    Its error is one unit in the last place of 1, not of itself.
+    """
     near = ca.fabs(x) < SMALL
-    divisor = ca.if_else(near, 1.0, x)
-    quotient = ca.expm1(x) / divisor
+    divisor, beyond = ca.if_else(near, 1.0, x), ca.expm1(x)
+    quotient = beyond / divisor
     series = 1 / 2 + x * (1 / 6 + x * (1 / 24 + x * (1 / 120 + x * (1 / 720))))
     phi2 = ca.if_else(near, series, (quotient - 1) / divisor)
-    return ca.if_else(near, 1 + x * phi2, quotient), phi2
+    phi1 = ca.if_else(near, 1 + x * phi2, quotient)
+    return ca.if_else(near, 1 + x * phi1, 1 + beyond), phi1, phi2
 
 
 @final

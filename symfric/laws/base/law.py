@@ -49,7 +49,7 @@ class Facts:
 
 @dataclass(frozen=True)
 class State:
-    """An internal state of a law: name, unit and typical magnitude.
+    """An internal state of a law: name, unit, typical magnitude and what it is.
 
     `even` states (a mode, an age) keep their value when the motion is mirrored; the others, such
     as deflections and forces, change sign with it.
@@ -59,6 +59,7 @@ class State:
     unit: str
     nominal: float
     even: bool = False
+    doc: str = ""
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,11 @@ class Sticking(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """The mode: direction of sliding, or 0 at rest."""
-        return (State("mode", "1", 1.0),) if self.has_mode else ()
+        return (
+            (State("mode", "1", 1.0, doc="direction of sliding, 0 at rest"),)
+            if self.has_mode
+            else ()
+        )
 
     @property
     def inputs(self) -> tuple[Input, ...]:

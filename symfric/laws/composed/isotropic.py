@@ -1,7 +1,7 @@
 """Any isotropic law for slip in a plane or in space."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from itertools import islice
 from typing import ClassVar, final
 
@@ -63,7 +63,7 @@ class Isotropic(Parametric):
         """The vectors along x, then along y, and so on, then the states that are numbers."""
         vectors = [s for s in self.law.states if not s.even]
         numbers = tuple(s for s in self.law.states if s.even)
-        along = (State(f"{s.name}_{x}", s.unit, s.nominal) for x in self.axes for s in vectors)
+        along = (replace(s, name=f"{s.name}_{x}") for x in self.axes for s in vectors)
         return *along, *numbers
 
     @property

@@ -229,8 +229,9 @@ class GenericAsperity(Population):
     @property
     def states(self) -> tuple[State, ...]:
         """Place in the period, stretch and age of one asperity."""
-        stretch = State("d", "m", 1e-6)
-        return (State("s", "1", 1.0, even=True), stretch, State("t_c", "s", 0.1, even=True))
+        stretch = State("d", "m", 1e-6, doc="stretch of the asperity")
+        place = State("s", "1", 1.0, even=True, doc="place in the period")
+        return (place, stretch, State("t_c", "s", 0.1, even=True, doc="age of the contact"))
 
     @property
     def velocity_scale(self) -> float:
@@ -303,7 +304,7 @@ class RandomBristles(Population):
     @property
     def states(self) -> tuple[State, ...]:
         """The stretch of one bristle."""
-        return (State("d", "m", 1e-6),)
+        return (State("d", "m", 1e-6, doc="stretch of the bristle"),)
 
     @property
     def velocity_scale(self) -> float:

@@ -47,7 +47,7 @@ class Lagged(Wrapper):
     @property
     def states(self) -> tuple[State, ...]:
         """The velocity that the force follows."""
-        return (State("w", "m/s", 0.1),)
+        return (State("w", "m/s", 0.1, doc="velocity that the force follows"),)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Friction force [N]."""

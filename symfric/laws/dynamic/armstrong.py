@@ -78,7 +78,11 @@ class Armstrong(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """Spring, filtered velocity and dwell."""
-        return (State("xi", "m", 1e-5), State("w", "m/s", 1e-2), State("q", "1", 1.0, even=True))
+        return (
+            State("xi", "m", 1e-5, doc="stretch of the stiction spring"),
+            State("w", "m/s", 1e-2, doc="velocity that the level follows"),
+            State("q", "1", 1.0, even=True, doc="share of the rest that is remembered"),
+        )
 
     @property
     def velocity_scale(self) -> Scalar:

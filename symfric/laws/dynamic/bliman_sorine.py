@@ -26,7 +26,7 @@ class BlimanSorine(Law):
     Limits: steady state (mu_1 - mu_2) N sign(v), no Stribeck effect in steady sliding; initial
     stiffness N (mu_1/eta - mu_2)/s_f. Weakly damped at velocity reversals, so that a block on
     a belt rings, and its break-away magnifies errors; dissipative for the
-    default set, not for every one. |v| is smooth over v_eps, as in `LuGre`.
+    default set, not for every one. |v| is smooth over v_eps.
     Source: Bliman and Sorine, Proc. European Control Conf. 1995; Olsson et al., Eur. J. Control 4,
     1998.
     """
@@ -58,7 +58,8 @@ class BlimanSorine(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """The fast and the slow part of the force."""
-        return tuple(State(f"F_{i + 1}", "N", 1.0) for i in range(int(self.order)))
+        count = range(1, int(self.order) + 1)
+        return tuple(State(f"F_{i}", "N", 1.0, doc=f"part {i} of the force") for i in count)
 
     @property
     def velocity_scale(self) -> Scalar:

@@ -69,7 +69,7 @@ class BoucWen(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """z: the share of the limit that the hysteretic part carries, within -1 ... 1."""
-        return (State("z", "1", 1.0),)
+        return (State("z", "1", 1.0, doc="friction force over its limit"),)
 
     @property
     def velocity_scale(self) -> Scalar:

@@ -41,7 +41,7 @@ class Bristle(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """z: mean deflection of the bristles [m], positive with v."""
-        return (State("z", "m", 1e-5),)
+        return (State("z", "m", 1e-5, doc="mean bristle deflection"),)
 
     @property
     def velocity_scale(self) -> Scalar:

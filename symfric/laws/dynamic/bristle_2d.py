@@ -56,7 +56,7 @@ class Bristle2D(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """z: deflection of the bristle [m], a vector in a plane."""
-        return (State("z", "m", 1e-5),)
+        return (State("z", "m", 1e-5, doc="bristle deflection"),)
 
     @property
     def velocity_scale(self) -> Scalar:

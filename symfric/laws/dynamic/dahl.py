@@ -23,7 +23,7 @@ class Dahl(Law):
     `z` is the mean bristle deflection [m].
     Limits: steady state mu_d N sign(v); rate-independent; drifts under vibration; n = 1 has the
     virgin curve F = mu_d N (1 - exp(-sigma_0 x / (mu_d N))). |v| and sign(v) are smooth over
-    v_eps, to be kept ten times below the slowest motion of interest (see `LuGre`); v_eps = 0 is
+    v_eps, to be kept ten times below the slowest motion of interest; v_eps = 0 is
     the original with a kink at v = 0. n < 1 reaches the level within a finite distance, with a
     corner that rho_eps rounds to a layer of z as wide as rho_eps^(1-n) of its level: keep that
     ten times above rtol, or the element is so stiff there that a step leaps over a reversal of
@@ -53,7 +53,7 @@ class Dahl(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """z: deflection of the contact [m], positive with v."""
-        return (State("z", "m", 1e-5),)
+        return (State("z", "m", 1e-5, doc="mean bristle deflection"),)
 
     @property
     def velocity_scale(self) -> Scalar:

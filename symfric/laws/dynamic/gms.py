@@ -95,8 +95,9 @@ class GMS(Law):
     def states(self) -> tuple[State, ...]:
         """The spring forces and the modes."""
         count = range(1, len(self.elements) + 1)
-        forces = tuple(State(f"F_{i}", "N", 0.1) for i in count)
-        return forces + tuple(State(f"p_{i}", "1", 1.0, even=True) for i in count)
+        forces = tuple(State(f"F_{i}", "N", 0.1, doc="spring force") for i in count)
+        mode = "0 in stick, 1 in slip"
+        return forces + tuple(State(f"p_{i}", "1", 1.0, even=True, doc=mode) for i in count)
 
     @property
     def velocity_scale(self) -> Scalar:

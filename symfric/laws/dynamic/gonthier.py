@@ -68,7 +68,8 @@ class Gonthier(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """Bristle deflection and dwell memory."""
-        return (State("z", "m", 1e-5), State("s_dw", "1", 1.0, even=True))
+        dwell = State("s_dw", "1", 1.0, even=True, doc="memory of the dwell, 1 after long rest")
+        return (State("z", "m", 1e-5, doc="bristle deflection"), dwell)
 
     @property
     def velocity_scale(self) -> Scalar:

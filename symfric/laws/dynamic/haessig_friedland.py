@@ -66,8 +66,9 @@ class HaessigFriedland(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """The bristle deflection, and in the event form the mode."""
-        mode = (State("slip", "1", 1.0, even=True),) if self.form == "event" else ()
-        return (State("z", "m", 1e-5), *mode)
+        slip = State("slip", "1", 1.0, even=True, doc="1 in slip")
+        deflection = State("z", "m", 1e-5, doc="bristle deflection")
+        return (deflection, slip) if self.form == "event" else (deflection,)
 
     @property
     def velocity_scale(self) -> Scalar:

@@ -82,7 +82,9 @@ class Leuven(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """The forces of the hysteresis elements."""
-        return tuple(State(f"F_{i}", "N", 0.1) for i in range(1, len(self.elements) + 1))
+        return tuple(
+            State(f"F_{i}", "N", 0.1, doc="spring force") for i in range(1, len(self.elements) + 1)
+        )
 
     @property
     def velocity_scale(self) -> Scalar:

@@ -73,7 +73,7 @@ class RateAndState(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """Logarithm of the age."""
-        return (State("psi", "1", 1.0, even=True),)
+        return (State("psi", "1", 1.0, even=True, doc="logarithm of the contacts' age"),)
 
     @property
     def velocity_scale(self) -> Scalar:

@@ -68,7 +68,7 @@ class StickSlip(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """D: deformation of the contact while it sticks [m]."""
-        return (State("D", "m", 1e-6),)
+        return (State("D", "m", 1e-6, doc="stiction deformation"),)
 
     @property
     def velocity_scale(self) -> Scalar:

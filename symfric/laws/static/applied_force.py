@@ -77,7 +77,14 @@ class Karnopp(Sticking):
     @property
     def states(self) -> tuple[State, ...]:
         """The mode, and 1 on the way out of the band."""
-        return (*super().states, State("leaving", "1", 1.0, even=True)) if self.has_mode else ()
+        return (
+            (
+                *super().states,
+                State("leaving", "1", 1.0, even=True, doc="1 while it leaves the band"),
+            )
+            if self.has_mode
+            else ()
+        )
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
         """That of the mode [1/s], and zero."""

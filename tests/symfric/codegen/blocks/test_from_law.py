@@ -50,9 +50,9 @@ def rolled(block, velocities, h, load=LOAD, state=None):
     z = ca.DM.zeros(len(block.states)) if state is None else ca.DM(state)
     states, forces = [], []
     for v in velocities:
-        z, F = block.step(z, p, [v, load])
+        z, y = block.step(z, p, [v, load])
         states.append(z.full().ravel())
-        forces.append(float(F))
+        forces.append(float(y[0]))
     return np.array(states), np.array(forces)
 
 
@@ -122,9 +122,9 @@ def test_long_sliding_is_where_the_reset_starts(name, v):
     block = law_block(law)
     p = [float(q.start) for q in block.parameters]
     start = block.reset("init_sliding")(0.0, p, [v, LOAD])
-    after, F = block.step(start, p, [v, LOAD])
+    after, y = block.step(start, p, [v, LOAD])
     assert (after / start).full() == pytest.approx(1.0, rel=1e-12)
-    assert float(F) == pytest.approx(float(law.force(v, LOAD, start)), rel=1e-9)
+    assert y.full() == pytest.approx(float(law.force(v, LOAD, start)), rel=1e-9)
 
 
 def test_at_rest_nothing_moves():
@@ -266,10 +266,10 @@ def test_the_name_is_that_of_the_law_as_an_identifier(text, name):
 
 
 def test_the_text_holds_the_equations_of_all_parts_once():
-    doc = law_block(law_from_text("asymmetric(coulomb+viscous)")).doc
-    assert doc.count("F = mu_d N s(v / v_eps)") == 1
-    assert doc.count("F = sigma_2 v") == 1
-    assert doc.startswith("One law with different parameters")
+    block = law_block(law_from_text("asymmetric(coulomb+viscous)"))
+    assert block.equations.count("F = mu_d N s(v / v_eps)") == 1
+    assert block.equations.count("F = sigma_2 v") == 1
+    assert block.doc.startswith("One law with different parameters")
 
 
 def operations(**options) -> int:
@@ -281,6 +281,22 @@ def test_folded_parameters_save_operations():
     default, few, none = operations(), operations(free=("mu_s",)), operations(free=(), h=1e-3)
     assert everything > default > few > none
     assert everything - none >= 8
+    assert operations(fold=True, h=1e-3) == none
+
+
+def test_fold_bakes_in_what_it_names_and_all_if_true():
+    block = law_block(LuGre(), fold=("mu_s", "v_eps"))
+    assert [p.name for p in block.parameters] == [
+        "mu_d",
+        "v_s",
+        "sigma_0",
+        "sigma_1",
+        "sigma_2",
+        "h",
+    ]
+    assert block.constants == {"mu_s": 0.15, "v_eps": 1e-15, "delta": 2.0}
+    assert [p.name for p in law_block(LuGre(), fold=True).parameters] == ["h"]
+    assert law_block(LuGre(), fold=True, h=1e-3).parameters == ()
 
 
 def test_a_constant_exponent_spares_the_power():
@@ -319,6 +335,11 @@ def test_parameters_without_effect_do_not_appear():
         (LuGre(), {"h": 0.0}, r"h: expected a number > 0 \[s\]"),
         (LuGre(), {"h": float("nan")}, r"h: expected a number > 0 \[s\]"),
         (LuGre(), {"name": "my law"}, "C identifier, got 'my law'"),
+        (LuGre(), {"free": ("mu_s",), "fold": True}, "fold: expected none beside free"),
+        (LuGre(), {"fold": ("mu_z",)}, "fold: expected one of"),
+        (LuGre(), {"fold": False}, "expected True, names, or None for the default, got False"),
+        (Stribeck(), {"h": 1e-3}, "h: expected none for a law without states, which has no step"),
+        (Stribeck(), {"h": 1e-3, "fold": ("a",)}, "fold: expected.*; h: expected none"),
     ],
 )
 def test_what_has_no_step_or_makes_no_sense_is_refused(law, options, message):

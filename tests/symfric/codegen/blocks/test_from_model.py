@@ -23,7 +23,7 @@ from symfric.codegen.blocks.block import Block
 from symfric.foundation.compiler import Compiler
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.model import Event
-from symfric.scenes import Arm, DoublePendulum
+from symfric.scenes import Arm, DoublePendulum, Drive, Rabinowicz
 
 pytestmark = pytest.mark.heavy
 
@@ -159,8 +159,23 @@ def test_free_parameters_and_the_step_size_stay_variable() -> None:
 def test_description_names_method_and_source() -> None:
     block = plant_block(rabinowicz(LuGre()), method="backward_euler", name="belt")
     assert block.name == "belt"
-    assert "backward Euler" in block.doc
-    assert METHODS["backward_euler"].source in block.doc
+    assert "backward Euler, order 1" in block.discretisation
+    assert METHODS["backward_euler"].source in block.sources
+
+
+def test_all_parameters_of_a_scene_are_variable_but_those_that_choose_a_form() -> None:
+    block = plant_block(Rabinowicz(LuGre()))
+    own = ["m", "k", "v_belt", "g"]
+    law = ["mu_s", "mu_d", "v_s", "sigma_0", "sigma_1", "sigma_2", "v_eps"]
+    assert [p.name for p in block.parameters] == [*own, *law, "h"]
+    assert block.constants == {"delta": 2.0}
+    fixed = plant_block(Rabinowicz(LuGre()), fold=True, h=1e-3)
+    assert fixed.parameters == ()
+    assert fixed.constants["k"] == 2.1
+    assert advanced(block, 50) == pytest.approx(advanced(fixed, 50), rel=1e-9, abs=1e-15)
+    assert [p.name for p in plant_block(Rabinowicz(LuGre()), free=["k"], h=1e-3).parameters] == [
+        "k"
+    ]
 
 
 BOUNCE = Model("ball", x=(x,), ode=-x.symbol, events=(Event("hit", x.symbol - 0.5),))
@@ -176,6 +191,8 @@ LATE = Model("clock", x=(x,), ode=-x.symbol, outputs={"now": Output(BOUNCE.t, "s
         (PENDULUM, {"method": "rodas5"}, "did you mean rodas5p"),
         (PENDULUM, {"method": "exponential"}, "got the algebraic unknowns z"),
         (PENDULUM, {"name": "int"}, "free C identifier"),
+        (PENDULUM, {"fold": True}, "fold: expected with a scene only, got a model"),
+        (Drive(LuGre()), {"free": ["mass"]}, "free: expected one of .* got mass"),
     ],
 )
 def test_what_cannot_be_a_plant_is_refused(

@@ -65,7 +65,10 @@ def test_the_text_says_how_a_population_is_made():
 
 @pytest.mark.parametrize(
     ("options", "message"),
-    [({"h": 0.0}, "h: expected a number > 0"), ({"free": ("k",)}, "expected none with a popul")],
+    [
+        ({"h": 0.0}, "h: expected a number > 0"),
+        ({"free": ("k",)}, "expected with a law only, got a popul"),
+    ],
 )
 def test_what_makes_no_sense_is_refused(options, message, tmp_path):
     with pytest.raises(ValueError, match=message):

@@ -12,36 +12,49 @@ z = ca.SX.sym("z", 2)
 
 
 def stepped(rate: ca.SX, start: list[float], h: float, rest: list[float]) -> list[np.ndarray]:
-    columns = held_step(rate, z, h, ca.SX(rest), "here")
-    function = ca.Function("step", [z], columns)
+    step = held_step(rate, z, h, ca.SX(rest), "here")
+    function = ca.Function("step", [z], [step.end, step.mean, step.mean_rate, step.end_rate])
     return [column.full().ravel() for column in function(start)]
 
 
 def test_affine_states_are_exact_in_end_mean_and_rate() -> None:
     rate = ca.vertcat(3 - 2 * z[0], -5 * z[1])
-    end, mean, mean_rate = stepped(rate, [0.0, 1.0], 0.7, [1.5, 0.0])
+    end, mean, mean_rate, end_rate = stepped(rate, [0.0, 1.0], 0.7, [1.5, 0.0])
     assert end == pytest.approx([1.5 * (1 - exp(-1.4)), exp(-3.5)], rel=1e-13)
     assert mean == pytest.approx([1.5 - end[0] / 1.4, (1 - end[1]) / 3.5], rel=1e-13)
     assert mean_rate * 0.7 == pytest.approx(end - np.array([0.0, 1.0]), rel=1e-13)
+    assert end_rate == pytest.approx([3 - 2 * end[0], -5 * end[1]], rel=1e-13)
 
 
 def test_the_way_ends_where_the_state_rests() -> None:
     """Even growth up to the limit 1, which the linearised rate does not see."""
     rate = ca.vertcat(4 * (1 - z[0] ** 30), 0 * z[1])
-    end, mean, mean_rate = stepped(rate, [0.0, 0.0], 1.0, [1.0, 0.0])
+    end, mean, mean_rate, end_rate = stepped(rate, [0.0, 0.0], 1.0, [1.0, 0.0])
     assert end[0] == 1.0
     assert mean[0] == pytest.approx(1 - 0.25 / 2)
-    assert mean_rate[0] == 1.0
+    assert (mean_rate[0], end_rate[0]) == (1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("rate", "kinds"),
+    [
+        (ca.vertcat(-z[0], 1 - z[1]), ("exact",)),
+        (ca.vertcat(-(z[0] ** 2), 1 - z[1]), ("second order", "exact")),
+        (ca.vertcat(z[1], -z[1]), ("exact", "second order")),
+    ],
+)
+def test_it_says_how_the_step_is_made(rate: ca.SX, kinds: tuple[str, ...]) -> None:
+    assert set(held_step(rate, z, 0.1, ca.SX([0.0, 0.0]), "here").kinds) == set(kinds)
 
 
 def test_a_state_that_moves_away_from_its_rest_is_not_held() -> None:
-    end, _, _ = stepped(ca.vertcat(-(z[0] ** 2), z[1]), [1.0, 0.0], 0.1, [2.0, 0.0])
+    end, *_ = stepped(ca.vertcat(-(z[0] ** 2), z[1]), [1.0, 0.0], 0.1, [2.0, 0.0])
     assert end[0] < 1.0
 
 
 def test_a_state_follows_the_mean_of_the_one_it_needs() -> None:
     """z_0' = z_1, z_1' = -z_1: first state to the mean of the second, here exactly."""
-    end, _, _ = stepped(ca.vertcat(z[1], -z[1]), [0.0, 1.0], 2.0, [0.0, 0.0])
+    end, *_ = stepped(ca.vertcat(z[1], -z[1]), [0.0, 1.0], 2.0, [0.0, 0.0])
     assert end == pytest.approx([1 - exp(-2.0), exp(-2.0)], rel=1e-12)
 
 

@@ -63,11 +63,11 @@ def test_the_status_says_how_long_a_step_may_be(compiler: Compiler, tmp_path: Pa
 def test_a_falling_arm_stays_bounded_by_the_method_of_mechanisms(law: BrownMcPhee | LuGre) -> None:
     """By rodas3 it is lost within 3 s at 1 ms."""
     block = plant_block(Arm(law).model())
-    assert "backward Euler" in block.doc
+    assert "backward Euler" in block.discretisation
     rows = run_vm(block, REALS["double"], np.zeros((4000, 6)))
     assert runs_away(block, rows) is None
     assert np.abs(rows[:, 6:12]).max() < 200.0
 
 
 def test_only_mechanisms_with_friction_are_integrated_that_way() -> None:
-    assert "RODAS3" in plant_block(Model("decay", x=(x,), ode=-x.symbol)).doc
+    assert "RODAS3" in plant_block(Model("decay", x=(x,), ode=-x.symbol)).discretisation
