@@ -1,18 +1,10 @@
 """Many runs of one model: over arrays of parameters and start values, on one machine or many."""
 
-from collections.abc import Callable, Generator, Mapping
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
+from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from os import cpu_count
 from pathlib import Path
 from typing import Any, final
 
@@ -32,11 +24,13 @@ from symfric.integrator.arguments import (
     stopping,
     tolerances,
 )
+from symfric.integrator.cuda import on_device
 from symfric.integrator.equations.initial import first_step
 from symfric.integrator.many.chunk import Chunk, Job, Solved, digest, solve_chunk
 from symfric.integrator.many.given import MemberInput, Members, members_of
 from symfric.integrator.many.one_by_one import solve_one_by_one
 from symfric.integrator.many.store import Store
+from symfric.integrator.many.workers import EXECUTORS, pool_of, solved
 from symfric.integrator.running.built import built
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import Tolerances
@@ -44,7 +38,9 @@ from symfric.integrator.step.layout import State
 from symfric.model import Model
 
 Array = NDArray[np.float64]
-EXECUTORS = ("serial", "threads", "processes")
+CUDA = "cuda"
+CHUNK = 500
+"""Members of a task for processors."""
 
 
 @final
@@ -99,7 +95,8 @@ def simulate_many(
     times: ArrayLike = (),
     executor: str | Executor = "threads",
     workers: int | None = None,
-    chunk: int = 500,
+    chunk: int | None = None,
+    real: str = "double",
     out: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Ensemble:
@@ -120,14 +117,19 @@ def simulate_many(
         backend: "compiled", "vm", or "auto": compiled where there is a compiler. Compiled members
             run side by side in the lanes of vector instructions; exp, sin, pow, ... of vectors may
             have another last digit than those of "vm" and `simulate`, and steps that stick and slip
-            then be a few more or less, within the tolerance.
+            then be a few more or less, within the tolerance. "cuda": on a graphics processor
+            through CuPy (extra 'cuda'), one member a thread, for ensembles of a hundred thousand
+            members and more; models without events, with the equations, steps, failures and counts
+            of the others, but for last digits. "auto" never chooses it, nothing replaces it.
         executor: "serial", "threads" (the compiled loop holds no lock), "processes", or any
             `concurrent.futures.Executor`, such as a dask client's or mpi4py's: a task is plain
             data and the C source, so a worker needs nothing but this package and, for compiled
             code, a compiler. Models with events are no plain data: "serial" or "threads" only.
         workers: number of threads or processes, or of the executor's workers; default all cores
             of this machine. Twice as many chunks are under way at once.
-        chunk: members per task.
+        chunk: members per task; default 500, on a graphics processor what a gigabyte holds.
+        real: "double", or with backend="cuda" "float", single precision: for rtol of 1e-5 and more
+            (`symfric.integrator.cuda`).
         out: folder that takes the results chunk by chunk, so that memory stays bounded; a call
             with the same arguments resumes where an interrupted one stopped, once the checksums
             of what is there are right.
@@ -139,7 +141,8 @@ def simulate_many(
 
     Raises:
         ValueError: bad input; arrays of different lengths.
-        RuntimeError: compiled code was asked for, and there is no compiler or it failed.
+        RuntimeError: compiled code was asked for, and there is no compiler or it failed; or a
+            graphics processor, and there is none, or no CuPy.
 
     Warns:
         UserWarning: rtol above 1e-5, where stick phases may get lost; results in `out` that are
@@ -151,9 +154,11 @@ def simulate_many(
     t_start, last, rtol = check_span("simulate_many", model, t_start, float(np.max(ends)), rtol)
     _all_later(ends, t_start)
     formula = chosen("simulate_many", method, rtol)
-    _check(model, backend, executor)
+    _check(model, backend, executor, real)
     workers = None if workers is None else checks.count("simulate_many: workers", workers)
-    chunk = checks.count("simulate_many: chunk", chunk)
+    chunk = None if chunk is None else checks.count("simulate_many: chunk", chunk)
+    if backend == CUDA:
+        on_device.check(model, executor, workers, rtol, real)
     given = members_of(model, (t_start, ends), x0, u, p)
     inputs = stopping("simulate_many", given.inputs, times, t_start, last)
     given, members = replace(given, inputs=inputs), given.count
@@ -164,27 +169,22 @@ def simulate_many(
     nominal = integrator.system.nominal
     allowed = tolerances("simulate_many", rtol, None, nominal, event_tolerance, max_steps, max_step)
     integrator = _suited(integrator, given)
-    here = isinstance(executor, str) and not model.events
-    job = _job(partial(Job.of, integrator, inputs.breaks, looks), backend, max_steps, here)
-    if model.events:
-        solve = partial(solve_one_by_one, integrator, inputs, allowed, backend, looks)
-        prepare = partial(_alone, integrator, given)
-    else:
-        solve = partial(solve_chunk, job)
-        prepare = partial(_chunk, integrator, given, allowed)
-    firsts = range(0, members, chunk)
-    picks = {first: slice(first, min(first + chunk, members)) for first in firsts}
+    way = _way(integrator, given, allowed, looks, (backend, real, executor))
+    size = chunk or way.chunk
+    picks = {first: slice(first, min(first + size, members)) for first in range(0, members, size)}
     folder = None
     if out is not None:
         place = checks.path("simulate_many: out", out)
-        folder = place / _identity(job, integrator, allowed, given, picks)
+        folder = place / _identity(way.job, integrator, allowed, given, picks)
     store = Store(folder, model.signals, members, max(1, looks.size))
     todo = {first: picks[first] for first in store.left(picks)}
     done, status = members - sum(_size(pick) for pick in todo.values()), Status.SUCCESS
+    if way.device is not None and progress is not None:
+        way.device.report(progress, lambda: done, members)
     try:
         with (
-            _pool(executor, workers) as pool,
-            closing(_solved(pool, workers, solve, prepare, todo)) as results,
+            pool_of("serial" if way.device else executor, workers) as pool,
+            closing(solved(pool, workers, way.solve, way.prepare, todo)) as results,
         ):
             for first, result in results:
                 store.put(first, result)
@@ -209,8 +209,9 @@ def _size(pick: slice) -> int:
     return pick.stop - pick.start
 
 
-def _check(model: Model, backend: str, executor: object) -> None:
-    checks.choice("simulate_many: backend", backend, BACKENDS)
+def _check(model: Model, backend: str, executor: object, real: str) -> None:
+    checks.choice("simulate_many: backend", backend, (*BACKENDS, CUDA))
+    on_device.check_real(real, backend == CUDA)
     if not isinstance(executor, str | Executor):
         what = f"one of {', '.join(EXECUTORS)} or a concurrent.futures.Executor"
         raise checks.refused("simulate_many: executor", what, executor)
@@ -256,6 +257,50 @@ def _suited(integrator: Integrator, given: Members) -> Integrator:
             points.append((integrator.start(y, d), d))
             integrator = integrator.suited(points, span)
     return integrator
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """How chunks are solved.
+
+    Attributes:
+        job: what they share.
+        prepare: members -> their chunk.
+        solve: chunk -> its results.
+        chunk: members of a chunk where nobody says.
+        device: the graphics processor that does it; None for processors.
+    """
+
+    job: Job
+    prepare: Callable[[slice], Any]
+    solve: Callable[[Any], Solved]
+    chunk: int = CHUNK
+    device: on_device.OnDevice | None = None
+
+
+def _way(
+    integrator: Integrator,
+    given: Members,
+    allowed: Tolerances,
+    looks: Array,
+    wanted: tuple[str, str, str | Executor],
+) -> _Way:
+    """How the members are solved where `wanted` are a backend, a type and an executor."""
+    (backend, real, executor), most = wanted, allowed.max_steps
+    model, inputs = integrator.model, given.inputs
+    if backend == CUDA:
+        device = on_device.OnDevice.of(integrator, inputs.breaks, looks, most, real)
+        own = inputs.values.size if given.own else 0
+        solve = partial(solve_chunk, device.job, runner=device.members)
+        prepare = partial(_chunk, integrator, given, allowed)
+        return _Way(device.job, prepare, solve, device.chunk(own), device)
+    here = isinstance(executor, str) and not model.events
+    job = _job(partial(Job.of, integrator, inputs.breaks, looks), backend, most, here)
+    if model.events:
+        alone = partial(solve_one_by_one, integrator, inputs, allowed, backend, looks)
+        return _Way(job, partial(_alone, integrator, given), alone)
+    return _Way(job, partial(_chunk, integrator, given, allowed), partial(solve_chunk, job))
 
 
 def _job(make: Callable[[str, int], Job], backend: str, max_steps: int, here: bool) -> Job:
@@ -310,42 +355,3 @@ def _identity(
     for pick in picks.values():
         parts.append(digest(*_alone(integrator, given, pick)))
     return digest(*parts)[:16]
-
-
-def _solved(
-    pool: Executor | None,
-    workers: int | None,
-    solve: Callable[[Any], Solved],
-    prepare: Callable[[slice], Any],
-    todo: dict[int, slice],
-) -> Generator[tuple[int, Solved]]:
-    """Results as they come; never more than a few chunks are under way at once."""
-    if pool is None:
-        for first, pick in todo.items():
-            yield first, solve(prepare(pick))
-        return
-    waiting: dict[Future[Solved], int] = {}
-    left, most = iter(todo.items()), 2 * (workers or cpu_count() or 1)
-    try:
-        while True:
-            while len(waiting) < most and (item := next(left, None)) is not None:
-                waiting[pool.submit(solve, prepare(item[1]))] = item[0]
-            if not waiting:
-                return
-            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-                yield waiting.pop(future), future.result()
-    finally:
-        for future in waiting:
-            future.cancel()
-
-
-@contextmanager
-def _pool(executor: str | Executor, workers: int | None) -> Generator[Executor | None]:
-    if isinstance(executor, Executor):
-        yield executor
-    elif executor == "serial":
-        yield None
-    else:
-        kind = ThreadPoolExecutor if executor == "threads" else ProcessPoolExecutor
-        with kind(workers or cpu_count() or 1) as pool:
-            yield pool

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from symfric.foundation.compiler import find_compiler
 from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import consistent_many, smallest_step
-from symfric.integrator.many.members import Stretch
+from symfric.integrator.many.members import Members, Stretch
 from symfric.integrator.many.program import Program, program
 from symfric.integrator.running.engine import Stop
 from symfric.integrator.running.integrator import Integrator
@@ -118,9 +118,13 @@ def digest(*parts: object) -> str:
     return total.hexdigest()
 
 
-def solve_chunk(job: Job, chunk: Chunk) -> Solved:
-    """Integrate the members of a chunk, those that hardly move again on their own scale."""
-    found, size = _solved(job, chunk)
+def solve_chunk(job: Job, chunk: Chunk, runner: Members | None = None) -> Solved:
+    """Integrate the members of a chunk, those that hardly move again on their own scale.
+
+    What runs them is `runner`, else the program of the job.
+    """
+    runner = runner or job.program.load()
+    found, size = _solved(job, chunk, runner)
     scale, last = np.tile(job.program.nominal, (size.shape[0], 1)), np.arange(size.shape[0])
     for _ in range(ROUNDS):
         own = np.minimum(scale[last], own_scale(size, job.program.nominal))
@@ -132,7 +136,7 @@ def solve_chunk(job: Job, chunk: Chunk) -> Solved:
         scale[last] = own[small]
         those, atol = chunk[last], Given.atol(job.program.nx)
         those.R[:, atol] *= scale[last] / job.program.nominal
-        again, size = _solved(job, those)
+        again, size = _solved(job, those, runner)
         better = np.array([m not in again.failed for m in range(last.size)])
         last, size = last[better], size[better]
         found.signals[last], found.attempts[last] = again.signals[better], again.attempts[better]
@@ -140,14 +144,14 @@ def solve_chunk(job: Job, chunk: Chunk) -> Solved:
     return found
 
 
-def _solved(job: Job, chunk: Chunk) -> tuple[Solved, Array]:
+def _solved(job: Job, chunk: Chunk, runner: Members) -> tuple[Solved, Array]:
     """The members of a chunk, and the largest magnitudes of their states (members, nx).
 
     They run through all their input intervals; where algebraic unknowns have to be searched for at
     the beginning of one, they stop, and go on from there. Those of a mechanism that is put together
     follow the first data as they follow others.
     """
-    runner, S, count = job.program.load(), chunk.S.copy(), chunk.S.shape[0]
+    S, count = chunk.S.copy(), chunk.S.shape[0]
     signals = np.full((count, max(1, job.times.size), job.program.n_signals), np.nan)
     attempts, size = np.zeros(count, dtype=np.int64), np.zeros((count, job.program.nx))
     failed: dict[int, str] = {}

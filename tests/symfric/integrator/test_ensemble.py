@@ -367,7 +367,7 @@ def test_loose_tolerance_warns() -> None:
         ({"t_eval": [0.5, 0.2]}, r"t_eval: expected increasing times in \[0, 1\] s"),
         ({"t_eval": [2.0]}, r"t_eval: expected increasing times in \[0, 1\] s"),
         ({"method": "euler"}, "simulate_many: method: expected one of .*, got euler"),
-        ({"backend": "gpu"}, "backend: expected one of auto, vm, compiled, got gpu"),
+        ({"backend": "gpu"}, "backend: expected one of auto, vm, compiled, cuda, got gpu"),
         ({"executor": "mpi"}, "executor: expected one of serial, threads, processes, got mpi"),
         ({"chunk": 0}, "simulate_many: chunk: expected a whole number >= 1, got 0"),
         ({"workers": 0}, "simulate_many: workers: expected a whole number >= 1, got 0"),

@@ -1,0 +1,152 @@
+"""The text of the kernel: one member a thread, in C that is CUDA C++, too.
+
+What differs between a graphics processor and a compiler of this machine is a few lines before and
+behind it, so that the arithmetic is tested where there is no graphics processor.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from string import Template
+from typing import final
+from weakref import WeakKeyDictionary
+
+from symfric.emitter.c99 import DOUBLE, Real
+from symfric.integrator.compiled.columns import densified
+from symfric.integrator.equations.following import DONE, ROUNDS
+from symfric.integrator.equations.initial import FLOOR
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.step.in_c import Written, in_c, macros
+from symfric.integrator.step.layout import Given, State
+
+BLOCK = 64
+"""Threads of a block: few, since each holds hundreds of numbers."""
+
+NAME = "symfric_launch"
+
+DONE_IN_SINGLE = 1e-5
+"""As `following.DONE`: last correction behind which rounding is left."""
+
+ON_DEVICE = """#define HUGE_VAL __longlong_as_double(0x7ff0000000000000LL)
+#define HUGE_VALF __int_as_float(0x7f800000)
+#define DEVICE __device__
+#define BESIDE __device__ __noinline__
+#define TICKET(count) atomicAdd(count, 1)
+"""
+"""NVRTC has no header; functions of math.h are built in."""
+
+LAUNCH_ON_DEVICE = Template("""
+extern "C" __global__ void __launch_bounds__($block) $name(const Many *all)
+{
+    symfric_thread(all);
+}
+""")
+
+ON_HOST = """#include <math.h>
+#include <stdbool.h>
+#define DEVICE inline
+#define BESIDE
+#define TICKET(count) ((*(count))++)
+"""
+
+LAUNCH_ON_HOST = Template("""
+/* Threads one after another. */
+void $name(const Many *all, long long threads)
+{
+    for (long long i = 0; i < threads; ++i) symfric_thread(all);
+}
+""")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Kernel:
+    """A kernel and the sizes of what it reads and writes.
+
+    Attributes:
+        text: of functions and loop, without what differs between machines.
+        real: floating point type of all but times.
+        rows: of S.
+        given: rows of R.
+        states: whose largest magnitudes are kept.
+        signals: of a result.
+        operations: of an attempt.
+    """
+
+    text: str
+    real: Real
+    rows: int
+    given: int
+    states: int
+    signals: int
+    operations: int
+
+    @property
+    def on_device(self) -> str:
+        """CUDA C++ for NVRTC; the kernel is `symfric_launch(const Many *)`."""
+        end = LAUNCH_ON_DEVICE.substitute(block=BLOCK, name=NAME)
+        return f"{ON_DEVICE}{self.text}{end}"
+
+    @property
+    def on_host(self) -> str:
+        """C99 that does the same on this machine, `symfric_launch(const Many *, long long)`."""
+        return f"{ON_HOST}{self.text}{LAUNCH_ON_HOST.substitute(name=NAME)}"
+
+
+_KNOWN: WeakKeyDictionary[Integrator, dict[tuple[bool, str], Kernel]] = WeakKeyDictionary()
+
+
+def kernel_of(integrator: Integrator, between: bool = True, real: Real = DOUBLE) -> Kernel:
+    """The kernel of an integrator's attempt, written once and kept for as long as that lives.
+
+    Args:
+        integrator: of a model without events.
+        between: whether there are results between the ends of steps.
+        real: floating point type.
+
+    Raises:
+        ValueError: an operation that C does not have.
+    """
+    known = _KNOWN.setdefault(integrator, {})
+    key = between, real.name
+    if key not in known:
+        known[key] = _written(integrator, between, real)
+    return known[key]
+
+
+def _written(integrator: Integrator, between: bool, real: Real) -> Kernel:
+    step, signals, system = integrator.step, densified(integrator.signals), integrator.system
+    n, follow, head = system.n, integrator.follow if integrator.follows else None, "static DEVICE "
+    names = ("next", "D" if between else "")
+    functions = [
+        in_c(step, "symfric_attempt", ("S", "R"), names, real, head),
+        in_c(signals, "symfric_values", ("t", "y", "d"), ("out",), real, head),
+    ]
+    sizes: dict[str, object] = {
+        "N": n, "NX": system.nx, "MEMORY": State.MEMORY, "T": State.T, "H": State.H,
+        "SIZE_R": step.numel_in(1), "T_END": Given.T_END, "N_D": signals.numel_in(2),
+        "ROWS": step.numel_out(1) // n if between else 0, "SIGNALS": signals.numel_out(0),
+        "FLOOR": repr(FLOOR), "OWN_TIME": int(real.size < 8), "TIMED": int(system.timed),
+        "FOLLOWS": 0 if not integrator.follows else 1 if follow is None else 2,
+    }  # fmt: skip
+    if follow is not None:
+        done = DONE if real.size == 8 else DONE_IN_SINGLE
+        sizes |= {"ROUNDS": ROUNDS, "DONE": repr(done), "CONTRACTION": repr(follow.contraction)}
+        places = ("y", "d"), ("after", "look")
+        functions.append(in_c(follow.round, "symfric_round", *places, real, head))
+    return Kernel(
+        _text(functions, sizes, real),
+        real,
+        step.numel_in(0),
+        step.numel_in(1),
+        system.nx,
+        signals.numel_out(0),
+        functions[0].operations,
+    )
+
+
+def _text(functions: list[Written], sizes: dict[str, object], real: Real) -> str:
+    written = "\n".join(one.text for one in functions)
+    defined = "".join(f"#define {name} {value}\n" for name, value in sizes.items())
+    loop = Path(__file__).with_name("members.h").read_text(encoding="utf-8")
+    # sizes stand behind the written functions, whose arguments may be called like one of them
+    return f"typedef {real.name} real;\n{macros(functions, real)}\n{written}\n{defined}\n{loop}"

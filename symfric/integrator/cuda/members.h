@@ -1,0 +1,265 @@
+/* Runs of many members, one a thread: a thread whose member is done takes the next one, so that
+   the threads of a warp make attempts together as long as there are members that wait.
+
+   This is C and CUDA C++ alike. Before it: `real`; DEVICE, BESIDE (a function of its own) and
+   TICKET (add one, return what was there); `symfric_attempt` (S, R -> next, D), `symfric_values`
+   (t, y, d -> signals) and, where FOLLOWS is 2, `symfric_round` (y, d -> after, look); and the
+   sizes of everything: N unknowns, NX states, MEMORY rows of S before them, T and H among these,
+   SIZE_R rows of R, T_END among them, N_D its last ones that are run data, ROWS of dense output
+   (0: results at the ends of members alone), SIGNALS, FLOOR. Where FOLLOWS is 2, algebraic
+   unknowns follow a jump of inputs in ROUNDS with DONE and CONTRACTION; where that fails, or
+   FOLLOWS is 1, the member stops there.
+
+   Time is a double in either type. Where `real` is single (OWN_TIME), an attempt sees time from
+   its own beginning, S[T] = 0, or t + h would have no digits of a short h; TIMED: the last unknown
+   is the time. */
+
+enum { S_ROWS = MEMORY + N };
+enum { ENDED = 0, RUNNING = 1, OUT_OF_ATTEMPTS = 2, TOO_SMALL = 3, SEARCH = 7, FRESH = 8 };
+
+/* What all members share, and theirs: number i of member m at [i * members + m] where not said. */
+typedef struct {
+    real *S;               /* columns S, advanced in place */
+    const real *R;         /* run data, whose last n_data entries the input intervals fill */
+    double *t;             /* time of each member */
+    long long members;
+    const double *breaks;  /* of the input intervals */
+    long long intervals;
+    const real *data;      /* (n_data, intervals), of member m from m * data_step on */
+    long long n_data, data_step;
+    const double *ends;    /* end time of each member */
+    const double *h_min;   /* smallest step of each member */
+    const double *times;   /* of results; one at which an interval begins belongs to that interval */
+    long long n_times, times_step, max_attempts;
+    long long follow;      /* whether algebraic unknowns follow the data at the start, too */
+    real *out;             /* signals, of member m from m * n_times * SIGNALS on */
+    int *reason;
+    long long *made;
+    real *largest;         /* magnitudes of the states at the ends of steps, of the start given */
+    int *interval, *next;  /* where each member is: input interval, next result */
+    const int *todo;       /* members that are to go on */
+    long long n_todo, budget;
+    int *ticket;           /* how many of them were taken */
+} Many;
+
+typedef struct {
+    real S[S_ROWS], R[SIZE_R], after[S_ROWS], D[ROWS * N + 1], largest[NX + 1];
+    double t, t_after, end; /* time, that behind the attempt, end of the input interval */
+    double h_min, due;      /* smallest step; time of the next result */
+    long long left;         /* attempts that are allowed still */
+    int member, interval, next;
+} Thread;
+
+static DEVICE const double *times_of(const Many *all, const Thread *x)
+{
+    return all->times + x->member * all->times_step;
+}
+
+/* The next result is that at the fraction s of the step just made, or at its start. */
+static BESIDE void ask(const Many *all, Thread *x, double fraction)
+{
+    const real s = (real)fraction, t = (real)times_of(all, x)[x->next];
+    real y[N + 1];
+    for (int i = 0; i < N; ++i) {
+#if ROWS
+        real bend = 0;
+        for (int r = ROWS - 1; r >= 0; --r) bend = x->D[r * N + i] + s * bend;
+        y[i] = s == 0 ? x->S[MEMORY + i]
+                      : (1 - s) * x->S[MEMORY + i]
+                            + s * (x->after[MEMORY + i] + (1 - s) * bend);
+#else
+        y[i] = s == 0 ? x->S[MEMORY + i] : x->after[MEMORY + i];
+#endif
+    }
+    symfric_values(&t, y, x->R + SIZE_R - N_D,
+                   all->out + (x->member * all->n_times + x->next) * SIGNALS);
+    ++x->next;
+}
+
+static DEVICE int is_last(const Many *all, const Thread *x)
+{
+    return x->interval + 1 >= all->intervals
+           || all->breaks[x->interval + 1] >= all->ends[x->member];
+}
+
+/* Whether there is a result to give up to time t. */
+static DEVICE int has_due(const Many *all, const Thread *x, double t)
+{
+    if (x->next >= all->n_times) return 0;
+    const double due = times_of(all, x)[x->next];
+    return due <= t && (is_last(all, x) ? due <= x->end : due < x->end);
+}
+
+static DEVICE void note_due(const Many *all, Thread *x)
+{
+    x->due = x->next < all->n_times ? times_of(all, x)[x->next] : HUGE_VAL;
+}
+
+/* Let the algebraic unknowns follow the run data; whether they could. */
+static BESIDE int follow(Thread *x)
+{
+#if FOLLOWS == 2
+    real now[N], after[N], look[3];
+    for (int i = 0; i < N; ++i) now[i] = x->S[MEMORY + i];
+    for (int k = 0; k < ROUNDS; ++k) {
+        symfric_round(now, x->R + SIZE_R - N_D, after, look);
+        if (!(look[1] <= DONE || look[1] <= CONTRACTION * look[0])) return 0;
+        for (int i = 0; i < N; ++i) now[i] = after[i];
+        if (look[1] <= DONE) {
+            if (!(look[2] >= 0)) return 0;
+            for (int i = 0; i < N; ++i) x->S[MEMORY + i] = now[i];
+            return 1;
+        }
+    }
+    return 0;
+#else
+    (void)x;
+    return FOLLOWS != 1;
+#endif
+}
+
+/* Time, as an attempt sees it. */
+static DEVICE void look_ahead(Thread *x)
+{
+#if OWN_TIME
+    x->S[T] = 0;
+    x->R[T_END] = (real)(x->end - x->t);
+#if TIMED
+    x->S[MEMORY + N - 1] = (real)x->t;
+#endif
+#else
+    x->R[T_END] = x->end;
+#endif
+}
+
+/* End and data of the input interval. */
+static DEVICE void take_data(const Many *all, Thread *x)
+{
+    const real *data = all->data + x->member * all->data_step;
+    x->end = is_last(all, x) ? all->ends[x->member] : all->breaks[x->interval + 1];
+    for (long long i = 0; i < all->n_data; ++i)
+        x->R[SIZE_R - all->n_data + i] = data[i * all->intervals + x->interval];
+    look_ahead(x);
+}
+
+/* Begin the input interval; whether that can be. */
+static BESIDE int enter(const Many *all, Thread *x)
+{
+    take_data(all, x);
+    if ((x->interval || all->follow) && !follow(x)) return 0;
+    while (has_due(all, x, x->t)) ask(all, x, 0.);
+    note_due(all, x);
+    return 1;
+}
+
+/* Leave the member, done or not. */
+static BESIDE void leave(const Many *all, Thread *x, int reason)
+{
+    const int m = x->member;
+    for (int i = 0; i < S_ROWS; ++i) all->S[i * all->members + m] = x->S[i];
+    for (int i = 0; i < NX; ++i) all->largest[i * all->members + m] = x->largest[i];
+    all->t[m] = x->t;
+    all->interval[m] = x->interval;
+    all->next[m] = x->next;
+    all->made[m] = all->max_attempts - x->left;
+    all->reason[m] = reason;
+    x->member = -1;
+}
+
+/* Take the next member, if there is one. */
+static BESIDE void fill(const Many *all, Thread *x)
+{
+    const int k = TICKET(all->ticket);
+    if (k >= all->n_todo) {
+        x->member = -2;
+        return;
+    }
+    const int m = x->member = all->todo[k];
+    for (int i = 0; i < S_ROWS; ++i) x->S[i] = all->S[i * all->members + m];
+    for (int i = 0; i < SIZE_R; ++i) x->R[i] = all->R[i * all->members + m];
+    for (int i = 0; i < NX; ++i) x->largest[i] = all->largest[i * all->members + m];
+    x->t = all->t[m];
+    x->h_min = all->h_min[m];
+    x->left = all->max_attempts - all->made[m];
+    x->interval = all->interval[m];
+    x->next = all->next[m];
+    if (all->reason[m] == RUNNING) {
+        take_data(all, x);
+        note_due(all, x);
+    } else if (!enter(all, x)) {
+        leave(all, x, SEARCH);
+    }
+}
+
+static DEVICE int is_small(const Thread *x)
+{
+    const double h = x->S[H];
+    return !(h >= x->h_min && h >= FLOOR * fabs(x->t));
+}
+
+/* The member has stopped: its next interval, or the next member, until one can go on. */
+static BESIDE void settle(const Many *all, Thread *x)
+{
+    while (x->member != -2) {
+        if (x->member < 0) {
+            fill(all, x);
+        } else if (!(x->t < x->end)) {
+            if (is_last(all, x)) {
+                leave(all, x, ENDED);
+            } else {
+                ++x->interval;
+                if (!enter(all, x)) leave(all, x, SEARCH);
+            }
+        } else if (is_small(x)) {
+            leave(all, x, TOO_SMALL);
+        } else if (x->left <= 0) {
+            leave(all, x, OUT_OF_ATTEMPTS);
+        } else {
+            return;
+        }
+    }
+}
+
+/* Take over what an attempt made. */
+static DEVICE void take(const Many *all, Thread *x)
+{
+    --x->left;
+#if OWN_TIME
+    x->t_after = !(x->after[T] > 0) ? x->t
+                 : x->after[T] == x->R[T_END] ? x->end : x->t + (double)x->after[T];
+#else
+    x->t_after = x->after[T];
+#endif
+    if (x->t_after > x->t) {
+        for (int i = 0; i < NX; ++i) {
+            const real size = x->after[MEMORY + i] < 0 ? -x->after[MEMORY + i] : x->after[MEMORY + i];
+            if (size > x->largest[i]) x->largest[i] = size;
+        }
+        if (x->due <= x->t_after) {
+            while (has_due(all, x, x->t_after))
+                ask(all, x, (times_of(all, x)[x->next] - x->t) / (x->t_after - x->t));
+            note_due(all, x);
+        }
+    }
+    for (int i = 0; i < S_ROWS; ++i) x->S[i] = x->after[i];
+    x->t = x->t_after;
+    look_ahead(x);
+    if (!(x->t < x->end) || is_small(x) || x->left <= 0) settle(all, x);
+}
+
+/* One thread: attempts of one member after another, as many as its budget. */
+static DEVICE void symfric_thread(const Many *all)
+{
+    Thread x;
+    x.member = -1;
+    settle(all, &x);
+    for (long long k = 0; k < all->budget && x.member >= 0; ++k) {
+#if ROWS
+        symfric_attempt(x.S, x.R, x.after, x.D);
+#else
+        symfric_attempt(x.S, x.R, x.after);
+#endif
+        take(all, &x);
+    }
+    if (x.member >= 0) leave(all, &x, RUNNING);
+}

@@ -1,0 +1,235 @@
+"""Ensembles on a device: what the virtual machine gives, to the bit, the counts and failures too.
+
+The processor takes the place of the graphics processor: the text of the kernel is the same, and so
+is all that drives it but the calls of CuPy (`test_cupy_device`).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from differentiable import oscillator, pendulum, root, switched
+from ensembles import after, assert_same, explosive
+
+from symfric import BrownMcPhee, Hold, Linear, LuGre, Model, Status, rabinowicz, simulate_many
+from symfric.emitter.c99 import DOUBLE
+from symfric.integrator.cuda import on_device
+from symfric.integrator.cuda.device import Device, HostArray, HostDevice
+from symfric.integrator.cuda.kernel import Kernel
+from symfric.model import Event
+
+VELOCITIES = np.linspace(-0.1, 0.1, 7)
+TIMES = [0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0]  # the jumps of inputs among them
+X = {"x": [0.5, 1.0, 2.0]}
+JUMPS = [0.0, 0.3, 0.7], [1.0, -2.0, 3.0]
+
+
+@pytest.fixture(autouse=True)
+def here(monkeypatch: pytest.MonkeyPatch) -> Callable[[Device], None]:
+    """The processor as the device; or another one, handed in."""
+
+    def use(device: Device) -> None:
+        monkeypatch.setattr(on_device, "find_device", lambda: device)
+
+    use(HostDevice())
+    return use
+
+
+CASES: dict[str, tuple[Callable[[], Model], float, dict[str, Any]]] = {
+    "stick and slip": (
+        lambda: rabinowicz(BrownMcPhee(), free=["mu_s", "k"]), 9.0,
+        {"x0": {"v": VELOCITIES}, "p": {"mu_s": np.linspace(0.12, 0.18, 7), "k": 2.0},
+         "t_eval": [0.0, 0.3, 2.71, 9.0]},
+    ),
+    "ends alone": (lambda: rabinowicz(LuGre()), 9.0, {"x0": {"v": VELOCITIES}}),
+    "ends of their own": (
+        lambda: rabinowicz(LuGre()), np.linspace(1.0, 4.0, 7), {"x0": {"v": VELOCITIES}},
+    ),
+    "ends of their own, common times": (
+        lambda: rabinowicz(LuGre()), np.linspace(1.0, 4.0, 7),
+        {"x0": {"v": VELOCITIES}, "t_eval": [0.5, 2.0, 4.0]},
+    ),
+    "longest step, times, start behind zero": (
+        lambda: rabinowicz(LuGre()), 2.0,
+        {"x0": {"v": VELOCITIES}, "t_start": 1.0, "max_step": 0.01, "times": [1.1234, 1.5]},
+    ),
+    "motions that are tiny": (
+        oscillator, 1.0, {"x0": {"x": [1.0, 1e-8, 1e-5], "v": [0.5, 0.0, 0.0]}, "t_eval": TIMES},
+    ),
+    "linear": (oscillator, 1.0, {"x0": X, "u": {"u": Linear(*JUMPS)}, "t_eval": TIMES}),
+    "function of time": (
+        oscillator, 1.0, {"x0": X, "u": {"u": lambda t: ca.sin(5 * t)}, "t_eval": TIMES},
+    ),
+    "a number each": (oscillator, 1.0, {"u": {"u": [1.0, 2.0, -3.0]}, "t_eval": TIMES}),
+    "samples each": (
+        oscillator, [1.0, 0.4, 0.8],
+        {"u": {"u": Hold([0.0, 0.3], np.arange(6.0).reshape(3, 2))}, "t_eval": TIMES},
+    ),
+    "algebraic unknowns follow": (
+        switched, 1.0, {"x0": X, "u": {"u": Hold(*JUMPS)}, "t_eval": TIMES},
+    ),
+    "algebraic unknowns start": (root, 0.5, {"p": {"p": [0.1, 0.7, 300.0]}, "t_eval": [0.0, 0.2]}),
+    "mechanism, one not to be assembled": (
+        pendulum, 1.0,
+        {"x0": {"x": [0.6, 0.7, 0.6]}, "p": {"l": [1.0, 1.1, 1e200]}, "t_eval": [0.0, 0.5, 1.0]},
+    ),
+    "some fail": (
+        explosive, 1.0, {"p": {"p": [0.1, 2.0, 0.5, 4.0, 0.0]}, "t_eval": [0.1, 1.0]},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_members_are_those_of_the_virtual_machine(case: str) -> None:
+    make, t_end, arguments = CASES[case]
+    model = make()
+    ours = simulate_many(model, t_end, backend="cuda", **arguments)
+    assert_same(ours, simulate_many(model, t_end, backend="vm", **arguments))
+    if "fail" not in case and "assembled" not in case and "start" not in case:
+        assert not ours.failed
+        assert ours.attempts.min() > 0
+
+
+def test_one_that_uses_up_its_steps_is_named() -> None:
+    arguments: dict[str, Any] = {"p": {"k": [1.0, 1e8, 4.0]}, "max_steps": 1000}
+    ours = simulate_many(oscillator(), 1.0, backend="cuda", **arguments)
+    assert_same(ours, simulate_many(oscillator(), 1.0, backend="vm", **arguments))
+    assert ours.failed[1].startswith(Status.MAX_STEPS.value)
+    assert ours.attempts[1] == 1000
+
+
+@dataclass(eq=False)
+class Counting:
+    """A device that notes its launches and the members that are to go on."""
+
+    device: HostDevice
+    launches: list[int]
+    todo: list[int]
+    lacking: int = 0
+
+    name, free = "counting", 2**30
+
+    def load(self, kernel: Any) -> Any:
+        loaded = self.device.load(kernel)
+
+        def launch(many: bytes, threads: int) -> None:
+            self.launches.append(threads)
+            loaded(many, threads)
+
+        launch.threads = loaded.threads  # type: ignore[attr-defined]
+        return launch
+
+    def put(self, array: Any) -> HostArray:
+        if array.dtype == np.int32:
+            self.todo.append(array.size)
+        if self.lacking and array.nbytes > self.lacking:
+            raise MemoryError
+        return self.device.put(array)
+
+    def full(self, shape: tuple[int, ...], value: float, kind: Any) -> HostArray:
+        return self.device.full(shape, value, kind)
+
+
+def members() -> Any:
+    return simulate_many(
+        rabinowicz(LuGre()), 9.0, x0={"v": VELOCITIES}, t_eval=[0.0, 2.71, 9.0], backend="cuda"
+    )
+
+
+@pytest.mark.parametrize("threads", [1, 3, 1000])
+def test_the_number_of_threads_changes_nothing(
+    threads: int, here: Callable[[Device], None]
+) -> None:
+    expected = members()
+    here(HostDevice(threads))
+    assert_same(members(), expected)
+
+
+def test_short_launches_change_nothing_and_leave_out_who_is_done(
+    here: Callable[[Device], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected, device = members(), Counting(HostDevice(4), [], [])
+    here(device)
+    monkeypatch.setattr(on_device.DeviceMembers, "budget", 40)
+    monkeypatch.setattr(on_device.DeviceMembers, "launched", lambda self, spent: None)
+    assert_same(members(), expected)
+    assert device.todo[0] == 7
+    assert device.todo == sorted(device.todo, reverse=True)
+    assert device.launches == [min(4, left) for left in device.todo]
+    # four threads of 40 attempts each
+    assert len(device.launches) >= expected.attempts.sum() / 160
+
+
+def test_what_the_memory_does_not_hold_goes_in_parts(here: Callable[[Device], None]) -> None:
+    expected = members()
+    here(HostDevice(free=1000))
+    assert_same(members(), expected)
+    device = Counting(HostDevice(), [], [], lacking=200)  # others took the rest meanwhile
+    here(device)
+    assert_same(members(), expected)
+    assert max(n for n in device.todo) == 7 // 2 or len(device.launches) > 1
+
+
+def test_chunks_change_nothing_and_progress_rises_between_launches() -> None:
+    told: list[float] = []
+    arguments: dict[str, Any] = {"x0": {"x": np.linspace(0.5, 2.0, 10)}, "backend": "cuda"}
+    whole = simulate_many(oscillator(), 1.0, **arguments)
+    assert_same(simulate_many(oscillator(), 1.0, chunk=3, **arguments), whole)
+    assert_same(simulate_many(oscillator(), 1.0, chunk=3, progress=told.append, **arguments), whole)
+    assert told == sorted(told)
+    assert set(told) >= {0.3, 0.6, 0.9, 1.0}
+
+
+def test_an_interrupt_keeps_what_is_finished_and_a_folder_goes_on(tmp_path: Path) -> None:
+    arguments: dict[str, Any] = {
+        "x0": {"x": np.linspace(0.5, 2.0, 20)}, "chunk": 4, "backend": "cuda", "out": tmp_path,
+    }  # fmt: skip
+    many = simulate_many(oscillator(), 1.0, progress=after(3), **arguments)
+    assert many.status is Status.INTERRUPTED
+    finished = np.isfinite(many["x"][:, 0])
+    assert 4 <= finished.sum() < 20
+    np.testing.assert_array_equal(finished, np.isfinite(many.reached))
+    again = simulate_many(oscillator(), 1.0, **arguments)
+    assert again.status is Status.SUCCESS
+    arguments.pop("out")
+    assert_same(again, simulate_many(oscillator(), 1.0, **arguments))
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_the_size_of_a_chunk_is_that_of_its_results() -> None:
+    kernel = Kernel("", DOUBLE, rows=7, given=5, states=2, signals=4, operations=0)
+    assert on_device.chunk_of(kernel, 1, 0) == on_device.MOST
+    assert on_device.chunk_of(kernel, 10_000, 0) == 2**30 // (8 * 40_012)
+    assert on_device.chunk_of(kernel, 1, 10**9) == 1
+    half = replace(kernel, real=on_device.REALS["float"])
+    assert on_device.chunk_of(half, 10_000, 0) == 2**30 // (4 * 40_012)
+
+
+def with_events() -> Model:
+    model = oscillator()
+    event = Event("through", model.x[0].symbol)
+    return replace(model, events=(event,))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"model": with_events()}, "a model without events, got 'oscillator' with through; use"),
+        ({"executor": "processes"}, "no executor and no workers.*, got executor = 'processes'"),
+        ({"workers": 2}, "no executor and no workers.*, got workers = 2"),
+        ({"real": "half"}, "simulate_many: real: expected one of double, float, got half"),
+        ({"real": "float"}, "rtol: expected at least 1e-05 with real='float', got 1e-06"),
+        (
+            {"real": "float", "backend": "auto"},
+            "real: expected double, which is what processors compute in, got float",
+        ),
+    ],
+)
+def test_what_a_device_has_no_use_for_is_refused(arguments: dict[str, Any], message: str) -> None:
+    given = {"model": oscillator(), "t_end": 1.0, "backend": "cuda"} | arguments
+    with pytest.raises(ValueError, match=message):
+        simulate_many(**given)
