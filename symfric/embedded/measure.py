@@ -172,8 +172,8 @@ def _equal(generated: Generated, real: str, inputs: Array, rows: Array) -> float
     if compiler is None:
         return nan
     folder, kind = generated.folder, REALS[real]
-    write_text(folder / "main.c", program(generated.block, kind))
+    write_text(folder / "main.c", program(generated.block, kind, generated.guards))
     parts = [folder / "main.c", generated.source(real)]
     link_program(compiler, parts, folder, folder / "main")
-    host = run_c(generated.block, kind, folder / "main", inputs)[:, : rows.shape[1]]
-    return float((host == rows).mean())
+    host = run_c(generated.block, kind, folder / "main", inputs, guards=generated.guards)
+    return float((host[:, : rows.shape[1]] == rows).mean())

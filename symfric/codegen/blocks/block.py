@@ -86,7 +86,7 @@ class Block:
     def _name_problems(self) -> list[str]:
         variables = [v.name for v in (*self.states, *self.inputs, *self.parameters)]
         members = variables + list(self.outputs)
-        reserved = {*KEYWORDS, *GROUPS, *FUNCTIONS.values()}
+        reserved = {*KEYWORDS, *GROUPS, "status", *FUNCTIONS.values()}
         reserved |= {f"{function}f" for function in FUNCTIONS.values()}
         wrong = [
             name

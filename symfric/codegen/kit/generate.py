@@ -33,6 +33,7 @@ class Generated:
         reals: floating point types, by name.
         files: all files, the manifest last.
         manifest: content of manifest.json.
+        guards: whether the C has guards, see `symfric.codegen.writing.guards`.
     """
 
     block: Block
@@ -40,6 +41,7 @@ class Generated:
     reals: tuple[str, ...]
     files: tuple[Path, ...]
     manifest: Mapping[str, Any]
+    guards: bool = True
 
     def header(self, real: str) -> Path:
         """The header file of the type `real`."""
@@ -60,14 +62,15 @@ def generate(
     free: Sequence[str] | None = None,
     fold: Fold = None,
     turning: bool = False,
+    guards: bool = True,
 ) -> Generated:
     """Write a friction law, or any block, as C99.
 
     For each type `NAME_f64.h`, `NAME_f64.c` (float: `f32`), and `manifest.json` with names, units,
-    sizes and operation counts. The C allocates nothing, includes only math.h and stdbool.h, has no
-    data but the constant defaults, and compiles without warnings under -Wall -Wextra -Wpedantic
-    -Wconversion -Wdouble-promotion, also as C++. The C of several blocks may share a folder and
-    a program; the manifest is then that of the last one.
+    sizes and operation counts. The C allocates nothing, includes only math.h, stdbool.h and, for
+    the guards, stdint.h and string.h, has no data but constants, and compiles without warnings
+    under -Wall -Wextra -Wpedantic -Wconversion -Wdouble-promotion, also as C++. The C of several
+    blocks may share a folder and a program; the manifest is then that of the last one.
 
     Args:
         law: a friction law, see `law_block`; a population, see `contact_block`; or a block.
@@ -79,6 +82,8 @@ def generate(
             by default they are fields of a struct with a constant default beside it. Those of a
             population are constants.
         turning: the law is that of a contact that turns: rad/s and N m in its texts.
+        guards: clamp inputs to their ranges, repair what is not finite, and return a status that
+            says so; see `symfric.codegen.writing.guards`. What is valid is not changed by a bit.
 
     Raises:
         ValueError: bad input, a law that has no step, an operation that C99 lacks, a
@@ -88,19 +93,20 @@ def generate(
     check_names("codegen: real", several, REALS)
     names = tuple(dict.fromkeys(several))
     folder = checks.path("codegen: out", out)
+    checks.flag("codegen: guards", guards)
     if not names:
         raise ValueError("codegen: real: expected double, float or both, got none")
     given = {"name": name, "h": h, "free": free, "fold": fold, "turning": turning or None}
     block = _block(law, {option: value for option, value in given.items() if value is not None})
     texts: dict[str, str] = {}
     for kind in (REALS[n] for n in names):
-        texts[f"{prefix(block, kind)}.h"] = header(block, kind)
-        texts[f"{prefix(block, kind)}.c"] = source(block, kind)
-    manifest = _manifest(block, [REALS[n] for n in names])
+        texts[f"{prefix(block, kind)}.h"] = header(block, kind, guards)
+        texts[f"{prefix(block, kind)}.c"] = source(block, kind, guards)
+    manifest = _manifest(block, [REALS[n] for n in names], guards)
     texts["manifest.json"] = json.dumps(manifest, indent=2) + "\n"
     for file, text in texts.items():
         write_text(folder / file, text)
-    return Generated(block, folder, names, tuple(folder / file for file in texts), manifest)
+    return Generated(block, folder, names, tuple(folder / file for file in texts), manifest, guards)
 
 
 def _block(law: AnyLaw | Block, options: dict[str, Any]) -> Block:
@@ -119,7 +125,7 @@ def _block(law: AnyLaw | Block, options: dict[str, Any]) -> Block:
     return (contact_block if isinstance(law, Population) else law_block)(law, **options)  # pyright: ignore[reportArgumentType]
 
 
-def _manifest(block: Block, reals: Sequence[Real]) -> dict[str, Any]:
+def _manifest(block: Block, reals: Sequence[Real], guards: bool) -> dict[str, Any]:
     return {
         "name": block.name,
         "model": block.fingerprint,
@@ -136,11 +142,12 @@ def _manifest(block: Block, reals: Sequence[Real]) -> dict[str, Any]:
             for name, output in block.outputs.items()
         ],
         "constants": dict(block.constants),
-        "real": {real.name: _described(block, real) for real in reals},
+        "guards": guards,
+        "real": {real.name: _described(block, real, guards) for real in reals},
     }
 
 
-def _described(block: Block, real: Real) -> dict[str, Any]:
+def _described(block: Block, real: Real, guards: bool) -> dict[str, Any]:
     name = prefix(block, real)
     return {
         "header": f"{name}.h",
@@ -155,6 +162,6 @@ def _described(block: Block, real: Real) -> dict[str, Any]:
                 "operations": routine.operations,
                 "calls": dict(sorted(routine.calls.items())),
             }
-            for routine in routines(block, real)
+            for routine in routines(block, real, guards)
         },
     }

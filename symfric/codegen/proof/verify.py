@@ -178,19 +178,20 @@ def _check(generated: Generated, real: Real, compiler: Compiler, inputs: Array) 
         folder = Path(name)
         target, main = folder / f"{prefix(block, real)}.o", folder / "main.c"
         warnings = compile_object(compiler, generated.source(real.name), target)
-        write_text(main, program(block, real))
+        write_text(main, program(block, real, generated.guards))
         link_program(compiler, [main, target], generated.folder, folder / "main")
-        rows = run_c(block, real, folder / "main", inputs)
+        rows = run_c(block, real, folder / "main", inputs, guards=generated.guards)
         needed = needed_symbols(target)
+        allowed = _allowed(block, real, generated.guards)
     own = rows[:, : len(block.states)] if real.size == 4 else None
-    expected = run_vm(block, real, inputs, own)
+    expected = run_vm(block, real, inputs, own, guards=generated.guards)
     return Check(
         real=real.name,
         steps=len(inputs),
         warnings=tuple(warnings),
         ulp=_ulp(rows, expected) if real.size == 8 else None,
         error=_error(rows, expected),
-        foreign=None if needed is None else tuple(sorted(needed - _allowed(block, real))),
+        foreign=None if needed is None else tuple(sorted(needed - allowed)),
         runs_away=runs_away(block, expected),
     )
 
@@ -246,11 +247,13 @@ def _error(a: Array, b: Array) -> float:
     return float(np.where(np.isnan(ratio), np.inf, ratio).max(initial=0.0))
 
 
-def _allowed(block: Block, real: Real) -> set[str]:
-    functions = {call for routine in routines(block, real) for call in routine.calls}
+def _allowed(block: Block, real: Real, guards: bool) -> set[str]:
+    """Functions of math.h, and memcpy, with which compilers copy large structs."""
+    functions = {call for routine in routines(block, real, guards) for call in routine.calls}
     if {"sin", "cos"} <= functions:
         functions.add("sincos")
-    return {f"{function}{real.letter}" for function in functions} | {"_GLOBAL_OFFSET_TABLE_"}
+    own = {f"{function}{real.letter}" for function in functions}
+    return own | {"_GLOBAL_OFFSET_TABLE_", "memcpy"}
 
 
 def _row(check: Check) -> tuple[str, ...]:

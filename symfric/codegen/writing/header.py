@@ -5,6 +5,7 @@ from math import isfinite
 from textwrap import wrap
 
 from symfric.codegen.blocks.block import Block
+from symfric.codegen.writing.guards import constants
 from symfric.codegen.writing.layout import Member, members, prefix
 from symfric.codegen.writing.routines import routines
 from symfric.codegen.writing.text import WIDTH, banner, block_comment, comment
@@ -20,7 +21,7 @@ MEANING = {
 """Of the structs."""
 
 
-def header(block: Block, real: Real) -> str:
+def header(block: Block, real: Real, guards: bool = True) -> str:
     """Text of the header file; raises as `routines`."""
     name = prefix(block, real)
     guard = f"{name.upper()}_H"
@@ -29,7 +30,8 @@ def header(block: Block, real: Real) -> str:
         _struct(f"{name}_{group}_t", MEANING[group], rows, ranges, real)
         for group, rows in members(block).items()
     )
-    prototypes = "\n".join(f"/* {r.doc} */\n{r.head};\n" for r in routines(block, real))
+    status = constants(block, real) + "\n" if guards else ""
+    prototypes = "\n".join(f"/* {r.doc} */\n{r.head};\n" for r in routines(block, real, guards))
     return f"""{block_comment([*banner(block, f"{name}.h"), *sheet(block, real)])}
 #ifndef {guard}
 #define {guard}
@@ -38,7 +40,7 @@ def header(block: Block, real: Real) -> str:
 extern "C" {{
 #endif
 
-{structs}{_constants(block, name)}{prototypes}
+{structs}{_constants(block, name)}{status}{prototypes}
 #ifdef __cplusplus
 }}
 #endif

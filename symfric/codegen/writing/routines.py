@@ -7,6 +7,13 @@ from dataclasses import dataclass
 import casadi as ca
 
 from symfric.codegen.blocks.block import GROUPS, Block
+from symfric.codegen.writing.guards import (
+    STEP_SIZE,
+    finite_outputs,
+    fit_parameters,
+    found_states,
+    mended,
+)
 from symfric.codegen.writing.layout import members, places, prefix
 from symfric.codegen.writing.text import WIDTH
 from symfric.emitter.c99 import Real
@@ -42,8 +49,11 @@ class Routine:
         )
 
 
-def routines(block: Block, real: Real) -> tuple[Routine, ...]:
-    """The C functions of a block: `_init`, its resets and `_step`, or one function of scalars.
+def routines(block: Block, real: Real, guards: bool = True) -> tuple[Routine, ...]:
+    """The C functions of a block: `_init`, `_reset`, its resets and `_step`, or one of scalars.
+
+    With `guards` they return the status of `symfric.codegen.writing.guards`, the function of
+    scalars adds its bits to an argument; without they return nothing and check nothing.
 
     Raises:
         ValueError: an operation without counterpart in C99, or a constant outside the type.
@@ -53,28 +63,31 @@ def routines(block: Block, real: Real) -> tuple[Routine, ...]:
         (output,) = block.outputs.values()
         (shown,) = block.outputs
         doc = f"{shown} [{output.unit}]: {output.doc}".rstrip(": ") + "."
-        return (_routine(block, real, name, doc, block.step, [[], ["return {};"]]),)
+        ends = f"const {real.name} {shown} = {{}};" if guards else "return {};"
+        return (_routine(block, real, name, doc, block.step, [[], [ends]], guards),)
     store = [f"state->{place} = {{}};" for place in places(block, "state")]
     show = [f"out->{place} = {{}};" for place in places(block, "out")]
-    found = [
-        _routine(block, real, f"{name}_{reset}", doc, block.reset(reset), [store])
+    found = list(_starts(block, real)) if block.states else []
+    found += [
+        _routine(block, real, f"{name}_{reset}", doc, block.reset(reset), [store], guards)
         for reset, (_, doc) in block.resets.items()
     ]
-    if block.states:
-        found.insert(0, _init(block, real))
-    doc = "One step: outputs and next state." if block.states else "All outputs."
-    found.append(_routine(block, real, f"{name}_step", doc, block.step, [store, show]))
+    doc = "One step: outputs and next state" if block.states else "All outputs"
+    doc += "; returns the status." if guards else "."
+    found.append(_routine(block, real, f"{name}_step", doc, block.step, [store, show], guards))
     return tuple(found)
 
 
-def _init(block: Block, real: Real) -> Routine:
+def _starts(block: Block, real: Real) -> tuple[Routine, Routine]:
+    """`_init` with start values of one's own, `_reset` to those of the model."""
     name = prefix(block, real)
-    values = tuple(
-        f"state->{place} = {real.literal(float(v.start))};"
-        for place, v in zip(places(block, "state"), block.states, strict=True)
+    own, given = f"{name}_state_t *state", f"const {name}_state_t *start"
+    init = "Initial state, such as that of the model; call it before the first step."
+    reset = "The initial state of the model."
+    return (
+        Routine(f"{name}_init", "void", (own, given), init, ("*state = *start;",), Counter(), 0),
+        Routine(f"{name}_reset", "void", (own,), reset, (f"*state = {name}_start;",), Counter(), 0),
     )
-    doc = "Initial state; call it before the first step."
-    return Routine(f"{name}_init", "void", (f"{name}_state_t *state",), doc, values, Counter(), 0)
 
 
 def _routine(
@@ -84,28 +97,73 @@ def _routine(
     doc: str,
     function: ca.Function,
     targets: Sequence[Sequence[str]],
+    guards: bool,
 ) -> Routine:
     groups = (block.states, block.parameters, block.inputs)
     source = graph(function)
     code = emit(source, [[v.name for v in group] for group in groups], targets, real)
-    scalars = block.is_function
+    scalars, steps = block.is_function, len(targets) > 1
     used = sorted(node.entry for node in source.nodes if node.op == ca.OP_INPUT)
-    loads = [
-        f"const {real.name} {groups[i][j].name} = {GROUPS[i]}->{places(block, GROUPS[i])[j]};"
-        for i, j in used
-        if not (scalars and GROUPS[i] == "in")
-    ]
     present = members(block)
     arguments = [
         f"{'const ' if group in ('param', 'in') else ''}{prefix(block, real)}_{group}_t *{group}"
         for group in GROUPS
-        if group in present and (group != "out" or len(targets) > 1)
+        if group in present and (group != "out" or steps)
     ]
-    idle = [g for i, g in enumerate(GROUPS[:3]) if g in present and i not in {u[0] for u in used}]
+    seen = {GROUPS[i] for i, _ in used} | {"state"}
+    idle = [group for group in GROUPS[:3] if group in present and group not in seen]
     if scalars:
         arguments = [f"{real.name} {v.name}" for v in block.inputs] + arguments
         idle += [v.name for j, v in enumerate(block.inputs) if (2, j) not in used]
-    voids = [f"(void){what};" for what in idle if what != "state"]
-    result = real.name if scalars else "void"
-    statements = (*voids, *loads, *code.lines)
+    voids = [f"(void){what};" for what in idle]
+    if not guards:
+        statements = (*voids, *_loads(block, real, used), *code.lines)
+        result = real.name if scalars else "void"
+    elif scalars:
+        arguments.append("unsigned int *status")
+        statements = (*voids, *_guarded(block, real, used, code.lines, steps, "status"))
+        result = real.name
+    else:
+        body = _guarded(block, real, used, code.lines, steps, "&status")
+        statements = ("unsigned int status = 0u;", *voids, *body, "return status;")
+        result = "unsigned int"
     return Routine(name, result, tuple(arguments), doc, statements, code.calls, code.operations)
+
+
+def _loads(block: Block, real: Real, used: Sequence[tuple[int, int]]) -> list[str]:
+    """Locals with the names of the variables; the arguments of a function of scalars have them."""
+    groups = (block.states, block.parameters, block.inputs)
+    return [
+        f"const {real.name} {groups[i][j].name} = {GROUPS[i]}->{places(block, GROUPS[i])[j]};"
+        for i, j in used
+        if not (block.is_function and GROUPS[i] == "in")
+    ]
+
+
+def _guarded(
+    block: Block,
+    real: Real,
+    used: Sequence[tuple[int, int]],
+    lines: Sequence[str],
+    steps: bool,
+    status: str,
+) -> list[str]:
+    """Loads and `lines` between guards: inputs, step size, parameters, states, then outputs.
+
+    The step size is read before parameters that are out of range give way to the defaults.
+    """
+    steered = [(1, j) for j, v in enumerate(block.parameters) if v.name == STEP_SIZE]
+    sizes = [entry for entry in used if entry in steered]
+    inputs = [entry for entry in used if entry[0] == 2]
+    others = [entry for entry in used if entry not in (*sizes, *inputs)]
+    found: list[str] = []
+    for i, j in (*inputs, *sizes):
+        variable = (block.parameters, block.inputs)[i - 1][j]
+        found += [load.removeprefix("const ") for load in _loads(block, real, [(i, j)])]
+        found += mended(block, real, variable, GROUPS[i], status)
+    if any(i == 1 for i, _ in others):
+        found += fit_parameters(block, real, status)
+    if steps:
+        found += found_states(block, real, status)
+    ends = finite_outputs(block, real, status) if steps else []
+    return [*found, *_loads(block, real, others), *lines, *ends]

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from symfric.codegen.blocks.block import Block
+from symfric.codegen.writing.guards import helpers
 from symfric.codegen.writing.layout import members, prefix
 from symfric.codegen.writing.routines import routines
 from symfric.codegen.writing.text import banner, block_comment, comment, folded
@@ -10,10 +11,10 @@ from symfric.emitter.c99 import TRANSCENDENTAL, Real, macro
 from symfric.foundation.parameters import Variable
 
 
-def source(block: Block, real: Real) -> str:
+def source(block: Block, real: Real, guards: bool = True) -> str:
     """Text of the source file; raises as `routines`."""
     name = prefix(block, real)
-    functions = routines(block, real)
+    functions = routines(block, real, guards)
     called = sorted({call for r in functions for call in r.calls} & set(TRANSCENDENTAL.values()))
     macros = "".join(
         f"#ifndef {macro(call, real)}\n#define {macro(call, real)} {call}{real.letter}\n#endif\n"
@@ -25,7 +26,11 @@ def source(block: Block, real: Real) -> str:
         f"{r.head}\n{{\n" + "".join(folded(line, "    ") + "\n" for line in r.statements) + "}\n"
         for r in functions
     )
-    booleans = "#include <stdbool.h>\n" if "const bool " in bodies else ""
+    if guards:
+        bodies = helpers(block, real, bodies) + bodies
+    booleans = "#include <stdbool.h>\n" if "bool " in bodies else ""
+    if guards:
+        booleans += "#include <stdint.h>\n#include <string.h>\n"
     return f"""{block_comment(banner(block, f"{name}.c"))}
 #include "{name}.h"
 

@@ -29,10 +29,11 @@ def comment(text: str) -> str:
 
 
 def folded(line: str, margin: str) -> str:
-    """A long line broken at blanks."""
+    """A long line broken at blanks, further in than it begins."""
+    margin += " " * (len(line) - len(line.lstrip(" ")))
     return "\n".join(
         wrap(
-            line,
+            line.lstrip(" "),
             WIDTH,
             initial_indent=margin,
             subsequent_indent=margin + "    ",
