@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import final
 
-from symfric.codegen import Block, law_block, plant_block
+from symfric.codegen import Block, inverse_dynamics_block, law_block, plant_block
 from symfric.laws import GMS, BrownMcPhee, LuGre, MaxwellSlip, VelocityBased
 from symfric.laws.dynamic.gms import Element
-from symfric.scenes import rabinowicz
+from symfric.scenes import Arm, rabinowicz
 
 TEN = tuple(Element(5e4 * 2.0**-i, 0.1) for i in range(10))
 """Elements of a tenth of the friction each, of stiffnesses over three decades."""
@@ -42,8 +42,12 @@ def _rabinowicz(method: str, name: str) -> Callable[[], Block]:
     return lambda: plant_block(rabinowicz(BrownMcPhee()), h=1e-4, method=method, name=name)
 
 
+def _arm() -> Block:
+    return inverse_dynamics_block(Arm(BrownMcPhee()).mechanism())
+
+
 def cases() -> Iterator[Case]:
-    """Laws, and Rabinowicz's stick-slip test as a plant by backward Euler and by rodas3."""
+    """Laws; Rabinowicz's stick-slip test as a plant; an arm with friction from reactions."""
     yield Case("Brown-McPhee", lambda: law_block(BrownMcPhee()), {"average": 75})
     yield Case("LuGre", lambda: law_block(LuGre()), {"average": 165})
     yield Case("GMS(10)", _gms, {"average": 550, "text": 800, "stack": 100})
@@ -51,3 +55,4 @@ def cases() -> Iterator[Case]:
     yield Case("velocity based", lambda: law_block(VelocityBased()), {"average": 50})
     yield Case("Rabinowicz, Euler", _rabinowicz("backward_euler", "belt_euler"), {"average": 325})
     yield Case("Rabinowicz, rodas3", _rabinowicz("rodas3", "belt_rodas3"), {})
+    yield Case("arm, six axes", _arm, {"average": 1850})

@@ -300,7 +300,7 @@ def embedded(result: "EmbeddedBenchmark") -> None:
         [
             [r.block, r.core if r.real == "float" else f"{r.core} {r.real}", round(r.average),
              round(r.maximum), round(r.text), round(r.data), round(r.stack), _known(r.error, 2),
-             f"{r.equal:.0%}" if r.equal == r.equal else ""]
+             f"{r.equal:.1%}" if r.equal == r.equal else ""]
             for r in result.rows
         ],
         "gcc -O2 under QEMU, float: instructions of a step (average, maximum), bytes, largest "

@@ -30,6 +30,9 @@ STEPS = 400
 
 MEASURED = "measured"
 
+FAMILY = 1e-3
+"""Least peak of a signal that errors are divided by, in the largest peak of its unit."""
+
 
 @final
 @dataclass(frozen=True)
@@ -45,7 +48,7 @@ class Measured:
         data: bytes of RAM for an instance: states and, so that they can be changed, parameters.
         stack: bytes of stack that the call uses at most, library included.
         error: largest difference from CasADi's double from the same states, relative to the peak
-            of each signal.
+            of each signal, at least a thousandth of the largest of its unit.
         equal: share of numbers with the bits of the host's C; NaN where it was not compared.
         finite: whether all numbers are.
     """
@@ -153,16 +156,23 @@ def _measured(
         library=said.library,
         data=said.data,
         stack=said.stack,
-        error=_error(said.rows, expected[:, : _columns(block)]),
+        error=_error(block, said.rows, expected[:, : _columns(block)]),
         equal=equal,
         finite=bool(np.isfinite(said.rows).all()),
     )
 
 
-def _error(a: Array, b: Array) -> float:
-    """Largest difference of a column relative to its peak in `b`."""
+def _error(block: Block, a: Array, b: Array) -> float:
+    """Largest difference of a column relative to its peak in `b`.
+
+    A peak below a thousandth of that of another signal of the same unit counts as so much: the
+    torque of an upright axis under gravity is rounding alone.
+    """
+    units = np.array([v.unit for v in (*block.states, *block.outputs.values())])
     peak = np.abs(b).max(axis=0, initial=0.0)
-    ratio = np.abs(a - b).max(axis=0, initial=0.0) / np.where(peak > 0.0, peak, 1.0)
+    family = np.array([peak[units == unit].max() for unit in units])
+    scale = np.maximum(peak, FAMILY * family)
+    ratio = np.abs(a - b).max(axis=0, initial=0.0) / np.where(scale > 0.0, scale, 1.0)
     return float(np.where(np.isnan(ratio), inf, ratio).max(initial=0.0))
 
 

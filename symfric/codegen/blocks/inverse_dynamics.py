@@ -1,0 +1,317 @@
+"""Inverse dynamics of a mechanism with friction in its joints as a block."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import final
+
+import casadi as ca
+import numpy as np
+
+from symfric.codegen.blocks.block import Block
+from symfric.codegen.blocks.from_law import SLIDING, step_variable
+from symfric.codegen.blocks.payload import with_gravity, with_payload
+from symfric.codegen.blocks.rubbing import Rubbing, numbered, rubbing
+from symfric.foundation import checks
+from symfric.foundation.parameters import Variable
+from symfric.foundation.symbols import stacked, starts_of, symbols_of
+from symfric.model import Output, Variables
+from symfric.multibody import Mechanism
+from symfric.multibody.equations import Equations
+from symfric.multibody.urdf.read import read_urdf
+
+WHERE = "inverse dynamics"
+
+SIGN = (
+    "A torque tau_k turns joint k in its positive direction; friction is what it must overcome. "
+    "Feed the position, velocity and acceleration that are planned: a measured velocity that "
+    "trembles about zero makes friction that trembles, too."
+)
+
+
+@final
+@dataclass(frozen=True)
+class Options:
+    """What is variable in the inverse dynamics; see `inverse_dynamics_block`."""
+
+    payload: str | None = None
+    payload_inertia: bool = False
+    tunable_gravity: bool = False
+
+    def __post_init__(self) -> None:
+        if self.payload is not None:
+            checks.text(f"{WHERE}: payload", self.payload, "the name of a frame, such as 'tool0'")
+        checks.flag(f"{WHERE}: payload_inertia", self.payload_inertia)
+        checks.flag(f"{WHERE}: tunable_gravity", self.tunable_gravity)
+        if self.payload_inertia and self.payload is None:
+            raise ValueError(f"{WHERE}: payload_inertia: expected with a payload only")
+
+
+def inverse_dynamics_block(
+    mechanism: Mechanism | str | Path,
+    *,
+    name: str | None = None,
+    p: Variables = (),
+    payload: str | None = None,
+    payload_inertia: bool = False,
+    tunable_gravity: bool = False,
+    separate: bool = False,
+    fold: bool = False,
+    h: float | None = None,
+) -> Block:
+    """The forces that a motion needs: tau(q, qd, qdd), friction of the joints included.
+
+        tau = M(q) qdd + c(q, qd) + g(q) + friction(qd, N(q, qd, qdd), z)
+
+    by the recursion of Newton and Euler. A bearing that reactions load has the normal force N that
+    this very motion makes in it, payload and acceleration included; it does not depend on friction,
+    so nothing is solved. Bristles are states of the block and make a step with velocity and normal
+    force held, as `law_block` says; feed the velocity and acceleration that are planned for the
+    step.
+
+    Inputs q_1 ... q_n, qd_1 ..., qdd_1 ... in the order of the joints that the header names;
+    outputs tau_1 ... [N m or N], positive along the joint. Parameters of the laws and constant
+    normal forces are numbered by the contacts that have them, and can be changed at run time.
+    Inputs of the mechanism are taken at their start values, those of motors at zero.
+
+    Couplings of constant ratio, such as the fingers that mimic another one in URDF files, leave the
+    joints that lead; tau is then what these need to move the others along.
+
+    Args:
+        mechanism: or a URDF file, or its text; `read_urdf(file, law=..., bearings=...)` chooses
+            its friction.
+        name: C identifier; default that of the mechanism.
+        p: parameters of the mechanism that stay variable, as for `Mechanism.build`.
+        payload: the frame "body.frame", or the body or link, that carries a load whose mass
+            payload_m and centre of mass payload_c are parameters, zero at first.
+        payload_inertia: whether the load has moments of inertia payload_J, too.
+        tunable_gravity: the vector of gravity is a parameter: a robot on a wall, on a vehicle.
+        separate: the share of friction as outputs friction_1 ..., too (tau contains it).
+        fold: the parameters of friction become constants.
+        h: step size [s] of laws with states as a constant; without it h is a parameter.
+
+    Raises:
+        ValueError: closed loops, balls or free bodies, prescribed motion; laws without a step of
+            their states (Leuven, Armstrong, smooth GMS) or that ask for the applied force (exact
+            Coulomb, Karnopp); friction whose normal force depends on other friction; a payload at
+            an unknown place; as `Mechanism.build`.
+    """
+    checks.flag(f"{WHERE}: separate", separate)
+    checks.flag(f"{WHERE}: fold", fold)
+    machine = _machine(mechanism, p, Options(payload, payload_inertia, tunable_gravity))
+    eq, size = machine.eq, step_variable(WHERE, h)
+    duration = size.symbol if h is None else ca.SX(float(size.start))
+    parts = [
+        rubbing(contact, normal, duration, fold=fold)
+        for contact, normal in zip(eq.contacts, eq.normals, strict=True)
+    ]
+    names = [part.name for part in parts]
+    states, order = numbered([part.states for part in parts], names)
+    if h is not None and not states:
+        raise ValueError(f"{WHERE}: h: expected none without laws with states, got {h!r}")
+    forces = stacked(part.force for part in parts)
+    still = ca.substitute(eq.balance, eq.F, ca.SX.zeros(eq.F.numel()))
+    rubbed = ca.jacobian(eq.balance, eq.F) @ forces
+    following, sliding = (
+        ca.SX(stacked(columns))[order] if order else ca.SX(0, 1)
+        for columns in ([p.following for p in parts], [p.sliding for p in parts])
+    )
+    motion, rubbed = machine.leading(still), machine.leading(rubbed)
+    following, sliding = machine.moved(following), machine.moved(sliding)
+    outputs = machine.outputs("tau", motion + rubbed, "force that joint '{}' needs")
+    if separate:
+        outputs |= machine.outputs("friction", rubbed, "share of friction in joint '{}'")
+    own = () if h is not None or not states else (size,)
+    return Block(
+        name or machine.name,
+        doc=machine.doc("Inverse dynamics", parts),
+        states=states,
+        inputs=machine.inputs,
+        parameters=(
+            *machine.parameters, *numbered([part.parameters for part in parts], names)[0], *own
+        ),
+        next=following,
+        outputs=outputs,
+        resets={"init_sliding": (sliding, SLIDING)} if states else {},
+        constants={} if h is None else {"h": float(size.start)},
+    )  # fmt: skip
+
+
+def gravity_block(
+    mechanism: Mechanism | str | Path,
+    *,
+    name: str | None = None,
+    p: Variables = (),
+    payload: str | None = None,
+    tunable_gravity: bool = False,
+) -> Block:
+    """The forces that hold a mechanism at rest: tau = g(q), springs included, without friction.
+
+    Arguments as of `inverse_dynamics_block`; the default name ends in _gravity.
+    """
+    machine = _machine(mechanism, p, Options(payload, False, tunable_gravity))
+    eq = machine.eq
+    zero = [ca.SX.zeros(eq.n), ca.SX.zeros(eq.n), ca.SX.zeros(eq.F.numel())]
+    holding = machine.leading(ca.substitute([eq.balance], [eq.qd, eq.a, eq.F], zero)[0])
+    return Block(
+        name or f"{machine.name}_gravity",
+        doc=machine.doc("Forces that hold it at rest", ()),
+        inputs=tuple(v for v in machine.inputs if v.name.startswith("q_")),
+        parameters=tuple(
+            v for v in machine.parameters if ca.depends_on(holding, v.symbol)
+        ),
+        outputs=machine.outputs("tau", holding, "force that holds joint '{}'"),
+    )  # fmt: skip
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Machine:
+    """Equations of a mechanism in the coordinates that lead.
+
+    Attributes:
+        joints: the coordinates that lead: name, unit.
+        inputs: q, qd, qdd of them.
+        symbols, values: what stands for the coordinates of all joints, and what is put there.
+        T: rates of all joints are T times those that lead, shape (n, k).
+    """
+
+    name: str
+    eq: Equations
+    joints: Variables
+    inputs: Variables
+    parameters: Variables
+    symbols: Sequence[ca.SX]
+    values: Sequence[ca.SX]
+    T: ca.DM
+
+    def moved(self, expression: ca.SX) -> ca.SX:
+        """An expression of all coordinates in those that lead."""
+        return ca.substitute([expression], list(self.symbols), list(self.values))[0]
+
+    def leading(self, forces: ca.SX) -> ca.SX:
+        """Forces along all coordinates as forces along those that lead."""
+        return ca.densify(ca.SX(self.T.T) @ self.moved(forces))
+
+    def outputs(self, stem: str, column: ca.SX, doc: str) -> dict[str, Output]:
+        """One output a joint."""
+        return {
+            f"{stem}_{k}": Output(column[k - 1], _force(v.unit), doc.format(v.name))
+            for k, v in enumerate(self.joints, start=1)
+        }
+
+    def doc(self, what: str, parts: Sequence[Rubbing]) -> str:
+        """Text for the header."""
+        order = ", ".join(f"{k} {v.name}" for k, v in enumerate(self.joints, start=1))
+        laws = dict.fromkeys(part.law for part in parts)
+        rubbing = {law: ", ".join(p.name for p in parts if p.law == law) for law in laws}
+        friction = "; ".join(f"{law} in {joints}" for law, joints in rubbing.items())
+        lines = [f"{what} of '{self.name}'.", f"Joints: {order}.", SIGN]
+        if parts:
+            lines.insert(2, f"Friction, numbered in this order: {friction}.")
+        return "\n\n".join(lines)
+
+
+def _force(unit: str) -> str:
+    """Of the force along a coordinate."""
+    return "N m" if unit == "rad" else "N"
+
+
+def _machine(mechanism: Mechanism | str | Path, p: Variables, options: Options) -> _Machine:
+    if not isinstance(mechanism, Mechanism):
+        mechanism = read_urdf(mechanism)
+    more: Variables = ()
+    if options.payload is not None:
+        mechanism, load = with_payload(mechanism, options.payload, inertia=options.payload_inertia)
+        more += load
+    if options.tunable_gravity:
+        mechanism, g = with_gravity(mechanism)
+        more += g
+    parameters = (*tuple(p), *more)
+    made = mechanism.prepare(parameters)
+    eq, u = made.eq, tuple(mechanism.inputs)
+    _check(eq, mechanism)
+    T, offset, leads = _couplings(eq, made.q, parameters)
+    joints = tuple(made.q[i] for i in leads)
+    groups = [
+        tuple(
+            Variable(f"{stem}_{k}", unit.format(v.unit), doc=f"{what} of joint '{v.name}'",
+                     nominal=nominal, lower=-limit, upper=limit)
+            for k, v in enumerate(joints, start=1)
+        )
+        for stem, unit, what, nominal, limit in (
+            ("q", "{}", "coordinate", 1.0, 1e4),
+            ("qd", "{}/s", "velocity", 1.0, 1e3),
+            ("qdd", "{}/s^2", "acceleration", 5.0, 1e5),
+        )
+    ]  # fmt: skip
+    y, yd, ydd = (symbols_of(group) for group in groups)
+    T_sx = ca.SX(T)
+    return _Machine(
+        mechanism.name, eq, joints, tuple(v for group in groups for v in group), parameters,
+        [eq.q, eq.qd, eq.a, eq.lam, symbols_of(u)],
+        [T_sx @ y + offset, T_sx @ yd, T_sx @ ydd, ca.SX.zeros(eq.m), ca.SX(starts_of(u))],
+        T,
+    )  # fmt: skip
+
+
+def _check(eq: Equations, mechanism: Mechanism) -> None:
+    """Refuse what this recursion does not know.
+
+    Raises:
+        ValueError: with the names of joints and constraints.
+    """
+    where = f"{WHERE} of '{mechanism.name}'"
+    if eq.loops:
+        names = ", ".join(loop.joint.name for loop in eq.loops)
+        raise ValueError(
+            f"{where}: expected an open chain or tree, got loops that close in {names}, whose "
+            "multipliers share the load as more than the motion tells; `plant_block` and "
+            "`functions` take loops"
+        )
+    balls = [v.joint.name for v in eq.kin.topology.links if v.joint.quaternion is not None]
+    if balls:
+        raise ValueError(
+            f"{where}: expected joints that turn about or slide along axes, got Euler parameters "
+            f"in {', '.join(balls)}; a base that is given needs a Fixed joint or the ground"
+        )
+    everything = ca.veccat(eq.balance, *eq.normals, eq.phi)
+    if ca.depends_on(everything, eq.kin.t):
+        raise ValueError(f"{where}: expected forces and constraints without time, got some with it")
+    if ca.depends_on(stacked(eq.normals), eq.F):
+        pressed = [
+            c.joint for c, N in zip(eq.contacts, eq.normals, strict=True) if ca.depends_on(N, eq.F)
+        ]
+        raise ValueError(
+            f"{where}: expected normal forces that do not depend on friction, got that of "
+            f"{', '.join(dict.fromkeys(pressed))}, which other friction presses; give it a "
+            "constant normal force"
+        )
+
+
+def _couplings(eq: Equations, q: Variables, p: Variables) -> tuple[ca.DM, ca.DM, list[int]]:
+    """T, c and the coordinates that lead: all coordinates are T times those, plus c.
+
+    Raises:
+        ValueError: a constraint that is not linear in coordinates, or with a ratio that is no
+            number; constraints that say nothing about the coordinates that are left.
+    """
+    J = ca.jacobian(eq.phi, eq.q)
+    if not (J.is_constant() and ca.substitute(eq.phi, eq.q, ca.SX.zeros(eq.n)).is_constant()):
+        raise ValueError(
+            f"{WHERE}: expected constraints of constant ratios, numbers, got others; leave them "
+            "out, or take `plant_block`"
+        )
+    matrix = ca.DM(ca.densify(J)).full()
+    constant = ca.DM(ca.substitute(eq.phi, eq.q, ca.SX.zeros(eq.n))).full()
+    follows: list[int] = []
+    for row in matrix:
+        follows.append(max(i for i in range(eq.n) if row[i] != 0.0 and i not in follows))
+    leads = [i for i in range(eq.n) if i not in follows]
+    T, c = np.zeros((eq.n, len(leads))), np.zeros((eq.n, 1))
+    T[leads, range(len(leads))] = 1.0
+    if follows:
+        own = matrix[:, follows]
+        T[follows] = -np.linalg.solve(own, matrix[:, leads])
+        c[follows] = -np.linalg.solve(own, constant)
+    return ca.DM(ca.sparsify(ca.DM(T))), ca.DM(c), leads

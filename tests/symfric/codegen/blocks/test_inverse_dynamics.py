@@ -1,0 +1,263 @@
+"""Inverse dynamics: beside the functions of a mechanism, Pinocchio, energies and closed forms."""
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from robots import random_robot, rod
+
+from symfric import BrownMcPhee, Coulomb, ExactCoulomb, Leuven, LuGre
+from symfric.codegen import Block, generate, law_block, verify
+from symfric.codegen.blocks.inverse_dynamics import gravity_block, inverse_dynamics_block
+from symfric.multibody import (
+    GROUND,
+    JointFriction,
+    Mechanism,
+    PrescribedMotion,
+    Revolute,
+    Spherical,
+    functions,
+)
+from symfric.multibody.urdf.read import read_urdf
+from symfric.scenes import Arm, FourBar
+
+EASY = Coulomb(mu_d=1.0, v_eps=0.1)
+
+
+def call(block: Block, u: Any, states: Any = (), **parameters: float) -> tuple[Any, Any]:
+    """States after a step and outputs as arrays, with some parameters changed."""
+    p = [parameters.pop(v.name, float(v.start)) for v in block.parameters]
+    assert not parameters
+    following, y = block.step(ca.DM(states), p, u)
+    return following.full().ravel(), y.full().ravel()
+
+
+def moved(n: int, seed: int = 0) -> Any:
+    return np.random.default_rng(seed).normal(size=3 * n)
+
+
+def test_arm_is_its_function_with_friction_from_reactions():
+    arm = Arm(BrownMcPhee()).mechanism()
+    block = inverse_dynamics_block(arm, separate=True)
+    u = moved(6)
+    q, qd, a = np.split(u, 3)
+    expected = functions(arm)["inverse_dynamics"](q, qd, a, [], [], np.zeros(6), []).full().ravel()
+    bare = Arm(BrownMcPhee()).mechanism()
+    bare.joints = [type(j)(j.name, j.parent, j.child, j.start) for j in bare.joints]
+    free = functions(bare)["inverse_dynamics"](q, qd, a, [], [], np.zeros(6), []).full().ravel()
+    _, y = call(block, u)
+    assert y[:6] == pytest.approx(expected, rel=1e-12)
+    assert y[6:] == pytest.approx(expected - free, rel=1e-10, abs=1e-12)
+    assert [v.name for v in block.inputs][::6] == ["q_1", "qd_1", "qdd_1"]
+
+
+def test_parameters_of_one_joint_change_its_friction_alone():
+    block = inverse_dynamics_block(Arm(BrownMcPhee()).mechanism(), separate=True)
+    u = moved(6)
+    _, y = call(block, u)
+    _, more = call(block, u, mu_d_3=0.2, mu_s_3=0.3)
+    ratio = more[6:] / y[6:]
+    assert np.delete(ratio, 2) == pytest.approx(np.ones(5), rel=1e-12)
+    assert ratio[2] > 1.5
+    assert inverse_dynamics_block(Arm(BrownMcPhee()).mechanism(), fold=True).parameters == ()
+
+
+@pytest.mark.parametrize("inertia", [False, True])
+def test_payload_adds_the_forces_of_a_body(inertia):
+    """J_v' m (a - g) + J_w' (J dw + w x J w) in world components, by differences of poses."""
+    arm = Arm(BrownMcPhee()).mechanism()
+    arm.joints = [type(j)(j.name, j.parent, j.child, j.start) for j in arm.joints]
+    block = inverse_dynamics_block(arm, payload="link6.root", payload_inertia=inertia)
+    m, c, J = 3.0, np.array([0.1, -0.05, 0.2]), np.array([0.05, 0.06, 0.07, 0.01, -0.01, 0.005])
+    given = {"payload_m": m} | {f"payload_c_{k + 1}": x for k, x in enumerate(c)}
+    given |= {f"payload_J_{k + 1}": x for k, x in enumerate(J)} if inertia else {}
+    u = moved(6)
+    added = call(block, u, **given)[1] - call(block, u)[1]
+
+    q, qd, a = ca.SX.sym("q", 6), ca.SX.sym("qd", 6), ca.SX.sym("a", 6)
+    pose = functions(arm)["poses"](q, [])[:, -4:]
+    frame = next(f for place, f in arm.frames if place == "link6.root")
+    R = pose[:, :3] @ frame.R
+    p = pose[:, 3] + pose[:, :3] @ frame.p + R @ c
+    v = ca.jtimes(p, q, qd)
+    acceleration = ca.jtimes(v, q, qd) + ca.jtimes(v, qd, a) - ca.DM([0, 0, -9.81])
+    spin = ca.jtimes(R, q, qd) @ R.T
+    w = ca.vertcat(spin[2, 1], spin[0, 2], spin[1, 0])
+    dw = ca.jtimes(w, q, qd) + ca.jtimes(w, qd, a)
+    full = R @ ca.DM([[J[0], J[3], J[4]], [J[3], J[1], J[5]], [J[4], J[5], J[2]]]) @ R.T * inertia
+    torque = full @ dw + ca.cross(w, full @ w)
+    expected = m * ca.jacobian(p, q).T @ acceleration + ca.jacobian(w, qd).T @ torque
+    values = ca.Function("f", [q, qd, a], [expected])(*np.split(u, 3)).full().ravel()
+    assert added == pytest.approx(values, rel=1e-10)
+
+
+def test_power_is_the_rate_of_energy_and_what_friction_takes():
+    arm = Arm(BrownMcPhee()).mechanism()
+    block, energy = inverse_dynamics_block(arm, separate=True), functions(arm)["energy"]
+    q, qd, a = ca.SX.sym("q", 6), ca.SX.sym("qd", 6), ca.SX.sym("a", 6)
+    total = sum(energy(q, qd, []))
+    rate = ca.jtimes(total, q, qd) + ca.jtimes(total, qd, a)
+    of = ca.Function("rate", [q, qd, a], [rate])
+    for seed in range(5):
+        u = moved(6, seed)
+        _, y = call(block, u)
+        _, qd_now, _ = np.split(u, 3)
+        assert qd_now @ (y[:6] - y[6:]) == pytest.approx(float(of(*np.split(u, 3))), rel=1e-10)
+        assert (qd_now * y[6:] > 0).all()
+
+
+def test_gravity_holds_at_rest():
+    arm = Arm(BrownMcPhee()).mechanism()
+    q = moved(6)[:6]
+    _, at_rest = call(inverse_dynamics_block(arm), [*q, *np.zeros(12)])
+    _, holding = call(gravity_block(arm), q)
+    assert holding == pytest.approx(at_rest, rel=1e-12, abs=1e-12)
+    turned = gravity_block(arm, tunable_gravity=True)
+    _, above = call(turned, q, g_3=9.81)
+    assert above == pytest.approx(-holding, rel=1e-12, abs=1e-12)
+
+
+def test_bristles_make_the_step_of_their_law():
+    """Under a constant load a joint is the block of its law at the bearing's surface."""
+    law, radius = LuGre(), 0.05
+    m = Mechanism("joint")
+    m.body("rotor", 1.0, (0.1, 0.1, 0.1))
+    m.joint(Revolute("q", GROUND, "rotor", friction=JointFriction(law, radius, normal=20.0)))
+    block, alone = inverse_dynamics_block(m), law_block(law)
+    z, y = call(block, [0.3, 0.7, 2.0], [1e-6], N_1=30.0)
+    by_law, F = call(alone, [0.7 * radius, 30.0], [1e-6])
+    assert z == pytest.approx(by_law, rel=1e-14)
+    assert y[0] == pytest.approx(0.1 * 2.0 + radius * F[0], rel=1e-14)
+    assert [v.name for v in block.states] == ["z_1"]
+    sliding = block.reset("init_sliding")(z, [float(v.start) for v in block.parameters], [0, 1, 0])
+    assert float(sliding) == pytest.approx(0.1 * 20.0 / 1e5, rel=1e-6)
+
+
+def test_every_joint_has_states_of_its_own():
+    block = inverse_dynamics_block(Arm(LuGre()).mechanism(), h=1e-3)
+    assert [v.name for v in block.states] == [f"z_{k}" for k in range(1, 7)]
+    u = moved(6)
+    z, _ = call(block, u, np.zeros(6))
+    same, _ = call(block, u, [0, 0, z[2], 0, 0, 0])
+    assert np.flatnonzero(same != z).tolist() == [2]
+
+
+def test_fingers_that_mimic_are_moved_along():
+    text = (
+        '<robot name="grip"><link name="world"/>'
+        + "".join(
+            f'<link name="{n}"><inertial><origin xyz="0.1 0 0"/><mass value="{m}"/>'
+            '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+            f'<joint name="j{n}" type="revolute"><parent link="world"/><child link="{n}"/>'
+            f'<axis xyz="0 0 1"/>{mimic}</joint>'
+            for n, m, mimic in (
+                ("a", 1, ""),
+                ("b", 2, '<mimic joint="ja" multiplier="-2" offset="0.3"/>'),
+            )
+        )
+        + "</robot>"
+    )
+    block = inverse_dynamics_block(read_urdf(text))
+    assert [v.name for v in block.inputs] == ["q_1", "qd_1", "qdd_1"]
+    _, y = call(block, [0.2, 0.5, 1.5])
+    inertia = (0.1 + 1 * 0.01) + 4 * (0.1 + 2 * 0.01)
+    assert y == pytest.approx([inertia * 1.5], rel=1e-12)
+
+
+def ball() -> Mechanism:
+    m = Mechanism("ball")
+    m.body("bob", 1.0, (0.1, 0.1, 0.1), com=(0.0, 0.0, -1.0))
+    m.joint(Spherical("socket", GROUND, "bob"))
+    return m
+
+
+def rotor(law: Any) -> Mechanism:
+    m = Mechanism("rotor")
+    m.body("wheel", 1.0, (0.1, 0.1, 0.1))
+    m.joint(Revolute("hinge", GROUND, "wheel", friction=JointFriction(law, 0.1, normal=1.0)))
+    return m
+
+
+def driven() -> Mechanism:
+    m = rotor(BrownMcPhee())
+    m.constraint(PrescribedMotion("drive", "hinge", lambda t: t * t))
+    return m
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: FourBar(BrownMcPhee()).mechanism(), "open chain or tree, got loops that close in"),
+        (ball, "Euler parameters in socket"),
+        (lambda: rotor(ExactCoulomb()), "v and N alone, got ExactCoulomb"),
+        (lambda: rotor(Leuven()), "circle"),
+        (driven, "without time"),
+    ],
+)
+def test_what_it_cannot_do_is_refused_by_name(make, text):
+    with pytest.raises(ValueError, match=text):
+        inverse_dynamics_block(make())
+
+
+def test_wrong_places_are_refused():
+    arm = Arm(BrownMcPhee()).mechanism()
+    for place, text in (("hand", "a body or a frame"), ("root", "one of link1.root, link2.root"),
+                        ("ground.tip", "a body that moves")):  # fmt: skip
+        with pytest.raises(ValueError, match=text):
+            inverse_dynamics_block(arm, payload=place)
+    with pytest.raises(ValueError, match="with a payload only"):
+        inverse_dynamics_block(arm, payload_inertia=True)
+    with pytest.raises(ValueError, match="h: expected none"):
+        inverse_dynamics_block(arm, h=1e-3)
+
+
+def test_urdf_is_taken_as_text_and_a_tool_that_is_fixed_carries_the_load():
+    tool = (
+        '<link name="tool"/><joint name="flange" type="fixed"><parent link="arm"/>'
+        '<child link="tool"/><origin xyz="0 0 -0.5"/></joint></robot>'
+    )
+    block = inverse_dynamics_block(rod(**{"</robot>": tool}), payload="tool")
+    _, y = call(block, [0.4, 0.0, 0.0], payload_m=3.0)
+    assert y == pytest.approx([9.81 * np.sin(0.4) * (2 * 0.25 + 3 * 0.5)], rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_robots_are_those_of_pinocchio_with_a_payload(seed):
+    pin: Any = pytest.importorskip("pinocchio", reason="needs Pinocchio (extra urdf-check)")
+    text = random_robot(seed, n=5 + seed)
+    limit = '<limit lower="-9" upper="9" effort="9" velocity="9"/></joint>'
+    model = pin.buildModelFromXML(text.replace("</joint>", limit))
+    mechanism = read_urdf(text, law=EASY)
+    last = f"l{5 + seed}"
+    block = inverse_dynamics_block(mechanism, payload=last, payload_inertia=True, separate=True)
+    names = [v.name for v in mechanism.prepare().q]
+    n = len(names)
+    u = moved(n, seed)
+    frame = model.frames[model.getFrameId(last)]
+    c, J = [0.1, 0.2, -0.3], [0.3, 0.4, 0.5, 0.05, -0.04, 0.03]
+    tensor = np.array([[J[0], J[3], J[4]], [J[3], J[1], J[5]], [J[4], J[5], J[2]]])
+    load = pin.Inertia(2.5, np.array(c), tensor)
+    model.inertias[frame.parentJoint] += frame.placement.act(load)
+    q, qd, a = np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.nv)
+    rows = []
+    for i, name in enumerate(names):
+        joint = model.joints[model.getJointId(name)]
+        at = slice(joint.idx_q, joint.idx_q + joint.nq)
+        q[at] = u[i] if joint.nq == 1 else (np.cos(u[i]), np.sin(u[i]))
+        qd[joint.idx_v], a[joint.idx_v] = u[n + i], u[2 * n + i]
+        rows.append(joint.idx_v)
+    expected = pin.rnea(model, model.createData(), q, qd, a)[rows]
+    given = {f"payload_c_{k + 1}": x for k, x in enumerate(c)}
+    given |= {f"payload_J_{k + 1}": x for k, x in enumerate(J)}
+    _, y = call(block, u, payload_m=2.5, **given)
+    assert np.abs(y[:n] - y[n:] - expected).max() <= 1e-10 * np.abs(expected).max()
+
+
+@pytest.mark.heavy
+def test_c_is_verified(compiler, tmp_path):
+    block = inverse_dynamics_block(Arm(LuGre()).mechanism(), payload="link6.root")
+    found = verify(generate(block, tmp_path))
+    double, single = found.checks
+    assert (double.ulp, double.warnings, single.warnings) == (0, (), ())
+    assert single.error < 1e-5, found.table()
