@@ -1,0 +1,206 @@
+"""A friction compensator as a block: the force to add to that of a controller."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+
+from symfric.codegen import Block, law_block
+from symfric.codegen.blocks.from_law import in_turning, step_variable
+from symfric.compensation import stages
+from symfric.compensation.parts import Parts
+from symfric.compensation.settings import Compensation, chosen_settings, formula
+from symfric.compensation.terms import TERMS, Terms, terms
+from symfric.foundation import checks
+from symfric.laws import Law, law_name
+from symfric.laws.base.law import check_law
+from symfric.model import Output
+
+INPUTS = ("v_ref", "a_ref", "e", "v", "N", "enable")
+
+USE = (
+    "Call it once a sample, with what the controller knows at that sample, and add F to the force "
+    "that it commands.",
+    "F has the sign of the velocity: it pushes where friction brakes.",
+)
+OVER = (
+    "More than the friction that is there (a scale above 1, or a law that is too high) is negative "
+    "damping; where the desired velocity follows the position error the axis then hunts at rest."
+)
+
+
+def compensator(
+    law: Law,
+    *,
+    name: str | None = None,
+    h: float | None = None,
+    turning: bool = False,
+    settings: Compensation | None = None,
+    **chosen: Any,
+) -> Block:
+    """The block of a friction compensator: the force to add, in the units of the drive.
+
+        v_c = dead zone of the blend of v_ref + delay a_ref + error_gain e and v
+        F   = slew(limit(ramp [scaled law(v_c, N) + inertia a_ref + stick + dither]))
+
+    The law makes the step of `law_block`. Scales act on forces, never on its states, so that they
+    can be turned while the machine moves.
+
+    Limits: it adds what the law says. More than the friction that is there (a scale above 1, or a
+    law that is too high) is a negative damping: with `error_gain` the axis then hunts where it
+    should rest.
+
+    Args:
+        law: with numbers, with states or without, a function of v and N.
+        name: C identifier; default "friction_compensator".
+        h: sample time [s] as a constant; without it a parameter, by default 1 ms.
+        turning: units rad/s and N m.
+        settings: what it does, or the fields of `Compensation` by name.
+
+    Raises:
+        ValueError: bad input; a law with inputs beside v and N, or without a block; a build-up of a
+            law that has states of its own; unknown terms.
+    """
+    check_law("compensator", law)
+    where = f"compensator '{law_name(law)}'"
+    s = chosen_settings(where, settings, chosen)
+    if law.inputs:
+        names = ", ".join(i.name for i in law.inputs)
+        raise ValueError(f"{where}: expected a law of v and N only, got one with {names}")
+    inner = law_block(law, h=h if law.states else None)
+    found = terms(law, inner)
+    size = next((v for v in inner.parameters if v.name == "h"), step_variable(where, h))
+    duration = size.symbol if h is None else float(size.start)
+    own = tuple(v for v in inner.parameters if v is not size)
+    parts = Parts(states=inner.states, parameters=own)
+    parts, wanted, v = _velocity(parts, s)
+    moved = v
+    if s.dead_zone is not None:
+        parts, moved = stages.beyond_dead_zone(parts, v, s.dead_zone)
+    parts, N = _load(parts, s)
+    old, new = ca.vertcat(found.v, found.N), ca.vertcat(moved, N)
+    following = ca.substitute(inner.next, old, new)
+    parts = replace(parts, next=tuple(ca.vertsplit(following)) if inner.states else ())
+    parts, found = _built(parts, found, s, moved, duration, where)
+    parts, force = _scaled(parts, found, s, where)
+    force = ca.substitute(force, old, new)
+    parts, force = _added(parts, force, s, wanted, duration)
+    parts, more = _held(parts, s)
+    uses_h = h is None and ca.depends_on(ca.vertcat(force, *parts.next), size.symbol)
+    block = Block(
+        "friction_compensator" if name is None else name,
+        doc=f"Friction compensator: the force to add to that of a controller. {inner.doc}",
+        states=parts.states,
+        inputs=tuple(sorted(parts.inputs, key=lambda v: INPUTS.index(v.name))),
+        parameters=(*parts.parameters, size) if uses_h else parts.parameters,
+        next=ca.vertcat(ca.SX(0, 1), *parts.next),
+        outputs={"F": Output(force, "N", "force to add to that of the controller")} | more,
+        constants=dict(inner.constants) | ({} if h is None else {"h": float(size.start)}),
+        equations=f"{formula(s)}\n\n{inner.equations}",
+        discretisation=inner.discretisation,
+        use=USE,
+        limits=(OVER, *inner.limits),
+        sources=inner.sources,
+    )
+    return in_turning(block) if turning else block
+
+
+def _velocity(parts: Parts, s: Compensation) -> tuple[Parts, ca.SX, ca.SX]:
+    """The desired velocity, and the one that moves the law."""
+    wanted = v = ca.SX(0)
+    if s.velocity != "measured" or s.stick is not None:
+        parts, wanted = parts.given("v_ref", "m/s", "reference velocity", 0.1)
+    if s.delay is not None and s.velocity != "measured":
+        parts, a = parts.given("a_ref", "m/s^2", "reference acceleration")
+        parts, delay = parts.parameter("t_ahead", s.delay, "s", "look-ahead of the reference")
+        wanted = wanted + delay * a
+    if s.error_gain is not None:
+        parts, e = parts.given("e", "m", "position error, reference less measured", 1e-5)
+        parts, gain = parts.parameter("k_error", s.error_gain, "1/s", "set velocity over error")
+        wanted = wanted + gain * e
+    if s.velocity != "reference" or s.stick is not None:
+        parts, v = parts.given("v", "m/s", "measured velocity", 0.1)
+    if s.velocity == "blend":
+        parts, blend = stages.blended(parts, wanted, v, s.v_blend)
+        return parts, wanted, blend
+    return parts, wanted, wanted if s.velocity == "reference" else v
+
+
+def _load(parts: Parts, s: Compensation) -> tuple[Parts, ca.SX]:
+    """The normal force, an input or a parameter."""
+    if isinstance(s.N, str):
+        return parts.given("N", "N", "normal force", 10.0, lower=0.0)
+    return parts.parameter("N", s.N, "N", "normal force")
+
+
+def _built(
+    parts: Parts, found: Terms, s: Compensation, v: ca.SX, h: ca.SX | float, where: str
+) -> tuple[Parts, Terms]:
+    """The terms with dry friction that builds up over a way, where that is chosen."""
+    if s.build_up is None:
+        return parts, found
+    if found.law.states:
+        raise ValueError(
+            f"{where}: build_up: expected a law without states, got one whose states build friction"
+            " up over a way of their own"
+        )
+    parts, b = stages.built_up(parts, v, h, s.build_up, s.build_up_table)
+    return parts, found.one_sided(b)
+
+
+def _scaled(parts: Parts, found: Terms, s: Compensation, where: str) -> tuple[Parts, ca.SX]:
+    """The force of the law with the scales of its terms."""
+    checks.check_names(f"{where}: without", s.without, found.names)
+    asked = s.scales
+    if asked is None:
+        left = [n for n in found.names if n != "bristle" and n not in s.without]
+        asked = dict.fromkeys(left, 1.0)
+    elif not isinstance(asked, Mapping):
+        asked = dict.fromkeys(asked, 1.0)
+    checks.check_names(f"{where}: scales", asked, found.names)
+    twice = sorted({*asked} & {*s.without})
+    if twice:
+        raise ValueError(f"{where}: expected terms in scales or in without, got both for {twice}")
+    scales: dict[str, ca.SX | float] = dict.fromkeys(s.without, 0.0)
+    for term, start in asked.items():
+        parts, scales[term] = parts.parameter(f"scale_{term}", start, "1", f"scale: {TERMS[term]}")
+    return parts, found.scaled(scales)
+
+
+def _held(parts: Parts, s: Compensation) -> tuple[Parts, dict[str, Output]]:
+    """The output that stops the integrator of the controller, where that is chosen."""
+    if s.hold is None:
+        return parts, {}
+    parts, v_ref = parts.given("v_ref", "m/s", "reference velocity", 0.1)
+    parts, e = parts.given("e", "m", "position error, reference less measured", 1e-5)
+    parts, v = parts.given("v", "m/s", "measured velocity", 0.1)
+    parts, band = parts.parameter("e_hold", s.hold[0], "m", "error that is small enough to rest")
+    parts, slow = parts.parameter("v_hold", s.hold[1], "m/s", "slower than this is rest")
+    small = (ca.fabs(e) <= band, ca.fabs(v_ref) <= slow, ca.fabs(v) <= slow)
+    rests = ca.if_else(ca.logic_and(ca.logic_and(*small[:2]), small[2]), 1, 0)
+    return parts, {"hold": Output(rests, "1", "1: stop the integrator of the controller")}
+
+
+def _added(
+    parts: Parts, force: ca.SX, s: Compensation, wanted: ca.SX, h: ca.SX | float
+) -> tuple[Parts, ca.SX]:
+    """The force of the law with all that is added, and within its limits."""
+    if s.inertia is not None:
+        parts, a = parts.given("a_ref", "m/s^2", "reference acceleration")
+        parts, mass = parts.parameter("inertia", s.inertia, "kg", "mass that a_ref is times")
+        force = force + mass * a
+    if s.stick is not None:
+        parts, v = parts.given("v", "m/s", "measured velocity", 0.1)
+        parts, more = stages.freed(parts, wanted, v, h, *s.stick)
+        force = force + more
+    if s.dither is not None:
+        parts, more = stages.dithered(parts, h, *s.dither)
+        force = force + more
+    if s.ramp is not None:
+        parts, force = stages.ramped(parts, force, h, s.ramp)
+    if s.limit is not None:
+        parts, force = stages.limited(parts, force, s.limit)
+    if s.slew is not None:
+        parts, force = stages.slowed(parts, force, h, s.slew)
+    return parts, force

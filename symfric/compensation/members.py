@@ -1,0 +1,127 @@
+"""Many members of one block that go step by step together: the generated C itself, or the VM."""
+
+import ctypes
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.codegen import Block, generate
+from symfric.codegen.running.compiler import FLAGS
+from symfric.codegen.writing.layout import prefix
+from symfric.emitter.c99 import REALS
+from symfric.foundation import checks
+from symfric.foundation.compiler import CompileError, Compiler
+from symfric.foundation.files import write_text
+
+Array = NDArray[np.float64]
+
+GLUE = """#include "{name}.h"
+
+void members(long count, {real} *state, const {real} *param, const {real} *in, {real} *out);
+
+void members(long count, {real} *state, const {real} *param, const {real} *in, {real} *out)
+{{
+    for (long i = 0; i < count; i++) {{
+        {call};
+    }}
+}}
+"""
+
+
+@final
+class Members:
+    """Blocks side by side; rows are members, and the arrays may be written between steps.
+
+    Attributes:
+        block: what they are.
+        state, param, input, output: shapes (members, ...), in the order of the block.
+    """
+
+    def __init__(
+        self,
+        block: Block,
+        values: Sequence[Mapping[str, float]],
+        real: str = "double",
+        compiler: Compiler | None = None,
+    ) -> None:
+        """`values` has the parameters of each member that are not the default.
+
+        Raises:
+            ValueError: unknown parameters.
+            CompileError: the compiler refuses the C, or what it made does not load here.
+        """
+        self.block, count = block, len(values)
+        kind: Any = np.float32 if real == "float" else np.float64
+        self.state = np.tile(np.array([v.start for v in block.states], kind), (count, 1))
+        self.param = np.tile(np.array([v.start for v in block.parameters], kind), (count, 1))
+        self.input = np.zeros((count, len(block.inputs)), kind)
+        self.output = np.zeros((count, len(block.outputs)), kind)
+        self.inputs = {v.name: self.input[:, i] for i, v in enumerate(block.inputs)}
+        self.outputs = {name: self.output[:, i] for i, name in enumerate(block.outputs)}
+        names = [v.name for v in block.parameters]
+        for row, own in zip(self.param, values, strict=True):
+            for name, value in checks.named(f"block '{block.name}'", own, names).items():
+                row[names.index(name)] = checks.number(f"block '{block.name}': {name}", value)
+        self.step = self._in_c(real, compiler) if compiler else self._in_vm()
+
+    def _in_c(self, real: str, compiler: Compiler) -> Any:
+        kind = REALS[real]
+        name = prefix(self.block, kind)
+        with TemporaryDirectory(prefix="symfric-") as folder:
+            generate(self.block, folder, real=real)
+            glue, library = Path(folder) / "members.c", Path(folder) / "members.so"
+            write_text(glue, GLUE.format(name=name, real=kind.name, call=self._call(name)))
+            sources = [str(Path(folder) / f"{name}.c"), str(glue)]
+            compiler.run(*FLAGS, "-shared", "-fPIC", *sources, "-o", str(library), "-lm")
+            try:
+                found = ctypes.CDLL(str(library))["members"]
+            except OSError as error:
+                raise CompileError(f"the library does not load on this machine: {error}") from None
+        found.restype = None
+        arrays = (self.state, self.param, self.input, self.output)
+        given = [ctypes.c_long(len(self.state)), *(ctypes.c_void_p(a.ctypes.data) for a in arrays)]
+        return lambda: found(*given)
+
+    def _call(self, name: str) -> str:
+        sizes = {
+            "state": self.state.shape[1],
+            "param": self.param.shape[1],
+            "in": self.input.shape[1],
+            "out": self.output.shape[1],
+        }
+        own = {
+            group: f"({'const ' * (group in ('param', 'in'))}{name}_{group}_t *)({group} + {n} * i)"
+            for group, n in sizes.items()
+            if n
+        }
+        idle = "".join(f"(void){group}; " for group in sizes if group not in own)
+        if not self.block.is_function:
+            return f"{idle}{name}_step({', '.join(own.values())})"
+        given = [f"in[{sizes['in']} * i + {k}]" for k in range(sizes["in"])]
+        if "param" in own:
+            given.append(own["param"])
+        return f"{idle}out[i] = {name}({', '.join(given)})"
+
+    def _in_vm(self) -> Any:
+        step = self.block.step.map(len(self.state))
+        buffer: Any
+        buffer, evaluate = step.buffer()
+        # CasADi's columns are the rows of the arrays
+        arrays = [np.array(a, float) for a in (self.state, self.param, self.input)]
+        results = [np.zeros(a.shape) for a in (self.state, self.output)]
+        for place, group in ((buffer.set_arg, arrays), (buffer.set_res, results)):
+            for i, array in enumerate(group):
+                if array.size:
+                    place(i, array.data)
+
+        def go(alive: object = step) -> None:
+            for own, given in zip(arrays, (self.state, self.param, self.input), strict=True):
+                own[:] = given
+            evaluate()
+            self.state[:], self.output[:] = results
+
+        return go

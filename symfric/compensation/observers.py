@@ -1,0 +1,323 @@
+"""Observers of friction as blocks: its states by a law and an error, or the force by a mass."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import casadi as ca
+
+from symfric.codegen import Block, law_block
+from symfric.codegen.blocks.from_law import in_turning, step_variable
+from symfric.codegen.blocks.held_step import held_step
+from symfric.compensation import stages
+from symfric.compensation.parts import Parts
+from symfric.foundation import checks
+from symfric.foundation.parameters import parameters, with_values
+from symfric.laws import GMS, Law, LuGre, LuGreNormalised, LuGrePassive, law_name
+from symfric.laws.base import smooth
+from symfric.laws.base.law import check_law
+from symfric.model import Output
+
+USE = (
+    "Call it once a sample and add F to the force that the controller commands.",
+    "e is the position error, reference less measured, in the direction of v.",
+)
+Corrected = tuple[ca.SX, ca.SX]
+"""States after the step, and the mean force."""
+ESTIMATE = "estimated friction force, to add to that of the controller; mean over the step"
+
+
+@dataclass(frozen=True, eq=False)
+class At:
+    """Where a step begins: velocity, load, states, gain times error, step size."""
+
+    v: ca.SX
+    N: ca.SX
+    z: ca.SX
+    push: ca.SX
+    h: ca.SX | float
+
+
+def lugre_observer(
+    law: LuGre | LuGreNormalised | LuGrePassive,
+    gain: float,
+    *,
+    N: float = 1.0,
+    ramp: float | None = 0.1,
+    limit: float | None = None,
+    h: float | None = None,
+    name: str | None = None,
+    turning: bool = False,
+) -> Block:
+    """The bristle deflection of LuGre friction, observed by the position error of a loop.
+
+        dz/dt = v - sigma_0 |v| z / g(v) + k e,   |z| <= mu_s N / sigma_0
+        F     = sigma_0 z + sigma_1 dz/dt + sigma_2 v
+
+    e is the position error, reference less measured. The step is exact for held v and e (see
+    `law_block`) and z is held in the set that the law itself never leaves, so that F is bounded for
+    every gain, error and step size.
+
+    Stability: with F added to the force of a linear controller on a mass m, position and friction
+    error go to zero if (sigma_1 s + sigma_0) / (m s^2 + k_v s + k_p) is strictly positive real,
+    that is if sigma_1 k_v > sigma_0 m, for any k > 0 (Canudas de Wit et al. 1995, in continuous
+    time). A loop with a sample time, a delay or an integrator bounds k; k = 0 is the compensator.
+
+    Args:
+        law: with numbers.
+        gain: k [1/s].
+        N: normal force [N], a parameter of the C.
+        ramp: time [s] of fading in and out at the input `enable`; None: no such input.
+        limit: largest force [N].
+        h: sample time [s] as a constant; without it a parameter, by default 1 ms.
+        name: C identifier; default "lugre_observer".
+        turning: units rad/s and N m.
+
+    Raises:
+        ValueError: bad input, another law.
+
+    Source: Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE TAC 40(3), 1995, section V; the bound
+    on z is constructed.
+    """
+    kinds: tuple[type[Law], ...] = (LuGre, LuGreNormalised, LuGrePassive)
+    where = _check("lugre_observer", law, kinds, "LuGre()", gain)
+
+    def corrected(known: Law, at: At) -> Corrected:
+        v, load, push, size = at.v, at.N, at.push, at.h
+        p, z, normalised = vars(known), at.z[0], isinstance(known, LuGreNormalised)
+        of_load = load if normalised else 1.0
+        most = p["mu_s"] * (1.0 if normalised else load) / p["sigma_0"]
+        rate = ca.SX(known.rate(v, load, at.z)) + push
+        step = held_step(rate, at.z, size, ca.SX(1, 1), where)
+        end, mean = ca.SX(smooth.clip(step.end, -most, most)), smooth.clip(step.mean, -most, most)
+        damping = p["sigma_1"]
+        if isinstance(known, LuGrePassive):
+            damping = damping * ca.exp(-((v / p["v_d"]) ** 2))
+        force = p["sigma_0"] * mean + damping * (end - z) / size + p["sigma_2"] * v
+        return end, ca.SX(force * of_load)
+
+    doc = "Observer of the bristle deflection by the position error."
+    formula = "dz/dt of the law + k_e e, |z| <= mu_s N / sigma_0"
+    called = "lugre_observer" if name is None else name
+    setup = Setup(called, doc, formula, gain, "1/s", N, ramp, limit)
+    return _observer(law, setup, corrected, h, turning, where)
+
+
+def gms_observer(
+    law: GMS,
+    gain: float,
+    *,
+    N: float = 1.0,
+    ramp: float | None = 0.1,
+    limit: float | None = None,
+    h: float | None = None,
+    name: str | None = None,
+    turning: bool = False,
+) -> Block:
+    """The spring forces of GMS friction, observed by the position error of a loop.
+
+        F_i+ = F_i of the law after the step + h k e k_i / (k_1 + k_2 + ...),   |F_i| <= a_i mu_s N
+        F    = F_1 + F_2 + ... + sigma_2 v
+
+    e is the position error, reference less measured; the correction is shared by stiffness, as a
+    displacement of all springs by k e h / sum k_i would be. Modes are those of the law. The forces
+    are held in the set that they never leave in the law, so that F is bounded for every gain,
+    error and step size. With one element and k / k_1 for its gain it is the observer of LuGre for
+    C -> inf in the limit of small steps; there is no proof of stability for more elements, and
+    tests in the loop stand for it.
+
+    Args:
+        law: form = "event", whose step is known exactly.
+        gain: k [N/(m s)].
+        N, ramp, limit, h, name, turning: as for `lugre_observer`.
+
+    Raises:
+        ValueError: bad input, another law or form.
+
+    Source: the law Al-Bender, Lampaert, Swevers, IEEE TAC 50(11), 2005; the correction is
+    constructed after the observer of LuGre.
+    """
+    where = _check("gms_observer", law, (GMS,), "GMS(form='event')", gain)
+    if law.form != "event":
+        raise checks.refused(f"{where}: form", "'event', whose step is known", law.form)
+
+    def corrected(known: Law, at: At) -> Corrected:
+        v, load, push, size = at.v, at.N, at.push, at.h
+        step = known.held_step(v, load, at.z, size)
+        if step is None or not isinstance(known, GMS):
+            raise checks.refused(where, "a law that knows its step", known)
+        end, mean = ca.SX(step[0]), ca.SX(step[1])
+        total = sum(element.k for element in known.elements)
+        force = known.sigma_2 * v
+        for i, (element, share) in enumerate(zip(known.elements, known.shares(), strict=True)):
+            more, most = size * push * element.k / total, share * known.mu_s * load
+            end[i] = smooth.clip(end[i] + more, -most, most)
+            force = force + smooth.clip(mean[i] + more / 2, -most, most)
+        return end, ca.SX(force)
+
+    doc = "Observer of the spring forces by the position error."
+    formula = "F_i+ = F_i of the law + h k_e e k_i / (k_1 + k_2 + ...), |F_i| <= alpha_i mu_s N"
+    called = "gms_observer" if name is None else name
+    setup = Setup(called, doc, formula, gain, "N/(m s)", N, ramp, limit)
+    return _observer(law, setup, corrected, h, turning, where)
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What observers of states share: texts, gain, load, and what is done to the force."""
+
+    name: str
+    doc: str
+    equations: str
+    gain: float
+    unit: str
+    N: float
+    ramp: float | None
+    limit: float | None
+
+
+def _check(what: str, law: object, kinds: tuple[type[Law], ...], such_as: str, gain: object) -> str:
+    check_law(what, law)
+    if not isinstance(law, kinds):
+        raise checks.refused(what, f"a law such as {such_as}", law)
+    where = f"{what} '{law_name(law)}'"
+    checks.number(f"{where}: gain", gain, lower=0.0)
+    return where
+
+
+def _observer(
+    law: Law,
+    setup: Setup,
+    corrected: Callable[[Law, At], Corrected],
+    h: float | None,
+    turning: bool,
+    where: str,
+) -> Block:
+    """The block of an observer of the states of `law`."""
+    inner = law_block(law, h=h)
+    known = parameters(law)
+    own = {p.name: p.symbol for p in inner.parameters if p.name in known}
+    size = next((p for p in inner.parameters if p.name == "h"), None)
+    duration = float(inner.constants["h"]) if size is None else size.symbol
+    v = inner.inputs[0]
+    parts = Parts(inner.states, (v,), tuple(p for p in inner.parameters if p is not size))
+    parts, e = parts.given("e", "m", "position error, reference less measured", 1e-5)
+    parts, k = parts.parameter("k_e", setup.gain, setup.unit, "gain of the error")
+    load = checks.number(f"{where}: N", setup.N, unit="N", lower=0.0)
+    parts, constant = parts.parameter("N", load, "N", "normal force")
+    z = ca.vertcat(*(state.symbol for state in inner.states))
+    at = At(v.symbol, constant, z, k * e, duration)
+    end, force = corrected(with_values(law, own), at)
+    parts = replace(parts, next=tuple(ca.vertsplit(end)))
+    parts, force = _finished(parts, force, setup.ramp, setup.limit, duration, where)
+    block = Block(
+        setup.name,
+        doc=f"{setup.doc} {inner.doc}",
+        equations=f"{setup.equations}\n\n{inner.equations}",
+        discretisation=inner.discretisation,
+        use=USE,
+        limits=inner.limits,
+        sources=inner.sources,
+        states=parts.states,
+        inputs=parts.inputs,
+        parameters=parts.parameters + (() if size is None else (size,)),
+        next=ca.vertcat(*parts.next),
+        outputs={"F": Output(force, "N", ESTIMATE)},
+        constants=inner.constants,
+    )
+    return in_turning(block) if turning else block
+
+
+def _finished(
+    parts: Parts,
+    force: ca.SX,
+    ramp: float | None,
+    limit: float | None,
+    h: ca.SX | float,
+    where: str,
+) -> tuple[Parts, ca.SX]:
+    """The force faded in and limited, where that is chosen."""
+    if ramp is not None:
+        ramp = checks.number(f"{where}: ramp", ramp, unit="s", above=0.0)
+        parts, force = stages.ramped(parts, force, h, ramp)
+    if limit is not None:
+        limit = checks.number(f"{where}: limit", limit, unit="N", lower=0.0)
+        parts, force = stages.limited(parts, force, limit)
+    return parts, force
+
+
+def disturbance_observer(
+    mass: float,
+    bandwidth: float,
+    *,
+    order: int = 1,
+    ramp: float | None = 0.1,
+    limit: float | None = None,
+    h: float | None = None,
+    name: str | None = None,
+    turning: bool = False,
+) -> Block:
+    """All that opposes the force of a drive beside its mass, by what its velocity should be.
+
+        d = Q(s) [u - m s v],   Q = (w / (s + w))^order,   F = d
+
+    u is the force that acted up to this sample (delayed as the drive delays it), v the velocity
+    measured now. In steps
+
+        f  = u - m (v - v before) / h          mean of what opposes over the last interval
+        d+ = d + (1 - exp(-w h)) (f - d)       once for each order
+
+    f is the balance of impulse, exact for a held force; the filter is bounded for every h. No law
+    is needed; it lags by order / w and so comes late after a reversal, where a law knows before.
+
+    Stability: with F added to the force, the loop of observer and mass M is stable for every w, h
+    and delay of the drive if 0 < m < 2 M: its open loop is Q (1 - m/M), below one then (small
+    gain). Velocity from an encoder brings noise of m count / h^2 times (1 - exp(-w h))^order, and a
+    filter or delay on it alone bounds w: keep w below a fifth of the inverse of that lag.
+
+    Args:
+        mass: m [kg].
+        bandwidth: w [rad/s].
+        order: of Q, 1 or 2.
+        ramp, limit, h, name, turning: as for `lugre_observer`; default name "disturbance_observer".
+
+    Raises:
+        ValueError: bad input.
+
+    Source: Ohnishi, Shibata, Murakami, IEEE/ASME Trans. Mechatronics 1(1), 1996 (Q filter of order
+    1); the balance of impulse in place of a filtered derivative is constructed.
+    """
+    where = "disturbance_observer"
+    mass = checks.number(f"{where}: mass", mass, unit="kg", above=0.0)
+    bandwidth = checks.number(f"{where}: bandwidth", bandwidth, unit="rad/s", above=0.0)
+    order = checks.count(f"{where}: order", order, least=1, most=2)
+    size = step_variable(where, h)
+    duration = size.symbol if h is None else float(size.start)
+    parts, u = Parts().given("u", "N", "force that acted since the last call")
+    parts, v = parts.given("v", "m/s", "measured velocity", 0.1)
+    parts, m = parts.parameter("m", mass, "kg", "mass", lower=1e-12)
+    parts, w = parts.parameter("w", bandwidth, "rad/s", "bandwidth of the filter")
+    parts, before = parts.state("v_before", "m/s", "velocity at the last call", 0.1)
+    parts = parts.following(v)
+    force = u - m * (v - before) / duration
+    for k in range(order):
+        parts, d = parts.state(f"d_{k + 1}", "N", "filtered force")
+        force = d + (1 - ca.exp(-w * duration)) * (force - d)
+        parts = parts.following(force)
+    parts, force = _finished(parts, force, ramp, limit, duration, where)
+    block = Block(
+        where if name is None else name,
+        doc="Disturbance observer: what opposes the force of a drive beside its mass.",
+        equations=(
+            "f  = u - m (v - v_before) / h\n"
+            f"d+ = d + (1 - exp(-w h)) (f - d){', twice' if order == 2 else ''}\nF  = d+"
+        ),
+        discretisation="The balance of impulse over the last interval, and an exact filter of it.",
+        use=("Call it once a sample and add F to the force that the controller commands.",),
+        states=parts.states,
+        inputs=parts.inputs,
+        parameters=parts.parameters + ((size,) if h is None else ()),
+        next=ca.vertcat(*parts.next),
+        outputs={"F": Output(force, "N", "estimated opposing force, to add to that commanded")},
+        constants={} if h is None else {"h": float(h)},
+    )
+    return in_turning(block) if turning else block

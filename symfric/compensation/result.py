@@ -1,0 +1,229 @@
+"""What became of a position loop with friction, without compensation and with it."""
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.compensation.reference import Reference
+from symfric.foundation import checks
+from symfric.foundation.files import written
+from symfric.foundation.panels import panels, save
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+WITHOUT = "without"
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """One loop; arrays have an entry for each of n samples, position and velocity one more.
+
+    Attributes:
+        name: of the case.
+        reference: what it was to follow.
+        x, v: true position [m] and velocity [m/s] at the samples and at the end.
+        force: that acted after each sample [N].
+        added: what the compensation asked for at each sample [N].
+        limit: largest force [N].
+        ended: why it ended early; empty if it did not.
+    """
+
+    name: str
+    reference: Reference
+    x: Array
+    v: Array
+    force: Array
+    added: Array
+    limit: float
+    ended: str = ""
+
+    @property
+    def t(self) -> Array:
+        """Times of the samples [s]."""
+        return self.reference.t[: self.force.size]
+
+    @property
+    def error(self) -> Array:
+        """Reference less true position [m]."""
+        return self.reference.x[: self.force.size] - self.x[: self.force.size]
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean square of the error [m], from the second tenth of the time on."""
+        return float(np.sqrt(np.mean(self._late**2)))
+
+    @property
+    def peak(self) -> float:
+        """Largest error [m], from the second tenth of the time on."""
+        return float(np.abs(self._late).max(initial=0.0))
+
+    @property
+    def hunting(self) -> float:
+        """How far the position goes to and fro [m] in the second half of the last rest.
+
+        NaN where the reference does not rest at the end, or the loop ended early.
+        """
+        rest = self.reference.rest
+        return np.nan if rest is None or self.ended else float(np.ptp(self.x[:-1][rest]))
+
+    @property
+    def work(self) -> float:
+        """Work of the force [J], exact for a force that is held."""
+        return float(self.force @ np.diff(self.x))
+
+    @property
+    def saturated(self) -> float:
+        """Share of the samples with the largest force."""
+        return float(np.mean(np.abs(self.force) >= self.limit))
+
+    @property
+    def _late(self) -> Array:
+        return self.error[self.force.size // 10 :]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Loops on the same plant and reference; the first is without compensation.
+
+    Attributes:
+        plant: its name.
+        reference: what the loops were to follow.
+        loops: case -> loop.
+        count: of the encoder [m].
+        engine: what computed the blocks.
+    """
+
+    plant: str
+    reference: Reference
+    loops: Mapping[str, Loop]
+    count: float
+    engine: str
+
+    def __getitem__(self, name: str) -> Loop:
+        checks.check_names("comparison", [name], self.loops)
+        return self.loops[name]
+
+    def reduction(self, name: str) -> float:
+        """How many times smaller the RMS error of a case is than without compensation."""
+        own = self[name].rms
+        return self[WITHOUT].rms / own if own else np.inf
+
+    def remarks(self) -> tuple[str, ...]:
+        """What a case does that nobody wants, one sentence each."""
+        found: list[str] = []
+        before = self[WITHOUT]
+        for loop in self.loops.values():
+            if loop.ended:
+                found.append(f"{loop.name}: {loop.ended}")
+            if loop.hunting >= self.count:
+                counts = loop.hunting / self.count
+                found.append(f"{loop.name}: hunts at rest, {counts:.3g} counts to and fro")
+            if loop is not before and loop.rms > before.rms:
+                found.append(f"{loop.name}: the error is larger than without compensation")
+            if loop is not before and loop.hunting > max(before.hunting, self.count):
+                found.append(f"{loop.name}: hunts more than without compensation")
+            if loop.saturated:
+                found.append(f"{loop.name}: {loop.saturated:.1%} of the samples at the limit")
+        return tuple(found)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """A row a case, as plain data."""
+        return [
+            {
+                "case": loop.name,
+                "rms_error_m": loop.rms,
+                "peak_error_m": loop.peak,
+                "reduction": self.reduction(loop.name),
+                "hunting_m": loop.hunting,
+                "work_J": loop.work,
+                "peak_added_N": float(np.abs(loop.added).max(initial=0.0)),
+                "saturated": loop.saturated,
+                "ended": loop.ended,
+            }
+            for loop in self.loops.values()
+        ]
+
+    def table(self) -> str:
+        """A few lines of text: errors in micrometres, the hunting in counts."""
+        width = max(len(name) for name in self.loops)
+        head = f"{'case':<{width}}  {'RMS [um]':>9} {'peak [um]':>10} {'smaller':>8} "
+        lines = [
+            f"plant '{self.plant}', {self.reference.t[-1]:.3g} s, blocks as {self.engine}",
+            head + f"{'hunting [counts]':>17} {'work [J]':>9} {'added [N]':>9}",
+        ]
+        for row in self.rows():
+            hunting = row["hunting_m"] / self.count
+            lines.append(
+                f"{row['case']:<{width}}  {1e6 * row['rms_error_m']:>9.4g} "
+                f"{1e6 * row['peak_error_m']:>10.4g} {row['reduction']:>8.3g} "
+                f"{'-' if np.isnan(hunting) else f'{hunting:.3g}':>17} "
+                f"{row['work_J']:>9.3g} {row['peak_added_N']:>9.3g}"
+            )
+        return "\n".join([*lines, *(f"! {remark}" for remark in self.remarks())])
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write a row a sample: time, reference, and position, force and compensation of all."""
+        columns: dict[str, Array] = {"t [s]": self.reference.t, "reference [m]": self.reference.x}
+        for name, loop in self.loops.items():
+            columns |= {
+                f"x ({name}) [m]": loop.x[:-1],
+                f"force ({name}) [N]": loop.force,
+                f"added ({name}) [N]": loop.added,
+            }
+        size = min(column.size for column in columns.values())
+        with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(columns)
+            writer.writerows(np.column_stack([c[:size] for c in columns.values()]).tolist())
+
+    def plot(self, *names: str, path: str | Path | None = None) -> "Figure":
+        """Position, error, force and what is added over time, and beside it the first reversal.
+
+        Args:
+            names: cases to show, by default all.
+            path: image file.
+        """
+        checks.check_names("comparison", names, self.loops)
+        shown: Sequence[Loop] = [self.loops[n] for n in names] or list(self.loops.values())
+        figure, axes = panels(5, height=1.6, shared=False)
+        window = self._reversal()
+        near = slice(window.start, window.stop)
+        axes[0].plot(self.reference.t, 1e3 * self.reference.x, "k--", lw=0.8, label="reference")
+        for number, loop in enumerate(shown):
+            t, n, colour = loop.t, loop.force.size, f"C{number}"
+            axes[0].plot(t, 1e3 * loop.x[:n], label=loop.name, color=colour, lw=1.0)
+            axes[1].plot(t, 1e6 * loop.error, color=colour, lw=1.0)
+            axes[2].step(t, loop.force, where="post", color=colour, lw=1.0)
+            axes[3].step(t, loop.added, where="post", color=colour, lw=1.0)
+            axes[4].plot(t[near], 1e6 * loop.error[near], color=colour, lw=1.0)
+        for axis, label in zip(
+            axes, ("x [mm]", "error [um]", "force [N]", "added [N]", "error [um]"), strict=True
+        ):
+            axis.set_ylabel(label)
+        for axis in axes[1:4]:
+            axis.sharex(axes[0])
+        axes[4].set_title("at a reversal" if self.reference.rest is None else "at rest", fontsize=9)
+        axes[4].set_xlabel("t [s]")
+        axes[0].legend(fontsize="small", ncols=3)
+        axes[0].set_title(f"plant '{self.plant}'")
+        figure.align_ylabels(axes)
+        return save(figure, path)
+
+    def _reversal(self) -> range:
+        """Samples around the last reversal of the reference, or the rest at its end."""
+        rest = self.reference.rest
+        size = self.reference.x.size
+        if rest is not None:
+            return range(int(rest.start), size)
+        turns = np.flatnonzero(np.diff(np.sign(self.reference.v[1:])) != 0)
+        middle = int(turns[-1]) if turns.size else size // 2
+        return range(max(0, middle - size // 30), min(size, middle + size // 15))

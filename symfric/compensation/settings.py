@@ -1,0 +1,168 @@
+"""What a friction compensator does: settings, their checks, and the formula they make."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, final
+
+import numpy as np
+
+from symfric.compensation.terms import TERMS
+from symfric.foundation import checks
+
+VELOCITIES = ("blend", "reference", "measured")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Compensation:
+    """What a friction compensator does; what is None or empty is not in its C at all.
+
+    Every number is a parameter of the C that can be changed while it runs.
+
+    Attributes:
+        velocity: what moves the law: "blend" is the desired velocity while the measured one is
+            below `v_blend` and the measured one beyond twice that; "reference" or "measured" are
+            one of them alone. A law that sees measured velocity takes damping from the loop, and
+            noise; one that sees the reference compensates what ought to be.
+        v_blend: [m/s]; several counts of the encoder a sample, and several v_s of the law.
+        N: normal force [N], a parameter of the C; "input" makes it an input. With a law whose
+            coefficients are forces it is 1.
+        scales: terms of friction whose scale, 0 to 1, can be set: names of `TERMS`, or start values
+            by name. By default all that the law has, but "bristle", with start value 1.
+        without: terms that are left out.
+        error_gain: [1/s]; the desired velocity is v_ref + error_gain e, e the position error
+            (reference less measured), as the set velocity of a cascade is. Without it there is
+            nothing at rest that would break a standing error away. Give it the position gain.
+        hold: (error [m], velocity [m/s]): an output `hold` that is 1 where reference and axis are
+            slower than the velocity and the error is smaller, else 0. Stop the integrator of the
+            controller on it: an axis that breaks away jumps, and one whose jump is longer than a
+            count hunts for ever if the integrator never rests.
+        dead_zone: velocities up to this [m/s] count as rest.
+        build_up: way [m] over which friction builds up after a reversal, of a law without states.
+        build_up_table: its shape: (share of the way, share of the force), from (0, 0) to (1, 1).
+        inertia: mass [kg] times the reference acceleration is added, too.
+        delay: time [s] by which the reference is looked ahead with its acceleration: the lag of the
+            drive, and half a step of the law.
+        stick: (force [N], time [s], velocity [m/s]): added while the reference moves and the axis,
+            slower than this, does not; it comes and goes over the time.
+        dither: (amplitude [N], frequency [Hz]) of a sine.
+        ramp: time [s] of fading in and out at the input `enable`; None: no such input.
+        limit: largest force [N].
+        slew: fastest change of the force [N/s].
+    """
+
+    velocity: str = "blend"
+    v_blend: float = 0.01
+    N: float | str = 1.0
+    scales: Mapping[str, float] | Sequence[str] | None = None
+    without: Sequence[str] = ()
+    dead_zone: float | None = None
+    build_up: float | None = None
+    build_up_table: Sequence[tuple[float, float]] = ()
+    inertia: float | None = None
+    delay: float | None = None
+    error_gain: float | None = None
+    hold: tuple[float, float] | None = None
+    stick: tuple[float, float, float] | None = None
+    dither: tuple[float, float] | None = None
+    ramp: float | None = 0.1
+    limit: float | None = None
+    slew: float | None = None
+
+
+def chosen_settings(
+    where: str, settings: Compensation | None, chosen: Mapping[str, Any]
+) -> Compensation:
+    """What is asked for, checked."""
+    known = [item.name for item in fields(Compensation)]
+    checks.check_names(where, chosen, known)
+    if settings is None:
+        settings = Compensation()
+    s = replace(checks.kind(where, settings, Compensation, "settings, Compensation()"), **chosen)
+    checks.choice(f"{where}: velocity", s.velocity, VELOCITIES)
+    if isinstance(s.N, str):
+        checks.choice(f"{where}: N", s.N, ["input"])
+    else:
+        checks.number(f"{where}: N", s.N, unit="N", lower=0.0)
+    positive = ("v_blend", "m/s"), ("build_up", "m"), ("ramp", "s")
+    for name, unit in positive:
+        if getattr(s, name) is not None:
+            checks.number(f"{where}: {name}", getattr(s, name), unit=unit, above=0.0)
+    others = (
+        ("dead_zone", "m/s"),
+        ("inertia", "kg"),
+        ("delay", "s"),
+        ("error_gain", "1/s"),
+        ("limit", "N"),
+        ("slew", "N/s"),
+    )
+    for name, unit in others:
+        if getattr(s, name) is not None:
+            checks.number(f"{where}: {name}", getattr(s, name), unit=unit, lower=0.0)
+    if s.velocity == "measured" and (s.error_gain is not None or s.delay is not None):
+        raise ValueError(
+            f"{where}: error_gain, delay: expected with a desired velocity only, got "
+            "velocity = 'measured'"
+        )
+    _check_numbers(f"{where}: hold", s.hold, "(error [m], velocity [m/s])", 2)
+    _check_numbers(f"{where}: stick", s.stick, "(force [N], time [s], velocity [m/s])", 3)
+    _check_numbers(f"{where}: dither", s.dither, "(amplitude [N], frequency [Hz])", 2)
+    _check_table(f"{where}: build_up_table", s)
+    checks.names(f"{where}: without", s.without, TERMS)
+    if isinstance(s.scales, Mapping):
+        for term, start in checks.named(f"{where}: scales", s.scales, TERMS).items():
+            checks.number(f"{where}: scales: {term}", start, lower=0.0)
+    elif s.scales is not None:
+        checks.names(f"{where}: scales", s.scales, TERMS)
+    return s
+
+
+def _check_numbers(where: str, value: object, what: str, count: int) -> None:
+    if value is None:
+        return
+    found = checks.array(where, value, what=what)
+    if found.size != count or (found < 0).any():
+        raise checks.refused(where, f"{what}, numbers >= 0", value)
+
+
+def _check_table(where: str, s: Compensation) -> None:
+    if not s.build_up_table:
+        return
+    if s.build_up is None:
+        raise ValueError(f"{where}: expected with build_up only, the way that it is a shape of")
+    points = checks.array(where, s.build_up_table, ndim=2, what="pairs of shares")
+    ends = points.shape[1] == 2 and (points[0] == 0).all() and (points[-1] == 1).all()
+    if not ends or not (np.diff(points[:, 0]) > 0).all() or not (np.diff(points[:, 1]) >= 0).all():
+        raise checks.refused(
+            where, "rising pairs (share of the way, share of the force) from (0, 0) to (1, 1)",
+            s.build_up_table,
+        )  # fmt: skip
+
+
+def formula(s: Compensation) -> str:
+    """What the block computes, line by line."""
+    wanted = "v_ref" + " + t_ahead a_ref" * (s.delay is not None)
+    wanted += " + k_error e" * (s.error_gain is not None)
+    moves = {
+        "blend": f"v_c = {wanted} while |v| < v_blend, v beyond 2 v_blend, C2 in between",
+        "reference": f"v_c = {wanted}",
+        "measured": "v_c = v",
+    }[s.velocity]
+    lines = [moves]
+    if s.dead_zone is not None:
+        lines.append("v_c less what lies within +-v_dead")
+    force = "F_law(v_c, N)"
+    if s.build_up is not None:
+        lines.append("built+ = built + 2 v_c h / d_build, held within +-1")
+        force = "built F_sliding(|v_c|, N) + viscous"
+    force += " + inertia a_ref" * (s.inertia is not None)
+    force += " + F_stick stuck" * (s.stick is not None)
+    force += " + F_dither sin(2 pi phase)" * (s.dither is not None)
+    lines.append(f"F = {force}, terms of the law by their scales")
+    chosen = {
+        "faded in by enable over t_ramp": s.ramp,
+        "within +-F_max": s.limit,
+        "by F_rate h a step at most": s.slew,
+    }
+    last = [text for text, value in chosen.items() if value is not None]
+    return "\n".join([*lines, *([f"F {', '.join(last)}"] if last else [])])

@@ -1,0 +1,181 @@
+"""The force of a law as a sum of terms, each with a scale."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import final
+
+import casadi as ca
+import numpy as np
+
+from symfric.codegen import Block
+from symfric.foundation.numeric import is_symbolic
+from symfric.foundation.parameters import parameters, with_values
+from symfric.laws import Law
+from symfric.laws.composed.wrapper import Wrapper
+from symfric.model import Variables
+
+TERMS = {
+    "coulomb": "dry friction; of a law with a Stribeck effect its level in fast sliding",
+    "stribeck": "by how much dry friction is larger in slow sliding than in fast",
+    "viscous": "what the viscous coefficients make",
+    "bristle": "what the states make beyond steady sliding: 0 is the steady curve",
+    "force": "the whole force, of a law whose terms cannot be told apart",
+}
+"""Terms of friction that have a scale of their own."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """The friction force of the block of a law in terms.
+
+        F = dry(coulomb, stribeck, bristle) + viscous
+
+    Attributes:
+        law: with the symbols of the block as parameters.
+        v, N: symbols of its inputs.
+        dry: force [N] without viscous coefficients.
+        viscous: the rest; None where there is none, or it cannot be told apart.
+        levels: dry levels among the parameters; empty where they cannot be told apart.
+        peaks: level of break-away -> the level in fast sliding.
+    """
+
+    law: Law
+    v: ca.SX
+    N: ca.SX
+    dry: ca.SX
+    viscous: ca.SX | None
+    levels: Variables
+    peaks: Mapping[str, str]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The terms that this law has, of `TERMS`."""
+        if not self.levels:
+            return ("force", *(["viscous"] if self.viscous is not None else []))
+        found = ["coulomb"]
+        if self.peaks:
+            found.append("stribeck")
+        if self.viscous is not None:
+            found.append("viscous")
+        if self.law.states:
+            found.append("bristle")
+        return tuple(found)
+
+    def scaled(self, scales: Mapping[str, ca.SX | float]) -> ca.SX:
+        """The force [N] with its terms scaled; terms that are not named are whole.
+
+        A law without states gets scaled levels. One with states keeps them, and so the motion of
+        its states: its dry force is scaled by the ratio of the Stribeck curves,
+
+            F_dry g'(v)/g(v),   g' = N [s_c mu_d + s_s (mu_s - mu_d) fall(v)]
+        """
+        dry = self.dry
+        if "bristle" in scales:
+            steady = self._steady()
+            dry = steady + scales["bristle"] * (dry - steady)
+        coulomb = scales.get("coulomb", 1.0)
+        stribeck = scales.get("stribeck", coulomb if not self.peaks else 1.0)
+        if "force" in scales:
+            dry = scales["force"] * dry
+        elif "coulomb" in scales or "stribeck" in scales:
+            level = level_of(self.law, self.v, self.N) if self.law.states else None
+            if level is not None and self.peaks:
+                dry = dry * self._with_levels(level, coulomb, stribeck) / level
+            elif self.law.states:
+                dry = coulomb * dry
+            else:
+                dry = self._with_levels(dry, coulomb, stribeck)
+        if self.viscous is None:
+            return dry
+        return dry + scales.get("viscous", 1.0) * self.viscous
+
+    def one_sided(self, built: ca.SX) -> "Terms":
+        """The terms with `built` times the sliding force of either side as dry friction.
+
+        Raises:
+            ValueError: a law that has no sliding force on one side of rest.
+        """
+        speed, one = ca.fabs(self.v), ca.SX(self.law.sliding(ca.fabs(self.v), self.N, 1))
+        other = one if self.law.facts.odd else -ca.SX(self.law.sliding(-speed, self.N, -1))
+        dry = built * one if other is one else built * ca.if_else(built < 0, other, one)
+        return replace(self, dry=_without_viscous(self.law, dry))
+
+    def _with_levels(
+        self, expression: ca.SX, coulomb: ca.SX | float, stribeck: ca.SX | float
+    ) -> ca.SX:
+        symbols = {v.name: v.symbol for v in self.levels}
+        values: list[ca.SX] = []
+        for name, symbol in symbols.items():
+            base = symbols[self.peaks[name]] if name in self.peaks else symbol
+            rise = symbol - base if name in self.peaks else 0
+            values.append(coulomb * base + stribeck * rise)
+        return ca.substitute(expression, ca.vertcat(*symbols.values()), ca.vertcat(*values))
+
+    def _steady(self) -> ca.SX:
+        """The dry force after long sliding at the velocity [N]."""
+        z = ca.SX(self.law.steady_state(self.v, self.N))
+        return _without_viscous(self.law, ca.SX(self.law.force(self.v, self.N, z)))
+
+
+def level_of(law: Law, v: ca.SX, N: ca.SX) -> ca.SX | None:
+    """The Stribeck curve g(v, N) > 0 [N] that a law with states tends to; None without one."""
+    if isinstance(law, Wrapper):
+        return level_of(law.inner_at(v), v, law.load(N))
+    level = getattr(law, "level", None)
+    return None if level is None else ca.SX(level(v, N))
+
+
+def terms(law: Law, block: Block) -> Terms:
+    """The terms of the `F` of `block`, the block of `law`."""
+    known = parameters(law)
+    own = {v.name: v for v in block.parameters if v.name in known}
+    v, N = (x.symbol for x in block.inputs[:2])
+    force = ca.SX(block.outputs["F"].expression)
+    viscous, dry = None, force
+    sigma = ca.veccat(*(own[n].symbol for n in own if known[n].role == "viscous"))
+    if sigma.numel() and ca.depends_on(force, sigma):
+        slope = ca.jacobian(force, sigma)
+        if not ca.depends_on(slope, sigma):
+            viscous = slope @ sigma
+            dry = ca.substitute(force, sigma, ca.DM.zeros(sigma.numel()))
+    levels = tuple(own[n] for n in own if known[n].role == "level")
+    peaks = _peaks({v.name for v in levels})
+    symbolic = with_values(law, {name: variable.symbol for name, variable in own.items()})
+    if law.states:
+        if peaks and level_of(symbolic, v, N) is None:
+            peaks = {}
+    elif not _made_of(dry, levels, block):
+        levels, peaks = (), {}
+    return Terms(symbolic, v, N, dry, viscous, levels, peaks)
+
+
+def _without_viscous(law: Law, force: ca.SX) -> ca.SX:
+    """The force with viscous coefficients of zero, where they are symbols."""
+    values = [p.value for p in parameters(law).values() if p.role == "viscous"]
+    symbols = ca.veccat(*(ca.SX(value) for value in values if is_symbolic(value)))
+    return ca.substitute(force, symbols, ca.DM.zeros(symbols.numel())) if values else force
+
+
+def _peaks(names: set[str]) -> dict[str, str]:
+    """Levels of break-away and the levels in fast sliding that they fall to."""
+    pairs = {name: name.replace("mu_s", "mu_d", 1) for name in names if "mu_s" in name}
+    return {peak: base for peak, base in pairs.items() if base in names}
+
+
+def _made_of(dry: ca.SX, levels: Variables, block: Block) -> bool:
+    """Whether the dry force is a sum over the levels, each times a function of the velocity."""
+    if not levels:
+        return False
+    symbols = ca.vertcat(*(v.symbol for v in levels))
+    slope = ca.jacobian(dry, symbols)
+    if ca.depends_on(slope, symbols):
+        return False
+    rest = ca.substitute(dry, symbols, ca.DM.zeros(symbols.numel()))
+    others = (*block.inputs, *(v for v in block.parameters if v not in levels))
+    look = ca.Function("rest", [ca.vertcat(*(v.symbol for v in others))], [rest])
+    random = np.random.default_rng(0)
+    scale = np.array([v.nominal for v in block.inputs])
+    fixed = np.array([float(v.start) for v in others[len(block.inputs) :]])
+    points = [np.append(scale * random.uniform(0.01, 2.0, scale.size), fixed) for _ in range(8)]
+    return all(float(look(point)) == 0.0 for point in points)
