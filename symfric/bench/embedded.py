@@ -38,10 +38,7 @@ def bench_embedded(*, quick: bool = False, progress: Tell | None = None) -> Embe
             if progress is not None:
                 progress(case.name, k / len(known))
             block = case.make()
-            rows += [
-                measure(block, real, core, options=case.options, tools=tools)
-                for core, real in targets
-            ]
+            rows += [measure(block, real, core, tools=tools) for core, real in targets]
     except KeyboardInterrupt:
         if not rows:
             raise

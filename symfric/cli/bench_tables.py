@@ -296,9 +296,9 @@ def embedded(result: "EmbeddedBenchmark") -> None:
     if result.advice:
         output.show(f"embedded: skipped, {result.advice}")
     output.show_table(
-        ["block", "core", "average", "max", "text", "data", "stack", "error", "bits"],
+        ["block", "core", "avg", "max", "text", "data", "stack", "error", "bits"],
         [
-            [r.block, r.core if r.real == "float" else f"{r.core} {r.real}", round(r.average),
+            [r.block, _core(r.core, r.real), round(r.average),
              round(r.maximum), round(r.text), round(r.data), round(r.stack), _known(r.error, 2),
              f"{r.equal:.1%}" if r.equal == r.equal else ""]
             for r in result.rows
@@ -306,6 +306,10 @@ def embedded(result: "EmbeddedBenchmark") -> None:
         "gcc -O2 under QEMU, float: instructions of a step (average, maximum), bytes, largest "
         "difference from CasADi over the peak, share of numbers with the bits of the host's C",
     )  # fmt: skip
+
+
+def _core(core: str, real: str) -> str:
+    return core.replace("plus", "+") + ("" if real == "float" else " f64")
 
 
 def _known(value: float, digits: int) -> float | str:

@@ -19,8 +19,9 @@ def few(monkeypatch, module) -> None:
 def test_a_row_has_our_c_beside_that_of_casadi(monkeypatch):
     few(monkeypatch, codegen_cores)
     (row,) = codegen_cores.measure(quick=False).to_dict()["rows"]
-    assert row["average"] < row["f"] < row["casadi"]
-    assert row["met"] == "yes"
+    assert row["avg"] < row["f"] < row["casadi"]
+    assert row["avg"] < row["guarded"]
+    assert row["goals"] == "75 ok"
 
 
 @on_target
