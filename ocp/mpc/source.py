@@ -118,7 +118,7 @@ def source(design: Design) -> str:
         f"#ifndef {macro(c, DOUBLE)}\n#define {macro(c, DOUBLE)} {c}\n#endif\n"
         for c in sorted(set(calls) & set(TRANSCENDENTAL.values()))
     )
-    booleans = "#include <stdbool.h>\n" if any("const bool " in f for f in functions) else ""
+    booleans = "#include <stdbool.h>\n" if any("bool " in f for f in functions) else ""
     loops = (PROGRAM.lstrip() + CYCLE).replace("NAME", name).replace("move_t", f"{name}_move_t")
     return f"""{_banner(f"{name}.c")}
  */

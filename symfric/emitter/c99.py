@@ -90,14 +90,11 @@ FORMS: dict[int, Form] = {
     ca.OP_NOT: Form("!{}", SIGN, (ATOM,), logical=True, conditions=1),
     ca.OP_AND: Form("{} && {}", LOGIC, (EQUAL, EQUAL), logical=True, conditions=2),
     ca.OP_OR: Form("{} || {}", LOGIC, (EQUAL, EQUAL), logical=True, conditions=2),
-    ca.OP_IF_ELSE_ZERO: Form("{} ? {} : {zero}", TERNARY, (LOGIC, LOGIC), conditions=1),
     SELECT: Form("{} ? {} : {}", TERNARY, (LOGIC, LOGIC, LOGIC), conditions=1),
 }
 
 CHEAP = {
     ca.OP_FABS: "fabs",
-    ca.OP_FMIN: "fmin",
-    ca.OP_FMAX: "fmax",
     ca.OP_SQRT: "sqrt",
     ca.OP_FLOOR: "floor",
     ca.OP_CEIL: "ceil",

@@ -98,7 +98,7 @@ def graph(function: ca.Function) -> Graph:
         else:
             slots[into[0]] = builder.add(Node(op, tuple(slots[i] for i in of)))
     results = [tuple(row[i] for i in range(len(row))) for row in rows]
-    return _without_unused(builder.nodes, results)
+    return pruned(builder.nodes, results)
 
 
 def _check(function: ca.Function) -> None:
@@ -115,7 +115,8 @@ def _check(function: ca.Function) -> None:
         raise ValueError(f"{where}: expected dense arguments and results, got sparse ones; densify")
 
 
-def _without_unused(nodes: Sequence[Node], results: Sequence[tuple[int, ...]]) -> Graph:
+def pruned(nodes: Sequence[Node], results: Sequence[tuple[int, ...]]) -> Graph:
+    """The graph of these results without the nodes that nobody takes."""
     used = {i for row in results for i in row}
     for i in reversed(range(len(nodes))):
         if i in used:
@@ -138,7 +139,7 @@ def merged(source: Graph, instead: Mapping[int, int]) -> Graph:
         else:
             args = tuple(number[j] for j in node.args)
             number.append(builder.add(replace(node, args=args)))
-    return _without_unused(builder.nodes, [tuple(number[i] for i in r) for r in source.results])
+    return pruned(builder.nodes, [tuple(number[i] for i in r) for r in source.results])
 
 
 def rebuild(

@@ -20,6 +20,7 @@ CROSSINGS = "symfric/integrator/running/crossings.py"
 RUN = "symfric/integrator/running/run.py"
 INITIAL = "symfric/integrator/equations/initial.py"
 EMITTER = "symfric/emitter/emit.py"
+STATEMENTS = "symfric/emitter/statements.py"
 COLLOCATION = "ocp/transcription/collocation.py"
 
 LOOP = "symfric/integrator/running/loop.py"
@@ -156,7 +157,7 @@ TRANSCRIPTION = (
 
 EMIT = (
     Mutant(
-        "operands lose their parentheses", EMITTER,
+        "operands lose their parentheses", "symfric/emitter/expressions.py",
         "return self.text if self.binds >= least else", "return self.text if True else", T_EMITTER,
     ),
     Mutant(
@@ -166,20 +167,20 @@ EMIT = (
         ("tests/symfric/foundation/test_graph.py",),
     ),
     Mutant(
-        "a shared value is written out each time", EMITTER,
-        "(uses[i] > 1 or long)", "long", T_EMITTER,
+        "a shared value is written out each time", STATEMENTS,
+        "if uses[i] > 1 or (", "if (", T_EMITTER,
     ),
     Mutant(
         "locals take the names of arguments", EMITTER,
         'stem += "_"', "break", T_EMITTER,
     ),
     Mutant(
-        "a pattern that repeats its operand counts once", EMITTER,
-        "found[i] += max(repeats, 1)", "found[i] += 1", T_EMITTER,
+        "a pattern that repeats its operand counts once", STATEMENTS,
+        "(operand, max(repeats, 1))", "(operand, 1)", T_EMITTER,
     ),
     Mutant(
-        "a bool stands where a number is meant", EMITTER,
-        "if not value.logical:\n        return value", "if True:\n        return value", T_EMITTER,
+        "a bool stands where a number is meant", "symfric/emitter/expressions.py",
+        "if not self.logical[i]:\n", "if True:\n", T_EMITTER,
     ),
     Mutant(
         "a parameter that spares a function stays variable", "symfric/codegen/blocks/folding.py",

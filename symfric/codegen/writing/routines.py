@@ -101,9 +101,16 @@ def _routine(
 ) -> Routine:
     groups = (block.states, block.parameters, block.inputs)
     source = graph(function)
-    code = emit(source, [[v.name for v in group] for group in groups], targets, real)
     scalars, steps = block.is_function, len(targets) > 1
-    used = sorted(node.entry for node in source.nodes if node.op == ca.OP_INPUT)
+    later = {
+        (i, j): f"{GROUPS[i]}->{place}"
+        for i, group in enumerate(groups)
+        for j, place in enumerate(places(block, GROUPS[i]))
+        if not (scalars or guards) or i < 2
+        if not (guards and i == 1 and group[j].name == STEP_SIZE)
+    }
+    code = emit(source, [[v.name for v in group] for group in groups], targets, real, loads=later)
+    used = sorted(code.used)
     present = members(block)
     arguments = [
         f"{'const ' if group in ('param', 'in') else ''}{prefix(block, real)}_{group}_t *{group}"
@@ -117,7 +124,7 @@ def _routine(
         idle += [v.name for j, v in enumerate(block.inputs) if (2, j) not in used]
     voids = [f"(void){what};" for what in idle]
     if not guards:
-        statements = (*voids, *_loads(block, real, used), *code.lines)
+        statements = (*voids, *code.lines)
         result = real.name if scalars else "void"
     elif scalars:
         arguments.append("unsigned int *status")
@@ -148,7 +155,7 @@ def _guarded(
     steps: bool,
     status: str,
 ) -> list[str]:
-    """Loads and `lines` between guards: inputs, step size, parameters, states, then outputs.
+    """`lines` between guards: inputs, step size, parameters, states, then outputs.
 
     The step size is read before parameters that are out of range give way to the defaults.
     """
@@ -166,4 +173,4 @@ def _guarded(
     if steps:
         found += found_states(block, real, status)
     ends = finite_outputs(block, real, status) if steps else []
-    return [*found, *_loads(block, real, others), *lines, *ends]
+    return [*found, *lines, *ends]

@@ -1,0 +1,278 @@
+"""Conditions as bools, and the smaller of two as a comparison: a graph as C wants it.
+
+CasADi's bools are the numbers 1 and 0, and its selects are sums of halves; its `fmin` and `fmax`
+are functions, of about thirty instructions on a Cortex-M4F. `simplified` gives a graph of the same
+values in which
+
+* conditions (of selects, in and, or, not) are comparisons and what is made of them, never numbers
+  that are compared with 0; negations stand innermost and constants are folded;
+* `if_else_zero`, `fmin` and `fmax` are selects.
+
+All finite numbers and infinities keep their bits, but for the sign of a zero, which C leaves to the
+library in fmin(0, -0). A number that is not one
+(NaN): `fmin(x, c)` gives c as CasADi's does wherever c is known to be a number (a constant, or
+itself cut so; hence every clip to constant bounds is NaN-proof); of two others, `fmin(x, NaN)` is
+NaN here and x there. The derivative of `fmin(x, y)` where x or y is NaN is that of a side and not
+NaN.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+from operator import eq, le, lt, ne
+
+import casadi as ca
+
+from symfric.foundation.graph import SELECT, Graph, Node, pruned
+
+COMPARISONS = {ca.OP_LT: lt, ca.OP_LE: le, ca.OP_EQ: eq, ca.OP_NE: ne}
+OPPOSITE = {ca.OP_EQ: ca.OP_NE, ca.OP_NE: ca.OP_EQ}
+"""Comparisons that are each other's negation for every number, NaN included."""
+BOOLEAN = frozenset({*COMPARISONS, ca.OP_NOT, ca.OP_AND, ca.OP_OR})
+COMMUTING = frozenset({ca.OP_ADD, ca.OP_MUL, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR})
+TRUTHFUL = frozenset({ca.OP_SIGN, ca.OP_NEG, ca.OP_FABS})
+"""Zero where their operand is zero, and nowhere else."""
+LOWERED = frozenset({ca.OP_FMIN, ca.OP_FMAX, ca.OP_IF_ELSE_ZERO})
+"""Operations that do not occur in a simplified graph."""
+
+
+def simplified(
+    source: Graph, conditions: Collection[int] = (), truths: Collection[int] = ()
+) -> Graph:
+    """The graph of the same values as C wants it, see above; what it gives it leaves as it is.
+
+    Args:
+        source: of numbers.
+        conditions: arguments that are bools.
+        truths: results that are wanted as bools.
+    """
+    made, found = _Algebra(conditions), list[int]()
+    for node in source.nodes:
+        args = [found[i] for i in node.args]
+        found.append(made.of(node, args))
+    rows = [
+        tuple(made.truth(found[i]) if k in truths else found[i] for i in row)
+        for k, row in enumerate(source.results)
+    ]
+    return pruned(made.nodes, rows)
+
+
+def logical(nodes: Sequence[Node], conditions: Collection[int] = ()) -> list[bool]:
+    """Whether each node is a bool."""
+    found: list[bool] = []
+    for node in nodes:
+        found.append(is_logical(node, found, conditions))
+    return found
+
+
+def is_logical(node: Node, before: Sequence[bool], conditions: Collection[int]) -> bool:
+    """Whether a node is a bool, by what is known of those before it."""
+    if node.op == ca.OP_INPUT:
+        return node.entry[0] in conditions
+    if node.op == SELECT:
+        return all(before[i] for i in node.args[1:])
+    return node.op in BOOLEAN
+
+
+@dataclass
+class _Algebra:
+    """Nodes so far, each once, with what is known of their values."""
+
+    conditions: Collection[int]
+    nodes: list[Node] = field(default_factory=list[Node])
+    known: dict[Node, int] = field(default_factory=dict[Node, int])
+    logical: list[bool] = field(default_factory=list[bool])
+    number: list[bool] = field(default_factory=list[bool])
+    """Whether it is never NaN unless an input or an operation made it so: constants and bools."""
+
+    def of(self, node: Node, args: Sequence[int]) -> int:
+        """The number of a node that means `node` with these arguments."""
+        match node.op:
+            case ca.OP_FMIN | ca.OP_FMAX:
+                return self.extreme(node.op, *args)
+            case ca.OP_IF_ELSE_ZERO:
+                return self.select(args[0], args[1], self.constant(0.0))
+            case _ if node.op == SELECT:
+                return self.select(*args)
+            case ca.OP_NOT:
+                return self.negated(self.truth(args[0]))
+            case ca.OP_AND | ca.OP_OR:
+                return self.joined(node.op, self.truth(args[0]), self.truth(args[1]))
+            case _ if node.op in COMPARISONS:
+                return self.compared(node.op, *args)
+            case ca.OP_DIV:
+                return self.weight_of_side(*args) or self.add(node.op, *args)
+            case _:
+                return self.keep(Node(node.op, tuple(args), node.entry, node.value))
+
+    def keep(self, node: Node) -> int:
+        if node.op in COMMUTING and node not in self.known:
+            swapped = Node(node.op, node.args[::-1])
+            node = swapped if swapped in self.known else node
+        place = self.known.setdefault(node, len(self.nodes))
+        if place == len(self.nodes):
+            self.nodes.append(node)
+            self.logical.append(is_logical(node, self.logical, self.conditions))
+            self.number.append(self.logical[-1] or self._is_number(node))
+        return place
+
+    def _is_number(self, node: Node) -> bool:
+        if node.op == SELECT:
+            condition, yes, no = node.args
+            compared = self.nodes[condition]
+            held = compared.op in (ca.OP_LT, ca.OP_LE) and yes in compared.args
+            return self.number[no] and (held or self.number[yes])
+        return node.op == ca.OP_CONST or (node.op in TRUTHFUL and self.number[node.args[0]])
+
+    def add(self, op: int, *args: int) -> int:
+        return self.keep(Node(op, args))
+
+    def constant(self, value: float) -> int:
+        return self.keep(Node(ca.OP_CONST, value=value))
+
+    def value(self, i: int) -> float | None:
+        node = self.nodes[i]
+        return node.value if node.op == ca.OP_CONST else None
+
+    def truth(self, i: int) -> int:
+        """Whether a number is not 0, as a bool or a constant."""
+        return i if self.logical[i] else self.compared(ca.OP_NE, i, self.constant(0.0))
+
+    def negated(self, i: int) -> int:
+        """The opposite of a bool; it moves into and, or where that spares a negation."""
+        node, value = self.nodes[i], self.value(i)
+        if value is not None:
+            return self.constant(float(value == 0.0))
+        if node.op == ca.OP_NOT:
+            return node.args[0]
+        if node.op in OPPOSITE:
+            return self.add(OPPOSITE[node.op], *node.args)
+        if node.op in (ca.OP_AND, ca.OP_OR) and any(map(self._turns, node.args)):
+            other = ca.OP_OR if node.op == ca.OP_AND else ca.OP_AND
+            return self.joined(other, *map(self.negated, node.args))
+        return self.add(ca.OP_NOT, i)
+
+    def _turns(self, i: int) -> bool:
+        return self.nodes[i].op in (ca.OP_NOT, *OPPOSITE)
+
+    def joined(self, op: int, a: int, b: int) -> int:
+        """And, or of two bools."""
+        neutral = float(op == ca.OP_AND)
+        for one, other in ((a, b), (b, a)):
+            value = self.value(one)
+            if value is not None:
+                return other if (value != 0.0) == neutral else self.constant(1.0 - neutral)
+        if a == b:
+            return a
+        if Node(ca.OP_NOT, (a,)) == self.nodes[b] or Node(ca.OP_NOT, (b,)) == self.nodes[a]:
+            return self.constant(1.0 - neutral)
+        return self.add(op, a, b)
+
+    def select(self, condition: int, yes: int, no: int) -> int:
+        """`yes` where the condition holds, else `no`."""
+        condition = self.truth(condition)
+        known = self.value(condition)
+        if known is not None:
+            return yes if known != 0.0 else no
+        if self.nodes[condition].op == ca.OP_NOT:
+            return self.select(self.nodes[condition].args[0], no, yes)
+        yes, no = self._settled(condition, yes, 1), self._settled(condition, no, 2)
+        if yes == no:
+            return yes
+        sides = [self._as_bool(side) for side in (yes, no)]
+        if None in sides:
+            return self.add(SELECT, condition, yes, no)
+        if sides[0] is True:
+            return self.joined(ca.OP_OR, condition, no)
+        if sides[0] is False:
+            return self.joined(ca.OP_AND, self.negated(condition), no)
+        if sides[1] is True:
+            return self.joined(ca.OP_OR, self.negated(condition), yes)
+        if sides[1] is False:
+            return self.joined(ca.OP_AND, condition, yes)
+        return self.add(SELECT, condition, yes, no)
+
+    def _settled(self, condition: int, side: int, taken: int) -> int:
+        """A side of a select on the same condition is one of that one's."""
+        node = self.nodes[side]
+        return node.args[taken] if node.op == SELECT and node.args[0] == condition else side
+
+    def _as_bool(self, i: int) -> bool | int | None:
+        """True, False, the number of a bool, or None for other numbers."""
+        value = self.value(i)
+        if value is None:
+            return i if self.logical[i] else None
+        return bool(value) if value in (0.0, 1.0) else None
+
+    def compared(self, op: int, a: int, b: int) -> int:
+        """A comparison; of a choice between constants with a constant it is the choice."""
+        x, y = self.value(a), self.value(b)
+        if x is not None and y is not None:
+            return self.constant(float(COMPARISONS[op](x, y)))
+        for varying, left in ((a, True), (b, False)):
+            fixed = b if left else a
+            if self.value(fixed) is None:
+                continue
+
+            def against(side: int, left: bool = left, fixed: int = fixed) -> int:
+                return self.compared(op, side, fixed) if left else self.compared(op, fixed, side)
+
+            node = self.nodes[varying]
+            if self.logical[varying]:
+                yes, no = against(self.constant(1.0)), against(self.constant(0.0))
+                return self.select(varying, yes, no)
+            if node.op == SELECT and None not in map(self._as_constant, node.args[1:]):
+                return self.select(node.args[0], against(node.args[1]), against(node.args[2]))
+            if self.value(fixed) == 0.0 and self._sees_zero(op, node):
+                return against(node.args[0])
+        return self.add(op, a, b)
+
+    def _as_constant(self, i: int) -> float | bool | None:
+        return True if self.logical[i] else self.value(i)
+
+    def _sees_zero(self, op: int, node: Node) -> bool:
+        """Whether the node compares with 0 as its operand does."""
+        return node.op == ca.OP_SIGN or (node.op in TRUTHFUL and op in OPPOSITE)
+
+    def extreme(self, op: int, a: int, b: int) -> int:
+        """The smaller or the larger of two."""
+        if a == b:
+            return a
+        if self.number[a] and not self.number[b]:
+            a, b = b, a
+        return self._clip(op, a, b) or self._first_if(op, a, b)
+
+    def _first_if(self, op: int, a: int, b: int) -> int:
+        """The one of two; of equal ones the first, or the one that is known to be a number."""
+        if not self.number[b]:
+            a, b = b, a
+        order = (a, b) if op == ca.OP_FMIN else (b, a)
+        return self.select(self.compared(ca.OP_LT, *order), a, b)
+
+    def _clip(self, op: int, a: int, b: int) -> int | None:
+        """A clip to constants, one cut before: x > low ? (x < high ? x : high) : low."""
+        node, bound = self.nodes[a], self.value(b)
+        if bound is None or node.op != SELECT:
+            return None
+        condition, x, other = node.args
+        if self.value(other) is None or self.nodes[condition].op != ca.OP_LT:
+            return None
+        low, high = (b, other) if op == ca.OP_FMAX else (other, b)
+        before = (x, high) if op == ca.OP_FMAX else (low, x)
+        ordered = (self.value(low) or 0.0) <= (self.value(high) or 0.0)
+        if self.nodes[condition].args != before or not ordered:
+            return None
+        return self.add(SELECT, condition, self._first_if(op, x, b), other)
+
+    def weight_of_side(self, a: int, b: int) -> int | None:
+        """A side's share in the derivative of fmin, fmax: (p <= q) / ((p <= q) + (q <= p)).
+
+        It is 1, 1/2 or 0.
+        """
+        total, one = self.nodes[b], self.nodes[a]
+        if one.op != ca.OP_LE or total.op != ca.OP_ADD or a not in total.args:
+            return None
+        (other,) = {*total.args} - {a} or {a}
+        if self.nodes[other] != Node(ca.OP_LE, one.args[::-1]):
+            return None
+        inner = self.add(SELECT, other, self.constant(0.5), self.constant(1.0))
+        return self.add(SELECT, a, inner, self.constant(0.0))
