@@ -7,6 +7,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.bench.cuda import CudaRow, measure_cuda
 from symfric.bench.timing import interleaved
 from symfric.integrator.ensemble import Ensemble, simulate_many
 from symfric.integrator.equations.initial import first_guess, first_step, smallest_step
@@ -60,13 +61,17 @@ class LaneRow:
 @final
 @dataclass(frozen=True, eq=False)
 class LaneBenchmark:
-    """All rows of one run of the benchmark."""
+    """All rows of one run of the benchmark, and those on a graphics processor."""
 
     rows: tuple[LaneRow, ...]
+    cuda: tuple[CudaRow, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """Rows."""
-        return {"rows": [asdict(row) for row in self.rows]}
+        return {
+            "rows": [asdict(row) for row in self.rows],
+            "cuda": [asdict(row) for row in self.cuda],
+        }
 
 
 Case = tuple[str, Callable[[], Model], str, float, float, int]
@@ -92,7 +97,7 @@ def bench_ensemble(
             progress(name, k / len(cases))
         members = 20 if quick else MEMBERS // fewer
         rows.append(_row(name, make(), state, middle, end, members))
-    return LaneBenchmark(tuple(rows))
+    return LaneBenchmark(tuple(rows), measure_cuda(quick=quick))
 
 
 def _row(name: str, model: Model, state: str, middle: float, end: float, members: int) -> LaneRow:

@@ -1,5 +1,6 @@
 """Tables of the benchmarks."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from symfric.cli import output
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
         OcpBenchmark,
         RegularisationBenchmark,
     )
+    from symfric.bench.cuda import CudaRow
 
 
 def integrator(result: "Benchmark") -> None:
@@ -91,6 +93,23 @@ def ensemble(result: "LaneBenchmark") -> None:
         ],
         "again: another call, one member; equal: with the same attempts; differ: at the end",
     )
+    on_graphics_processor(result.cuda)
+
+
+def on_graphics_processor(rows: "Sequence[CudaRow]") -> None:
+    """Members a second, or that there is none."""
+    output.show_table(
+        ["case", "type", "a second", "on cores", "ratio", "differ"],
+        [
+            [r.case, r.real, r.device, "", "", ""] if r.why else
+            [r.case, r.real, round(r.per_second), round(r.cores_per_second), round(r.ratio, 1),
+             _short(r.difference)]
+            for r in rows
+        ],
+        "Members a second on a graphics processor, beside all cores",
+    )  # fmt: skip
+    for device in dict.fromkeys(r.why or f"{r.device}, {r.members} members" for r in rows):
+        output.note(device)
 
 
 def multibody(result: "MultibodyBenchmark") -> None:

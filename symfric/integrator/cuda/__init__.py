@@ -1,1 +1,25 @@
-"""The adaptive attempt on a graphics processor, one member a thread."""
+"""The adaptive attempt on a graphics processor, one member a thread: `backend="cuda"`.
+
+Everything but the launches is what the other backends have: members start on the CPU, fail with the
+same sentences, stop and go on where algebraic unknowns have to be searched for, and go chunk by
+chunk to memory or to a folder. The own emitter writes attempt, signals and the jump of algebraic
+unknowns in C (`step.in_c`); `members.h` goes with them from input interval to input interval. A
+thread whose member is done takes the next one, so that the threads of a warp stay together until no
+member is left; a launch ends after a number of attempts that takes a quarter of a second, and the
+members that are under way go on in the next one.
+
+What is tested where. The text of the kernel is C and CUDA C++ alike. Compiled for a processor it
+gives, through the same driver, the bits of the virtual machine for every scene without modes
+(`tests/symfric/integrator/cuda`); NVRTC compiles it without a graphics processor (`nvrtc`), which
+shows what it refuses, and how many registers a thread takes; the calls of CuPy are checked by a
+module in its place. On a device nothing is contracted to fused multiply-adds, so that only the last
+digits of exp, sin, pow and the like are others than those tested. What a device makes of it is
+tested by `test_gpu.py` where there is one, and `symfric bench ensemble` measures it there.
+
+Limits: models with events are refused. Large mechanisms spill: a slider-crank (4300 operations)
+takes all 255 registers, a six-joint arm (27000) writes kilobytes of memory in every attempt and
+takes NVRTC a minute. Single precision (`real="float"`) follows double at rtol 1e-4 with as many
+attempts, takes up to twice as many at 1e-5, and is refused below, where rounding is taken for error
+and steps shrink to nothing; time stays double. The results are as accurate as rtol says as long as
+that is above some 1e-5 of the largest magnitudes; differences of large numbers lose digits.
+"""

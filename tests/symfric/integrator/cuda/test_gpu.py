@@ -1,0 +1,64 @@
+"""On a machine with a graphics processor: what it gives beside the CPU, and how fast.
+
+`pytest tests/symfric/integrator/cuda -m "slow or not slow" -rs` on such a machine, with the extra
+'cuda'; elsewhere everything here is skipped, and says why.
+"""
+
+import warnings
+
+import numpy as np
+import pytest
+from device_cases import CASES
+
+from symfric import BrownMcPhee, LuGre, rabinowicz, simulate_many
+from symfric.bench.cuda import measure_cuda
+from symfric.cli import bench_tables
+from symfric.integrator.cuda.cupy_device import CupyDevice
+from symfric.integrator.cuda.device import DeviceError
+
+
+def missing() -> str:
+    try:
+        CupyDevice.found()
+    except DeviceError as error:
+        return str(error)
+    return ""
+
+
+WHY = missing()
+pytestmark = pytest.mark.skipif(bool(WHY), reason=f"no GPU: {WHY}")
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_members_are_those_of_the_cpu_but_for_last_digits(case: str) -> None:
+    make, t_end, arguments = CASES[case]
+    model = make()
+    ours = simulate_many(model, t_end, backend="cuda", **arguments)
+    cpu = simulate_many(model, t_end, backend="vm", **arguments)
+    assert ours.failed.keys() == cpu.failed.keys()
+    np.testing.assert_allclose(ours.reached, cpu.reached, rtol=1e-6)
+    np.testing.assert_allclose(ours.attempts, cpu.attempts, rtol=0.1, atol=3)
+    for name in model.signals:
+        np.testing.assert_array_equal(np.isnan(ours[name]), np.isnan(cpu[name]))
+        scale = np.nanmax(np.abs(cpu[name]), initial=1e-9)
+        np.testing.assert_allclose(ours[name], cpu[name], rtol=0.0, atol=3e-5 * scale)
+
+
+@pytest.mark.parametrize("law", [BrownMcPhee(), LuGre()], ids=lambda law: type(law).__name__)
+def test_single_precision_meets_its_tolerance(law: object) -> None:
+    model, v = rabinowicz(law), np.linspace(-0.1, 0.1, 300)  # type: ignore[arg-type]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        ours = simulate_many(model, 9.0, x0={"v": v}, rtol=1e-4, backend="cuda", real="float")
+    cpu = simulate_many(model, 9.0, x0={"v": v}, rtol=1e-9)
+    assert not ours.failed
+    assert np.abs(ours["x"] - cpu["x"]).max() < 1e-3 * np.abs(cpu["x"]).max()
+
+
+@pytest.mark.slow
+def test_a_million_members(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = measure_cuda()
+    with capsys.disabled():
+        bench_tables.on_graphics_processor(rows)
+    for row in rows:
+        assert row.difference < (1e-4 if row.real == "double" else 1e-2)
