@@ -151,6 +151,7 @@ FLOORS: dict[str, set[str]] = {
     "symfric.fmu": {
         "symfric.foundation",
         "symfric.model",
+        "symfric.scenes",
         "symfric.emitter",
         "symfric.integrator",
         "symfric.codegen",

@@ -23,6 +23,7 @@ from symfric.model.holonomic import Holonomic
 from symfric.model.parts import Event, Monitor, Output
 from symfric.model.problems import GROUPS, equation_problems, kind_problems, naming_problems
 from symfric.model.sketch import Sketch
+from symfric.model.start import start_function
 
 Variables = tuple[Variable, ...]
 
@@ -357,14 +358,7 @@ class Model:
     @cached_property
     def _start(self) -> ca.Function:
         """Start values as a Function of (values given, which are given, u, p)."""
-        n, x = len(self.x), self.vector("x")
-        known, chosen = ca.SX.sym("known", n), ca.SX.sym("chosen", n)
-        rows = [ca.if_else(chosen[i], known[i], v.start) for i, v in enumerate(self.x)]
-        values = stacked(rows)
-        for _ in range(2):
-            values = ca.substitute(values, x, values)
-        arguments = [known, chosen, self.vector("u"), self.vector("p")]
-        return ca.Function("start", arguments, [values], ["known", "chosen", "u", "p"], ["x"])
+        return start_function(self.x, self.vector("u"), self.vector("p"))
 
     @cached_property
     def _start_follows(self) -> bool:

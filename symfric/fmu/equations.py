@@ -1,0 +1,290 @@
+"""What a unit computes, written in C: the step of the integrator, signals, start values, events.
+
+All of it comes from the functions that `simulate` runs, through the emitter: the same bits, without
+CasADi at run time.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from math import inf
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.emitter.c99 import DOUBLE
+from symfric.fmu.variables import LEAST_RTOL
+from symfric.integrator.arguments import chosen
+from symfric.integrator.equations.initial import (
+    FLOOR,
+    LONGEST_FIRST,
+    SURE,
+    first_guess,
+    smallest_step,
+)
+from symfric.integrator.equations.inputs import InputData
+from symfric.integrator.equations.onsets import pace
+from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.run import PACES
+from symfric.integrator.running.search import search_source
+from symfric.integrator.step.attempt import build_fixed
+from symfric.integrator.step.layout import GROWTH_MEMORY
+from symfric.integrator.step.pieces import all_macros, routine
+from symfric.model import Model
+from symfric.model.start import start_function
+
+Array = NDArray[np.float64]
+MOST_ATTEMPTS = 10**6
+"""Attempts allowed in one communication step."""
+EVENT_TOLERANCE = 1e-10
+"""Tolerance of event times [s], as in `simulate`."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """A model as a unit computes it.
+
+    Attributes:
+        model, integrator: whose functions.
+        y0: consistent unknowns at the start.
+        rtol: default of the relative tolerance.
+        step: length [s] of fixed steps, None where the step is adaptive.
+        method: of fixed steps.
+        span: first and last time [s] of the default experiment.
+    """
+
+    model: Model
+    integrator: Integrator
+    y0: Array
+    rtol: float
+    step: float | None
+    method: str
+    span: tuple[float, float]
+
+    @property
+    def n(self) -> int:
+        """Number of unknowns."""
+        return self.integrator.system.n
+
+    @property
+    def start(self) -> dict[str, float]:
+        """Values of states and algebraic variables at the start."""
+        places = [*range(len(self.model.x)), *_places(self.integrator)]
+        names = (v.name for v in (*self.model.x, *self.model.z))
+        return dict(zip(names, self.y0[places].tolist(), strict=True))
+
+
+def equations(
+    model: Model, rtol: float, step: float | None, method: str, span: tuple[float, float]
+) -> Equations:
+    """Build the integrator of a model whose inputs are held.
+
+    Raises:
+        ValueError: unknown method; start values without consistent algebraic ones.
+    """
+    u = model.vector("u")
+    held = InputData(u, u, np.array(span), np.zeros((len(model.u), 1)), ("fmu",))
+    rtol = min((event.rtol for event in model.events if event.rtol < rtol), default=rtol)
+    if step is None:
+        integrator = Integrator(model, held, chosen("export_fmu", method, rtol))
+    else:
+        integrator = Integrator(model, held, METHODS[method])
+    system = integrator.system
+    guess = first_guess(system, model, model.initial_state(), span[0])
+    d = np.concatenate([model.values("p"), model.values("u")])
+    if step is None:
+        integrator = integrator.suited([(guess, d)], span[1] - span[0])
+    return Equations(
+        model, integrator, integrator.start(guess, d), rtol, step, integrator.tableau.name, span
+    )
+
+
+def _places(integrator: Integrator) -> list[int]:
+    """Where the algebraic variables of the model stand among the unknowns."""
+    names = list(integrator.system.names)
+    return [names.index(v.name) for v in integrator.model.z]
+
+
+def header(own: Equations, token: str) -> str:
+    """Sizes and settings of a model as C."""
+    model, system = own.model, own.integrator.system
+    manifold, crossings = system.manifold, own.integrator.crossings
+    events = len(model.events) if own.step is None else 0
+    adaptive = own.step is None
+    loops = manifold.m if manifold is not None else 0
+    sizes = {
+        "N": system.n, "NX": system.nx, "NZ": len(model.z), "NU": len(model.u),
+        "NP": len(model.p), "ND": len(model.p) + len(model.u), "NS": len(model.signals),
+        "ROWS": own.integrator.tableau.H.shape[0] if adaptive else 1,
+        "EVENT_MEMORY": own_memory(events), "JUMP": crossings.width if crossings and events else 0,
+    }  # fmt: skip
+    switches = {
+        "TIMED": int(system.timed),
+        "EQUATIONS": len(system.algebraic[0]),
+        "CONSTRAINTS": loops,
+        "COORDINATES": 0 if manifold is None else manifold.n,
+        "BASIS": 0 if manifold is None else len(manifold.basis),
+        "BASIS_AT": 0 if manifold is None else manifold.basis.start,
+        "CROSSINGS": events,
+        "STEP_IS_FIXED": int(not adaptive),
+        "CLOSES": int(bool(loops) and any(event.reset for event in model.events)),
+    }
+    span = own.span[1] - own.span[0]
+    numbers = {
+        "DEFAULT_RTOL": own.rtol, "LEAST_RTOL": LEAST_RTOL, "LARGEST_RTOL": largest_rtol(model),
+        "ATOL": 0.1, "LONGEST_STEP": _longest(own), "FIRST_STEP": min(1e-8 * span, LONGEST_FIRST),
+        "SURE_STEP": SURE, "SMALLEST_STEP": smallest_step(span), "STEP_FLOOR": FLOOR,
+        "GROWTH_MEMORY": GROWTH_MEMORY, "MOST_ATTEMPTS": MOST_ATTEMPTS,
+        "EVENT_TOLERANCE": EVENT_TOLERANCE, "STEP_SIZE": own.step or 0.0,
+    }  # fmt: skip
+    kind = int(sha256(token.encode()).hexdigest()[:16], 16)
+    lines = [
+        f'#define MODEL_NAME "{_quoted(model.name)}"',
+        f'#define MODEL_TOKEN "{token}"',
+        f"#define MODEL_KIND 0x{kind:016x}ULL",
+        f"enum {{ {', '.join(f'{name} = {value}' for name, value in sizes.items())} }};",
+        *(f"#define {name} {value}" for name, value in switches.items()),
+        *(f"#define {name} {DOUBLE.literal(float(value))}" for name, value in numbers.items()),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def own_memory(events: int) -> int:
+    """Length of what the search for events remembers (`crossings.Memory`)."""
+    return 105 + 2 * events if events else 0
+
+
+def largest_rtol(model: Model) -> float:
+    """The loosest tolerance that the events of a model allow."""
+    return min((event.rtol for event in model.events), default=0.1)
+
+
+def _longest(own: Equations) -> float:
+    """The longest step [s]: a few straight pieces of events in time alone, see `run.integrate`."""
+    quickest = min((pace(f, *own.span) for f in own.integrator.schedules), default=inf)
+    return PACES * quickest
+
+
+def source(own: Equations) -> str:
+    """Tables and functions of a model as C."""
+    system, integrator = own.integrator.system, own.integrator
+    model, y, d = own.model, system.y, system.d
+    functions: dict[str, ca.Function] = {
+        "model_signals": integrator.signals,
+        "model_start": start_function(model.x, model.vector("u"), model.vector("p")),
+        "model_rates": integrator.f,
+    }
+    if own.step is None:
+        functions["model_attempt"] = integrator.step
+    else:
+        functions["model_step"] = build_fixed(system, METHODS[own.method])
+    manifold, follow = system.manifold, integrator.follow
+    if follow is not None:
+        functions |= {"model_equations": system.constraints, "model_round": follow.round}
+    if manifold is not None and manifold.m:
+        functions |= {"model_defect": manifold.defect, "model_project": manifold.project}
+        if manifold.charted:
+            n, m = manifold.n, manifold.m
+            slope = ca.densify(ca.SX(manifold.slope(y, d))[n : n + m, :n])
+            functions["model_slope"] = ca.Function("slope", [y, d], [slope])
+    text = [all_macros(), "\n", tables(own), "\n"]
+    text += [routine(function, name) for name, function in functions.items()]
+    if follow is not None or (integrator.crossings is not None and own.step is None):
+        text.append("typedef long long casadi_int;\n\n")
+    if follow is not None:
+        text += [_called("symfric_round", "model_round", 2, 2), FOLLOWED, follow.c_source, "\n"]
+    if integrator.crossings is not None and own.step is None:
+        text.append(_events(own))
+    return "".join(text)
+
+
+FOLLOWED = "static int symfric_follow(double *y, const double *d);\n"
+
+
+def _called(name: str, of: str, arguments: int, results: int) -> str:
+    """`of` as the C of the integrator calls functions."""
+    given = [*(f"arg[{i}]" for i in range(arguments)), *(f"res[{i}]" for i in range(results))]
+    return (
+        f"static int {name}(const double **arg, double **res, casadi_int *iw, double *w, int mem)\n"
+        f"{{\n    (void)iw;\n    (void)w;\n    (void)mem;\n    {of}({', '.join(given)});\n"
+        "    return 0;\n}\n\n"
+    )
+
+
+def _events(own: Equations) -> str:
+    """C of the search for events, and of what they are at the start."""
+    crossings, integrator = own.integrator.crossings, own.integrator
+    if crossings is None:
+        return ""
+    parts: list[str] = []
+    for function in crossings.functions:
+        name = f"model_{function.name().removeprefix('symfric_')}"
+        parts.append(routine(function, name))
+        parts.append(_called(function.name(), name, function.n_in(), function.n_out()))
+    parts.append(search_source(crossings, integrator.step.numel_in(1)))
+    parts.append(routine(integrator.events, "model_events"))
+    events = own.model.events
+    signs = [-event.direction if event.at_start else 0 for event in events]
+    parts.append(_table("model_at_start", signs))
+    parts.append(_strings("model_event_names", [event.name for event in events]))
+    return "".join(parts)
+
+
+def tables(own: Equations) -> str:
+    """Names, start values and ranges."""
+    model, system = own.model, own.integrator.system
+    data = [*model.values("p"), *model.values("u")]
+    guess = [float(v.start) for v in model.z]
+    parts = [
+        _strings("model_unknown_names", system.names),
+        _strings("model_signal_names", model.signals),
+        _strings("model_parameter_names", [v.name for v in model.p]),
+        _table("model_nominal", system.nominal),
+        _table("model_data", [*data, 0.0]),
+        _table("model_guess", [*guess, 0.0]),
+        _table("model_lower", [v.lower for v in model.p]),
+        _table("model_upper", [v.upper for v in model.p]),
+        _table("model_start_values", own.y0),
+        _table("model_place_of_z", _places(own.integrator), "int"),
+    ]
+    if own.integrator.follow is not None:
+        parts.append(_table("model_free", system.free.ravel(order="F")))
+    return "".join(parts)
+
+
+def _table(name: str, values: Iterable[float], kind: str = "double") -> str:
+    """A constant array, of one number at least."""
+    texts = [str(x) if kind == "int" else DOUBLE.literal(float(x)) for x in values] or ["0"]
+    return _wrapped(f"static const {kind} {name}[{len(texts)}] = {{", texts)
+
+
+def _strings(name: str, values: Iterable[str]) -> str:
+    texts = [f'"{_quoted(text)}"' for text in values] or ['""']
+    return _wrapped(f"static const char *const {name}[{len(texts)}] = {{", texts)
+
+
+def _wrapped(head: str, texts: list[str]) -> str:
+    """Entries of an array in lines of up to 96 columns."""
+    lines, line = [head], "   "
+    for text in texts:
+        if len(line) + len(text) > 94 and line.strip():
+            lines.append(line)
+            line = "   "
+        line += f" {text},"
+    return "\n".join([*lines, line, "};"]) + "\n"
+
+
+def _quoted(text: str) -> str:
+    """Text as it stands in a C string."""
+    return text.replace("\\", "\\\\").replace('"', '\\"')
+
+
+def fingerprint(parts: Mapping[str, str]) -> str:
+    """A token of all that a unit consists of."""
+    digest = sha256("\0".join(f"{name}\0{text}" for name, text in parts.items()).encode())
+    text = digest.hexdigest()
+    return f"{{{text[:8]}-{text[8:12]}-{text[12:16]}-{text[16:20]}-{text[20:32]}}}"

@@ -1,0 +1,210 @@
+"""A model as a Functional Mock-up Unit, which runs in other tools without Python and CasADi."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from re import sub
+from time import perf_counter
+from typing import final
+
+from symfric.fmu.description import Described, build_description, described
+from symfric.fmu.equations import equations, fingerprint, header, source
+from symfric.fmu.package import compiled, fixed_text, packed, sources
+from symfric.fmu.variables import LARGEST_RTOL, LEAST_RTOL, Entry, entries
+from symfric.foundation import checks
+from symfric.foundation.parameters import parameters
+from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS
+from symfric.model import Model, check_model
+from symfric.scenes.base import Scene
+
+KINDS = ("co-simulation",)
+VERSIONS = (2, 3)
+INTERVALS = 200
+"""Communication steps of the default experiment."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Exported:
+    """A unit that was written.
+
+    Attributes:
+        path: the archive.
+        size: its length in bytes.
+        fmi, kind: version and kind.
+        identifier: name of its binary.
+        variables: all variables.
+        binary: name of the binary in the archive; empty without a compiler.
+        missing: why there is no binary.
+        method: formula of the steps.
+        times: seconds it took to write and to compile the C.
+    """
+
+    path: Path
+    size: int
+    fmi: int
+    kind: str
+    identifier: str
+    variables: tuple[Entry, ...]
+    binary: str
+    missing: str
+    method: str
+    times: tuple[float, float]
+
+    def count(self, causality: str) -> int:
+        """Number of variables of a causality."""
+        return sum(entry.causality == causality for entry in self.variables)
+
+    def __str__(self) -> str:
+        held = self.binary or f"sources only: {self.missing}"
+        return (
+            f"{self.path}: FMI {self.fmi}.0 {self.kind}, {self.size / 1024:.0f} kB, {held}\n"
+            f"{self.count('input')} inputs, {self.count('output')} outputs, "
+            f"{self.count('parameter') - 1} parameters; {self.method}; C written in "
+            f"{self.times[0]:.1f} s, compiled in {self.times[1]:.1f} s"
+        )
+
+
+def export_fmu(
+    model: Model | Scene,
+    path: str | Path,
+    *,
+    fmi: int = 3,
+    kind: str = "co-simulation",
+    rtol: float = 1e-6,
+    step: float | None = None,
+    method: str = "auto",
+    free: Iterable[str] | None = None,
+    t_end: float | None = None,
+    name: str | None = None,
+) -> Exported:
+    """Write `model` as a Functional Mock-up Unit: sources and the binary of this platform.
+
+    The unit has the adaptive step of `simulate` inside, the same bits, in C of its own. Inputs are
+    held over a communication step, which may be as long or short as the importer likes: steps go
+    beyond a communication point and are not cut there, as long as no input jumps; values in between
+    are those of the step's polynomial. Where inputs or tunable parameters jump, the last step is
+    made again up to there, and the algebraic variables follow at once. Events of the model are
+    located and carried out inside.
+
+    All unknowns may be set before the initialisation ends; those that were not set follow, as in
+    `simulate(x0=...)`: bristles start in steady sliding, algebraic variables where their equations
+    hold.
+
+    Limits: absolute tolerances stay 0.1 rtol times nominal, also for motions that are tiny beside
+    their nominal values (`simulate` runs these again); pivots are those that are sound at the
+    start; events in time alone set the longest step by the default experiment.
+
+    Args:
+        model: a model, or a scene, whose parameters become tunable.
+        path: the archive, such as "drive.fmu".
+        fmi: 2 or 3.
+        kind: "co-simulation".
+        rtol: relative tolerance; the importer may change it, by the parameter `rtol` or the
+            tolerance of the experiment.
+        step: length [s] of fixed steps instead, without error control, as of `plant_block`. A
+            communication step is divided into equal ones of at most this length.
+        method: formula of the steps, as in `simulate`; with `step` as in `plant_block`.
+        free: parameters of a scene that become tunable; by default all that are not zero, which
+            switch terms off. A model has those in `Model.p`.
+        t_end: stop time [s] of the default experiment; default that of the scene, or 1 s.
+        name: model identifier; default the name of the model.
+
+    Returns:
+        What was written; it prints itself.
+
+    Raises:
+        ValueError: bad input, or start values without consistent algebraic variables.
+        CompileError: the compiler refuses the C.
+    """
+    where = "export_fmu"
+    made, span = _model(where, model, free, t_end)
+    target = checks.path(f"{where}: path", path)
+    if target.suffix != ".fmu":
+        raise ValueError(f"{where}: expected a path that ends in .fmu, got '{target}'")
+    if fmi not in VERSIONS:
+        raise ValueError(f"{where}: fmi: expected 2 or 3, got {fmi!r}")
+    checks.choice(f"{where}: kind", kind, KINDS)
+    rtol = checks.number(f"{where}: rtol", rtol, lower=LEAST_RTOL, upper=LARGEST_RTOL)
+    identifier = _identifier(where, made.name if name is None else name)
+    method = _method(where, made, method, step)
+    begin = perf_counter()
+    own = equations(made, rtol, step, method, span)
+    model_c = source(own)
+    shared = {f"fmi{fmi}.c": fixed_text(f"fmi{fmi}.c"), "model.c": model_c, "kind": kind}
+    token = fingerprint(shared | {"sizes": header(own, ""), "unit": fixed_text("unit.c")})
+    texts = sources(header(own, token), model_c, fmi, step is not None)
+    write_time, begin = perf_counter() - begin, perf_counter()
+    binary = compiled(texts, identifier, fmi)
+    compile_time = perf_counter() - begin
+    loops = made.holonomic is not None and made.holonomic.phi.numel() > 0
+    listed = entries(made, own.start, 0.0 if step else own.rtol, given=not loops)
+    what = Described(
+        made.name,
+        identifier,
+        token,
+        f"{made.name}: {own.integrator.tableau.name} steps of symfric, "
+        + ("fixed" if step else "adaptive"),
+        f"symfric {version('symfric')}",
+        span,
+        None if step else own.rtol,
+        step,
+        (span[1] - span[0]) / INTERVALS,
+        ("all.c",),
+    )
+    build = build_description(what) if fmi == 3 else ""
+    size = packed(target, described(what, listed, fmi), build, texts, binary)
+    return Exported(
+        target, size, fmi, kind, identifier, listed, binary.name if binary.content else "",
+        binary.missing, own.method, (write_time, compile_time),
+    )  # fmt: skip
+
+
+def _model(
+    where: str, given: Model | Scene, free: Iterable[str] | None, t_end: float | None
+) -> tuple[Model, tuple[float, float]]:
+    """The model and the span of its default experiment."""
+    until = 1.0
+    if isinstance(given, Scene):
+        until = given.t_end
+        known = parameters(given)
+        names = [n for n, p in known.items() if _switches_on(p.value)] if free is None else free
+        given = given.model(names)
+    elif free is not None:
+        raise ValueError(
+            f"{where}: free: expected with a scene only, got a model, whose parameters are in "
+            "Model.p already"
+        )
+    check_model(where, given)
+    if t_end is not None:
+        until = checks.number(f"{where}: t_end", t_end, unit="s", above=0.0)
+    return given, (0.0, until)
+
+
+def _switches_on(value: object) -> bool:
+    """Whether a parameter is a number other than zero."""
+    number = checks.as_number(value)
+    return number is not None and number != 0.0
+
+
+def _identifier(where: str, name: str) -> str:
+    """A C identifier."""
+    text = sub(r"\W+", "_", checks.text(f"{where}: name", name, "a name")).strip("_")
+    return f"m_{text}" if not text or text[0].isdigit() else text
+
+
+def _method(where: str, model: Model, method: str, step: float | None) -> str:
+    """The formula of the steps."""
+    if step is None:
+        return checks.choice(f"{where}: method", method, ["auto", *ADAPTIVE])
+    checks.number(f"{where}: step", step, unit="s", above=0.0)
+    if model.events:
+        raise ValueError(
+            f"{where}: step: expected a model without events, got {len(model.events)}; leave the "
+            "step adaptive, or use a smooth or bristle law"
+        )
+    method = checks.choice(f"{where}: method", method, ["auto", *METHODS])
+    if method == "auto":
+        method = "backward_euler" if model.holonomic and model.monitors else "rodas3"
+    return method

@@ -1,0 +1,79 @@
+/* Steps with error control. A step may lead beyond the communication point as long as nothing
+   jumps: the values there are those of its polynomial, and no step is cut. Where something does
+   jump, what lies beyond is forgotten and the last step is made again, up to there. */
+
+enum { TINY = 100, MANY };
+
+/* The accepted step from m->S to `next` is noted, and searched for events. */
+static void noted(Memory *m, double *next, const double *dense)
+{
+    memcpy(m->base, m->S, sizeof m->base);
+    m->row[0] = m->S[AT_T];
+    m->row[1] = next[AT_T];
+    memcpy(m->row + 2, m->S + MEMORY, N * sizeof(double));
+    memcpy(m->row + 2 + N, next + MEMORY, N * sizeof(double));
+    memcpy(m->row + 2 + 2 * N, dense, ROWS * N * sizeof(double));
+#if CROSSINGS
+    memcpy(m->events_base, m->events, sizeof m->events_base);
+    m->stopped = 0;
+    (void)symfric_search(m->row, next, m->R, m->events, m->jump, 0, 0, 0, &m->stopped);
+#endif
+}
+
+/* Steps up to `end` or beyond; what stopped them before, 0 if nothing. */
+static int steps_to(Memory *m, double end)
+{
+    double next[MEMORY + N], dense[ROWS * N];
+    double most = m->attempts + MOST_ATTEMPTS;
+    while (m->S[AT_T] < end) {
+        if (m->stopped) return m->stopped;
+        if (!(m->S[AT_H] >= SMALLEST_STEP && m->S[AT_H] >= STEP_FLOOR * fabs(m->S[AT_T]))) {
+            return TINY;
+        }
+        if (m->attempts >= most) return MANY;
+        m->R[AT_END] = end;
+        if (m->quiet) {
+            m->R[AT_END] += 2.0 * m->S[AT_H];
+            if (m->limited && m->R[AT_END] > m->stop) m->R[AT_END] = end > m->stop ? end : m->stop;
+        }
+        model_attempt(m->S, m->R, next, dense);
+        m->attempts += 1.0;
+        if (next[AT_T] > m->S[AT_T]) noted(m, next, dense);
+        memcpy(m->S, next, sizeof next);
+#if CROSSINGS && EQUATIONS
+        if (m->stopped == 6) {
+            m->stopped = *consistent(m->S + MEMORY, m->R + DATA, CLOSES) ? 7 : 0;
+        }
+#endif
+    }
+    return m->stopped && m->S[AT_T] <= end ? m->stopped : 0;
+}
+
+/* Unknowns at the communication point. */
+static void unknowns(const Memory *m, double *y)
+{
+    const double *row = m->row;
+    double s;
+    int i, r;
+    if (m->t >= m->S[AT_T]) {
+        memcpy(y, m->S + MEMORY, N * sizeof(double));
+        return;
+    }
+    s = (m->t - row[0]) / (row[1] - row[0]);
+    for (i = 0; i < N; ++i) {
+        double bend = 0.0;
+        for (r = ROWS - 1; r >= 0; --r) bend = row[2 + 2 * N + r * N + i] + s * bend;
+        y[i] = (1.0 - s) * row[2 + i] + s * (row[2 + N + i] + (1.0 - s) * bend);
+    }
+}
+
+/* Back from beyond the communication point, with what drove the model until there. */
+static int returned(Memory *m)
+{
+    m->quiet = 0;
+    if (!(m->S[AT_T] > m->t)) return 0;
+    memcpy(m->S, m->base, sizeof m->S);
+    memcpy(m->events, m->events_base, sizeof m->events);
+    m->stopped = 0;
+    return steps_to(m, m->t);
+}

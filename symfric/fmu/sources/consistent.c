@@ -1,0 +1,143 @@
+/* Unknowns that satisfy the algebraic equations: at the start, and behind a jump of what drives
+   the model. See symfric.integrator.equations.initial and .following. */
+
+#if EQUATIONS
+/* How far the residual moves when the last digits of all numbers do. */
+static double rounding(const double *y, const double *d)
+{
+    double g[EQUATIONS], moved[EQUATIONS], J[EQUATIONS * EQUATIONS], yy[N], dd[ND + 1], most = 0.0;
+    unsigned int bits = 2463534242u;
+    int i, k;
+    model_equations(y, d, g, J);
+    for (k = 0; k < 4; ++k) {
+        for (i = 0; i < N + ND; ++i) {
+            const double value = i < N ? y[i] : d[i - N];
+            bits ^= bits << 13;
+            bits ^= bits >> 17;
+            bits ^= bits << 5;
+            if (i < N) {
+                yy[i] = value * (1.0 + ((bits & 1u) ? 1e-15 : -1e-15));
+            } else {
+                dd[i - N] = value * (1.0 + ((bits & 1u) ? 1e-15 : -1e-15));
+            }
+        }
+        model_equations(yy, dd, moved, J);
+        for (i = 0; i < EQUATIONS; ++i) moved[i] -= g[i];
+        if (norm_of(moved, EQUATIONS) > most) most = norm_of(moved, EQUATIONS);
+    }
+    return most;
+}
+
+/* A step of Newton's method in y, and the residual; 0 where the derivatives are singular. */
+static int newton_step(const double *y, const double *d, double *change, double *residual)
+{
+    double g[EQUATIONS], J[EQUATIONS * EQUATIONS];
+    int i, j;
+    model_equations(y, d, g, J);
+    *residual = norm_of(g, EQUATIONS);
+    if (!isfinite(*residual) || !solved(EQUATIONS, J, g)) return 0;
+    for (i = 0; i < N; ++i) {
+        change[i] = 0.0;
+        for (j = 0; j < EQUATIONS; ++j) change[i] += model_free[i + j * N] * g[j];
+    }
+    return 1;
+}
+
+/* Damped Newton from the guess in y; 0 where it finds nothing, and y is as it was. */
+static int searched(double *y, const double *d)
+{
+    double now[N], change[N], trial[N], g[EQUATIONS], J[EQUATIONS * EQUATIONS], residual;
+    double last = HUGE_VAL;
+    int i, k, part;
+    memcpy(now, y, sizeof now);
+    for (k = 0; k < 50; ++k) {
+        double size = 0.0, share = 1.0;
+        if (!newton_step(now, d, change, &residual)) return 0;
+        for (i = 0; i < N; ++i) {
+            if (fabs(change[i]) > size * (fabs(now[i]) + 1e-14)) {
+                size = fabs(change[i]) / (fabs(now[i]) + 1e-14);
+            }
+        }
+        if (size < 1e-4) {
+            for (i = 0; i < N; ++i) now[i] -= change[i];
+            if (size < 1e-10 || size > last / 2.0) {
+                memcpy(y, now, sizeof now);
+                return 1;
+            }
+        } else if (isfinite(last) && residual <= rounding(now, d)) {
+            memcpy(y, now, sizeof now);
+            return 1;
+        } else {
+            for (part = 0; part < 12; ++part, share *= 0.5) {
+                for (i = 0; i < N; ++i) trial[i] = now[i] - share * change[i];
+                model_equations(trial, d, g, J);
+                if (norm_of(g, EQUATIONS) < residual) break;
+            }
+            if (part == 12) return 0;
+            memcpy(now, trial, sizeof now);
+        }
+        last = size;
+    }
+    return 0;
+}
+
+/* Whether the equations forbid this solution: friction has jammed, or a bearing pulls. */
+static int jams(const double *y, const double *d)
+{
+    double after[N], look[3];
+    model_round(y, d, after, look);
+    return !(look[2] >= 0.0);
+}
+#endif
+
+#if CONSTRAINTS
+/* Positions and velocities of a mechanism onto its constraints; 0 where none are near. */
+static int assembled(double *y, const double *d)
+{
+    double defect[2 * CONSTRAINTS], after[N];
+    int k;
+    for (k = 0; k < 50; ++k) {
+        const double scale = largest(y, NX) > 1.0 ? largest(y, NX) : 1.0;
+        model_defect(y, d, defect);
+        if (largest(defect, 2 * CONSTRAINTS) < 1e-12 * scale) return 1;
+        model_project(y, d, after);
+        memcpy(y, after, sizeof after);
+    }
+    return 0;
+}
+#endif
+
+/* All unknowns of y consistent, states of a mechanism included where `moved`. What is missing is
+   said; empty where nothing is. */
+static const char *consistent(double *y, const double *d, int moved)
+{
+#if CONSTRAINTS
+    if (moved && !assembled(y, d)) {
+        return "the loops of the mechanism cannot be closed from these positions and velocities; "
+               "give others";
+    }
+#endif
+#if EQUATIONS
+    if (symfric_follow(y, d) && !searched(y, d)) {
+        return "the algebraic equations have no solution near their last one; give better start "
+               "values, or change inputs and parameters less at once";
+    }
+#endif
+#if BASIS
+    if (moved) {
+        double slope[CONSTRAINTS * COORDINATES];
+        model_slope(y, d, slope);
+        null_space(CONSTRAINTS, COORDINATES, slope, y + BASIS_AT);
+    }
+#endif
+#if EQUATIONS
+    if (jams(y, d)) {
+        return "friction jams: reactions grow with the friction that they cause, or a bearing "
+               "would pull; less friction or a longer bearing would let it move";
+    }
+#endif
+    (void)y;
+    (void)d;
+    (void)moved;
+    return "";
+}

@@ -1,0 +1,86 @@
+/* FMI 2.0: communication steps. */
+
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference references[],
+                                       size_t n, const fmi2Integer orders[],
+                                       const fmi2Real values[])
+{
+    UNUSED(c);
+    UNUSED(references);
+    UNUSED(orders);
+    UNUSED(values);
+    return n ? fmi2Error : fmi2OK;
+}
+
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference references[],
+                                        size_t n, const fmi2Integer orders[], fmi2Real values[])
+{
+    UNUSED(c);
+    UNUSED(references);
+    UNUSED(orders);
+    UNUSED(values);
+    return n ? fmi2Error : fmi2OK;
+}
+
+/* Discard where nothing was done, for a communication step that cannot be one, and where an event
+   of the model ended it early: fmi2Terminated. Where steps fail it is an error. How far it came is
+   fmi2LastSuccessfulTime in any case. */
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean no_return)
+{
+    Instance *unit = unit_of(c);
+    UNUSED(no_return);
+    if (!allowed(unit, "fmi2DoStep", RUNNING, ENDED)) return fmi2Error;
+    switch (advance(unit, time, size)) {
+    case DONE:
+        return fmi2OK;
+    case OVER:
+    case REFUSED:
+        return refused(unit);
+    case FAILED:
+    default:
+        return failed(unit);
+    }
+}
+
+fmi2Status fmi2CancelStep(fmi2Component c)
+{
+    UNUSED(c);
+    return fmi2Error;
+}
+
+fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
+{
+    UNUSED(c);
+    UNUSED(kind);
+    UNUSED(value);
+    return fmi2Discard;
+}
+
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
+{
+    if (!c || kind != fmi2LastSuccessfulTime) return fmi2Discard;
+    *value = unit_of(c)->m.t;
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
+{
+    UNUSED(c);
+    UNUSED(kind);
+    UNUSED(value);
+    return fmi2Discard;
+}
+
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
+{
+    if (!c || kind != fmi2Terminated) return fmi2Discard;
+    *value = unit_of(c)->m.phase == ENDED;
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value)
+{
+    UNUSED(c);
+    UNUSED(kind);
+    UNUSED(value);
+    return fmi2Discard;
+}

@@ -1,0 +1,313 @@
+/* The unit behind both versions of the interface: variables, initialisation, communication steps.
+   Value references: 0 time, then all signals, parameters, rtol, attempts. */
+
+enum { OF_SIGNALS = 1, OF_P = OF_SIGNALS + NS, OF_RTOL = OF_P + NP, OF_ATTEMPTS, REFERENCES };
+
+static void say(Instance *unit, const char *text) { snprintf(unit->said, SAID, "%s", text); }
+
+static const char *const phase_names[] = {
+    "before the initialisation", "in the initialisation", "in a simulation under way",
+    "behind its end", "after an error"
+};
+
+/* Events of a model may ask for a tighter tolerance than the one set. */
+static void tolerance(Memory *m, double rtol)
+{
+    int i;
+    if (rtol > LARGEST_RTOL) rtol = LARGEST_RTOL;
+    m->R[AT_RTOL] = rtol;
+    for (i = 0; i < NX; ++i) m->R[FIXED + i] = ATOL * rtol * model_nominal[i];
+}
+
+/* The instance as it was made. */
+static void fresh(Memory *m)
+{
+    memset(m, 0, sizeof *m);
+    m->kind = MODEL_KIND;
+    m->stop = HUGE_VAL;
+    m->R[AT_H_MAX] = LONGEST_STEP;
+    tolerance(m, DEFAULT_RTOL);
+    memcpy(m->set, model_data, sizeof m->set);
+    memcpy(m->guess, model_guess, sizeof m->guess);
+}
+
+static double first_step(const Memory *m)
+{
+    const double least = SURE_STEP * fabs(m->begin);
+    return FIRST_STEP > least ? FIRST_STEP : least;
+}
+
+#if CROSSINGS
+/* Events that have happened by the start have values as if just before it. */
+static void before_start(Memory *m)
+{
+    double now[CROSSINGS];
+    int i, any = 0;
+    m->events[TOLERANCE] = EVENT_TOLERANCE;
+    model_events(&m->begin, m->S + MEMORY, m->R + DATA, now);
+    for (i = 0; i < CROSSINGS; ++i) any = any || model_at_start[i] != 0.0;
+    for (i = 0; i < CROSSINGS && any; ++i) {
+        m->events[BEFORE + i] = model_at_start[i] != 0.0 ? model_at_start[i] : now[i];
+    }
+    if (any) m->events[PHASE] = JUMPED;
+}
+#endif
+
+/* Start values: those set, else those of the model, which may follow them and the parameters. */
+static const char *start(Memory *m)
+{
+    double *y = m->S + MEMORY, data[ND + 1];
+    int i, own = m->begin != 0.0 || memcmp(m->set, model_data, sizeof m->set) != 0
+              || memcmp(m->guess, model_guess, sizeof m->guess) != 0;
+    const char *missing = "";
+    for (i = 0; i < NX; ++i) own = own || m->chosen[i] > 0.0;
+    memset(m->S, 0, sizeof m->S);
+    m->S[AT_T] = m->begin;
+    m->S[AT_H] = m->S[AT_H_OLD] = first_step(m);
+    m->S[AT_GROWTH] = GROWTH_MEMORY;
+    memcpy(data, m->set, sizeof data);
+    memcpy(m->R + DATA, data, ND * sizeof(double));
+    memcpy(y, model_start_values, N * sizeof(double));
+    if (own) {
+        model_start(m->known, m->chosen, data + NP, data, y);
+        for (i = 0; i < NZ; ++i) y[model_place_of_z[i]] = m->guess[i];
+#if TIMED
+        y[N - 1] = m->begin;
+#endif
+        missing = consistent(y, m->R + DATA, 1);
+#if EQUATIONS
+        if (*missing) { /* once more, from the unknowns of the model's own start */
+            for (i = NX; i < N - TIMED; ++i) y[i] = model_start_values[i];
+            missing = consistent(y, m->R + DATA, 1);
+        }
+#endif
+    }
+    m->t = m->begin;
+    m->quiet = 1;
+    m->stopped = 0;
+    m->seen = 0;
+#if CROSSINGS
+    memset(m->events, 0, sizeof m->events);
+    before_start(m);
+#endif
+    m->settled = !*missing;
+    return missing;
+}
+
+/* Begin to initialise at a time, up to an end where there is one. 0 where that cannot be. */
+static int initialise(Instance *unit, double begin, int limited, double stop, double rtol)
+{
+    Memory *m = &unit->m;
+    if (!isfinite(begin) || (limited && !(stop > begin)) || !(rtol >= LEAST_RTOL && rtol <= 0.1)) {
+        say(unit, "initialisation: expected a finite start time before the stop time, and a "
+                  "tolerance from 1e-13 to 0.1");
+        return 0;
+    }
+    m->begin = m->t = begin;
+    m->limited = limited;
+    m->stop = limited ? stop : HUGE_VAL;
+    tolerance(m, rtol);
+    m->settled = 0;
+    return 1;
+}
+
+/* Whether the start values are consistent; looks for consistent ones where they are not. */
+static int settled(Instance *unit)
+{
+    Memory *m = &unit->m;
+    const char *missing;
+    if (m->settled || m->phase > INITIALISING) return 1;
+    missing = start(m);
+    if (*missing) snprintf(unit->said, SAID, "start of %s at t = %.9g s: %s", MODEL_NAME, m->t, missing);
+    return !*missing;
+}
+
+static int driven_otherwise(const Memory *m)
+{
+    return memcmp(m->set, m->R + DATA, ND * sizeof(double)) != 0;
+}
+
+/* All signals at the communication point, with inputs and parameters as they are set. */
+static void look(Memory *m)
+{
+    double y[N];
+    if (m->seen) return;
+    unknowns(m, y);
+    if (driven_otherwise(m)) (void)consistent(y, m->set, 0);
+    model_signals(&m->t, y, m->set, m->out);
+    m->seen = 1;
+}
+
+/* The value of a variable; 0 where there is no such one, or no consistent start. */
+static int get(Instance *unit, unsigned int reference, double *value)
+{
+    Memory *m = &unit->m;
+    if (reference >= REFERENCES) {
+        snprintf(unit->said, SAID, "get: expected a value reference below %d, got %u", REFERENCES,
+                 reference);
+        return 0;
+    }
+    if (reference >= OF_SIGNALS && reference < OF_P) {
+        if (!settled(unit)) return 0;
+        look(m);
+        *value = m->out[reference - OF_SIGNALS];
+    } else if (reference == 0) {
+        *value = m->t;
+    } else if (reference == OF_RTOL) {
+        *value = m->R[AT_RTOL];
+    } else {
+        *value = reference == OF_ATTEMPTS ? m->attempts : m->set[reference - OF_P];
+    }
+    return 1;
+}
+
+/* Refuse a value that is no number, or outside the range of its variable. */
+static int within(Instance *unit, const char *name, double value, double lower, double upper)
+{
+    if (isfinite(value) && value >= lower && value <= upper) return 1;
+    snprintf(unit->said, SAID, "set %s: expected a finite number from %g to %g, got %g; it stays as "
+             "it was", name, lower, upper, value);
+    return 0;
+}
+
+static Outcome set(Instance *unit, unsigned int reference, double value)
+{
+    Memory *m = &unit->m;
+    const int place = reference < REFERENCES ? (int)reference : 0, signal = place - OF_SIGNALS;
+    const int early = m->phase <= INITIALISING;
+    if (signal >= NX + NZ && signal < NX + NZ + NU) {
+        const int i = signal - (NX + NZ);
+        if (!within(unit, model_signal_names[signal], value, -HUGE_VAL, HUGE_VAL)) return REFUSED;
+        m->set[NP + i] = value;
+    } else if (place >= OF_P && place < OF_RTOL) {
+        const int i = place - OF_P;
+        if (!within(unit, model_parameter_names[i], value, model_lower[i], model_upper[i])) {
+            return REFUSED;
+        }
+        m->set[i] = value;
+    } else if (place == OF_RTOL) {
+        if (!within(unit, "the relative tolerance", value, LEAST_RTOL, LARGEST_RTOL)) {
+            return REFUSED;
+        }
+        tolerance(m, value);
+    } else if (early && signal >= 0 && signal < NX) {
+        if (!within(unit, model_signal_names[signal], value, -HUGE_VAL, HUGE_VAL)) return REFUSED;
+        m->known[signal] = value;
+        m->chosen[signal] = 1.0;
+    } else if (early && signal >= 0 && signal < NX + NZ) {
+        if (!within(unit, model_signal_names[signal], value, -HUGE_VAL, HUGE_VAL)) return REFUSED;
+        m->guess[signal - NX] = value;
+    } else {
+        snprintf(unit->said, SAID, "set: expected an input or a parameter, or before the end of the "
+                 "initialisation a start value, got the value reference %u", reference);
+        return FAILED;
+    }
+    m->seen = 0;
+    if (early) m->settled = 0;
+    return DONE;
+}
+
+/* Inputs or parameters that were set come into force at the communication point. */
+static const char *jumped(Memory *m)
+{
+    const int moved = memcmp(m->set, m->R + DATA, NP * sizeof(double)) != 0;
+    memcpy(m->R + DATA, m->set, ND * sizeof(double));
+#if CROSSINGS
+    if (m->events[PHASE] == ON) m->events[PHASE] = JUMPED;
+#endif
+    return consistent(m->S + MEMORY, m->R + DATA, moved);
+}
+
+/* Why steps ended before the communication point, in a sentence. */
+static void explain(Instance *unit, int why)
+{
+    Memory *m = &unit->m;
+    double y[N], f[N];
+    const double t = m->S[AT_T], h = m->S[AT_H];
+    int i, fastest = 0, broken = -1;
+    memcpy(y, m->S + MEMORY, sizeof y);
+    model_rates(y, m->R + DATA, f);
+    for (i = N - 1; i >= 0; --i) {
+        if (!isfinite(f[i]) || !isfinite(y[i])) broken = i;
+    }
+    for (i = 1; i < NX; ++i) {
+        if (fabs(f[i]) / model_nominal[i] > fabs(f[fastest]) / model_nominal[fastest]) fastest = i;
+    }
+    if (why == MANY) {
+        snprintf(unit->said, SAID, "%s: stopped at t = %.9g s: more than %g steps in one communication "
+                 "step; loosen rtol or look for a discontinuity", MODEL_NAME, t,
+                 (double)MOST_ATTEMPTS);
+    } else if (why == 7) {
+        snprintf(unit->said, SAID, "%s: stopped at t = %.9g s: behind an event the algebraic equations "
+                 "have no solution near their last one", MODEL_NAME, t);
+    } else if (why == 5) {
+        snprintf(unit->said, SAID, "%s: stopped at t = %.9g s: events pile up without time advancing; "
+                 "give the model a mode in which the contact rests", MODEL_NAME, t);
+    } else if (broken >= 0) {
+        snprintf(unit->said, SAID, "%s: stopped at t = %.9g s: the equation of %s returned NaN or "
+                 "infinity; look for a division by zero or a root of a negative number there",
+                 MODEL_NAME, t, model_unknown_names[broken]);
+#if EQUATIONS
+    } else if (jams(y, m->R + DATA)) {
+        snprintf(unit->said, SAID, "%s: stopped at t = %.9g s: friction jams or a bearing would pull; "
+                 "less friction or a longer bearing would let it move", MODEL_NAME, t);
+#endif
+    } else {
+        snprintf(unit->said, SAID, "%s: stopped at t = %.9g s: the step fell to %.1e s, fastest "
+                 "equation %s; a discontinuity is near, give the law a smooth form or the model an "
+                 "event there", MODEL_NAME, t, h, model_unknown_names[fastest]);
+    }
+}
+
+/* Inputs held over a communication step from `from` to `from` + `size` [s]. */
+static Outcome advance(Instance *unit, double from, double size)
+{
+    Memory *m = &unit->m;
+    const double end = from + size;
+    const char *missing = "";
+    int why;
+    if (m->phase == ENDED) return OVER;
+    if (!(isfinite(size) && fabs(from - m->t) <= 1e-6 * size + 1e-12 * fabs(from) && end > m->t)) {
+        snprintf(unit->said, SAID, "%s: expected a communication step of more than 0 s from t = %.12g s "
+                 "on, got %g s from %.12g s", MODEL_NAME, m->t, size, from);
+        return REFUSED;
+    }
+    if (m->limited && end > m->stop + 1e-9 * fabs(m->stop) + 1e-6 * size) {
+        snprintf(unit->said, SAID, "%s: expected no communication step beyond the stop time %.12g s, "
+                 "got one to %.12g s", MODEL_NAME, m->stop, end);
+        return REFUSED;
+    }
+    m->seen = 0;
+    if (driven_otherwise(m)) {
+        why = returned(m);
+        if (!why) missing = jumped(m);
+        if (*missing) {
+            snprintf(unit->said, SAID, "%s: at t = %.9g s %s", MODEL_NAME, m->t, missing);
+            return FAILED;
+        }
+    } else {
+        why = 0;
+        m->quiet = 1;
+    }
+    if (!why) why = steps_to(m, end);
+    if (!why) {
+        m->t = end;
+        return DONE;
+    }
+    m->t = m->S[AT_T];
+    if (why == 4) {
+        m->phase = ENDED;
+        snprintf(unit->said, SAID, "%s: a terminal event ended the simulation at t = %.9g s",
+                 MODEL_NAME, m->t);
+        return OVER;
+    }
+    explain(unit, why);
+    return FAILED;
+}
+
+static unsigned long long state_kind(const void *state)
+{
+    unsigned long long kind;
+    memcpy(&kind, state, sizeof kind);
+    return kind;
+}

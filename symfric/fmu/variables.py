@@ -1,0 +1,171 @@
+"""The variables of a unit, as both versions of the standard list them.
+
+Value references count time, all signals of the model in its order (x, z, u, outputs), parameters,
+the relative tolerance, the attempts of the integrator.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import inf
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.parameters import Variable
+from symfric.foundation.symbols import strays
+from symfric.model import Model
+
+LEAST_RTOL, LARGEST_RTOL = 1e-13, 0.1
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """A variable of the unit.
+
+    Attributes:
+        reference: value reference.
+        causality, variability, initial: words of the standard; `initial` may be empty.
+        start: None where the unit calculates it.
+        needs: names of what an output depends on directly: inputs, and in model exchange states.
+    """
+
+    name: str
+    reference: int
+    causality: str
+    variability: str
+    initial: str = ""
+    start: float | None = None
+    unit: str = ""
+    nominal: float | None = None
+    lower: float = -inf
+    upper: float = inf
+    doc: str = ""
+    needs: tuple[str, ...] = ()
+
+
+def entries(
+    model: Model, start: Mapping[str, float], rtol: float, given: bool = True
+) -> tuple[Entry, ...]:
+    """All variables of the unit of a `model`.
+
+    Args:
+        model: its signals and parameters.
+        start: values of states and algebraic variables at the start.
+        rtol: default of the relative tolerance; 0 of a unit in fixed steps, which has none.
+        given: whether the start values of all states stay as they are set: not where the loops of
+            a mechanism have to be closed.
+    """
+    names = model.signals
+    needed = direct(model)
+    states = {v.name: v for v in model.x}
+    unknown = {v.name: v for v in model.z}
+    inputs = {v.name: v for v in model.u}
+    taken = {*names, *(v.name for v in model.p)}
+    found = [Entry(_free("time", taken), 0, "independent", "continuous", unit="s", doc="time")]
+    for name, unit in names.items():
+        number = len(found)
+        if name in inputs:
+            v = inputs[name]
+            entry = _bounded(v, number, "input", "continuous", "", float(v.start))
+        elif name in states:
+            v = states[name]
+            own = given and ca.SX(v.start).is_constant()
+            entry = _bounded(
+                v, number, "output", "continuous", "exact" if own else "approx", start[name]
+            )
+        elif name in unknown:
+            v = unknown[name]
+            entry = _bounded(v, number, "output", "continuous", "approx", start[name], needed[name])
+        else:
+            doc = model.outputs[name].doc
+            entry = Entry(
+                name, number, "output", "continuous", "calculated", unit=unit, doc=doc,
+                needs=needed[name],
+            )  # fmt: skip
+        found.append(entry)
+    for v in model.p:
+        found.append(_bounded(v, len(found), "parameter", "tunable", "exact", float(v.start)))
+    tuned, idle = ("tunable", "") if rtol else ("fixed", "; without effect: steps are fixed")
+    found.append(
+        Entry(
+            _free("rtol", taken), len(found), "parameter", tuned, "exact", rtol or 1e-6, "1",
+            lower=LEAST_RTOL, upper=LARGEST_RTOL,
+            doc=f"relative tolerance of a step{idle}",
+        )
+    )  # fmt: skip
+    found.append(
+        Entry(
+            _free("attempts", taken), len(found), "local", "discrete", "calculated", unit="1",
+            doc="steps of the integrator so far, rejected ones included",
+        )
+    )  # fmt: skip
+    return tuple(found)
+
+
+def _bounded(
+    v: Variable, number: int, causality: str, variability: str, initial: str, start: float,
+    needs: tuple[str, ...] = (),
+) -> Entry:  # fmt: skip
+    nominal = v.nominal if v.nominal != 1.0 else None
+    return Entry(
+        v.name, number, causality, variability, initial, start, v.unit, nominal, v.lower, v.upper,
+        v.doc, needs,
+    )  # fmt: skip
+
+
+def _free(name: str, taken: set[str]) -> str:
+    """`name`, or another one where the model has it."""
+    while name in taken:
+        name = f"symfric_{name}"
+    return name
+
+
+def direct(model: Model) -> dict[str, tuple[str, ...]]:
+    """Signal -> inputs and states that it depends on at the same instant, by structure.
+
+    Algebraic variables stand for all that their equations contain, those of others included that
+    they are coupled with.
+    """
+    x, z, u = (model.vector(letter) for letter in "xzu")
+    known = ca.vertcat(u, x)
+    names = [v.name for v in (*model.u, *model.x)]
+    equations = model.alg if model.ode is not None else model.residual
+    unknown = z if model.ode is not None else ca.vertcat(z, model.xdot)
+    behind = _reach(_pattern(equations, unknown), _pattern(equations, known))
+    found: dict[str, tuple[str, ...]] = {}
+
+    def named(row: NDArray[np.bool_]) -> tuple[str, ...]:
+        return tuple(name for name, needs in zip(names, row, strict=True) if needs)
+
+    for i, v in enumerate(model.z):
+        found[v.name] = named(behind[i])
+    for name, output in model.outputs.items():
+        expression = ca.SX(output.expression)
+        row = _pattern(expression, known)[0] if strays(expression, ca.SX(0, 1)) else None
+        if row is None:
+            found[name] = ()
+            continue
+        through = _pattern(expression, unknown)[0]
+        found[name] = named(row | (through[:, None] & behind).any(axis=0))
+    return found
+
+
+def _pattern(expression: ca.SX, symbols: ca.SX) -> NDArray[np.bool_]:
+    """Which rows depend on which symbols."""
+    shape = (expression.numel(), symbols.numel())
+    if not all(shape):
+        return np.zeros(shape, dtype=bool)
+    return ca.DM(ca.jacobian_sparsity(expression, symbols), 1).full() != 0
+
+
+def _reach(of_unknown: NDArray[np.bool_], of_known: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """What each unknown may depend on: all that equations contain which share unknowns with it."""
+    group = of_unknown.T.astype(int) @ of_unknown.astype(int) > 0
+    group |= np.eye(group.shape[0], dtype=bool)
+    while ((wider := group.astype(int) @ group.astype(int) > 0) != group).any():
+        group = wider
+    in_groups = group.astype(int) @ of_unknown.T.astype(int)
+    return in_groups @ of_known.astype(int) > 0

@@ -1,0 +1,176 @@
+"""C of large Functions in pieces that call each other.
+
+An SX Function becomes one C function (`in_c`). An MX Function that calls others, as the step of a
+large mechanism does, becomes a C function for each of those and one that calls them; what stands
+between two calls is written out. Text and compile time then grow with the blocks and not with how
+often a step calls them: those of a six-joint arm in 0.5 MB and 3 s. The bits are CasADi's in both
+forms.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import final
+
+import casadi as ca
+
+from symfric.emitter.c99 import DOUBLE, TRANSCENDENTAL, macro
+from symfric.emitter.emit import emit
+from symfric.foundation.graph import graph
+from symfric.integrator.step.in_c import in_c
+
+
+def all_macros() -> str:
+    """Definitions of all macros through which written functions call transcendental ones."""
+    called = sorted(set(TRANSCENDENTAL.values()))
+    return "".join(f"#define {macro(name, DOUBLE)} {name}\n" for name in called)
+
+
+def routine(function: ca.Function, name: str) -> str:
+    """C of `function`: static void name(const double *a0, ..., double *r0, ...), dense columns.
+
+    Results must not share memory with arguments.
+
+    Raises:
+        ValueError: operations that C does not have; calls with sparse arguments.
+    """
+    if function.is_a("MXFunction"):
+        return _Pieces(name).written(function)
+    arguments = [f"a{i}" for i in range(function.n_in())]
+    results = [f"r{i}" for i in range(function.n_out())]
+    return in_c(function, name, arguments, results).text + "\n"
+
+
+def _heading(function: ca.Function, name: str) -> str:
+    arguments = [f"const double *a{i}" for i in range(function.n_in())]
+    results = [f"double *r{i}" for i in range(function.n_out())]
+    return f"static void {name}({', '.join([*arguments, *results])})"
+
+
+@final
+@dataclass(eq=False)
+class _Pieces:
+    """C functions of the blocks that an MX Function calls, and its own C.
+
+    Attributes:
+        name: of the function in C, with which those of its blocks begin.
+        known: the blocks written so far, by what they are.
+        arrays: symbols (n, 1) and the C arrays that hold them.
+    """
+
+    name: str
+    blocks: list[str] = field(default_factory=list[str])
+    known: dict[int, str] = field(default_factory=dict[int, str])
+    arrays: list[tuple[ca.SX, str]] = field(default_factory=list[tuple[ca.SX, str]])
+    lines: list[str] = field(default_factory=list[str])
+
+    def written(self, function: ca.Function) -> str:
+        """C of `function` and of all that it calls."""
+        slots: dict[int, ca.SX] = {}
+        results: dict[int, list[tuple[int, ca.SX]]] = {}
+        for k in range(function.n_instructions()):
+            op = function.instruction_id(k)
+            into, of = function.instruction_output(k), function.instruction_input(k)
+            if op == ca.OP_INPUT:
+                slots[into[0]] = self._array(f"a{of[0]}", function.sparsity_in(of[0]))
+            elif op == ca.OP_OUTPUT:  # a result may come in parts
+                offset = function.instruction_MX(k).info()["offset"]
+                results.setdefault(into[0], []).append((offset, slots[of[0]]))
+            elif op == ca.OP_CALL:
+                node = function.instruction_MX(k)
+                found = self._call(node.which_function(), [slots[i] for i in of], k)
+                slots |= {i: value for i, value in zip(into, found, strict=True) if i >= 0}
+            else:
+                slots[into[0]] = _between(function.instruction_MX(k), [slots[i] for i in of])
+        values = [_joined(results.get(i, [])) for i in range(function.n_out())]
+        self._write(values, [f"r{i}" for i in range(len(values))])
+        idle = [f"(void)a{i};" for i in range(function.n_in()) if not self._reads(f"a{i}")]
+        heading = _heading(function, self.name)
+        body = "".join(f"    {line}\n" for line in (*idle, *self.lines))
+        return "".join(self.blocks) + f"{heading}\n{{\n{body}}}\n\n"
+
+    def _reads(self, array: str) -> bool:
+        return any(array in line for line in self.lines)
+
+    def _array(self, name: str, sparsity: ca.Sparsity) -> ca.SX:
+        """Symbols for the numbers of a C array."""
+        if not sparsity.is_dense():
+            raise ValueError(f"codegen '{self.name}': expected calls of dense columns, got sparse")
+        symbols = ca.SX.sym(name, sparsity.numel())
+        self.arrays.append((symbols, name))
+        return ca.reshape(symbols, sparsity.size1(), sparsity.size2())
+
+    def _block(self, function: ca.Function) -> str:
+        """Name of the C function of a block, which is written at its first call."""
+        key = function.__hash__()
+        if key not in self.known:
+            self.known[key] = f"{self.name}_{len(self.known) + 1}_{function.name()}"
+            self.blocks.append(routine(function, self.known[key]))
+        return self.known[key]
+
+    def _call(self, function: ca.Function, arguments: list[ca.SX], number: int) -> list[ca.SX]:
+        """The results of a call."""
+        name = self._block(function)
+        places = [self._place(a, f"x{number}_{i}") for i, a in enumerate(arguments)]
+        made = [f"y{number}_{i}" for i in range(function.n_out())]
+        sizes = [max(1, function.numel_out(i)) for i in range(function.n_out())]
+        self.lines += [f"double {one}[{size}];" for one, size in zip(made, sizes, strict=True)]
+        self.lines.append(f"{name}({', '.join([*places, *made])});")
+        dense = (ca.Sparsity.dense(*function.size_out(i)) for i in range(function.n_out()))
+        return [self._array(one, shape) for one, shape in zip(made, dense, strict=True)]
+
+    def _place(self, value: ca.SX, name: str) -> str:
+        """Where the numbers of an argument stand in C: part of an array, or one made for them."""
+        column = ca.vec(ca.densify(value))
+        for symbols, array in self.arrays:
+            begin = _within(column, symbols)
+            if begin is not None:
+                return f"{array} + {begin}" if begin else array
+        self.lines.append(f"double {name}[{max(1, column.numel())}];")
+        self._write([column], [name])
+        return name
+
+    def _write(self, values: Sequence[ca.SX], arrays: Sequence[str]) -> None:
+        """Statements that put `values` into C arrays."""
+        used = [(s, name) for s, name in self.arrays if ca.depends_on(ca.veccat(*values), s)]
+        glue = ca.Function(
+            "between", [s for s, _ in used], ca.cse([ca.vec(value) for value in values])
+        )
+        names = [[f"{name}[{k}]" for k in range(s.numel())] for s, name in used]
+        targets = [
+            [f"{name}[{k}] = {{}};" for k in range(value.numel())]
+            for value, name in zip(values, arrays, strict=True)
+        ]
+        code = emit(graph(glue), names, targets, DOUBLE)
+        self.lines += ["{", *(f"    {line}" for line in code.lines), "}"]
+
+
+def _joined(parts: list[tuple[int, ca.SX]]) -> ca.SX:
+    """A result of its parts and where each begins."""
+    ordered = sorted(parts, key=lambda part: part[0])
+    return ca.densify(ca.vertcat(ca.SX(0, 1), *(ca.vec(part) for _, part in ordered)))
+
+
+def _within(column: ca.SX, symbols: ca.SX) -> int | None:
+    """Where in `symbols` the rows of `column` stand one after the other; None where they do not."""
+    count = column.numel()
+    if not count or count > symbols.numel():
+        return None
+    own, whole = list(_hashes(column)), list(_hashes(symbols))
+    if own[0] not in whole:
+        return None
+    begin = whole.index(own[0])
+    return begin if whole[begin : begin + count] == own else None
+
+
+def _hashes(column: ca.SX) -> Iterator[int]:
+    return (ca.SX(element).__hash__() for element in ca.vertsplit(column))
+
+
+def _between(node: ca.MX, arguments: list[ca.SX]) -> ca.SX:
+    """The value of an MX operation that is no call."""
+    if not arguments:
+        return ca.SX(ca.evalf(node))
+    parts = [node.dep(i) for i in range(node.n_dep())]
+    symbols = [ca.MX.sym("d", part.sparsity()) for part in parts]
+    alone = ca.graph_substitute(node, parts, symbols)
+    return ca.SX(ca.Function("operation", symbols, [alone]).call(arguments)[0])
