@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
@@ -22,10 +22,29 @@ from symfric.multibody.urdf.read import read_urdf
 
 WHERE = "inverse dynamics"
 
-SIGN = (
-    "A torque tau_k turns joint k in its positive direction; friction is what it must overcome. "
+EQUATIONS = "tau = M(q) qdd + c(q, qd) + g(q) + T     by Newton and Euler, from body to body"
+
+RUBBING = """\
+T = R F(R qd, N)     turning, radius R; F(qd, N) for a law of the moment, and sliding
+N = |f_1| + |f_2| + |f_z|     of a hinge: reactions of its two stations and its face, which
+                              q, qd, qdd tell; or the constant that a joint has instead"""
+
+MEAN = "The friction of laws with states is the mean over the step (F below, not F_end)."
+
+USE = (
+    "tau moves a joint in its positive direction; friction is a part of it: what it takes.",
     "Feed the position, velocity and acceleration that are planned: a measured velocity that "
-    "trembles about zero makes friction that trembles, too."
+    "trembles about zero makes friction that trembles, too.",
+)
+
+LIMITS = (
+    "Rigid bodies and joints; what pushes from outside, other than the payload, is not in tau and "
+    "does not press the bearings.",
+)
+
+SOURCES = (
+    "Luh, Walker, Paul, J. Dyn. Sys. Meas. Control 102, 1980: recursion of Newton and Euler.",
+    "Haug, Mech. Based Des. Struct. Mach., 2018: bearings pressed by reactions.",
 )
 
 
@@ -124,7 +143,7 @@ def inverse_dynamics_block(
     own = () if h is not None or not states else (size,)
     return Block(
         name or machine.name,
-        doc=machine.doc("Inverse dynamics", parts),
+        **machine.texts("Inverse dynamics", parts),
         states=states,
         inputs=machine.inputs,
         parameters=(
@@ -155,7 +174,7 @@ def gravity_block(
     holding = machine.leading(ca.substitute([eq.balance], [eq.qd, eq.a, eq.F], zero)[0])
     return Block(
         name or f"{machine.name}_gravity",
-        doc=machine.doc("Forces that hold it at rest", ()),
+        **machine.texts("Forces that hold it at rest: g(q)", ()),
         inputs=tuple(v for v in machine.inputs if v.name.startswith("q_")),
         parameters=tuple(
             v for v in machine.parameters if ca.depends_on(holding, v.symbol)
@@ -200,16 +219,28 @@ class _Machine:
             for k, v in enumerate(self.joints, start=1)
         }
 
-    def doc(self, what: str, parts: Sequence[Rubbing]) -> str:
-        """Text for the header."""
+    def texts(self, what: str, parts: Sequence[Rubbing]) -> dict[str, Any]:
+        """What the data sheet says."""
+        laws = {part.law.name: part.law for part in parts}
         order = ", ".join(f"{k} {v.name}" for k, v in enumerate(self.joints, start=1))
-        laws = dict.fromkeys(part.law for part in parts)
-        rubbing = {law: ", ".join(p.name for p in parts if p.law == law) for law in laws}
-        friction = "; ".join(f"{law} in {joints}" for law, joints in rubbing.items())
-        lines = [f"{what} of '{self.name}'.", f"Joints: {order}.", SIGN]
-        if parts:
-            lines.insert(2, f"Friction, numbered in this order: {friction}.")
-        return "\n\n".join(lines)
+        where = (f"{law}: {', '.join(p.name for p in parts if p.law.name == law)}" for law in laws)
+        rubbing = ("Friction, its numbers in this order: " + "; ".join(where) + ".",)
+        every = [text for law in laws.values() for text in (law.doc, law.equations) if text]
+        return {
+            "doc": f"{what} of '{self.name}'.",
+            "equations": "\n\n".join([EQUATIONS, *([RUBBING] if parts else []), *every]),
+            "discretisation": "\n\n".join(
+                dict.fromkeys(law.discretisation for law in laws.values() if law.discretisation)
+            ),
+            "use": (
+                f"Joints: {order}.",
+                *(rubbing if parts else ()),
+                *USE,
+                *([MEAN] if any(law.states for law in laws.values()) else []),
+            ),
+            "limits": (*LIMITS, *dict.fromkeys(x for law in laws.values() for x in law.limits)),
+            "sources": (*SOURCES, *dict.fromkeys(x for law in laws.values() for x in law.sources)),
+        }
 
 
 def _force(unit: str) -> str:

@@ -6,6 +6,7 @@ from typing import final
 
 import casadi as ca
 
+from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.from_law import law_block
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Variable
@@ -21,7 +22,7 @@ class Rubbing:
 
     Attributes:
         name: of the contact.
-        law: what its law is called.
+        law: the block of its law alone, whose texts are those of the data sheet.
         force: friction [N], for a law of the moment [N m].
         parameters, states: under the names that the law gives them.
         following: the states after the step.
@@ -29,7 +30,7 @@ class Rubbing:
     """
 
     name: str
-    law: str
+    law: Block
     force: ca.SX
     parameters: Variables
     states: Variables
@@ -69,7 +70,7 @@ def rubbing(contact: Contact, normal: ca.SX, h: ca.SX, *, fold: bool) -> Rubbing
     )
     parameters = tuple(v for v in block.parameters if v.name != "h")
     return Rubbing(
-        contact.name, block.name, force, (*parameters, *level), block.states, following, sliding
+        contact.name, block, force, (*parameters, *level), block.states, following, sliding
     )
 
 
@@ -99,7 +100,6 @@ def numbered(groups: Sequence[Variables], names: Sequence[str]) -> tuple[Variabl
     for stem in dict.fromkeys(v.name for v, _ in every):
         alike = [(i, v, name) for i, (v, name) in enumerate(every) if v.name == stem]
         for k, (i, v, name) in enumerate(alike, start=1):
-            doc = f"{v.doc}, joint '{name}'" if v.doc else f"joint '{name}'"
-            found.append(replace(v, name=f"{stem}_{k}", doc=doc))
+            found.append(replace(v, name=f"{stem}_{k}", doc=f"{v.doc}, joint '{name}'"))
             order.append(i)
     return tuple(found), order
