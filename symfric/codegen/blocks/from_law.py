@@ -12,6 +12,7 @@ from symfric.codegen.blocks.discretisation import of_law
 from symfric.codegen.blocks.folding import Fold, variable
 from symfric.codegen.blocks.held_step import advanced, force_of_rate
 from symfric.codegen.blocks.law_text import LawText, texts
+from symfric.codegen.blocks.unloaded import LEAST_LOAD, NO_LOAD, Held, needs_words, with_words
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_casadi
 from symfric.foundation.parameters import Variable, parameters, symbolise
@@ -110,7 +111,7 @@ def law_block(
     if problems:
         raise ValueError(f"{where}: {'; '.join(problems)}")
     symbolic, runtime = symbolise(law, *names)
-    block = _step(symbolic, runtime, h, where) if law.states else _function(symbolic, runtime)
+    block = _step(law, symbolic, runtime, h, where) if law.states else _function(symbolic, runtime)
     idle = [p.name for p in runtime if not ca.depends_on(block.everything, p.symbol)]
     if idle and free is not None:
         raise ValueError(
@@ -166,7 +167,7 @@ def _function(law: Law, runtime: Variables) -> Block:
     return Block("F", inputs=inputs, parameters=runtime, outputs=outputs, use=(SIGN,))
 
 
-def _step(law: Law, runtime: Variables, h: float | None, where: str) -> Block:
+def _step(numeric: Law, law: Law, runtime: Variables, h: float | None, where: str) -> Block:
     v, N, *_ = inputs = _inputs(law)
     states = tuple(Variable(s.name, s.unit, nominal=s.nominal, doc=s.doc) for s in law.states)
     size = step_variable(where, h)
@@ -177,24 +178,45 @@ def _step(law: Law, runtime: Variables, h: float | None, where: str) -> Block:
     rate = ca.SX(law.rate(v.symbol, N.symbol, z, **given))
     step = advanced(law, v.symbol, N.symbol, z, rate, given, duration, where)
     force, r = force_of_rate(ca.SX(law.force(v.symbol, N.symbol, z, **given)), rate, z)
-    of_step = ca.vertcat(z, r)
-    mean = ca.substitute(force, of_step, ca.vertcat(step.mean, step.mean_rate))
-    outputs = {"F": Output(mean, "N", f"{FORCE}, mean over the step")}
-    if ca.depends_on(force, of_step):
-        end = ca.substitute(force, of_step, ca.vertcat(step.end, step.end_rate))
-        outputs["F_end"] = Output(end, "N", f"{FORCE}, at the end of the step")
+    at = {"F": (step.mean, step.mean_rate)}
+    if ca.depends_on(force, ca.vertcat(z, r)):
+        at["F_end"] = (step.end, step.end_rate)
+    held = Held(step.end, force, z, r, at)
+    sizes = (size,) if h is None else ()
+    following, forces, use = step.end, held.outputs, (SIGN, MEAN_VELOCITY)
+    told = with_words(held, N)
+    own = [_of_numbers(*given, inputs, z, runtime + sizes) for given in ((following, forces), told)]
+    if needs_words(numeric, *own):
+        following, forces = told
+        use = (*use, NO_LOAD.format(least=LEAST_LOAD * N.nominal))
+    said = {"F": "mean over the step", "F_end": "at the end of the step"}
+    outputs = {n: Output(e, "N", f"{FORCE}, {said[n]}") for n, e in forces.items()}
     return Block(
         "F",
         states=states,
         inputs=inputs,
-        parameters=runtime + ((size,) if h is None else ()),
-        next=step.end,
+        parameters=runtime + sizes,
+        next=following,
         outputs=outputs,
         resets={"init_sliding": (ca.SX(law.steady_state(v.symbol, N.symbol)), SLIDING)},
         constants={} if h is None else {"h": float(size.start)},
         discretisation=of_law(step.kinds, "F_end" in outputs),
-        use=(SIGN, MEAN_VELOCITY, *([WHICH_FORCE] if "F_end" in outputs else [])),
+        use=(*use, *([WHICH_FORCE] if "F_end" in outputs else [])),
     )
+
+
+def _of_numbers(
+    following: ca.SX, forces: dict[str, ca.SX], inputs: Variables, z: ca.SX, own: Variables
+) -> ca.Function:
+    """(v, N, z, further inputs) -> states, forces with the start values of the parameters `own`."""
+    v, N, *others = (i.symbol for i in inputs)
+    given = ca.vertcat(ca.SX(0, 1), *(p.symbol for p in own))
+    numbers = ca.vertcat(ca.SX(0, 1), *(ca.SX(float(p.start)) for p in own))
+    rows = [
+        ca.densify(ca.substitute(result, given, numbers))
+        for result in (following, ca.vertcat(*forces.values()))
+    ]
+    return ca.Function("step", [v, N, z, ca.vertcat(ca.SX(0, 1), *others)], rows)
 
 
 def _check_at_rest(block: Block, where: str) -> None:

@@ -43,7 +43,7 @@ def test_the_manifest_names_everything_with_its_unit(tmp_path):
 def test_the_manifest_counts_operations_and_calls(tmp_path):
     step = generate(LuGre(), tmp_path).manifest["real"]["float"]["functions"]["lugre_f32_step"]
     assert step["calls"] == {"exp": 1, "expm1": 1, "fabs": 1, "tanh": 1}
-    assert 45 <= step["operations"] <= 58
+    assert 45 <= step["operations"] <= 62
     assert step["prototype"].startswith("unsigned int lugre_f32_step(lugre_f32_state_t *state, ")
 
 
