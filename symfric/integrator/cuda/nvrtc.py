@@ -17,7 +17,11 @@ from symfric.integrator.cuda.cupy_device import OPTIONS
 from symfric.integrator.cuda.device import DeviceError
 
 ARCHITECTURE = "compute_80"
-"""Of the first processors whose double precision is half as fast as single (A100)."""
+"""Of the first devices whose double precision is half as fast as single (A100)."""
+
+
+STANDARD = "--std=c++14"
+"""As CuPy has it by default."""
 
 
 @final
@@ -69,7 +73,7 @@ def build(source: str, architecture: str = ARCHITECTURE) -> Built:
         ctypes.byref(handle), source.encode(), b"symfric.cu", 0, None, None
     ))  # fmt: skip
     try:
-        options = [f"--gpu-architecture={architecture}", *OPTIONS]
+        options = [f"--gpu-architecture={architecture}", STANDARD, *OPTIONS]
         machine = architecture.startswith("sm_")
         if machine:
             options.append("--ptxas-options=-v")
