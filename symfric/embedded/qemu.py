@@ -1,6 +1,5 @@
 """From C to an image for a core, and what it says when QEMU runs it."""
 
-import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -16,6 +15,7 @@ from symfric.embedded.subjects import Subject, literals
 from symfric.embedded.tools import Tools
 from symfric.foundation.compiler import CompileError
 from symfric.foundation.files import write_text
+from symfric.foundation.programs import ProgramError, finished
 
 Array = NDArray[np.float64]
 
@@ -117,17 +117,13 @@ def ran(image: Image, core: Core, tools: Tools) -> Said:
         *("-icount", f"shift={SHIFT}", "-kernel", str(image.path)),
     )
     try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, check=False, timeout=PATIENCE
-        )
-    except subprocess.TimeoutExpired:
-        raise CompileError(f"{core.title}: came to no end within {PATIENCE:.0f} s") from None
-    except OSError as error:
-        raise CompileError(f"{tools.qemu} does not start: {error.strerror}") from None
-    lines = (done.stdout + done.stderr).split()
-    if done.returncode or "end" not in lines:
-        said = " ".join((done.stdout + done.stderr).split()[-8:])
-        raise CompileError(f"{core.title}: QEMU ended with status {done.returncode}: {said}")
+        done = finished(command, limit=PATIENCE, name=f"{core.title} under QEMU")
+    except ProgramError as error:
+        raise CompileError(str(error)) from None
+    lines = (done.output.decode(errors="replace") + done.said).split()
+    if done.status or "end" not in lines:
+        said = " ".join(lines[-8:])
+        raise CompileError(f"{core.title}: QEMU ended with status {done.status}: {said}")
     return _read(lines, image)
 
 

@@ -1,11 +1,11 @@
 """The tools that cross-compile and run code for Cortex-M, or what to say where they are absent."""
 
 import shutil
-import subprocess
 from dataclasses import dataclass
 from typing import final
 
 from symfric.foundation.compiler import Compiler
+from symfric.foundation.programs import ProgramError, finished
 
 GCC, QEMU, NEWLIB = "arm-none-eabi-gcc", "qemu-system-arm", "newlib for arm-none-eabi"
 
@@ -60,13 +60,7 @@ def find_tools() -> Tools | Absent:
 def _has_library(gcc: str) -> bool:
     """Whether the compiler finds the mathematical library: asked, it says a path, not a name."""
     try:
-        said = subprocess.run(
-            [gcc, "-print-file-name=libm.a"],
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=PATIENCE,
-        ).stdout.strip()
-    except (OSError, subprocess.TimeoutExpired):
+        said = finished((gcc, "-print-file-name=libm.a"), limit=PATIENCE).output.strip()
+    except ProgramError:
         return False
-    return said not in ("", "libm.a")
+    return said not in (b"", b"libm.a")

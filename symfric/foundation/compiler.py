@@ -1,26 +1,21 @@
-"""The C compiler of this machine: found in one place, run within a time limit."""
+"""The C compiler of this machine: found in one place, run in one way, within a time limit."""
 
 import os
 import shlex
 import shutil
-import signal
-import subprocess
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+
+from symfric.foundation.programs import PATIENCE, ProgramError, called, finished
 
 NAMES = ("gcc", "clang", "cc")
-PATIENCE, PER_BYTE = 60.0, 1e-4
-"""Seconds that a compiler may take for nothing, and for each byte of C: a hundred times the usual,
-for machines under load; one that waits for something is stopped."""
-GRACE = 1.0
-"""Seconds for a compiler that was asked to stop."""
-KILL = getattr(signal, "SIGKILL", signal.SIGTERM)
+PER_BYTE = 1e-4
+"""Seconds that a compiler may take for each byte of C, besides `PATIENCE`: a hundred times the
+usual, for machines under load."""
 
 
-class CompileError(RuntimeError):
+class CompileError(ProgramError):
     """There is no compiler, it refused the code, or what it made cannot be used."""
 
 
@@ -31,7 +26,7 @@ class Compiler:
     command: tuple[str, ...]
 
     def __str__(self) -> str:
-        return shlex.join((Path(self.command[0]).name, *self.command[1:]))
+        return called(self.command)
 
     def run(
         self, *arguments: str, code: str = "", variables: Mapping[str, str] | None = None
@@ -41,41 +36,27 @@ class Compiler:
         Raises:
             CompileError: it cannot be started, refuses the code, or does not come to an end.
         """
-        process = self.start(*arguments, stdin=subprocess.PIPE, variables=variables)
-        limit = patience(code)
         try:
-            said = process.communicate(code.encode(), timeout=limit)[1].decode(errors="replace")
-        except subprocess.TimeoutExpired:
-            raise CompileError(f"{self} came to no end within {limit:.0f} s") from None
-        finally:
-            end(process)
-        if process.returncode:
-            raise CompileError(f"{self} failed with status {process.returncode}:\n{said}")
-        return said
+            done = finished(
+                (*self.command, *arguments),
+                code.encode(),
+                limit=patience(code),
+                variables=variables,
+                name=str(self),
+            )
+        except ProgramError as error:
+            raise CompileError(str(error)) from None
+        if done.status:
+            raise CompileError(f"{self} failed with status {done.status}:\n{done.said}")
+        return done.said
 
-    def start(
-        self,
-        *arguments: str,
-        stdin: IO[bytes] | int,
-        stderr: int = subprocess.PIPE,
-        variables: Mapping[str, str] | None = None,
-    ) -> subprocess.Popen[bytes]:
-        """Its process, which leads a session of its own; `end` stops and closes it.
+    def warnings(self, *arguments: str) -> list[str]:
+        """Run it on files; returns the lines in which it warns.
 
         Raises:
-            CompileError: it cannot be started.
+            CompileError: as `run`.
         """
-        try:
-            return subprocess.Popen(
-                [*self.command, *arguments],
-                stdin=stdin,
-                stdout=subprocess.DEVNULL,
-                stderr=stderr,
-                env={**os.environ, "LC_ALL": "C", **(variables or {})},
-                start_new_session=True,
-            )
-        except OSError as error:
-            raise CompileError(f"{self} does not start: {error.strerror}") from None
+        return [line for line in self.run(*arguments).splitlines() if "warning:" in line]
 
 
 def patience(code: str) -> float:
@@ -83,29 +64,12 @@ def patience(code: str) -> float:
     return PATIENCE + PER_BYTE * len(code)
 
 
-def end(process: subprocess.Popen[bytes]) -> None:
-    """Stop a compiler that still runs, after an interrupt too, and what it has started.
-
-    It is asked first: then it takes its temporary files away.
-    """
-    if process.poll() is None:
-        _signal(process, signal.SIGTERM)
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(GRACE)
-        _signal(process, KILL)
-        process.wait()
-    for stream in (process.stdin, process.stderr):
-        if stream is not None:
-            stream.close()
-
-
-def _signal(process: subprocess.Popen[bytes], number: int) -> None:
-    """Send a signal to all that a compiler has started; there may be nobody left."""
-    with suppress(ProcessLookupError, PermissionError):
-        if hasattr(os, "killpg"):
-            os.killpg(process.pid, number)
-        else:
-            process.send_signal(number)
+def first_error(text: str) -> str:
+    """The head of what a compiler said, and its first error."""
+    head, _, said = text.partition("\n")
+    lines = said.strip().splitlines()
+    error = next((line for line in lines if "error" in line), "".join(lines[:1]))
+    return f"{head} {error}".strip()
 
 
 def find_compiler(name: str | None = None) -> Compiler | None:
@@ -134,6 +98,18 @@ def _command(text: str) -> tuple[str, ...] | None:
         return None
     path = shutil.which(words[0]) if words else None
     return None if path is None else (str(Path(path)), *words[1:])
+
+
+def needed_compiler() -> Compiler:
+    """The compiler of this machine.
+
+    Raises:
+        CompileError: there is none.
+    """
+    found = find_compiler()
+    if found is None:
+        raise no_compiler()
+    return found
 
 
 def no_compiler() -> CompileError:

@@ -1,12 +1,12 @@
 """Compiling the C that is given away: with warnings, in C99, and what an object file needs."""
 
 import shutil
-import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from symfric.foundation.compiler import Compiler
+from symfric.foundation.programs import finished
 
 WARNINGS = (
     "-Wall",
@@ -27,8 +27,7 @@ def compile_object(compiler: Compiler, source: Path, target: Path) -> list[str]:
     Raises:
         CompileError: the compiler refuses it.
     """
-    said = compiler.run(*FLAGS, *WARNINGS, "-c", str(source), "-o", str(target))
-    return [line for line in said.splitlines() if "warning:" in line]
+    return compiler.warnings(*FLAGS, *WARNINGS, "-c", str(source), "-o", str(target))
 
 
 def link_program(compiler: Compiler, parts: Sequence[Path], include: Path, target: Path) -> None:
@@ -45,8 +44,8 @@ def needed_symbols(target: Path) -> frozenset[str] | None:
     nm = shutil.which("nm")
     if nm is None:
         return None
-    done = subprocess.run([nm, "-u", str(target)], capture_output=True, text=True, check=True)
-    names = [line.split()[-1] for line in done.stdout.splitlines() if line.split()]
+    listed = finished((nm, "-u", str(target))).output.decode(errors="replace")
+    names = [line.split()[-1] for line in listed.splitlines() if line.split()]
     if sys.platform == "darwin":
         names = [name.removeprefix("_") for name in names]
     return frozenset(names)

@@ -4,7 +4,6 @@ Both give one row a step: the states after it, the outputs, the states that each
 the inputs, and with guards the status.
 """
 
-import subprocess
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,8 +17,12 @@ from symfric.codegen.writing.guards import Model, Status
 from symfric.codegen.writing.layout import members, prefix
 from symfric.emitter.c99 import Real
 from symfric.foundation.compiler import CompileError
+from symfric.foundation.programs import PATIENCE, ProgramError, finished
 
 Array = NDArray[np.float64]
+
+PER_STEP = 1e-3
+"""Seconds that a step may take."""
 
 PROGRAM = """#include "{name}.h"
 
@@ -114,13 +117,14 @@ def run_c(
     with np.errstate(over="ignore", under="ignore"):
         numbers = given.astype(kind).tobytes()
     try:
-        done = subprocess.run(command, input=numbers, capture_output=True, check=False)
-    except OSError as error:
-        raise CompileError(f"the program does not run on this machine: {error.strerror}") from None
+        limit = PATIENCE + PER_STEP * len(inputs)
+        done = finished(command, numbers, limit=limit, name="the program that was compiled")
+    except ProgramError as error:
+        raise CompileError(str(error)) from None
     columns = len(signals(block, guards=guards))
-    if done.returncode != 0 or len(done.stdout) != len(inputs) * columns * real.size:
-        raise CompileError(f"the program ended too early, with status {done.returncode}")
-    return np.frombuffer(done.stdout, kind).reshape(len(inputs), columns).astype(float)
+    if done.status != 0 or len(done.output) != len(inputs) * columns * real.size:
+        raise CompileError(f"the program ended too early, with status {done.status}")
+    return np.frombuffer(done.output, kind).reshape(len(inputs), columns).astype(float)
 
 
 def run_vm(

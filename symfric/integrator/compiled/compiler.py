@@ -19,11 +19,12 @@ from typing import final
 from symfric.foundation.compiler import (
     CompileError,
     Compiler,
-    end,
     find_compiler,
-    no_compiler,
+    first_error,
+    needed_compiler,
     patience,
 )
+from symfric.foundation.programs import ProgramError, end, started
 from symfric.integrator.compiled.cache import Cache, caches
 
 FLAGS = (
@@ -85,9 +86,7 @@ def library(source: str, *names: str, flags: tuple[str, ...] = FLAGS) -> Path:
         CompileError: no compiler, no place for its result, or it refused the source; its first
             error is quoted.
     """
-    compiler = find_compiler()
-    if compiler is None:
-        raise no_compiler()
+    compiler = needed_compiler()
     key, problems = key_of(source, compiler, flags), list[str]()
     for place in caches():
         known = place.find(key)
@@ -117,7 +116,7 @@ def _made(
         try:
             compiler.run(*_arguments(flags, temporary), code=source, variables=_folders(place))
         except CompileError as error:
-            raise CompileError(f"compile: {_first_error(str(error))}") from None
+            raise CompileError(f"compile: {first_error(str(error))}") from None
         opened(temporary, names)  # what cannot be used is not kept
     place.evict()
     found = place.find(key)
@@ -189,9 +188,7 @@ def begun(source: str, names: tuple[str, ...]) -> Unfinished:
     Raises:
         CompileError: no compiler, no place for its result, or it does not start.
     """
-    compiler = find_compiler()
-    if compiler is None:
-        raise no_compiler()
+    compiler = needed_compiler()
     key = key_of(source, compiler, FLAGS)
     for place in caches():
         with suppress(OSError), TemporaryFile() as text:
@@ -199,15 +196,15 @@ def begun(source: str, names: tuple[str, ...]) -> Unfinished:
             text.seek(0)
             path = place.begin(key)
             try:
-                process = compiler.start(
-                    *_arguments(FLAGS, path),
+                process = started(
+                    (*compiler.command, *_arguments(FLAGS, path)),
                     stdin=text,
-                    stderr=subprocess.DEVNULL,
                     variables=_folders(place),
+                    name=str(compiler),
                 )
-            except CompileError:
+            except ProgramError as error:
                 path.unlink()
-                raise
+                raise CompileError(str(error)) from None
             if hasattr(os, "setpriority"):
                 with suppress(OSError):
                     os.setpriority(os.PRIO_PGRP, process.pid, NICENESS)
@@ -234,11 +231,3 @@ def opened(path: Path, names: tuple[str, ...]) -> ctypes.CDLL:
             " holds; is $CC a C compiler?"
         )
     return found
-
-
-def _first_error(text: str) -> str:
-    """The head of what a compiler said, and its first error."""
-    head, _, said = text.partition("\n")
-    lines = said.strip().splitlines()
-    error = next((line for line in lines if "error" in line), "".join(lines[:1]))
-    return f"{head} {error}".strip()

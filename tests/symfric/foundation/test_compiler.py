@@ -9,6 +9,7 @@ from time import sleep
 import pytest
 
 from symfric.foundation import compiler as module
+from symfric.foundation import programs
 from symfric.foundation.compiler import CompileError, Compiler, find_compiler, no_compiler
 
 needs_shell = pytest.mark.skipif(sys.platform == "win32", reason="shell scripts as compilers")
@@ -110,10 +111,12 @@ def test_an_interrupt_stops_it_too(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
         raise KeyboardInterrupt
 
     waiting = script(tmp_path / "waiting", f"echo $$ > {tmp_path / 'pid'}; exec sleep 60")
-    monkeypatch.setattr(module.subprocess.Popen, "communicate", interrupted)
+    monkeypatch.setattr(programs.subprocess.Popen, "communicate", interrupted)
     started: list[int] = []
-    end = module.end
-    monkeypatch.setattr(module, "end", lambda process: (started.append(process.pid), end(process)))
+    end = programs.end
+    monkeypatch.setattr(
+        programs, "end", lambda process: (started.append(process.pid), end(process))
+    )
     with pytest.raises(KeyboardInterrupt):
         waiting.run()
     with pytest.raises(ProcessLookupError):

@@ -6,6 +6,7 @@ import pytest
 
 from symfric import Output, Variable
 from symfric.codegen import Block, generate
+from symfric.codegen.running import runner
 from symfric.codegen.running.compiler import link_program
 from symfric.codegen.running.runner import program, run_c, run_vm, signals
 from symfric.emitter.c99 import DOUBLE
@@ -91,7 +92,7 @@ def test_signals_name_the_columns():
 def test_a_program_that_cannot_run_is_an_error(tmp_path):
     (tmp_path / "main").write_bytes(b"\x7fELF of another machine")
     (tmp_path / "main").chmod(0o755)
-    with pytest.raises(CompileError, match="does not run on this machine"):
+    with pytest.raises(CompileError, match="that was compiled does not start: Exec format"):
         run_c(pair(), DOUBLE, tmp_path / "main", np.zeros((1, 1)))
 
 
@@ -99,3 +100,11 @@ def test_a_program_that_stops_early_is_an_error(compiler, tmp_path):
     executable = built(pair(), compiler, tmp_path)
     with pytest.raises(CompileError, match="ended too early"):
         run_c(mass(), DOUBLE, executable, np.zeros((1, 1)))
+
+
+def test_a_program_that_comes_to_no_end_is_stopped(compiler, tmp_path, monkeypatch):
+    (tmp_path / "main.c").write_text("int main(void) { for (;;) { } }\n")
+    link_program(compiler, [tmp_path / "main.c"], tmp_path, tmp_path / "main")
+    monkeypatch.setattr(runner, "PATIENCE", 0.5)
+    with pytest.raises(CompileError, match="came to no end"):
+        run_c(mass(), DOUBLE, tmp_path / "main", np.ones((2, 2)))
