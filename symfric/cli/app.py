@@ -25,6 +25,7 @@ COMMANDS = {
     "run": "Simulate SCENE with a friction law.",
     "identify": "Fit friction laws to measured data, and say what they are worth.",
     "codegen": "Write a friction law or a plant as C99, and verify it.",
+    "export-fmu": "Write a scene or a model as a Functional Mock-up Unit.",
     "ocp": "Solve an optimal control problem and check it.",
     "demo": "Simulate, identify, optimise and generate C.",
     "bench": "Measure symfric beside other integrators.",
@@ -50,7 +51,8 @@ class Commands(TyperGroup):
         if cmd_name not in COMMANDS:
             return None
         one = typer.Typer(**SETTINGS)
-        one.command()(getattr(import_module(f"symfric.cli.{cmd_name}"), cmd_name))
+        name = cmd_name.replace("-", "_")
+        one.command()(getattr(import_module(f"symfric.cli.{name}"), name))
         return typer.main.get_command(one)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:

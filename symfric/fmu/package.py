@@ -55,6 +55,7 @@ def sources(sizes: str, model: str, fmi: int, fixed: bool) -> dict[str, str]:
     steps = "fixed.c" if fixed else "adaptive.c"
     shared = ["numbers.c", "consistent.c", steps, "unit.c"]
     own = [f"fmi{fmi}.c", f"fmi{fmi}_cosimulation.c"]
+    own += ["fmi3_absent.c", "fmi3_no_exchange.c"] if fmi == 3 else []
     texts = {"sizes.h": sizes, "model.c": model}
     texts |= {name: fixed_text(name) for name in ("memory.h", *shared, f"fmi{fmi}.h", *own)}
     included = [f"fmi{fmi}.h", "sizes.h", "memory.h", "numbers.c", "model.c", *shared[1:], *own]

@@ -1,0 +1,167 @@
+"""`symfric export-fmu`: a scene, or a model in a Python file, as a Functional Mock-up Unit."""
+
+import runpy
+import traceback
+from inspect import signature
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from symfric.cli import output
+from symfric.cli.options import JsonOption, SetOption, check_outputs, numbers
+from symfric.cli.run import scenes_with
+from symfric.fmu import Exported
+from symfric.fmu import export_fmu as exported
+from symfric.foundation import checks
+from symfric.foundation.parameters import check_names
+from symfric.model import Model
+from symfric.scenes import Scene
+
+DEFAULT_NAME = "model"
+"""What a model is called in a file that does not say otherwise."""
+
+
+def export_fmu(
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENE|FILE.urdf|FILE.py[:NAME]",
+            help="A scene, a robot, or a `Model`, or a function that returns one, in a file.",
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE.fmu", help="Default: the name of the model."),
+    ] = None,
+    law: Annotated[
+        str | None, typer.Option("--law", metavar="NAME", help="Friction law of a scene.")
+    ] = None,
+    settings: SetOption = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--free",
+            metavar="NAME",
+            help="Make this parameter tunable, and others not; by default all that are not zero.",
+        ),
+    ] = None,
+    fmi: Annotated[int, typer.Option("--fmi", help="Version of the standard: 2 or 3.")] = 3,
+    kind: Annotated[str, typer.Option("--kind", help="co-simulation.")] = "co-simulation",
+    rtol: Annotated[
+        float, typer.Option("--rtol", help="Relative tolerance; can be tuned in the unit.")
+    ] = 1e-6,
+    step: Annotated[
+        float | None, typer.Option("--step", help="Fixed steps of this length [s] instead.")
+    ] = None,
+    method: Annotated[
+        str, typer.Option("--method", help="Formula of the steps, as of `run` and `codegen`.")
+    ] = "auto",
+    t_end: Annotated[
+        float | None, typer.Option("--t-end", help="Stop time [s] of the default experiment.")
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option("--name", help="Model identifier; default from the model.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Write a scene or a model as a Functional Mock-up Unit.
+
+    The unit holds sources and the binary of this platform, and needs neither Python nor CasADi. Its
+    steps are those of `symfric run`, at any communication step.
+
+    Example: symfric export-fmu drive --law lugre --fmi 2 --out drive.fmu
+
+    Example: symfric export-fmu press.py:model --rtol 1e-8
+    """
+    check_outputs(out, json)
+    values = numbers("--set", settings)
+    model = from_file(what, law, values) if ".py" in what else scene_of(what, law, values)
+    unit = exported(
+        model,
+        Path(f"{named(model, what)}.fmu") if out is None else out,
+        fmi=fmi,
+        kind=kind,
+        rtol=rtol,
+        step=step,
+        method=method,
+        free=free,
+        t_end=t_end,
+        name=name,
+    )
+    output.emit_json(to_dict(unit), json)
+    if json != "-":
+        output.show(str(unit))
+    output.say_written(unit.path, json)
+
+
+def named(model: Model | Scene, what: str) -> str:
+    """File name of the unit without its ending."""
+    return model.name if isinstance(model, Model) else Path(what).stem
+
+
+def scene_of(what: str, law: str | None, values: dict[str, float]) -> Scene:
+    """The scene or robot with its law.
+
+    Raises:
+        ValueError: no law, unknown names.
+    """
+    if law is None:
+        raise ValueError(f"export-fmu {what}: expected --law NAME, got none; such as --law lugre")
+    return scenes_with(what, [law], values)[law]
+
+
+def from_file(what: str, law: str | None, values: dict[str, float]) -> Model | Scene:
+    """The model that a Python file holds.
+
+    Raises:
+        ValueError: no such file or name, a file that fails, something that is no model.
+    """
+    if law is not None:
+        raise ValueError(f"--law: expected none with '{what}', which has its laws")
+    path, _, name = what.partition(".py")
+    file, name = Path(f"{path}.py"), name.removeprefix(":") or DEFAULT_NAME
+    if not file.is_file():
+        raise ValueError(f"export-fmu: expected a Python file, got '{file}', which does not exist")
+    try:
+        held = runpy.run_path(str(file))
+    except Exception as error:
+        frames = traceback.extract_tb(error.__traceback__)
+        line = next((f.lineno for f in reversed(frames) if f.filename == str(file)), None)
+        raise ValueError(
+            f"export-fmu: expected a file that runs, got {type(error).__name__} in line {line} of "
+            f"'{file}': {error}"
+        ) from error
+    if name not in held:
+        there = [n for n, value in held.items() if isinstance(value, Model | Scene)]
+        hint = f"; it holds {', '.join(there)}" if there else "; name one after a colon"
+        raise ValueError(f"export-fmu: expected '{name}' in '{file}', got none{hint}")
+    found: Any = held[name]
+    if callable(found):
+        check_names(f"--set of {what}", values, list(signature(found).parameters))
+        found = found(**values)
+    elif values:
+        raise ValueError(f"--set: expected none for '{name}', which is no function")
+    if not isinstance(found, Model | Scene):
+        raise checks.refused(
+            f"export-fmu '{what}'", "a Model, or a function that returns one", found
+        )
+    return found
+
+
+def to_dict(unit: Exported) -> dict[str, Any]:
+    """What `--json` holds."""
+    return {
+        "file": str(unit.path),
+        "size": unit.size,
+        "fmi": unit.fmi,
+        "kind": unit.kind,
+        "identifier": unit.identifier,
+        "binary": unit.binary,
+        "missing": unit.missing,
+        "method": unit.method,
+        "variables": {
+            entry.name: {"reference": entry.reference, "causality": entry.causality}
+            for entry in unit.variables
+        },
+    }

@@ -1,0 +1,80 @@
+/* FMI 3.0: communication steps. */
+
+fmi3Instance fmi3InstantiateCoSimulation(
+    fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible, fmi3Boolean on,
+    fmi3Boolean event_mode, fmi3Boolean early_return, const fmi3ValueReference required[],
+    size_t n_required, fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
+    fmi3IntermediateUpdateCallback update)
+{
+    UNUSED(resources);
+    UNUSED(visible);
+    UNUSED(event_mode);
+    UNUSED(early_return);
+    UNUSED(required);
+    UNUSED(n_required);
+    UNUSED(update);
+    return made(name, token, on, environment, log);
+}
+
+fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources,
+                                          fmi3Boolean visible, fmi3Boolean on,
+                                          fmi3InstanceEnvironment environment,
+                                          fmi3LogMessageCallback log)
+{
+    UNUSED(name);
+    UNUSED(token);
+    UNUSED(resources);
+    UNUSED(visible);
+    UNUSED(on);
+    UNUSED(environment);
+    UNUSED(log);
+    return NULL;
+}
+
+fmi3Status fmi3ExitInitializationMode(fmi3Instance c)
+{
+    Instance *unit = unit_of(c);
+    if (!allowed(unit, "fmi3ExitInitializationMode", INITIALISING, INITIALISING)) return fmi3Error;
+    if (!settled(unit)) return failed(unit);
+    unit->m.phase = RUNNING;
+    return fmi3OK;
+}
+
+/* Discard where nothing was done, for a communication step that cannot be one; an error where steps
+   fail; early and to be terminated where an event of the model ended it. */
+fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Boolean no_return,
+                      fmi3Boolean *event, fmi3Boolean *terminate, fmi3Boolean *early,
+                      fmi3Float64 *reached)
+{
+    Instance *unit = unit_of(c);
+    Outcome found;
+    UNUSED(no_return);
+    if (!allowed(unit, "fmi3DoStep", RUNNING, ENDED)) return fmi3Error;
+    found = advance(unit, time, size);
+    *event = fmi3False;
+    *terminate = found == OVER;
+    *early = found == OVER;
+    *reached = unit->m.t;
+    switch (found) {
+    case DONE:
+    case OVER:
+        return fmi3OK;
+    case REFUSED:
+        return refused(unit);
+    case FAILED:
+    default:
+        return failed(unit);
+    }
+}
+
+fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference references[], size_t n,
+                                    const fmi3Int32 orders[], fmi3Float64 values[],
+                                    size_t n_values)
+{
+    UNUSED(c);
+    UNUSED(references);
+    UNUSED(orders);
+    UNUSED(values);
+    UNUSED(n_values);
+    return n ? fmi3Error : fmi3OK;
+}

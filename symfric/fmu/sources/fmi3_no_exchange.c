@@ -1,0 +1,122 @@
+/* FMI 3.0: calls of model exchange and event mode, which co-simulation does not have. */
+
+fmi3Status fmi3EnterEventMode(fmi3Instance c)
+{
+    UNUSED(c);
+    return fmi3Error;
+}
+
+fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[],
+    size_t n_unknowns, const fmi3ValueReference knowns[], size_t n_knowns, const fmi3Float64
+    seeds[], size_t n_seeds, fmi3Float64 values[], size_t n_values)
+{
+    UNUSED(c);
+    UNUSED(unknowns);
+    UNUSED(n_unknowns);
+    UNUSED(knowns);
+    UNUSED(n_knowns);
+    UNUSED(seeds);
+    UNUSED(n_seeds);
+    UNUSED(values);
+    UNUSED(n_values);
+    return fmi3Error;
+}
+
+fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c)
+{
+    UNUSED(c);
+    return fmi3Error;
+}
+
+fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *again, fmi3Boolean *terminate,
+    fmi3Boolean *nominals_changed, fmi3Boolean *values_changed, fmi3Boolean *has_next, fmi3Float64
+    *next)
+{
+    UNUSED(c);
+    UNUSED(again);
+    UNUSED(terminate);
+    UNUSED(nominals_changed);
+    UNUSED(values_changed);
+    UNUSED(has_next);
+    UNUSED(next);
+    return fmi3Error;
+}
+
+fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c)
+{
+    UNUSED(c);
+    return fmi3Error;
+}
+
+fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_return, fmi3Boolean
+    *event_mode, fmi3Boolean *terminate)
+{
+    UNUSED(c);
+    UNUSED(no_return);
+    UNUSED(event_mode);
+    UNUSED(terminate);
+    return fmi3Error;
+}
+
+fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time)
+{
+    UNUSED(c);
+    UNUSED(time);
+    return fmi3Error;
+}
+
+fmi3Status fmi3SetContinuousStates(fmi3Instance c, const fmi3Float64 x[], size_t n)
+{
+    UNUSED(c);
+    UNUSED(x);
+    return n ? fmi3Error : fmi3OK;
+}
+
+fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance c, fmi3Float64 derivatives[], size_t
+    n)
+{
+    UNUSED(c);
+    UNUSED(derivatives);
+    return n ? fmi3Error : fmi3OK;
+}
+
+fmi3Status fmi3GetEventIndicators(fmi3Instance c, fmi3Float64 indicators[], size_t n)
+{
+    UNUSED(c);
+    UNUSED(indicators);
+    return n ? fmi3Error : fmi3OK;
+}
+
+fmi3Status fmi3GetContinuousStates(fmi3Instance c, fmi3Float64 x[], size_t n)
+{
+    UNUSED(c);
+    UNUSED(x);
+    return n ? fmi3Error : fmi3OK;
+}
+
+fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance c, fmi3Float64 nominals[], size_t n)
+{
+    UNUSED(c);
+    UNUSED(nominals);
+    return n ? fmi3Error : fmi3OK;
+}
+
+fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n)
+{
+    UNUSED(c);
+    UNUSED(n);
+    return fmi3Error;
+}
+
+fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n)
+{
+    UNUSED(c);
+    UNUSED(n);
+    return fmi3Error;
+}
+
+fmi3Status fmi3EnterStepMode(fmi3Instance c)
+{
+    UNUSED(c);
+    return fmi3Error;
+}
