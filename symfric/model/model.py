@@ -300,6 +300,11 @@ class Model:
         parameters = np.tile(self.values("p")[:, None], (1, count))
         for i, v in enumerate(self.p):
             parameters[i] = p.get(v.name, parameters[i])
+        if self._starts_alone:
+            alone = np.tile(self._default_state[:, None], (1, count))
+            for i, v in enumerate(self.x):
+                alone[i] = given.get(v.name, alone[i])
+            return alone.T, parameters.T
         known = np.zeros((len(self.x), count))
         chosen = np.array([float(v.name in given) for v in self.x])
         for i, v in enumerate(self.x):

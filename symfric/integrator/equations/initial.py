@@ -311,6 +311,16 @@ def first_step(span: float, t_start: float = 0.0) -> float:
     return max(min(1e-8 * span, LONGEST_FIRST), SURE * abs(t_start))
 
 
+def first_steps(spans: Array, t_start: float = 0.0) -> Array:
+    """`first_step` of many spans, with its bits."""
+    return np.maximum(np.minimum(1e-8 * spans, LONGEST_FIRST), SURE * abs(t_start))
+
+
 def smallest_step(span: float) -> float:
     """The step [s] below which a run gives up where t is near 0; elsewhere rounding of t counts."""
     return 1e-15 * first_step(span)
+
+
+def smallest_steps(spans: Array) -> Array:
+    """`smallest_step` of many spans, with its bits."""
+    return 1e-15 * first_steps(spans)

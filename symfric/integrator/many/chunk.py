@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.compiler import find_compiler
 from symfric.foundation.status import Status
-from symfric.integrator.equations.initial import consistent_many, smallest_step
+from symfric.integrator.equations.initial import consistent_many, smallest_steps
 from symfric.integrator.many.members import Members, Stretch
 from symfric.integrator.many.program import Program, program
 from symfric.integrator.running.engine import Stop
@@ -96,8 +96,7 @@ class Job:
 
     def stretch(self, chunk: Chunk, first: int, follow: bool) -> tuple[Stretch, Indices]:
         """All input intervals from `first` on, and which of the times belong to them."""
-        breaks, begin = self.breaks[first:], float(self.breaks[0])
-        h_min = np.array([smallest_step(end - begin) for end in chunk.ends.tolist()])
+        breaks, h_min = self.breaks[first:], smallest_steps(chunk.ends - self.breaks[0])
         times = self.times[None] if self.times.size else chunk.ends[:, None]
         inside = np.flatnonzero((times >= breaks[0]).any(axis=0))
         data, times = chunk.data[:, :, first:], times[:, inside]
@@ -173,11 +172,9 @@ def _solved(job: Job, chunk: Chunk, runner: Members) -> tuple[Solved, Array]:
         size[here] = np.maximum(size[here], largest[:, : job.program.nx])
         S[here], attempts[here], t = part, made, part[:, State.T]
         signals[np.ix_(here, inside)] = found
-        for m, why, at in zip(here.tolist(), reason.tolist(), t.tolist(), strict=True):
-            if why in WHY:
-                failed[m] = (
-                    f"{WHY[why].value} It stands at t = {at:g} s; simulate it alone for more."
-                )
+        for k in np.flatnonzero(np.isin(reason, list(WHY))).tolist():
+            why = WHY[Stop(int(reason[k]))].value
+            failed[int(here[k])] = f"{why} It stands at t = {t[k]:g} s; simulate it alone for more."
         stuck = reason == Stop.SEARCH
         interval = np.searchsorted(job.breaks, t[stuck])
         for k in np.unique(interval).tolist():

@@ -20,7 +20,15 @@ from symfric import (
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.following import following
-from symfric.integrator.equations.initial import consistent, consistent_many, first_guess
+from symfric.integrator.equations.initial import (
+    consistent,
+    consistent_many,
+    first_guess,
+    first_step,
+    first_steps,
+    smallest_step,
+    smallest_steps,
+)
 from symfric.scenes import SliderCrank
 
 Array = NDArray[np.float64]
@@ -221,3 +229,11 @@ def test_a_quick_way_is_taken_where_it_leads_there() -> None:
         found = consistent(system, "here", guess, none, quick)
         assert found == pytest.approx(searched, rel=1e-9, abs=1e-9 * np.abs(searched).max())
     assert tried == [True, True]
+
+
+@pytest.mark.parametrize("t_start", [0.0, 3.0, -1e6])
+def test_first_steps_of_many_spans_have_the_bits_of_each(t_start: float) -> None:
+    spans = np.array([1e-9, 0.1, 20.0, 999.0, 1000.1, 1e7])
+    alone = [first_step(span, t_start) for span in spans.tolist()]
+    assert first_steps(spans, t_start).tolist() == alone
+    assert smallest_steps(spans).tolist() == [smallest_step(span) for span in spans.tolist()]
