@@ -1,7 +1,6 @@
 """Friction compensators and observers as blocks, and their proof in closed loops."""
 
 from symfric.compensation.cascade import Cascade as Cascade
-from symfric.compensation.compensator import Compensation as Compensation
 from symfric.compensation.compensator import compensator as compensator
 from symfric.compensation.loop import close_loop as close_loop
 from symfric.compensation.observers import disturbance_observer as disturbance_observer
@@ -13,4 +12,6 @@ from symfric.compensation.reference import sine as sine
 from symfric.compensation.reference import step as step
 from symfric.compensation.result import Comparison as Comparison
 from symfric.compensation.result import Loop as Loop
+from symfric.compensation.settings import Compensation as Compensation
+from symfric.compensation.settings import settings_from_text as settings_from_text
 from symfric.compensation.terms import TERMS as TERMS

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from math import inf
 from typing import Any
 
 import casadi as ca
@@ -16,6 +17,7 @@ from symfric.foundation import checks
 from symfric.laws import Law, law_name
 from symfric.laws.base.law import check_law
 from symfric.model import Output
+from symfric.scenes import Drive
 
 INPUTS = ("v_ref", "a_ref", "e", "v", "N", "enable")
 
@@ -31,7 +33,7 @@ OVER = (
 
 
 def compensator(
-    law: Law,
+    law: Law | Drive,
     *,
     name: str | None = None,
     h: float | None = None,
@@ -52,7 +54,8 @@ def compensator(
     should rest.
 
     Args:
-        law: with numbers, with states or without, a function of v and N.
+        law: with numbers, with states or without, a function of v and N; or a drive, which brings
+            its law, its load, its offset, and whether it turns.
         name: C identifier; default "friction_compensator".
         h: sample time [s] as a constant; without it a parameter, by default 1 ms.
         turning: units rad/s and N m.
@@ -62,9 +65,12 @@ def compensator(
         ValueError: bad input; a law with inputs beside v and N, or without a block; a build-up of a
             law that has states of its own; unknown terms.
     """
-    check_law("compensator", law)
-    where = f"compensator '{law_name(law)}'"
+    where = "compensator"
     s = chosen_settings(where, settings, chosen)
+    if isinstance(law, Drive):
+        s, law, turning = _of_drive(where, law, s), law.law, law.turning or turning
+    check_law(where, law)
+    where = f"compensator '{law_name(law)}'"
     if law.inputs:
         names = ", ".join(i.name for i in law.inputs)
         raise ValueError(f"{where}: expected a law of v and N only, got one with {names}")
@@ -98,7 +104,7 @@ def compensator(
         outputs={"F": Output(force, "N", "force to add to that of the controller")} | more,
         constants=dict(inner.constants) | ({} if h is None else {"h": float(size.start)}),
         equations=f"{formula(s)}\n\n{inner.equations}",
-        discretisation=inner.discretisation,
+        discretisation=without_end(inner.discretisation),
         use=USE,
         limits=(OVER, *inner.limits),
         sources=inner.sources,
@@ -127,11 +133,27 @@ def _velocity(parts: Parts, s: Compensation) -> tuple[Parts, ca.SX, ca.SX]:
     return parts, wanted, wanted if s.velocity == "reference" else v
 
 
+def without_end(discretisation: str) -> str:
+    """What is said of a step of the law, without its force at the end, which is no output here."""
+    return "\n".join(line for line in discretisation.splitlines() if "F_end" not in line)
+
+
+def _of_drive(where: str, drive: Drive, s: Compensation) -> Compensation:
+    """The settings with the numbers of a drive where none are given."""
+    load = checks.number(f"{where}: N of the drive", drive.N, unit="N", lower=0.0)
+    offset = checks.number(f"{where}: offset of the drive", drive.offset, unit="N")
+    return replace(
+        s,
+        N=load if s.N is None else s.N,
+        offset=offset or None if s.offset is None else s.offset,
+    )
+
+
 def _load(parts: Parts, s: Compensation) -> tuple[Parts, ca.SX]:
     """The normal force, an input or a parameter."""
     if isinstance(s.N, str):
         return parts.given("N", "N", "normal force", 10.0, lower=0.0)
-    return parts.parameter("N", s.N, "N", "normal force")
+    return parts.parameter("N", 1.0 if s.N is None else s.N, "N", "normal force")
 
 
 def _built(
@@ -186,6 +208,9 @@ def _added(
     parts: Parts, force: ca.SX, s: Compensation, wanted: ca.SX, h: ca.SX | float
 ) -> tuple[Parts, ca.SX]:
     """The force of the law with all that is added, and within its limits."""
+    if s.offset is not None:
+        parts, more = parts.parameter("offset", s.offset, "N", "constant force", lower=-inf)
+        force = force + more
     if s.inertia is not None:
         parts, a = parts.given("a_ref", "m/s^2", "reference acceleration")
         parts, mass = parts.parameter("inertia", s.inertia, "kg", "mass that a_ref is times")

@@ -182,6 +182,7 @@ def _run(
     rows = np.zeros((4, steps + 1, count))  # position, velocity, acting and added force
     rows[:2, 0] = plant.x[:, places].T
     control.state[:, 0] = rows[0, 0]
+    forces = np.zeros((steps + 1 + setup.delay, len(added), count))  # of each block, when it acts
     queue = [np.zeros(count) for _ in range(setup.delay)]
     ended, k = "", 0
     try:
@@ -191,7 +192,8 @@ def _run(
                 "r": reference.x[k], "v_ref": reference.v[k], "a_ref": reference.a[k],
                 "u": rows[2, k - 1], "N": setup.load, "enable": 1.0,
             }  # fmt: skip
-            command, rows[3, k] = _commanded(control, added, now, setup)
+            command = _commanded(control, added, now, forces[k], forces[k + 1 + setup.delay], setup)
+            rows[3, k] = forces[k + 1 + setup.delay].sum(axis=0)
             queue.append(command)
             rows[2, k] = queue.pop(0)
             rows[:2, k + 1] = plant.step(rows[2, k][:, None])[:, places].T
@@ -200,28 +202,38 @@ def _run(
         ended = f"interrupted at {k * controller.h:g} s"
     except SolveError as error:
         ended = f"stopped at {k * controller.h:g} s: {error}"
+    status = np.bitwise_or.reduce([np.zeros(count, np.uint32), *(b.status for b in added)])
     return {
         name: Loop(name, reference, *(rows[i, : k + (i < 2), m] for i in range(4)),
-                   limit=controller.limit, ended=ended)
+                   limit=controller.limit, ended=ended, status=int(status[m]))
         for m, name in enumerate(names)
     }  # fmt: skip
 
 
 def _commanded(
-    control: Members, added: Sequence[Members], now: Mapping[str, float | Array], setup: Setup
-) -> tuple[Array, Array]:
-    """The command of controller and blocks together, and the part of the blocks."""
+    control: Members,
+    added: Sequence[Members],
+    now: Mapping[str, float | Array],
+    acted: Array,
+    forces: Array,
+    setup: Setup,
+) -> Array:
+    """The command of controller and blocks together; the `forces` of the blocks are written.
+
+    `acted` are those over the last interval: an observer of forces does not see what others do.
+    """
     for name in ("x", "r", "v_ref", "a_ref"):
         control.inputs[name][:] = now[name]
     control.step()
     seen = {**now, "v": control.outputs["v_m"], "e": control.outputs["e"]}
-    more = np.zeros(len(control.input))
-    for block in added:
+    for i, block in enumerate(added):
         for name, place in block.inputs.items():
             place[:] = seen[name]
+            if name == "u":
+                place -= acted.sum(axis=0) - acted[i]
         block.step()
-        more += block.outputs["F"]
+        forces[i] = block.outputs["F"]
         if "hold" in block.outputs:
             control.inputs["hold"][:] = block.outputs["hold"]
     most = setup.controller.limit
-    return np.clip(control.outputs["u"] + more, -most, most), more
+    return np.clip(control.outputs["u"] + forces.sum(axis=0), -most, most)

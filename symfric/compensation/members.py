@@ -19,11 +19,16 @@ from symfric.foundation.files import write_text
 
 Array = NDArray[np.float64]
 
+COMPILED: dict[tuple[str, str, str], Any] = {}
+"""Of this process: fingerprint of a block, type and compiler -> its function of members."""
+
 GLUE = """#include "{name}.h"
 
-void members(long count, {real} *state, const {real} *param, const {real} *in, {real} *out);
+void members(long count, {real} *state, const {real} *param, const {real} *in, {real} *out,
+             unsigned int *status);
 
-void members(long count, {real} *state, const {real} *param, const {real} *in, {real} *out)
+void members(long count, {real} *state, const {real} *param, const {real} *in, {real} *out,
+             unsigned int *status)
 {{
     for (long i = 0; i < count; i++) {{
         {call};
@@ -39,6 +44,7 @@ class Members:
     Attributes:
         block: what they are.
         state, param, input, output: shapes (members, ...), in the order of the block.
+        status: bits of all steps so far, a number each; 0 in the VM, which has no guards.
     """
 
     def __init__(
@@ -60,6 +66,7 @@ class Members:
         self.param = np.tile(np.array([v.start for v in block.parameters], kind), (count, 1))
         self.input = np.zeros((count, len(block.inputs)), kind)
         self.output = np.zeros((count, len(block.outputs)), kind)
+        self.status = np.zeros(count, np.uint32)
         self.inputs = {v.name: self.input[:, i] for i, v in enumerate(block.inputs)}
         self.outputs = {name: self.output[:, i] for i, name in enumerate(block.outputs)}
         names = [v.name for v in block.parameters]
@@ -69,6 +76,14 @@ class Members:
         self.step = self._in_c(real, compiler) if compiler else self._in_vm()
 
     def _in_c(self, real: str, compiler: Compiler) -> Any:
+        key = (self.block.fingerprint, real, str(compiler))
+        if key not in COMPILED:
+            COMPILED[key] = self._compiled(real, compiler)
+        arrays = (self.state, self.param, self.input, self.output, self.status)
+        given = [ctypes.c_long(len(self.state)), *(ctypes.c_void_p(a.ctypes.data) for a in arrays)]
+        return lambda: COMPILED[key](*given)
+
+    def _compiled(self, real: str, compiler: Compiler) -> Any:
         kind = REALS[real]
         name = prefix(self.block, kind)
         with TemporaryDirectory(prefix="symfric-") as folder:
@@ -82,9 +97,7 @@ class Members:
             except OSError as error:
                 raise CompileError(f"the library does not load on this machine: {error}") from None
         found.restype = None
-        arrays = (self.state, self.param, self.input, self.output)
-        given = [ctypes.c_long(len(self.state)), *(ctypes.c_void_p(a.ctypes.data) for a in arrays)]
-        return lambda: found(*given)
+        return found
 
     def _call(self, name: str) -> str:
         sizes = {
@@ -100,10 +113,11 @@ class Members:
         }
         idle = "".join(f"(void){group}; " for group in sizes if group not in own)
         if not self.block.is_function:
-            return f"{idle}{name}_step({', '.join(own.values())})"
+            return f"{idle}status[i] |= {name}_step({', '.join(own.values())})"
         given = [f"in[{sizes['in']} * i + {k}]" for k in range(sizes["in"])]
         if "param" in own:
             given.append(own["param"])
+        given.append("&status[i]")
         return f"{idle}out[i] = {name}({', '.join(given)})"
 
     def _in_vm(self) -> Any:
@@ -118,7 +132,7 @@ class Members:
                 if array.size:
                     place(i, array.data)
 
-        def go(alive: object = step) -> None:
+        def go(alive: object = (step, buffer)) -> None:
             for own, given in zip(arrays, (self.state, self.param, self.input), strict=True):
                 own[:] = given
             evaluate()

@@ -9,6 +9,7 @@ from symfric.codegen import Block, law_block
 from symfric.codegen.blocks.from_law import in_turning, step_variable
 from symfric.codegen.blocks.held_step import held_step
 from symfric.compensation import stages
+from symfric.compensation.compensator import without_end
 from symfric.compensation.parts import Parts
 from symfric.foundation import checks
 from symfric.foundation.parameters import parameters, with_values
@@ -98,7 +99,7 @@ def lugre_observer(
     doc = "Observer of the bristle deflection by the position error."
     formula = "dz/dt of the law + k_e e, |z| <= mu_s N / sigma_0"
     called = "lugre_observer" if name is None else name
-    setup = Setup(called, doc, formula, gain, "1/s", N, ramp, limit)
+    setup = Setup(called, doc, formula, gain, N, ramp, limit)
     return _observer(law, setup, corrected, h, turning, where)
 
 
@@ -115,19 +116,18 @@ def gms_observer(
 ) -> Block:
     """The spring forces of GMS friction, observed by the position error of a loop.
 
-        F_i+ = F_i of the law after the step + h k e k_i / (k_1 + k_2 + ...),   |F_i| <= a_i mu_s N
+        F_i+ = F_i of the law after the step + k_i h k e,   |F_i| <= alpha_i mu_s N
         F    = F_1 + F_2 + ... + sigma_2 v
 
-    e is the position error, reference less measured; the correction is shared by stiffness, as a
-    displacement of all springs by k e h / sum k_i would be. Modes are those of the law. The forces
+    e is the position error, reference less measured; the correction stretches all springs by
+    h k e, as that of LuGre's bristle does. Modes are those of the law. The forces
     are held in the set that they never leave in the law, so that F is bounded for every gain,
-    error and step size. With one element and k / k_1 for its gain it is the observer of LuGre for
-    C -> inf in the limit of small steps; there is no proof of stability for more elements, and
-    tests in the loop stand for it.
+    error and step size. There is no proof of stability; tests in the loop
+    stand for it, and show that a gain far beyond 1/s x ten makes it worse.
 
     Args:
         law: form = "event", whose step is known exactly.
-        gain: k [N/(m s)].
+        gain: k [1/s].
         N, ramp, limit, h, name, turning: as for `lugre_observer`.
 
     Raises:
@@ -146,18 +146,17 @@ def gms_observer(
         if step is None or not isinstance(known, GMS):
             raise checks.refused(where, "a law that knows its step", known)
         end, mean = ca.SX(step[0]), ca.SX(step[1])
-        total = sum(element.k for element in known.elements)
         force = known.sigma_2 * v
         for i, (element, share) in enumerate(zip(known.elements, known.shares(), strict=True)):
-            more, most = size * push * element.k / total, share * known.mu_s * load
+            more, most = size * push * element.k, share * known.mu_s * load
             end[i] = smooth.clip(end[i] + more, -most, most)
             force = force + smooth.clip(mean[i] + more / 2, -most, most)
         return end, ca.SX(force)
 
     doc = "Observer of the spring forces by the position error."
-    formula = "F_i+ = F_i of the law + h k_e e k_i / (k_1 + k_2 + ...), |F_i| <= alpha_i mu_s N"
+    formula = "F_i+ = F_i of the law + k_i h k_e e, |F_i| <= alpha_i mu_s N"
     called = "gms_observer" if name is None else name
-    setup = Setup(called, doc, formula, gain, "N/(m s)", N, ramp, limit)
+    setup = Setup(called, doc, formula, gain, N, ramp, limit)
     return _observer(law, setup, corrected, h, turning, where)
 
 
@@ -169,7 +168,6 @@ class Setup:
     doc: str
     equations: str
     gain: float
-    unit: str
     N: float
     ramp: float | None
     limit: float | None
@@ -201,7 +199,7 @@ def _observer(
     v = inner.inputs[0]
     parts = Parts(inner.states, (v,), tuple(p for p in inner.parameters if p is not size))
     parts, e = parts.given("e", "m", "position error, reference less measured", 1e-5)
-    parts, k = parts.parameter("k_e", setup.gain, setup.unit, "gain of the error")
+    parts, k = parts.parameter("k_e", setup.gain, "1/s", "gain of the error")
     load = checks.number(f"{where}: N", setup.N, unit="N", lower=0.0)
     parts, constant = parts.parameter("N", load, "N", "normal force")
     z = ca.vertcat(*(state.symbol for state in inner.states))
@@ -213,7 +211,7 @@ def _observer(
         setup.name,
         doc=f"{setup.doc} {inner.doc}",
         equations=f"{setup.equations}\n\n{inner.equations}",
-        discretisation=inner.discretisation,
+        discretisation=without_end(inner.discretisation),
         use=USE,
         limits=inner.limits,
         sources=inner.sources,
@@ -260,8 +258,9 @@ def disturbance_observer(
 
         d = Q(s) [u - m s v],   Q = (w / (s + w))^order,   F = d
 
-    u is the force that acted up to this sample (delayed as the drive delays it), v the velocity
-    measured now. In steps
+    u is the force that acted up to this sample (delayed as the drive delays it), less that of a
+    compensator beside it, of which it then finds what is left; v is the velocity measured now. In
+    steps
 
         f  = u - m (v - v before) / h          mean of what opposes over the last interval
         d+ = d + (1 - exp(-w h)) (f - d)       once for each order
@@ -292,7 +291,9 @@ def disturbance_observer(
     order = checks.count(f"{where}: order", order, least=1, most=2)
     size = step_variable(where, h)
     duration = size.symbol if h is None else float(size.start)
-    parts, u = Parts().given("u", "N", "force that acted since the last call")
+    parts, u = Parts().given(
+        "u", "N", "force that acted since the last call, less that of a compensator beside"
+    )
     parts, v = parts.given("v", "m/s", "measured velocity", 0.1)
     parts, m = parts.parameter("m", mass, "kg", "mass", lower=1e-12)
     parts, w = parts.parameter("w", bandwidth, "rad/s", "bandwidth of the filter")

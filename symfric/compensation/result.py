@@ -33,6 +33,7 @@ class Loop:
         force: that acted after each sample [N].
         added: what the compensation asked for at each sample [N].
         limit: largest force [N].
+        status: bits that the guards of the blocks have set, 0 where nothing was repaired.
         ended: why it ended early; empty if it did not.
     """
 
@@ -44,6 +45,7 @@ class Loop:
     added: Array
     limit: float
     ended: str = ""
+    status: int = 0
 
     @property
     def t(self) -> Array:
@@ -73,6 +75,11 @@ class Loop:
         """
         rest = self.reference.rest
         return np.nan if rest is None or self.ended else float(np.ptp(self.x[:-1][rest]))
+
+    @property
+    def standing(self) -> float:
+        """Size of the error at the end [m]."""
+        return float(np.abs(self.error[-1:]).max(initial=0.0))
 
     @property
     def work(self) -> float:
@@ -127,10 +134,18 @@ class Comparison:
             if loop.hunting >= self.count:
                 counts = loop.hunting / self.count
                 found.append(f"{loop.name}: hunts at rest, {counts:.3g} counts to and fro")
+            elif not np.isnan(loop.hunting) and loop.standing >= self.count:
+                counts = loop.standing / self.count
+                found.append(
+                    f"{loop.name}: rests {counts:.3g} counts off; an integrator goes on and it may "
+                    "break away later"
+                )
             if loop is not before and loop.rms > before.rms:
                 found.append(f"{loop.name}: the error is larger than without compensation")
             if loop is not before and loop.hunting > max(before.hunting, self.count):
                 found.append(f"{loop.name}: hunts more than without compensation")
+            if loop.status:
+                found.append(f"{loop.name}: the guards of the C repaired something, {loop.status}")
             if loop.saturated:
                 found.append(f"{loop.name}: {loop.saturated:.1%} of the samples at the limit")
         return tuple(found)
@@ -147,6 +162,7 @@ class Comparison:
                 "work_J": loop.work,
                 "peak_added_N": float(np.abs(loop.added).max(initial=0.0)),
                 "saturated": loop.saturated,
+                "status": loop.status,
                 "ended": loop.ended,
             }
             for loop in self.loops.values()

@@ -25,8 +25,8 @@ class Compensation:
             one of them alone. A law that sees measured velocity takes damping from the loop, and
             noise; one that sees the reference compensates what ought to be.
         v_blend: [m/s]; several counts of the encoder a sample, and several v_s of the law.
-        N: normal force [N], a parameter of the C; "input" makes it an input. With a law whose
-            coefficients are forces it is 1.
+        N: normal force [N], a parameter of the C; "input" makes it an input. By default that of
+            the drive; 1 with a law alone, whose coefficients are then forces.
         scales: terms of friction whose scale, 0 to 1, can be set: names of `TERMS`, or start values
             by name. By default all that the law has, but "bristle", with start value 1.
         without: terms that are left out.
@@ -40,6 +40,7 @@ class Compensation:
         dead_zone: velocities up to this [m/s] count as rest.
         build_up: way [m] over which friction builds up after a reversal, of a law without states.
         build_up_table: its shape: (share of the way, share of the force), from (0, 0) to (1, 1).
+        offset: constant force [N] that is added; of a drive its own, where it has one.
         inertia: mass [kg] times the reference acceleration is added, too.
         delay: time [s] by which the reference is looked ahead with its acceleration: the lag of the
             drive, and half a step of the law.
@@ -53,12 +54,13 @@ class Compensation:
 
     velocity: str = "blend"
     v_blend: float = 0.01
-    N: float | str = 1.0
+    N: float | str | None = None
     scales: Mapping[str, float] | Sequence[str] | None = None
     without: Sequence[str] = ()
     dead_zone: float | None = None
     build_up: float | None = None
     build_up_table: Sequence[tuple[float, float]] = ()
+    offset: float | None = None
     inertia: float | None = None
     delay: float | None = None
     error_gain: float | None = None
@@ -68,6 +70,42 @@ class Compensation:
     ramp: float | None = 0.1
     limit: float | None = None
     slew: float | None = None
+
+
+def settings_from_text(texts: Sequence[str]) -> Compensation:
+    """Settings as a command line has them.
+
+        v_blend=0.02  scales=coulomb:0.9,stribeck:0  without=viscous  stick=1,0.1,1e-3
+
+    Raises:
+        ValueError: unknown names, repeated ones, no numbers.
+    """
+    where, found = "compensation", dict[str, Any]()
+    known = [item.name for item in fields(Compensation)]
+    for text in texts:
+        name, _, value = text.partition("=")
+        checks.check_names(where, [name], known)
+        if name in found or not value:
+            raise checks.refused(where, "NAME=VALUE, every name once", text)
+        parts = value.split(",")
+        pairs = [part.split(":") for part in parts]
+        if name == "velocity" or (name == "N" and value == "input"):
+            found[name] = value
+        elif name == "without" or (name == "scales" and all(len(pair) == 1 for pair in pairs)):
+            found[name] = tuple(parts)
+        elif name in ("scales", "build_up_table"):
+            if any(len(pair) != 2 for pair in pairs):
+                raise checks.refused(f"{where}: {name}", "A:B,A:B,...", value)
+            number = [checks.parsed(f"{where}: {name}", pair[1]) for pair in pairs]
+            firsts = [pair[0] for pair in pairs]
+            found[name] = dict(zip(firsts, number, strict=True))
+            if name == "build_up_table":
+                shares = [checks.parsed(f"{where}: {name}", first) for first in firsts]
+                found[name] = tuple(zip(shares, number, strict=True))
+        else:
+            numbers = tuple(checks.parsed(f"{where}: {name}", part) for part in parts)
+            found[name] = numbers[0] if len(numbers) == 1 else numbers
+    return chosen_settings(where, None, found)
 
 
 def chosen_settings(
@@ -82,8 +120,10 @@ def chosen_settings(
     checks.choice(f"{where}: velocity", s.velocity, VELOCITIES)
     if isinstance(s.N, str):
         checks.choice(f"{where}: N", s.N, ["input"])
-    else:
+    elif s.N is not None:
         checks.number(f"{where}: N", s.N, unit="N", lower=0.0)
+    if s.offset is not None:
+        checks.number(f"{where}: offset", s.offset, unit="N")
     positive = ("v_blend", "m/s"), ("build_up", "m"), ("ramp", "s")
     for name, unit in positive:
         if getattr(s, name) is not None:
@@ -155,6 +195,7 @@ def formula(s: Compensation) -> str:
     if s.build_up is not None:
         lines.append("built+ = built + 2 v_c h / d_build, held within +-1")
         force = "built F_sliding(|v_c|, N) + viscous"
+    force += " + offset" * (s.offset is not None)
     force += " + inertia a_ref" * (s.inertia is not None)
     force += " + F_stick stuck" * (s.stick is not None)
     force += " + F_dither sin(2 pi phase)" * (s.dither is not None)

@@ -96,9 +96,10 @@ class Terms:
         Raises:
             ValueError: a law that has no sliding force on one side of rest.
         """
-        speed, one = ca.fabs(self.v), ca.SX(self.law.sliding(ca.fabs(self.v), self.N, 1))
-        other = one if self.law.facts.odd else -ca.SX(self.law.sliding(-speed, self.N, -1))
-        dry = built * one if other is one else built * ca.if_else(built < 0, other, one)
+        speed = ca.fabs(self.v)
+        one = ca.SX(self.law.sliding(speed, self.N, 1))
+        other = -ca.SX(self.law.sliding(-speed, self.N, -1))
+        dry = built * (one if _same(one, other) else ca.if_else(built < 0, other, one))
         return replace(self, dry=_without_viscous(self.law, dry))
 
     def _with_levels(
@@ -155,6 +156,15 @@ def _without_viscous(law: Law, force: ca.SX) -> ca.SX:
     values = [p.value for p in parameters(law).values() if p.role == "viscous"]
     symbols = ca.veccat(*(ca.SX(value) for value in values if is_symbolic(value)))
     return ca.substitute(force, symbols, ca.DM.zeros(symbols.numel())) if values else force
+
+
+def _same(a: ca.SX, b: ca.SX) -> bool:
+    """Whether both are the same function, by its values for random symbols."""
+    symbols = ca.symvar(ca.vertcat(a, b))
+    look = ca.Function("both", [ca.vertcat(*symbols)], [a, b])
+    points = np.random.default_rng(0).uniform(0.1, 2.0, (4, len(symbols)))
+    pairs = [[float(value) for value in look(point)] for point in points]
+    return all(abs(x - y) <= 1e-12 * abs(x) for x, y in pairs)
 
 
 def _peaks(names: set[str]) -> dict[str, str]:

@@ -1,0 +1,317 @@
+"""Friction compensators as blocks: stage by stage, and what is refused."""
+
+from math import exp, pi
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric import (
+    GMS,
+    Asymmetric,
+    BrownMcPhee,
+    Coulomb,
+    Dahl,
+    Karnopp,
+    Law,
+    LuGre,
+    SelfTuning,
+    Stribeck,
+    Table,
+)
+from symfric.codegen import Block, generate, law_block, verify
+from symfric.compensation import TERMS, Compensation, compensator, settings_from_text
+from symfric.foundation.graph import graph
+from symfric.scenes import Drive
+
+H = 1e-3
+BARE = {"velocity": "reference", "scales": (), "ramp": None}
+CURVE = {"mu_s": 6.0, "mu_d": 4.0, "v_s": 5e-3, "sigma_2": 20.0}
+STEP = Stribeck(v_eps=1e-9, **CURVE)
+"""With N = 1 N the coefficients are newtons, and sign(v) is one at any speed."""
+
+
+class Machine:
+    """A block that goes step by step; what is not given is 0, and enable 1."""
+
+    def __init__(self, block: Block, **parameters: float) -> None:
+        self.block = block
+        self.x = ca.DM([float(v.start) for v in block.states])
+        self.p = [parameters.get(v.name, float(v.start)) for v in block.parameters]
+
+    def __call__(self, **inputs: float) -> float:
+        known = {"enable": 1.0, **inputs}
+        u = [known.get(v.name, 0.0) for v in self.block.inputs]
+        self.x, y = self.block.step(self.x, self.p, u)
+        self.y = dict(zip(self.block.outputs, y.full().ravel(), strict=True))
+        return float(self.y["F"])
+
+
+def force(law: Law, inputs: dict[str, float], steps: int = 1, **settings: object) -> float:
+    machine = Machine(compensator(law, **(BARE | settings)))
+    return [machine(**inputs) for _ in range(steps)][-1]
+
+
+@pytest.mark.parametrize("law", [STEP, LuGre(), GMS(form="event"), Dahl(), BrownMcPhee()])
+def test_nothing_but_the_law_is_there_where_nothing_is_chosen(law: Law) -> None:
+    """Not an operation more than in the block of the law, and the same bits."""
+    alone, bare = law_block(law), compensator(law, **BARE)
+    wanted = ca.vertcat(ca.SX(0, 1), alone.next, alone.outputs["F"].expression)
+    inputs = ca.vertcat(*(v.symbol for v in (*alone.states, *alone.parameters, *alone.inputs)))
+    assert len(graph(bare.step).nodes) == len(graph(ca.Function("f", [inputs], [wanted])).nodes)
+    machine, other, random = Machine(bare), Machine(alone), np.random.default_rng(1)
+    for v in 0.02 * random.standard_normal(50):
+        assert machine(v_ref=v) == other(v=v, N=1.0)
+
+
+def test_the_terms_of_a_law_are_those_it_has() -> None:
+    assert [p.name for p in compensator(STEP).parameters if p.name.startswith("scale")] == [
+        "scale_coulomb",
+        "scale_stribeck",
+        "scale_viscous",
+    ]
+    for law, names in (
+        (Coulomb(), {"scale_coulomb"}),
+        (SelfTuning(), {"scale_force"}),
+        (Table((0.0, 1.0), (0.1, 0.2)), {"scale_force"}),
+    ):
+        found = {p.name for p in compensator(law).parameters if p.name.startswith("scale")}
+        assert found == names
+
+
+@pytest.mark.parametrize(
+    "law", [STEP, LuGre(**CURVE), Asymmetric(STEP, STEP), GMS(C=400.0, **CURVE, form="event")]
+)
+def test_scaled_terms_add_up_to_the_closed_form(law: Law) -> None:
+    """Long sliding at 3 mm/s: s_c 4 + s_s 2 exp(-0.36) + s_v 20 v."""
+    v = 3e-3
+    parts = {"coulomb": 4.0, "stribeck": 2.0 * exp(-((v / 5e-3) ** 2)), "viscous": 20.0 * v}
+    for scales in (
+        {"coulomb": 0.5},
+        {"stribeck": 0.3},
+        {"viscous": 0.0},
+        dict.fromkeys(parts, 0.0),
+    ):
+        wanted = sum(value * scales.get(term, 1.0) for term, value in parts.items())
+        assert force(law, {"v_ref": v}, 400, scales=scales) == pytest.approx(wanted, rel=1e-6)
+        without = [term for term, scale in scales.items() if scale == 0.0]
+        if without:
+            assert force(law, {"v_ref": v}, 400, without=without) == pytest.approx(wanted, rel=1e-6)
+
+
+def test_scales_do_not_touch_the_states() -> None:
+    """Turned while the machine moves they act at once."""
+    block = compensator(LuGre(**CURVE), **(BARE | {"scales": {"coulomb": 1.0, "stribeck": 1.0}}))
+    machine = Machine(block)
+    whole = [machine(v_ref=2e-3) for _ in range(5)][-1]
+    state = machine.x
+    half = Machine(block, scale_coulomb=0.5, scale_stribeck=0.5)
+    half.x = state
+    again = Machine(block)
+    again.x = state
+    dry = again(v_ref=2e-3) - 20.0 * 2e-3
+    assert half(v_ref=2e-3) == pytest.approx(dry / 2 + 20.0 * 2e-3)
+    assert float(half.x[0]) == float(again.x[0])
+    assert whole != dry
+
+
+def test_without_bristles_what_is_left_is_the_steady_curve() -> None:
+    law, v = LuGre(**CURVE), 3e-3
+    steady = 4.0 + 2.0 * exp(-((v / 5e-3) ** 2)) + 20.0 * v
+    assert force(law, {"v_ref": v}, scales={"bristle": 0.0}) == pytest.approx(steady)
+    assert force(law, {"v_ref": v}, scales={"bristle": 1.0}) == pytest.approx(
+        force(law, {"v_ref": v})
+    )
+    assert force(law, {"v_ref": v}) < 0.5 * steady
+
+
+def test_the_desired_velocity_moves_the_law_near_zero_and_the_measured_one_beyond() -> None:
+    settings = {"velocity": "blend", "v_blend": 0.01}
+    law = Stribeck(mu_s=0.0, mu_d=0.0, sigma_2=1.0, v_eps=1e-3)
+    for v, wanted in ((0.0, 0.3), (-0.0099, 0.3), (0.0201, 0.0201), (-0.5, -0.5)):
+        assert force(law, {"v_ref": 0.3, "v": v}, **settings) == pytest.approx(wanted)
+    between = [force(law, {"v_ref": 0.3, "v": v}, **settings) for v in np.linspace(0.01, 0.02, 9)]
+    assert (np.diff(between) < 0).all()
+    assert between[4] == pytest.approx((0.3 + 0.015) / 2)
+
+
+def test_the_reference_is_looked_ahead_and_follows_the_error() -> None:
+    law = Stribeck(mu_s=0.0, mu_d=0.0, sigma_2=1.0, v_eps=1e-3)
+    given = {"v_ref": 0.1, "a_ref": 5.0, "e": 1e-3}
+    found = force(law, given, delay=2e-3, error_gain=20.0)
+    assert found == pytest.approx(0.1 + 5.0 * 2e-3 + 20.0 * 1e-3)
+
+
+def test_a_dead_zone_is_silent_and_continuous() -> None:
+    law = Stribeck(mu_s=0.0, mu_d=0.0, sigma_2=1.0, v_eps=1e-3)
+    for v, wanted in ((5e-4, 0.0), (-1e-3, 0.0), (1.5e-3, 5e-4), (-3e-3, -2e-3)):
+        assert force(law, {"v_ref": v}, dead_zone=1e-3) == pytest.approx(wanted)
+
+
+def test_friction_builds_up_over_a_way_and_remembers_short_reversals() -> None:
+    """From -4 N to 4 N over 0.1 mm in steps of 1 um, as a Maxwell element does."""
+    machine = Machine(compensator(Coulomb(mu_d=4.0), **(BARE | {"build_up": 1e-4})))
+    forth = [machine(v_ref=1e-3) for _ in range(200)]
+    assert forth[0] == pytest.approx(0.5 * 8.0 / 100)  # the mean of the first step
+    assert np.allclose(np.diff(forth[:49]), 8.0 / 100)
+    assert forth[-1] == pytest.approx(4.0)
+    back = [machine(v_ref=-1e-3) for _ in range(20)]
+    assert back[-1] == pytest.approx(4.0 - 19.5 * 8.0 / 100)
+    again = [machine(v_ref=1e-3) for _ in range(20)]
+    assert again[-1] == pytest.approx(4.0 - 0.5 * 8.0 / 100)
+    assert machine() == pytest.approx(4.0)  # held at rest
+
+
+def test_the_shape_of_the_build_up_is_a_table() -> None:
+    table = ((0.0, 0.0), (0.25, 0.75), (1.0, 1.0))
+    settings = BARE | {"build_up": 1e-4, "build_up_table": table}
+    machine = Machine(compensator(Coulomb(mu_d=4.0), **settings))
+    for _ in range(200):
+        machine(v_ref=-1e-3)
+    forth = np.array([machine(v_ref=1e-3) for _ in range(100)])
+    way = (np.arange(100) + 0.5) / 100
+    shares = np.interp(way, *np.array(table).T)
+    assert np.allclose(forth, 4.0 * (2 * shares - 1))
+
+
+def test_sides_that_differ_build_up_to_their_own_levels() -> None:
+    law = Asymmetric(Coulomb(mu_d=4.0, v_eps=1e-9), Coulomb(mu_d=2.0, v_eps=1e-9))
+    machine = Machine(compensator(law, **(BARE | {"build_up": 1e-4})))
+    assert [machine(v_ref=1e-3) for _ in range(200)][-1] == pytest.approx(4.0)
+    assert [machine(v_ref=-1e-3) for _ in range(300)][-1] == pytest.approx(-2.0)
+
+
+def test_a_stuck_axis_is_freed_and_let_go() -> None:
+    law = Stribeck(mu_s=0.0, mu_d=0.0, v_eps=1e-3)
+    machine = Machine(compensator(law, **(BARE | {"stick": (2.0, 0.1, 1e-3)})))
+    stuck = [machine(v_ref=0.1) for _ in range(150)]
+    assert stuck[49] == pytest.approx(1.0)
+    assert stuck[99] == stuck[-1] == pytest.approx(2.0)
+    free = [machine(v_ref=0.1, v=0.1) for _ in range(150)]
+    assert free[49] == pytest.approx(1.0)
+    assert free[-1] == 0.0
+    assert machine(v_ref=-0.1) < 0.0
+
+
+def test_dither_is_a_sine_of_its_own() -> None:
+    law = Stribeck(mu_s=0.0, mu_d=0.0, v_eps=1e-3)
+    machine = Machine(compensator(law, **(BARE | {"dither": (0.5, 40.0)})))
+    found = [machine() for _ in range(100)]
+    assert np.allclose(found, 0.5 * np.sin(2 * pi * 40.0 * H * np.arange(1, 101)))
+
+
+def test_it_fades_in_and_out_without_a_bump() -> None:
+    machine = Machine(compensator(STEP, velocity="reference", ramp=0.1))
+    full = force(STEP, {"v_ref": 0.1})
+    course = [machine(v_ref=0.1, enable=float(100 <= k < 300)) for k in range(500)]
+    assert course[99] == 0.0
+    assert course[149] == pytest.approx(full / 2)
+    assert course[199] == course[299] == pytest.approx(full)
+    assert course[-1] == 0.0
+    assert np.abs(np.diff(course)).max() < 1.6 * full * H / 0.1
+
+
+def test_force_and_its_pace_are_limited() -> None:
+    assert force(STEP, {"v_ref": 1.0}, limit=3.0) == 3.0
+    machine = Machine(compensator(STEP, **(BARE | {"slew": 100.0})))
+    forth = [machine(v_ref=0.1) for _ in range(100)]
+    assert np.allclose(np.diff([0.0, *forth])[:59], 0.1)
+    assert forth[-1] == pytest.approx(force(STEP, {"v_ref": 0.1}))
+
+
+def test_offset_and_inertia_are_added() -> None:
+    found = force(STEP, {"a_ref": 2.0}, offset=-0.5, inertia=3.0)
+    assert found == pytest.approx(-0.5 + 6.0)
+
+
+def test_the_integrator_is_held_at_rest_near_the_goal() -> None:
+    machine = Machine(compensator(STEP, hold=(1e-5, 1e-3)))
+    for given, wanted in (
+        ({"e": 9e-6}, 1.0),
+        ({"e": -1.1e-5}, 0.0),
+        ({"e": 0.0, "v": 2e-3}, 0.0),
+        ({"e": 0.0, "v_ref": -2e-3}, 0.0),
+    ):
+        machine(**given)
+        assert machine.y["hold"] == wanted
+
+
+def test_a_drive_brings_its_numbers() -> None:
+    block = compensator(Drive(STEP, N=2.0, offset=0.3, turning=True))
+    starts = {p.name: float(p.start) for p in block.parameters}
+    assert (starts["N"], starts["offset"]) == (2.0, 0.3)
+    assert {v.name: v.unit for v in block.inputs}["v_ref"] == "rad/s"
+    assert block.outputs["F"].unit == "N m"
+    assert "offset" not in {p.name for p in compensator(Drive(STEP)).parameters}
+
+
+def test_settings_come_from_texts() -> None:
+    s = settings_from_text(
+        ["v_blend=0.02", "scales=coulomb:0.9,stribeck:0", "without=viscous", "stick=1,0.1,1e-3",
+         "N=input", "build_up_table=0:0,1:1", "build_up=1e-4"]
+    )  # fmt: skip
+    assert s.v_blend == 0.02
+    assert s.scales == {"coulomb": 0.9, "stribeck": 0.0}
+    assert tuple(s.without) == ("viscous",)
+    assert s.stick == (1.0, 0.1, 1e-3)
+    assert s.N == "input"
+    assert s.build_up_table == ((0.0, 0.0), (1.0, 1.0))
+
+
+FULL = Compensation(
+    N="input", dead_zone=1e-3, inertia=1.0, delay=1e-3, error_gain=20.0, hold=(1e-5, 1e-3),
+    stick=(1.0, 0.1, 1e-3), dither=(0.1, 100.0), limit=5.0, slew=100.0, offset=0.1,
+)  # fmt: skip
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("law", [LuGre(**CURVE), GMS(form="event")])
+def test_the_c_of_a_full_compensator_has_the_bits_of_casadi(law, tmp_path, compiler) -> None:
+    block = compensator(law, settings=FULL, scales=["coulomb", "stribeck", "viscous", "bristle"])
+    found = verify(generate(block, tmp_path))
+    assert found.ok, found
+
+
+@pytest.mark.heavy
+def test_the_c_of_a_built_up_compensator_has_the_bits_of_casadi(tmp_path, compiler) -> None:
+    block = compensator(
+        STEP, settings=FULL, build_up=1e-4, build_up_table=((0, 0), (0.3, 0.6), (1, 1))
+    )
+    found = verify(generate(block, tmp_path))
+    assert found.ok, found
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"v_blend": 0.0}, "v_blend: expected a number > 0"),
+        ({"velocity": "desired"}, "velocity: expected one of blend, reference, measured"),
+        ({"N": "given"}, "N: expected one of input"),
+        ({"N": -1.0}, "N: expected a number >= 0"),
+        ({"scales": ["coulom"]}, "did you mean coulomb?"),
+        ({"scales": ["force"]}, "scales: expected one of coulomb, stribeck, viscous, bristle"),
+        ({"scales": ["coulomb"], "without": ["coulomb"]}, "in scales or in without"),
+        ({"build_up": 1e-4}, "expected a law without states"),
+        ({"build_up_table": ((0, 0), (1, 1))}, "expected with build_up only"),
+        ({"stick": (1.0, 0.1)}, "stick: expected (force [N], time [s], velocity [m/s])"),
+        ({"dither": (1.0, -1.0)}, "dither: expected (amplitude [N], frequency [Hz])"),
+        ({"velocity": "measured", "delay": 1e-3}, "with a desired velocity only"),
+        ({"limt": 3.0}, "did you mean limit?"),
+        ({"settings": 3}, "expected settings, Compensation()"),
+        ({"h": 0.0}, "h: expected a number > 0"),
+    ],
+)
+def test_bad_settings_are_refused_in_a_sentence(given: dict[str, object], words: str) -> None:
+    with pytest.raises(ValueError, match=r"^compensator|^codegen|^settings") as caught:
+        compensator(LuGre(), **given)
+    assert words in str(caught.value)
+
+
+def test_laws_that_cannot_are_refused() -> None:
+    with pytest.raises(ValueError, match="expected a law of v and N only, got one with F_e"):
+        compensator(Karnopp(form="original"))
+    with pytest.raises(ValueError, match="expected a law such as"):
+        compensator("lugre")
+    with pytest.raises(ValueError, match="build_up_table: expected rising pairs"):
+        compensator(STEP, build_up=1e-4, build_up_table=((0, 0), (1, 0.5)))
+    assert set(TERMS) >= {"coulomb", "stribeck", "viscous", "bristle"}

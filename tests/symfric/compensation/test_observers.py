@@ -1,0 +1,152 @@
+"""Observers of friction: closed forms, bounds for every step, gain and input, stability."""
+
+from itertools import product
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric import GMS, LuGre, LuGreNormalised, LuGrePassive, Stribeck
+from symfric.codegen import Block, generate, law_block, verify
+from symfric.compensation import disturbance_observer, gms_observer, lugre_observer
+
+H = 1e-3
+LAWS = [LuGre(mu_s=6.0, mu_d=4.0, sigma_2=1.0), LuGreNormalised(), LuGrePassive()]
+SPRINGS = GMS(form="event", mu_s=6.0, mu_d=4.0)
+
+
+def rolled(block: Block, rows: np.ndarray, **parameters: float) -> tuple[np.ndarray, np.ndarray]:
+    """States and forces after each row of inputs."""
+    p = [parameters.get(v.name, float(v.start)) for v in block.parameters]
+    x = ca.DM([float(v.start) for v in block.states])
+    states, forces = [], []
+    for row in rows:
+        x, y = block.step(x, p, row)
+        states.append(x.full().ravel())
+        forces.append(float(y[0]))
+    return np.array(states), np.array(forces)
+
+
+@pytest.mark.parametrize("law", [*LAWS, SPRINGS], ids=lambda law: type(law).__name__)
+def test_without_a_gain_an_observer_makes_the_steps_of_the_law(law) -> None:
+    make = gms_observer if isinstance(law, GMS) else lugre_observer
+    velocities = 2e-3 * np.sin(0.05 * np.arange(200.0))
+    zeros = np.zeros_like(velocities)
+    _, found = rolled(make(law, 0.0, N=2.0, ramp=None), np.column_stack([velocities, zeros]))
+    _, wanted = rolled(law_block(law), np.column_stack([velocities, zeros + 2.0]))
+    assert found == pytest.approx(wanted, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("h", [1e-6, 1e-3, 1.0, 1e3])
+def test_bristles_stay_in_the_set_that_the_law_never_leaves(h: float) -> None:
+    """|z| <= mu_s N / sigma_0 for gains, errors and velocities of any size."""
+    random = np.random.default_rng(0)
+    for law, gain in product(LAWS[:2], (0.0, 1.0, 1e6)):
+        rows = 10.0 ** random.uniform(-9, 2, (200, 2)) * random.choice([-1.0, 1.0], (200, 2))
+        states, forces = rolled(lugre_observer(law, gain, N=3.0, ramp=None), rows, h=h)
+        most = law.mu_s * (1.0 if isinstance(law, LuGreNormalised) else 3.0) / law.sigma_0
+        assert np.abs(states).max() <= most
+        assert np.isfinite(forces).all()
+
+
+@pytest.mark.parametrize("h", [1e-6, 1e-3, 1.0, 1e3])
+def test_springs_stay_within_their_shares(h: float) -> None:
+    random = np.random.default_rng(0)
+    rows = 10.0 ** random.uniform(-9, 2, (300, 2)) * random.choice([-1.0, 1.0], (300, 2))
+    states, forces = rolled(gms_observer(SPRINGS, 1e4, N=3.0, ramp=None), rows, h=h)
+    shares = np.array([float(share) for share in SPRINGS.shares()])
+    assert (np.abs(states[:, :4]) <= shares * 6.0 * 3.0).all()
+    assert np.isfinite(forces).all()
+
+
+def test_an_error_that_stands_bends_the_bristles() -> None:
+    """At rest dz/dt = k e: after n steps z = n h k e, and the force sigma_0 z + sigma_1 k e."""
+    law, e = LuGre(mu_s=6.0, mu_d=4.0), 1e-6
+    rows = np.tile([0.0, e], (10, 1))
+    states, forces = rolled(lugre_observer(law, 20.0, ramp=None), rows)
+    assert states[:, 0] == pytest.approx(H * 20.0 * e * np.arange(1, 11))
+    mean = H * 20.0 * e * (np.arange(10) + 0.5)
+    assert forces == pytest.approx(law.sigma_0 * mean + law.sigma_1 * 20.0 * e)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_disturbance_is_found_by_the_balance_of_impulse(order: int) -> None:
+    """Mass 2 kg under u = 5 N against 3 N, held: d_k = 3 (1 - q^k), or twice filtered."""
+    w, k = 100.0, np.arange(1, 61)
+    v = (5.0 - 3.0) / 2.0 * H * k
+    rows = np.column_stack([np.full(60, 5.0), v])
+    _, forces = rolled(disturbance_observer(2.0, w, order=order, ramp=None), rows)
+    b, d = 1 - np.exp(-w * H), np.zeros(order)
+    for found in forces:
+        f = 3.0
+        for i in range(order):
+            d[i] = f = d[i] + b * (f - d[i])
+        assert found == pytest.approx(f, rel=1e-9)
+    if order == 1:
+        assert forces == pytest.approx(3.0 * (1 - (1 - b) ** k))
+
+
+def slowest(ratio: float, b: float, delay: int, order: int) -> float:
+    """Largest pole of mass M and observer with m = ratio M, its force `delay` samples late.
+
+    f = ratio F + (1 - ratio) u,  d+ = d + b (f - d) for each order,  u = d `delay` samples before.
+    """
+    n = order + delay + 1
+    A = np.zeros((n, n))  # d_1 .. d_order, then u now and later
+    first = np.zeros(n)
+    first[order] = 1 - ratio
+    for i in range(order):
+        before = first if i == 0 else A[i - 1]
+        A[i] = b * before
+        A[i, i] += 1 - b
+    A[order:-1, order + 1 :] = np.eye(delay)
+    A[-1] = A[order - 1]
+    return float(np.abs(np.linalg.eigvals(A)).max())
+
+
+def test_the_disturbance_observer_is_stable_up_to_twice_the_mass() -> None:
+    """For every bandwidth, step and delay, as its docstring says; beyond, not for all."""
+    for ratio, wh, delay, order in product(
+        (0.01, 0.5, 1.0, 1.5, 1.99), (1e-3, 0.1, 1.0, 10.0), (0, 1, 3, 10), (1, 2)
+    ):
+        assert slowest(ratio, 1 - np.exp(-wh), delay, order) < 1.0
+    assert slowest(2.5, 1 - np.exp(-10.0), 1, 1) > 1.0
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: lugre_observer(LAWS[0], 20.0, limit=5.0),
+        lambda: lugre_observer(LAWS[2], 20.0, h=H),
+        lambda: gms_observer(SPRINGS, 20.0),
+        lambda: disturbance_observer(1.0, 200.0, order=2),
+    ],
+)
+def test_the_c_has_the_bits_of_casadi(make, tmp_path, compiler) -> None:
+    found = verify(generate(make(), tmp_path))
+    assert found.ok, found
+
+
+def test_units_turn() -> None:
+    block = disturbance_observer(1.0, 100.0, turning=True)
+    assert {v.name: v.unit for v in block.parameters}["m"] == "kg m^2"
+    assert block.outputs["F"].unit == "N m"
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: lugre_observer(Stribeck(), 1.0), "lugre_observer: expected a law such as LuGre"),
+        (lambda: lugre_observer(LuGre(), -1.0), "gain: expected a number >= 0"),
+        (lambda: lugre_observer(LuGre(), 1.0, ramp=0.0), "ramp: expected a number > 0"),
+        (lambda: gms_observer(GMS(), 1.0), "form: expected 'event'"),
+        (lambda: disturbance_observer(0.0, 1.0), "mass: expected a number > 0"),
+        (lambda: disturbance_observer(1.0, 1.0, order=3), "order: expected a whole number"),
+        (lambda: disturbance_observer(1.0, 1.0, limit=-1.0), "limit: expected a number >= 0"),
+    ],
+)
+def test_bad_input_is_refused(make, words: str) -> None:
+    with pytest.raises(ValueError) as caught:
+        make()
+    assert words in str(caught.value)
