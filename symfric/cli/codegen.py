@@ -9,6 +9,7 @@ import typer
 
 from symfric import Law, any_from_text, law_from_text, with_values
 from symfric.cli import output
+from symfric.cli.codegen_robot import robot_block
 from symfric.cli.options import (
     JsonOption,
     SetOption,
@@ -32,7 +33,10 @@ def codegen(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")],
     fit: Annotated[
         Path | None,
-        typer.Argument(metavar="[FIT.json]", help="What `symfric identify --json` wrote."),
+        typer.Argument(
+            metavar="[FIT.json]",
+            help="What `symfric identify --json` wrote; ROBOT.urdf with --inverse-dynamics.",
+        ),
     ] = None,
     law: Annotated[
         str | None,
@@ -71,27 +75,57 @@ def codegen(
     turning: Annotated[
         bool, typer.Option("--turning", help="A law in rad/s and N m: units in the header.")
     ] = False,
+    inverse_dynamics: Annotated[
+        bool,
+        typer.Option(
+            "--inverse-dynamics",
+            help="Forces of the joints that a motion needs, of ROBOT.urdf or --scene, with the "
+            "friction of --law or of the file.",
+        ),
+    ] = False,
+    payload: Annotated[
+        str | None,
+        typer.Option(
+            "--payload", metavar="FRAME", help="Link or frame that carries a load, set at run time."
+        ),
+    ] = None,
+    tunable_gravity: Annotated[
+        bool, typer.Option("--tunable-gravity", help="Gravity is set at run time.")
+    ] = False,
     compiler: Annotated[
         str | None, typer.Option("--compiler", help="Default: $CC, gcc or clang.")
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Write a friction law or a plant as C99, and verify it.
+    """Write a friction law, a plant or inverse dynamics as C99, and verify it.
 
     The C is compiled and compared with CasADi over 20 000 steps. The exit status is 1 where it
     could not be verified, as without a compiler, or differs; the files are written all the same.
     The law of a fit has the fitted numbers, and so has its drive with `--scene drive`.
 
     Example: symfric codegen --law lugre --out build --step-size 0.001
+
+    Example: symfric codegen robot.urdf --inverse-dynamics --payload tool0 --out build
     """
     kind = real
     if kind is None:
-        kind = "both" if scene is None else "double"
+        kind = "both" if scene is None or inverse_dynamics else "double"
     check_names("--real", [kind], REALS)
     check_folder(out)
     check_outputs(json)
     if compiler is not None:
         find_compiler(checks.text("--compiler", compiler, "a C compiler"))
+    if inverse_dynamics:
+        _refuse({"--method": method, "--free": free, "--turning": turning or None})
+        block = robot_block(
+            fit, scene, law, numbers("--set", settings),
+            name=name, h=step_size, payload=payload, tunable_gravity=tunable_gravity,
+        )  # fmt: skip
+        generated = generate(block, out, real=REALS[kind])
+        _proved(law or block.name, generated, verify(generated, compiler=compiler), json)
+        return
+    if payload is not None or tunable_gravity:
+        raise ValueError("--payload, --tunable-gravity: expected with --inverse-dynamics only")
     chosen = chosen_law(fit, law)
     adjustable = None
     if scene is not None and turning:
@@ -113,13 +147,25 @@ def codegen(
             turning=turning or chosen.turning,
         )
     verification = verify(generated, compiler=compiler, adjustable=adjustable)
-    output.emit_json(to_dict(chosen.text, generated, verification), json)
-    if json != "-":
-        show_verification(verification)
-    output.say_written(*generated.files, json)
     if chosen.forces and scene is None:
         names = ", ".join(chosen.forces)
         output.note(f"{names}: forces, fitted under a load of 1 N; call the C with N = 1")
+    _proved(chosen.text, generated, verification, json)
+
+
+def _refuse(given: dict[str, object]) -> None:
+    """Options that say nothing to inverse dynamics."""
+    wrong = [name for name, value in given.items() if value is not None]
+    if wrong:
+        raise ValueError(f"--inverse-dynamics: expected no {', '.join(wrong)}, got one")
+
+
+def _proved(text: str, generated: Generated, verification: Verification, json: str | None) -> None:
+    """Say what was written and whether it was verified; the exit status says it, too."""
+    output.emit_json(to_dict(text, generated, verification), json)
+    if json != "-":
+        show_verification(verification)
+    output.say_written(*generated.files, json)
     if not verification.ok:
         raise typer.Exit(1)
 
