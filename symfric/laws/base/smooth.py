@@ -11,6 +11,9 @@ import numpy as np
 from symfric.foundation.numeric import Scalar, equals, exp, expm1, is_casadi, is_number, sqrt, tanh
 from symfric.foundation.vector import ROUND, TINY, NotIsotropicError, Vector, Vectors, no_vector
 
+BACK = 1e16
+"""Yielding this many times as fast as slip at the limit, an element is back there at once."""
+
 SHARE = 1e-6
 """Share of the Stribeck velocity over which one side of its fall is rounded at rest."""
 
@@ -52,6 +55,24 @@ def power(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
     if equals(eps, 0.0):
         return magnitude(x, 0.0) ** exponent
     return (x * x + eps * eps) ** (exponent / 2) - eps**exponent
+
+
+def overload(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
+    """`power` of a load share that may be far above 1, bounded so that it is a number in float.
+
+        (q w)^(n/2) - eps^n,   q = x^2 + eps^2,   q w = q below Q = BACK^(2/n), Q above it, smooth
+
+    To the bit the `power` up to q = (1 + Q)/2. What yields as fast as beyond is back at its limit
+    within a path of 1/BACK of its stretch, the rounding of a double: how fast it is cannot be seen
+    in any result. But |x|^50 of a load that fell to a sixth is no number in float, and |x|^1000 of
+    one that fell to a half none in double.
+    """
+    if equals(exponent, 2.0) or equals(eps, 0.0):
+        return power(x, exponent, eps)
+    q, top = x * x + eps * eps, BACK ** (2 / exponent)
+    beyond = tanh(40 * (q - top) / (top - 1))  # -1 to the bit up to the middle between 1 and top
+    within = (q * (1 - beyond) + top * (1 + beyond)) / 2
+    return within ** (exponent / 2) - eps**exponent
 
 
 def signed_power(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:

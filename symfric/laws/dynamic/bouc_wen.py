@@ -87,7 +87,7 @@ class BoucWen(Law):
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Rate of the load share [1/s], shape (1, 1)."""
-        used = smooth.power(z[0], self.n, self.z_eps)
+        used = smooth.overload(z[0], self.n, self.z_eps)
         t, s = smooth.sign(v, self.v_eps), smooth.sign(z[0], self.z_eps)
         yielded = (self.beta - self.gamma) * s + self.gamma * onward(t, s)
         stretch = self.A * v - used * (v * t) * yielded

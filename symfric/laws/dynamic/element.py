@@ -134,4 +134,4 @@ def yielding(v: Scalar, r: Scalar, n: Scalar, v_eps: Scalar, r_eps: Scalar) -> S
     direction and however slowly it is moved.
     """
     t, s = smooth.sign(v, v_eps), smooth.sign(r, r_eps)
-    return v - smooth.power(r, n, r_eps) / 2 * (v * t) * onward(t, s)
+    return v - smooth.overload(r, n, r_eps) / 2 * (v * t) * onward(t, s)
