@@ -50,6 +50,7 @@ class Block:
         resets: further initialisations by name: the states, SX (n, 1), as functions of inputs and
             parameters, and what they are for.
         constants: numbers folded into the expressions, by name, for the header.
+        about: what constants are, with their units, by name.
         equations: formulas that the block solves, line by line, as in a paper.
         discretisation: how a step solves them, in words and formulas, line by line.
         use: what to feed in and what each result is good for, a sentence each.
@@ -70,6 +71,7 @@ class Block:
     outputs: Mapping[str, Output] = field(default_factory=dict[str, Output])
     resets: Mapping[str, tuple[ca.SX, str]] = field(default_factory=dict[str, tuple[ca.SX, str]])
     constants: Mapping[str, float] = field(default_factory=dict[str, float])
+    about: Mapping[str, str] = field(default_factory=dict[str, str])
     equations: str = ""
     discretisation: str = ""
     use: tuple[str, ...] = ()

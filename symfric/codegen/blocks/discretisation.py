@@ -19,7 +19,8 @@ Exact exponential step, whatever its length, for dz/dt = a - b z at held inputs:
     EVENT: """\
 Event step, exact whatever its length: every element sticks up to its limit, which it meets
 within the step, and slips from there on; it sticks again when v turns round.
-    z+, zm  at the end of the step, and mean over it,   r = (z+ - z) / h""",
+    z+, zm  at the end of the step, and mean over it
+    r       = (z+ - z) / h              mean rate,   r+ = dz/dt at z+""",
     SECOND: """\
 Exponential step of second order, bounded whatever its length, linearised in each state:
     J     = d(dz/dt)/dz,   x = J h,   phi1 = (exp(x) - 1) / x,   phi2 = (phi1 - 1) / x

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from re import sub
+from re import search, sub
 from typing import Any
 
 import casadi as ca
@@ -11,7 +11,7 @@ from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.discretisation import of_law
 from symfric.codegen.blocks.folding import Fold, variable
 from symfric.codegen.blocks.held_step import advanced, force_of_rate
-from symfric.codegen.blocks.law_text import LawText, texts
+from symfric.codegen.blocks.law_text import equations, texts
 from symfric.codegen.blocks.unloaded import LEAST_LOAD, NO_LOAD, Held, needs_words, with_words
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_casadi
@@ -121,10 +121,11 @@ def law_block(
     block = replace(
         block,
         name=name or sub(r"\W+", "_", law_name(law)).strip("_"),
-        **_described(law),
+        **_described(law, idle),
         parameters=tuple(p for p in block.parameters if p.name not in idle),
         constants={p.name: float(p.value) for p in known.values() if p.name not in names}
         | dict(block.constants),
+        about={p.name: f"{p.doc} [{p.unit}]" for p in known.values() if p.name not in names},
     )
     _check_at_rest(block, where)
     return in_turning(block) if turning else block
@@ -231,17 +232,16 @@ def _check_at_rest(block: Block, where: str) -> None:
         )
 
 
-def _described(law: Law) -> dict[str, Any]:
-    """What docstrings say of the law and of those that it holds, for the data sheet."""
+def _described(law: Law, idle: Sequence[str]) -> dict[str, Any]:
+    """What docstrings say of the law and of those that it holds, for the data sheet.
+
+    Of parameters without effect, `idle`, nothing is said.
+    """
     found = texts(law)
-    several = len(found) > 1
+    limits = dict.fromkeys(limit for text in found for limit in text.limits)
     return {
         "doc": "\n".join(text.title for text in found),
-        "equations": "\n\n".join(_titled(text) if several else text.equations for text in found),
-        "limits": tuple(dict.fromkeys(limit for text in found for limit in text.limits)),
+        "equations": equations(law),
+        "limits": tuple(x for x in limits if not any(search(rf"\b{n}\b", x) for n in idle)),
         "sources": tuple(text.source for text in found if text.source),
     }
-
-
-def _titled(text: LawText) -> str:
-    return f"{text.title}\n{text.equations}".rstrip()

@@ -12,8 +12,9 @@ from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.discretisation import of_method
 from symfric.codegen.blocks.folding import Fold, variable
 from symfric.codegen.blocks.from_law import step_variable
+from symfric.codegen.blocks.law_text import equations
 from symfric.foundation import checks
-from symfric.foundation.parameters import Parametric, Variable, parameters
+from symfric.foundation.parameters import Parameter, Parametric, Variable, parameters
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.system import System, system
@@ -90,9 +91,10 @@ def plant_block(
             values without consistent algebraic ones; outputs that depend on time where the
             equations do not.
     """
-    constants: dict[str, float] = {}
+    folded: dict[str, Parameter] = {}
+    machine = model
     if not isinstance(model, Model):
-        model, constants = _opened(model, free, fold)
+        model, folded = _opened(model, free, fold)
     elif free is not None or fold is not None:
         raise ValueError(
             "codegen: free, fold: expected with a scene only, got a model; "
@@ -122,7 +124,10 @@ def plant_block(
         parameters=model.p + ((size,) if h is None else ()),
         next=following,
         outputs=_outputs(model, whole, following, where),
-        constants=constants | ({} if h is None else {"h": float(h)}),
+        constants={n: float(p.value) for n, p in folded.items()}
+        | ({} if h is None else {"h": float(h)}),
+        about={n: f"{p.doc} [{p.unit}]" for n, p in folded.items()},
+        equations=equations(machine) if isinstance(machine, Parametric) else "",
         discretisation=of_method(METHODS[method], whole.n > whole.nx),
         use=USE,
         limits=LIMITS,
@@ -146,14 +151,14 @@ LIMITS = (
 
 def _opened(
     machine: Machine, free: Sequence[str] | None, fold: Fold
-) -> tuple[Model, dict[str, float]]:
+) -> tuple[Model, dict[str, Parameter]]:
     """The model of a scene with its variable parameters, and those that are constants."""
     if not (isinstance(machine, Parametric) and hasattr(machine, "model")):
         raise checks.refused("codegen", "a model, or a scene such as Rabinowicz(LuGre())", machine)
     names, problems = variable(machine, free, fold)
     if problems:
         raise ValueError(f"codegen '{type(machine).__name__}': {'; '.join(problems)}")
-    folded = {n: float(p.value) for n, p in parameters(machine).items() if n not in names}
+    folded = {n: p for n, p in parameters(machine).items() if n not in names}
     return machine.model(names), folded
 
 

@@ -1,20 +1,20 @@
 """What the docstring of a law says to somebody who has only its C: formulas, limits, source."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from inspect import getdoc
 from re import match, search, split
 from textwrap import dedent
 from typing import final
 
-from symfric.foundation.parameters import Parametric, options
+from symfric.foundation.parameters import Option, Parametric, options
 
 TELLING = (
     r"[Nn]ot valid|[Cc]reeps? |[Dd]rifts?\b|Needs |Keep |Never |[Oo]nly if |smooth over|rounded"
 )
 """What a sentence holds that a user of the numbers must know."""
 
-LEANING = r"^Without it|^Made for slip|, as there|form = "
+LEANING = r"^Without it|^Made for slip|, as there|that form|form = "
 """What leans on the sentence before it, or speaks of another form."""
 
 
@@ -41,12 +41,20 @@ def texts(law: Parametric) -> tuple[LawText, ...]:
     return tuple(dict.fromkeys(_all(law)))
 
 
+def equations(obj: Parametric) -> str:
+    """The formulas of a law or a machine and of what it holds, under their titles if several."""
+    found = texts(obj)
+    if len(found) == 1:
+        return found[0].equations
+    return "\n\n".join(f"{text.title}\n{text.equations}".rstrip() for text in found)
+
+
 def _all(law: Parametric) -> Iterator[LawText]:
     yield _text(law)
     for item in fields(law):
         value = getattr(law, item.name)
         for inner in value if isinstance(value, tuple) else (value,):
-            if isinstance(inner, Parametric) and "\n\n" in (getdoc(type(inner)) or ""):
+            if isinstance(inner, Parametric) and "\n\n    " in (getdoc(type(inner)) or ""):
                 yield from _all(inner)
 
 
@@ -55,17 +63,29 @@ def _text(law: Parametric) -> LawText:
     paragraphs = (
         paragraphs[: paragraphs.index("Raises:")] if "Raises:" in paragraphs else paragraphs
     )
-    formulas = [p for p in paragraphs if p.startswith("    ")]
+    formulas = list(_formulas(paragraphs, options(law).values()))
     prose = "\n".join(p for p in paragraphs[1:] if not p.startswith(("    ", "Raises:")))
     about, _, source = prose.partition("\nSource: ")
-    chosen = [f"{name} = {option.value}" for name, option in options(law).items()]
-    lines = [dedent(p) for p in formulas] + ([f"Form: {', '.join(chosen)}."] if chosen else [])
+    chosen = [f"{name}: {option.value}." for name, option in options(law).items()]
+    lines = [dedent(p) for p in formulas] + ["    ".join(chosen).capitalize()] * bool(chosen)
     return LawText(
         title=" ".join(paragraphs[0].split()),
         equations="\n".join(lines),
         limits=tuple(_limits(about)),
         source=" ".join(source.split()),
     )
+
+
+def _formulas(paragraphs: Sequence[str], forms: Iterable[Option]) -> Iterator[str]:
+    """The formulas but for those of another form, whose name stands before them."""
+    others = "|".join(rf'{o.name} = "(?!{o.value}")' for o in forms) or "(?!)"
+    before = ""
+    for paragraph in paragraphs:
+        if not paragraph.startswith("    "):
+            before = " ".join(paragraph.split())
+        elif not search(others, before.rpartition(". ")[2]):
+            lines = paragraph.splitlines()
+            yield "\n".join(line for line in lines if not search(others, line))
 
 
 def _limits(prose: str) -> Iterator[str]:

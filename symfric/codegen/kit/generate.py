@@ -1,9 +1,8 @@
-"""Files of generated C: header and source a floating point type, and a manifest."""
+"""The files of a block: header and source of each floating point type, and the kit round them."""
 
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, final
 
@@ -11,12 +10,19 @@ from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.folding import Fold
 from symfric.codegen.blocks.from_law import law_block
 from symfric.codegen.blocks.from_population import contact_block
+from symfric.codegen.kit.cmake import EVERY, of_block
+from symfric.codegen.kit.footprint import footprint
+from symfric.codegen.kit.loader import loader
+from symfric.codegen.kit.manifest import manifest
+from symfric.codegen.kit.simulink import wrapper
+from symfric.codegen.kit.unit_test import table, unit_test, vector_header
+from symfric.codegen.kit.vectors import vectors
 from symfric.codegen.writing.header import header
-from symfric.codegen.writing.layout import members, prefix
-from symfric.codegen.writing.routines import routines
+from symfric.codegen.writing.layout import prefix
 from symfric.codegen.writing.source import source
 from symfric.emitter.c99 import REALS, Real
 from symfric.foundation import checks
+from symfric.foundation.compiler import CompileError, find_compiler
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import check_names
 from symfric.laws import AnyLaw, Population
@@ -32,7 +38,7 @@ class Generated:
         folder: where the files are.
         reals: floating point types, by name.
         files: all files, the manifest last.
-        manifest: content of manifest.json.
+        manifest: content of NAME_manifest.json.
         guards: whether the C has guards, see `symfric.codegen.writing.guards`.
     """
 
@@ -63,14 +69,21 @@ def generate(
     fold: Fold = None,
     turning: bool = False,
     guards: bool = True,
+    kit: bool = True,
 ) -> Generated:
     """Write a friction law, or any block, as C99.
 
-    For each type `NAME_f64.h`, `NAME_f64.c` (float: `f32`), and `manifest.json` with names, units,
-    sizes and operation counts. The C allocates nothing, includes only math.h, stdbool.h and, for
-    the guards, stdint.h and string.h, has no data but constants, and compiles without warnings
-    under -Wall -Wextra -Wpedantic -Wconversion -Wdouble-promotion, also as C++. The C of several
-    blocks may share a folder and a program; the manifest is then that of the last one.
+    For each type `NAME_f64.h`, whose head is the data sheet, and `NAME_f64.c` (float: `f32`), and
+    what makes a kit of them: test vectors and a unit test in C (`NAME_f64_test.c`, `..._vectors.h`,
+    `.csv`), `CMakeLists.txt` and `NAME_block.cmake`, a loader for Python without symfric
+    (`NAME_ctypes.py`), an S-function for Simulink (`NAME_sfun.c`) and `NAME_manifest.json` with
+    meanings, units, ranges, hashes, operation counts and, where there is a compiler, sizes and
+    stack. All names but CMakeLists.txt, which is the same for all, begin with that of the block, so
+    that several kits may share a folder and a program.
+
+    The C allocates nothing, includes only math.h, stdbool.h and, for the guards, stdint.h and
+    string.h, has no data but constants, and compiles without warnings under -Wall -Wextra
+    -Wpedantic -Wconversion -Wdouble-promotion, also as C++.
 
     Args:
         law: a friction law, see `law_block`; a population, see `contact_block`; or a block.
@@ -84,6 +97,7 @@ def generate(
         turning: the law is that of a contact that turns: rad/s and N m in its texts.
         guards: clamp inputs to their ranges, repair what is not finite, and return a status that
             says so; see `symfric.codegen.writing.guards`. What is valid is not changed by a bit.
+        kit: False leaves sources and manifest, without sizes.
 
     Raises:
         ValueError: bad input, a law that has no step, an operation that C99 lacks, a
@@ -98,15 +112,54 @@ def generate(
         raise ValueError("codegen: real: expected double, float or both, got none")
     given = {"name": name, "h": h, "free": free, "fold": fold, "turning": turning or None}
     block = _block(law, {option: value for option, value in given.items() if value is not None})
-    texts: dict[str, str] = {}
-    for kind in (REALS[n] for n in names):
-        texts[f"{prefix(block, kind)}.h"] = header(block, kind, guards)
-        texts[f"{prefix(block, kind)}.c"] = source(block, kind, guards)
-    manifest = _manifest(block, [REALS[n] for n in names], guards)
-    texts["manifest.json"] = json.dumps(manifest, indent=2) + "\n"
+    reals = [REALS[n] for n in names]
+    texts = _sources(block, reals, guards) | (_kit(block, reals, guards) if kit else {})
     for file, text in texts.items():
         write_text(folder / file, text)
-    return Generated(block, folder, names, tuple(folder / file for file in texts), manifest, guards)
+    content = manifest(block, reals, guards, texts, _measured(block, reals, folder) if kit else {})
+    last = f"{block.name}_manifest.json"
+    write_text(folder / last, json.dumps(content, indent=2) + "\n")
+    files = tuple(folder / file for file in (*texts, last))
+    return Generated(block, folder, names, files, content, guards)
+
+
+def _sources(block: Block, reals: Sequence[Real], guards: bool) -> dict[str, str]:
+    """Header and source of each type."""
+    texts: dict[str, str] = {}
+    for real in reals:
+        texts[f"{prefix(block, real)}.h"] = header(block, real, guards)
+        texts[f"{prefix(block, real)}.c"] = source(block, real, guards)
+    return texts
+
+
+def _kit(block: Block, reals: Sequence[Real], guards: bool) -> dict[str, str]:
+    """What stands beside the sources: the proof for the target, builds, loaders."""
+    texts: dict[str, str] = {}
+    for real in reals:
+        stem, rows = prefix(block, real), vectors(block, real, guards)
+        texts[f"{stem}_test.c"] = unit_test(block, real, guards)
+        texts[f"{stem}_vectors.h"] = vector_header(rows, guards)
+        texts[f"{stem}_vectors.csv"] = table(rows, guards)
+    texts[f"{block.name}_block.cmake"] = of_block(block, reals)
+    texts["CMakeLists.txt"] = EVERY
+    texts[f"{block.name}_ctypes.py"] = loader(block, reals, guards)
+    texts[f"{block.name}_sfun.c"] = wrapper(block, reals, guards)
+    return texts
+
+
+def _measured(block: Block, reals: Sequence[Real], folder: Path) -> dict[str, dict[str, Any]]:
+    """Sizes and stack by type, as the compiler of this machine makes them, if it has one."""
+    compiler = find_compiler()
+    if compiler is None:
+        return {}
+    found: dict[str, dict[str, Any]] = {}
+    for real in reals:
+        try:
+            sizes = footprint(block, real, folder, compiler)
+        except CompileError:  # one that cannot compile makes no sizes; `verify` says why
+            continue
+        found[real.name] = {"measured": {"compiler": str(compiler), **sizes.to_dict()}}
+    return found
 
 
 def _block(law: AnyLaw | Block, options: dict[str, Any]) -> Block:
@@ -123,45 +176,3 @@ def _block(law: AnyLaw | Block, options: dict[str, Any]) -> Block:
     if isinstance(law, Block):
         return law
     return (contact_block if isinstance(law, Population) else law_block)(law, **options)  # pyright: ignore[reportArgumentType]
-
-
-def _manifest(block: Block, reals: Sequence[Real], guards: bool) -> dict[str, Any]:
-    return {
-        "name": block.name,
-        "model": block.fingerprint,
-        "symfric": version("symfric"),
-        "casadi": version("casadi"),
-        "states": [{"name": v.name, "unit": v.unit, "start": float(v.start)} for v in block.states],
-        "parameters": [
-            {"name": v.name, "unit": v.unit, "default": float(v.start), "doc": v.doc}
-            for v in block.parameters
-        ],
-        "inputs": [{"name": v.name, "unit": v.unit, "doc": v.doc} for v in block.inputs],
-        "outputs": [
-            {"name": name, "unit": output.unit, "doc": output.doc}
-            for name, output in block.outputs.items()
-        ],
-        "constants": dict(block.constants),
-        "guards": guards,
-        "real": {real.name: _described(block, real, guards) for real in reals},
-    }
-
-
-def _described(block: Block, real: Real, guards: bool) -> dict[str, Any]:
-    name = prefix(block, real)
-    return {
-        "header": f"{name}.h",
-        "source": f"{name}.c",
-        "bytes": {
-            group: real.size * sum(row.count for row in rows)
-            for group, rows in members(block).items()
-        },
-        "functions": {
-            routine.name: {
-                "prototype": f"{' '.join(routine.head.split())};",
-                "operations": routine.operations,
-                "calls": dict(sorted(routine.calls.items())),
-            }
-            for routine in routines(block, real, guards)
-        },
-    }

@@ -23,8 +23,10 @@ class HaessigFriedland(Law):
 
     The stiction gradient of the paper is a = (mu_s - mu_d) / mu_d. form = "event" is this law, for
     constant N; the force drops from mu_s N to mu_d N at once. form = "smooth" yields with the
-    sharpness n, dz/dt = v [1 - |r|^n (1 + sign(v r)) / 2], and loses the excess in a step of |r|
-    from 1 - knee to 1.
+    sharpness n, and loses the excess in a step of |r| from 1 - knee to 1:
+
+        smooth: dz/dt = v [1 - |r|^n (1 + sign(v r)) / 2]
+
     Limits: steady state mu_d N sign(v); rate-independent for sigma_1 = 0; drifts as little as
     `MaxwellSlip` with one element. |v| is smooth over v_eps. Not valid for N = 0.
     Source: Haessig and Friedland, ASME J. Dyn. Syst. Meas. Control 113(3), 1991.

@@ -35,10 +35,13 @@ class MaxwellSlip(Law):
         F = F_1 + F_2 + ...
 
     form = "event" is this law, with a mode slip_i of 0 or 1 for each element, for constant N.
-    form = "smooth" (n elements, n states) rounds the corner by the sharpness n,
-    dF_i/dt = k_i v [1 - |F_i/(mu_i N)|^n (1 + sign(v F_i)) / 2]; with n = 1, 2, 10, 50 an element
-    reaches 63, 76, 94, 99 % of its limit over the stretch at which the exact one slips. `update`
-    is the exact law for increments of position, for discrete time and optimisation.
+    form = "smooth" (n elements, n states) rounds the corner by the sharpness n:
+
+        smooth: dF_i/dt = k_i v [1 - |F_i/(mu_i N)|^n (1 + sign(v F_i)) / 2]
+
+    With n = 1, 2, 10, 50 an element reaches 63, 76, 94, 99 % of its limit over the stretch at which
+    the exact one slips. `update` is the exact law for increments of position, for discrete time and
+    optimisation.
     Limits: steady state (mu_1 + mu_2 + ...) N sign(v); rate-independent; virgin curve
     f(x) = sum min(k_i x, mu_i N); a reversal branch is twice the virgin curve (Masing), and closed
     inner loops are forgotten. One stiff element is Coulomb friction. |v| is smooth over v_eps, to

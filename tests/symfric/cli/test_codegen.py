@@ -42,7 +42,7 @@ def test_the_table_shows_every_type(tmp_path: Path, capsys: pytest.CaptureFixtur
 def test_set_parameters_and_a_fixed_step_become_constants(tmp_path: Path) -> None:
     line = f"codegen --law dahl --out {tmp_path} --set sigma_0=12345 --step-size 0.002"
     assert main(f"{line} --free mu_d --real double".split()) == 0
-    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    manifest = json.loads((tmp_path / "dahl_manifest.json").read_text())
     assert [p["name"] for p in manifest["parameters"]] == ["mu_d"]
     assert manifest["constants"]["sigma_0"] == 12345.0
 

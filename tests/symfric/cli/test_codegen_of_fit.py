@@ -51,9 +51,10 @@ def test_compiled_c_gives_the_numbers_of_the_fitted_law(
 def test_the_plant_of_a_fit_holds_the_law_and_settings_change_it(fit: Path, tmp_path: Path) -> None:
     line = ["codegen", str(fit), "--scene", "drive", "--set", "m=3", "--set", "N=1"]
     assert main([*line, "--out", str(tmp_path), "--step-size", "0.001"]) == 0
-    manifest = json.loads((tmp_path / "manifest.json").read_text())
-    assert manifest["constants"]["m"] == 3.0
-    assert manifest["constants"]["mu_s"] == Fitted.from_json(fit).values["mu_s"]
+    manifest = json.loads((tmp_path / "drive_manifest.json").read_text())
+    values = {p["name"]: p["default"] for p in manifest["parameters"]} | manifest["constants"]
+    assert values["m"] == 3.0
+    assert values["mu_s"] == Fitted.from_json(fit).values["mu_s"]
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,8 @@ from symfric.laws import GMS
 
 
 def test_writes_header_and_source_for_each_type_and_a_manifest(tmp_path):
-    made = generate(LuGre(), tmp_path / "new" / "c")
-    names = ["lugre_f64.h", "lugre_f64.c", "lugre_f32.h", "lugre_f32.c", "manifest.json"]
+    made = generate(LuGre(), tmp_path / "new" / "c", kit=False)
+    names = ["lugre_f64.h", "lugre_f64.c", "lugre_f32.h", "lugre_f32.c", "lugre_manifest.json"]
     assert [path.name for path in made.files] == names
     assert sorted(path.name for path in (tmp_path / "new" / "c").iterdir()) == sorted(names)
     assert made.header("float") == tmp_path / "new" / "c" / "lugre_f32.h"
@@ -20,12 +20,17 @@ def test_writes_header_and_source_for_each_type_and_a_manifest(tmp_path):
 
 def test_one_type_by_its_name(tmp_path):
     made = generate(BrownMcPhee(), tmp_path, real="float", name="seal")
-    assert [path.name for path in made.files] == ["seal_f32.h", "seal_f32.c", "manifest.json"]
+    assert [path.name for path in made.files] == [
+        *("seal_f32.h", "seal_f32.c", "seal_f32_test.c", "seal_f32_vectors.h"),
+        *("seal_f32_vectors.csv", "seal_block.cmake", "CMakeLists.txt", "seal_ctypes.py"),
+        *("seal_sfun.c", "seal_manifest.json"),
+    ]
+    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in made.files}
 
 
 def test_the_manifest_names_everything_with_its_unit(tmp_path):
     made = generate(LuGre(), tmp_path, h=2e-3, free=("sigma_0", "mu_s"))
-    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    manifest = json.loads((tmp_path / "lugre_manifest.json").read_text())
     assert manifest == made.manifest
     assert [(s["name"], s["unit"], s["start"]) for s in manifest["states"]] == [("z", "m", 0.0)]
     assert [(p["name"], p["unit"], p["default"]) for p in manifest["parameters"]] == [

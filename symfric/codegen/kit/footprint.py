@@ -1,0 +1,81 @@
+"""What the C of a block needs: bytes of code and constants, and stack, by a compiler at hand."""
+
+import shutil
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, final
+
+from symfric.codegen.blocks.block import Block
+from symfric.codegen.running.compiler import FLAGS
+from symfric.codegen.writing.layout import prefix
+from symfric.emitter.c99 import Real
+from symfric.foundation.compiler import CompileError, Compiler
+
+
+@final
+@dataclass(frozen=True)
+class Footprint:
+    """The object file of one source.
+
+    Attributes:
+        text: bytes of code and of constants; None where there is no `size`.
+        data: bytes of variables, which there are none of.
+        stack: function -> bytes of its own frame; functions of libm come on top. Empty where the
+            compiler does not tell.
+    """
+
+    text: int | None
+    data: int | None
+    stack: dict[str, int]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything by name."""
+        return {"text": self.text, "data": self.data, "stack": dict(self.stack)}
+
+
+def footprint(
+    block: Block, real: Real, folder: Path, compiler: Compiler, flags: Sequence[str] = ()
+) -> Footprint:
+    """Compile the source of a block in `folder` and measure the object file.
+
+    Args:
+        flags: beside -std=c99 -O2 -ffp-contract=off, such as -mcpu=cortex-m4 of a cross-compiler.
+
+    Raises:
+        CompileError: the compiler refuses it.
+    """
+    stem = prefix(block, real)
+    with TemporaryDirectory(prefix="symfric-") as place:
+        target = Path(place) / f"{stem}.o"
+        command = [*FLAGS, *flags, "-c", str(folder / f"{stem}.c"), "-o", str(target)]
+        try:
+            compiler.run("-fstack-usage", *command)
+        except CompileError:  # clang before 11, and others, do not know the option
+            compiler.run(*command)
+        said = target.with_suffix(".su")
+        stack = _stack(said.read_text(encoding="utf-8")) if said.is_file() else {}
+        text, data = _sizes(compiler, target)
+    return Footprint(text, data, stack)
+
+
+def _stack(text: str) -> dict[str, int]:
+    """The frames in a file of -fstack-usage: "file:line:column:function", bytes, kind."""
+    rows = [line.split("\t") for line in text.splitlines() if line.count("\t") >= 2]
+    return {row[0].rpartition(":")[2]: int(row[1]) for row in rows}
+
+
+def _sizes(compiler: Compiler, target: Path) -> tuple[int | None, int | None]:
+    """Bytes of text and of data with bss, by the `size` beside the compiler."""
+    program = Path(compiler.command[0])
+    beside = program.name.removesuffix("gcc") + "size" if program.name.endswith("gcc") else "size"
+    size = shutil.which(str(program.with_name(beside))) or shutil.which(beside)
+    if size is None:
+        return None, None
+    done = subprocess.run([size, str(target)], capture_output=True, text=True, check=False)
+    if done.returncode:
+        return None, None
+    text, data, bss, *_ = done.stdout.splitlines()[1].split()
+    return int(text), int(data) + int(bss)

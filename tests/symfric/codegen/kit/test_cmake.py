@@ -1,0 +1,34 @@
+"""Several kits in one folder are one project of CMake, whose tests pass."""
+
+import shutil
+import subprocess
+
+import pytest
+
+from symfric import BrownMcPhee, LuGre
+from symfric.codegen import generate
+
+needs_cmake = pytest.mark.skipif(shutil.which("cmake") is None, reason="needs cmake")
+
+
+def test_kits_in_one_folder_do_not_overwrite_each_other(tmp_path):
+    first = {path: path.read_bytes() for path in generate(LuGre(), tmp_path).files}
+    second = generate(BrownMcPhee(), tmp_path, real="float").files
+    assert {path.name for path in first} & {path.name for path in second} == {"CMakeLists.txt"}
+    assert all(path.read_bytes() == text for path, text in first.items())
+
+
+@needs_cmake
+def test_cmake_builds_all_kits_and_their_tests_pass(compiler, tmp_path):
+    generate(LuGre(), tmp_path / "kit", real="float")
+    generate(BrownMcPhee(), tmp_path / "kit", real="double")
+    build = tmp_path / "build"
+    for command in (
+        ["cmake", "-S", str(tmp_path / "kit"), "-B", str(build)],
+        ["cmake", "--build", str(build), "--parallel", "2"],
+    ):
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+    done = subprocess.run(["ctest"], cwd=build, capture_output=True, text=True, check=False)
+    assert "100% tests passed, 0 tests failed out of 2" in done.stdout
+    assert any(build.glob("*lugre_shared.*"))
