@@ -314,6 +314,7 @@ def embedded(result: "EmbeddedBenchmark") -> None:
     """Instructions and bytes, block by block and core by core."""
     if result.advice:
         output.show(f"embedded: skipped, {result.advice}")
+        return
     output.show_table(
         ["block", "core", "avg", "max", "text", "data", "stack", "error", "bits"],
         [

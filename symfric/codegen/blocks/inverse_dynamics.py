@@ -142,7 +142,7 @@ def inverse_dynamics_block(
         outputs |= machine.outputs("friction", rubbed, "share of friction in joint '{}'")
     own = () if h is not None or not states else (size,)
     return Block(
-        name or machine.name,
+        name or machine.identifier,
         **machine.texts("Inverse dynamics", parts),
         states=states,
         inputs=machine.inputs,
@@ -173,7 +173,7 @@ def gravity_block(
     zero = [ca.SX.zeros(eq.n), ca.SX.zeros(eq.n), ca.SX.zeros(eq.F.numel())]
     holding = machine.leading(ca.substitute([eq.balance], [eq.qd, eq.a, eq.F], zero)[0])
     return Block(
-        name or f"{machine.name}_gravity",
+        name or f"{machine.identifier}_gravity",
         **machine.texts("Forces that hold it at rest: g(q)", ()),
         inputs=tuple(v for v in machine.inputs if v.name.startswith("q_")),
         parameters=tuple(
@@ -203,6 +203,11 @@ class _Machine:
     symbols: Sequence[ca.SX]
     values: Sequence[ca.SX]
     T: ca.DM
+
+    @property
+    def identifier(self) -> str:
+        """Its name as one of C: files of robots may begin with a digit."""
+        return self.name if self.name[:1].isalpha() else f"robot_{self.name.lstrip('_')}"
 
     def moved(self, expression: ca.SX) -> ca.SX:
         """An expression of all coordinates in those that lead."""

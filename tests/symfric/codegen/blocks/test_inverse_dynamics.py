@@ -222,6 +222,11 @@ def test_urdf_is_taken_as_text_and_a_tool_that_is_fixed_carries_the_load():
     assert y == pytest.approx([9.81 * np.sin(0.4) * (2 * 0.25 + 3 * 0.5)], rel=1e-12)
 
 
+def test_a_robot_whose_name_begins_with_a_digit_gets_one_of_c():
+    block = gravity_block(rod(**{'name="small"': 'name="2dof arm"'}))
+    assert block.name == "robot_2dof_arm_gravity"
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_random_robots_are_those_of_pinocchio_with_a_payload(seed):
     pin: Any = pytest.importorskip("pinocchio", reason="needs Pinocchio (extra urdf-check)")
