@@ -8,6 +8,7 @@ from mutants.derivatives import DERIVATIVES
 from mutants.dry import DRY
 from mutants.ensembles import ENSEMBLES
 from mutants.fits import FITS
+from mutants.loops import LOOPS
 from mutants.mutant import Mutant
 from mutants.plants import PLANTS
 from mutants.solvers import RESULTS, SOLVERS
@@ -342,5 +343,6 @@ LEFT_OUT = (
 
 MUTANTS = (
     *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
-    *BESIDE, *CACHES, *DRY, *ENSEMBLES, *LEFT_OUT, *DERIVATIVES, *PLANTS, *RESULTS, *SOLVERS,
+    *BESIDE, *CACHES, *DRY, *ENSEMBLES, *LEFT_OUT, *LOOPS, *DERIVATIVES, *PLANTS, *RESULTS,
+    *SOLVERS,
 )  # fmt: skip

@@ -32,6 +32,29 @@ KEYWORDS = frozenset(
 )
 """Of C99 and C++."""
 
+RESERVED = frozenset(
+    {*KEYWORDS, *GROUPS, "status", *FUNCTIONS.values(), *(f"{f}f" for f in FUNCTIONS.values())}
+)
+"""What no variable may be called."""
+
+
+@final
+@dataclass(frozen=True)
+class Elements:
+    """Neighbouring variables of a group that C holds in one array, one of each alike element.
+
+    Attributes:
+        group: one of `GROUPS`.
+        name: C identifier of the array.
+        first: row of the first variable in its group.
+        size: how many they are.
+    """
+
+    group: str
+    name: str
+    first: int
+    size: int
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -56,6 +79,7 @@ class Block:
         use: what to feed in and what each result is good for, a sentence each.
         limits: what is not valid, a sentence each.
         sources: of the formulas, one each.
+        arrays: variables that are arrays in C, see `symfric.codegen.blocks.elements`.
 
     Raises:
         ValueError: all problems at once: names that are repeated or no C identifiers, start values
@@ -77,6 +101,7 @@ class Block:
     use: tuple[str, ...] = ()
     limits: tuple[str, ...] = ()
     sources: tuple[str, ...] = ()
+    arrays: tuple[Elements, ...] = ()
 
     def __post_init__(self) -> None:
         problems = [*self._name_problems(), *self._shape_problems()]
@@ -88,12 +113,10 @@ class Block:
     def _name_problems(self) -> list[str]:
         variables = [v.name for v in (*self.states, *self.inputs, *self.parameters)]
         members = variables + list(self.outputs)
-        reserved = {*KEYWORDS, *GROUPS, "status", *FUNCTIONS.values()}
-        reserved |= {f"{function}f" for function in FUNCTIONS.values()}
         wrong = [
             name
             for name in (self.name, *members, *self.resets)
-            if not (name.isascii() and fullmatch(r"[A-Za-z]\w*", name)) or name in reserved
+            if not (name.isascii() and fullmatch(r"[A-Za-z]\w*", name)) or name in RESERVED
         ]
         repeated = [name for name, count in Counter(members).items() if count > 1]
         return [

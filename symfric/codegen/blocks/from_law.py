@@ -9,6 +9,7 @@ import casadi as ca
 
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.discretisation import of_law
+from symfric.codegen.blocks.elements import arranged
 from symfric.codegen.blocks.folding import Fold, variable
 from symfric.codegen.blocks.held_step import advanced, force_of_rate
 from symfric.codegen.blocks.law_text import equations, texts
@@ -128,7 +129,7 @@ def law_block(
         about={p.name: f"{p.doc} [{p.unit}]" for p in known.values() if p.name not in names},
     )
     _check_at_rest(block, where)
-    return in_turning(block) if turning else block
+    return arranged(in_turning(block) if turning else block)
 
 
 def in_turning(block: Block) -> Block:

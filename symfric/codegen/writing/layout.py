@@ -9,11 +9,14 @@ Numbers of alike elements that stand next to each other, such as the states F_1 
 array member, `float F[10]`. In memory a struct is the flat column of the block's variables.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import final
 
-from symfric.codegen.blocks.block import Block
+from symfric.codegen.blocks.block import GROUPS, Block
+from symfric.emitter.arrays import Arrays
 from symfric.emitter.c99 import Real
+from symfric.emitter.rolling import Array
 
 
 @final
@@ -65,13 +68,43 @@ def members(block: Block) -> dict[str, tuple[Member, ...]]:
     flat["out"] = [(name, output.unit, output.doc) for name, output in block.outputs.items()]
     if block.is_function:
         del flat["in"], flat["out"]
-    return {
-        group: tuple(Member(*row, first=i) for i, row in enumerate(rows))
-        for group, rows in flat.items()
-        if rows
-    }
+    return {group: tuple(_members(block, group, rows)) for group, rows in flat.items() if rows}
+
+
+def _members(block: Block, group: str, rows: Sequence[tuple[str, str, str]]) -> Iterator[Member]:
+    first = {a.first: a for a in block.arrays if a.group == group}
+    i = 0
+    while i < len(rows):
+        name, unit, doc = rows[i]
+        if i in first:
+            name, size = first[i].name, first[i].size
+            same = all(row[2] == doc for row in rows[i : i + size])
+            doc = f"{doc}, of each element".removeprefix(", ") if same else "of each element"
+            yield Member(name, unit, doc, i, size)
+            i += size
+        else:
+            yield Member(name, unit, doc, i)
+            i += 1
 
 
 def places(block: Block, group: str) -> tuple[str, ...]:
     """The numbers of a struct in the block's order, as C writes them behind `state->`."""
     return tuple(place for member in members(block).get(group, ()) for place in member.places)
+
+
+def indexed(block: Block, results: Sequence[str]) -> Arrays:
+    """What loops may index: the arrays of the structs in the order of `GROUPS`.
+
+    Args:
+        results: the structs that the results of the function are written to.
+    """
+
+    def of(groups: Sequence[str]) -> tuple[Array, ...]:
+        return tuple(
+            Array(number, member.first, member.size, f"{group}->{member.name}")
+            for number, group in enumerate(groups)
+            for member in members(block).get(group, ())
+            if member.size
+        )
+
+    return Arrays(of(GROUPS[:3]), of(results))

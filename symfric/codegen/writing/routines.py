@@ -14,10 +14,10 @@ from symfric.codegen.writing.guards import (
     found_states,
     mended,
 )
-from symfric.codegen.writing.layout import members, places, prefix
+from symfric.codegen.writing.layout import indexed, members, places, prefix
 from symfric.codegen.writing.text import WIDTH
+from symfric.emitter.arrays import emit_rolled
 from symfric.emitter.c99 import Real
-from symfric.emitter.emit import emit
 from symfric.foundation.graph import graph
 
 
@@ -109,7 +109,8 @@ def _routine(
         if not (scalars or guards) or i < 2
         if not (guards and i == 1 and group[j].name == STEP_SIZE)
     }
-    code = emit(source, [[v.name for v in group] for group in groups], targets, real, loads=later)
+    names, arrays = [[v.name for v in group] for group in groups], indexed(block, GROUPS[::3])
+    code = emit_rolled(source, names, targets, real, arrays, later)
     used = sorted(code.used)
     present = members(block)
     arguments = [

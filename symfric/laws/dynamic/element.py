@@ -90,17 +90,24 @@ class Held:
         return cls(way, smooth.sign(v, 0.0), still, smooth.choose(still, h, way))
 
     def stretched(
-        self, F: Scalar, k: Scalar, limit: Scalar, slips: Scalar, slipped: tuple[Scalar, Scalar]
+        self,
+        F: Scalar,
+        p: Scalar,
+        k: Scalar,
+        limit: Scalar,
+        slips: Scalar,
+        slipped: tuple[Scalar, Scalar],
     ) -> tuple[Scalar, Scalar, Scalar]:
-        """An element with the load F and the stiffness k, that slips at +-limit.
+        """An element with the load F, the mode p and the stiffness k, that slips at +-limit.
 
-        Its load at the end and in the mean of the step, and whether it slips at its end:
+        Its load at the end and in the mean of the step, and its mode at the end:
 
-            slips     all along:  F+ and mean as given in `slipped`
-            reaches   the limit:  F+ = s limit,    mean = F+ - (F+ - F)^2 / (2 k way)
-            sticks:               F+ = F + k way,  mean = F + k way / 2
+            slips     all along:  F+ and mean as given in `slipped`,               p+ = 1
+            reaches   the limit:  F+ = s limit,   mean = F+ - (F+ - F)^2 / (2 k way),  p+ = 1
+            sticks:               F+ = F + k way, mean = F + k way / 2,            p+ = 0
 
-        The load rises evenly, so that what the limit cuts off the mean is a triangle.
+        The load rises evenly, so that what the limit cuts off the mean is a triangle. At rest p
+        stays.
         """
         goal, tried = self.s * limit, F + k * self.way
         reaches = self.s * tried >= limit
@@ -108,17 +115,19 @@ class Held:
         cut = goal - gap * (gap / (k * self.some)) / 2
         end = smooth.choose(reaches, goal, tried)
         mean = smooth.choose(reaches, cut, F + k * self.way / 2)
-        mode = smooth.choose(reaches, 1.0, 0.0)
+        mode = smooth.choose(reaches, 1.0, smooth.choose(self.still, p, 0.0))
         return (
             smooth.choose(slips, slipped[0], end),
             smooth.choose(slips, slipped[1], mean),
             smooth.choose(slips, 1.0, mode),
         )
 
-    def yielded(self, F: Scalar, k: Scalar, limit: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    def yielded(
+        self, F: Scalar, p: Scalar, k: Scalar, limit: Scalar
+    ) -> tuple[Scalar, Scalar, Scalar]:
         """The same of an element that stays at its limit as long as it slips."""
         goal = self.s * limit
-        return self.stretched(F, k, limit, self.s * F >= limit, (goal, goal))
+        return self.stretched(F, p, k, limit, self.s * F >= limit, (goal, goal))
 
 
 def yielding(v: Scalar, r: Scalar, n: Scalar, v_eps: Scalar, r_eps: Scalar) -> Scalar:

@@ -171,8 +171,7 @@ class GMS(Law):
             load, goal = held.s * F, held.s * limit
             slips = either(load >= limit, both(p > 0.5, load > 0))
             slipped = goal + (F - goal) * left, goal + (F - goal) * left_in_mean
-            end, mean, mode = held.stretched(F, e.k, limit, slips, slipped)
-            parts.append((end, mean, smooth.choose(held.still, p, mode)))
+            parts.append(held.stretched(F, p, e.k, limit, slips, slipped))
         ends, means, modes = zip(*parts, strict=True)
         return column(*ends, *modes), column(*means, *modes)
 

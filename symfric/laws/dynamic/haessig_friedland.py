@@ -115,8 +115,7 @@ class HaessigFriedland(Law):
         if self.form == "smooth":
             return None
         held = Held.over(v, h)
-        end, mean, mode = held.yielded(z[0], 1.0, self.mu_d * N / self.sigma_0)
-        slip = smooth.choose(held.still, z[1], mode)
+        end, mean, slip = held.yielded(z[0], z[1], 1.0, self.mu_d * N / self.sigma_0)
         return column(end, slip), column(mean, slip)
 
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:

@@ -137,10 +137,9 @@ class MaxwellSlip(Law):
         if self.form == "smooth":
             return None
         count, held = len(self.elements), Held.over(v, h)
-        parts: list[tuple[Scalar, Scalar, Scalar]] = []
-        for i, e in enumerate(self.elements):
-            end, mean, mode = held.yielded(z[i], e.k, e.mu * N)
-            parts.append((end, mean, smooth.choose(held.still, z[count + i], mode)))
+        parts = [
+            held.yielded(z[i], z[count + i], e.k, e.mu * N) for i, e in enumerate(self.elements)
+        ]
         ends, means, modes = zip(*parts, strict=True)
         return column(*ends, *modes), column(*means, *modes)
 
