@@ -14,8 +14,6 @@ TITLE = (
 )
 HEAD = ("block", "avg", "max", "text", "stack", "guarded", "casadi", "f", "goals")
 
-BARE = {"guards": False}
-
 
 def measure(quick: bool) -> Section:
     """A row for every block; `quick` leaves CasADi's C out."""
@@ -26,7 +24,7 @@ def measure(quick: bool) -> Section:
     goals: list[Goal] = []
     for case in cases():
         block = case.make()
-        bare = measured(block, options=BARE, tools=tools)
+        bare = measured(block, guards=False, tools=tools)
         guarded = measured(block, tools=tools).average
         others = [nan if quick else measured(block, by=by, tools=tools).average for by in BY[1:]]
         own = _goals(case, bare, guarded)

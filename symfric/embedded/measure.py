@@ -1,6 +1,6 @@
 """What a step of a block costs on a Cortex-M core, and whether it gives what the host gives."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from math import inf, isfinite, nan
 from pathlib import Path
@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.kit.generate import Generated, generate
 from symfric.codegen.running.compiler import link_program
 from symfric.codegen.running.runner import program, run_c, run_vm
+from symfric.codegen.writing.layout import prefix
 from symfric.embedded.cores import CORES, Core
 from symfric.embedded.inputs import day
 from symfric.embedded.qemu import Said, built, ran
@@ -89,7 +89,7 @@ def measure(
     by: str = "symfric",
     flags: Sequence[str] = ("-O2",),
     steps: int = STEPS,
-    options: Mapping[str, Any] | None = None,
+    guards: bool = True,
     tools: Tools | Absent | None = None,
 ) -> Measured:
     """Cross-compile a step of `block`, run it under QEMU and compare it with the host.
@@ -103,7 +103,7 @@ def measure(
         by: who writes the C, one of `BY`.
         flags: of the compiler, such as -Os.
         steps: how many, up to 4000.
-        options: of `generate`, such as {"guards": False}; for our own C.
+        guards: whether our C clamps and repairs; CasADi's has no such thing.
         tools: what `find_tools` found.
 
     Returns:
@@ -118,22 +118,20 @@ def measure(
     for what, value, known in (("real", real, REALS), ("core", core, CORES), ("by", by, BY)):
         checks.choice(f"{where}: {what}", value, known)
     checks.count(f"{where}: steps", steps, least=1, most=4000)
-    if options and by != "symfric":
-        raise ValueError(f"{where}: options: expected none with the C of CasADi, got {options}")
+    checks.flag(f"{where}: guards", guards)
     found = find_tools() if tools is None else tools
     if isinstance(found, Absent):
         return Measured(block.name, real, core, by, f"skipped: {found.advice}")
     inputs = day(block, steps)
     with TemporaryDirectory(prefix="symfric-") as name:
         folder = Path(name)
-        made = generate(block, folder, real=real, **(options or {}))
         if by == "symfric":
-            subject = own(made, real)
+            subject = own(block, real, folder, guards=guards)
         else:
             subject = by_casadi(block, real, folder, functions_of_float=by != "casadi")
         image = built(subject, (real, inputs, _columns(block)), CORES[core], found, flags)
         said = ran(image, CORES[core], found)
-        equal = _equal(made, real, inputs, said.rows) if by == "symfric" else nan
+        equal = _equal(block, subject.source, (real, guards), inputs, said.rows)
     return _measured(block, real, CORES[core], by, inputs, said, equal)
 
 
@@ -176,14 +174,17 @@ def _error(block: Block, a: Array, b: Array) -> float:
     return float(np.where(np.isnan(ratio), inf, ratio).max(initial=0.0))
 
 
-def _equal(generated: Generated, real: str, inputs: Array, rows: Array) -> float:
-    """Share of numbers with the bits that the host's compiler gives; NaN without one."""
-    compiler = find_compiler()
-    if compiler is None:
+def _equal(block: Block, source: Path, how: tuple[str, bool], inputs: Array, rows: Array) -> float:
+    """Share of numbers with the bits of our C on the host; NaN without a compiler or with others'.
+
+    Args:
+        how: floating point type, and whether there are guards.
+    """
+    compiler, folder = find_compiler(), source.parent
+    real, guards = REALS[how[0]], how[1]
+    if compiler is None or source.stem != prefix(block, real):
         return nan
-    folder, kind = generated.folder, REALS[real]
-    write_text(folder / "main.c", program(generated.block, kind, generated.guards))
-    parts = [folder / "main.c", generated.source(real)]
-    link_program(compiler, parts, folder, folder / "main")
-    host = run_c(generated.block, kind, folder / "main", inputs, guards=generated.guards)
+    write_text(folder / "main.c", program(block, real, guards))
+    link_program(compiler, [folder / "main.c", source], folder, folder / "main")
+    host = run_c(block, real, folder / "main", inputs, guards=guards)
     return float((host[:, : rows.shape[1]] == rows).mean())

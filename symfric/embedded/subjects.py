@@ -10,9 +10,11 @@ import casadi as ca
 import numpy as np
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.kit.generate import Generated
+from symfric.codegen.writing.header import header
 from symfric.codegen.writing.layout import prefix
+from symfric.codegen.writing.source import source
 from symfric.emitter.c99 import REALS
+from symfric.foundation.files import write_text
 
 BY = ("symfric", "casadi", "casadi, functions of float")
 """Who writes the C: we; CasADi, whose code of float calls tanh, exp, fmax of double; CasADi with a
@@ -39,10 +41,13 @@ class Subject:
     parts: Mapping[str, str]
 
 
-def own(generated: Generated, real: str) -> Subject:
-    """Our C, called as its header says: every argument by its name."""
-    block, name = generated.block, prefix(generated.block, REALS[real])
-    header = generated.header(real).read_text(encoding="utf-8")
+def own(block: Block, real: str, folder: Path, *, guards: bool) -> Subject:
+    """Our C, written into `folder` and called as its header says: every argument by its name."""
+    name, kind = prefix(block, REALS[real]), REALS[real]
+    prototypes = header(block, kind, guards)
+    files = folder / f"{name}.h", folder / f"{name}.c"
+    write_text(files[0], prototypes)
+    write_text(files[1], source(block, kind, guards))
     values = {
         "state": "&state",
         "param": f"&{name}_default",
@@ -55,18 +60,18 @@ def own(generated: Generated, real: str) -> Subject:
     declarations, start, keep = ["unsigned int status;"], "status = 0u;", "(void)k;"
     if block.states:
         declarations.append(f"{name}_state_t state;")
-        start += f" {_call(header, f'{name}_init', values)};"
+        start += f" {_call(prototypes, f'{name}_init', values)};"
         keep = "memcpy(Y[k], &state, sizeof state);"
     if block.is_function:
-        step = f"Y[k][0] = {_call(header, name, values)};"
+        step = f"Y[k][0] = {_call(prototypes, name, values)};"
     else:
-        step = f"{_call(header, f'{name}_step', values)};"
-        if _result(header, f"{name}_step") != "void":
+        step = f"{_call(prototypes, f'{name}_step', values)};"
+        if _result(prototypes, f"{name}_step") != "void":
             step = f"status |= {step}"
     sizes = [f"sizeof({name}_state_t)"] * bool(block.states)
     sizes += [f"sizeof({name}_param_t)"] * bool(block.parameters)
     return Subject(
-        generated.source(real),
+        files[1],
         {
             "include": f'#include "{name}.h"',
             "declarations": "\n".join(f"static {line}" for line in declarations),
@@ -78,18 +83,18 @@ def own(generated: Generated, real: str) -> Subject:
     )
 
 
-def _call(header: str, function: str, values: Mapping[str, str]) -> str:
+def _call(prototypes: str, function: str, values: Mapping[str, str]) -> str:
     """A call of a function with every argument by its name."""
-    found = search(rf"\b{escape(function)}\(([^)]*)\);", header)
+    found = search(rf"\b{escape(function)}\(([^)]*)\);", prototypes)
     if found is None:
         raise RuntimeError(f"embedded: expected {function} in the header, found none")
     names = [text.split()[-1].lstrip("*") for text in found[1].split(",")]
     return f"{function}({', '.join(values[n] for n in names if n != 'void')})"
 
 
-def _result(header: str, function: str) -> str:
+def _result(prototypes: str, function: str) -> str:
     """The type that a function returns."""
-    found = search(rf"^([\w ]+?) {escape(function)}\(", header, MULTILINE)
+    found = search(rf"^([\w ]+?) {escape(function)}\(", prototypes, MULTILINE)
     return "void" if found is None else found[1]
 
 
@@ -107,9 +112,8 @@ def by_casadi(block: Block, real: str, folder: Path, *, functions_of_float: bool
     if functions_of_float:
         renamed = "".join(f"#define {name} {name}f\n" for name in _MATH)
         text = f"#include <math.h>\n{renamed}\n{text}"
-    source = folder / "casadi_step.c"
-    source.write_text(text, encoding="utf-8")
-    return Subject(source, _casadi_parts(block, real))
+    write_text(folder / "casadi_step.c", text)
+    return Subject(folder / "casadi_step.c", _casadi_parts(block, real))
 
 
 def _casadi_parts(block: Block, real: str) -> dict[str, str]:

@@ -16,6 +16,7 @@ def few(monkeypatch, module) -> None:
 
 
 @on_target
+@pytest.mark.heavy
 def test_a_row_has_our_c_beside_that_of_casadi(monkeypatch):
     few(monkeypatch, codegen_cores)
     (row,) = codegen_cores.measure(quick=False).to_dict()["rows"]
@@ -25,6 +26,7 @@ def test_a_row_has_our_c_beside_that_of_casadi(monkeypatch):
 
 
 @on_target
+@pytest.mark.heavy
 def test_every_core_is_measured(monkeypatch):
     few(monkeypatch, embedded)
     rows = bench_embedded().rows

@@ -24,8 +24,7 @@ def sum_of_squares(count: int) -> Block:
 @on_target
 def test_instructions_are_counted_one_by_one():
     """Ten more terms are ten loads, multiplications and additions, or at most a little more."""
-    bare = {"guards": False}
-    ten, twenty = (measure(sum_of_squares(n), steps=10, options=bare) for n in (10, 20))
+    ten, twenty = (measure(sum_of_squares(n), steps=10, guards=False) for n in (10, 20))
     assert 30.0 <= twenty.average - ten.average <= 60.0
     assert twenty.maximum - twenty.average < 1.0  # no branches: every step costs the same
 
@@ -51,7 +50,7 @@ def test_double_has_the_bits_of_the_host():
 @pytest.mark.heavy
 def test_casadi_calls_functions_of_double():
     block = law_block(LuGre())
-    own = measure(block, steps=100, options={"guards": False})
+    own = measure(block, steps=100, guards=False)
     mapped, raw = (
         measure(block, by=by, steps=100) for by in ("casadi, functions of float", "casadi")
     )
