@@ -94,3 +94,53 @@ def over(unit, times, names, inputs=None):
         assert unit.step(t, after - t) == OK, unit.said
         rows.append(unit.get(*names))
     return np.array(rows)
+
+
+class Third:
+    """An instance of FMI 3.0 for co-simulation; what it says is kept."""
+
+    def __init__(self, archive: Archive) -> None:
+        self.archive, self.said = archive, list[str]()
+        log = c.CFUNCTYPE(None, c.c_void_p, c.c_int, c.c_char_p, c.c_char_p)
+        self.log = log(lambda _e, _s, _c, text: self.said.append(text.decode()))
+        self.library = archive.library
+        self.library.fmi3InstantiateCoSimulation.restype = c.c_void_p
+        self.self = c.c_void_p(
+            self.library.fmi3InstantiateCoSimulation(
+                b"unit", archive.token.encode(), None, False, False, False, False, None,
+                c.c_size_t(0), None, self.log, None,
+            )
+        )  # fmt: skip
+
+    def call(self, name: str, *arguments) -> int:
+        return getattr(self.library, f"fmi3{name}")(self.self, *arguments)
+
+    def set(self, **values: float) -> int:
+        references = (c.c_uint32 * len(values))(*(self.archive.reference[n] for n in values))
+        numbers, count = (c.c_double * len(values))(*values.values()), c.c_size_t(len(values))
+        return self.call("SetFloat64", references, count, numbers, count)
+
+    def get(self, *names: str) -> np.ndarray:
+        references = (c.c_uint32 * len(names))(*(self.archive.reference[n] for n in names))
+        numbers, count = (c.c_double * len(names))(), c.c_size_t(len(names))
+        assert self.call("GetFloat64", references, count, numbers, count) == OK, self.said
+        return np.array(numbers[:])
+
+    def begin(self, begin: float = 0.0, stop: float | None = None, **start: float) -> int:
+        worst = self.set(**start) if start else OK
+        entered = self.call(
+            "EnterInitializationMode", False, c.c_double(0.0), c.c_double(begin),
+            stop is not None, c.c_double(stop or 0.0),
+        )  # fmt: skip
+        return max(worst, entered, self.call("ExitInitializationMode"))
+
+    def step(self, t: float, size: float) -> int:
+        self.flags = [c.c_bool() for _ in range(3)]
+        self.reached = c.c_double()
+        places = [c.byref(flag) for flag in self.flags]
+        return self.call(
+            "DoStep", c.c_double(t), c.c_double(size), True, *places, c.byref(self.reached)
+        )
+
+    def free(self) -> None:
+        self.library.fmi3FreeInstance(self.self)

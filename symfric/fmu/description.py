@@ -10,7 +10,8 @@ from xml.etree import ElementTree as Xml
 from symfric.fmu.units import CELSIUS, exponents
 from symfric.fmu.variables import Entry
 
-CATEGORIES = ("logEvents", "logStatusDiscard", "logStatusError")
+CATEGORIES = ("logStatusDiscard", "logStatusError")
+"""Messages come in any case: there are none but of what failed or was refused."""
 
 
 @final

@@ -26,6 +26,7 @@ from symfric.integrator.equations.initial import (
 )
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.onsets import pace
+from symfric.integrator.methods.suited import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import PACES
@@ -66,9 +67,11 @@ class Equations:
     span: tuple[float, float]
 
     @property
-    def n(self) -> int:
-        """Number of unknowns."""
-        return self.integrator.system.n
+    def formula(self) -> str:
+        """What the steps are, in words."""
+        if self.step is None:
+            return f"{self.integrator.tableau.name}, adaptive steps"
+        return f"{METHODS[self.method].name}, fixed steps of {self.step:g} s"
 
     @property
     def start(self) -> dict[str, float]:
@@ -89,18 +92,14 @@ def equations(
     u = model.vector("u")
     held = InputData(u, u, np.array(span), np.zeros((len(model.u), 1)), ("fmu",))
     rtol = min((event.rtol for event in model.events if event.rtol < rtol), default=rtol)
-    if step is None:
-        integrator = Integrator(model, held, chosen("export_fmu", method, rtol))
-    else:
-        integrator = Integrator(model, held, METHODS[method])
+    # fixed steps, too, look at signals and jumps by it
+    adaptive = "auto" if step is not None else method
+    integrator = Integrator(model, held, chosen("export_fmu", adaptive, rtol))
     system = integrator.system
     guess = first_guess(system, model, model.initial_state(), span[0])
     d = np.concatenate([model.values("p"), model.values("u")])
-    if step is None:
-        integrator = integrator.suited([(guess, d)], span[1] - span[0])
-    return Equations(
-        model, integrator, integrator.start(guess, d), rtol, step, integrator.tableau.name, span
-    )
+    integrator = integrator.suited([(guess, d)], span[1] - span[0])
+    return Equations(model, integrator, integrator.start(guess, d), rtol, step, method, span)
 
 
 def _places(integrator: Integrator) -> list[int]:
@@ -181,7 +180,8 @@ def source(own: Equations) -> str:
     if own.step is None:
         functions["model_attempt"] = integrator.step
     else:
-        functions["model_step"] = build_fixed(system, METHODS[own.method])
+        formula = METHODS[own.method]
+        functions["model_step"] = build_fixed(suited_to_start(system, formula, model), formula)
     manifold, follow = system.manifold, integrator.follow
     if follow is not None:
         functions |= {"model_equations": system.constraints, "model_round": follow.round}

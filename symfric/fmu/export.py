@@ -144,8 +144,7 @@ def export_fmu(
         made.name,
         identifier,
         token,
-        f"{made.name}: {own.integrator.tableau.name} steps of symfric, "
-        + ("fixed" if step else "adaptive"),
+        f"{made.name}: {own.formula} of symfric",
         f"symfric {version('symfric')}",
         span,
         None if step else own.rtol,
@@ -157,7 +156,7 @@ def export_fmu(
     size = packed(target, described(what, listed, fmi), build, texts, binary)
     return Exported(
         target, size, fmi, kind, identifier, listed, binary.name if binary.content else "",
-        binary.missing, own.method, (write_time, compile_time),
+        binary.missing, own.formula, (write_time, compile_time),
     )  # fmt: skip
 
 

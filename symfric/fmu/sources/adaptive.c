@@ -2,8 +2,6 @@
    jumps: the values there are those of its polynomial, and no step is cut. Where something does
    jump, what lies beyond is forgotten and the last step is made again, up to there. */
 
-enum { TINY = 100, MANY };
-
 /* The accepted step from m->S to `next` is noted, and searched for events. */
 static void noted(Memory *m, double *next, const double *dense)
 {
@@ -41,8 +39,8 @@ static int steps_to(Memory *m, double end)
         if (next[AT_T] > m->S[AT_T]) noted(m, next, dense);
         memcpy(m->S, next, sizeof next);
 #if CROSSINGS && EQUATIONS
-        if (m->stopped == 6) {
-            m->stopped = *consistent(m->S + MEMORY, m->R + DATA, CLOSES) ? 7 : 0;
+        if (m->stopped == FOLLOW) {
+            m->stopped = *consistent(m->S + MEMORY, m->R + DATA, CLOSES) ? UNSOLVED : 0;
         }
 #endif
     }

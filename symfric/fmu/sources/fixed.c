@@ -1,7 +1,5 @@
 /* Equal steps of a constant length, and shorter ones where a communication step is no multiple. */
 
-enum { TINY = 100, MANY };
-
 static int steps_to(Memory *m, double end)
 {
     const double begin = m->S[AT_T];

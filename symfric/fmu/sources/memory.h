@@ -11,6 +11,9 @@ enum { DATA = FIXED + NX, GIVEN = DATA + ND };
 /* A record of an accepted step: t0, t1, y0, y1, and the rows of its dense output. */
 enum { RECORD = 2 + (2 + ROWS) * N };
 
+/* Why steps stop; the first three are what the search for events asks for. */
+enum { TERMINAL = 4, STORM, FOLLOW, UNSOLVED, TINY, MANY };
+
 typedef enum { INSTANTIATED, INITIALISING, RUNNING, ENDED, BROKEN } Phase;
 
 /* How a call ended. OVER: a terminal event; REFUSED: nothing was done. */
@@ -46,7 +49,6 @@ typedef struct {
     Memory m;
     char said[SAID];                  /* the last message */
     char name[120];
-    int talks;                        /* whether events are logged */
     const void *callbacks;            /* of the importer, FMI 2.0 */
     void *environment;                /* and FMI 3.0 */
     void (*logger)(void);

@@ -218,6 +218,19 @@ static const char *jumped(Memory *m)
     return consistent(m->S + MEMORY, m->R + DATA, moved);
 }
 
+/* The first event of those that happened last, by name. */
+static const char *last_event(const Memory *m)
+{
+#if CROSSINGS
+    int i;
+    for (i = 0; i < CROSSINGS; ++i) {
+        if (m->jump[3 + 2 * N + i] > 0.0) return model_event_names[i];
+    }
+#endif
+    (void)m;
+    return "";
+}
+
 /* Why steps ended before the communication point, in a sentence. */
 static void explain(Instance *unit, int why)
 {
@@ -237,12 +250,14 @@ static void explain(Instance *unit, int why)
         snprintf(unit->said, SAID, "%s: stopped at t = %.9g s: more than %g steps in one communication "
                  "step; loosen rtol or look for a discontinuity", MODEL_NAME, t,
                  (double)MOST_ATTEMPTS);
-    } else if (why == 7) {
-        snprintf(unit->said, SAID, "%s: stopped at t = %.9g s: behind an event the algebraic equations "
-                 "have no solution near their last one", MODEL_NAME, t);
-    } else if (why == 5) {
-        snprintf(unit->said, SAID, "%s: stopped at t = %.9g s: events pile up without time advancing; "
-                 "give the model a mode in which the contact rests", MODEL_NAME, t);
+    } else if (why == UNSOLVED) {
+        snprintf(unit->said, SAID, "%s: stopped at t = %.9g s: behind the event %s the algebraic "
+                 "equations have no solution near their last one, or friction jams", MODEL_NAME, t,
+                 last_event(m));
+    } else if (why == STORM) {
+        snprintf(unit->said, SAID, "%s: stopped at t = %.9g s: events pile up without time "
+                 "advancing, the last one %s; give the model a mode in which the contact rests",
+                 MODEL_NAME, t, last_event(m));
     } else if (broken >= 0) {
         snprintf(unit->said, SAID, "%s: stopped at t = %.9g s: the equation of %s returned NaN or "
                  "infinity; look for a division by zero or a root of a negative number there",
@@ -295,10 +310,10 @@ static Outcome advance(Instance *unit, double from, double size)
         return DONE;
     }
     m->t = m->S[AT_T];
-    if (why == 4) {
+    if (why == TERMINAL) {
         m->phase = ENDED;
-        snprintf(unit->said, SAID, "%s: a terminal event ended the simulation at t = %.9g s",
-                 MODEL_NAME, m->t);
+        snprintf(unit->said, SAID, "%s: the terminal event %s ended the simulation at t = %.9g s",
+                 MODEL_NAME, last_event(m), m->t);
         return OVER;
     }
     explain(unit, why);

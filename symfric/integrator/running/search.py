@@ -128,9 +128,9 @@ static double symfric_crossing(const symfric_place *p, double *M, double *which)
 {
   const double *arg[$arg], *g0, *g1;
   double *res[$res];
-  double g[(LOOKS + 1) * EVENTS], root[EVENTS], low = 0, theta, first, share;
+  double g[(LOOKS + 1) * EVENTS], root[EVENTS], low = 0, first, share;
   double h = p->row[1] - p->row[0];
-  int jumped[EVENTS], i, look, any;
+  int jumped[EVENTS], i, look;
   for (i = 0; i < EVENTS; ++i) jumped[i] = 0;
   if (M[PHASE] == ON) {
     for (i = 0; i < EVENTS; ++i) g[i] = M[BEFORE + i];
@@ -184,7 +184,7 @@ static int symfric_storm(double *M, double t, const double *which)
   M[TIMES + count % KEPT] = t;
   M[COUNT] = (double)++count;
   M[ALIKE] = alike ? M[ALIKE] + 1 : 1;
-  apart = nextafter(fabs(t), INFINITY) - fabs(t);
+  apart = nextafter(fabs(t), HUGE_VAL) - fabs(t);
   if (apart < M[TOLERANCE]) apart = M[TOLERANCE];
   if (count >= KEPT && t - M[TIMES + count % KEPT] < 10 * apart * KEPT) return 1;
   if (M[ALIKE] < $alike) return 0;
@@ -229,7 +229,7 @@ static int symfric_search(double *row, double *S, const double *R, double *M, do
   symfric_jump(arg, res, iw, w, 0);
   M[PHASE] = JUMPED;
   for (i = 0; i < EVENTS; ++i)
-    if (which[i] != 0) M[BEFORE + i] = NAN;
+    if (which[i] != 0) M[BEFORE + i] = (double)NAN;
   jump[0] = (double)(kept ? rows + 1 : rows);
   jump[1] = cut[1];
   jump[2] = theta > 0 ? (kept ? h : -h) : 0;

@@ -1,0 +1,60 @@
+"""Units before the eyes of FMPy: validated, simulated, and its headers beside ours."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from symfric import BrownMcPhee, Hold, LuGre, simulate
+from symfric.fmu import export_fmu
+from symfric.fmu.package import compile_unit
+from symfric.foundation.compiler import find_compiler
+from symfric.scenes import ALL_SCENES
+
+WHY = "the validator of FMPy: pip install symfric[fmu]"
+fmpy = pytest.importorskip("fmpy", reason=WHY)
+validation = pytest.importorskip("fmpy.validation", reason=WHY)
+compiler = find_compiler()
+pytestmark = pytest.mark.skipif(compiler is None, reason="units are run as machine code")
+RTOL, STEP = 1e-9, 0.1
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(
+    "scene",
+    ["rabinowicz", "drive", "quarter_car", "pendulum", "double_pendulum", "pendulum_box",
+     *(pytest.param(name, marks=pytest.mark.heavy)
+       for name in ("slider_crank", "four_mass", "four_bar", "arm"))],
+)  # fmt: skip
+def test_units_validate_and_follow_simulate(scene, fmi, tmp_path):
+    machine = ALL_SCENES[scene](BrownMcPhee())
+    unit = export_fmu(machine, tmp_path / "unit.fmu", fmi=fmi, rtol=RTOL)
+    assert validation.validate_fmu(str(unit.path)) == []
+    model = machine.model([e.name for e in unit.variables if e.causality == "parameter"][:-1])
+    times = np.arange(round(min(machine.t_end, 3.0) / STEP) + 1) * STEP
+    given = {v.name: np.sin(3 * times) for v in model.u}
+    driven = np.array(
+        list(zip(times, *given.values(), strict=True)), [(n, "f8") for n in ("time", *given)]
+    )
+    names = [v.name for v in model.x]
+    found = fmpy.simulate_fmu(
+        str(unit.path), stop_time=times[-1], step_size=STEP, output_interval=STEP, output=names,
+        input=driven if given else None,
+    )  # fmt: skip
+    held = {name: Hold(times, values) for name, values in given.items()}
+    same = simulate(model, times[-1], t_eval=times, rtol=RTOL, u=held)
+    for name in names:
+        size = np.abs(same[name]).max()
+        assert np.abs(found[name] - same[name]).max() <= 10 * RTOL * size, name
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_declarations_agree_with_those_of_the_standard(fmi, tmp_path):
+    """The official header in the place of ours: another type anywhere would not compile."""
+    unit = export_fmu(ALL_SCENES["drive"](LuGre()), tmp_path / "unit.fmu", fmi=fmi)
+    folder = Path(fmpy.extract(str(unit.path), str(tmp_path / "open"))) / "sources"
+    theirs = Path(fmpy.__file__).parent / "c-code" / f"fmi{fmi}Functions.h"
+    (folder / f"fmi{fmi}.h").write_text(
+        f'#define FMI3_OVERRIDE_FUNCTION_PREFIX\n#include "{theirs}"\n'
+    )
+    compile_unit(compiler, folder, tmp_path / "unit.so", f"-I{theirs.parent}", "-Werror")

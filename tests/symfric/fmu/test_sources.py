@@ -1,0 +1,94 @@
+"""C of units compiles without a warning, and their descriptions hold what other tools ask for."""
+
+import shutil
+from xml.etree import ElementTree as Xml
+from zipfile import ZipFile
+
+import casadi as ca
+import pytest
+
+from symfric import ExactCoulomb, LuGre
+from symfric.codegen.running.compiler import WARNINGS
+from symfric.fmu import export_fmu
+from symfric.fmu.variables import direct
+from symfric.foundation.compiler import CompileError, Compiler, find_compiler
+from symfric.foundation.parameters import Variable
+from symfric.model import Model, Output
+from symfric.scenes import Drive, Pendulum, Rabinowicz, SliderCrank
+
+compilers = [pytest.param(Compiler((path,)), id=name) for name in ("gcc", "clang")
+             if (path := shutil.which(name))]  # fmt: skip
+
+
+@pytest.mark.parametrize("compiler", compilers)
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(
+    "what",
+    [Drive(LuGre()), Pendulum(ExactCoulomb()),
+     pytest.param(SliderCrank(ExactCoulomb()), marks=pytest.mark.heavy)],
+    ids=["ode", "events", "loops"],
+)  # fmt: skip
+def test_no_warnings(what, fmi, compiler, tmp_path, monkeypatch):
+    monkeypatch.setattr("symfric.fmu.package.find_compiler", lambda: None)
+    unit = export_fmu(what, tmp_path / "unit.fmu", fmi=fmi)
+    assert unit.binary == ""
+    assert "no C compiler" in str(unit)
+    ZipFile(unit.path).extractall(tmp_path)
+    source = str(tmp_path / "sources" / "all.c")
+    assert "warning" not in compiler.run("-std=c99", *WARNINGS, "-fsyntax-only", source)
+
+
+def described(what, folder, monkeypatch, fmi):
+    monkeypatch.setattr("symfric.fmu.package.find_compiler", lambda: None)
+    unit = export_fmu(what, folder / "unit.fmu", fmi=fmi, rtol=1e-7, t_end=3.0)
+    root = Xml.fromstring(ZipFile(unit.path).read("modelDescription.xml"))
+    return root, {v.get("name"): v for v in root.find("ModelVariables")}
+
+
+def test_description_of_2_0(tmp_path, monkeypatch):
+    root, variables = described(Drive(LuGre(), turning=True), tmp_path, monkeypatch, 2)
+    units = {u.get("name"): u[0].attrib for u in root.find("UnitDefinitions") if len(u)}
+    assert units["N m"] == {"kg": "1", "m": "2", "s": "-2"}
+    assert units["rad/s"] == {"rad": "1", "s": "-1"}
+    assert root.find("DefaultExperiment").attrib["stopTime"] == "3.0"
+    assert root.find("CoSimulation/SourceFiles/File").get("name") == "all.c"
+    v, real = variables["m"], variables["m"].find("Real")
+    assert (v.get("causality"), v.get("variability"), v.get("initial")) == (
+        "parameter",
+        "tunable",
+        "exact",
+    )
+    assert (real.get("unit"), real.get("start"), real.get("min")) == ("kg m^2", "0.8", "1e-12")
+    assert variables["x"].find("Real").get("nominal") == "0.1"
+    assert variables["z"].get("initial") == "approx"
+    assert variables["x"].get("initial") == "exact"
+    assert "position" in variables["x"].get("description")
+    assert variables["rtol"].find("Real").get("start") == "1e-07"
+
+
+def test_what_outputs_depend_on_directly(tmp_path, monkeypatch):
+    root, variables = described(Pendulum(LuGre()), tmp_path, monkeypatch, 3)
+    needs = {u.get("valueReference"): u.get("dependencies") for u in root.find("ModelStructure")
+             if u.tag == "Output"}  # fmt: skip
+    assert set(needs.values()) == {""}  # no input
+    assert len(needs) == sum(v.get("causality") == "output" for v in variables.values())
+    root, variables = described(Rabinowicz(LuGre()), tmp_path, monkeypatch, 3)
+    assert [v.get("causality") for v in variables.values()].count("independent") == 1
+
+
+def test_an_output_that_an_input_reaches_through_equations_depends_on_it():
+    x, z, w, u = (Variable(n, "m") for n in ("x", "z", "w", "u"))
+    model = Model(
+        name="m", x=(x,), z=(z, w), u=(u,), ode=-x.symbol,
+        alg=ca.vertcat(z.symbol - u.symbol, w.symbol - 2 * x.symbol),
+        outputs={"a": Output(z.symbol, "m"), "b": Output(w.symbol + 1, "m"), "c": Output(2.0, "m")},
+    )  # fmt: skip
+    assert direct(model) == {"z": ("u",), "w": ("x",), "a": ("u",), "b": ("x",), "c": ()}
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="compiles")
+def test_a_broken_compiler_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("symfric.fmu.package.find_compiler", lambda: Compiler(("false",)))
+    with pytest.raises(CompileError, match="false"):
+        export_fmu(Drive(LuGre()), tmp_path / "unit.fmu")
+    assert not list(tmp_path.iterdir())
