@@ -19,7 +19,7 @@ tested by `test_gpu.py` where there is one, and `symfric bench ensemble` measure
 Limits: models with events are refused. Large mechanisms spill: a slider-crank (4300 operations)
 takes all 255 registers, a six-joint arm (27000) writes kilobytes of memory in every attempt and
 takes NVRTC a minute. Single precision (`real="float"`) follows double at rtol 1e-4 with as many
-attempts, takes up to twice as many at 1e-5, and is refused below, where rounding is taken for error
-and steps shrink to nothing; time stays double. The results are as accurate as rtol says as long as
-that is above some 1e-5 of the largest magnitudes; differences of large numbers lose digits.
+attempts and as small errors; at 1e-5 errors stay at up to 4e-5 of the largest magnitudes, with up
+to twice as many attempts; below it is refused, where rounding is taken for error and steps shrink
+to nothing. Times stay double, and differences of large numbers lose digits.
 """

@@ -131,7 +131,10 @@ def _written(integrator: Integrator, between: bool, real: Real) -> Kernel:
     }  # fmt: skip
     if follow is not None:
         done = DONE if real.size == 8 else DONE_IN_SINGLE
-        sizes |= {"ROUNDS": ROUNDS, "DONE": repr(done), "CONTRACTION": repr(follow.contraction)}
+        sizes |= {
+            "ROUNDS": ROUNDS, "DONE": real.literal(done),
+            "CONTRACTION": real.literal(follow.contraction),
+        }  # fmt: skip
         places = ("y", "d"), ("after", "look")
         functions.append(in_c(follow.round, "symfric_round", *places, real, head))
     return Kernel(

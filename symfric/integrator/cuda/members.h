@@ -193,7 +193,7 @@ static BESIDE void fill(const Many *all, Thread *x)
 
 static DEVICE int is_small(const Thread *x)
 {
-    const double h = x->S[H];
+    const double h = (double)x->S[H];
     return !(h >= x->h_min && h >= FLOOR * fabs(x->t));
 }
 
