@@ -10,8 +10,9 @@ import numpy as np
 
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.from_law import SLIDING, step_variable
+from symfric.codegen.blocks.numbering import in_arrays, numbered
 from symfric.codegen.blocks.payload import with_gravity, with_payload
-from symfric.codegen.blocks.rubbing import Rubbing, numbered, rubbing
+from symfric.codegen.blocks.rubbing import Rubbing, rubbing
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import stacked, starts_of, symbols_of
@@ -124,8 +125,7 @@ def inverse_dynamics_block(
         rubbing(contact, normal, duration, fold=fold)
         for contact, normal in zip(eq.contacts, eq.normals, strict=True)
     ]
-    names = [part.name for part in parts]
-    states, order = numbered([part.states for part in parts], names)
+    states, order = numbered([part.states for part in parts])
     if h is not None and not states:
         raise ValueError(f"{WHERE}: h: expected none without laws with states, got {h!r}")
     forces = stacked(part.force for part in parts)
@@ -137,23 +137,22 @@ def inverse_dynamics_block(
     )
     motion, rubbed = machine.leading(still), machine.leading(rubbed)
     following, sliding = machine.moved(following), machine.moved(sliding)
-    outputs = machine.outputs("tau", motion + rubbed, "force that joint '{}' needs")
+    outputs = machine.outputs("tau", motion + rubbed, "force that the motion needs")
     if separate:
-        outputs |= machine.outputs("friction", rubbed, "share of friction in joint '{}'")
+        outputs |= machine.outputs("friction", rubbed, "friction, a part of it")
     own = () if h is not None or not states else (size,)
-    return Block(
+    made = Block(
         name or machine.identifier,
         **machine.texts("Inverse dynamics", parts),
         states=states,
         inputs=machine.inputs,
-        parameters=(
-            *machine.parameters, *numbered([part.parameters for part in parts], names)[0], *own
-        ),
+        parameters=(*machine.parameters, *numbered([part.parameters for part in parts])[0], *own),
         next=following,
         outputs=outputs,
         resets={"init_sliding": (sliding, SLIDING)} if states else {},
         constants={} if h is None else {"h": float(size.start)},
-    )  # fmt: skip
+    )
+    return in_arrays(made)  # fmt: skip
 
 
 def gravity_block(
@@ -172,15 +171,14 @@ def gravity_block(
     eq = machine.eq
     zero = [ca.SX.zeros(eq.n), ca.SX.zeros(eq.n), ca.SX.zeros(eq.F.numel())]
     holding = machine.leading(ca.substitute([eq.balance], [eq.qd, eq.a, eq.F], zero)[0])
-    return Block(
+    made = Block(
         name or f"{machine.identifier}_gravity",
         **machine.texts("Forces that hold it at rest: g(q)", ()),
         inputs=tuple(v for v in machine.inputs if v.name.startswith("q_")),
-        parameters=tuple(
-            v for v in machine.parameters if ca.depends_on(holding, v.symbol)
-        ),
-        outputs=machine.outputs("tau", holding, "force that holds joint '{}'"),
-    )  # fmt: skip
+        parameters=tuple(v for v in machine.parameters if ca.depends_on(holding, v.symbol)),
+        outputs=machine.outputs("tau", holding, "force that holds it"),
+    )
+    return in_arrays(made)  # fmt: skip
 
 
 @final
@@ -220,7 +218,7 @@ class _Machine:
     def outputs(self, stem: str, column: ca.SX, doc: str) -> dict[str, Output]:
         """One output a joint."""
         return {
-            f"{stem}_{k}": Output(column[k - 1], _force(v.unit), doc.format(v.name))
+            f"{stem}_{k}": Output(column[k - 1], _force(v.unit), doc)
             for k, v in enumerate(self.joints, start=1)
         }
 
@@ -271,7 +269,7 @@ def _machine(mechanism: Mechanism | str | Path, p: Variables, options: Options) 
     joints = tuple(made.q[i] for i in leads)
     groups = [
         tuple(
-            Variable(f"{stem}_{k}", unit.format(v.unit), doc=f"{what} of joint '{v.name}'",
+            Variable(f"{stem}_{k}", unit.format(v.unit), doc=what,
                      nominal=nominal, lower=-limit, upper=limit)
             for k, v in enumerate(joints, start=1)
         )

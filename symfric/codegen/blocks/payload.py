@@ -14,9 +14,6 @@ from symfric.multibody import GROUND, Body, Mechanism
 from symfric.multibody.forces import Gravity
 from symfric.multibody.spatial import Frame, skew, vector
 
-AXES = ("x", "y", "z")
-MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
-
 
 def with_payload(mechanism: Mechanism, place: str, *, inertia: bool) -> tuple[Mechanism, Variables]:
     """A copy whose body at `place` carries a rigid load, and the load's parameters.
@@ -39,13 +36,13 @@ def with_payload(mechanism: Mechanism, place: str, *, inertia: bool) -> tuple[Me
     m = Variable("payload_m", "kg", lower=0.0, upper=1e6, doc="mass of the payload")
     c = [
         Variable(f"payload_c_{k}", "m", lower=-1e3, upper=1e3,
-                 doc=f"centre of mass of the payload in '{place}', {axis}")
-        for k, axis in enumerate(AXES, start=1)
+                 doc=f"its centre of mass in {place}")
+        for k in range(1, 4)
     ]  # fmt: skip
     J = [
         Variable(f"payload_J_{k}", "kg m^2", lower=-1e6, upper=1e6,
-                 doc=f"inertia of the payload about its centre of mass, {moment}")
-        for k, moment in enumerate(MOMENTS, start=1)
+                 doc="its inertia about it, xx yy zz xy xz yz")
+        for k in range(1, 7)
     ]  # fmt: skip
     load = Body(
         "payload", m.symbol, [v.symbol for v in J] if inertia else (0.0, 0.0, 0.0),
@@ -104,8 +101,8 @@ def with_gravity(mechanism: Mechanism) -> tuple[Mechanism, Variables]:
     values = [float(start[k]) if weights else 0.0 for k in range(3)]
     g = tuple(
         Variable(f"g_{k}", "m/s^2", start=value, lower=-1e3, upper=1e3, nominal=9.81,
-                 doc=f"gravity in the axes of the base, {axis}")
-        for k, (value, axis) in enumerate(zip(values, AXES, strict=True), start=1)
+                 doc="gravity in the axes of the base")
+        for k, value in enumerate(values, start=1)
     )  # fmt: skip
     changed = copy(mechanism)
     others = [force for force in mechanism.forces if not isinstance(force, Gravity)]

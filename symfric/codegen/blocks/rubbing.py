@@ -1,7 +1,6 @@
 """Friction in the joints of a mechanism as parts of a block: every joint has its own numbers."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import final
 
 import casadi as ca
@@ -82,24 +81,3 @@ def _level(friction: JointFriction) -> Variables:
     doc, unit = ("friction level", "N m") if turning else ("normal force", "N")
     known = max(start, 1e-3)
     return (Variable("N", unit, start=start, lower=0.0, upper=1e6, nominal=known, doc=doc),)
-
-
-def numbered(groups: Sequence[Variables], names: Sequence[str]) -> tuple[Variables, list[int]]:
-    """Variables of several contacts, those of one name together, numbered: mu_s_1, mu_s_2 ...
-
-    Args:
-        groups: the variables of each contact.
-        names: what each contact is called.
-
-    Returns:
-        The variables, and the place of each among all of `groups`, one group behind the other.
-    """
-    every = [(v, name) for group, name in zip(groups, names, strict=True) for v in group]
-    found: list[Variable] = []
-    order: list[int] = []
-    for stem in dict.fromkeys(v.name for v, _ in every):
-        alike = [(i, v, name) for i, (v, name) in enumerate(every) if v.name == stem]
-        for k, (i, v, name) in enumerate(alike, start=1):
-            found.append(replace(v, name=f"{stem}_{k}", doc=f"{v.doc}, joint '{name}'"))
-            order.append(i)
-    return tuple(found), order

@@ -109,7 +109,8 @@ def _routine(
         if not (scalars or guards) or i < 2
         if not (guards and i == 1 and group[j].name == STEP_SIZE)
     }
-    names, arrays = [[v.name for v in group] for group in groups], indexed(block, GROUPS[::3])
+    names = [[v.name for v in group] for group in groups]
+    arrays = indexed(block, GROUPS[::3][: len(targets)])
     code = emit_rolled(source, names, targets, real, arrays, later)
     used = sorted(code.used)
     present = members(block)

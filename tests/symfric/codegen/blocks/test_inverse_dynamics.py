@@ -10,11 +10,14 @@ from robots import random_robot, rod
 from symfric import BrownMcPhee, Coulomb, ExactCoulomb, Leuven, LuGre
 from symfric.codegen import Block, generate, law_block, verify
 from symfric.codegen.blocks.inverse_dynamics import gravity_block, inverse_dynamics_block
+from symfric.codegen.writing.header import header
+from symfric.emitter.c99 import FLOAT
 from symfric.multibody import (
     GROUND,
     JointFriction,
     Mechanism,
     PrescribedMotion,
+    Prismatic,
     Revolute,
     Spherical,
     functions,
@@ -257,6 +260,22 @@ def test_random_robots_are_those_of_pinocchio_with_a_payload(seed):
     given |= {f"payload_J_{k + 1}": x for k, x in enumerate(J)}
     _, y = call(block, u, payload_m=2.5, **given)
     assert np.abs(y[:n] - y[n:] - expected).max() <= 1e-10 * np.abs(expected).max()
+
+
+def test_joints_are_arrays_in_c():
+    block = inverse_dynamics_block(Arm(LuGre()).mechanism(), payload="link6.root")
+    text = header(block, FLOAT)
+    for declared in ("q[6]", "qd[6]", "qdd[6]", "tau[6]", "z[6]", "mu_s[6]", "payload_c[3]"):
+        assert f"    float {declared};" in text
+
+
+def test_joints_of_two_kinds_are_no_array():
+    m = rotor(BrownMcPhee())
+    m.body("slide", 1.0, (0.1, 0.1, 0.1))
+    m.joint(Prismatic("rail", "wheel", "slide"))
+    text = header(inverse_dynamics_block(m), FLOAT)
+    assert "float q_2;" in text
+    assert "q[2]" not in text
 
 
 @pytest.mark.heavy
