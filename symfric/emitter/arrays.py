@@ -23,7 +23,7 @@ from typing import final
 
 import casadi as ca
 
-from symfric.emitter.c99 import FUNCTIONS, Real
+from symfric.emitter.c99 import Real
 from symfric.emitter.emit import Code, emit
 from symfric.emitter.known import settled
 from symfric.emitter.logic import simplified
@@ -74,6 +74,8 @@ def emit_rolled(
     Raises:
         ValueError: as `emit`.
     """
+    if not (arrays.read or arrays.written):
+        return emit(source, names, targets, real, loads=loads)
     plan = planned(_better(source), arrays.read, arrays.written)
     if not plan.loops:
         return emit(source, names, targets, real, loads=loads)
@@ -115,6 +117,7 @@ class _Rolled:
         self.first = self._loaded_first(loads)
         self.loads = {e: text for e, text in loads.items() if e not in self.first}
         self.tables: dict[tuple[float, ...], str] = {}
+        self.calls, self.operations, self.outside = Counter[str](), 0, 0
 
     def free(self, name: str) -> str:
         """A name that nothing else has."""
@@ -165,14 +168,15 @@ class _Rolled:
             f"{{{', '.join(map(self.real.literal, values))}}};"
             for values, name in self.tables.items()
         ]
-        calls = Counter(FUNCTIONS[node.op] for node in self.source.nodes if node.op in FUNCTIONS)
-        return Code(
-            frozenset({*self._uses(), *self._in_loops()}),
-            (*tables, *lines),
-            calls,
-            self.source.operations,
-            self.source.operations,
-        )
+        used = frozenset({*self._uses(), *self._in_loops()})
+        return Code(used, (*tables, *lines), self.calls, self.operations, self.outside)
+
+    def _counted(self, code: Code, times: int = 1) -> tuple[str, ...]:
+        """The lines of a part that is executed so often."""
+        self.calls.update({call: times * count for call, count in code.calls.items()})
+        self.operations += times * code.operations
+        self.outside += times * code.outside
+        return code.lines
 
     def _straight(self, part: "_Part") -> list[str]:
         """The lines of a straight part."""
@@ -203,7 +207,7 @@ class _Rolled:
         )
         kinds = [f"const {self.real.name}", "const bool", self.real.name]
         declared = [(kind, name) for kind, group in zip(kinds, made, strict=True) for name in group]
-        return list(_declared(code.lines, declared))
+        return list(_declared(self._counted(code), declared))
 
     def _truth(self, i: int) -> bool:
         return is_truth(self.source, i)
@@ -211,7 +215,8 @@ class _Rolled:
     def _loop(self, loop: Loop) -> list[str]:
         """The lines of a loop."""
         body, i = loop.body, self.index
-        reads = [self._read(*entry) for entry in body.reads]
+        taken = set[str]()
+        reads = [self._read(*entry, taken) for entry in body.reads]
         tables = [self._table(values) for values in body.tables]
         loads = {(READ, k): place for k, (_, place) in enumerate(reads)}
         loads |= {(TABLE, k): f"{table}[{i}]" for k, table in enumerate(tables)}
@@ -239,7 +244,7 @@ class _Rolled:
         return [
             *starts,
             f"for (int {i} = 0; {i} < {loop.size}; {i}++) {{",
-            *(INDENT + line for line in code.lines),
+            *(INDENT + line for line in self._counted(code, loop.size)),
             "}",
         ]
 
@@ -249,14 +254,14 @@ class _Rolled:
             return self.names[node.entry[0]][node.entry[1]]
         return self.local[i]
 
-    def _read(self, group: int, row: int) -> tuple[str, str]:
-        """Local and place of a row that a loop reads."""
+    def _read(self, group: int, row: int, taken: set[str]) -> tuple[str, str]:
+        """Local, with a name that is not `taken`, and place of a row that a loop reads."""
         array = next(a for a in self.arrays.read if a.holds(group, row))
-        stem = sub(r"\W+", "_", fullmatch(r"(?:.*(?:->|\.))?(.*)", array.text)[1])  # pyright: ignore[reportOptionalSubscript]
         offset = row - array.first
-        name = f"{stem}_{self.index}" + (f"{offset}" if offset else "")
-        while name in {n for names in self.names for n in names}:
+        name = f"{sub(r'.*[>.]', '', array.text)}_{self.index}{offset or ''}"
+        while name in self.taken or name in taken:
             name += "_"
+        taken.add(name)
         return name, f"{array.text}[{self._at(offset)}]"
 
     def _written(self, group: int, row: int) -> str:
@@ -273,17 +278,30 @@ class _Rolled:
 
 
 def _declared(lines: Sequence[str], made: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """The lines with a declaration of every name, where it is given its value or before."""
+    """The lines with a declaration of every name, where it is given its value or before.
+
+    A local that only another name is given to has that name.
+    """
     waiting = {name: kind for kind, name in made}
     once = {name for name in waiting if any(line.startswith(f"{name} = ") for line in lines)}
+    called: dict[str, str] = {}
+    for line in lines:
+        copy = fullmatch(r"(\w+) = (\w+);", line)
+        if copy and copy[1] in once and waiting[copy[1]].startswith("const "):
+            kind, local = waiting[copy[1]], copy[2]
+            if any(other.startswith(f"{kind} {local} = ") for other in lines):
+                called.setdefault(local, copy[1])
     yield from (
         f"{kind.removeprefix('const ')} {name};"
         for name, kind in waiting.items()
         if name not in once
     )
     for line in lines:
-        name = line.partition(" = ")[0]
-        yield f"{waiting[name]} {line}" if name in once else line
+        name, _, value = line.partition(" = ")
+        if called.get(value.removesuffix(";")) == name:
+            continue
+        shown = sub(r"\w+", lambda word: called.get(word[0], word[0]), line)
+        yield f"{waiting[name]} {shown}" if name in once else shown
 
 
 @final

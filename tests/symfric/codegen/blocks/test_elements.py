@@ -1,6 +1,7 @@
 """Alike elements as arrays: which variables, which laws, equal bits, and what the text costs."""
 
 from collections.abc import Callable
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -28,6 +29,11 @@ def gms(n: int, share: float = 0.0, **numbers: float) -> GMS:
 
 def maxwell(n: int) -> MaxwellSlip:
     return MaxwellSlip(elements=tuple(Slider(5e4 / n, 0.1 / n) for _ in range(n)), form="event")
+
+
+@cache
+def block_of(n: int) -> Block:
+    return law_block(gms(n))
 
 
 def step(block: Block) -> tuple[str, ...]:
@@ -74,7 +80,7 @@ def test_a_family_has_one_unit_and_one_range(odd: dict[str, float]) -> None:
 
 
 def test_arrays_stand_in_the_structs_in_the_order_of_the_variables() -> None:
-    block = law_block(gms(4))
+    block = block_of(4)
     declared = [m.declared for rows in members(block).values() for m in rows]
     assert declared[:2] == ["F[4]", "p[4]"]
     assert {"k[4]", "alpha[4]"} <= set(declared)
@@ -109,8 +115,19 @@ def inputs(block: Block, steps: int) -> np.ndarray:
     return np.column_stack([v, N])
 
 
-@pytest.mark.parametrize("fold", [False, True], ids=["tunable", "folded"])
-@pytest.mark.parametrize("name", CASES)
+SLOW = ("gms of 40", "asymmetric", "gms twice")
+
+
+@pytest.mark.parametrize(
+    ("name", "fold"),
+    [
+        *(pytest.param(n, False, marks=[pytest.mark.slow] * (n in SLOW)) for n in CASES),
+        *(
+            pytest.param(n, True, marks=[pytest.mark.slow] * (n != "gms of 4, unequal"))
+            for n in CASES
+        ),
+    ],
+)
 def test_loops_have_the_bits_of_casadi(name: str, fold: bool, compiler, tmp_path) -> None:
     block = law_block(CASES[name](), name="law", free=[] if fold else None)
     made = generate(block, tmp_path, real="double", guards=False)
@@ -123,15 +140,15 @@ def test_loops_have_the_bits_of_casadi(name: str, fold: bool, compiler, tmp_path
     assert np.array_equal(c, run_vm(block, DOUBLE, rows, guards=False), equal_nan=True)
 
 
-@pytest.mark.parametrize(("n", "expected"), [(1, 0), (2, 0), (3, 1), (4, 1), (10, 2), (40, 2)])
+@pytest.mark.parametrize(("n", "expected"), [(1, 0), (2, 0), (3, 1), (4, 1), (10, 2), (25, 2)])
 def test_three_elements_and_more_are_loops(n: int, expected: int) -> None:
-    assert loops(law_block(gms(n))) == expected
+    assert loops(block_of(n)) == expected
 
 
 def test_the_text_does_not_grow_with_the_elements() -> None:
-    ten, forty = law_block(gms(10)), law_block(gms(40))
-    assert len(step(ten)) == len(step(forty))
-    assert len(step(ten)) < len(step(law_block(gms(2))))
+    ten, more = block_of(10), block_of(25)
+    assert len(step(ten)) == len(step(more))
+    assert len(step(ten)) < len(step(block_of(2)))
 
 
 def test_constants_that_differ_are_a_table_and_equal_ones_are_not() -> None:
@@ -143,7 +160,7 @@ def test_constants_that_differ_are_a_table_and_equal_ones_are_not() -> None:
 
 
 def test_the_sums_of_a_law_are_added_in_its_loop() -> None:
-    lines = [line.strip() for line in step(law_block(gms(10)))]
+    lines = [line.strip() for line in step(block_of(10))]
     assert sum(line.startswith("for (") for line in lines) == 2
     assert [line.split()[0] for line in lines if "+=" in line].count("sum2") == 3
     assert any(line.startswith("double sum2 = ") for line in lines)
