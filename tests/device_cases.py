@@ -57,3 +57,6 @@ CASES: dict[str, tuple[Callable[[], Model], Any, dict[str, Any]]] = {
         explosive, 1.0, {"p": {"p": [0.1, 2.0, 0.5, 4.0, 0.0]}, "t_eval": [0.1, 1.0]},
     ),
 }  # fmt: skip
+
+ALIKE = {"ends of their own, common times", "a number each", "linear", "some fail"}
+"""Cases of which others tell most."""

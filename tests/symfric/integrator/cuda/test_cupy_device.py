@@ -82,5 +82,5 @@ def test_memory_that_is_short_is_shared(cupy: FakeCupy) -> None:
 
 def test_no_other_backend_asks_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "cupy", None)
-    for backend in ("auto", "vm", "compiled"):
+    for backend in ("auto", "vm"):
         assert not members(backend).failed

@@ -11,16 +11,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from device_cases import CASES, VELOCITIES
+from device_cases import ALIKE, CASES, VELOCITIES
 from differentiable import oscillator
 from ensembles import after, assert_same
 
-from symfric import LuGre, Model, Status, rabinowicz, simulate_many
+from symfric import BrownMcPhee, Law, LuGre, Model, Status, rabinowicz, simulate_many
 from symfric.emitter.c99 import DOUBLE
 from symfric.integrator.cuda import on_device
 from symfric.integrator.cuda.device import Device, HostArray, HostDevice
 from symfric.integrator.cuda.kernel import Kernel
 from symfric.model import Event
+from symfric.scenes.catalogue import ALL_SCENES
 
 
 @pytest.fixture(autouse=True)
@@ -34,7 +35,9 @@ def here(monkeypatch: pytest.MonkeyPatch) -> Callable[[Device], None]:
     return use
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", [pytest.param(c, marks=pytest.mark.slow) if c in ALIKE else c for c in CASES]
+)
 def test_members_are_those_of_the_virtual_machine(case: str) -> None:
     make, t_end, arguments = CASES[case]
     model = make()
@@ -184,3 +187,35 @@ def test_what_a_device_has_no_use_for_is_refused(arguments: dict[str, Any], mess
     given = {"model": oscillator(), "t_end": 1.0, "backend": "cuda"} | arguments
     with pytest.raises(ValueError, match=message):
         simulate_many(**given)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", [BrownMcPhee(), LuGre()], ids=lambda law: type(law).__name__)
+@pytest.mark.parametrize("name", ALL_SCENES)
+def test_all_scenes_have_the_bits_of_the_virtual_machine(name: str, law: Law) -> None:
+    """The arm compiles for half a minute."""
+    made = ALL_SCENES[name](law).model()
+    x = made.x[0]
+    x0 = {x.name: float(x.start) + np.array([-0.01, 0.0, 0.01])}
+    arguments: dict[str, Any] = {"x0": x0, "t_eval": np.linspace(0.0, 0.3, 4)}
+    ours = simulate_many(made, 0.3, backend="cuda", **arguments)
+    assert_same(ours, simulate_many(made, 0.3, backend="vm", **arguments))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["quarter_car", "pendulum_box", "slider_crank"])
+def test_single_precision_follows_double(name: str) -> None:
+    made = ALL_SCENES[name](BrownMcPhee()).model()
+    x, t = made.x[0], np.linspace(0.0, 1.0, 5)
+    x0 = {x.name: float(x.start) + np.array([-0.01, 0.0, 0.01])}
+    exact = simulate_many(made, 1.0, x0=x0, t_eval=t, rtol=1e-9, backend="vm")
+    with pytest.warns(UserWarning, match=r"rtol = 0\.0001 is above"):
+        double, single = (
+            simulate_many(made, 1.0, x0=x0, t_eval=t, rtol=1e-4, backend="cuda", real=real)
+            for real in ("double", "float")
+        )
+    assert single.attempts == pytest.approx(double.attempts, rel=0.1)
+    for v in made.x:
+        scale = np.abs(exact[v.name]).max()
+        error = [np.abs(found[v.name] - exact[v.name]).max() for found in (double, single)]
+        assert error[1] < 2 * error[0] + 1e-4 * scale
