@@ -4,6 +4,7 @@ A select whose side costs something becomes a branch, with the operations that o
 inside, nested as deep as it goes; selects of one place with the same condition share a branch.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import final
@@ -15,6 +16,8 @@ from symfric.foundation.graph import LEAVES, SELECT, Graph
 
 LEAST = 4
 """Cost of a side from which on it is worth a branch."""
+SHARE = 2
+"""Cost of a side for each select of a branch: else it only keeps their operands waiting."""
 COSTS = {ca.OP_DIV: 4, ca.OP_INV: 4, ca.OP_SQRT: 4, ca.OP_FLOOR: 8, ca.OP_CEIL: 8} | dict.fromkeys(
     TRANSCENDENTAL, 30
 )
@@ -88,10 +91,11 @@ def _cheap(found: Placed) -> set[int]:
             cost[found.place[i]] += COSTS.get(node.op, 1)
     for number in reversed(range(1, len(cost))):
         cost[found.regions[number].parent] += cost[number]
+    count = Counter((found.place[i], label) for i, label in found.labels.items())
     worth = {
         (region.parent, region.label)
         for number, region in enumerate(found.regions)
-        if number and cost[number] >= LEAST
+        if number and cost[number] >= max(LEAST, SHARE * count[region.parent, region.label])
     }
     return {i for i, label in found.labels.items() if (found.place[i], label) not in worth}
 

@@ -17,8 +17,17 @@ import casadi as ca
 from symfric.emitter.c99 import FORMS, FUNCTIONS, Real, operation_name
 from symfric.emitter.expressions import Writer
 from symfric.emitter.known import settled
-from symfric.emitter.logic import LOWERED, simplified
-from symfric.emitter.statements import Branch, Local, Plan, Side, Statement, Store, planned
+from symfric.emitter.logic import LOWERED, logical, simplified
+from symfric.emitter.statements import (
+    Branch,
+    Local,
+    Plan,
+    Side,
+    Statement,
+    Store,
+    Stores,
+    planned,
+)
 from symfric.foundation.graph import LEAVES, Graph
 
 INDENT = "    "
@@ -81,27 +90,53 @@ def emit(
         got = ", ".join(sorted(map(operation_name, unsupported)))
         raise ValueError(f"codegen: expected operations that C99 has, got {got}")
     better = settled(simplified(source, conditions, truths))
-    used = frozenset(node.entry for node in better.nodes if node.op == ca.OP_INPUT)
-    every = [pattern for row in targets for pattern in row]
-    shared = [names[i][j] for i, j in used if (i, j) not in (loads or {})]
-    locked = any(pattern.startswith("return") for pattern in every)
-    locked = locked or not all(fullmatch(r"\w+", name) for name in shared)
-    stores = [Store(k, j) for k, row in enumerate(targets) for j in range(len(row))]
-    plan = planned(better, frozenset(stores if locked else ()))
-    body = _Body(plan, names, targets, real, loads or {}, stem, conditions, truths, locked)
-    lines = body.region(0)
-    ops = [
-        (node.op, plan.placed.place[i])
-        for i, node in enumerate(plan.placed.source.nodes)
-        if node.op not in LEAVES
-    ]
+    bools = logical(better.nodes, conditions)
+    stores = _stores(better, names, targets, loads or {}, truths)
+    plan = planned(better, bools, stores)
+    lines = _Body(plan, bools, names, targets, real, loads or {}, stem, truths).region(0)
+    taken = {i for values in plan.takes.values() for i in values}
+    nodes = enumerate(better.nodes)
+    done = [(n.op, plan.placed.place[i] == 0) for i, n in nodes if n.op not in LEAVES]
     return Code(
-        used,
+        frozenset(better.nodes[i].entry for i in taken if better.nodes[i].op == ca.OP_INPUT),
         tuple(lines),
-        Counter(FUNCTIONS[op] for op, _ in ops if op in FUNCTIONS),
-        len(ops),
-        sum(place == 0 for _, place in ops),
+        Counter(FUNCTIONS[op] for op, _ in done if op in FUNCTIONS),
+        len(done),
+        sum(outside for _, outside in done),
     )
+
+
+def _stores(
+    source: Graph,
+    names: Sequence[Sequence[str]],
+    targets: Sequence[Sequence[str]],
+    loads: Mapping[tuple[int, int], str],
+    truths: Collection[int],
+) -> Stores:
+    """How results are written, see `emit`."""
+    inputs = {node.entry: i for i, node in enumerate(source.nodes) if node.op == ca.OP_INPUT}
+    patterns = {Store(k, j): text for k, row in enumerate(targets) for j, text in enumerate(row)}
+    shared = [names[i][j] for i, j in inputs if (i, j) not in loads]
+    late = any(text.startswith("return") for text in patterns.values())
+    places = {loads[entry]: i for entry, i in inputs.items() if entry in loads}
+    return Stores(
+        late or not all(fullmatch(r"\w+", name) for name in shared),
+        frozenset(
+            store
+            for store, text in patterns.items()
+            if fullmatch(r"\S+ \+?= \{\};", text) and store.result not in truths
+        ),
+        {
+            store: places[_place(text)]
+            for store, text in patterns.items()
+            if text == f"{_place(text)} = {{}};" and _place(text) in places
+        },
+    )
+
+
+def _place(pattern: str) -> str:
+    """Where a result is written to."""
+    return pattern.partition(" ")[0]
 
 
 class _Body:
@@ -110,38 +145,32 @@ class _Body:
     def __init__(
         self,
         plan: Plan,
+        bools: Sequence[bool],
         names: Sequence[Sequence[str]],
         targets: Sequence[Sequence[str]],
         real: Real,
         loads: Mapping[tuple[int, int], str],
         stem: str,
-        conditions: Collection[int],
         truths: Collection[int],
-        locked: bool,
     ) -> None:
-        self.plan, self.targets, self.truths = plan, targets, truths
+        self.plan, self.targets, self.truths, self.real = plan, targets, truths, real
         self.stem, self.count = _free(stem, [name for row in names for name in row]), 0
-        self.writer = Writer(plan.placed.source, real, conditions)
-        self.real, self.locked = real, locked
+        self.writer = Writer(plan.placed.source, bools, real)
         self.loads: dict[int, str] = {}
-        for i, node in enumerate(plan.placed.source.nodes):
+        """Inputs that are still to be loaded, with their places."""
+        taken = {i for values in plan.takes.values() for i in values}
+        for i in sorted(taken):
+            node = plan.placed.source.nodes[i]
             if node.op == ca.OP_INPUT:
                 argument, row = node.entry
                 self.writer.names[i] = names[argument][row]
                 if node.entry in loads:
                     self.loads[i] = loads[node.entry]
-        self.direct: dict[int, str] = {}
-        """Selects whose sides are written to a result at once: its pattern."""
-        self.stored: set[Store] = set()
-        self.given: dict[int, int] = {}
-        """Selects that are a side of another one and nothing else: they share its variable."""
 
     def region(self, number: int) -> list[str]:
         """The lines of a region."""
         lines: list[str] = []
-        body = self.plan.bodies[number]
-        self._share(body)
-        for statement in body:
+        for statement in self.plan.bodies[number]:
             for i in self._loaded(number, statement):
                 place = self.loads.pop(i)
                 lines.append(f"const {self.real.name} {self.writer.names[i]} = {place};")
@@ -150,43 +179,26 @@ class _Body:
 
     def _loaded(self, number: int, statement: Statement) -> list[int]:
         """What has to be loaded before a statement of a region."""
-        places = self.plan.placed.place
-        wanted = [i for i in self.plan.takes[statement] if i in self.loads and places[i] == number]
-        written = self._written(statement)
-        wanted += [i for i, text in self.loads.items() if text in written and i not in wanted]
-        return sorted(wanted)
+        places, written = self.plan.placed.place, self._written(statement)
+        taken = self.plan.takes[statement]
+        wanted = [i for i in taken if i in self.loads and places[i] == number]
+        return sorted({*wanted, *(i for i, text in self.loads.items() if text in written)})
 
     def _written(self, statement: Statement) -> set[str]:
-        """Places that a statement writes to."""
-        patterns: list[str] = []
-        if isinstance(statement, Store):
-            patterns = [self.targets[statement.result][statement.row]]
-        elif isinstance(statement, Branch):
-            patterns = [self.direct[i] for i in statement.selects if i in self.direct]
-        return {pattern.partition(" ")[0] for pattern in patterns}
-
-    def _share(self, body: Sequence[Statement]) -> None:
-        """Find selects that need no variable of their own."""
-        placed, uses = self.plan.placed, self.plan.uses
-        branches = {i for s in body if isinstance(s, Branch) for i in s.selects}
-        for statement in body:
-            match statement:
-                case Store(result, row) if not self.locked and result not in self.truths:
-                    i, pattern = placed.source.results[result][row], self.targets[result][row]
-                    if i in branches and uses[i] == 1 and fullmatch(r"\S+ \+?= \{\};", pattern):
-                        self.direct[i] = pattern
-                        self.stored.add(statement)
-                case Side(select, side):
-                    i = placed.source.nodes[select].args[side]
-                    same = self.writer.logical[i] == self.writer.logical[select]
-                    if i in branches and uses[i] == 1 and same:
-                        self.given[i] = select
-                case _:
-                    pass
+        """Places that a statement writes to, what is inside it included."""
+        match statement:
+            case Store(result, row):
+                return {_place(self.targets[result][row])}
+            case Branch(selects=selects):
+                goals = [self.plan.goals.get(i) for i in selects]
+                stores = [goal for goal in goals if isinstance(goal, Store)]
+                return {_place(self.targets[store.result][store.row]) for store in stores}
+            case _:
+                return set()
 
     def statement(self, statement: Statement) -> list[str]:
         """The lines of one."""
-        placed, write = self.plan.placed, self.writer
+        nodes, write = self.plan.placed.source.nodes, self.writer
         match statement:
             case Local(node):
                 text = write.expression(node).text
@@ -194,40 +206,37 @@ class _Body:
             case Branch():
                 return self._branch(statement)
             case Side(select, side):
-                value = placed.source.nodes[select].args[side]
-                if self.given.get(value) == select:
-                    return []
-                if select in self.direct:
-                    return [self.direct[select].format(write.number(value).text)]
-                logical = write.logical[select]
-                shown = write.expression(value) if logical else write.number(value)
-                return [f"{write.names[select]} = {shown.text};"]
+                value, goal = nodes[select].args[side], self._goal(select)
+                if isinstance(goal, Store):
+                    return [self._stored(goal, value)]
+                shown = (write.expression if write.logical[goal] else write.number)(value)
+                return [f"{write.names[goal]} = {shown.text};"]
             case Store(result, row):
-                if statement in self.stored:
-                    return []
-                value = placed.source.results[result][row]
-                shown = write.truth(value) if result in self.truths else write.number(value)
-                return [self.targets[result][row].format(shown.text)]
+                return [self._stored(statement, self.plan.placed.source.results[result][row])]
+
+    def _goal(self, select: int) -> int | Store:
+        """The result that a select becomes, or the select whose variable it shares."""
+        goal = self.plan.goals.get(select)
+        return select if goal is None else goal if isinstance(goal, Store) else self._goal(goal)
+
+    def _stored(self, store: Store, value: int) -> str:
+        shown = (self.writer.truth if store.result in self.truths else self.writer.number)(value)
+        return self.targets[store.result][store.row].format(shown.text)
 
     def _branch(self, branch: Branch) -> list[str]:
         placed, write = self.plan.placed, self.writer
-        lines: list[str] = []
-        for i in branch.selects:
-            if i in self.given:
-                outer = self.given[i]
-                if outer in self.direct:
-                    self.direct[i] = self.direct[outer]
-                else:
-                    write.names[i] = write.names[outer]
-            elif i not in self.direct:
-                lines.append(f"{self._kind(i)} {self._name(i)};")
-        condition = write.expression(placed.source.nodes[branch.selects[0]].args[0]).text
+        own = [i for i in branch.selects if i not in self.plan.goals]
+        lines = [f"{self._kind(i)} {self._name(i)};" for i in own]
+        condition = placed.source.nodes[branch.selects[0]].args[0]
         yes, no = (self.region(placed.inside[branch.region, branch.label, side]) for side in (1, 2))
-        lines.append(f"if ({condition}) {{")
-        lines += [INDENT + line for line in yes]
-        if no and no[0].startswith("if (") and _is_one_block(no):
+        if not yes:
+            return [*lines, f"if ({write.negation(condition).text}) {{", *_indented(no), "}"]
+        lines += [f"if ({write.expression(condition).text}) {{", *_indented(yes)]
+        if not no:
+            return [*lines, "}"]
+        if no[0].startswith("if (") and _is_one_block(no):
             return [*lines, f"}} else {no[0]}", *no[1:]]
-        return [*lines, "} else {", *(INDENT + line for line in no), "}"]
+        return [*lines, "} else {", *_indented(no), "}"]
 
     def _kind(self, i: int) -> str:
         return "bool" if self.writer.logical[i] else self.real.name
@@ -237,6 +246,10 @@ class _Body:
         self.count += 1
         self.writer.names[i] = f"{self.stem}{self.count}"
         return self.writer.names[i]
+
+
+def _indented(lines: Sequence[str]) -> list[str]:
+    return [INDENT + line for line in lines]
 
 
 def _is_one_block(lines: Sequence[str]) -> bool:

@@ -1,13 +1,13 @@
 """Formulas of C99 for the operations of a graph."""
 
-from collections.abc import Collection
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final
 
 import casadi as ca
 
 from symfric.emitter.c99 import ATOM, LOGIC, SIGN, TERNARY, Real, form
-from symfric.emitter.logic import logical
+from symfric.emitter.logic import OPPOSITE
 from symfric.foundation.graph import SELECT, Graph
 
 
@@ -33,33 +33,36 @@ class Writer:
         logical: whether each node is a bool.
     """
 
-    def __init__(self, source: Graph, real: Real, conditions: Collection[int]) -> None:
+    def __init__(self, source: Graph, logical: Sequence[bool], real: Real) -> None:
         self.source, self.real = source, real
         self.names: dict[int, str] = {}
-        self.logical = logical(source.nodes, conditions)
+        self.logical = logical
+        self.constants = {"zero": real.literal(0.0), "one": real.literal(1.0)}
+        self.constants["two"] = real.literal(2.0)
 
     def expression(self, i: int) -> Expression:
         """The value of a node, as it is."""
         if i in self.names:
             return Expression(self.names[i], ATOM)
-        node, real = self.source.nodes[i], self.real
+        node = self.source.nodes[i]
         if node.op == ca.OP_CONST:
-            text = real.literal(node.value)
+            text = self.real.literal(node.value)
             return Expression(text, SIGN if text.startswith("-") else ATOM)
-        how = form(node.op, len(node.args), real)
-        plain = how.conditions if not (node.op == SELECT and self.logical[i]) else len(node.args)
-        operands = [
-            (self.expression if k < plain else self.number)(j) for k, j in enumerate(node.args)
-        ]
+        return self._operation(i, node.op)
+
+    def _operation(self, i: int, op: int) -> Expression:
+        """Operation `op` on the operands of node `i`."""
+        args = self.source.nodes[i].args
+        how = form(op, len(args), self.real)
+        plain = len(args) if op == SELECT and self.logical[i] else how.conditions
+        operands = [(self.expression if k < plain else self.number)(j) for k, j in enumerate(args)]
         pattern = how.pattern
-        if node.op in MIRRORED and self.source.nodes[node.args[0]].op == ca.OP_CONST:
+        if op in MIRRORED and self.source.nodes[args[0]].op == ca.OP_CONST:
             operands.reverse()
-            pattern = MIRRORED[node.op]
+            pattern = MIRRORED[op]
         text = pattern.format(
             *(operand.within(least) for operand, least in zip(operands, how.needs, strict=True)),
-            zero=real.literal(0.0),
-            one=real.literal(1.0),
-            two=real.literal(2.0),
+            **self.constants,
         )
         return Expression(text, how.binds)
 
@@ -68,8 +71,17 @@ class Writer:
         value = self.expression(i)
         if not self.logical[i]:
             return value
-        one, zero = self.real.literal(1.0), self.real.literal(0.0)
+        one, zero = self.constants["one"], self.constants["zero"]
         return Expression(f"{value.within(LOGIC)} ? {one} : {zero}", TERNARY)
+
+    def negation(self, i: int) -> Expression:
+        """The opposite of a bool."""
+        node = self.source.nodes[i]
+        if i not in self.names and node.op in OPPOSITE:
+            return self._operation(i, OPPOSITE[node.op])
+        if i not in self.names and node.op == ca.OP_NOT:
+            return self.expression(node.args[0])
+        return Expression(f"!{self.expression(i).within(ATOM)}", SIGN)
 
     def truth(self, i: int) -> Expression:
         """The value of a node that is a bool or one of the numbers 1 and 0."""

@@ -6,7 +6,9 @@ values in which
 
 * conditions (of selects, in and, or, not) are comparisons and what is made of them, never numbers
   that are compared with 0; negations stand innermost and constants are folded;
-* `if_else_zero`, `fmin` and `fmax` are selects.
+* `if_else_zero`, `fmin` and `fmax` are selects;
+* 2 (0.5 / x), which is how `reciprocal` keeps CasADi from dividing again, is 1 / x: the same bits
+  for |x| below 2e307 (4e37 in float).
 
 All finite numbers and infinities keep their bits, but for the sign of a zero, which C leaves to the
 library in fmin(0, -0). A number that is not one
@@ -99,6 +101,8 @@ class _Algebra:
                 return self.joined(node.op, self.truth(args[0]), self.truth(args[1]))
             case _ if node.op in COMPARISONS:
                 return self.compared(node.op, *args)
+            case ca.OP_TWICE if self._is_half_inverse(args[0]):
+                return self.add(ca.OP_INV, self.nodes[args[0]].args[1])
             case ca.OP_DIV:
                 return self.weight_of_side(*args) or self.add(node.op, *args)
             case _:
@@ -262,6 +266,10 @@ class _Algebra:
         if self.nodes[condition].args != before or not ordered:
             return None
         return self.add(SELECT, condition, self._first_if(op, x, b), other)
+
+    def _is_half_inverse(self, i: int) -> bool:
+        node = self.nodes[i]
+        return node.op == ca.OP_DIV and self.value(node.args[0]) == 0.5
 
     def weight_of_side(self, a: int, b: int) -> int | None:
         """A side's share in the derivative of fmin, fmax: (p <= q) / ((p <= q) + (q <= p)).

@@ -3,13 +3,16 @@
 from collections.abc import Iterable, Sequence
 from heapq import heappop, heappush
 
+IDLE = 2
+"""Growth of a statement that makes and ends nothing: it waits for those that make one value."""
+
 
 def ordered(takes: Sequence[Iterable[int]], makes: Sequence[Iterable[int]]) -> list[int]:
     """An order of statements 0, 1, ... in which what is taken has been made before.
 
     Of those that are ready the one comes next that adds least to the values that are live, the
-    first of several: it makes some, and ends those that nobody else takes. Linear in the number of
-    values taken, but for a logarithm.
+    first of several: it makes some, and ends those that nobody else takes. The time is that of
+    sorting all that is taken.
 
     Args:
         takes: values that each statement takes; those that none makes are there from the beginning.
@@ -31,13 +34,10 @@ def ordered(takes: Sequence[Iterable[int]], makes: Sequence[Iterable[int]]) -> l
         for j in before:
             next_ones[j].append(i)
 
-    live: set[int] = set()
-
     def growth(i: int) -> int:
         made = sum(bool(takers.get(value)) for value in makes[i])
-        begun = sum(value not in maker and value not in live for value in set(takes[i]))
         ended = sum(len(takers[value]) == 1 for value in set(takes[i]))
-        return made + begun - ended
+        return made - ended if made or ended else IDLE
 
     heap: list[tuple[int, int]] = []
     for i, count in enumerate(waits):
@@ -54,9 +54,6 @@ def ordered(takes: Sequence[Iterable[int]], makes: Sequence[Iterable[int]]) -> l
         fewer: set[int] = set()
         for value in set(takes[i]):
             takers[value].discard(i)
-            if value not in live and value not in maker:
-                fewer |= takers[value]
-            live.add(value)
             if len(takers[value]) == 1:
                 fewer |= takers[value]
         for j in next_ones[i]:

@@ -1,8 +1,8 @@
 """The statements of a function: what becomes a local, what each statement takes, their order."""
 
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import final
 
 import casadi as ca
@@ -57,29 +57,48 @@ Statement = Local | Branch | Side | Store
 
 @final
 @dataclass(frozen=True)
+class Stores:
+    """How results are written.
+
+    Attributes:
+        late: all of them when all else is done.
+        within: those that may be written inside a branch, where that decides about them alone.
+        same: those that are written to where an input was loaded from, with its node.
+    """
+
+    late: bool = False
+    within: frozenset[Store] = frozenset()
+    same: Mapping[Store, int] = field(default_factory=dict[Store, int])
+
+
+@final
+@dataclass(frozen=True)
 class Plan:
     """A function as statements.
 
     Attributes:
         placed: the graph with its branches.
-        locals: nodes that have a local of their own.
         bodies: the statements of each region in order.
         takes: what each statement takes, what is inside it included: nodes of its own region.
-        uses: how often each node is written out.
+        goals: select -> the select or result that it is a side or all of, whose place it takes.
     """
 
     placed: Placed
-    locals: frozenset[int]
     bodies: tuple[tuple[Statement, ...], ...]
-    takes: dict[Statement, frozenset[int]]
-    uses: Counter[int]
+    takes: Mapping[Statement, frozenset[int]]
+    goals: Mapping[int, int | Store]
 
 
-def planned(source: Graph, late: Collection[Store] = ()) -> Plan:
-    """Statements for a simplified graph; results in `late` are written when all else is done."""
+def planned(source: Graph, bools: Sequence[bool], stores: Stores) -> Plan:
+    """Statements for a simplified graph.
+
+    Args:
+        bools: whether each node is one.
+        stores: how results are written.
+    """
     apart: set[int] = set()
     while True:
-        builder = _Planner(placed(source, apart), late)
+        builder = _Planner(placed(source, apart), bools, stores)
         plan, waiting = builder.result()
         if not waiting:
             return plan
@@ -87,11 +106,12 @@ def planned(source: Graph, late: Collection[Store] = ()) -> Plan:
 
 
 class _Planner:
-    def __init__(self, found: Placed, late: Collection[Store]) -> None:
-        self.placed, self.late = found, late
+    def __init__(self, found: Placed, bools: Sequence[bool], stores: Stores) -> None:
+        self.placed, self.stores = found, stores
         self.branches = _branches(found)
-        self.uses = _uses(found)
-        self.locals = _locals(found, self.uses)
+        uses = _uses(found)
+        self.locals = _locals(found, uses)
+        self.goals = _goals(found, bools, stores, uses)
         self.items: list[list[Statement]] = [[] for _ in found.regions]
         self.takes: dict[Statement, set[int]] = {}
 
@@ -105,7 +125,7 @@ class _Planner:
             bodies.append(body)
             waiting.update(i for s in left if isinstance(s, Branch) for i in s.selects)
         takes = {statement: frozenset(values) for statement, values in self.takes.items()}
-        return Plan(self.placed, self.locals, tuple(bodies), takes, self.uses), waiting
+        return Plan(self.placed, tuple(bodies), takes, self.goals), waiting
 
     def _collect(self) -> None:
         """All statements by region, in the order of the graph."""
@@ -120,10 +140,24 @@ class _Planner:
                     done.add(branch)
                     self.items[found.place[i]].append(branch)
                 for side in (1, 2):
-                    inner = found.inside[branch.region, branch.label, side]
-                    self.items[inner].append(Side(i, side))
+                    if not self._is_there(i, found.source.nodes[i].args[side]):
+                        inner = found.inside[branch.region, branch.label, side]
+                        self.items[inner].append(Side(i, side))
+        direct = {goal for goal in self.goals.values() if isinstance(goal, Store)}
         for k, row in enumerate(found.source.results):
-            self.items[0].extend(Store(k, j) for j in range(len(row)))
+            for j, i in enumerate(row):
+                store = Store(k, j)
+                if store not in direct and self.stores.same.get(store) != i:
+                    self.items[0].append(store)
+
+    def _is_there(self, select: int, value: int) -> bool:
+        """Whether a side of a select need not be written: it has its place, or never left it."""
+        if self.goals.get(value) == select:
+            return True
+        goal: int | Store | None = select
+        while isinstance(goal, int):
+            goal = self.goals.get(goal)
+        return goal is not None and self.stores.same.get(goal) == value
 
     def _connect(self) -> None:
         """What every statement takes."""
@@ -173,12 +207,12 @@ class _Planner:
         self, statements: Sequence[Statement]
     ) -> tuple[tuple[Statement, ...], list[Statement]]:
         """In order; and those that wait for each other in a circle, with others."""
-        early = [s for s in statements if s not in self.late]
+        early = [s for s in statements if not (self.stores.late and isinstance(s, Store))]
         takes = [self.takes[s] for s in early]
         makes = [_made(s) for s in early]
         order = ordered(takes, makes)
         body = [early[k] for k in order]
-        body += [s for s in statements if s in self.late]
+        body += [s for s in statements if self.stores.late and isinstance(s, Store)]
         chosen = set(order)
         return tuple(body), [s for k, s in enumerate(early) if k not in chosen]
 
@@ -200,6 +234,23 @@ def _branches(found: Placed) -> dict[tuple[int, int], Branch]:
     for i, label in found.labels.items():
         groups[found.place[i], label].append(i)
     return {key: Branch(*key, tuple(sorted(selects))) for key, selects in groups.items()}
+
+
+def _goals(
+    found: Placed, bools: Sequence[bool], stores: Stores, uses: Counter[int]
+) -> dict[int, int | Store]:
+    """Branches that need no variable: all that becomes of their select is one result or side."""
+    once = {i for i in found.labels if uses[i] == 1}
+    goals: dict[int, int | Store] = {}
+    for outer in found.labels:
+        for i in found.source.nodes[outer].args[1:]:
+            if i in once and bools[i] == bools[outer]:
+                goals[i] = outer
+    for store in stores.within:
+        i = found.source.results[store.result][store.row]
+        if i in once and not stores.late:
+            goals[i] = store
+    return goals
 
 
 def _written(found: Placed) -> Iterator[tuple[int, int]]:
