@@ -92,19 +92,21 @@ def places(block: Block, group: str) -> tuple[str, ...]:
     return tuple(place for member in members(block).get(group, ()) for place in member.places)
 
 
-def indexed(block: Block, results: Sequence[str]) -> Arrays:
+def indexed(block: Block, results: Sequence[str], guards: bool) -> Arrays:
     """What loops may index: the arrays of the structs in the order of `GROUPS`.
 
     Args:
         results: the structs that the results of the function are written to.
+        guards: inputs are mended in locals, one by one; no loop may read them past these.
     """
+    mended = {"in"} if guards else set[str]()
 
     def of(groups: Sequence[str]) -> tuple[Array, ...]:
         return tuple(
             Array(number, member.first, member.size, f"{group}->{member.name}")
             for number, group in enumerate(groups)
             for member in members(block).get(group, ())
-            if member.size
+            if member.size and group not in mended
         )
 
     return Arrays(of(GROUPS[:3]), of(results))

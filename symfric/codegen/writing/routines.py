@@ -110,7 +110,7 @@ def _routine(
         if not (guards and i == 1 and group[j].name == STEP_SIZE)
     }
     names = [[v.name for v in group] for group in groups]
-    arrays = indexed(block, GROUPS[::3][: len(targets)])
+    arrays = indexed(block, GROUPS[::3][: len(targets)], guards)
     code = emit_rolled(source, names, targets, real, arrays, later)
     used = sorted(code.used)
     present = members(block)

@@ -9,6 +9,7 @@ import pytest
 
 from symfric import Output, Variable
 from symfric.codegen import Block, generate
+from symfric.codegen.blocks.block import Elements
 from symfric.codegen.blocks.elements import arranged, families
 from symfric.codegen.blocks.from_law import law_block
 from symfric.codegen.running.compiler import link_program
@@ -193,3 +194,13 @@ def test_float_has_no_double_in_its_loops() -> None:
     text = source(law_block(gms(10), free=[]), FLOAT)
     assert "double" not in text
     assert "-0.0f; /* adds nothing" in text or "sum1 = " in text
+
+
+def test_loops_do_not_read_inputs_past_their_guards() -> None:
+    x = tuple(Variable(f"x_{i}", "m") for i in range(1, 9))
+    total = sum((v.symbol**2 * ca.sin(v.symbol) for v in x), start=ca.SX(0))
+    outputs = {"y": Output(total, "m"), "z": Output(2 * total, "m")}
+    block = Block("b", inputs=x, outputs=outputs, arrays=(Elements("in", "x", 0, 8),))
+    free, guarded = (routines(block, DOUBLE, guards=g)[-1].statements for g in (False, True))
+    assert any("in->x[i]" in line for line in free)
+    assert not any("in->x[i]" in line for line in guarded)
