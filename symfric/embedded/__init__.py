@@ -8,3 +8,4 @@ from symfric.embedded.subjects import BY as BY
 from symfric.embedded.tools import Absent as Absent
 from symfric.embedded.tools import Tools as Tools
 from symfric.embedded.tools import find_tools as find_tools
+from symfric.embedded.unit_test import wrong_on_target as wrong_on_target

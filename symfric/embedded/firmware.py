@@ -13,6 +13,7 @@ STARTUP = """\
 extern uint32_t _data_source, _data, _data_end, _bss, _bss_end, _stack;
 int main(void);
 void say(const char *text);
+void word(uint32_t value);
 void Reset_Handler(void);
 
 static void host(int operation, const void *argument)
@@ -23,6 +24,19 @@ static void host(int operation, const void *argument)
 }
 
 void say(const char *text) { host(0x04, text); }
+
+void word(uint32_t value)
+{
+    char text[10];
+    int i;
+    for (i = 0; i < 8; i++) {
+        const uint32_t digit = (value >> (28 - 4 * i)) & 15u;
+        text[i] = (char)(digit < 10u ? '0' + digit : 'a' + digit - 10u);
+    }
+    text[8] = '\\n';
+    text[9] = 0;
+    say(text);
+}
 
 static void leave(uint32_t status)
 {
@@ -84,6 +98,7 @@ $include
 
 typedef $real real_t;
 void say(const char *text);
+void word(uint32_t value);
 extern char _block, _block_end, _library, _library_end;
 
 static const real_t U[STEPS][$inputs] = {
@@ -96,19 +111,6 @@ static __attribute__((noinline)) void start(void) { $start }
 static __attribute__((noinline)) void one(int k) { $step }
 static __attribute__((noinline)) void nothing(int k) { (void)k; __asm__ volatile(""); }
 static void keep(int k) { $keep }
-
-static void word(uint32_t value)
-{
-    char text[10];
-    int i;
-    for (i = 0; i < 8; i++) {
-        const uint32_t digit = (value >> (28 - 4 * i)) & 15u;
-        text[i] = (char)(digit < 10u ? '0' + digit : 'a' + digit - 10u);
-    }
-    text[8] = '\\n';
-    text[9] = 0;
-    say(text);
-}
 
 static __attribute__((noinline)) uint32_t ticks(void (*what)(int), int k)
 {
@@ -154,3 +156,19 @@ int main(void)
 """)
 """Its parts: `include`, `real`, `steps`, `inputs` (columns), `values`, `columns` (of the results),
 `declarations`, and statements: `start`, `step` and `keep` for step k; `data`, bytes."""
+
+TEST = Template("""\
+#include <stdint.h>
+
+void say(const char *text);
+void word(uint32_t value);
+int ${name}_test(void);
+
+int main(void)
+{
+    say("wrong\\n"); word((uint32_t)${name}_test());
+    say("end\\n");
+    return 0;
+}
+""")
+"""Says how many results of a kit's unit test are wrong; `name` is that of its C."""

@@ -16,7 +16,7 @@ from symfric.codegen.running.runner import program, run_c, run_vm
 from symfric.codegen.writing.layout import prefix
 from symfric.embedded.cores import CORES, Core
 from symfric.embedded.inputs import day
-from symfric.embedded.qemu import Said, built, ran
+from symfric.embedded.qemu import Said, Target, built, said
 from symfric.embedded.subjects import BY, by_casadi, own
 from symfric.embedded.tools import Absent, Tools, find_tools
 from symfric.emitter.c99 import REALS
@@ -129,10 +129,11 @@ def measure(
             subject = own(block, real, folder, guards=guards)
         else:
             subject = by_casadi(block, real, folder, functions_of_float=by != "casadi")
-        image = built(subject, (real, inputs, _columns(block)), CORES[core], found, flags)
-        said = ran(image, CORES[core], found)
-        equal = _equal(block, subject.source, (real, guards), inputs, said.rows)
-    return _measured(block, real, CORES[core], by, inputs, said, equal)
+        target = Target(CORES[core], found, flags)
+        image = built(subject, real, inputs, _columns(block), target)
+        heard = said(target.heard(image), real, _columns(block))
+        equal = _equal(block, subject.source, (real, guards), inputs, heard.rows)
+    return _measured(block, real, CORES[core], by, inputs, heard, equal)
 
 
 def _columns(block: Block) -> int:
@@ -140,23 +141,23 @@ def _columns(block: Block) -> int:
 
 
 def _measured(
-    block: Block, real: str, core: Core, by: str, inputs: Array, said: Said, equal: float
+    block: Block, real: str, core: Core, by: str, inputs: Array, heard: Said, equal: float
 ) -> Measured:
-    expected = run_vm(block, REALS[real], inputs, said.rows[:, : len(block.states)])
+    expected = run_vm(block, REALS[real], inputs, heard.rows[:, : len(block.states)])
     return Measured(
         block.name,
         real,
         core.name,
         by,
-        average=float(said.instructions.mean()),
-        maximum=float(said.instructions.max()),
-        text=said.text,
-        library=said.library,
-        data=said.data,
-        stack=said.stack,
-        error=_error(block, said.rows, expected[:, : _columns(block)]),
+        average=float(heard.instructions.mean()),
+        maximum=float(heard.instructions.max()),
+        text=heard.text,
+        library=heard.library,
+        data=heard.data,
+        stack=heard.stack,
+        error=_error(block, heard.rows, expected[:, : _columns(block)]),
         equal=equal,
-        finite=bool(np.isfinite(said.rows).all()),
+        finite=bool(np.isfinite(heard.rows).all()),
     )
 
 

@@ -1,9 +1,9 @@
 """From C to an image for a core, and what it says when QEMU runs it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
+from re import fullmatch
 from typing import final
 
 import numpy as np
@@ -25,6 +25,8 @@ FLAGS = ("-mthumb", "-std=gnu99", "-ffunction-sections", "-fdata-sections", "-ff
 SHIFT = 7
 """An instruction takes 2^7 ns of QEMU's time: 3.2 ticks of SysTick, whose 24 bits are enough for
 5 million instructions."""
+
+WORD = "[0-9a-f]{8}"
 
 PATIENCE = 120.0
 """Seconds that a program may run."""
@@ -51,31 +53,61 @@ class Said:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Image:
-    """A linked program, and how its results are to be read: type and number of columns."""
+class Target:
+    """A core, the tools for it and options of the compiler."""
 
-    path: Path
-    real: str
-    columns: int
+    core: Core
+    tools: Tools
+    flags: Sequence[str]
+
+    def linked(self, folder: Path, main: str, sources: Sequence[Path], *flags: str) -> Path:
+        """An image of a main program and `sources`, the first of which is what is measured.
+
+        Raises:
+            CompileError: the compiler refuses it.
+        """
+        for name, text in (("startup.c", STARTUP), ("memory.ld", LINKER), ("target.c", main)):
+            write_text(folder / name, text)
+        gcc, options = self.tools.gcc, (*self.core.options, *FLAGS, *self.flags, *flags)
+        names = ("block", *(f"more_{k}" for k in range(1, len(sources))), "startup", "target")
+        objects = [str(folder / f"{name}.o") for name in names]
+        files = (*sources, folder / "startup.c", folder / "target.c")
+        for source, item in zip(files, objects, strict=True):
+            gcc.run(*options, f"-I{folder}", "-c", str(source), "-o", item)
+        image = folder / "image.elf"
+        linking = ("-nostartfiles", f"-T{folder / 'memory.ld'}", "-Wl,--gc-sections")
+        gcc.run(*options, *linking, "--specs=nosys.specs", *objects, "-lm", "-o", str(image))
+        return image
+
+    def heard(self, image: Path) -> dict[str, NDArray[np.uint32]]:
+        """What an image says under QEMU: words by the name before them.
+
+        Raises:
+            CompileError: it does not start, comes to no end, or ends in a fault.
+        """
+        core = self.core
+        command = (
+            *(self.tools.qemu, "-M", core.machine, "-display", "none", "-monitor", "none"),
+            *("-serial", "none", "-semihosting-config", "enable=on,target=native"),
+            *("-icount", f"shift={SHIFT}", "-kernel", str(image)),
+        )
+        try:
+            done = finished(command, limit=PATIENCE, name=f"{core.title} under QEMU")
+        except ProgramError as error:
+            raise CompileError(str(error)) from None
+        lines = (done.output.decode(errors="replace") + done.said).split()
+        if done.status or "end" not in lines:
+            said = " ".join(lines[-8:])
+            raise CompileError(f"{core.title}: QEMU ended with status {done.status}: {said}")
+        return _words(lines)
 
 
-def built(
-    subject: Subject,
-    run: tuple[str, Array, int],
-    core: Core,
-    tools: Tools,
-    flags: Sequence[str],
-) -> Image:
-    """Compile and link what calls the subject with inputs.
-
-    Args:
-        run: floating point type, inputs (steps, inputs), number of columns of the results.
+def built(subject: Subject, real: str, inputs: Array, columns: int, target: Target) -> Path:
+    """Compile and link what calls the subject with `inputs` and keeps rows of `columns` numbers.
 
     Raises:
         CompileError: the compiler refuses it.
     """
-    real, inputs, columns = run
-    folder = subject.source.parent
     rows = [f"{{{literals(row, real) or '0'}}}" for row in inputs]
     parts = {
         "real": real,
@@ -84,63 +116,30 @@ def built(
         "columns": str(columns),
         "values": ",\n".join(rows),
     }
-    texts = {
-        "startup.c": STARTUP,
-        "memory.ld": LINKER,
-        "target.c": MAIN.substitute(parts | dict(subject.parts)),
-    }
-    for name, text in texts.items():
-        write_text(folder / name, text)
-    options = (*core.options, *FLAGS, *flags)
-    for source, target in (
-        (subject.source, "block.o"),
-        (folder / "target.c", "target.o"),
-        (folder / "startup.c", "startup.o"),
-    ):
-        tools.gcc.run(*options, f"-I{folder}", "-c", str(source), "-o", str(folder / target))
-    objects = [str(folder / f"{name}.o") for name in ("startup", "target", "block")]
-    image = folder / "image.elf"
-    linking = ("-nostartfiles", f"-T{folder / 'memory.ld'}", "-Wl,--gc-sections")
-    tools.gcc.run(*options, *linking, "--specs=nosys.specs", *objects, "-lm", "-o", str(image))
-    return Image(image, real, columns)
-
-
-def ran(image: Image, core: Core, tools: Tools) -> Said:
-    """Run an image under QEMU.
-
-    Raises:
-        CompileError: it does not start, comes to no end, or ends in a fault.
-    """
-    command = (
-        *(tools.qemu, "-M", core.machine, "-display", "none", "-monitor", "none"),
-        *("-serial", "none", "-semihosting-config", "enable=on,target=native"),
-        *("-icount", f"shift={SHIFT}", "-kernel", str(image.path)),
+    return target.linked(
+        subject.source.parent, MAIN.substitute(parts | dict(subject.parts)), (subject.source,)
     )
-    try:
-        done = finished(command, limit=PATIENCE, name=f"{core.title} under QEMU")
-    except ProgramError as error:
-        raise CompileError(str(error)) from None
-    lines = (done.output.decode(errors="replace") + done.said).split()
-    if done.status or "end" not in lines:
-        said = " ".join(lines[-8:])
-        raise CompileError(f"{core.title}: QEMU ended with status {done.status}: {said}")
-    return _read(lines, image)
 
 
-def _read(lines: Sequence[str], image: Image) -> Said:
-    """Words behind the name that stands before them."""
-    names = ("stack", "text", "library", "data", "ticks", "rows", "end")
-    places = [lines.index(name) for name in names]
-    words = {
-        name: np.array([int(word, 16) for word in lines[a + 1 : b]], dtype=np.uint32)
-        for name, (a, b) in zip(names, pairwise(places), strict=False)
-    }
-    kind = np.float32 if image.real == "float" else np.float64
+def said(words: Mapping[str, NDArray[np.uint32]], real: str, columns: int) -> Said:
+    """What a measured program said."""
+    kind = np.float32 if real == "float" else np.float64
     return Said(
         instructions=words["ticks"].astype(float) * (1e9 / CLOCK / 2**SHIFT),
-        rows=words["rows"].view(kind).reshape(-1, image.columns).astype(float),
+        rows=words["rows"].view(kind).reshape(-1, columns).astype(float),
         text=int(words["text"][0]),
         library=int(words["library"][0]),
         data=int(words["data"][0]),
         stack=int(words["stack"][0]),
     )
+
+
+def _words(lines: Sequence[str]) -> dict[str, NDArray[np.uint32]]:
+    """The words behind each name, up to "end"."""
+    found: dict[str, list[int]] = {}
+    for line in lines[: lines.index("end")]:
+        if fullmatch(WORD, line):
+            found[next(reversed(found))].append(int(line, 16))
+        else:
+            found[line] = []
+    return {name: np.array(words, dtype=np.uint32) for name, words in found.items()}
