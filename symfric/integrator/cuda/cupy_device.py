@@ -63,8 +63,8 @@ class CupyLoaded:
             self.cupy.cuda.get_current_stream().synchronize()
         except RuntimeError as error:  # CuPy's own are
             raise DeviceError(
-                f"simulate_many: the graphics processor stopped ({error}); members of chunks that "
-                "are complete are kept"
+                f"simulate_many: the graphics processor stopped ({error}); chunks that were "
+                "complete are in the folder `out`, where one was given"
             ) from None
 
 

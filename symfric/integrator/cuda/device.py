@@ -57,7 +57,7 @@ class Device(Protocol):
         ...
 
     def load(self, kernel: Kernel) -> Loaded:
-        """Compile a kernel; once in a process."""
+        """Compile a kernel, or take it from a cache."""
         ...
 
     def put(self, array: Numbers) -> Held:

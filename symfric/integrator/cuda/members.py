@@ -55,6 +55,7 @@ class DeviceMembers:
     Attributes:
         kernel: what they do.
         device: where.
+        loaded: the kernel there.
         tell: called between launches with how many of the members of this call are done.
         launches: how many there were.
         budget: attempts of a thread in the next one.
@@ -62,9 +63,15 @@ class DeviceMembers:
 
     kernel: Kernel
     device: Device
+    loaded: Loaded
     tell: Callable[[int], None] | None = None
     launches: int = 0
     budget: int = FIRST
+
+    @classmethod
+    def of(cls, kernel: Kernel, device: Device) -> "DeviceMembers":
+        """Members of a kernel, which is compiled; raises as `Device.load`."""
+        return cls(kernel, device, device.load(kernel))
 
     def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> Advanced:
         """Advance members over a stretch, as many at once as the memory of the device takes.
@@ -74,7 +81,7 @@ class DeviceMembers:
             MemoryError: there is no room for a single member.
             KeyboardInterrupt: Ctrl-C, between two launches.
         """
-        loaded, count = self.device.load(self.kernel), S.shape[0]
+        count = S.shape[0]
         shape = (count, stretch.times.shape[1], self.kernel.signals)
         found, reason = np.empty(shape), np.empty(count, dtype=np.int64)
         largest = np.abs(S[:, State.Y])
@@ -88,7 +95,7 @@ class DeviceMembers:
                     raise
                 most = (most + 1) // 2  # somebody else took some meanwhile
                 continue
-            part.whole(loaded)
+            part.whole()
             found[pick], reason[pick] = part.results(S[pick], made[pick], largest[pick])
             first = pick.stop
         return found, reason, largest
@@ -169,12 +176,12 @@ class _Part:
         }  # fmt: skip
         return cls(members, count, held, numbers)
 
-    def whole(self, loaded: Loaded) -> None:
+    def whole(self) -> None:
         """Launch until no member is under way.
 
         Those that are go on together: a warp that had one of them left would run for it alone.
         """
-        all_, device = self.of_all, self.of_all.device
+        all_, device, loaded = self.of_all, self.of_all.device, self.of_all.loaded
         todo = np.arange(self.count, dtype=np.int32)
         while todo.size:
             own = {"todo": device.put(todo), "ticket": device.full((1,), 0, np.int32)}

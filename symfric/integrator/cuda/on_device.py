@@ -96,10 +96,9 @@ class OnDevice:
         device = find_device()
         between = not np.isin(times, breaks).all()
         kernel = kernel_of(integrator, between, REALS[real])
-        device.load(kernel)
         # the kernel is the code that the results depend on
         own = replace(program(integrator, False), code=kernel.text)
-        return cls(Job(own, breaks, times, max_steps), DeviceMembers(kernel, device))
+        return cls(Job(own, breaks, times, max_steps), DeviceMembers.of(kernel, device))
 
     def chunk(self, own_data: int) -> int:
         """How many members a chunk has whose own input data are so many numbers each."""
