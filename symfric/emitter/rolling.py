@@ -88,6 +88,7 @@ class Body:
         truths: those behind the rows of `TRUTH`, which are conditions.
         reads: (argument, row) of the first element behind the rows of `READ`.
         tables: constants of all elements behind the rows of `TABLE`.
+        inside: the operations of the whole graph that it does.
     """
 
     graph: Graph
@@ -95,6 +96,7 @@ class Body:
     truths: tuple[int, ...]
     reads: tuple[tuple[int, int], ...]
     tables: tuple[tuple[float, ...], ...]
+    inside: frozenset[int]
 
 
 def strands(source: Graph, read: Sequence[Array], written: Sequence[Array]) -> list[Strand]:
@@ -222,7 +224,8 @@ def woven(source: Graph, strands: Sequence[Strand], read: Sequence[Array]) -> Bo
     stored = tuple(number[s.lanes] for s in strands if isinstance(s, Store))
     added = tuple(number[s.lanes] for s in strands if not isinstance(s, Store))
     made = Graph(tuple(nodes), (stored, added))
-    return Body(made, tuple(outer), tuple(truths), tuple(reads), tuple(tables))
+    inside = frozenset(i for lanes in gathered if len(set(lanes)) > 1 for i in lanes)
+    return Body(made, tuple(outer), tuple(truths), tuple(reads), tuple(tables), inside)
 
 
 def is_truth(source: Graph, i: int) -> bool:

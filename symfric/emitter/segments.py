@@ -6,7 +6,8 @@ A loop belongs to the stage after everything that it takes from outside is known
 is computed in the last part that is early enough for all its users.
 """
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
@@ -93,40 +94,25 @@ class Plan:
 def planned(source: Graph, read: Sequence[Array], written: Sequence[Array]) -> Plan:
     """The graph with all loops that spare statements and cost next to nothing.
 
-    Where the loops together would compute too much twice, or would write what another one has yet
-    to read, they are left out one by one.
+    What is left out: loops that would write what another one has yet to read; sums that nobody
+    needs; short loops; and, where too much would be computed twice, those that do so.
     """
-    chosen = strands(source, read, written)
+    chosen = {s: woven(source, [s], read) for s in strands(source, read, written)}
     while chosen:
         plan = _plan(source, chosen, read, written)
-        if plan is None:
-            tried = [_plan(source, _without(chosen, s), read, written) for s in chosen]
-            good = [p for p in tried if p is not None]
-            if not good:
-                chosen = _without(chosen, min(chosen, key=lambda s: len(s.lanes)))
-                continue
-            plan = min(good, key=_written)
-        idle = {s for loop in plan.loops if _spared(loop) < SPARED for s in loop.strands}
-        idle |= set(plan.idle)
-        if not idle:
+        out = _overwriting(plan.loops, read, written) or _idle(plan) or _wasteful(plan, chosen)
+        if not out:
             return plan
-        chosen = [s for loop in plan.loops for s in loop.strands if s not in idle]
+        chosen = {s: body for s, body in chosen.items() if s not in out}
     return Plan(source, (), {})
 
 
-def _without(chosen: Sequence[Strand], strand: Strand) -> list[Strand]:
-    return [other for other in chosen if other != strand]
-
-
-def _spared(loop: Loop) -> int:
-    operations = sum(node.op not in LEAVES for node in loop.body.graph.nodes)
-    return (loop.size - 1) * (operations + len(loop.strands))
-
-
 def _plan(
-    source: Graph, chosen: Sequence[Strand], read: Sequence[Array], written: Sequence[Array]
-) -> Plan | None:
-    """The plan with these loops; None where they are in each other's way or cost too much."""
+    source: Graph,
+    chosen: Mapping[Strand, Body],
+    read: Sequence[Array],
+    written: Sequence[Array],
+) -> Plan:
     stages = _stages(source, chosen, read, written)
 
     def key(strand: Strand) -> tuple[int, int]:
@@ -136,18 +122,35 @@ def _plan(
         Loop(stage, size, group := tuple(members), woven(source, group, read))
         for (stage, size), members in groupby(sorted(chosen, key=key), key)
     )
-    if _overwritten(loops, read, written):
-        return None
-    part, idle = _parts(source, loops)
-    plan = Plan(source, loops, part, idle)
-    executed = _cost([source.nodes[i] for i in plan.part])
-    executed += sum(loop.size * (loop.cost + len(loop.sums)) for loop in loops)
-    return plan if executed <= MORE * _cost(source.nodes) else None
+    return Plan(source, loops, *_parts(source, loops))
 
 
-def _written(plan: Plan) -> int:
-    straight = _cost([plan.source.nodes[i] for i in plan.part])
-    return straight + sum(loop.cost for loop in plan.loops)
+def _idle(plan: Plan) -> set[Strand]:
+    """Sums without users, and what short loops do."""
+
+    def spared(loop: Loop) -> int:
+        operations = sum(node.op not in LEAVES for node in loop.body.graph.nodes)
+        return (loop.size - 1) * (operations + len(loop.strands))
+
+    short = {s for loop in plan.loops if spared(loop) < SPARED for s in loop.strands}
+    return short | set(plan.idle)
+
+
+def _wasteful(plan: Plan, chosen: Mapping[Strand, Body]) -> set[Strand]:
+    """Where too much is computed in several places, what does so most."""
+    nodes = plan.source.nodes
+    executed = _cost([nodes[i] for i in plan.part])
+    executed += sum(loop.size * (loop.cost + len(loop.sums)) for loop in plan.loops)
+    if executed <= MORE * _cost(nodes):
+        return set()
+    places = Counter(dict.fromkeys(plan.part, 1))
+    places.update(i for loop in plan.loops for i in loop.body.inside)
+    waste = {
+        strand: sum((places[i] - 1) * _cost([nodes[i]]) for i in body.inside)
+        for strand, body in chosen.items()
+    }
+    most = max(waste.values())
+    return {strand for strand, lost in waste.items() if 2 * lost >= most}
 
 
 def _cost(nodes: Sequence[Node]) -> int:
@@ -155,11 +158,13 @@ def _cost(nodes: Sequence[Node]) -> int:
 
 
 def _stages(
-    source: Graph, chosen: Sequence[Strand], read: Sequence[Array], written: Sequence[Array]
+    source: Graph,
+    bodies: Mapping[Strand, Body],
+    read: Sequence[Array],
+    written: Sequence[Array],
 ) -> dict[Strand, int]:
-    """The stage of every loop: after what it needs, stores not before others have read."""
-    bodies = {strand: woven(source, [strand], read) for strand in chosen}
-    sums = {strand.total: strand for strand in chosen if isinstance(strand, Sum)}
+    """The stage of every strand: after what it needs, stores not before others have read."""
+    sums = {strand.total: strand for strand in bodies if isinstance(strand, Sum)}
     stages: dict[Strand, int] = {}
     known: list[int] = []
     for i, node in enumerate(source.nodes):
@@ -176,7 +181,7 @@ def _stages(
             stages[strand] = 1 + max((known[k] for k in (*body.outer, *body.truths)), default=0)
     latest = max(stages.values(), default=0)
     for _ in range(latest):
-        for strand in chosen:
+        for strand in bodies:
             if isinstance(strand, Store):
                 text = _text(strand, written)
                 readers = (s for s, b in bodies.items() if text in _texts(b, read))
@@ -197,18 +202,21 @@ def _texts(body: Body, read: Sequence[Array]) -> dict[str, list[int]]:
     return found
 
 
-def _overwritten(loops: Sequence[Loop], read: Sequence[Array], written: Sequence[Array]) -> bool:
-    """Whether a loop reads what has been written before."""
+def _overwriting(
+    loops: Sequence[Loop], read: Sequence[Array], written: Sequence[Array]
+) -> set[Strand]:
+    """What would overwrite rows before they have been read."""
+    found = set[Strand]()
     for i, loop in enumerate(loops):
         for store in loop.stores:
             text = _text(store, written)
-            if any(text in _texts(later.body, read) for later in loops[i + 1 :]):
-                return True
             array = next(a for a in written if a.holds(store.group, store.first))
             own = _texts(loop.body, read).get(text, [])
             if any(offset < store.first - array.first for offset in own):
-                return True
-    return False
+                found.add(store)
+            if any(text in _texts(later.body, read) for later in loops[i + 1 :]):
+                found.add(store)
+    return found
 
 
 def _parts(source: Graph, loops: Sequence[Loop]) -> tuple[dict[int, int], tuple[Sum, ...]]:
