@@ -143,6 +143,14 @@ def optimised_motion_tells_more(printed: str, folder: Path) -> None:
     assert "SOLVED" in printed or "ACCEPTABLE" in printed
 
 
+def each_term_makes_the_arm_truer(printed: str, folder: Path) -> None:
+    """Friction known beforehand takes nine tenths of what is left, in float."""
+    assert "C: verified" in printed
+    rms = [float(x) for x in re.findall(r"([\d.]+) mrad", printed)]
+    assert rms == sorted(rms, reverse=True)
+    assert rms[3] < 0.1 * rms[2]
+
+
 LONG = (
     "arm_to_a_place",
     "co_design",
@@ -156,6 +164,7 @@ LONG = (
     "identify_quarter_car",
     "identify_raw_files",
     "quarter_car_profile",
+    "robot_feed_forward",
     "swing_up",
     "through_a_spring",
 )
@@ -174,6 +183,7 @@ SAYS = dict.fromkeys(LONG, motion_is_verified) | {
     "out_and_back": out_and_back_is_the_motion_known_on_paper,
     "mpc_drive": drives_get_there_and_the_c_is_verified,
     "learn_drive": drive_has_learnt_to_stop,
+    "robot_feed_forward": each_term_makes_the_arm_truer,
     "rabinowicz": period_is_between_those_of_two_laws,
     "optimal_move": moves_are_solved_and_saved,
 }
