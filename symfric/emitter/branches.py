@@ -18,6 +18,8 @@ LEAST = 4
 """Cost of a side from which on it is worth a branch."""
 SHARE = 2
 """Cost of a side for each select of a branch: else it only keeps their operands waiting."""
+DEEPEST = 30
+"""Branches within each other; what is nested deeper is chosen by `?:`."""
 COSTS = {ca.OP_DIV: 4, ca.OP_INV: 4, ca.OP_SQRT: 4, ca.OP_FLOOR: 8, ca.OP_CEIL: 8} | dict.fromkeys(
     TRANSCENDENTAL, 30
 )
@@ -95,7 +97,8 @@ def _cheap(found: Placed) -> set[int]:
     worth = {
         (region.parent, region.label)
         for number, region in enumerate(found.regions)
-        if number and cost[number] >= max(LEAST, SHARE * count[region.parent, region.label])
+        if 0 < region.depth <= DEEPEST
+        and cost[number] >= max(LEAST, SHARE * count[region.parent, region.label])
     }
     return {i for i, label in found.labels.items() if (found.place[i], label) not in worth}
 

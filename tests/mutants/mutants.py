@@ -6,6 +6,7 @@ Where the line of a mutant is rewritten, rewrite the mutant: `tests/test_mutants
 from mutants.beside import BESIDE
 from mutants.derivatives import DERIVATIVES
 from mutants.dry import DRY
+from mutants.emitted import EMITTED
 from mutants.ensembles import ENSEMBLES
 from mutants.fits import FITS
 from mutants.loops import LOOPS
@@ -343,6 +344,6 @@ LEFT_OUT = (
 
 MUTANTS = (
     *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
-    *BESIDE, *CACHES, *DRY, *ENSEMBLES, *LEFT_OUT, *LOOPS, *DERIVATIVES, *PLANTS, *RESULTS,
-    *SOLVERS,
+    *BESIDE, *CACHES, *DRY, *EMITTED, *ENSEMBLES, *LEFT_OUT, *LOOPS, *DERIVATIVES, *PLANTS,
+    *RESULTS, *SOLVERS,
 )  # fmt: skip

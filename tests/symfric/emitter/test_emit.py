@@ -83,6 +83,7 @@ OPERATIONS = {
     "logic as number": ca.fmax(less, y < 2) + ca.fmin(x < 1, equal) * ca.if_else(less, equal, 1),
     "number as logic": ca.if_else(ca.if_else(less, x < 0, 0) * 1, y, ca.if_else(equal, 0, less)),
     "logic of signs": ca.if_else(ca.sign(x) == 0, y, ca.if_else(ca.sign(y) < 0, x, -y)),
+    "opposite against zero": (-ca.sin(x) < 0) + 2 * (ca.fabs(y - 1) <= 0),
     "negated": ca.logic_not(ca.logic_and(ca.logic_not(equal), ca.logic_or(less, x < 1))),
     "negated order": ca.if_else(ca.logic_not(less), x, ca.if_else(ca.logic_not(x <= 2), y, 3)),
     "branch": ca.if_else(less, ca.sin(x) / y, ca.if_else(y < 0, ca.exp(-x * x), ca.cos(y))),
