@@ -20,9 +20,10 @@ from symfric.model import Model
 
 Array = NDArray[np.float64]
 WHERE = "simulate_many: backend='cuda'"
-MOST, BYTES = 2**17, 2**30
-"""Members of a chunk, and what their results and data may take: enough for all threads of the
-largest devices several times over, few enough to keep what is done after an interrupt."""
+OPERATIONS, BYTES = 2**30, 2**30
+"""Of one attempt of all members of a chunk, and of their results and data: enough members for all
+threads of the largest devices several times over where they are small, and where they are large few
+enough to keep what is done after an interrupt."""
 LOOSEST = 1e-5
 """Smallest relative tolerance that single precision meets."""
 
@@ -121,4 +122,4 @@ class OnDevice:
 def chunk_of(kernel: Kernel, times: int, own_data: int) -> int:
     """Members of a chunk; the same on every device, so that a folder of results is found again."""
     size = kernel.real.size * (kernel.rows + kernel.given + times * kernel.signals + own_data)
-    return max(1, min(MOST, BYTES // size))
+    return max(1, min(OPERATIONS // kernel.operations, BYTES // size))
