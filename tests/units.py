@@ -144,3 +144,55 @@ class Third:
 
     def free(self) -> None:
         self.library.fmi3FreeInstance(self.self)
+
+
+class Rates(Third):
+    """An instance of FMI 3.0 for model exchange."""
+
+    def __init__(self, archive: Archive) -> None:
+        self.archive, self.said = archive, list[str]()
+        log = c.CFUNCTYPE(None, c.c_void_p, c.c_int, c.c_char_p, c.c_char_p)
+        self.log = log(lambda _e, _s, _c, text: self.said.append(text.decode()))
+        self.library = archive.library
+        self.library.fmi3InstantiateModelExchange.restype = c.c_void_p
+        token = archive.token.encode()
+        self.self = c.c_void_p(
+            self.library.fmi3InstantiateModelExchange(
+                b"unit", token, None, False, False, None, self.log
+            )
+        )
+        count = c.c_size_t()
+        assert self.call("GetNumberOfContinuousStates", c.byref(count)) == OK
+        self.n = count.value
+        assert self.call("GetNumberOfEventIndicators", c.byref(count)) == OK
+        self.events = count.value
+
+    def column(self, name: str, n: int) -> np.ndarray:
+        values = np.zeros(n)
+        assert self.call(name, c.c_void_p(values.ctypes.data), c.c_size_t(n)) == OK, self.said
+        return values
+
+    def at(self, t: float, x: np.ndarray) -> None:
+        assert self.call("SetTime", c.c_double(t)) == OK
+        x = np.ascontiguousarray(x)
+        assert self.call("SetContinuousStates", c.c_void_p(x.ctypes.data), c.c_size_t(x.size)) == OK
+
+    def rates(self, t: float, x: np.ndarray) -> np.ndarray:
+        self.at(t, x)
+        return self.column("GetContinuousStateDerivatives", self.n)
+
+    @property
+    def x(self) -> np.ndarray:
+        return self.column("GetContinuousStates", self.n)
+
+    def update(self) -> tuple[bool, bool, bool]:
+        """Carry out events; whether once more, whether it is over, whether states jumped."""
+        flags, after = [c.c_bool() for _ in range(5)], c.c_double()
+        assert self.call("EnterEventMode") == OK
+        assert self.call("UpdateDiscreteStates", *map(c.byref, flags), c.byref(after)) == OK
+        return flags[0].value, flags[1].value, flags[3].value
+
+    def completed(self) -> bool:
+        event, over = c.c_bool(), c.c_bool()
+        assert self.call("CompletedIntegratorStep", True, c.byref(event), c.byref(over)) == OK
+        return event.value

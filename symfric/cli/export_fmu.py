@@ -13,6 +13,7 @@ from symfric.cli.options import JsonOption, SetOption, check_outputs, numbers
 from symfric.cli.run import scenes_with
 from symfric.fmu import Exported
 from symfric.fmu import export_fmu as exported
+from symfric.fmu.export import KINDS
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
 from symfric.model import Model
@@ -47,7 +48,7 @@ def export_fmu(
         ),
     ] = None,
     fmi: Annotated[int, typer.Option("--fmi", help="Version of the standard: 2 or 3.")] = 3,
-    kind: Annotated[str, typer.Option("--kind", help="co-simulation.")] = "co-simulation",
+    kind: Annotated[str, typer.Option("--kind", help=f"{', '.join(KINDS)}.")] = KINDS[0],
     rtol: Annotated[
         float, typer.Option("--rtol", help="Relative tolerance; can be tuned in the unit.")
     ] = 1e-6,

@@ -30,6 +30,7 @@ class Described:
         step: length [s] of fixed steps, None where the step is adaptive.
         interval: communication step [s] that is proposed.
         files: sources, the one to be compiled.
+        exchange: whether it is for model exchange.
     """
 
     name: str
@@ -42,6 +43,17 @@ class Described:
     step: float | None
     interval: float
     files: tuple[str, ...]
+    exchange: bool = False
+
+    @property
+    def tag(self) -> str:
+        """What the standard calls its kind."""
+        return "ModelExchange" if self.exchange else "CoSimulation"
+
+    @property
+    def variable_steps(self) -> bool | None:
+        """Whether communication steps may be of any length; None where there are none."""
+        return None if self.exchange else True
 
 
 def described(what: Described, entries: Iterable[Entry], fmi: int) -> str:
@@ -123,45 +135,15 @@ def _numbers(entry: Entry) -> dict[str, object]:
 
 
 def _unknowns(entries: Iterable[Entry]) -> list[Entry]:
-    """What is calculated at the start: outputs that are not set themselves."""
-    return [e for e in entries if e.causality == "output" and e.initial != "exact"]
+    """What is calculated at the start: outputs and states that are not set, and rates."""
+    calculated = (e for e in entries if e.initial in ("approx", "calculated"))
+    return [e for e in calculated if e.causality == "output" or e.kind == "rate"]
 
 
-def _second(what: Described, entries: tuple[Entry, ...]) -> Xml.Element:
-    """FMI 2.0."""
-    root = _root(what, "2.0", guid=what.token)
-    cosimulation = _child(
-        root, "CoSimulation", modelIdentifier=what.identifier,
-        canHandleVariableCommunicationStepSize=True, canGetAndSetFMUstate=True,
-        canSerializeFMUstate=True, canNotUseMemoryManagementFunctions=True,
-    )  # fmt: skip
-    sources = _child(cosimulation, "SourceFiles")
-    for name in what.files:
-        _child(sources, "File", name=name)
-    _units(root, entries)
-    _log(root)
-    _experiment(root, what)
-    variables = _child(root, "ModelVariables")
-    for entry in entries:
-        variable = _child(
-            variables, "ScalarVariable", name=entry.name, valueReference=entry.reference,
-            description=entry.doc or None, causality=entry.causality,
-            variability=entry.variability, initial=entry.initial or None,
-        )  # fmt: skip
-        _child(variable, "Real", **_numbers(entry))
-    index = {entry.name: i for i, entry in enumerate(entries, start=1)}
-    structure = _child(root, "ModelStructure")
-    inputs = {entry.name for entry in entries if entry.causality == "input"}
-    outputs = _child(structure, "Outputs")
-    for entry in entries:
-        if entry.causality == "output":
-            _child(outputs, "Unknown", index=index[entry.name], **_needs(entry, inputs, index))
-    initial = _unknowns(entries)
-    if initial:
-        group = _child(structure, "InitialUnknowns")
-        for entry in initial:
-            _child(group, "Unknown", index=index[entry.name])
-    return root
+def _known(what: Described, entries: Iterable[Entry]) -> set[str]:
+    """Names of what outputs may depend on."""
+    kinds = ("state",) if what.exchange else ()
+    return {e.name for e in entries if e.causality == "input" or e.kind in kinds}
 
 
 def _needs(entry: Entry, known: set[str], number: Mapping[str, int]) -> dict[str, object]:
@@ -170,34 +152,77 @@ def _needs(entry: Entry, known: set[str], number: Mapping[str, int]) -> dict[str
     return {"dependencies": " ".join(map(str, needs))}
 
 
+def _second(what: Described, entries: tuple[Entry, ...]) -> Xml.Element:
+    """FMI 2.0, which has no variables for event indicators."""
+    indicators = sum(entry.kind == "indicator" for entry in entries)
+    entries = tuple(entry for entry in entries if entry.kind != "indicator")
+    own = {"numberOfEventIndicators": str(indicators)} if what.exchange else {}
+    root = _root(what, "2.0", guid=what.token, **own)
+    kind = _child(
+        root, what.tag, modelIdentifier=what.identifier,
+        canHandleVariableCommunicationStepSize=what.variable_steps, canGetAndSetFMUstate=True,
+        canSerializeFMUstate=True, canNotUseMemoryManagementFunctions=True,
+    )  # fmt: skip
+    sources = _child(kind, "SourceFiles")
+    for name in what.files:
+        _child(sources, "File", name=name)
+    _units(root, entries)
+    _log(root)
+    _experiment(root, what)
+    index = {entry.name: i for i, entry in enumerate(entries, start=1)}
+    variables = _child(root, "ModelVariables")
+    for entry in entries:
+        variable = _child(
+            variables, "ScalarVariable", name=entry.name, valueReference=entry.reference,
+            description=entry.doc or None, causality=entry.causality,
+            variability=entry.variability, initial=entry.initial or None,
+        )  # fmt: skip
+        _child(variable, "Real", **_numbers(entry), derivative=index.get(entry.of))
+    structure = _child(root, "ModelStructure")
+    known = _known(what, entries)
+    for tag, group in (
+        ("Outputs", [e for e in entries if e.causality == "output"]),
+        ("Derivatives", [e for e in entries if e.kind == "rate"]),
+        ("InitialUnknowns", _unknowns(entries)),
+    ):
+        listed = _child(structure, tag) if group else root
+        for entry in group:
+            needs = _needs(entry, known, index) if tag == "Outputs" else {}
+            _child(listed, "Unknown", index=index[entry.name], **needs)
+    return root
+
+
 def _third(what: Described, entries: tuple[Entry, ...]) -> Xml.Element:
     """FMI 3.0."""
     root = _root(what, "3.0", instantiationToken=what.token)
     _child(
-        root, "CoSimulation", modelIdentifier=what.identifier,
-        canHandleVariableCommunicationStepSize=True, canGetAndSetFMUState=True,
+        root, what.tag, modelIdentifier=what.identifier,
+        canHandleVariableCommunicationStepSize=what.variable_steps, canGetAndSetFMUState=True,
         canSerializeFMUState=True, fixedInternalStepSize=what.step,
-        canReturnEarlyAfterIntermediateUpdate=False, hasEventMode=False,
     )  # fmt: skip
     _units(root, entries)
     _log(root)
     _experiment(root, what)
+    reference = {entry.name: entry.reference for entry in entries}
     variables = _child(root, "ModelVariables")
     for entry in entries:
         _child(
             variables, "Float64", name=entry.name, valueReference=entry.reference,
             description=entry.doc or None, causality=entry.causality,
             variability=entry.variability, initial=entry.initial or None, **_numbers(entry),
+            derivative=reference.get(entry.of),
         )  # fmt: skip
-    reference = {entry.name: entry.reference for entry in entries}
     structure = _child(root, "ModelStructure")
-    inputs = {entry.name for entry in entries if entry.causality == "input"}
+    known = _known(what, entries)
     for entry in entries:
         if entry.causality == "output":
-            _child(
-                structure, "Output", valueReference=entry.reference,
-                **_needs(entry, inputs, reference),
-            )  # fmt: skip
-    for entry in _unknowns(entries):
-        _child(structure, "InitialUnknown", valueReference=entry.reference)
+            needs = _needs(entry, known, reference)
+            _child(structure, "Output", valueReference=entry.reference, **needs)
+    for tag, group in (
+        ("ContinuousStateDerivative", [e for e in entries if e.kind == "rate"]),
+        ("InitialUnknown", _unknowns(entries)),
+        ("EventIndicator", [e for e in entries if e.kind == "indicator"]),
+    ):
+        for entry in group:
+            _child(structure, tag, valueReference=entry.reference)
     return root

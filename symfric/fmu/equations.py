@@ -26,6 +26,7 @@ from symfric.integrator.equations.initial import (
 )
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.onsets import pace
+from symfric.integrator.equations.system import System
 from symfric.integrator.methods.suited import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator
@@ -55,6 +56,7 @@ class Equations:
         rtol: default of the relative tolerance.
         step: length [s] of fixed steps, None where the step is adaptive.
         method: of fixed steps.
+        exchange: whether the importer integrates, from rates of the states.
         span: first and last time [s] of the default experiment.
     """
 
@@ -65,10 +67,13 @@ class Equations:
     step: float | None
     method: str
     span: tuple[float, float]
+    exchange: bool = False
 
     @property
     def formula(self) -> str:
         """What the steps are, in words."""
+        if self.exchange:
+            return "rates of the states"
         if self.step is None:
             return f"{self.integrator.tableau.name}, adaptive steps"
         return f"{METHODS[self.method].name}, fixed steps of {self.step:g} s"
@@ -82,12 +87,18 @@ class Equations:
 
 
 def equations(
-    model: Model, rtol: float, step: float | None, method: str, span: tuple[float, float]
+    model: Model,
+    rtol: float,
+    step: float | None,
+    method: str,
+    span: tuple[float, float],
+    exchange: bool = False,
 ) -> Equations:
     """Build the integrator of a model whose inputs are held.
 
     Raises:
-        ValueError: unknown method; start values without consistent algebraic ones.
+        ValueError: unknown method; start values without consistent algebraic ones; rates for
+            model exchange that are no unknowns of their own.
     """
     u = model.vector("u")
     held = InputData(u, u, np.array(span), np.zeros((len(model.u), 1)), ("fmu",))
@@ -96,10 +107,24 @@ def equations(
     adaptive = "auto" if step is not None else method
     integrator = Integrator(model, held, chosen("export_fmu", adaptive, rtol))
     system = integrator.system
+    if exchange:
+        _check_rates(model, system)
     guess = first_guess(system, model, model.initial_state(), span[0])
     d = np.concatenate([model.values("p"), model.values("u")])
     integrator = integrator.suited([(guess, d)], span[1] - span[0])
-    return Equations(model, integrator, integrator.start(guess, d), rtol, step, method, span)
+    return Equations(
+        model, integrator, integrator.start(guess, d), rtol, step, method, span, exchange
+    )
+
+
+def _check_rates(model: Model, system: System) -> None:
+    """Refuse a model whose mass matrix mixes the rates of states."""
+    mass = ca.DM(system.mass).full()
+    if not np.array_equal(mass[: system.nx], np.eye(system.n)[: system.nx]):
+        raise ValueError(
+            f"export_fmu '{model.name}': expected one rate in each equation for model exchange, "
+            "got several in one; export it for co-simulation"
+        )
 
 
 def _places(integrator: Integrator) -> list[int]:
@@ -119,7 +144,9 @@ def header(own: Equations, token: str) -> str:
         "N": system.n, "NX": system.nx, "NZ": len(model.z), "NU": len(model.u),
         "NP": len(model.p), "ND": len(model.p) + len(model.u), "NS": len(model.signals),
         "ROWS": own.integrator.tableau.H.shape[0] if adaptive else 1,
-        "EVENT_MEMORY": own_memory(events), "JUMP": crossings.width if crossings and events else 0,
+        "EVENT_MEMORY": events if own.exchange else own_memory(events),
+        "JUMP": crossings.width if crossings and events else 0,
+        "RESET_VALUES": len(crossings.resets) if crossings and events else 0,
     }  # fmt: skip
     switches = {
         "TIMED": int(system.timed),
@@ -130,6 +157,7 @@ def header(own: Equations, token: str) -> str:
         "BASIS_AT": 0 if manifold is None else manifold.basis.start,
         "CROSSINGS": events,
         "STEP_IS_FIXED": int(not adaptive),
+        "EXCHANGE": int(own.exchange),
         "CLOSES": int(bool(loops) and any(event.reset for event in model.events)),
     }
     span = own.span[1] - own.span[0]
@@ -177,7 +205,9 @@ def source(own: Equations) -> str:
         "model_start": start_function(model.x, model.vector("u"), model.vector("p")),
         "model_rates": integrator.f,
     }
-    if own.step is None:
+    if own.exchange:
+        pass  # the importer's integrator makes the steps
+    elif own.step is None:
         functions["model_attempt"] = integrator.step
     else:
         formula = METHODS[own.method]
@@ -193,11 +223,13 @@ def source(own: Equations) -> str:
             functions["model_slope"] = ca.Function("slope", [y, d], [slope])
     text = [all_macros(), "\n", tables(own), "\n"]
     text += [routine(function, name) for name, function in functions.items()]
-    if follow is not None or (integrator.crossings is not None and own.step is None):
+    searches = integrator.crossings is not None and own.step is None and not own.exchange
+    if follow is not None or searches:
         text.append("typedef long long casadi_int;\n\n")
     if follow is not None:
         text += [_called("symfric_round", "model_round", 2, 2), FOLLOWED, follow.c_source, "\n"]
-    if integrator.crossings is not None and own.step is None:
+    if model.events and own.step is None:
+        text.append(_search(own) if searches else _resets(own))
         text.append(_events(own))
     return "".join(text)
 
@@ -215,9 +247,9 @@ def _called(name: str, of: str, arguments: int, results: int) -> str:
     )
 
 
-def _events(own: Equations) -> str:
-    """C of the search for events, and of what they are at the start."""
-    crossings, integrator = own.integrator.crossings, own.integrator
+def _search(own: Equations) -> str:
+    """C of the search for events behind a step."""
+    crossings = own.integrator.crossings
     if crossings is None:
         return ""
     parts: list[str] = []
@@ -225,13 +257,34 @@ def _events(own: Equations) -> str:
         name = f"model_{function.name().removeprefix('symfric_')}"
         parts.append(routine(function, name))
         parts.append(_called(function.name(), name, function.n_in(), function.n_out()))
-    parts.append(search_source(crossings, integrator.step.numel_in(1)))
-    parts.append(routine(integrator.events, "model_events"))
+    return "".join([*parts, search_source(crossings, own.integrator.step.numel_in(1))])
+
+
+def _resets(own: Equations) -> str:
+    """C of what events do, where the importer searches for them."""
+    crossings = own.integrator.crossings
+    if crossings is None:
+        return ""
+    tables = (
+        _table("model_directions", crossings.directions, "int"),
+        _table("model_terminal", map(int, crossings.terminal), "int"),
+        _table("model_by_event", (i for i, _ in crossings.resets), "int"),
+        _table("model_of_state", (j for _, j in crossings.resets), "int"),
+    )
+    return "".join([routine(own.integrator.resets, "model_resets"), *tables])
+
+
+def _events(own: Equations) -> str:
+    """C of the values of events, of what they are at the start, and of their names."""
     events = own.model.events
     signs = [-event.direction if event.at_start else 0 for event in events]
-    parts.append(_table("model_at_start", signs))
-    parts.append(_strings("model_event_names", [event.name for event in events]))
-    return "".join(parts)
+    return "".join(
+        [
+            routine(own.integrator.events, "model_events"),
+            _table("model_at_start", signs),
+            _strings("model_event_names", [event.name for event in events]),
+        ]
+    )
 
 
 def tables(own: Equations) -> str:

@@ -18,7 +18,7 @@ from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS
 from symfric.model import Model, check_model
 from symfric.scenes.base import Scene
 
-KINDS = ("co-simulation",)
+KINDS = ("co-simulation", "model-exchange")
 VERSIONS = (2, 3)
 INTERVALS = 200
 """Communication steps of the default experiment."""
@@ -61,7 +61,7 @@ class Exported:
         return (
             f"{self.path}: FMI {self.fmi}.0 {self.kind}, {self.size / 1024:.0f} kB, {held}\n"
             f"{self.count('input')} inputs, {self.count('output')} outputs, "
-            f"{self.count('parameter') - 1} parameters; {self.method}; C written in "
+            f"{self.count('parameter')} parameters; {self.method}; C written in "
             f"{self.times[0]:.1f} s, compiled in {self.times[1]:.1f} s"
         )
 
@@ -100,7 +100,10 @@ def export_fmu(
         model: a model, or a scene, whose parameters become tunable.
         path: the archive, such as "drive.fmu".
         fmi: 2 or 3.
-        kind: "co-simulation".
+        kind: "co-simulation", with an integrator inside, or "model-exchange", for that of the
+            importer: rates of the states, with algebraic variables solved for inside, and event
+            indicators. Of a mechanism with loops the rates are those at the nearest state that
+            closes them, and pull there within 20 ms; its coordinates stay states.
         rtol: relative tolerance; the importer may change it, by the parameter `rtol` or the
             tolerance of the experiment.
         step: length [s] of fixed steps instead, without error control, as of `plant_block`. A
@@ -128,18 +131,24 @@ def export_fmu(
     checks.choice(f"{where}: kind", kind, KINDS)
     rtol = checks.number(f"{where}: rtol", rtol, lower=LEAST_RTOL, upper=LARGEST_RTOL)
     identifier = _identifier(where, made.name if name is None else name)
+    exchange = kind == "model-exchange"
+    if exchange and (step is not None or method != "auto"):
+        raise ValueError(
+            f"{where}: expected no step and no method for model exchange, where the importer "
+            "integrates"
+        )
     method = _method(where, made, method, step)
     begin = perf_counter()
-    own = equations(made, rtol, step, method, span)
+    own = equations(made, rtol, step, method, span, exchange)
     model_c = source(own)
     shared = {f"fmi{fmi}.c": fixed_text(f"fmi{fmi}.c"), "model.c": model_c, "kind": kind}
     token = fingerprint(shared | {"sizes": header(own, ""), "unit": fixed_text("unit.c")})
-    texts = sources(header(own, token), model_c, fmi, step is not None)
+    texts = sources(header(own, token), model_c, fmi, step is not None, exchange)
     write_time, begin = perf_counter() - begin, perf_counter()
     binary = compiled(texts, identifier, fmi)
     compile_time = perf_counter() - begin
     loops = made.holonomic is not None and made.holonomic.phi.numel() > 0
-    listed = entries(made, own.start, 0.0 if step else own.rtol, given=not loops)
+    listed = entries(made, own.start, 0.0 if step else own.rtol, not loops, exchange)
     what = Described(
         made.name,
         identifier,
@@ -151,6 +160,7 @@ def export_fmu(
         step,
         (span[1] - span[0]) / INTERVALS,
         ("all.c",),
+        exchange,
     )
     build = build_description(what) if fmi == 3 else ""
     size = packed(target, described(what, listed, fmi), build, texts, binary)

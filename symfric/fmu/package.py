@@ -13,7 +13,10 @@ from symfric.foundation.compiler import CompileError, Compiler, find_compiler
 from symfric.foundation.files import written
 
 SOURCES = Path(__file__).with_name("sources")
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared")
+FLAGS = (
+    "-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared",
+    "-Werror=implicit-function-declaration",
+)  # fmt: skip
 """Without contraction to fused multiply-add the steps have the bits of `simulate`."""
 MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "i386": "x86", "i686": "x86"}
 SYSTEMS = {"Linux": "linux", "Darwin": "darwin", "Windows": "windows"}
@@ -44,25 +47,27 @@ def fixed_text(name: str) -> str:
     return (SOURCES / name).read_text(encoding="utf-8")
 
 
-def sources(sizes: str, model: str, fmi: int, fixed: bool) -> dict[str, str]:
-    """Name -> text of the C of a unit; `unit_all.c` includes the others.
+def sources(sizes: str, model: str, fmi: int, fixed: bool, exchange: bool) -> dict[str, str]:
+    """Name -> text of the C of a unit; `all.c` includes the others.
 
     Args:
         sizes, model: C of the model.
         fmi: version, 2 or 3.
         fixed: whether its steps are.
+        exchange: whether it is for model exchange, and makes no steps.
     """
-    steps = "fixed.c" if fixed else "adaptive.c"
-    shared = ["numbers.c", "consistent.c", steps, "unit.c"]
-    own = [f"fmi{fmi}.c", f"fmi{fmi}_cosimulation.c"]
-    own += ["fmi3_absent.c", "fmi3_no_exchange.c"] if fmi == 3 else []
+    steps = "exchange.c" if exchange else "fixed.c" if fixed else "adaptive.c"
+    shared = ["consistent.c", steps, "unit.c", "rates.c" if exchange else "communication.c"]
+    kinds = ("exchange", "cosimulation") if exchange else ("cosimulation", "exchange")
+    own = [f"fmi{fmi}.c", f"fmi{fmi}_{kinds[0]}.c"]
+    own += ["fmi3_absent.c", f"fmi3_no_{kinds[1]}.c"] if fmi == 3 else []
     texts = {"sizes.h": sizes, "model.c": model}
-    texts |= {name: fixed_text(name) for name in ("memory.h", *shared, f"fmi{fmi}.h", *own)}
-    included = [f"fmi{fmi}.h", "sizes.h", "memory.h", "numbers.c", "model.c", *shared[1:], *own]
-    heading = "/* The whole unit: the one file to compile. */\n\n"
+    fixed_files = ("memory.h", "numbers.c", *shared, f"fmi{fmi}.h", *own)
+    texts |= {name: fixed_text(name) for name in fixed_files}
+    included = [f"fmi{fmi}.h", "sizes.h", "memory.h", "numbers.c", "model.c", *shared, *own]
     system = ("float.h", "math.h", "stdbool.h", "stdio.h", "stdlib.h", "string.h")
     texts["all.c"] = (
-        heading
+        "/* The whole unit: the one file to compile. */\n\n"
         + "".join(f"#include <{name}>\n" for name in system)
         + "\n"
         + "".join(f'#include "{name}"\n' for name in included)

@@ -38,3 +38,13 @@ def exponents(text: str) -> dict[str, int] | None:
             for base, power in unit.items():
                 found[base] = found.get(base, 0) + sign * power * int(match[2] or 1)
     return {base: found[base] for base in BASE if found.get(base)}
+
+
+def per_second(text: str) -> str:
+    """The unit of a rate."""
+    numerator, slash, denominator = text.partition("/")
+    if not slash:
+        return f"{numerator}/s"
+    return (
+        f"{numerator}/s^2" if denominator == "s" else f"{numerator}/({denominator.strip('()')} s)"
+    )

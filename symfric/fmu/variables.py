@@ -4,7 +4,7 @@ Value references count time, all signals of the model in its order (x, z, u, out
 the relative tolerance, the attempts of the integrator.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import inf
 from typing import final
@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.fmu.units import per_second
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import strays
 from symfric.model import Model
@@ -29,7 +30,9 @@ class Entry:
         reference: value reference.
         causality, variability, initial: words of the standard; `initial` may be empty.
         start: None where the unit calculates it.
-        needs: names of what an output depends on directly: inputs, and in model exchange states.
+        needs: names of what an output or a rate depends on directly: inputs and states.
+        of: state whose rate it is.
+        kind: "rate" or "indicator" in model exchange, "state" of a state.
     """
 
     name: str
@@ -44,10 +47,16 @@ class Entry:
     upper: float = inf
     doc: str = ""
     needs: tuple[str, ...] = ()
+    of: str = ""
+    kind: str = ""
 
 
 def entries(
-    model: Model, start: Mapping[str, float], rtol: float, given: bool = True
+    model: Model,
+    start: Mapping[str, float],
+    rtol: float,
+    given: bool = True,
+    exchange: bool = False,
 ) -> tuple[Entry, ...]:
     """All variables of the unit of a `model`.
 
@@ -57,62 +66,80 @@ def entries(
         rtol: default of the relative tolerance; 0 of a unit in fixed steps, which has none.
         given: whether the start values of all states stay as they are set: not where the loops of
             a mechanism have to be closed.
+        exchange: whether rates and event indicators are listed, too.
     """
-    names = model.signals
-    needed = direct(model)
-    states = {v.name: v for v in model.x}
-    unknown = {v.name: v for v in model.z}
-    inputs = {v.name: v for v in model.u}
-    taken = {*names, *(v.name for v in model.p)}
-    found = [Entry(_free("time", taken), 0, "independent", "continuous", unit="s", doc="time")]
-    for name, unit in names.items():
-        number = len(found)
-        if name in inputs:
-            v = inputs[name]
-            entry = _bounded(v, number, "input", "continuous", "", float(v.start))
-        elif name in states:
-            v = states[name]
-            own = given and ca.SX(v.start).is_constant()
-            entry = _bounded(
-                v, number, "output", "continuous", "exact" if own else "approx", start[name]
-            )
-        elif name in unknown:
-            v = unknown[name]
-            entry = _bounded(v, number, "output", "continuous", "approx", start[name], needed[name])
-        else:
-            doc = model.outputs[name].doc
-            entry = Entry(
-                name, number, "output", "continuous", "calculated", unit=unit, doc=doc,
-                needs=needed[name],
-            )  # fmt: skip
-        found.append(entry)
-    for v in model.p:
-        found.append(_bounded(v, len(found), "parameter", "tunable", "exact", float(v.start)))
+    found = [*_signals(model, start, given, exchange)]
+    found += [
+        _bounded(v, k, "parameter", "tunable", "exact", float(v.start))
+        for k, v in enumerate(model.p, start=len(found))
+    ]
+    taken, number = {entry.name for entry in found}, len(found)
+    if exchange:
+        return (*found, *_rates(model, number + 2))
     tuned, idle = ("tunable", "") if rtol else ("fixed", "; without effect: steps are fixed")
-    found.append(
-        Entry(
-            _free("rtol", taken), len(found), "parameter", tuned, "exact", rtol or 1e-6, "1",
-            lower=LEAST_RTOL, upper=LARGEST_RTOL,
-            doc=f"relative tolerance of a step{idle}",
-        )
+    tolerance = Entry(
+        _free("rtol", taken), number, "parameter", tuned, "exact", rtol or 1e-6, "1",
+        lower=LEAST_RTOL, upper=LARGEST_RTOL, doc=f"relative tolerance of a step{idle}",
     )  # fmt: skip
-    found.append(
-        Entry(
-            _free("attempts", taken), len(found), "local", "discrete", "calculated", unit="1",
-            doc="steps of the integrator so far, rejected ones included",
-        )
+    attempts = Entry(
+        _free("attempts", taken), number + 1, "local", "discrete", "calculated", unit="1",
+        doc="steps of the integrator so far, rejected ones included",
     )  # fmt: skip
-    return tuple(found)
+    return (*found, tolerance, attempts)
+
+
+def _signals(
+    model: Model, start: Mapping[str, float], given: bool, exchange: bool
+) -> Iterator[Entry]:
+    """Time and all signals."""
+    names, needed = model.signals, direct(model)
+    groups = {v.name: v for v in (*model.x, *model.z, *model.u)}
+    states = {v.name for v in model.x}
+    taken = {*names, *(v.name for v in model.p)}
+    yield Entry(_free("time", taken), 0, "independent", "continuous", unit="s", doc="time")
+    for number, (name, unit) in enumerate(names.items(), start=1):
+        if name not in groups:
+            yield Entry(
+                name, number, "output", "continuous", "calculated", unit=unit,
+                doc=model.outputs[name].doc, needs=needed[name],
+            )  # fmt: skip
+        elif name in states:
+            own = given and ca.SX(groups[name].start).is_constant()
+            yield _bounded(
+                groups[name], number, "output", "continuous", "exact" if own else "approx",
+                start[name], (name,) if exchange else (), kind="state",
+            )  # fmt: skip
+        elif name in needed:
+            yield _bounded(
+                groups[name], number, "output", "continuous", "approx", start[name], needed[name]
+            )
+        else:
+            first = float(groups[name].start)
+            yield _bounded(groups[name], number, "input", "continuous", "", first)
+
+
+def _rates(model: Model, first: int) -> Iterator[Entry]:
+    """Rates of the states and event indicators of model exchange."""
+    for number, v in enumerate(model.x, start=first):
+        yield Entry(
+            f"der({v.name})", number, "local", "continuous", "calculated",
+            unit=per_second(v.unit), doc=f"rate of {v.doc or v.name}", of=v.name, kind="rate",
+        )  # fmt: skip
+    for number, event in enumerate(model.events, start=first + len(model.x)):
+        yield Entry(
+            f"event({event.name})", number, "local", "continuous", "calculated",
+            doc=f"passes through zero at the event {event.name}", kind="indicator",
+        )  # fmt: skip
 
 
 def _bounded(
     v: Variable, number: int, causality: str, variability: str, initial: str, start: float,
-    needs: tuple[str, ...] = (),
+    needs: tuple[str, ...] = (), kind: str = "",
 ) -> Entry:  # fmt: skip
     nominal = v.nominal if v.nominal != 1.0 else None
     return Entry(
         v.name, number, causality, variability, initial, start, v.unit, nominal, v.lower, v.upper,
-        v.doc, needs,
+        v.doc, needs, kind=kind,
     )  # fmt: skip
 
 

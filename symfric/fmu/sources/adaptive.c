@@ -2,6 +2,23 @@
    jumps: the values there are those of its polynomial, and no step is cut. Where something does
    jump, what lies beyond is forgotten and the last step is made again, up to there. */
 
+#if CROSSINGS
+/* Events that have happened by the start have values as if just before it. */
+static void before_start(Memory *m)
+{
+    double now[CROSSINGS];
+    int i, any = 0;
+    memset(m->events, 0, sizeof m->events);
+    m->events[TOLERANCE] = EVENT_TOLERANCE;
+    model_events(&m->begin, m->S + MEMORY, m->R + DATA, now);
+    for (i = 0; i < CROSSINGS; ++i) any = any || model_at_start[i] != 0.0;
+    for (i = 0; i < CROSSINGS && any; ++i) {
+        m->events[BEFORE + i] = model_at_start[i] != 0.0 ? model_at_start[i] : now[i];
+    }
+    if (any) m->events[PHASE] = JUMPED;
+}
+#endif
+
 /* The accepted step from m->S to `next` is noted, and searched for events. */
 static void noted(Memory *m, double *next, const double *dense)
 {

@@ -1,4 +1,4 @@
-/* FMI 2.0 for co-simulation. */
+/* FMI 2.0: what co-simulation and model exchange have in common. */
 
 #define UNUSED(x) (void)(x)
 
@@ -67,8 +67,8 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     unit->callbacks = functions;
     UNUSED(on);
     fresh(&unit->m);
-    if (type != fmi2CoSimulation || !guid || strcmp(guid, MODEL_TOKEN) != 0) {
-        snprintf(unit->said, SAID, "instantiate %s: expected co-simulation and the guid %s, got "
+    if (type != (EXCHANGE ? fmi2ModelExchange : fmi2CoSimulation) || !guid || strcmp(guid, MODEL_TOKEN) != 0) {
+        snprintf(unit->said, SAID, "instantiate %s: expected its own kind and the guid %s, got "
                  "another; modelDescription.xml and binary do not belong together", MODEL_NAME,
                  MODEL_TOKEN);
         (void)failed(unit);

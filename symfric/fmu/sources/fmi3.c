@@ -97,6 +97,15 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has_tolerance
     return fmi3OK;
 }
 
+fmi3Status fmi3ExitInitializationMode(fmi3Instance c)
+{
+    Instance *unit = unit_of(c);
+    if (!allowed(unit, "fmi3ExitInitializationMode", INITIALISING, INITIALISING)) return fmi3Error;
+    if (!settled(unit)) return failed(unit);
+    unit->m.phase = RUNNING;
+    return fmi3OK;
+}
+
 fmi3Status fmi3Terminate(fmi3Instance c)
 {
     if (!allowed(unit_of(c), "fmi3Terminate", RUNNING, BROKEN)) return fmi3Error;

@@ -209,3 +209,19 @@ fmi3Status fmi3ActivateModelPartition(fmi3Instance c, fmi3ValueReference clock, 
     UNUSED(time);
     return fmi3Error;
 }
+
+fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[],
+    size_t n_unknowns, const fmi3ValueReference knowns[], size_t n_knowns, const fmi3Float64
+    seeds[], size_t n_seeds, fmi3Float64 values[], size_t n_values)
+{
+    UNUSED(c);
+    UNUSED(unknowns);
+    UNUSED(n_unknowns);
+    UNUSED(knowns);
+    UNUSED(n_knowns);
+    UNUSED(seeds);
+    UNUSED(n_seeds);
+    UNUSED(values);
+    UNUSED(n_values);
+    return fmi3Error;
+}

@@ -16,30 +16,6 @@ fmi3Instance fmi3InstantiateCoSimulation(
     return made(name, token, on, environment, log);
 }
 
-fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources,
-                                          fmi3Boolean visible, fmi3Boolean on,
-                                          fmi3InstanceEnvironment environment,
-                                          fmi3LogMessageCallback log)
-{
-    UNUSED(name);
-    UNUSED(token);
-    UNUSED(resources);
-    UNUSED(visible);
-    UNUSED(on);
-    UNUSED(environment);
-    UNUSED(log);
-    return NULL;
-}
-
-fmi3Status fmi3ExitInitializationMode(fmi3Instance c)
-{
-    Instance *unit = unit_of(c);
-    if (!allowed(unit, "fmi3ExitInitializationMode", INITIALISING, INITIALISING)) return fmi3Error;
-    if (!settled(unit)) return failed(unit);
-    unit->m.phase = RUNNING;
-    return fmi3OK;
-}
-
 /* Discard where nothing was done, for a communication step that cannot be one; an error where steps
    fail; early and to be terminated where an event of the model ended it. */
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Boolean no_return,

@@ -1,24 +1,23 @@
 /* FMI 3.0: calls of model exchange and event mode, which co-simulation does not have. */
 
+fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources,
+                                          fmi3Boolean visible, fmi3Boolean on,
+                                          fmi3InstanceEnvironment environment,
+                                          fmi3LogMessageCallback log)
+{
+    UNUSED(name);
+    UNUSED(token);
+    UNUSED(resources);
+    UNUSED(visible);
+    UNUSED(on);
+    UNUSED(environment);
+    UNUSED(log);
+    return NULL;
+}
+
 fmi3Status fmi3EnterEventMode(fmi3Instance c)
 {
     UNUSED(c);
-    return fmi3Error;
-}
-
-fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[],
-    size_t n_unknowns, const fmi3ValueReference knowns[], size_t n_knowns, const fmi3Float64
-    seeds[], size_t n_seeds, fmi3Float64 values[], size_t n_values)
-{
-    UNUSED(c);
-    UNUSED(unknowns);
-    UNUSED(n_unknowns);
-    UNUSED(knowns);
-    UNUSED(n_knowns);
-    UNUSED(seeds);
-    UNUSED(n_seeds);
-    UNUSED(values);
-    UNUSED(n_values);
     return fmi3Error;
 }
 

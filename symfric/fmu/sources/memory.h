@@ -23,7 +23,8 @@ typedef struct {
     unsigned long long kind;          /* of which model */
     Phase phase;
     int settled;                      /* whether the start values are consistent with what was set */
-    int seen;                         /* whether `out` is up to date */
+    int seen;                         /* whether `out` is up to date, */
+    int rated;                        /* and whether `rates` is */
     int quiet;                        /* communication points in a row at which nothing jumped */
     int stopped;                      /* what the events behind the last step ask for */
     int limited;                      /* whether nothing may be computed behind `stop` */
@@ -38,6 +39,7 @@ typedef struct {
     double chosen[NX + 1];            /* and which were */
     double guess[NZ + 1];             /* where the search for algebraic variables begins */
     double out[NS + 1];               /* all signals at t */
+    double rates[NX + CROSSINGS + 1]; /* model exchange: rates of states, event indicators */
     double events[EVENT_MEMORY + 1];  /* of the search for events, now */
     double events_base[EVENT_MEMORY + 1]; /* and before the last accepted step */
     double jump[JUMP + 1];            /* the last event */

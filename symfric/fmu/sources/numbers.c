@@ -12,7 +12,7 @@ static double largest(const double *a, int n)
 }
 #endif
 
-#if EQUATIONS || STEP_IS_FIXED
+#if EQUATIONS || STEP_IS_FIXED || EXCHANGE
 static int finite_all(const double *a, int n)
 {
     int i;

@@ -1,7 +1,9 @@
-/* The unit behind both versions of the interface: variables, initialisation, communication steps.
-   Value references: 0 time, then all signals, parameters, rtol, attempts. */
+/* The unit behind both versions of the interface: its variables and its initialisation.
+   Value references: 0 time, then all signals, parameters, rtol, attempts; in model exchange rates
+   of the states and event indicators behind these. */
 
-enum { OF_SIGNALS = 1, OF_P = OF_SIGNALS + NS, OF_RTOL = OF_P + NP, OF_ATTEMPTS, REFERENCES };
+enum { OF_SIGNALS = 1, OF_P = OF_SIGNALS + NS, OF_RTOL = OF_P + NP, OF_ATTEMPTS, OF_RATES };
+enum { OF_INDICATORS = OF_RATES + EXCHANGE * NX, REFERENCES = OF_INDICATORS + EXCHANGE * CROSSINGS };
 
 static void say(Instance *unit, const char *text) { snprintf(unit->said, SAID, "%s", text); }
 
@@ -37,22 +39,6 @@ static double first_step(const Memory *m)
     return FIRST_STEP > least ? FIRST_STEP : least;
 }
 
-#if CROSSINGS
-/* Events that have happened by the start have values as if just before it. */
-static void before_start(Memory *m)
-{
-    double now[CROSSINGS];
-    int i, any = 0;
-    m->events[TOLERANCE] = EVENT_TOLERANCE;
-    model_events(&m->begin, m->S + MEMORY, m->R + DATA, now);
-    for (i = 0; i < CROSSINGS; ++i) any = any || model_at_start[i] != 0.0;
-    for (i = 0; i < CROSSINGS && any; ++i) {
-        m->events[BEFORE + i] = model_at_start[i] != 0.0 ? model_at_start[i] : now[i];
-    }
-    if (any) m->events[PHASE] = JUMPED;
-}
-#endif
-
 /* Start values: those set, else those of the model, which may follow them and the parameters. */
 static const char *start(Memory *m)
 {
@@ -85,9 +71,8 @@ static const char *start(Memory *m)
     m->t = m->begin;
     m->quiet = 1;
     m->stopped = 0;
-    m->seen = 0;
+    m->seen = m->rated = 0;
 #if CROSSINGS
-    memset(m->events, 0, sizeof m->events);
     before_start(m);
 #endif
     m->settled = !*missing;
@@ -133,10 +118,14 @@ static void look(Memory *m)
     double y[N];
     if (m->seen) return;
     unknowns(m, y);
-    if (driven_otherwise(m)) (void)consistent(y, m->set, 0);
+    if (EXCHANGE || driven_otherwise(m)) (void)consistent(y, m->set, 0);
     model_signals(&m->t, y, m->set, m->out);
     m->seen = 1;
 }
+
+#if EXCHANGE
+static int rated(Instance *unit);
+#endif
 
 /* The value of a variable; 0 where there is no such one, or no consistent start. */
 static int get(Instance *unit, unsigned int reference, double *value)
@@ -151,6 +140,11 @@ static int get(Instance *unit, unsigned int reference, double *value)
         if (!settled(unit)) return 0;
         look(m);
         *value = m->out[reference - OF_SIGNALS];
+#if EXCHANGE
+    } else if (reference >= OF_RATES) {
+        if (!settled(unit) || !rated(unit)) return 0;
+        *value = m->rates[reference - OF_RATES];
+#endif
     } else if (reference == 0) {
         *value = m->t;
     } else if (reference == OF_RTOL) {
@@ -202,20 +196,9 @@ static Outcome set(Instance *unit, unsigned int reference, double value)
                  "initialisation a start value, got the value reference %u", reference);
         return FAILED;
     }
-    m->seen = 0;
+    m->seen = m->rated = 0;
     if (early) m->settled = 0;
     return DONE;
-}
-
-/* Inputs or parameters that were set come into force at the communication point. */
-static const char *jumped(Memory *m)
-{
-    const int moved = memcmp(m->set, m->R + DATA, NP * sizeof(double)) != 0;
-    memcpy(m->R + DATA, m->set, ND * sizeof(double));
-#if CROSSINGS
-    if (m->events[PHASE] == ON) m->events[PHASE] = JUMPED;
-#endif
-    return consistent(m->S + MEMORY, m->R + DATA, moved);
 }
 
 /* The first event of those that happened last, by name. */
@@ -272,52 +255,6 @@ static void explain(Instance *unit, int why)
                  "equation %s; a discontinuity is near, give the law a smooth form or the model an "
                  "event there", MODEL_NAME, t, h, model_unknown_names[fastest]);
     }
-}
-
-/* Inputs held over a communication step from `from` to `from` + `size` [s]. */
-static Outcome advance(Instance *unit, double from, double size)
-{
-    Memory *m = &unit->m;
-    const double end = from + size;
-    const char *missing = "";
-    int why;
-    if (m->phase == ENDED) return OVER;
-    if (!(isfinite(size) && fabs(from - m->t) <= 1e-6 * size + 1e-12 * fabs(from) && end > m->t)) {
-        snprintf(unit->said, SAID, "%s: expected a communication step of more than 0 s from t = %.12g s "
-                 "on, got %g s from %.12g s", MODEL_NAME, m->t, size, from);
-        return REFUSED;
-    }
-    if (m->limited && end > m->stop + 1e-9 * fabs(m->stop) + 1e-6 * size) {
-        snprintf(unit->said, SAID, "%s: expected no communication step beyond the stop time %.12g s, "
-                 "got one to %.12g s", MODEL_NAME, m->stop, end);
-        return REFUSED;
-    }
-    m->seen = 0;
-    if (driven_otherwise(m)) {
-        why = returned(m);
-        if (!why) missing = jumped(m);
-        if (*missing) {
-            snprintf(unit->said, SAID, "%s: at t = %.9g s %s", MODEL_NAME, m->t, missing);
-            return FAILED;
-        }
-    } else {
-        why = 0;
-        m->quiet = 1;
-    }
-    if (!why) why = steps_to(m, end);
-    if (!why) {
-        m->t = end;
-        return DONE;
-    }
-    m->t = m->S[AT_T];
-    if (why == TERMINAL) {
-        m->phase = ENDED;
-        snprintf(unit->said, SAID, "%s: the terminal event %s ended the simulation at t = %.9g s",
-                 MODEL_NAME, last_event(m), m->t);
-        return OVER;
-    }
-    explain(unit, why);
-    return FAILED;
 }
 
 static unsigned long long state_kind(const void *state)

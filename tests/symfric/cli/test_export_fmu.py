@@ -50,7 +50,7 @@ def test_a_file_of_python_becomes_a_unit(tmp_path, monkeypatch, capsys):
         ("drive --law lugre --fmi 4", "expected 2 or 3"),
         ("drive --law lugre --out x.zip", "ends in .fmu"),
         ("drive --law lugre --rtol 1", "rtol"),
-        ("drive --law lugre --kind other", "co-simulation"),
+        ("drive --law lugre --kind other", "co-simulation, model-exchange"),
         ("drive --law lugre --step -1", "step"),
         ("drive --law lugre --method exponential", "method"),
         ("drive --law exact_coulomb --step 0.001", "without events"),

@@ -2,42 +2,21 @@
 
 import ctypes as c
 
-import casadi as ca
 import numpy as np
 import pytest
 from units import DISCARD, ERROR, OK, Archive, Second, over
+from wires import wire
 
 from symfric import Hold, LuGre, simulate
 from symfric.fmu import export_fmu
 from symfric.foundation.compiler import find_compiler
-from symfric.foundation.parameters import Variable
-from symfric.model import Event, Model, Output
+from symfric.model import Model
 from symfric.scenes import Drive
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="units are run as machine code")
 RTOL, SPAN = 1e-9, 2.0
 TIMES = np.arange(17) / 8
 """Whose sums and differences are exact."""
-
-
-def wire():
-    """A falling bead on a bent wire: x'' by an algebraic equation, an input, a floor, an end."""
-    x, v, z = Variable("x", "m", 1.0), Variable("v", "m/s"), Variable("z", "N", 0.5)
-    f = Variable("f", "N", nominal=2.0, doc="push")
-    k = Variable("k", "N/m", 3.0, lower=0.0, upper=50.0)
-    ends = Event("end", x.symbol - 4.0, direction=1, terminal=True)
-    bounce = Event("floor", x.symbol, direction=-1, reset={"v": -0.5 * v.symbol})
-    return Model(
-        name="wire",
-        x=(x, v),
-        z=(z,),
-        u=(f,),
-        p=(k,),
-        ode=ca.vertcat(v.symbol, f.symbol - z.symbol - ca.sqrt(6.0 - x.symbol) + 2.0),
-        alg=ca.atan(z.symbol) + 0.1 * z.symbol - k.symbol * x.symbol / (4.0 + f.symbol**2),
-        outputs={"power": Output(v.symbol * f.symbol, "W")},
-        events=(bounce, ends),
-    )
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from symfric import BrownMcPhee, Hold, LuGre, simulate
+from symfric import BrownMcPhee, Hold, LuGre, law_from_text, simulate
 from symfric.fmu import export_fmu
+from symfric.fmu.export import KINDS
 from symfric.fmu.package import compile_unit
 from symfric.foundation.compiler import find_compiler
 from symfric.scenes import ALL_SCENES
@@ -49,9 +50,25 @@ def test_units_validate_and_follow_simulate(scene, fmi, tmp_path):
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_declarations_agree_with_those_of_the_standard(fmi, tmp_path):
+@pytest.mark.parametrize("law", ["brown_mcphee", "exact_coulomb"])
+def test_rates_are_integrated_by_others(law, fmi, tmp_path):
+    machine = ALL_SCENES["pendulum"](law_from_text(law))
+    unit = export_fmu(machine, tmp_path / "unit.fmu", fmi=fmi, kind="model-exchange")
+    assert validation.validate_fmu(str(unit.path)) == []
+    model = machine.model([e.name for e in unit.variables if e.causality == "parameter"])
+    found = fmpy.simulate_fmu(
+        str(unit.path), stop_time=2.0, output_interval=0.5, relative_tolerance=1e-8,
+        output=["phi"], solver="CVode",
+    )  # fmt: skip
+    same = simulate(model, 2.0, rtol=RTOL)
+    assert abs(found["phi"][-1] - same.final["phi"]) < 1e-6
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_declarations_agree_with_those_of_the_standard(fmi, kind, tmp_path):
     """The official header in the place of ours: another type anywhere would not compile."""
-    unit = export_fmu(ALL_SCENES["drive"](LuGre()), tmp_path / "unit.fmu", fmi=fmi)
+    unit = export_fmu(ALL_SCENES["drive"](LuGre()), tmp_path / "unit.fmu", fmi=fmi, kind=kind)
     folder = Path(fmpy.extract(str(unit.path), str(tmp_path / "open"))) / "sources"
     theirs = Path(fmpy.__file__).parent / "c-code" / f"fmi{fmi}Functions.h"
     (folder / f"fmi{fmi}.h").write_text(

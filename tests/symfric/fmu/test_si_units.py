@@ -2,7 +2,7 @@
 
 import pytest
 
-from symfric.fmu.units import exponents
+from symfric.fmu.units import exponents, per_second
 
 
 @pytest.mark.parametrize(
@@ -23,3 +23,12 @@ from symfric.fmu.units import exponents
 )
 def test_products_of_units_have_exponents(text, expected):
     assert exponents(text) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("m", "m/s"), ("m/s", "m/s^2"), ("1", "1/s"), ("rad/(s K)", "rad/(s K s)")],
+)
+def test_units_of_rates_are_units(text, expected):
+    assert per_second(text) == expected
+    assert exponents(per_second(text)) is not None

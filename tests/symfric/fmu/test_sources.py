@@ -10,6 +10,7 @@ import pytest
 from symfric import ExactCoulomb, LuGre
 from symfric.codegen.running.compiler import WARNINGS
 from symfric.fmu import export_fmu
+from symfric.fmu.export import KINDS
 from symfric.fmu.variables import direct
 from symfric.foundation.compiler import CompileError, Compiler, find_compiler
 from symfric.foundation.parameters import Variable
@@ -21,6 +22,7 @@ compilers = [pytest.param(Compiler((path,)), id=name) for name in ("gcc", "clang
 
 
 @pytest.mark.parametrize("compiler", compilers)
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize(
     "what",
@@ -28,9 +30,9 @@ compilers = [pytest.param(Compiler((path,)), id=name) for name in ("gcc", "clang
      pytest.param(SliderCrank(ExactCoulomb()), marks=pytest.mark.heavy)],
     ids=["ode", "events", "loops"],
 )  # fmt: skip
-def test_no_warnings(what, fmi, compiler, tmp_path, monkeypatch):
+def test_no_warnings(what, fmi, kind, compiler, tmp_path, monkeypatch):
     monkeypatch.setattr("symfric.fmu.package.find_compiler", lambda: None)
-    unit = export_fmu(what, tmp_path / "unit.fmu", fmi=fmi)
+    unit = export_fmu(what, tmp_path / "unit.fmu", fmi=fmi, kind=kind)
     assert unit.binary == ""
     assert "no C compiler" in str(unit)
     ZipFile(unit.path).extractall(tmp_path)
