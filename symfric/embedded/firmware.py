@@ -92,6 +92,7 @@ $include
 #define STEPS $steps
 #define PAINT 0xDEADBEEFu
 #define DEPTH 16384 /* words of the stack that are watched */
+#define IDLE 400
 #define SYST_CSR (*(volatile uint32_t *)0xE000E010u)
 #define SYST_RVR (*(volatile uint32_t *)0xE000E014u)
 #define SYST_CVR (*(volatile uint32_t *)0xE000E018u)
@@ -111,6 +112,15 @@ static __attribute__((noinline)) void start(void) { $start }
 static __attribute__((noinline)) void one(int k) { $step }
 static __attribute__((noinline)) void nothing(int k) { (void)k; __asm__ volatile(""); }
 static void keep(int k) { $keep }
+
+/* An instruction takes 3.2 ticks: a step that begins anywhere in one is known in the mean. */
+static __attribute__((noinline)) void wait(void)
+{
+    static uint32_t dice = 1u;
+    uint32_t count;
+    dice = dice * 1664525u + 1013904223u;
+    for (count = dice >> 26; count > 0u; count--) { __asm__ volatile("nop"); }
+}
 
 static __attribute__((noinline)) uint32_t ticks(void (*what)(int), int k)
 {
@@ -134,9 +144,9 @@ static __attribute__((noinline)) uint32_t stack(void)
 int main(void)
 {
     const uint32_t *rows = (const uint32_t *)Y;
-    uint32_t i, call;
+    static uint32_t cost[STEPS], idle[IDLE];
+    uint32_t i;
     int k;
-    static uint32_t cost[STEPS];
     start();
     say("stack\\n"); word(stack());
     say("text\\n"); word((uint32_t)(&_block_end - &_block));
@@ -144,8 +154,10 @@ int main(void)
     say("data\\n"); word((uint32_t)($data));
     start();
     SYST_RVR = 0xFFFFFFu; SYST_CVR = 0u; SYST_CSR = 5u;
-    call = ticks(nothing, 0);
-    for (k = 0; k < STEPS; k++) { cost[k] = ticks(one, k) - call; keep(k); }
+    for (k = 0; k < IDLE; k++) { wait(); idle[k] = ticks(nothing, k); }
+    for (k = 0; k < STEPS; k++) { wait(); cost[k] = ticks(one, k); keep(k); }
+    say("idle\\n");
+    for (k = 0; k < IDLE; k++) { word(idle[k]); }
     say("ticks\\n");
     for (k = 0; k < STEPS; k++) { word(cost[k]); }
     say("rows\\n");

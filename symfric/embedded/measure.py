@@ -150,7 +150,7 @@ def _measured(
         core.name,
         by,
         average=float(heard.instructions.mean()),
-        maximum=float(heard.instructions.max()),
+        maximum=float(round(heard.instructions.max())),
         text=heard.text,
         library=heard.library,
         data=heard.data,

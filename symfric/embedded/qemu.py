@@ -38,7 +38,7 @@ class Said:
     """What a program said.
 
     Attributes:
-        instructions: of every step, shape (steps,).
+        instructions: of every step, shape (steps,); each to a third of one, their mean exactly.
         rows: states after every step, and its outputs.
         text, library, data, stack: bytes.
     """
@@ -124,8 +124,9 @@ def built(subject: Subject, real: str, inputs: Array, columns: int, target: Targ
 def said(words: Mapping[str, NDArray[np.uint32]], real: str, columns: int) -> Said:
     """What a measured program said."""
     kind = np.float32 if real == "float" else np.float64
+    ticks = words["ticks"] - words["idle"].mean()
     return Said(
-        instructions=words["ticks"].astype(float) * (1e9 / CLOCK / 2**SHIFT),
+        instructions=ticks * (1e9 / CLOCK / 2**SHIFT),
         rows=words["rows"].view(kind).reshape(-1, columns).astype(float),
         text=int(words["text"][0]),
         library=int(words["library"][0]),

@@ -24,9 +24,10 @@ def sum_of_squares(count: int) -> Block:
 @on_target
 def test_instructions_are_counted_one_by_one():
     """Ten more terms are ten loads, multiplications and additions, or at most a little more."""
-    ten, twenty = (measure(sum_of_squares(n), steps=10, guards=False) for n in (10, 20))
+    ten, twenty = (measure(sum_of_squares(n), steps=100, guards=False) for n in (10, 20))
     assert 30.0 <= twenty.average - ten.average <= 60.0
-    assert twenty.maximum - twenty.average < 1.0  # no branches: every step costs the same
+    for found in (ten, twenty):  # no branches: every step costs the same, a whole number
+        assert found.average == pytest.approx(found.maximum, abs=0.05)
 
 
 @on_target
