@@ -151,9 +151,23 @@ def each_term_makes_the_arm_truer(printed: str, folder: Path) -> None:
     assert rms[3] < 0.1 * rms[2]
 
 
+def compensated_drives_err_less_and_rest(printed: str, folder: Path) -> None:
+    """Five times less error on friction that the compensator does not know, and no hunting."""
+    assert "C: verified" in printed
+    found = re.findall(
+        r"RMS error ([\d.]+) times smaller, hunting ([\d.]+) um .*, (.+) um", printed
+    )
+    assert len(found) == 3
+    for smaller, before, after in found:
+        assert float(smaller) > 5.0
+        assert float(before) > 1000.0
+        assert float(after) < 1.0
+
+
 LONG = (
     "arm_to_a_place",
     "co_design",
+    "compensate_drive",
     "crank_start_up",
     "identify_arm",
     "identify_emps",
@@ -181,6 +195,7 @@ SAYS = dict.fromkeys(LONG, motion_is_verified) | {
     "identify_raw_files": friction_is_found_in_every_file,
     "identify_quarter_car": friction_of_the_guide_is_found,
     "out_and_back": out_and_back_is_the_motion_known_on_paper,
+    "compensate_drive": compensated_drives_err_less_and_rest,
     "mpc_drive": drives_get_there_and_the_c_is_verified,
     "learn_drive": drive_has_learnt_to_stop,
     "robot_feed_forward": each_term_makes_the_arm_truer,

@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 
 from symfric.codegen import Block, law_block
+from symfric.codegen.blocks.elements import arranged
 from symfric.codegen.blocks.from_law import in_turning, step_variable
 from symfric.compensation import stages
 from symfric.compensation.parts import Parts
@@ -109,6 +110,7 @@ def compensator(
         limits=(OVER, *inner.limits),
         sources=inner.sources,
     )
+    block = arranged(block)
     return in_turning(block) if turning else block
 
 

@@ -87,7 +87,7 @@ class Members:
         kind = REALS[real]
         name = prefix(self.block, kind)
         with TemporaryDirectory(prefix="symfric-") as folder:
-            generate(self.block, folder, real=real)
+            generate(self.block, folder, real=real, kit=False)
             glue, library = Path(folder) / "members.c", Path(folder) / "members.so"
             write_text(glue, GLUE.format(name=name, real=kind.name, call=self._call(name)))
             sources = [str(Path(folder) / f"{name}.c"), str(glue)]

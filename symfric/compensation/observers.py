@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 
 from symfric.codegen import Block, law_block
+from symfric.codegen.blocks.elements import arranged
 from symfric.codegen.blocks.from_law import in_turning, step_variable
 from symfric.codegen.blocks.held_step import held_step
 from symfric.compensation import stages
@@ -18,6 +19,8 @@ from symfric.laws.base import smooth
 from symfric.laws.base.law import check_law
 from symfric.model import Output
 
+LEAST = 1e-9
+"""Load [N] that observers see where there is none: the laws divide by it."""
 USE = (
     "Call it once a sample and add F to the force that the controller commands.",
     "e is the position error, reference less measured, in the direction of v.",
@@ -203,7 +206,7 @@ def _observer(
     load = checks.number(f"{where}: N", setup.N, unit="N", lower=0.0)
     parts, constant = parts.parameter("N", load, "N", "normal force")
     z = ca.vertcat(*(state.symbol for state in inner.states))
-    at = At(v.symbol, constant, z, k * e, duration)
+    at = At(v.symbol, ca.fmax(constant, LEAST), z, k * e, duration)
     end, force = corrected(with_values(law, own), at)
     parts = replace(parts, next=tuple(ca.vertsplit(end)))
     parts, force = _finished(parts, force, setup.ramp, setup.limit, duration, where)
@@ -222,6 +225,7 @@ def _observer(
         outputs={"F": Output(force, "N", ESTIMATE)},
         constants=inner.constants,
     )
+    block = arranged(block)
     return in_turning(block) if turning else block
 
 

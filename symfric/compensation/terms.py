@@ -34,6 +34,7 @@ class Terms:
     Attributes:
         law: with the symbols of the block as parameters.
         v, N: symbols of its inputs.
+        force: all of it [N].
         dry: force [N] without viscous coefficients.
         viscous: the rest; None where there is none, or it cannot be told apart.
         levels: dry levels among the parameters; empty where they cannot be told apart.
@@ -43,6 +44,7 @@ class Terms:
     law: Law
     v: ca.SX
     N: ca.SX
+    force: ca.SX
     dry: ca.SX
     viscous: ca.SX | None
     levels: Variables
@@ -70,6 +72,8 @@ class Terms:
 
             F_dry g'(v)/g(v),   g' = N [s_c mu_d + s_s (mu_s - mu_d) fall(v)]
         """
+        if not scales:
+            return self.force
         dry = self.dry
         if "bristle" in scales:
             steady = self._steady()
@@ -79,7 +83,7 @@ class Terms:
         if "force" in scales:
             dry = scales["force"] * dry
         elif "coulomb" in scales or "stribeck" in scales:
-            level = level_of(self.law, self.v, self.N) if self.law.states else None
+            level = level_of(self.law, self.v) if self.law.states else None
             if level is not None and self.peaks:
                 dry = dry * self._with_levels(level, coulomb, stribeck) / level
             elif self.law.states:
@@ -100,7 +104,9 @@ class Terms:
         one = ca.SX(self.law.sliding(speed, self.N, 1))
         other = -ca.SX(self.law.sliding(-speed, self.N, -1))
         dry = built * (one if _same(one, other) else ca.if_else(built < 0, other, one))
-        return replace(self, dry=_without_viscous(self.law, dry))
+        dry = _without_viscous(self.law, dry)
+        force = dry if self.viscous is None else dry + self.viscous
+        return replace(self, dry=dry, force=force)
 
     def _with_levels(
         self, expression: ca.SX, coulomb: ca.SX | float, stribeck: ca.SX | float
@@ -119,12 +125,15 @@ class Terms:
         return _without_viscous(self.law, ca.SX(self.law.force(self.v, self.N, z)))
 
 
-def level_of(law: Law, v: ca.SX, N: ca.SX) -> ca.SX | None:
-    """The Stribeck curve g(v, N) > 0 [N] that a law with states tends to; None without one."""
+def level_of(law: Law, v: ca.SX) -> ca.SX | None:
+    """The Stribeck curve g(v) > 0 under 1 N that a law with states tends to, if it has one.
+
+    Only ratios of it count, which do not depend on the load.
+    """
     if isinstance(law, Wrapper):
-        return level_of(law.inner_at(v), v, law.load(N))
+        return level_of(law.inner_at(v), v)
     level = getattr(law, "level", None)
-    return None if level is None else ca.SX(level(v, N))
+    return None if level is None else ca.SX(level(v, 1.0))
 
 
 def terms(law: Law, block: Block) -> Terms:
@@ -144,11 +153,11 @@ def terms(law: Law, block: Block) -> Terms:
     peaks = _peaks({v.name for v in levels})
     symbolic = with_values(law, {name: variable.symbol for name, variable in own.items()})
     if law.states:
-        if peaks and level_of(symbolic, v, N) is None:
+        if peaks and level_of(symbolic, v) is None:
             peaks = {}
     elif not _made_of(dry, levels, block):
         levels, peaks = (), {}
-    return Terms(symbolic, v, N, dry, viscous, levels, peaks)
+    return Terms(symbolic, v, N, force, dry, viscous, levels, peaks)
 
 
 def _without_viscous(law: Law, force: ca.SX) -> ca.SX:

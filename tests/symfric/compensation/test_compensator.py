@@ -99,6 +99,14 @@ def test_scaled_terms_add_up_to_the_closed_form(law: Law) -> None:
             assert force(law, {"v_ref": v}, 400, without=without) == pytest.approx(wanted, rel=1e-6)
 
 
+@pytest.mark.parametrize("law", [LuGre(**CURVE), GMS(**CURVE, form="event")])
+def test_without_a_load_there_is_no_force_and_it_comes_back(law: Law) -> None:
+    machine = Machine(compensator(law, ramp=None, N="input", without=["viscous"]))
+    assert [machine(v_ref=1e-3, N=1.0) for _ in range(900)][-1] > 3.0
+    assert [machine(v_ref=1e-3, N=0.0) for _ in range(5)][-1] == 0.0
+    assert [machine(v_ref=1e-3, N=1.0) for _ in range(900)][-1] > 3.0
+
+
 def test_scales_do_not_touch_the_states() -> None:
     """Turned while the machine moves they act at once."""
     block = compensator(LuGre(**CURVE), **(BARE | {"scales": {"coulomb": 1.0, "stribeck": 1.0}}))

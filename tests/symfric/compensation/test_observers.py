@@ -59,6 +59,16 @@ def test_springs_stay_within_their_shares(h: float) -> None:
     assert np.isfinite(forces).all()
 
 
+@pytest.mark.parametrize(
+    "make", [lambda: lugre_observer(LAWS[0], 1.0), lambda: gms_observer(SPRINGS, 1.0)]
+)
+def test_without_a_load_the_force_vanishes(make) -> None:
+    block = make()
+    rows = np.tile([1e-2, 1e-6, 1.0], (200, 1))
+    _, forces = rolled(block, rows, N=0.0, sigma_2=0.0)
+    assert np.abs(forces[1:]).max() < 1e-6
+
+
 def test_an_error_that_stands_bends_the_bristles() -> None:
     """At rest dz/dt = k e: after n steps z = n h k e, and the force sigma_0 z + sigma_1 k e."""
     law, e = LuGre(mu_s=6.0, mu_d=4.0), 1e-6
