@@ -14,6 +14,7 @@ from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator
 from symfric.scenes import SliderCrank
+from symfric.scenes.catalogue import ALL_SCENES
 
 needs_nvrtc = pytest.mark.skipif(
     nvrtc.library() is None, reason="needs NVRTC (extra 'cuda-check'); no GPU is needed"
@@ -44,6 +45,16 @@ def test_a_kernel_becomes_ptx_without_a_warning(name: str, between: bool, real: 
     assert not built.log.strip("\0\n ")
     doubles = len(re.findall(r"\b(?:add|mul|fma|div|sqrt)\S*\.f64", built.text))
     assert (doubles > 100) == (real == "double")
+
+
+@needs_nvrtc
+@pytest.mark.slow
+@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("name", ALL_SCENES)
+def test_all_scenes_become_ptx(name: str, real: str) -> None:
+    """The arm takes a minute."""
+    kernel = kernel_of(integrator(ALL_SCENES[name](LuGre()).model()), True, REALS[real])
+    assert f".visible .entry {NAME}(" in nvrtc.build(kernel.on_device).text
 
 
 @needs_nvrtc

@@ -154,6 +154,23 @@ def test_an_interrupt_keeps_what_is_finished_and_a_folder_goes_on(tmp_path: Path
     assert len(list(tmp_path.iterdir())) == 1
 
 
+def test_an_interrupt_between_launches_ends_a_chunk(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(on_device.DeviceMembers, "budget", 5)
+    monkeypatch.setattr(on_device.DeviceMembers, "launched", lambda self, spent: None)
+    told = list[float]()
+
+    def progress(fraction: float) -> None:
+        told.append(fraction)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(on_device, "find_device", lambda: HostDevice(2))
+    x0 = {"x": np.linspace(0.5, 2.0, 20)}
+    many = simulate_many(oscillator(), 1.0, x0=x0, backend="cuda", progress=progress)
+    assert many.status is Status.INTERRUPTED
+    assert 0 < told[0] < 1
+    assert np.isnan(many.reached).all()
+
+
 def test_the_size_of_a_chunk_is_that_of_its_work_or_of_its_results() -> None:
     kernel = Kernel("", DOUBLE, rows=7, given=5, states=2, signals=4, operations=800)
     assert on_device.chunk_of(kernel, 1, 0) == 2**30 // 800
