@@ -1,6 +1,7 @@
 """`symfric codegen`: a friction law, or a scene as a plant, as C99, verified on this machine."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, final
@@ -20,6 +21,8 @@ from symfric.cli.options import (
 )
 from symfric.cli.run import kind_of
 from symfric.codegen import Block, Generated, Verification, generate, plant_block, verify
+from symfric.codegen.kit.generate import with_cores
+from symfric.embedded import CORES, Measured, measure
 from symfric.foundation import checks
 from symfric.foundation.compiler import find_compiler
 from symfric.foundation.parameters import check_names, parameters
@@ -68,9 +71,30 @@ def codegen(
     name: Annotated[
         str | None, typer.Option("--name", help="C identifier; default from the law.")
     ] = None,
+    fold: Annotated[
+        bool,
+        typer.Option("--fold", help="Bake all parameters in; without it all can be changed."),
+    ] = False,
     free: Annotated[
         list[str] | None,
-        typer.Option("--free", metavar="NAME", help="Keep this one variable, fold the others."),
+        typer.Option("--free", metavar="NAME", help="Keep this one variable, bake the others in."),
+    ] = None,
+    guards: Annotated[
+        bool,
+        typer.Option("--guards/--no-guards", help="Clamp, repair and report what cannot be."),
+    ] = True,
+    kit: Annotated[
+        bool,
+        typer.Option(
+            "--kit/--no-kit",
+            help="Unit test, CMake, Python and Simulink files beside the sources.",
+        ),
+    ] = True,
+    core: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--core", metavar="NAME", help=f"Measure it on this core, too: {', '.join(CORES)}."
+        ),
     ] = None,
     turning: Annotated[
         bool, typer.Option("--turning", help="A law in rad/s and N m: units in the header.")
@@ -107,67 +131,140 @@ def codegen(
 
     Example: symfric codegen robot.urdf --inverse-dynamics --payload tool0 --out build
     """
-    kind = real
-    if kind is None:
-        kind = "both" if scene is None or inverse_dynamics else "double"
-    check_names("--real", [kind], REALS)
+    check_names("--core", core or (), CORES)
     check_folder(out)
     check_outputs(json)
     if compiler is not None:
         find_compiler(checks.text("--compiler", compiler, "a C compiler"))
-    if inverse_dynamics:
-        _refuse({"--method": method, "--free": free, "--turning": turning or None})
-        block = robot_block(
-            fit, scene, law, numbers("--set", settings),
+    chosen = None if inverse_dynamics else chosen_law(fit, law)
+    subject = subject_of(chosen, scene)
+    kind = real
+    if kind is None:
+        kind = "double" if subject == PLANT else "both"
+    check_names("--real", [kind], REALS)
+    given = {
+        "--step-size": step_size is not None, "--method": method is not None, "--free": bool(free),
+        "--fold": fold, "--turning": turning, "--payload": payload is not None,
+        "--tunable-gravity": tunable_gravity,
+    }  # fmt: skip
+    check_applicable(subject, [option for option, there in given.items() if there])
+    own: dict[str, Any] = {"fold": fold or None, "free": free or None, "name": name, "h": step_size}
+    own = {option: value for option, value in own.items() if value is not None}
+    values, adjustable, forces = numbers("--set", settings), None, ()
+    if chosen is None:
+        made: Block | AnyLaw = robot_block(
+            fit, scene, law, values,
             name=name, h=step_size, payload=payload, tunable_gravity=tunable_gravity,
         )  # fmt: skip
-        generated = generate(block, out, real=REALS[kind])
-        _proved(law or block.name, generated, verify(generated, compiler=compiler), json)
-        return
-    if payload is not None or tunable_gravity:
-        raise ValueError("--payload, --tunable-gravity: expected with --inverse-dynamics only")
-    chosen = chosen_law(fit, law)
-    adjustable = None
-    if scene is not None and turning:
-        raise ValueError("--turning: expected with a law only: a scene knows what turns")
-    if scene is not None:
-        machine = machine_of(scene, chosen, numbers("--set", settings))
-        made = partial(plant, machine, "auto" if method is None else method, name, free)
-        generated, adjustable = generate(made(step_size), out, real=REALS[kind]), made
-    elif method is not None:
-        raise ValueError("--method: expected with --scene only: the step of a law is exact")
+        text, own = law or made.name, {}
+    elif scene is not None:
+        machine = machine_of(scene, chosen, values)
+        own["method"] = "auto" if method is None else method
+        made = plant_block(machine, **own)
+        adjustable = partial(plant_block, machine, **{n: v for n, v in own.items() if n != "h"})
+        text, own = chosen.text, {}
     else:
-        generated = generate(
-            with_settings(chosen.law, chosen.text, settings),
-            out,
-            name=name,
-            real=REALS[kind],
-            h=step_size,
-            free=free,
-            turning=turning or chosen.turning,
-        )
+        made = with_settings(chosen.law, chosen.text, settings)
+        if turning or chosen.turning:
+            own["turning"] = True
+        text, forces = chosen.text, chosen.forces
+    generated = generate(made, out, real=REALS[kind], guards=guards, kit=kit, **own)
     verification = verify(generated, compiler=compiler, adjustable=adjustable)
-    if chosen.forces and scene is None:
-        names = ", ".join(chosen.forces)
+    if forces:
+        names = ", ".join(forces)
         output.note(f"{names}: forces, fitted under a load of 1 N; call the C with N = 1")
-    _proved(chosen.text, generated, verification, json)
+    measured = on_cores(generated, core or ())
+    generated = with_cores(generated, [m.to_dict() for m in measured])
+    _proved(text, generated, verification, measured, json)
 
 
-def _refuse(given: dict[str, object]) -> None:
-    """Options that say nothing to inverse dynamics."""
-    wrong = [name for name, value in given.items() if value is not None]
-    if wrong:
-        raise ValueError(f"--inverse-dynamics: expected no {', '.join(wrong)}, got one")
+LAW, FUNCTION, POPULATION = "a law", "a law without states", "a population"
+PLANT, INVERSE = "--scene", "--inverse-dynamics"
+
+APPLIES = {
+    "--step-size": (LAW, POPULATION, PLANT, INVERSE),
+    "--method": (PLANT,),
+    "--free": (LAW, FUNCTION, PLANT),
+    "--fold": (LAW, FUNCTION, PLANT),
+    "--turning": (LAW, FUNCTION),
+    "--payload": (INVERSE,),
+    "--tunable-gravity": (INVERSE,),
+}
+"""Options that do not fit all that C is made of, and what they fit."""
+
+WHY = {
+    "--step-size": "which has no step",
+    "--method": "whose step is exact, or the best that is known",
+    "--turning": "which knows what turns",
+}
 
 
-def _proved(text: str, generated: Generated, verification: Verification, json: str | None) -> None:
+def subject_of(chosen: "Chosen | None", scene: str | None) -> str:
+    """What C is made of."""
+    if chosen is None:
+        return INVERSE
+    if scene is not None:
+        return PLANT
+    if not isinstance(chosen.law, Law):
+        return POPULATION
+    return LAW if chosen.law.states else FUNCTION
+
+
+def check_applicable(subject: str, given: list[str]) -> None:
+    """Refuse options that say nothing to what is asked for, all at once."""
+    problems: list[str] = []
+    for option in given:
+        fits = [s for s in APPLIES[option] if s != FUNCTION]
+        if subject not in APPLIES[option]:
+            why = f", {WHY[option]}" if option in WHY and subject != INVERSE else ""
+            problems.append(f"{option}: expected with {' or '.join(fits)} only, got {subject}{why}")
+    if {"--free", "--fold"} <= set(given):
+        problems.append("--free, --fold: expected one of them, got both; --free folds the others")
+    if problems:
+        raise ValueError("codegen: " + "; ".join(problems))
+
+
+def _proved(
+    text: str,
+    generated: Generated,
+    verification: Verification,
+    measured: list[Measured],
+    json: str | None,
+) -> None:
     """Say what was written and whether it was verified; the exit status says it, too."""
-    output.emit_json(to_dict(text, generated, verification), json)
+    output.emit_json(to_dict(text, generated, verification, measured), json)
     if json != "-":
         show_verification(verification)
+        show_sizes(generated, measured)
     output.say_written(*generated.files, json)
     if not verification.ok:
         raise typer.Exit(1)
+
+
+def on_cores(generated: Generated, cores: Sequence[str]) -> list[Measured]:
+    """The block on Cortex-M cores, in every type that was generated."""
+    return [
+        measure(generated.block, real, core, guards=generated.guards)
+        for core in cores
+        for real in generated.reals
+    ]
+
+
+def show_sizes(generated: Generated, measured: Sequence[Measured]) -> None:
+    """Print what the C needs here, by size and -fstack-usage, and on other cores, by QEMU."""
+    rows: list[tuple[str | float, ...]] = []
+    for real in generated.reals:
+        found = generated.manifest["real"][real].get("measured")
+        if found is not None:
+            stack = max(found["stack"].values(), default="-")
+            rows.append((real, found["compiler"], found["text"] or "-", stack, "-", "-"))
+    for m in measured:
+        cells = (m.text, m.stack, m.average, m.maximum) if m.ok else (m.status, "-", "-", "-")
+        numbers = (f"{x:.0f}" if isinstance(x, float) else x for x in cells)
+        rows.append((m.real, m.core, *numbers))
+    if rows:
+        head = ["type", "built by, for", "code [B]", "stack [B]", "instructions", "at most"]
+        output.show_table(head, rows)
 
 
 @final
@@ -229,22 +326,16 @@ def machine_of(scene: str, chosen: Chosen, values: dict[str, float]) -> Scene:
     return with_values(machine, values)
 
 
-def plant(
-    machine: Scene, method: str, name: str | None, free: list[str] | None, h: float | None = None
-) -> Block:
-    """The plant of a scene, whose other parameters are listed as constants."""
-    block = plant_block(machine.model(free or ()), h=h, method=method, name=name)
-    known = {n: float(p.value) for n, p in parameters(machine).items() if n not in (free or ())}
-    return replace(block, constants=known | dict(block.constants))
-
-
-def to_dict(law: str, generated: Generated, verification: Verification) -> dict[str, Any]:
+def to_dict(
+    law: str, generated: Generated, verification: Verification, measured: Sequence[Measured]
+) -> dict[str, Any]:
     """What `--json` holds."""
     return {
         "law": law,
         "files": [str(path) for path in generated.files],
         "manifest": dict(generated.manifest),
         "verification": verification.to_dict(),
+        "cores": [m.to_dict() for m in measured],
     }
 
 

@@ -26,8 +26,8 @@ Exponential step of second order, bounded whatever its length, linearised in eac
     J     = d(dz/dt)/dz,   x = J h,   phi1 = (exp(x) - 1) / x,   phi2 = (phi1 - 1) / x
     z+    = z + s h phi1 dz/dt          at the end of the step
     zm    = z + s h [(1 - s) phi1 + s phi2] dz/dt       mean over the step
-    r     = (z+ - z) / h                mean rate,   r+ = dz/dt at z+
-s is 1, or the share of the way on which z comes to rest, where it stays.""",
+    r     = (z+ - z) / h                mean rate,   r+ = exp(x) dz/dt at the end
+s is 1, or the share of the way on which z comes to rest, where it stays, with r+ = 0.""",
 }
 
 FORCES = """\

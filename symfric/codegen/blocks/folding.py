@@ -1,9 +1,11 @@
 """Which parameters stay variable at run time, and which become constants of the code."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import casadi as ca
 
+from symfric.codegen.blocks.block import Block
 from symfric.emitter.c99 import TRANSCENDENTAL
 from symfric.foundation import checks
 from symfric.foundation.graph import graph
@@ -107,3 +109,20 @@ def _calls(law: Law, groups: Sequence[Sequence[str]]) -> int:
         node.op in TRANSCENDENTAL and depends
         for node, depends in zip(source.nodes, of_inputs, strict=True)
     )
+
+
+def without_idle(block: Block, free: Sequence[str] | None, where: str) -> Block:
+    """The block without parameters that have no effect.
+
+    Raises:
+        ValueError: one of them was asked for in `free`.
+    """
+    everything = block.everything
+    idle = [p.name for p in block.parameters if not ca.depends_on(everything, p.symbol)]
+    wrong = [name for name in idle if name in (free or ())]
+    if wrong:
+        raise ValueError(
+            f"{where}: free: expected parameters that have an effect, got {', '.join(wrong)}; "
+            "the values of the other parameters switch them off"
+        )
+    return replace(block, parameters=tuple(p for p in block.parameters if p.name not in idle))

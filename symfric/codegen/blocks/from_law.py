@@ -1,6 +1,6 @@
 """A friction law as a block: one stateless function, or a step of its states for held inputs."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from re import search, sub
 from typing import Any
@@ -10,7 +10,7 @@ import casadi as ca
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.discretisation import of_law
 from symfric.codegen.blocks.elements import arranged
-from symfric.codegen.blocks.folding import Fold, variable
+from symfric.codegen.blocks.folding import Fold, variable, without_idle
 from symfric.codegen.blocks.held_step import advanced, force_of_rate
 from symfric.codegen.blocks.law_text import equations, texts
 from symfric.codegen.blocks.unloaded import LEAST_LOAD, NO_LOAD, Held, needs_words, with_words
@@ -113,20 +113,15 @@ def law_block(
         raise ValueError(f"{where}: {'; '.join(problems)}")
     symbolic, runtime = symbolise(law, *names)
     block = _step(law, symbolic, runtime, h, where) if law.states else _function(symbolic, runtime)
-    idle = [p.name for p in runtime if not ca.depends_on(block.everything, p.symbol)]
-    if idle and free is not None:
-        raise ValueError(
-            f"{where}: free: expected parameters that have an effect, got {', '.join(idle)}; "
-            "the values of the other parameters switch them off"
-        )
+    block = without_idle(block, free, where)
+    idle = {p.name for p in runtime} - {p.name for p in block.parameters}
+    folded = [p for p in known.values() if p.name not in names]
     block = replace(
         block,
         name=name or sub(r"\W+", "_", law_name(law)).strip("_"),
         **_described(law, idle),
-        parameters=tuple(p for p in block.parameters if p.name not in idle),
-        constants={p.name: float(p.value) for p in known.values() if p.name not in names}
-        | dict(block.constants),
-        about={p.name: f"{p.doc} [{p.unit}]" for p in known.values() if p.name not in names},
+        constants={p.name: float(p.value) for p in folded} | dict(block.constants),
+        about={p.name: f"{p.doc} [{turned(p.unit) if turning else p.unit}]" for p in folded},
     )
     _check_at_rest(block, where)
     return arranged(in_turning(block) if turning else block)
@@ -233,7 +228,7 @@ def _check_at_rest(block: Block, where: str) -> None:
         )
 
 
-def _described(law: Law, idle: Sequence[str]) -> dict[str, Any]:
+def _described(law: Law, idle: Iterable[str]) -> dict[str, Any]:
     """What docstrings say of the law and of those that it holds, for the data sheet.
 
     Of parameters without effect, `idle`, nothing is said.

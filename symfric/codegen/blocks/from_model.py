@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.discretisation import of_method
-from symfric.codegen.blocks.folding import Fold, variable
+from symfric.codegen.blocks.folding import Fold, variable, without_idle
 from symfric.codegen.blocks.from_law import step_variable
 from symfric.codegen.blocks.law_text import equations
 from symfric.foundation import checks
@@ -71,10 +71,13 @@ def plant_block(
 
     All parameters of a scene and of its law can be changed at run time, but for those whose value
     selects a cheaper form of the law (`runtime_parameters`). Operations of a step with all of them
-    constants, by default, and with every one variable:
+    constants, by default, and with every one variable (instructions on a Cortex-M4F in float, by
+    `symfric.embedded.measure`, for the first two):
 
-        drive / rabinowicz / four_mass / arm, BrownMcPhee     0   0   0
-        drive / rabinowicz / four_mass / arm, LuGre           0   0   0
+        drive, BrownMcPhee            118    126    143     554   548   574
+        rabinowicz, LuGre             201    217    243     576   609   912
+        four_mass, LuGre             3222   3341   3458
+        arm, LuGre                  32133  32314  32485
 
     Args:
         model: without events; a model, whose parameters in `model.p` stay variable at run time, or
@@ -116,7 +119,7 @@ def plant_block(
     whole = suited_to_start(_held(model), METHODS[method], model)
     duration = size.symbol if h is None else ca.SX(float(h))
     following = build_fixed(whole, METHODS[method])(whole.y, duration, whole.d)
-    return Block(
+    block = Block(
         name or model.name,
         doc=f"Plant '{model.name}': the machine with its friction, to simulate it in real time.",
         states=_states(model, whole, where),
@@ -133,6 +136,7 @@ def plant_block(
         limits=LIMITS,
         sources=(METHODS[method].source,),
     )
+    return block if isinstance(machine, Model) else without_idle(block, free, where)
 
 
 USE = (

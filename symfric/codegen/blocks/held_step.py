@@ -98,8 +98,8 @@ def held_step(rate: ca.SX, z: ca.SX, h: ca.SX | float, rest: ca.SX, where: str) 
 
     of second order (Rosenbrock-Euler, exponential). s = min(1, (rest - z)/dz) ends the way where
     the state comes to rest, which the solution cannot pass and the linearised one may. The rate at
-    the end is exp(J h) f where it is affine, without the difference of large numbers that it is in
-    fast sliding, else the rate at z+.
+    the end is exp(J h) f, without the difference of large numbers that it is at z+ in fast sliding;
+    0 where the state has come to rest.
 
     Args:
         rate: of the states `z`.
@@ -126,7 +126,7 @@ def held_step(rate: ca.SX, z: ca.SX, h: ca.SX | float, rest: ca.SX, where: str) 
                 raise ValueError(f"{where}: {_expected('depend on others')}")
             s = _share(h * rates[i], rest[i] - z[i])
             rates[i], bend = s * rates[i], s * ((1 - s) * rates[i] + s * bend)
-            last[i], kind = ca.substitute(f, z[i], z[i] + h * rates[i]), SECOND
+            last[i], kind = ca.if_else(s < 1, 0, last[i]), SECOND
         means[i] = z[i] + h * bend
         kinds[kind] = None
     columns = (ca.vertcat(*rows) for rows in (means, rates, last))

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, final
 
@@ -121,6 +121,19 @@ def generate(
     write_text(folder / last, json.dumps(content, indent=2) + "\n")
     files = tuple(folder / file for file in (*texts, last))
     return Generated(block, folder, names, files, content, guards)
+
+
+def with_cores(generated: Generated, measured: Sequence[Mapping[str, Any]]) -> Generated:
+    """The same with what was measured on other cores in its manifest, also in the file.
+
+    Args:
+        measured: of each core and type what `symfric.embedded` found, as `Measured.to_dict`.
+    """
+    if not measured:
+        return generated
+    content = {**generated.manifest, "cores": [dict(row) for row in measured]}
+    write_text(generated.files[-1], json.dumps(content, indent=2) + "\n")
+    return replace(generated, manifest=content)
 
 
 def _sources(block: Block, reals: Sequence[Real], guards: bool) -> dict[str, str]:

@@ -17,7 +17,7 @@ EXPLAINED = """\
 A number passes if it differs from what CasADi computed in double precision by no more than its
 tolerance: {base:g} of the peak of its signal over all rows, for the rounding of a few operations,
 of the functions of math.h and of fused multiply-add, which differ between compilers and targets; or
-{roundings:g} times what rounding the numbers that go in to this type changes, where that is more,
+{roundings:g} times what rounding to this type changes in nine of ten rows, where that is more,
 as in differences of large numbers."""
 
 TEST = """\

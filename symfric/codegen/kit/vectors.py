@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
+from symfric.codegen.kit.rounding import in_type
 from symfric.codegen.running.runner import run_vm
 from symfric.emitter.c99 import Real
 from symfric.foundation.graph import Graph, graph, rebuild
@@ -32,8 +33,9 @@ BASE = {4: 1e-5, 8: 1e-12}
 """Tolerance relative to the peak of a signal, by the size of the type: rounding of some operations,
 of libm and of fused multiply-add, which differ between compilers and targets."""
 ROUNDINGS = 8.0
-"""Tolerance in units of what rounding the numbers that go in changes in the result: the condition
-of a difference of large numbers. A row in which the result may jump by that much is left out."""
+"""Tolerance in units of what rounding changes in most rows: of the numbers that go in, and in float
+of every operation, as in differences of large numbers. The tenth of the rows in which a result may
+change by more, such as at a jump, is left out."""
 BAD = (np.nan, np.inf, -np.inf)
 
 
@@ -89,12 +91,13 @@ def vectors(block: Block, real: Real, guards: bool) -> Vectors:
     peak = np.abs(results).max(axis=0, initial=0.0)
     usual = np.quantile(spread, 0.9, axis=0) if len(spread) else peak
     tolerance = np.maximum(BASE[real.size] * np.where(peak > 0, peak, 1.0), ROUNDINGS * usual)
-    sound = np.flatnonzero((ROUNDINGS / 2 * spread <= tolerance).all(axis=1))
+    sound = np.flatnonzero(_is_sound(spread, tolerance))
     sound = sound[_telling(block, real, run.chosen(sound))]
     parts = [run.chosen(sound)]
     parts += [
         _changing(block, real, parts[0], results[sound], i, tolerance)
         for i in range(len(block.parameters))
+        if len(sound)
     ]
     if guards and len(sound):
         parts.append(_bad(block, parts[0]))
@@ -105,11 +108,11 @@ def vectors(block: Block, real: Real, guards: bool) -> Vectors:
 
 def made(block: Block, real: Real, steps: Steps, *, guards: bool) -> tuple[Array, Integers]:
     """Results and status of steps by CasADi; the run of `run_vm` has one step before them."""
-    first = np.zeros((1, len(block.inputs)))
-    parameters = np.tile(_defaults(block, real), (len(steps) + 1, 1))
-    rows = np.flatnonzero(steps.changed >= 0)
-    parameters[rows + 1, steps.changed[rows]] = steps.values[rows]
-    inputs = np.vstack([first, steps.inputs])
+    first, given = np.zeros((1, len(block.inputs))), _parameters(block, real, steps)
+    parameters, inputs = (
+        np.vstack([_defaults(block, real), given]),
+        np.vstack([first, steps.inputs]),
+    )
     found = run_vm(block, real, inputs, steps.states, parameters, guards=guards)[1:]
     if not guards:
         return found, np.zeros(len(steps), np.int64)
@@ -166,21 +169,47 @@ def _defaults(block: Block, real: Real) -> Array:
     return rounded([float(v.start) for v in block.parameters], real)
 
 
+def _parameters(block: Block, real: Real, steps: Steps) -> Array:
+    """The parameters of every step, shape (rows, parameters)."""
+    found = np.tile(_defaults(block, real), (len(steps), 1))
+    rows = np.flatnonzero(steps.changed >= 0)
+    found[rows, steps.changed[rows]] = steps.values[rows]
+    return found
+
+
+def _is_sound(spread: Array, tolerance: Array) -> NDArray[np.bool_]:
+    """Rows that no rounding can take out of the tolerance."""
+    return np.all(ROUNDINGS / 2 * spread <= tolerance, axis=1)
+
+
 def _spread(block: Block, real: Real, steps: Steps, results: Array) -> Array:
     """What rounding the numbers that go in changes in the results, shape (rows, results)."""
     random, found = np.random.default_rng(1), np.zeros_like(results)
     unit = float(np.finfo(f"f{real.size}").eps)
-    first, defaults = np.zeros((1, len(block.inputs))), _defaults(block, real)
+    first, given = np.zeros((1, len(block.inputs))), _parameters(block, real, steps)
 
     def near(x: Array) -> Array:
         return x * (1.0 + unit * random.choice([-1.0, 1.0], x.shape))
 
     for _ in range(3):
-        parameters = near(np.tile(defaults, (len(steps) + 1, 1)))
+        parameters = near(np.vstack([_defaults(block, real), given]))
         inputs = np.vstack([first, near(steps.inputs)])
         other = run_vm(block, real, inputs, near(steps.states), parameters, guards=False)[1:]
         found = np.maximum(found, np.abs(other - results))
+    if real.size == 4:
+        found = np.fmax(found, np.abs(_in_float(block, steps, given, results) - results))
     return found
+
+
+def _in_float(block: Block, steps: Steps, parameters: Array, results: Array) -> Array:
+    """Results with every operation in float; NaN where that is not known."""
+    arguments = [steps.states, parameters, steps.inputs]
+    parts: list[Array] = []
+    for function in (block.step, *(block.reset(name) for name in block.resets)):
+        rows = in_type(function, arguments, "f4")
+        parts.append(np.full_like(results, np.nan) if rows is None else rows)
+    found = np.hstack(parts)
+    return found if found.shape == results.shape else np.full_like(results, np.nan)
 
 
 def _telling(block: Block, real: Real, steps: Steps) -> Integers:
@@ -228,8 +257,9 @@ def _changing(
     new = Steps(steps.states, steps.inputs, changed, np.full(len(steps), value))
     after, _ = made(block, real, new, guards=False)
     effect = (np.abs(after - before) / tolerance).max(axis=1, initial=0.0)
-    rows = np.argsort(np.where(np.isfinite(effect), effect, -1.0))[::-1][:EACH]
-    return new.chosen(rows[np.isfinite(effect[rows])])
+    fit = np.isfinite(effect) & _is_sound(_spread(block, real, new, after), tolerance)
+    rows = np.argsort(np.where(fit, effect, -1.0))[::-1][:EACH]
+    return new.chosen(rows[fit[rows]])
 
 
 def changed_value(variable: Variable) -> float:

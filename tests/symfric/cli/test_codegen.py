@@ -78,6 +78,61 @@ def test_scene_becomes_a_plant(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert "backward Euler" in (tmp_path / "rabinowicz_f64.h").read_text()
 
 
+def test_all_parameters_of_a_plant_are_variable_by_default_and_none_when_folded(
+    tmp_path: Path,
+) -> None:
+    line = f"codegen --scene drive --law brown_mcphee --no-kit --out {tmp_path} --step-size 1e-3"
+    assert main(line.split()) == 0
+    manifest = json.loads((tmp_path / "drive_manifest.json").read_text())
+    assert [p["name"] for p in manifest["parameters"]] == [
+        "m",
+        "N",
+        "offset",
+        "mu_s",
+        "mu_d",
+        "v_t",
+    ]
+    assert manifest["constants"] == {"mu_v": 0.0, "h": 1e-3}
+    assert main([*line.split(), "--fold"]) == 0
+    manifest = json.loads((tmp_path / "drive_manifest.json").read_text())
+    assert manifest["parameters"] == []
+    assert manifest["constants"]["m"] == 0.8
+
+
+def test_guards_and_kit_are_left_out_on_request(tmp_path: Path) -> None:
+    line = f"codegen --law coulomb --real float --no-guards --no-kit --out {tmp_path}"
+    assert main(line.split()) == 0
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"coulomb_f32.c", "coulomb_f32.h", "coulomb_manifest.json"}
+    assert "status" not in (tmp_path / "coulomb_f32.h").read_text()
+
+
+@pytest.mark.parametrize(
+    ("options", "messages"),
+    [
+        (
+            "--law lugre --method rodas3 --payload tool",
+            ["--method: expected", "--payload: expected"],
+        ),
+        ("--law lugre --fold --free mu_s", ["--free, --fold: expected one of them, got both"]),
+        ("--law coulomb --step-size 1e-3", ["--step-size: expected", "got a law without states"]),
+        ("--law coulomb --step-size 1e-3 --method rodas3", ["--step-size: ", "--method: "]),
+        ("--law random_bristles --fold --turning", ["--fold: ", "--turning: ", "a population"]),
+        ("--law lugre --scene drive --turning", ["--turning: ", "got --scene, which knows"]),
+        ("--law lugre --core m9", ["--core: expected one of m0plus, m3, m4f, m7, got m9"]),
+        ("robot.urdf --inverse-dynamics --free a --fold", ["--free: ", "--fold: ", "one of them"]),
+    ],
+)
+def test_options_that_do_not_apply_are_refused_all_at_once(
+    options: str, messages: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(f"codegen {options} --out {tmp_path / 'c'}".split()) == 2
+    error = capsys.readouterr().err
+    assert all(message in error for message in messages)
+    assert error.count("\n") == 1
+    assert not (tmp_path / "c").exists()
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

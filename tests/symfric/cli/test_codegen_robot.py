@@ -49,7 +49,7 @@ def test_a_scene_has_the_law_that_is_asked_for(tmp_path, capsys):
         ("--scene rabinowicz --law lugre --inverse-dynamics", "a scene of bodies and joints"),
         ("--scene four_bar --law lugre --inverse-dynamics", "loops that close in"),
         ("{robot} --inverse-dynamics --payload hand", "a body or a frame, got 'hand'"),
-        ("{robot} --inverse-dynamics --turning", "expected no --turning"),
+        ("{robot} --inverse-dynamics --turning", "--turning: expected with a law only"),
         ("{robot} --inverse-dynamics --set g=1", "--set: expected with --law only"),
         ("--law lugre --payload hand", "expected with --inverse-dynamics only"),
     ],
