@@ -51,8 +51,16 @@ def compensator(
     can be turned while the machine moves.
 
     Limits: it adds what the law says. More than the friction that is there (a scale above 1, or a
-    law that is too high) is a negative damping: with `error_gain` the axis then hunts where it
-    should rest.
+    law that is too high) is negative damping: with `error_gain` the axis then hunts where it should
+    rest. Moved by the measured velocity alone a law finds the way out of rest too late, and makes
+    hunting worse. Where the reference jumps, bristle damping makes a peak; set a `limit`.
+
+    Measured (`symfric bench codegen`: 1 kg, 1 kHz, counts of 1 um, one sample late; LuGre with half
+    the stiffness against four other plants): with `error_gain` and without the term "stribeck" the
+    RMS error of a sine is 10 to 15 times smaller, and hunting of 1100 counts after a step is gone.
+    That term makes axes jump that break away at once: on exact Coulomb friction 350 counts stay
+    with it. Levels of 80 % make the error 5 times smaller, of 50 % twice; 120 % hunt 1000 counts
+    there. A law without states and a `build_up` of 0.1 mm does as well as bristles.
 
     Args:
         law: with numbers, with states or without, a function of v and N; or a drive, which brings

@@ -123,7 +123,8 @@ def close_loop(
     if wanted:
         runs |= _run(going(len(values)), reference, given, values, tuple(wanted), setup)
     engine = "CasADi's VM" if compiler is None else f"C in {real}, {compiler}"
-    return Comparison(plant.name, reference, runs, controller.count, engine)
+    units = plant.signals[position], plant.signals[plant.u[0].name]
+    return Comparison(plant.name, reference, runs, controller.count, engine, units)
 
 
 def _check(

@@ -107,6 +107,7 @@ class Comparison:
         loops: case -> loop.
         count: of the encoder [m].
         engine: what computed the blocks.
+        units: of position and force, such as rad and N m; read them for m and N everywhere.
     """
 
     plant: str
@@ -114,6 +115,7 @@ class Comparison:
     loops: Mapping[str, Loop]
     count: float
     engine: str
+    units: tuple[str, str] = ("m", "N")
 
     def __getitem__(self, name: str) -> Loop:
         checks.check_names("comparison", [name], self.loops)
@@ -137,8 +139,8 @@ class Comparison:
             elif not np.isnan(loop.hunting) and loop.standing >= self.count:
                 counts = loop.standing / self.count
                 found.append(
-                    f"{loop.name}: rests {counts:.3g} counts off; an integrator goes on and it may "
-                    "break away later"
+                    f"{loop.name}: rests {counts:.3g} counts off; unless its integrator is held "
+                    "it may break away later"
                 )
             if loop is not before and loop.rms > before.rms:
                 found.append(f"{loop.name}: the error is larger than without compensation")
@@ -155,12 +157,12 @@ class Comparison:
         return [
             {
                 "case": loop.name,
-                "rms_error_m": loop.rms,
-                "peak_error_m": loop.peak,
+                "rms_error": loop.rms,
+                "peak_error": loop.peak,
                 "reduction": self.reduction(loop.name),
-                "hunting_m": loop.hunting,
-                "work_J": loop.work,
-                "peak_added_N": float(np.abs(loop.added).max(initial=0.0)),
+                "hunting": loop.hunting,
+                "work": loop.work,
+                "peak_added": float(np.abs(loop.added).max(initial=0.0)),
                 "saturated": loop.saturated,
                 "status": loop.status,
                 "ended": loop.ended,
@@ -171,29 +173,32 @@ class Comparison:
     def table(self) -> str:
         """A few lines of text: errors in micrometres, the hunting in counts."""
         width = max(len(name) for name in self.loops)
-        head = f"{'case':<{width}}  {'RMS [um]':>9} {'peak [um]':>10} {'smaller':>8} "
+        x, force = self.units
+        small = f"[u{x}]"
+        head = f"{'case':<{width}} {'RMS ' + small:>10} {'peak ' + small:>11} {'smaller':>8} "
         lines = [
             f"plant '{self.plant}', {self.reference.t[-1]:.3g} s, blocks as {self.engine}",
-            head + f"{'hunting [counts]':>17} {'work [J]':>9} {'added [N]':>9}",
+            head + f"{'hunting [counts]':>17} {'work [J]':>9} {f'added [{force}]':>11}",
         ]
         for row in self.rows():
-            hunting = row["hunting_m"] / self.count
+            hunting = row["hunting"] / self.count
             lines.append(
-                f"{row['case']:<{width}}  {1e6 * row['rms_error_m']:>9.4g} "
-                f"{1e6 * row['peak_error_m']:>10.4g} {row['reduction']:>8.3g} "
+                f"{row['case']:<{width}} {1e6 * row['rms_error']:>10.4g} "
+                f"{1e6 * row['peak_error']:>11.4g} {row['reduction']:>8.3g} "
                 f"{'-' if np.isnan(hunting) else f'{hunting:.3g}':>17} "
-                f"{row['work_J']:>9.3g} {row['peak_added_N']:>9.3g}"
+                f"{row['work']:>9.3g} {row['peak_added']:>11.3g}"
             )
         return "\n".join([*lines, *(f"! {remark}" for remark in self.remarks())])
 
     def to_csv(self, path: str | Path) -> None:
         """Write a row a sample: time, reference, and position, force and compensation of all."""
-        columns: dict[str, Array] = {"t [s]": self.reference.t, "reference [m]": self.reference.x}
+        x, force = self.units
+        columns = {"t [s]": self.reference.t, f"reference [{x}]": self.reference.x}
         for name, loop in self.loops.items():
             columns |= {
-                f"x ({name}) [m]": loop.x[:-1],
-                f"force ({name}) [N]": loop.force,
-                f"added ({name}) [N]": loop.added,
+                f"x ({name}) [{x}]": loop.x[:-1],
+                f"force ({name}) [{force}]": loop.force,
+                f"added ({name}) [{force}]": loop.added,
             }
         size = min(column.size for column in columns.values())
         with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
@@ -210,6 +215,7 @@ class Comparison:
         """
         checks.check_names("comparison", names, self.loops)
         shown: Sequence[Loop] = [self.loops[n] for n in names] or list(self.loops.values())
+        x, force = self.units
         figure, axes = panels(5, height=1.6, shared=False)
         window = self._reversal()
         near = slice(window.start, window.stop)
@@ -222,7 +228,9 @@ class Comparison:
             axes[3].step(t, loop.added, where="post", color=colour, lw=1.0)
             axes[4].plot(t[near], 1e6 * loop.error[near], color=colour, lw=1.0)
         for axis, label in zip(
-            axes, ("x [mm]", "error [um]", "force [N]", "added [N]", "error [um]"), strict=True
+            axes,
+            (f"x [m{x}]", f"error [u{x}]", f"force [{force}]", f"added [{force}]", f"error [u{x}]"),
+            strict=True,
         ):
             axis.set_ylabel(label)
         for axis in axes[1:4]:

@@ -1,5 +1,7 @@
 """The C of compensators in the loop of a drive whose friction is another one than theirs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,7 +18,7 @@ from symfric.compensation import (
     sine,
     step,
 )
-from symfric.scenes import rabinowicz
+from symfric.scenes import Drive, rabinowicz
 
 CURVE = {"mu_s": 6.0, "mu_d": 4.0, "v_s": 5e-3, "sigma_2": 20.0}
 """With N = 1 N the coefficients are newtons."""
@@ -138,6 +140,16 @@ def test_a_function_of_velocities_is_a_block_too(compiler) -> None:
     assert block.is_function
     found = compared("bristles", moves([1e-3], 0.2, 0.1), block)
     assert np.abs(found["compensated"].added).max() > 3.0
+
+
+def test_a_drive_that_turns_has_its_units(tmp_path) -> None:
+    turning = Drive(PLANTS["bristles"], m=1.0, N=1.0, turning=True)
+    block = compensator(replace(turning, law=BELIEVED))
+    found = close_loop(turning.model(), moves([1e-3], 0.1, 0.05), block, controller=SOFT)
+    assert found.units == ("rad", "N m")
+    assert "RMS [urad]" in found.table()
+    found.to_csv(tmp_path / "loops.csv")
+    assert "added (compensated) [N m]" in (tmp_path / "loops.csv").read_text().splitlines()[0]
 
 
 @heavy
