@@ -80,10 +80,10 @@ def compensator(
         s, law, turning = _of_drive(where, law, s), law.law, law.turning or turning
     check_law(where, law)
     where = f"compensator '{law_name(law)}'"
-    if law.inputs:
-        names = ", ".join(i.name for i in law.inputs)
-        raise ValueError(f"{where}: expected a law of v and N only, got one with {names}")
     inner = law_block(law, h=h if law.states else None)
+    if len(inner.inputs) > 2:
+        names = ", ".join(v.name for v in inner.inputs[2:])
+        raise ValueError(f"{where}: expected a law of v and N only, got one with {names}")
     found = terms(law, inner)
     size = next((v for v in inner.parameters if v.name == "h"), step_variable(where, h))
     duration = size.symbol if h is None else float(size.start)

@@ -53,13 +53,15 @@ class Terms:
     @property
     def names(self) -> tuple[str, ...]:
         """The terms that this law has, of `TERMS`."""
+        viscous = () if self.viscous is None else ("viscous",)
+        if self.dry.is_zero():
+            return viscous
         if not self.levels:
-            return ("force", *(["viscous"] if self.viscous is not None else []))
+            return ("force", *viscous)
         found = ["coulomb"]
         if self.peaks:
             found.append("stribeck")
-        if self.viscous is not None:
-            found.append("viscous")
+        found += viscous
         if self.law.states:
             found.append("bristle")
         return tuple(found)

@@ -5,6 +5,7 @@ from math import exp, pi
 import casadi as ca
 import numpy as np
 import pytest
+from law_cases import CASES
 
 from symfric import (
     GMS,
@@ -18,6 +19,7 @@ from symfric import (
     SelfTuning,
     Stribeck,
     Table,
+    Viscous,
 )
 from symfric.codegen import Block, generate, law_block, verify
 from symfric.compensation import TERMS, Compensation, compensator, settings_from_text
@@ -72,6 +74,7 @@ def test_the_terms_of_a_law_are_those_it_has() -> None:
     ]
     for law, names in (
         (Coulomb(), {"scale_coulomb"}),
+        (Viscous(2.0), {"scale_viscous"}),
         (SelfTuning(), {"scale_force"}),
         (Table((0.0, 1.0), (0.1, 0.2)), {"scale_force"}),
     ):
@@ -105,6 +108,29 @@ def test_without_a_load_there_is_no_force_and_it_comes_back(law: Law) -> None:
     assert [machine(v_ref=1e-3, N=1.0) for _ in range(900)][-1] > 3.0
     assert [machine(v_ref=1e-3, N=0.0) for _ in range(5)][-1] == 0.0
     assert [machine(v_ref=1e-3, N=1.0) for _ in range(900)][-1] > 3.0
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", CASES)
+def test_all_terms_of_every_law_make_the_whole_and_none_nothing(name: str) -> None:
+    law = CASES[name]
+    try:
+        alone = law_block(law)
+    except ValueError:
+        return  # a law without a step has no compensator either
+    if len(alone.inputs) > 2:
+        with pytest.raises(ValueError, match="expected a law of v and N only"):
+            compensator(law)
+        return
+    settings = {"velocity": "reference", "ramp": None}
+    whole = compensator(law, **settings)
+    scales = [p.name[6:] for p in whole.parameters if p.name.startswith("scale_")]
+    nothing = compensator(law, **settings, scales=dict.fromkeys(scales, 0.0))
+    machines = Machine(alone), Machine(whole), Machine(nothing)
+    for v in np.cumsum(2e-3 * np.random.default_rng(0).standard_normal(40)):
+        wanted, found, none = (machine(v=v, v_ref=v, N=1.0) for machine in machines)
+        assert found == pytest.approx(wanted, rel=1e-12, abs=1e-14)
+        assert none == 0.0
 
 
 def test_scales_do_not_touch_the_states() -> None:
