@@ -12,6 +12,7 @@ from mutants.fits import FITS
 from mutants.loops import LOOPS
 from mutants.mutant import Mutant
 from mutants.plants import PLANTS
+from mutants.robots import ROBOTS
 from mutants.solvers import RESULTS, SOLVERS
 
 STEP = "symfric/integrator/step/attempt.py"
@@ -345,5 +346,5 @@ LEFT_OUT = (
 MUTANTS = (
     *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
     *BESIDE, *CACHES, *DRY, *EMITTED, *ENSEMBLES, *LEFT_OUT, *LOOPS, *DERIVATIVES, *PLANTS,
-    *RESULTS, *SOLVERS,
+    *RESULTS, *ROBOTS, *SOLVERS,
 )  # fmt: skip

@@ -20,6 +20,7 @@ from symfric.multibody import (
     Prismatic,
     Revolute,
     Spherical,
+    Universal,
     functions,
 )
 from symfric.multibody.urdf.read import read_urdf
@@ -153,7 +154,7 @@ def test_fingers_that_mimic_are_moved_along():
             f'<link name="{n}"><inertial><origin xyz="0.1 0 0"/><mass value="{m}"/>'
             '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
             f'<joint name="j{n}" type="revolute"><parent link="world"/><child link="{n}"/>'
-            f'<axis xyz="0 0 1"/>{mimic}</joint>'
+            f'<axis xyz="0 1 0"/>{mimic}</joint>'
             for n, m, mimic in (
                 ("a", 1, ""),
                 ("b", 2, '<mimic joint="ja" multiplier="-2" offset="0.3"/>'),
@@ -165,7 +166,8 @@ def test_fingers_that_mimic_are_moved_along():
     assert [v.name for v in block.inputs] == ["q_1", "qd_1", "qdd_1"]
     _, y = call(block, [0.2, 0.5, 1.5])
     inertia = (0.1 + 1 * 0.01) + 4 * (0.1 + 2 * 0.01)
-    assert y == pytest.approx([inertia * 1.5], rel=1e-12)
+    weight = -9.81 * 0.1 * (1 * np.cos(0.2) - 2 * 2 * np.cos(0.3 - 2 * 0.2))
+    assert y == pytest.approx([inertia * 1.5 + weight], rel=1e-12)
 
 
 def ball() -> Mechanism:
@@ -179,6 +181,14 @@ def rotor(law: Any) -> Mechanism:
     m = Mechanism("rotor")
     m.body("wheel", 1.0, (0.1, 0.1, 0.1))
     m.joint(Revolute("hinge", GROUND, "wheel", friction=JointFriction(law, 0.1, normal=1.0)))
+    return m
+
+
+def cross() -> Mechanism:
+    m = Mechanism("cross")
+    m.body("bob", 1.0, (0.1, 0.1, 0.1), com=(0.0, 0.0, -1.0))
+    friction = JointFriction(BrownMcPhee(), 0.05, length=0.1)
+    m.joint(Universal("cardan", GROUND, "bob", friction=friction))
     return m
 
 
@@ -196,6 +206,7 @@ def driven() -> Mechanism:
         (lambda: rotor(ExactCoulomb()), "v and N alone, got ExactCoulomb"),
         (lambda: rotor(Leuven()), "circle"),
         (driven, "without time"),
+        (cross, "that of cardan, which other friction presses"),
     ],
 )
 def test_what_it_cannot_do_is_refused_by_name(make, text):
