@@ -1,4 +1,4 @@
-"""Defects of loops in generated C: what is taken for alike, and in which order it is computed."""
+"""Defects of loops in generated C, and of the steps of the elements in them."""
 
 from mutants.mutant import Mutant
 
@@ -62,5 +62,14 @@ LOOPS = (
         "what the limit cuts off the mean is a rectangle", ELEMENT,
         "goal - gap * (gap / (k * self.some)) / 2", "goal - gap * (gap / (k * self.some))",
         ("tests/symfric/laws/dynamic/test_element.py",),
+    ),
+    Mutant(
+        "growth that is no number is taken as it is", "symfric/codegen/blocks/held_step.py",
+        "FASTEST = 10.0", "FASTEST = 1e9", ("tests/symfric/codegen/blocks/test_held_step.py",),
+    ),
+    Mutant(
+        "a state rests where others were before the step", "symfric/codegen/blocks/held_step.py",
+        "place = ca.substitute(rest[i], z, ca.vertcat(*others))", "place = rest[i]",
+        ("tests/symfric/codegen/blocks/test_held_step.py",),
     ),
 )  # fmt: skip

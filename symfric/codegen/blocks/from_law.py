@@ -92,10 +92,10 @@ def law_block(
     Raises:
         ValueError: symbols in the law; names in `free` or `fold` that are unknown, repeated or, in
             `free`, without effect; both of them; a step size of a law without states; states that
-            act on each other in a circle (Leuven, smooth GMS) or are not affine and depend on
-            others (Armstrong); modes that follow zero crossings of v within the step (exact
-            Coulomb, Karnopp and Leine by events); a force that is not finite at rest (a smoothing
-            width of 0 left variable).
+            act on each other in a circle (Leuven, smooth GMS), or are not affine and depend on
+            others in a law that does not say where they rest then; modes that follow zero crossings
+            of v within the step (exact Coulomb, Karnopp and Leine by events); a force that is not
+            finite at rest (a smoothing width of 0 left variable).
     """
     check_law("codegen", law)
     where = f"codegen '{law_name(law)}'"

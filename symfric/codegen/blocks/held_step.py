@@ -17,6 +17,10 @@ from symfric.laws.base.law import chosen
 EXACT, EVENT, SECOND = "exact", "event", "second order"
 """How a step is made: the exponential of an affine rate, corners solved for, linearised rates."""
 
+FASTEST = 10.0
+"""Largest J h of a linearised rate: exp of what is above says nothing of the solution, but may be
+no number."""
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -72,8 +76,10 @@ def advanced(
             "modes follow zero crossings within the step; karnopp and leine_switch with "
             "form = 'original' are functions of v, N and F_e"
         )
-    rest = ca.SX(law.steady_state(v, N))
-    return held_step(rate, z, h, rest, where)
+    rest = law.held_rest(v, N, z)
+    if rest is None:
+        return held_step(rate, z, h, ca.SX(law.steady_state(v, N)), where)
+    return held_step(rate, z, h, ca.SX(rest), where, each=True)
 
 
 def _stacked(parts: Sequence[Step]) -> Step:
@@ -87,7 +93,9 @@ def _stacked(parts: Sequence[Step]) -> Step:
     return Step(*columns, kinds=kinds)
 
 
-def held_step(rate: ca.SX, z: ca.SX, h: ca.SX | float, rest: ca.SX, where: str) -> Step:
+def held_step(
+    rate: ca.SX, z: ca.SX, h: ca.SX | float, rest: ca.SX, where: str, *, each: bool = False
+) -> Step:
     """States after a step of h [s], their means over it, and their rates, columns.
 
     Each state by itself, those that others need first, with the means of these: exact where the
@@ -96,18 +104,19 @@ def held_step(rate: ca.SX, z: ca.SX, h: ca.SX | float, rest: ca.SX, where: str) 
         dz = h phi1(J h) f,   m = h phi2(J h) f,   J = df_i/dz_i
         z+ = z + s dz,   mean z = z + s [(1 - s) dz + s m]
 
-    of second order (Rosenbrock-Euler, exponential). s = min(1, (rest - z)/dz) ends the way where
-    the state comes to rest, which the solution cannot pass and the linearised one may. The rate at
-    the end is exp(J h) f, without the difference of large numbers that it is at z+ in fast sliding;
-    0 where the state has come to rest.
+    of second order (Rosenbrock-Euler, exponential), with J h not above `FASTEST`. s = min(1,
+    (rest - z)/dz) ends the way where the state comes to rest, which the solution cannot pass and
+    the linearised one may. The rate at the end is exp(J h) f, without the difference of large
+    numbers that it is at z+ in fast sliding; 0 where the state has come to rest.
 
     Args:
         rate: of the states `z`.
         rest: where each state comes to rest.
+        each: `rest` is that of each state at the values of the others in `z`.
 
     Raises:
         ValueError: states that act on each other in a circle, or a rate that depends on others and
-            is not affine in its own state, whose place of rest is then not known.
+            is not affine in its own state, whose place of rest is not known (without `each`).
     """
     count = z.numel()
     means, rates = [z[i] for i in range(count)], [z[i] for i in range(count)]
@@ -117,14 +126,16 @@ def held_step(rate: ca.SX, z: ca.SX, h: ca.SX | float, rest: ca.SX, where: str) 
         alone = set(pattern[i].nonzero()[0].tolist()) <= {i}
         others = [means[j] if j != i else z[i] for j in range(count)]
         f = ca.substitute(rate[i], z, ca.vertcat(*others))
-        slope = ca.jacobian(f, z[i])
-        growth, phi1, phi2 = exp_phi1_phi2(h * ca.densify(slope))
+        slope = ca.densify(ca.jacobian(f, z[i]))
+        affine = not ca.depends_on(slope, z[i])
+        growth, phi1, phi2 = exp_phi1_phi2(h * slope if affine else ca.fmin(h * slope, FASTEST))
         rates[i], bend = phi1 * f, phi2 * f
         last[i], kind = growth * f, EXACT if alone else SECOND
-        if ca.depends_on(slope, z[i]):
-            if not alone:
+        if not affine:
+            if not (alone or each):
                 raise ValueError(f"{where}: {_expected('depend on others')}")
-            s = _share(h * rates[i], rest[i] - z[i])
+            place = ca.substitute(rest[i], z, ca.vertcat(*others))
+            s = _share(h * rates[i], place - z[i])
             rates[i], bend = s * rates[i], s * ((1 - s) * rates[i] + s * bend)
             last[i], kind = ca.if_else(s < 1, 0, last[i]), SECOND
         means[i] = z[i] + h * bend

@@ -112,7 +112,7 @@ def inverse_dynamics_block(
 
     Raises:
         ValueError: closed loops, balls or free bodies, prescribed motion; laws without a step of
-            their states (Leuven, Armstrong, smooth GMS) or that ask for the applied force (exact
+            their states (Leuven, smooth GMS) or that ask for the applied force (exact
             Coulomb, Karnopp); friction whose normal force depends on other friction; a payload at
             an unknown place; as `Mechanism.build`.
     """

@@ -198,6 +198,13 @@ class Law(Parametric, ABC):
         """
         return None
 
+    def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar | None:
+        """Where each state comes to rest while v, N and the other states stay as they are.
+
+        None for a law of which only the `steady_state` is known, where all rest together.
+        """
+        return None
+
     def warnings(self) -> tuple[str, ...]:
         """What the present numbers give away, such as passivity, one sentence each."""
         return ()

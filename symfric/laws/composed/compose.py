@@ -110,6 +110,13 @@ class Sum(Law):
             return None
         return _join(v, [end for end, _ in steps]), _join(v, [mean for _, mean in steps])
 
+    def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar | None:
+        """Those of the terms below each other; steady states where a term knows no more."""
+        known = [(law, law.held_rest(v, N, part)) for law, part in self.terms(z) if law.states]
+        if all(rest is None for _, rest in known):
+            return None
+        return _join(v, [law.steady_state(v, N) if r is None else r for law, r in known])
+
     def warnings(self) -> tuple[str, ...]:
         """Those of the terms."""
         return tuple(warning for law in self.laws for warning in law.warnings())

@@ -78,6 +78,10 @@ class Wrapper(Law):
         """That of the law inside."""
         return self.inner_at(v).held_step(v, self.load(N), z, h)
 
+    def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar | None:
+        """That of the law inside."""
+        return self.inner_at(v).held_rest(v, self.load(N), z)
+
     def warnings(self) -> tuple[str, ...]:
         """Those of the law inside."""
         return self.inner.warnings()

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from symfric.foundation.numeric import Scalar, column, exp, sqrt
+from symfric.foundation.numeric import Scalar, column, exp, expm1, sqrt
 from symfric.foundation.parameters import param
 from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, Law, State
@@ -109,18 +109,34 @@ class Armstrong(Law):
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Rates of the spring [m/s], the filter [m/s^2] and the dwell [1/s]."""
         xi, w, q = z[0], z[1], z[2]
-        rest = exp(-((v / self.v_e) ** 2))
+        rest, slip = self._shares(v)
         share = self.k_t * xi / self.level(N, w, q)
         return column(
             yielding(v, share, self.n, self.v_eps, self.r_eps),
             (v - w) / self.tau_L,
-            rest * (1 - q) ** 2 / self.gamma - (1 - rest) * q / self.tau_r,
+            rest * (1 - q) ** 2 / self.gamma - slip * q / self.tau_r,
         )
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Spring at its level, filter at v, dwell in balance of growth and loss."""
-        rest = exp(-((v / self.v_e) ** 2))
-        grow, lose = rest * self.tau_r, (1 - rest) * self.gamma
-        q = 2 * grow / (2 * grow + lose + sqrt(lose * (lose + 4 * grow)))
-        xi = self.level(N, v, q) / self.k_t * smooth.sign(v, self.v_eps)
-        return column(xi, v, q)
+        q = self._balance(v)
+        return column(self._yielded(v, N, v, q), v, q)
+
+    def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
+        """The same with the spring at the level of the filter and the dwell that there are."""
+        return column(self._yielded(v, N, z[1], z[2]), v, self._balance(v))
+
+    def _shares(self, v: Scalar) -> tuple[Scalar, Scalar]:
+        """How much v is rest and how much slip, together 1, each right where it is small."""
+        x = -((v / self.v_e) ** 2)
+        return exp(x), -expm1(x)
+
+    def _balance(self, v: Scalar) -> Scalar:
+        """Where the dwell grows as fast as it is lost."""
+        rest, slip = self._shares(v)
+        grow, lose = rest * self.tau_r, slip * self.gamma
+        return 2 * grow / (2 * grow + lose + sqrt(lose * (lose + 4 * grow)))
+
+    def _yielded(self, v: Scalar, N: Scalar, w: Scalar, q: Scalar) -> Scalar:
+        """Stretch of the spring at its level."""
+        return self.level(N, w, q) / self.k_t * smooth.sign(v, self.v_eps)

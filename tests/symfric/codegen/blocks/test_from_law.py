@@ -160,6 +160,8 @@ SECOND_ORDER = {
     "gonthier": (Gonthier(), 2000),
     "rate_and_state": (RateAndState(), 2000),
     "lagged": (Lagged(Stribeck()), 2000),
+    "armstrong": (Armstrong(n=2.0), 2000),
+    "armstrong and lugre": (Sum((Armstrong(n=2.0), LuGre())), 2000),
 }
 
 
@@ -324,7 +326,6 @@ def test_parameters_without_effect_do_not_appear():
     [
         (GMS(), {}, "gms.*states that act on each other in a circle; gms with form = 'event'"),
         (Leuven(), {}, "act on each other in a circle"),
-        (Armstrong(), {}, "got states that depend on others"),
         (ExactCoulomb(), {}, "modes follow zero crossings within the step; karnopp and leine"),
         (Karnopp(form="event"), {}, "got one whose modes follow zero crossings"),
         (Dahl(), {"free": ("rho_eps",)}, "free: expected parameters that have an effect"),

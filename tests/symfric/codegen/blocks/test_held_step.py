@@ -47,6 +47,22 @@ def test_it_says_how_the_step_is_made(rate: ca.SX, kinds: tuple[str, ...]) -> No
     assert set(held_step(rate, z, 0.1, ca.SX([0.0, 0.0]), "here").kinds) == set(kinds)
 
 
+def test_growth_that_is_no_number_ends_at_rest() -> None:
+    """Logistic growth: exp(J h) is infinite, the solution comes to rest at 1."""
+    rate = ca.vertcat(1e4 * z[0] * (1 - z[0]), 0 * z[1])
+    end, mean, mean_rate, end_rate = stepped(rate, [1e-3, 0.0], 1.0, [1.0, 0.0])
+    assert (end[0], end_rate[0]) == (1.0, 0.0)
+    assert np.isfinite([mean[0], mean_rate[0]]).all()
+
+
+def test_a_state_rests_where_the_mean_of_another_one_says() -> None:
+    """z_0 yields at z_1, which grows evenly: z_0 ends at the mean of z_1."""
+    rate = ca.vertcat(5 * (1 - (z[0] / z[1]) ** 30), 0 * z[0] + 2)
+    step = held_step(rate, z, 1.0, ca.vertcat(z[1], z[1]), "here", each=True)
+    end = ca.Function("end", [z], [step.end])([0.0, 1.0]).full().ravel()
+    assert end == pytest.approx([2.0, 3.0], rel=1e-12)
+
+
 def test_a_state_that_moves_away_from_its_rest_is_not_held() -> None:
     end, *_ = stepped(ca.vertcat(-(z[0] ** 2), z[1]), [1.0, 0.0], 0.1, [2.0, 0.0])
     assert end[0] < 1.0
