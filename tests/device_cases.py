@@ -8,12 +8,23 @@ import numpy as np
 from differentiable import oscillator, pendulum, root, switched
 from ensembles import explosive
 
-from symfric import BrownMcPhee, Hold, Linear, LuGre, Model, rabinowicz
+from symfric import BrownMcPhee, Hold, Linear, LuGre, Model, Viscous, rabinowicz
+from symfric.scenes import PendulumBox
 
 VELOCITIES = np.linspace(-0.1, 0.1, 7)
 TIMES = [0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0]  # the jumps of inputs among them
 X = {"x": [0.5, 1.0, 2.0]}
 JUMPS = [0.0, 0.3, 0.7], [1.0, -2.0, 3.0]
+WEDGES = [np.roots([(1 - r) * 1.001, -0.12, (1 - r) * 1e-3]).max() for r in (0.1, 5e-4)]
+"""Slopes at which `wedge` has so much of its normal force left: the second one jams."""
+
+
+def wedge() -> Model:
+    """A light box on its pendulum, see `test_following`."""
+    law = BrownMcPhee(mu_s=0.12, mu_d=0.12, v_t=1e-3)
+    box = PendulumBox(law, hinge=Viscous(sigma_2=0.0), m_box=0.02)
+    return box.mechanism().build(formulation="joint", index=1)
+
 
 CASES: dict[str, tuple[Callable[[], Model], Any, dict[str, Any]]] = {
     "stick and slip": (
@@ -52,6 +63,9 @@ CASES: dict[str, tuple[Callable[[], Model], Any, dict[str, Any]]] = {
     "mechanism, one not to be assembled": (
         pendulum, 1.0,
         {"x0": {"x": [0.6, 0.7, 0.6]}, "p": {"l": [1.0, 1.1, 1e200]}, "t_eval": [0.0, 0.5, 1.0]},
+    ),
+    "friction jams in one": (
+        wedge, 1e-3, {"x0": {"x": 0.0, "phi": np.arctan(WEDGES), "x_rate": 1.0, "phi_rate": 0.0}},
     ),
     "some fail": (
         explosive, 1.0, {"p": {"p": [0.1, 2.0, 0.5, 4.0, 0.0]}, "t_eval": [0.1, 1.0]},

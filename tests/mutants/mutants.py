@@ -5,6 +5,7 @@ Where the line of a mutant is rewritten, rewrite the mutant: `tests/test_mutants
 
 from mutants.beside import BESIDE
 from mutants.derivatives import DERIVATIVES
+from mutants.devices import DEVICES
 from mutants.dry import DRY
 from mutants.emitted import EMITTED
 from mutants.ensembles import ENSEMBLES
@@ -345,6 +346,6 @@ LEFT_OUT = (
 
 MUTANTS = (
     *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
-    *BESIDE, *CACHES, *DRY, *EMITTED, *ENSEMBLES, *LEFT_OUT, *LOOPS, *DERIVATIVES, *PLANTS,
-    *RESULTS, *ROBOTS, *SOLVERS,
+    *BESIDE, *CACHES, *DEVICES, *DRY, *EMITTED, *ENSEMBLES, *LEFT_OUT, *LOOPS, *DERIVATIVES,
+    *PLANTS, *RESULTS, *ROBOTS, *SOLVERS,
 )  # fmt: skip

@@ -13,10 +13,11 @@ gives, through the same driver, the bits of the virtual machine for every scene 
 (`tests/symfric/integrator/cuda`); NVRTC compiles it without a graphics processor (`nvrtc`), which
 shows what it refuses, and how many registers a thread takes; the calls of CuPy are checked by a
 module in its place. On a device nothing is contracted to fused multiply-adds, so that only the last
-digits of exp, sin, pow and the like are others than those tested. What a device makes of it is
-tested by `test_gpu.py` where there is one, and `symfric bench ensemble` measures it there.
+digits of exp, sin, pow and the like are others than those tested. It has not run on a graphics
+processor yet: none was at hand. Where there is one, `test_gpu.py` compares with the CPU, and
+`symfric bench ensemble` measures members a second.
 
-Limits: models with events are refused. Large mechanisms spill: a slider-crank (4300 operations)
+Limits: models with events are refused. Large mechanisms spill: a slider-crank (4100 operations)
 takes all 255 registers, a six-joint arm (27000) writes kilobytes of memory in every attempt and
 takes NVRTC a minute. Single precision (`real="float"`) follows double at rtol 1e-4 with as many
 attempts and as small errors; at 1e-5 errors stay at up to 4e-5 of the largest magnitudes, with up
