@@ -164,6 +164,14 @@ def compensated_drives_err_less_and_rest(printed: str, folder: Path) -> None:
         assert float(after) < 1.0
 
 
+def unit_does_what_python_does(printed: str, folder: Path) -> None:
+    """A jump of the force every millisecond costs one attempt a sample."""
+    attempts, difference = re.findall(r"1 kHz: ([\d.]+) .* - Python ([\d.e+-]+) m", printed)[0]
+    assert float(attempts) < 1.1
+    assert float(difference) < 1e-9
+    assert (folder / "drive.fmu").is_file()
+
+
 LONG = (
     "arm_to_a_place",
     "co_design",
@@ -198,6 +206,7 @@ SAYS = dict.fromkeys(LONG, motion_is_verified) | {
     "compensate_drive": compensated_drives_err_less_and_rest,
     "mpc_drive": drives_get_there_and_the_c_is_verified,
     "learn_drive": drive_has_learnt_to_stop,
+    "drive_unit": unit_does_what_python_does,
     "robot_feed_forward": each_term_makes_the_arm_truer,
     "rabinowicz": period_is_between_those_of_two_laws,
     "optimal_move": moves_are_solved_and_saved,

@@ -186,6 +186,8 @@ def _model(
             "Model.p already"
         )
     check_model(where, given)
+    if not given.x:
+        raise ValueError(f"{where} '{given.name}': expected a model with states, got none")
     if t_end is not None:
         until = checks.number(f"{where}: t_end", t_end, unit="s", above=0.0)
     return given, (0.0, until)
