@@ -154,7 +154,7 @@ def codegen(
     if chosen is None:
         made: Block | AnyLaw = robot_block(
             fit, scene, law, values,
-            name=name, h=step_size, payload=payload, tunable_gravity=tunable_gravity,
+            name=name, h=step_size, fold=fold, payload=payload, tunable_gravity=tunable_gravity,
         )  # fmt: skip
         text, own = law or made.name, {}
     elif scene is not None:
@@ -185,7 +185,7 @@ APPLIES = {
     "--step-size": (LAW, POPULATION, PLANT, INVERSE),
     "--method": (PLANT,),
     "--free": (LAW, FUNCTION, PLANT),
-    "--fold": (LAW, FUNCTION, PLANT),
+    "--fold": (LAW, FUNCTION, PLANT, INVERSE),
     "--turning": (LAW, FUNCTION),
     "--payload": (INVERSE,),
     "--tunable-gravity": (INVERSE,),

@@ -20,6 +20,7 @@ def robot_block(
     *,
     name: str | None,
     h: float | None,
+    fold: bool,
     payload: str | None,
     tunable_gravity: bool,
 ) -> Block:
@@ -29,6 +30,7 @@ def robot_block(
         file, scene: one of them; a scene may be a robot's file, too.
         law: in all joints; of a file without one, what its tags say.
         values: parameters of the scene or of the law, which become its defaults.
+        fold: the numbers of friction become constants.
         payload: frame that carries a load; its inertia is a parameter, too.
 
     Raises:
@@ -44,6 +46,7 @@ def robot_block(
         _mechanism(str(where), law, values),
         name=name,
         h=h,
+        fold=fold,
         payload=payload,
         payload_inertia=payload is not None,
         tunable_gravity=tunable_gravity,

@@ -39,6 +39,13 @@ def test_a_scene_has_the_law_that_is_asked_for(tmp_path, capsys):
     assert "verified" in capsys.readouterr().out
 
 
+@compiled
+def test_friction_is_baked_in(robot, tmp_path, capsys):
+    line = f"codegen {robot} --inverse-dynamics --fold --no-kit --out {tmp_path / 'c'} --json -"
+    assert main(line.split()) == 0
+    assert json.loads(capsys.readouterr().out)["manifest"]["parameters"] == []
+
+
 @pytest.mark.parametrize(
     ("line", "said"),
     [
