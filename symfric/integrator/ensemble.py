@@ -6,7 +6,7 @@ from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +24,6 @@ from symfric.integrator.arguments import (
     stopping,
     tolerances,
 )
-from symfric.integrator.cuda import on_device
 from symfric.integrator.equations.initial import first_steps
 from symfric.integrator.many.chunk import Chunk, Job, Solved, digest, solve_chunk
 from symfric.integrator.many.given import MemberInput, Members, members_of
@@ -37,8 +36,11 @@ from symfric.integrator.running.run import Tolerances
 from symfric.integrator.step.layout import State
 from symfric.model import Model
 
+if TYPE_CHECKING:
+    from symfric.integrator.cuda.on_device import OnDevice
+
 Array = NDArray[np.float64]
-CUDA = "cuda"
+CUDA, REALS = "cuda", ("double", "float")
 CHUNK = 500
 """Members of a task for processors."""
 
@@ -127,7 +129,8 @@ def simulate_many(
             code, a compiler. Models with events are no plain data: "serial" or "threads" only.
         workers: number of threads or processes, or of the executor's workers; default all cores
             of this machine. Twice as many chunks are under way at once.
-        chunk: members per task; default 500, on a graphics processor what a gigabyte holds.
+        chunk: members per task; default 500, on a graphics processor so many that an attempt of
+            all is a billion operations, or their results are a gigabyte.
         real: "double", or with backend="cuda" "float", single precision: for rtol of 1e-5 and more
             (`symfric.integrator.cuda`).
         out: folder that takes the results chunk by chunk, so that memory stays bounded; a call
@@ -158,7 +161,7 @@ def simulate_many(
     workers = None if workers is None else checks.count("simulate_many: workers", workers)
     chunk = None if chunk is None else checks.count("simulate_many: chunk", chunk)
     if backend == CUDA:
-        on_device.check(model, executor, workers, rtol, real)
+        _devices().check(model, executor, workers, rtol, real)
     given = members_of(model, (t_start, ends), x0, u, p)
     inputs = stopping("simulate_many", given.inputs, times, t_start, last)
     given, members = replace(given, inputs=inputs), given.count
@@ -211,7 +214,12 @@ def _size(pick: slice) -> int:
 
 def _check(model: Model, backend: str, executor: object, real: str) -> None:
     checks.choice("simulate_many: backend", backend, (*BACKENDS, CUDA))
-    on_device.check_real(real, backend == CUDA)
+    checks.choice("simulate_many: real", real, REALS)
+    if real != "double" and backend != CUDA:
+        raise ValueError(
+            f"simulate_many: real: expected double, which is what processors compute in, got "
+            f"{real}; single precision is for backend='cuda'"
+        )
     if not isinstance(executor, str | Executor):
         what = f"one of {', '.join(EXECUTORS)} or a concurrent.futures.Executor"
         raise checks.refused("simulate_many: executor", what, executor)
@@ -276,7 +284,7 @@ class _Way:
     prepare: Callable[[slice], Any]
     solve: Callable[[Any], Solved]
     chunk: int = CHUNK
-    device: on_device.OnDevice | None = None
+    device: "OnDevice | None" = None
 
 
 def _way(
@@ -290,7 +298,7 @@ def _way(
     (backend, real, executor), most = wanted, allowed.max_steps
     model, inputs = integrator.model, given.inputs
     if backend == CUDA:
-        device = on_device.OnDevice.of(integrator, inputs.breaks, looks, most, real)
+        device = _devices().OnDevice.of(integrator, inputs.breaks, looks, most, real)
         own = inputs.values.size if given.own else 0
         solve = partial(solve_chunk, device.job, runner=device.members)
         prepare = partial(_chunk, integrator, given, allowed)
@@ -301,6 +309,12 @@ def _way(
         alone = partial(solve_one_by_one, integrator, inputs, allowed, backend, looks)
         return _Way(job, partial(_alone, integrator, given), alone)
     return _Way(job, partial(_chunk, integrator, given, allowed), partial(solve_chunk, job))
+
+
+def _devices() -> Any:
+    from symfric.integrator.cuda import on_device  # noqa: PLC0415  (nobody else needs the emitter)
+
+    return on_device
 
 
 def _job(make: Callable[[str, int], Job], backend: str, max_steps: int, here: bool) -> Job:

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.emitter.c99 import REALS
-from symfric.foundation import checks
 from symfric.integrator.cuda.cupy_device import CupyDevice
 from symfric.integrator.cuda.device import Device
 from symfric.integrator.cuda.kernel import Kernel, kernel_of
@@ -35,16 +34,6 @@ def find_device() -> Device:
         DeviceError: none, or no CuPy.
     """
     return CupyDevice.found()
-
-
-def check_real(real: str, on_device: bool) -> None:
-    """Refuse an unknown type, and single precision on processors."""
-    checks.choice("simulate_many: real", real, tuple(REALS))
-    if real != "double" and not on_device:
-        raise ValueError(
-            f"simulate_many: real: expected double, which is what processors compute in, got "
-            f"{real}; single precision is for backend='cuda'"
-        )
 
 
 def check(model: Model, executor: object, workers: object, rtol: float, real: str) -> None:
