@@ -10,6 +10,7 @@ import typer
 
 from symfric import Law, any_from_text, law_from_text, with_values
 from symfric.cli import output
+from symfric.cli.codegen_compensator import compensator_block
 from symfric.cli.codegen_robot import robot_block
 from symfric.cli.options import (
     JsonOption,
@@ -116,6 +117,18 @@ def codegen(
     tunable_gravity: Annotated[
         bool, typer.Option("--tunable-gravity", help="Gravity is set at run time.")
     ] = False,
+    compensator: Annotated[
+        bool,
+        typer.Option("--compensator", help="A friction compensator of the law, or of a fit."),
+    ] = False,
+    compensation: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--compensation",
+            metavar="NAME=VALUE",
+            help="What it does, such as v_blend=0.02, scales=coulomb:0.9,stribeck:0, limit=5.",
+        ),
+    ] = None,
     compiler: Annotated[
         str | None, typer.Option("--compiler", help="Default: $CC, gcc or clang.")
     ] = None,
@@ -130,6 +143,8 @@ def codegen(
     Example: symfric codegen --law lugre --out build --step-size 0.001
 
     Example: symfric codegen robot.urdf --inverse-dynamics --payload tool0 --out build
+
+    Example: symfric codegen fit.json --compensator --compensation v_blend=0.02 --out build
     """
     check_names("--core", core or (), CORES)
     check_folder(out)
@@ -137,7 +152,7 @@ def codegen(
     if compiler is not None:
         find_compiler(checks.text("--compiler", compiler, "a C compiler"))
     chosen = None if inverse_dynamics else chosen_law(fit, law)
-    subject = subject_of(chosen, scene)
+    subject = subject_of(chosen, scene, compensator)
     kind = real
     if kind is None:
         kind = "double" if subject == PLANT else "both"
@@ -145,7 +160,7 @@ def codegen(
     given = {
         "--step-size": step_size is not None, "--method": method is not None, "--free": bool(free),
         "--fold": fold, "--turning": turning, "--payload": payload is not None,
-        "--tunable-gravity": tunable_gravity,
+        "--tunable-gravity": tunable_gravity, "--compensation": bool(compensation),
     }  # fmt: skip
     check_applicable(subject, [option for option, there in given.items() if there])
     own: dict[str, Any] = {"fold": fold or None, "free": free or None, "name": name, "h": step_size}
@@ -163,6 +178,13 @@ def codegen(
         made = plant_block(machine, **own)
         adjustable = partial(plant_block, machine, **{n: v for n, v in own.items() if n != "h"})
         text, own = chosen.text, {}
+    elif compensator:
+        law_of = with_settings(chosen.law, chosen.text, settings)
+        made = compensator_block(
+            law_of, chosen.drive, compensation or (),
+            name=name, h=step_size, turning=turning, fold=fold,
+        )  # fmt: skip
+        text, own = chosen.text, {}
     else:
         made = with_settings(chosen.law, chosen.text, settings)
         if turning or chosen.turning:
@@ -179,16 +201,17 @@ def codegen(
 
 
 LAW, FUNCTION, POPULATION = "a law", "a law without states", "a population"
-PLANT, INVERSE = "--scene", "--inverse-dynamics"
+PLANT, INVERSE, COMPENSATOR = "--scene", "--inverse-dynamics", "--compensator"
 
 APPLIES = {
-    "--step-size": (LAW, POPULATION, PLANT, INVERSE),
+    "--step-size": (LAW, POPULATION, PLANT, INVERSE, COMPENSATOR),
     "--method": (PLANT,),
     "--free": (LAW, FUNCTION, PLANT),
-    "--fold": (LAW, FUNCTION, PLANT, INVERSE),
-    "--turning": (LAW, FUNCTION),
+    "--fold": (LAW, FUNCTION, PLANT, INVERSE, COMPENSATOR),
+    "--turning": (LAW, FUNCTION, COMPENSATOR),
     "--payload": (INVERSE,),
     "--tunable-gravity": (INVERSE,),
+    "--compensation": (COMPENSATOR,),
 }
 """Options that do not fit all that C is made of, and what they fit."""
 
@@ -199,8 +222,17 @@ WHY = {
 }
 
 
-def subject_of(chosen: "Chosen | None", scene: str | None) -> str:
-    """What C is made of."""
+def subject_of(chosen: "Chosen | None", scene: str | None, compensator: bool) -> str:
+    """What C is made of.
+
+    Raises:
+        ValueError: a compensator of a scene or of inverse dynamics.
+    """
+    if compensator and (chosen is None or scene is not None):
+        other = INVERSE if chosen is None else PLANT
+        raise ValueError(f"codegen: {COMPENSATOR}: expected with a law or a fit, got {other}")
+    if compensator:
+        return COMPENSATOR
     if chosen is None:
         return INVERSE
     if scene is not None:

@@ -19,6 +19,7 @@ def compensator_block(
     name: str | None,
     h: float | None,
     turning: bool,
+    fold: bool,
 ) -> Block:
     """The compensator of a law, with the load and the offset of the drive that it was fitted in.
 
@@ -34,4 +35,4 @@ def compensator_block(
         raise ValueError(f"{FLAG}: expected a law, got a population, whose force is random")
     subject = law if drive is None else replace(drive, law=law)
     settings = settings_from_text(texts)
-    return compensator(subject, settings=settings, name=name, h=h, turning=turning)
+    return compensator(subject, settings=settings, name=name, h=h, turning=turning, fold=fold)

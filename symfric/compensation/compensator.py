@@ -39,6 +39,7 @@ def compensator(
     name: str | None = None,
     h: float | None = None,
     turning: bool = False,
+    fold: bool = False,
     settings: Compensation | None = None,
     **chosen: Any,
 ) -> Block:
@@ -68,6 +69,7 @@ def compensator(
         name: C identifier; default "friction_compensator".
         h: sample time [s] as a constant; without it a parameter, by default 1 ms.
         turning: units rad/s and N m.
+        fold: all parameters but h become constants.
         settings: what it does, or the fields of `Compensation` by name.
 
     Raises:
@@ -111,6 +113,7 @@ def compensator(
         parameters=(*parts.parameters, size) if uses_h else parts.parameters,
         next=ca.vertcat(ca.SX(0, 1), *parts.next),
         outputs={"F": Output(force, "N", "force to add to that of the controller")} | more,
+        about=inner.about,
         constants=dict(inner.constants) | ({} if h is None else {"h": float(size.start)}),
         equations=f"{formula(s)}\n\n{inner.equations}",
         discretisation=without_end(inner.discretisation),
@@ -118,7 +121,7 @@ def compensator(
         limits=(OVER, *inner.limits),
         sources=inner.sources,
     )
-    block = arranged(block)
+    block = arranged(folded(block) if checks.flag(f"{where}: fold", fold) else block)
     return in_turning(block) if turning else block
 
 
@@ -141,6 +144,27 @@ def _velocity(parts: Parts, s: Compensation) -> tuple[Parts, ca.SX, ca.SX]:
         parts, blend = stages.blended(parts, wanted, v, s.v_blend)
         return parts, wanted, blend
     return parts, wanted, wanted if s.velocity == "reference" else v
+
+
+def folded(block: Block) -> Block:
+    """The block with all its parameters but h as constants."""
+    gone = [p for p in block.parameters if p.name != "h"]
+    symbols = ca.vertcat(*(p.symbol for p in gone))
+    numbers = ca.vertcat(*(ca.SX(float(p.start)) for p in gone))
+
+    def constant(expression: Any) -> ca.SX:
+        return ca.substitute(ca.SX(expression), symbols, numbers)
+
+    return replace(
+        block,
+        parameters=tuple(p for p in block.parameters if p.name == "h"),
+        next=constant(block.next),
+        outputs={
+            n: replace(o, expression=constant(o.expression)) for n, o in block.outputs.items()
+        },
+        constants={p.name: float(p.start) for p in gone} | dict(block.constants),
+        about={p.name: f"{p.doc} [{p.unit}]" for p in gone} | dict(block.about),
+    )
 
 
 def without_end(discretisation: str) -> str:

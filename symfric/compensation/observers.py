@@ -218,6 +218,7 @@ def _observer(
         use=USE,
         limits=inner.limits,
         sources=inner.sources,
+        about=inner.about,
         states=parts.states,
         inputs=parts.inputs,
         parameters=parts.parameters + (() if size is None else (size,)),
