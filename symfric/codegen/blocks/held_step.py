@@ -17,9 +17,9 @@ from symfric.laws.base.law import chosen
 EXACT, EVENT, SECOND = "exact", "event", "second order"
 """How a step is made: the exponential of an affine rate, corners solved for, linearised rates."""
 
-FASTEST = 10.0
-"""Largest J h of a linearised rate: exp of what is above says nothing of the solution, but may be
-no number."""
+FASTEST = 1.0
+"""Largest J h of a linearised rate: growth beyond says nothing of the solution, and may be no
+number."""
 
 
 @final
