@@ -131,6 +131,7 @@ FLOORS: dict[str, set[str]] = {
     },
     "symfric.codegen.proof": {
         "symfric.foundation",
+        "symfric.model",
         "symfric.emitter",
         "symfric.codegen.blocks",
         "symfric.codegen.writing",

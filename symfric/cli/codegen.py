@@ -377,7 +377,7 @@ def show_verification(verification: Verification) -> None:
     output.show(f"{verification.name}: {verification.status}{compiler}")
     if verification.checks:
         output.show_table(
-            ["type", "steps", "warnings", "against CasADi", "error / peak", "foreign symbols"],
+            ["type", "steps", "warnings", "against CasADi", "error", "of", "foreign symbols"],
             [
                 (
                     check.real,
@@ -385,6 +385,7 @@ def show_verification(verification: Verification) -> None:
                     len(check.warnings),
                     bits(check.ulp),
                     f"{check.error:.2g}",
+                    check.worst or "-",
                     ", ".join(check.foreign or ()) or "none",
                 )
                 for check in verification.checks

@@ -2,15 +2,20 @@
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, final
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.kit.generate import Generated
+from symfric.codegen.proof.compared import Run, ulp
+from symfric.codegen.proof.excitation import excitation, spoiled, varied
+from symfric.codegen.proof.magnitude import terms
 from symfric.codegen.running.compiler import compile_object, link_program, needed_symbols
 from symfric.codegen.running.runaway import longest_step, runs_away, step_size
 from symfric.codegen.running.runner import program, run_c, run_vm
@@ -20,14 +25,15 @@ from symfric.emitter.c99 import REALS, Real
 from symfric.foundation.checks import kind
 from symfric.foundation.compiler import CompileError, Compiler, find_compiler
 from symfric.foundation.files import write_text
-from symfric.foundation.parameters import Variable
 
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-5
-"""Largest error of float, relative to the peak of each signal."""
+"""Largest error of float, relative to the magnitude of each signal."""
 
 STEPS = 20_000
+FEWER = 4000
+"""Steps with bad inputs, and with other parameters."""
 
 
 @final
@@ -42,12 +48,16 @@ class Check:
         ulp: in double, the largest distance from CasADi in units in the last place; 0 means equal
             bits (but for the sign of a zero). None in float.
         error: largest difference from CasADi, which computes in double from the same rounded
-            inputs and parameters, relative to the peak of each signal. In float every step begins
-            from the states that the C has: a contact that breaks away some rounding errors later
-            is no error of the C.
+            inputs and parameters, relative to the magnitude of each signal: its nominal value, its
+            peak, or the size of the terms it is the difference of, see `magnitudes`, whichever is
+            the largest. In float every step begins from the states that the C has: a contact that
+            breaks away some rounding errors later is no error of the C.
         foreign: what the object file needs besides functions of math.h in its own type; None where
             there is no `nm`.
         runs_away: the step after which a state is huge or not finite in CasADi, too; None if none.
+        worst: the signal that differs most, "" where none does.
+        rounding: how far a last bit of the arguments of that step moves that signal, in the unit of
+            `error`; an error of that size is no fault of the C but of the type. None in double.
     """
 
     real: str
@@ -57,12 +67,33 @@ class Check:
     error: float
     foreign: tuple[str, ...] | None
     runs_away: int | None = None
+    worst: str = ""
+    rounding: float | None = None
 
     @property
     def ok(self) -> bool:
         """No warnings, nothing foreign, equal bits in double, small errors in float, all finite."""
         exact = self.error <= TOLERANCE if self.ulp is None else self.ulp == 0
         return exact and not self.warnings and not self.foreign and self.runs_away is None
+
+    @property
+    def why(self) -> str:
+        """What is wrong, in words; "" where nothing is."""
+        if self.ulp:
+            return f"{self.worst} differs from CasADi by {self.ulp} ulp"
+        if not self.error <= TOLERANCE:
+            off = f"{self.worst} is off by {self.error:.1e} of its magnitude"
+            if self.rounding is None or not self.error <= ROUNDINGS * self.rounding:
+                return f"{off}, more than rounding explains"
+            moved = f"a last bit of the inputs and states moves it by {self.rounding:.1e}"
+            return f"{off}, by rounding: {moved}"
+        if self.warnings:
+            return self.warnings[0]
+        return f"it needs {', '.join(self.foreign)}" if self.foreign else ""
+
+
+ROUNDINGS = 64.0
+"""Times a last bit of the arguments: what the operations of a step may round on top of that."""
 
 
 @final
@@ -91,7 +122,7 @@ class Verification:
         """The content as plain types, for JSON."""
         return asdict(self) | {
             "ok": self.ok,
-            "checks": [asdict(check) | {"ok": check.ok} for check in self.checks],
+            "checks": [asdict(c) | {"ok": c.ok, "why": c.why} for c in self.checks],
         }
 
     def table(self) -> str:
@@ -99,7 +130,7 @@ class Verification:
         head = f"{self.name}: {self.status}" + (f" ({self.compiler})" if self.compiler else "")
         if not self.checks:
             return head
-        rows = [("real", "steps", "warnings", "bits", "error/peak", "foreign symbols")]
+        rows = [("real", "steps", "warnings", "bits", "error", "of", "foreign symbols")]
         rows += [_row(check) for check in self.checks]
         widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
         lines = (
@@ -121,12 +152,20 @@ def verify(
 ) -> Verification:
     """Compile generated C, run it beside CasADi on the same inputs and compare.
 
-    The inputs (a fixed pseudo-random sequence of 20 000 steps) hold slow sines, bursts, reversals,
-    velocities down to 1e-12, exact zeros and a varying load. The C is compiled with -O2
-    -ffp-contract=off; where a compiler may fuse multiply and add, the last bits differ.
+    Three fixed pseudo-random sequences: 20 000 steps of `excitation` (slow sines, bursts,
+    reversals, velocities down to 1e-12, exact zeros, loads that jump a thousandfold or vanish); of
+    guarded C 4000 with NaN, infinities and absurd numbers among them, `spoiled`; and where there
+    are parameters 4000 with other ones, step sizes over three decades among them, `varied`. What
+    the guards of the C do is done beside CasADi in NumPy, and the status is compared as well. The C
+    is compiled with -O2 -ffp-contract=off; where a compiler may fuse multiply and add, the last
+    bits differ. A step in which float overflows, such as a plant under an absurd force, and says so
+    by its status is not compared.
 
     A plant that runs away under these inputs, in CasADi as in C, fails: its step is too long for
     it, and the status names the longest of some shorter ones that is not, where h is a parameter.
+
+    In float a signal may be off by more than is allowed although the C is right: where friction is
+    steep, a last bit of the velocity moves it as far. That fails, too, and the status says so.
 
     Args:
         generated: what `generate` returned.
@@ -145,19 +184,19 @@ def verify(
     block, found = generated.block, find_compiler(compiler)
     if found is None:
         return Verification(block.name, NO_COMPILER, None, ())
-    inputs = excitation(block)
+    given, of = _given(generated), cache(partial(terms, block))
     checks: list[Check] = []
     try:
         for real in generated.reals:
-            checks.append(_check(generated, REALS[real], found, inputs))
+            checks.append(_check(generated, REALS[real], found, given, of))
     except CompileError as error:
         return Verification(block.name, f"not verified: {error}", str(found), tuple(checks))
-    wrong = [check.real for check in checks if not check.ok]
-    status = f"failed in {' and '.join(wrong)}" if wrong else VERIFIED
+    wrong = [f"{check.real}: {check.why}" for check in checks if not check.ok]
+    status = f"failed in {'; in '.join(wrong)}" if wrong else VERIFIED
     lost = [check.runs_away for check in checks if check.runs_away is not None]
     if lost:
         whole = block if adjustable is None or "h" not in block.constants else adjustable()
-        status = f"failed: {_too_long(whole, step_size(block), lost[0], inputs)}"
+        status = f"failed: {_too_long(whole, step_size(block), lost[0], given[0][0])}"
     return Verification(block.name, status, str(found), tuple(checks))
 
 
@@ -172,7 +211,32 @@ def _too_long(block: Block, h: float | None, steps: int, inputs: Array) -> str:
     return f"{said}, {shorter:g} s is not"
 
 
-def _check(generated: Generated, real: Real, compiler: Compiler, inputs: Array) -> Check:
+Given = list[tuple[Array, Array | None]]
+"""Inputs and, where they are not the defaults of the C, parameters of every run."""
+
+
+def _given(generated: Generated) -> Given:
+    block = generated.block
+    found: Given = [(excitation(block, STEPS), None)]
+    few = found[0][0][:FEWER]
+    if generated.guards and block.inputs:
+        found.append((spoiled(block, few), None))
+    if block.parameters:
+        parameters = varied(block, FEWER, 10.0)
+        rows = run_vm(block, REALS["double"], few, parameters=parameters, guards=False)
+        if runs_away(block, rows) is not None:  # a plant is not asked for steps beyond its own
+            parameters = varied(block, FEWER, 1.0)
+        found.append((few, parameters))
+    return found
+
+
+def _check(
+    generated: Generated,
+    real: Real,
+    compiler: Compiler,
+    given: Given,
+    of: Callable[[], ca.Function],
+) -> Check:
     block = generated.block
     with TemporaryDirectory(prefix="symfric-") as name:
         folder = Path(name)
@@ -180,71 +244,34 @@ def _check(generated: Generated, real: Real, compiler: Compiler, inputs: Array) 
         warnings = compile_object(compiler, generated.source(real.name), target)
         write_text(main, program(block, real, generated.guards))
         link_program(compiler, [main, target], generated.folder, folder / "main")
-        rows = run_c(block, real, folder / "main", inputs, guards=generated.guards)
+        runs = [
+            Run(generated, real, *g, *_rows(generated, real, folder / "main", *g), of)
+            for g in given
+        ]
         needed = needed_symbols(target)
         allowed = _allowed(block, real, generated.guards)
-    own = rows[:, : len(block.states)] if real.size == 4 else None
-    expected = run_vm(block, real, inputs, own, guards=generated.guards)
+    worst = max(runs, key=lambda run: run.error)
     return Check(
         real=real.name,
-        steps=len(inputs),
+        steps=sum(len(run.rows) for run in runs),
         warnings=tuple(warnings),
-        ulp=_ulp(rows, expected) if real.size == 8 else None,
-        error=_error(rows, expected),
+        ulp=max(ulp(run.rows, run.expected) for run in runs) if real.size == 8 else None,
+        error=worst.error,
         foreign=None if needed is None else tuple(sorted(needed - allowed)),
-        runs_away=runs_away(block, expected),
+        runs_away=runs_away(block, runs[0].expected),
+        worst=worst.worst,
+        rounding=worst.rounding if real.size == 4 else None,
     )
 
 
-def excitation(block: Block) -> Array:
-    """Inputs of every step, shape (steps, inputs), the same at each call.
-
-    An input with a lower bound of 0 or more, such as a load, varies by half around its nominal
-    value; the others see in turn, in units of their nominal value, slow sines, bursts up to 2,
-    tiny values of 1e-12 ... 1e-3, a hundred zeros and abrupt reversals.
-    """
-    random = np.random.default_rng(0)
-    return np.column_stack(
-        [np.zeros((STEPS, 0)), *(_signal(variable, random) for variable in block.inputs)]
-    )
-
-
-def _signal(variable: Variable, random: np.random.Generator) -> Array:
-    k = np.arange(STEPS)
-    if variable.lower >= 0.0:
-        return variable.nominal * (1.0 + 0.5 * np.sin(0.003 * k + random.uniform(0.0, 6.0)))
-    tiny = 10.0 ** random.uniform(-12.0, -3.0, STEPS) * random.choice([-1.0, 1.0], STEPS)
-    pieces = [
-        0.05 * np.sin(0.008 * k),
-        np.clip(random.standard_normal(STEPS), -2.0, 2.0),
-        tiny,
-        0.1 * np.sign(np.sin(0.03 * k)),
-        np.zeros(STEPS),
-    ]
-    turn = np.repeat(random.integers(0, len(pieces), STEPS // 100), 100)
-    return variable.nominal * np.choose(turn, pieces)
-
-
-def _ulp(a: Array, b: Array) -> int:
-    """Largest distance in units in the last place, the largest integer if a value is not finite."""
-    if not (np.isfinite(a).all() and np.isfinite(b).all()):
-        return np.iinfo(np.int64).max
-    distance = np.abs(_ordered(a) - _ordered(b))
-    return int(distance.max(initial=0))
-
-
-def _ordered(values: Array) -> NDArray[np.int64]:
-    """Integers in the order of the floats, neighbours one apart, both zeros 0."""
-    bits = np.ascontiguousarray(values).view(np.int64)
-    return np.where(bits < 0, np.iinfo(np.int64).min - bits, bits)
-
-
-def _error(a: Array, b: Array) -> float:
-    """Largest difference of a column relative to its peak in `b`."""
-    peak = np.abs(b).max(axis=0, initial=0.0)
-    difference = np.abs(a - b).max(axis=0, initial=0.0)
-    ratio = np.where(difference == 0.0, 0.0, difference / np.where(peak > 0.0, peak, 1.0))
-    return float(np.where(np.isnan(ratio), np.inf, ratio).max(initial=0.0))
+def _rows(
+    generated: Generated, real: Real, executable: Path, inputs: Array, parameters: Array | None
+) -> tuple[Array, Array]:
+    """One sequence of inputs, by C and by CasADi."""
+    block, guards = generated.block, generated.guards
+    rows = run_c(block, real, executable, inputs, parameters, guards=guards)
+    own = rows[:, : len(block.states)] if real.size == 4 else None
+    return rows, run_vm(block, real, inputs, own, parameters, guards=guards)
 
 
 def _allowed(block: Block, real: Real, guards: bool) -> set[str]:
@@ -256,8 +283,9 @@ def _allowed(block: Block, real: Real, guards: bool) -> set[str]:
     return own | {"_GLOBAL_OFFSET_TABLE_", "memcpy"}
 
 
-def _row(check: Check) -> tuple[str, ...]:
+def _row(check: Check) -> tuple[str, str, str, str, str, str, str]:
     bits = "-" if check.ulp is None else "equal" if check.ulp == 0 else f"{check.ulp} ulp"
     foreign = "not checked" if check.foreign is None else " ".join(check.foreign) or "none"
     error = f"{check.error:.1e}" if check.error else "0"
-    return check.real, str(check.steps), str(len(check.warnings)), bits, error, foreign
+    warnings = str(len(check.warnings))
+    return check.real, str(check.steps), warnings, bits, error, check.worst or "-", foreign

@@ -6,23 +6,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.running.runner import run_vm
+from symfric.codegen.running.runner import run_vm, signals
+from symfric.codegen.writing.guards import HUGE, Status
 from symfric.emitter.c99 import REALS
 
 Array = NDArray[np.float64]
-HUGE = 1e10
-"""Times its nominal value: no state of a machine, but one of a step that is too long."""
 SHORTER = (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3)
 
 
 def runs_away(block: Block, rows: Array) -> int | None:
-    """The first step after which a state is huge or not finite; None if there is none.
+    """The first step after which a state is huge or not finite, or restarts; None if there is none.
 
     Args:
         rows: what `run_vm` returned.
     """
     scale = np.array([v.nominal for v in block.states])
     lost = ~(np.abs(rows[:, : scale.size]) <= HUGE * scale).all(axis=1)
+    if rows.shape[1] == len(signals(block)):
+        lost |= (rows[:, -1].astype(int) & int(Status.STATE | Status.OUTPUT)) != 0
     return int(np.argmax(lost)) + 1 if lost.any() else None
 
 
@@ -48,6 +49,6 @@ def longest_step(block: Block, inputs: Array, below: float) -> float | None:
             block,
             parameters=tuple(replace(v, start=h) if v.name == "h" else v for v in block.parameters),
         )
-        if runs_away(block, run_vm(shorter, REALS["double"], inputs)) is None:
+        if runs_away(block, run_vm(shorter, REALS["double"], inputs, guards=False)) is None:
             return h
     return None

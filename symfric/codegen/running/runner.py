@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import GROUPS, Block
-from symfric.codegen.writing.guards import Model, Status
+from symfric.codegen.running.guarded import Model
+from symfric.codegen.writing.guards import Status
 from symfric.codegen.writing.layout import members, prefix
 from symfric.emitter.c99 import Real
 from symfric.foundation.compiler import CompileError
@@ -144,16 +145,11 @@ def run_vm(
         states: shape (steps, states): every step but the first begins from the row before.
         parameters: of every step, shape (steps, parameters); the defaults without them.
     """
-    kind = np.float32 if real.size == 4 else np.float64
     model = Model(block, real)
-    with np.errstate(over="ignore", under="ignore"):
-        inputs = inputs.astype(kind).astype(float)
-    said = np.zeros(len(inputs), np.int64)
+    inputs, said = model.typed(inputs), np.zeros(len(inputs), np.int64)
     if guards:
         inputs, said = model.inputs(inputs)
-    p = _typed([v.start for v in block.parameters], kind)
-    start = _typed([v.start for v in block.states], kind)
-    x, u = start.copy(), np.zeros(len(block.inputs))
+    p, x, u = model.default.copy(), model.start.copy(), np.zeros(len(block.inputs))
     following, y = np.zeros_like(x), np.zeros(len(block.outputs))
     step = _bound(block.step, (x, p, u), (following, y))
     others = [np.zeros_like(x) for _ in block.resets]
@@ -167,27 +163,22 @@ def run_vm(
         if states is not None and k:
             x[:] = states[k - 1]
         if parameters is not None:
-            p[:] = _typed(parameters[k], kind)
+            p[:] = model.typed(parameters[k])
             if guards:
                 p[:], bits = model.parameters(p)
                 said[k] |= bits
         if guards and model.lost(x):
-            x[:] = start
+            x[:] = model.start
             said[k] |= Status.STATE
         step()
         for call in calls:
             call()
         if guards and not np.isfinite(y).all():
-            following[:], y[:] = start, 0.0
+            following[:], y[:] = model.start, 0.0
             said[k] |= Status.OUTPUT
         row[:] = np.concatenate([following, y, *others, said[k : k + 1] if guards else ()])
         x[:] = following
     return rows
-
-
-def _typed(values: Sequence[Any] | Array, kind: type[np.floating[Any]]) -> Array:
-    """Numbers rounded to a floating point type."""
-    return np.array(values, dtype=kind).astype(float)
 
 
 def _bound(

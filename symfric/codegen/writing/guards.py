@@ -11,7 +11,7 @@ within its range is not changed by a bit, nor is a state that is too large for t
 as a bristle after the load fell. Numbers are compared by their bits, as integers: that is as cheap
 as floats, and works under -ffast-math, too, where a compiler believes that NaN does not exist.
 
-`Model` does the same in NumPy, for the comparison with CasADi.
+`symfric.codegen.running.guarded` does the same in NumPy, for the comparison with CasADi.
 """
 
 from collections.abc import Sequence
@@ -20,14 +20,12 @@ from enum import IntFlag
 from math import isfinite
 from typing import final
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.writing.layout import Member, members, places, prefix
 from symfric.emitter.c99 import Real
-from symfric.foundation.graph import graph
 from symfric.foundation.parameters import Variable
 
 Array = NDArray[np.float64]
@@ -108,14 +106,6 @@ def _range(variable: Variable, low: float, high: float, safe: float) -> Range:
 def state_limit(variable: Variable) -> float:
     """The magnitude beyond which a state counts as lost."""
     return min(HUGE * max(variable.nominal, abs(float(variable.start))), TOP)
-
-
-def used_rows(function: ca.Function, argument: int) -> tuple[int, ...]:
-    """Rows of an argument of `step` or of a reset that its results depend on."""
-    nodes = graph(function).nodes
-    return tuple(
-        sorted(n.entry[1] for n in nodes if n.op == ca.OP_INPUT and n.entry[0] == argument)
-    )
 
 
 def constants(block: Block, real: Real) -> str:
@@ -338,60 +328,3 @@ def _any(
     joined = "\n        || ".join(single) if single else "false"
     count = ["    int i;"] if loops else []
     return "\n".join([head, "{", *count, *loops, f"    return {joined};", "}"])
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Model:
-    """What the guards of a block do, on rows of numbers of one type."""
-
-    block: Block
-    real: Real
-
-    def inputs(self, rows: Array) -> tuple[Array, NDArray[np.int64]]:
-        """Inputs (steps, inputs) as a guarded step sees them, and the status of every step."""
-        used = used_rows(self.block.step, 2)
-        mended = rows.copy()
-        status = np.zeros(len(rows), np.int64)
-        for i in used:
-            column, bits = _mended(rows[:, i], range_of(self.block.inputs[i]), self.real)
-            mended[:, i], status = column, status | bits
-        return mended, status
-
-    def lost(self, states: Array) -> bool:
-        """Whether the states (states,) restart before a step."""
-        limits = self._typed(np.array([state_limit(v) for v in self.block.states]))
-        return not bool((np.abs(states) <= limits).all())
-
-    def parameters(self, values: Array) -> tuple[Array, int]:
-        """Parameters (parameters,) as a guarded step sees them, and the status."""
-        start = np.array([float(v.start) for v in self.block.parameters])
-        ranges = [parameter_range(v) for v in self.block.parameters]
-        low, high = (
-            self._typed(np.array([getattr(r, s) for r in ranges])) for s in ("low", "high")
-        )
-        fit = (values >= low) & (values <= high)
-        own = np.array([v.name == STEP_SIZE for v in self.block.parameters], bool)
-        status = 0
-        found = values.copy()
-        if not fit[~own].all():
-            found[~own] = self._typed(start)[~own]
-            status = int(Status.PARAMETER)
-        for i in np.flatnonzero(own & ~fit):
-            found[i] = np.clip(values[i], low[i], high[i]) if np.isfinite(values[i]) else start[i]
-            status = int(Status.PARAMETER)
-        return self._typed(found), status
-
-    def _typed(self, values: Array) -> Array:
-        kind = np.float32 if self.real.size == 4 else np.float64
-        return values.astype(kind).astype(float)
-
-
-def _mended(column: Array, within: Range, real: Real) -> tuple[Array, NDArray[np.int64]]:
-    kind = np.float32 if real.size == 4 else np.float64
-    low, high, safe = (float(kind(x)) for x in (within.low, within.high, within.safe))
-    finite = np.isfinite(column)
-    clamped = np.clip(np.where(finite, column, safe), low, high)
-    found = np.where(finite, np.where(clamped == column, column, clamped), safe)
-    bits = np.where(finite, (clamped != column) * int(Status.CLAMPED), int(Status.NOT_FINITE))
-    return found, bits.astype(np.int64)

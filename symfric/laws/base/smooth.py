@@ -60,19 +60,20 @@ def power(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
 def overload(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
     """`power` of a load share that may be far above 1, bounded so that it is a number in float.
 
-        (q w)^(n/2) - eps^n,   q = x^2 + eps^2,   q w = q below Q = BACK^(2/n), Q above it, smooth
+        w^(n/2) [1 + n/2 (1 - w/q)] - eps^n,   q = x^2 + eps^2
+        w = q well below Q = BACK^(2/n), w = Q well above it, smooth
 
-    To the bit the `power` up to q = (1 + Q)/2. What yields as fast as beyond is back at its limit
-    within a path of 1/BACK of its stretch, the rounding of a double: how fast it is cannot be seen
-    in any result. But |x|^50 of a load that fell to a sixth is no number in float, and |x|^1000 of
-    one that fell to a half none in double.
+    To the bit the `power` up to q = (1 + Q)/2, and never falling. What yields as fast as beyond is
+    back at its limit within a path of 1/BACK of its stretch, the rounding of a double: how fast it
+    is cannot be seen in any result. But |x|^50 of a load that fell to a sixth is no number in
+    float, and |x|^1000 of one that fell to a half none in double.
     """
     if equals(exponent, 2.0) or equals(eps, 0.0):
         return power(x, exponent, eps)
     q, top = x * x + eps * eps, BACK ** (2 / exponent)
     beyond = tanh(40 * (q - top) / (top - 1))  # -1 to the bit up to the middle between 1 and top
     within = (q * (1 - beyond) + top * (1 + beyond)) / 2
-    return within ** (exponent / 2) - eps**exponent
+    return within ** (exponent / 2) * (1 + exponent / 2 * (1 - within / q)) - eps**exponent
 
 
 def signed_power(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
