@@ -110,10 +110,10 @@ def compile_unit(compiler: Compiler, folder: Path, target: Path, *more: str) -> 
     Raises:
         CompileError: the compiler refuses it.
     """
-    said = compiler.run(*FLAGS, *more, str(folder / "all.c"), "-o", str(target), "-lm")
+    warned = compiler.warnings(*FLAGS, *more, str(folder / "all.c"), "-o", str(target), "-lm")
     if not target.exists():
         raise CompileError(f"{compiler} wrote nothing")
-    return [line for line in said.splitlines() if "warning:" in line]
+    return warned
 
 
 def packed(

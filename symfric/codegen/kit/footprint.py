@@ -1,7 +1,6 @@
 """What the C of a block needs: bytes of code and constants, and stack, by a compiler at hand."""
 
 import shutil
-import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from symfric.codegen.running.compiler import FLAGS
 from symfric.codegen.writing.layout import prefix
 from symfric.emitter.c99 import Real
 from symfric.foundation.compiler import CompileError, Compiler
+from symfric.foundation.programs import ProgramError, finished
 
 
 @final
@@ -74,8 +74,11 @@ def _sizes(compiler: Compiler, target: Path) -> tuple[int | None, int | None]:
     size = shutil.which(str(program.with_name(beside))) or shutil.which(beside)
     if size is None:
         return None, None
-    done = subprocess.run([size, str(target)], capture_output=True, text=True, check=False)
-    if done.returncode:
+    try:
+        done = finished((size, str(target)))
+    except ProgramError:
         return None, None
-    text, data, bss, *_ = done.stdout.splitlines()[1].split()
+    if done.status:
+        return None, None
+    text, data, bss, *_ = done.output.decode().splitlines()[1].split()
     return int(text), int(data) + int(bss)

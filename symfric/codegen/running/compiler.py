@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from symfric.foundation.compiler import Compiler
-from symfric.foundation.programs import finished
+from symfric.foundation.programs import ProgramError, finished
 
 WARNINGS = (
     "-Wall",
@@ -40,11 +40,14 @@ def link_program(compiler: Compiler, parts: Sequence[Path], include: Path, targe
 
 
 def needed_symbols(target: Path) -> frozenset[str] | None:
-    """Names that an object file takes from elsewhere; None where there is no `nm`."""
+    """Names that an object file takes from elsewhere; None where no `nm` says it."""
     nm = shutil.which("nm")
     if nm is None:
         return None
-    listed = finished((nm, "-u", str(target))).output.decode(errors="replace")
+    try:
+        listed = finished((nm, "-u", str(target))).output.decode(errors="replace")
+    except ProgramError:
+        return None
     names = [line.split()[-1] for line in listed.splitlines() if line.split()]
     if sys.platform == "darwin":
         names = [name.removeprefix("_") for name in names]
