@@ -181,6 +181,17 @@ class Rates(Third):
         self.at(t, x)
         return self.column("GetContinuousStateDerivatives", self.n)
 
+    def along(self, unknowns: list[str], seeds: dict[str, float]) -> np.ndarray:
+        """Directional derivatives."""
+        of = (c.c_uint32 * len(unknowns))(*(self.archive.reference[n] for n in unknowns))
+        by = (c.c_uint32 * len(seeds))(*(self.archive.reference[n] for n in seeds))
+        given, values = (c.c_double * len(seeds))(*seeds.values()), np.zeros(len(unknowns))
+        n, k = c.c_size_t(len(unknowns)), c.c_size_t(len(seeds))
+        place = c.c_void_p(values.ctypes.data)
+        status = self.call("GetDirectionalDerivative", of, n, by, k, given, k, place, n)
+        assert status == OK, self.said
+        return values
+
     @property
     def x(self) -> np.ndarray:
         return self.column("GetContinuousStates", self.n)

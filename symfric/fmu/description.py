@@ -31,6 +31,7 @@ class Described:
         interval: communication step [s] that is proposed.
         files: sources, the one to be compiled.
         exchange: whether it is for model exchange.
+        slopes: whether it gives directional derivatives.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Described:
     interval: float
     files: tuple[str, ...]
     exchange: bool = False
+    slopes: bool = False
 
     @property
     def tag(self) -> str:
@@ -162,6 +164,7 @@ def _second(what: Described, entries: tuple[Entry, ...]) -> Xml.Element:
         root, what.tag, modelIdentifier=what.identifier,
         canHandleVariableCommunicationStepSize=what.variable_steps, canGetAndSetFMUstate=True,
         canSerializeFMUstate=True, canNotUseMemoryManagementFunctions=True,
+        providesDirectionalDerivative=what.slopes,
     )  # fmt: skip
     sources = _child(kind, "SourceFiles")
     for name in what.files:
@@ -199,6 +202,7 @@ def _third(what: Described, entries: tuple[Entry, ...]) -> Xml.Element:
         root, what.tag, modelIdentifier=what.identifier,
         canHandleVariableCommunicationStepSize=what.variable_steps, canGetAndSetFMUState=True,
         canSerializeFMUState=True, fixedInternalStepSize=what.step,
+        providesDirectionalDerivatives=what.slopes,
     )  # fmt: skip
     _units(root, entries)
     _log(root)

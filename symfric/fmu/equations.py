@@ -221,6 +221,8 @@ def source(own: Equations) -> str:
             n, m = manifold.n, manifold.m
             slope = ca.densify(ca.SX(manifold.slope(y, d))[n : n + m, :n])
             functions["model_slope"] = ca.Function("slope", [y, d], [slope])
+    else:
+        functions["model_along"] = _along(own)
     text = [all_macros(), "\n", tables(own), "\n"]
     text += [routine(function, name) for name, function in functions.items()]
     searches = integrator.crossings is not None and own.step is None and not own.exchange
@@ -232,6 +234,20 @@ def source(own: Equations) -> str:
         text.append(_search(own) if searches else _resets(own))
         text.append(_events(own))
     return "".join(text)
+
+
+def _along(own: Equations) -> ca.Function:
+    """(t, y, d, dy, dd) -> derivatives of rates, signals and algebraic equations along (dy, dd)."""
+    model, system = own.model, own.integrator.system
+    t, y, d = ca.SX.sym("t"), system.y, system.d
+    dy, dd = ca.SX.sym("dy", system.n), ca.SX.sym("dd", d.numel())
+    outputs = (ca.SX(output.expression) for output in model.outputs.values())
+    every = ca.vertcat(*(model.vector(letter) for letter in "xzu"), *outputs)
+    signals = own.integrator.of_time("signals", every)(t, y, d)
+    rates, equations = system.f[: system.nx], system.f[system.algebraic[0]]
+    of = ca.vertcat(rates, signals, equations)
+    slope = ca.jtimes(of, ca.vertcat(y, d), ca.vertcat(dy, dd))
+    return ca.Function("along", [t, y, d, dy, dd], [ca.densify(slope)], {"cse": True})
 
 
 FOLLOWED = "static int symfric_follow(double *y, const double *d);\n"

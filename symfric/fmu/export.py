@@ -92,6 +92,8 @@ def export_fmu(
     `simulate(x0=...)`: bristles start in steady sliding, algebraic variables where their equations
     hold.
 
+    Directional derivatives are exact; units of mechanisms with loops have none.
+
     Limits: absolute tolerances stay 0.1 rtol times nominal, also for motions that are tiny beside
     their nominal values (`simulate` runs these again); pivots are those that are sound at the
     start; events in time alone set the longest step by the default experiment.
@@ -161,6 +163,7 @@ def export_fmu(
         (span[1] - span[0]) / INTERVALS,
         ("all.c",),
         exchange,
+        not loops,
     )
     build = build_description(what) if fmi == 3 else ""
     size = packed(target, described(what, listed, fmi), build, texts, binary)

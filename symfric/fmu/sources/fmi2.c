@@ -226,12 +226,8 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         size_t n_unknowns, const fmi2ValueReference knowns[],
                                         size_t n_knowns, const fmi2Real seeds[], fmi2Real values[])
 {
-    UNUSED(c);
-    UNUSED(unknowns);
-    UNUSED(n_unknowns);
-    UNUSED(knowns);
-    UNUSED(n_knowns);
-    UNUSED(seeds);
-    UNUSED(values);
-    return fmi2Error;
+    if (!c) return fmi2Error;
+    return directional(unit_of(c), unknowns, n_unknowns, knowns, n_knowns, seeds, values)
+               ? fmi2OK
+               : failed(unit_of(c));
 }

@@ -197,3 +197,13 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_
     memcpy(*state, bytes, sizeof(Memory));
     return fmi3OK;
 }
+
+fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[],
+    size_t n_unknowns, const fmi3ValueReference knowns[], size_t n_knowns, const fmi3Float64
+    seeds[], size_t n_seeds, fmi3Float64 values[], size_t n_values)
+{
+    if (!c || n_seeds != n_knowns || n_values != n_unknowns) return fmi3Error;
+    return directional(unit_of(c), unknowns, n_unknowns, knowns, n_knowns, seeds, values)
+               ? fmi3OK
+               : failed(unit_of(c));
+}

@@ -1,5 +1,5 @@
-/* FMI 3.0: what no unit has: variables of other types, clocks, configurations, dependencies that
-   change. */
+/* FMI 3.0: what no unit has: variables of other types, clocks, configurations, adjoint derivatives,
+   dependencies that change. */
 
 #define NONE_OF(type)                                                                             \
     fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference references[], size_t n,     \
@@ -207,21 +207,5 @@ fmi3Status fmi3ActivateModelPartition(fmi3Instance c, fmi3ValueReference clock, 
     UNUSED(c);
     UNUSED(clock);
     UNUSED(time);
-    return fmi3Error;
-}
-
-fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[],
-    size_t n_unknowns, const fmi3ValueReference knowns[], size_t n_knowns, const fmi3Float64
-    seeds[], size_t n_seeds, fmi3Float64 values[], size_t n_values)
-{
-    UNUSED(c);
-    UNUSED(unknowns);
-    UNUSED(n_unknowns);
-    UNUSED(knowns);
-    UNUSED(n_knowns);
-    UNUSED(seeds);
-    UNUSED(n_seeds);
-    UNUSED(values);
-    UNUSED(n_values);
     return fmi3Error;
 }

@@ -88,6 +88,32 @@ def test_a_block_that_sticks_exactly_breaks_away(tmp_path):
     unit.free()
 
 
+@pytest.mark.parametrize("what", [wire(), Pendulum(BrownMcPhee())], ids=["wire", "pendulum"])
+def test_directional_derivatives_are_those_of_differences(what, tmp_path):
+    unit, model = unit_of(what, tmp_path)
+    assert unit.begin() == OK
+    x = np.array([0.8, -0.3])
+    unit.at(0.0, x)
+    knowns = [v.name for v in (*model.x, *model.u, *model.p[:2])]
+    unknowns = [*(f"der({v.name})" for v in model.x), *(v.name for v in model.z), *model.outputs]
+    at = dict(zip(knowns[:2], x, strict=True))
+    at |= dict(zip(knowns[2:], unit.get(*knowns[2:]), strict=True))
+
+    def values(name: str, value: float) -> np.ndarray:
+        unit.at(0.0, np.array([value if name == n else at[n] for n in knowns[:2]]))
+        if name not in knowns[:2]:
+            assert unit.set(**{name: value}) == OK
+        return unit.get(*unknowns)
+
+    for name in knowns:
+        h = 1e-6 * max(1.0, abs(at[name]))
+        expected = (values(name, at[name] + h) - values(name, at[name] - h)) / (2 * h)
+        values(name, at[name])
+        found = unit.along(unknowns, {name: 2.0}) / 2.0
+        assert np.abs(found - expected).max() < 1e-6 * (1.0 + np.abs(expected).max()), name
+    unit.free()
+
+
 @pytest.mark.heavy
 def test_loops_pull_states_back_and_change_nothing_on_them(tmp_path):
     unit, model = unit_of(SliderCrank(BrownMcPhee()), tmp_path)
