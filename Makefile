@@ -1,6 +1,7 @@
-# make demo, test, check, stress, mutants, embedded: each makes its own virtual environment .venv when there is
-# none. PYTHON=... chooses the interpreter (3.11 or newer). make newest: the fast half of the tests on
-# the newest interpreter there is, with the newest NumPy, in .venv-newest.
+# make demo, test, check, stress, mutants, embedded: each makes its own virtual environment .venv when
+# there is none. PYTHON=... chooses the interpreter (3.11 or newer). make newest: the fast half of the
+# tests on the newest interpreter there is, with the newest NumPy, in .venv-newest. make extras: tests
+# beside other tools (FMPy, NVRTC, Pinocchio) in .venv-extras.
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
@@ -8,7 +9,7 @@ VENV := .venv
 ONE_THREAD := OPENBLAS_NUM_THREADS=1
 BIN := $(VENV)/bin
 
-.PHONY: demo test newest check stress mutants embedded clean
+.PHONY: demo test newest extras check stress mutants embedded clean
 
 demo: $(VENV)/.runtime
 	$(BIN)/symfric demo --out out
@@ -25,6 +26,15 @@ newest:
 		.venv-newest/bin/python -c 'import numpy; print("newest: NumPy", numpy.__version__)' && \
 		.venv-newest/bin/python -m pytest -n auto --dist loadfile -p no:cacheprovider \
 			-m "not slow and not heavy"; fi
+
+# What other tools say of units, kernels and robots; where their wheels cannot be had, it says so.
+extras:
+	@$(MAKE) VENV=.venv-extras .venv-extras/.test
+	@if .venv-extras/bin/python -m pip install --quiet --editable ".[fmu,cuda-check,urdf-check]"; then \
+		.venv-extras/bin/python -m pytest -n auto --dist loadfile -p no:cacheprovider \
+			tests/symfric/fmu tests/symfric/integrator/cuda tests/symfric/codegen/blocks \
+			tests/symfric/multibody/test_urdf_pinocchio.py tests/symfric/multibody/urdf; \
+	else echo "extras: the wheels of FMPy, NVRTC and Pinocchio cannot be had here, nothing run"; fi
 
 stress: $(VENV)/.test
 	$(BIN)/python -m pytest -m slow
@@ -45,7 +55,7 @@ check: $(VENV)/.dev
 	$(BIN)/basedpyright --pythonpath $(BIN)/python
 
 clean:
-	rm -rf $(VENV) .venv-newest out dist build .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .venv-newest .venv-extras out dist build .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The stages build on each other, so that `make -j` never runs two installers at once.
