@@ -13,7 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from symfric import SolveError, Status, __version__
-from symfric.foundation.compiler import CompileError
+from symfric.foundation.programs import ProgramError
 
 BAD_INPUT, FAILED_SOLVE, INTERRUPTED = 2, 1, 130
 
@@ -24,7 +24,7 @@ COMMANDS = {
     "laws": "List the friction laws, or show one in full.",
     "run": "Simulate SCENE with a friction law.",
     "identify": "Fit friction laws to measured data, and say what they are worth.",
-    "codegen": "Write a friction law or a plant as C99, and verify it.",
+    "codegen": "Write a friction law, a plant or inverse dynamics as C99, and verify it.",
     "export-fmu": "Write a scene or a model as a Functional Mock-up Unit.",
     "ocp": "Solve an optimal control problem and check it.",
     "demo": "Simulate, identify, optimise and generate C.",
@@ -108,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refuse(error, INTERRUPTED if interrupted else FAILED_SOLVE)
     except (KeyboardInterrupt, typer.Abort):
         return _refuse(KeyboardInterrupt("interrupted"), INTERRUPTED)
-    except (ValueError, OSError, MemoryError, CompileError, USAGE_ERROR) as error:
+    except (ValueError, OSError, MemoryError, ProgramError, USAGE_ERROR) as error:
         return _refuse(error, BAD_INPUT)
 
 

@@ -94,5 +94,6 @@ def test_what_is_not_there() -> None:
 
 def test_the_list_of_commands_says_what_they_say() -> None:
     for name, line in COMMANDS.items():
-        function = getattr(importlib.import_module(f"symfric.cli.{name}"), name)
+        own = name.replace("-", "_")
+        function = getattr(importlib.import_module(f"symfric.cli.{own}"), own)
         assert (function.__doc__ or "").splitlines()[0] == line
