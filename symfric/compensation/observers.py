@@ -12,6 +12,7 @@ from symfric.codegen.blocks.held_step import held_step
 from symfric.compensation import stages
 from symfric.compensation.compensator import without_end
 from symfric.compensation.parts import Parts
+from symfric.compensation.terms import LEAST
 from symfric.foundation import checks
 from symfric.foundation.parameters import parameters, with_values
 from symfric.laws import GMS, Law, LuGre, LuGreNormalised, LuGrePassive, law_name
@@ -19,8 +20,6 @@ from symfric.laws.base import smooth
 from symfric.laws.base.law import check_law
 from symfric.model import Output
 
-LEAST = 1e-9
-"""Load [N] that observers see where there is none: the laws divide by it."""
 USE = (
     "Call it once a sample and add F to the force that the controller commands.",
     "e is the position error, reference less measured, in the direction of v.",

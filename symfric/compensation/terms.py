@@ -24,6 +24,10 @@ TERMS = {
 """Terms of friction that have a scale of their own."""
 
 
+LEAST = 1e-9
+"""Load [N] that is seen where there is none: laws with states divide by it."""
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Terms:
@@ -123,8 +127,9 @@ class Terms:
 
     def _steady(self) -> ca.SX:
         """The dry force after long sliding at the velocity [N]."""
-        z = ca.SX(self.law.steady_state(self.v, self.N))
-        return _without_viscous(self.law, ca.SX(self.law.force(self.v, self.N, z)))
+        N = ca.fmax(self.N, LEAST)
+        z = ca.SX(self.law.steady_state(self.v, N))
+        return _without_viscous(self.law, ca.SX(self.law.force(self.v, N, z)))
 
 
 def level_of(law: Law, v: ca.SX) -> ca.SX | None:
