@@ -168,11 +168,14 @@ class Block:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Sixteen hexadecimal digits that change with names, units, numbers and operations."""
+        """Sixteen hexadecimal digits that change with names, units, numbers, operations, ranges."""
         groups = (self.states, self.parameters, self.inputs)
         content = (
             self.name,
-            [[(v.name, v.unit, float(v.start).hex()) for v in group] for group in groups],
+            [
+                [(v.name, v.unit, float(v.start).hex(), v.nominal, v.lower, v.upper) for v in group]
+                for group in groups
+            ],
             [(name, output.unit) for name, output in self.outputs.items()],
             graph(self.step),
             [(name, graph(self.reset(name))) for name in self.resets],

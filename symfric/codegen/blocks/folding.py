@@ -1,6 +1,6 @@
 """Which parameters stay variable at run time, and which become constants of the code."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import casadi as ca
@@ -126,3 +126,22 @@ def without_idle(block: Block, free: Sequence[str] | None, where: str) -> Block:
             "the values of the other parameters switch them off"
         )
     return replace(block, parameters=tuple(p for p in block.parameters if p.name not in idle))
+
+
+LEAST = 1e-6
+"""Times its default: the least that a parameter may become which must not be 0."""
+
+
+def above_zero(block: Block, names: Collection[str]) -> Block:
+    """The block whose parameters `names`, which are valid from 0 on, keep a distance from it.
+
+    A law takes a width of the number 0 for its original form; of a parameter that becomes 0 at run
+    time the C knows nothing, and divides by it.
+    """
+    changed = tuple(
+        replace(p, lower=LEAST * float(p.start))
+        if p.name in names and p.lower == 0.0 and float(p.start) > 0.0
+        else p
+        for p in block.parameters
+    )
+    return replace(block, parameters=changed)

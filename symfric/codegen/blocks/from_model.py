@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.discretisation import of_method
-from symfric.codegen.blocks.folding import Fold, variable, without_idle
+from symfric.codegen.blocks.folding import Fold, above_zero, variable, without_idle
 from symfric.codegen.blocks.from_law import step_variable
 from symfric.codegen.blocks.law_text import equations
 from symfric.foundation import checks
@@ -136,7 +136,10 @@ def plant_block(
         limits=LIMITS,
         sources=(METHODS[method].source,),
     )
-    return block if isinstance(machine, Model) else without_idle(block, free, where)
+    if isinstance(machine, Model):
+        return block
+    widths = [n for n, p in parameters(machine).items() if p.role == "width"]  # pyright: ignore[reportArgumentType]
+    return above_zero(without_idle(block, free, where), widths)
 
 
 USE = (

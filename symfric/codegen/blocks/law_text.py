@@ -70,7 +70,7 @@ def _text(law: Parametric) -> LawText:
     lines = [dedent(p) for p in formulas] + ["    ".join(chosen).capitalize()] * bool(chosen)
     return LawText(
         title=" ".join(paragraphs[0].split()),
-        equations="\n".join(lines),
+        equations="\n".join(lines).replace("`", ""),
         limits=tuple(_limits(about)),
         source=" ".join(source.split()),
     )

@@ -64,12 +64,12 @@ def _struct(block: Block, group: str, rows: Sequence[Member], real: Real, guards
 
 def _numbers(group: str, variables: Sequence[Variable], guards: bool) -> Iterator[str]:
     """Start or default value, where all have the same, and range."""
-    starts = {float(v.start) for v in variables}
-    if group in ("state", "param") and len(starts) == 1:
-        yield f"{'start' if group == 'state' else 'default'} {starts.pop():g}"
-    ranges = {interval(v, group, guards) for v in variables}
-    if len(ranges) == 1:
-        yield ranges.pop()
+    starts = list(dict.fromkeys(f"{float(v.start):g}" for v in variables))
+    if starts and group in ("state", "param"):
+        shown = starts if len(starts) < 2 else [starts[0], "...", starts[-1]]
+        yield f"{'start' if group == 'state' else 'default'} {' '.join(shown)}"
+    if variables:
+        yield interval(variables, group, guards)
 
 
 def _constants(block: Block, name: str) -> str:

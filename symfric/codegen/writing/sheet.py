@@ -86,7 +86,7 @@ def _inputs(block: Block, guards: bool) -> Iterator[str]:
     """Meaning, unit and range of the arguments of a function, a line each."""
     width = max((len(v.name) for v in block.inputs), default=0)
     for v in block.inputs:
-        yield f"{v.name:<{width}}  {meaning(v.doc, v.unit, interval(v, 'in', guards))}"
+        yield f"{v.name:<{width}}  {meaning(v.doc, v.unit, interval([v], 'in', guards))}"
 
 
 def meaning(doc: str, unit: str, *more: str) -> str:
@@ -94,16 +94,14 @@ def meaning(doc: str, unit: str, *more: str) -> str:
     return ", ".join(text for text in (f"{doc} [{unit}]".strip(), *more) if text)
 
 
-def interval(variable: Variable, group: str, guards: bool) -> str:
-    """The closed interval in which a variable is valid; "" for all numbers.
+def interval(variables: Sequence[Variable], group: str, guards: bool) -> str:
+    """The closed interval in which each of some variables is valid; "" for all numbers.
 
     Args:
         group: "state", "param" or "in"; guards keep the latter two within.
     """
-    low, high = variable.lower, variable.upper
-    if guards and group != "state":
-        kept = range_of(variable) if group == "in" else parameter_range(variable)
-        low, high = kept.low, kept.high
+    ends = [_ends(v, group, guards) for v in variables]
+    low, high = max(low for low, _ in ends), min(high for _, high in ends)
     if low == -high and isfinite(high):
         return f"+-{high:g}"
     if isfinite(low) and isfinite(high):
@@ -111,3 +109,10 @@ def interval(variable: Variable, group: str, guards: bool) -> str:
     if isfinite(low):
         return f">= {low:g}"
     return f"<= {high:g}" if isfinite(high) else ""
+
+
+def _ends(variable: Variable, group: str, guards: bool) -> tuple[float, float]:
+    if guards and group != "state":
+        kept = range_of(variable) if group == "in" else parameter_range(variable)
+        return kept.low, kept.high
+    return variable.lower, variable.upper

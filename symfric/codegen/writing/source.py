@@ -10,6 +10,9 @@ from symfric.codegen.writing.text import banner, block_comment, comment, folded
 from symfric.emitter.c99 import TRANSCENDENTAL, Real, macro
 from symfric.foundation.parameters import Variable
 
+ALIGNED = 30
+"""Width of values whose comments stand in a column."""
+
 
 def source(block: Block, real: Real, guards: bool = True) -> str:
     """Text of the source file; raises as `routines`."""
@@ -60,7 +63,7 @@ def _constant(
         rows.append(
             (f"{{{text}}}," if member.size else f"{text},", f"{member.name} [{member.unit}]")
         )
-    width = max(len(text) for text, _ in rows)
+    width = max((len(text) for text, _ in rows if len(text) <= ALIGNED), default=0)
     lines = "".join(
         folded(f"{text:<{width}} /* {comment(name)} */", "    ") + "\n" for text, name in rows
     )

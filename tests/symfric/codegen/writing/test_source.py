@@ -92,7 +92,7 @@ def test_cpp_links_against_the_c_objects(everything, compiler, tmp_path):
 
 def test_a_law_with_states_has_structs_and_a_step():
     text = header(law_block(LuGre()), DOUBLE)
-    assert "    double mu_s;    /* static friction coefficient [1], default 0.15, 0 to " in text
+    assert "    double mu_s;    /* static friction coefficient [1], default 0.15, " in text
     assert "    double z; /* mean bristle deflection [m], start 0 */\n" in text
     assert "extern const lugre_f64_state_t lugre_f64_start;" in text
     assert "void lugre_f64_reset(lugre_f64_state_t *state);\n" in text
