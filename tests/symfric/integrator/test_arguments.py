@@ -109,7 +109,8 @@ def test_numbers_that_would_change_results_silently_are_refused_by_every_door() 
         (doors[1:2], {"p": {"m": [1.0, -1.0]}}, r"p[.]m: expected a number >= .*, got -1"),
         (doors[1:2], {"executor": None}, "executor: expected one of serial, .*Executor, got None"),
         (doors[2:], {"peer": "vm"}, "peer: expected one of sundials, rosenbrock, ggl, got vm"),
-        (doors[:2], {"backend": "ggl"}, "backend: expected one of auto, vm, compiled, got ggl"),
+        (doors[:1], {"backend": "ggl"}, "backend: expected one of auto, vm, compiled, got ggl"),
+        (doors[1:2], {"backend": "ggl"}, "expected one of auto, vm, compiled, cuda, got ggl"),
     ]
     for some, arguments, message in cases:
         for door in some:
