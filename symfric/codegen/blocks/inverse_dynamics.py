@@ -19,6 +19,7 @@ from symfric.foundation.symbols import stacked, starts_of, symbols_of
 from symfric.model import Output, Variables
 from symfric.multibody import Mechanism
 from symfric.multibody.equations import Equations
+from symfric.multibody.friction import Contact
 from symfric.multibody.urdf.read import read_urdf
 
 WHERE = "inverse dynamics"
@@ -90,8 +91,8 @@ def inverse_dynamics_block(
     step.
 
     Inputs q_1 ... q_n, qd_1 ..., qdd_1 ... in the order of the joints that the header names;
-    outputs tau_1 ... [N m or N], positive along the joint. Parameters of the laws and constant
-    normal forces are numbered by the contacts that have them, and can be changed at run time.
+    outputs tau_1 ... [N m or N], positive along the joint. Parameters and states of the laws, and
+    constant normal forces, have the numbers of their joints, and can be changed at run time.
     Inputs of the mechanism are taken at their start values, those of motors at zero.
 
     Couplings of constant ratio, such as the fingers that mimic another one in URDF files, leave the
@@ -122,10 +123,11 @@ def inverse_dynamics_block(
     eq, size = machine.eq, step_variable(WHERE, h)
     duration = size.symbol if h is None else ca.SX(float(size.start))
     parts = [
-        rubbing(contact, normal, duration, fold=fold)
+        rubbing(contact, machine.along(contact), normal, duration, fold=fold)
         for contact, normal in zip(eq.contacts, eq.normals, strict=True)
     ]
-    states, order = numbered([part.states for part in parts])
+    labels = [machine.label(part.along) for part in parts]
+    states, order = numbered([part.states for part in parts], labels)
     if h is not None and not states:
         raise ValueError(f"{WHERE}: h: expected none without laws with states, got {h!r}")
     forces = stacked(part.force for part in parts)
@@ -146,7 +148,11 @@ def inverse_dynamics_block(
         **machine.texts("Inverse dynamics", parts),
         states=states,
         inputs=machine.inputs,
-        parameters=(*machine.parameters, *numbered([part.parameters for part in parts])[0], *own),
+        parameters=(
+            *machine.parameters,
+            *numbered([part.parameters for part in parts], labels)[0],
+            *own,
+        ),
         next=following,
         outputs=outputs,
         resets={"init_sliding": (sliding, SLIDING)} if states else {},
@@ -207,6 +213,16 @@ class _Machine:
         """Its name as one of C: files of robots may begin with a digit."""
         return self.name if self.name[:1].isalpha() else f"robot_{self.name.lstrip('_')}"
 
+    def along(self, contact: Contact) -> str:
+        """The coordinate that a contact resists."""
+        joint = self.eq.kin.topology.link_of[contact.joint].joint
+        return joint.coordinate(joint.directions[contact.direction])
+
+    def label(self, coordinate: str) -> str:
+        """The number of a coordinate that leads; the name of one that follows."""
+        names = [v.name for v in self.joints]
+        return str(names.index(coordinate) + 1) if coordinate in names else coordinate
+
     def moved(self, expression: ca.SX) -> ca.SX:
         """An expression of all coordinates in those that lead."""
         return ca.substitute([expression], list(self.symbols), list(self.values))[0]
@@ -226,8 +242,11 @@ class _Machine:
         """What the data sheet says."""
         laws = {part.law.name: part.law for part in parts}
         order = ", ".join(f"{k} {v.name}" for k, v in enumerate(self.joints, start=1))
-        where = (f"{law}: {', '.join(p.name for p in parts if p.law.name == law)}" for law in laws)
-        rubbing = ("Friction, its numbers in this order: " + "; ".join(where) + ".",)
+        where = (
+            f"{law} in {', '.join(self.label(p.along) for p in parts if p.law.name == law)}"
+            for law in laws
+        )
+        rubbing = (f"Friction, numbered by joints: {'; '.join(where)}.",)
         every = [text for law in laws.values() for text in (law.doc, law.equations) if text]
         return {
             "doc": f"{what} of '{self.name}'.",

@@ -9,23 +9,31 @@ from symfric.foundation.parameters import Variable
 from symfric.model import Variables
 
 
-def numbered(groups: Sequence[Variables]) -> tuple[Variables, list[int]]:
+def numbered(groups: Sequence[Variables], labels: Sequence[str]) -> tuple[Variables, list[int]]:
     """Variables of several joints, those of one name together: mu_s_1, mu_s_2, ..., mu_d_1, ...
 
     Args:
         groups: the variables of each joint.
+        labels: number of each joint, or another name.
 
     Returns:
         The variables, and the place of each among all of `groups`, one group behind the other.
     """
-    every = [variable for group in groups for variable in group]
+    every = [(v, label) for group, label in zip(groups, labels, strict=True) for v in group]
     found: list[Variable] = []
     order: list[int] = []
-    for stem in dict.fromkeys(v.name for v in every):
-        alike = [(i, v) for i, v in enumerate(every) if v.name == stem]
-        found += [replace(v, name=f"{stem}_{k}") for k, (_, v) in enumerate(alike, start=1)]
-        order += [i for i, _ in alike]
+    for stem in dict.fromkeys(v.name for v, _ in every):
+        alike = [(_rank(label), i) for i, (v, label) in enumerate(every) if v.name == stem]
+        for _, i in sorted(alike):
+            variable, label = every[i]
+            found.append(replace(variable, name=f"{stem}_{label}"))
+            order.append(i)
     return tuple(found), order
+
+
+def _rank(label: str) -> tuple[bool, int]:
+    """Numbers in their order, names behind them as they come."""
+    return (False, int(label)) if label.isdecimal() else (True, 0)
 
 
 def in_arrays(block: Block) -> Block:

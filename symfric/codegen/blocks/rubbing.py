@@ -20,7 +20,7 @@ class Rubbing:
     """Friction of one contact over a step.
 
     Attributes:
-        name: of the contact.
+        along: the coordinate that it resists.
         law: the block of its law alone, whose texts are those of the data sheet.
         force: friction [N], for a law of the moment [N m].
         parameters, states: under the names that the law gives them.
@@ -28,7 +28,7 @@ class Rubbing:
         sliding: the states of long sliding.
     """
 
-    name: str
+    along: str
     law: Block
     force: ca.SX
     parameters: Variables
@@ -37,10 +37,14 @@ class Rubbing:
     sliding: ca.SX
 
 
-def rubbing(contact: Contact, normal: ca.SX, h: ca.SX, *, fold: bool) -> Rubbing:
+def rubbing(contact: Contact, along: str, normal: ca.SX, h: ca.SX, *, fold: bool) -> Rubbing:
     """The friction of a contact under the normal force `normal` [N], in a step of `h` [s].
 
     A constant normal force is a parameter N.
+
+    Args:
+        along: the coordinate that it resists.
+        fold: whether all parameters are constants.
 
     Raises:
         ValueError: as `law_block`; a law that asks for more than v and N.
@@ -53,11 +57,11 @@ def rubbing(contact: Contact, normal: ca.SX, h: ca.SX, *, fold: bool) -> Rubbing
             f"{', '.join(i.name for i in law.inputs)}"
         )
     block = law_block(law, free=() if fold else None, turning=friction.turning)
-    level = () if fold else _level(friction)
+    v, N = block.inputs
+    level = () if fold or not ca.depends_on(block.everything, N.symbol) else _level(friction)
     if level:
         normal = level[0].symbol
     sizes = [variable for variable in block.parameters if variable.name == "h"]
-    v, N = block.inputs
     force, following, sliding = ca.substitute(
         [
             ca.SX(block.outputs["F"].expression),
@@ -68,9 +72,7 @@ def rubbing(contact: Contact, normal: ca.SX, h: ca.SX, *, fold: bool) -> Rubbing
         [contact.slip, normal, h if sizes else ca.SX(0, 1)],
     )
     parameters = tuple(v for v in block.parameters if v.name != "h")
-    return Rubbing(
-        contact.name, block, force, (*parameters, *level), block.states, following, sliding
-    )
+    return Rubbing(along, block, force, (*parameters, *level), block.states, following, sliding)
 
 
 def _level(friction: JointFriction) -> Variables:

@@ -56,7 +56,7 @@ def test_friction_is_baked_in(robot, tmp_path, capsys):
         ("--scene rabinowicz --law lugre --inverse-dynamics", "a scene of bodies and joints"),
         ("--scene four_bar --law lugre --inverse-dynamics", "loops that close in"),
         ("{robot} --inverse-dynamics --payload hand", "a body or a frame, got 'hand'"),
-        ("{robot} --inverse-dynamics --turning", "--turning: expected with a law only"),
+        ("{robot} --inverse-dynamics --turning", "--turning: expected with a law"),
         ("{robot} --inverse-dynamics --set g=1", "--set: expected with --law only"),
         ("--law lugre --payload hand", "expected with --inverse-dynamics only"),
     ],

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from robots import random_robot, rod
 
-from symfric import BrownMcPhee, Coulomb, ExactCoulomb, Leuven, LuGre
+from symfric import BrownMcPhee, Coulomb, ExactCoulomb, Leuven, LuGre, law_from_text
 from symfric.codegen import Block, generate, law_block, verify
 from symfric.codegen.blocks.inverse_dynamics import gravity_block, inverse_dynamics_block
 from symfric.codegen.writing.header import header
@@ -278,6 +278,17 @@ def test_joints_are_arrays_in_c():
     text = header(block, FLOAT)
     for declared in ("q[6]", "qd[6]", "qdd[6]", "tau[6]", "z[6]", "mu_s[6]", "payload_c[3]"):
         assert f"    float {declared};" in text
+
+
+def test_friction_has_the_number_of_its_joint():
+    m = rotor(BrownMcPhee())
+    m.body("slide", 1.0, (0.1, 0.1, 0.1))
+    friction = JointFriction(law_from_text("viscous"), normal=2.0)
+    m.joint(Prismatic("rail", "wheel", "slide", friction=friction))
+    block = inverse_dynamics_block(m)
+    names = [v.name for v in block.parameters]
+    assert names == ["mu_s_1", "mu_d_1", "v_t_1", "N_1", "sigma_2_2"]  # N does not matter there
+    assert "Friction, numbered by joints: brown_mcphee in 1; viscous in 2." in block.use
 
 
 def test_joints_of_two_kinds_are_no_array():
