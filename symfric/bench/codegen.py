@@ -13,7 +13,7 @@ from symfric.foundation.parameters import check_names
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SECTIONS = ("cores", "fmu", "compensation")
+SECTIONS = ("cores", "fuzz", "fmu", "compensation")
 """Modules `symfric.bench.codegen_<section>`, each with `measure(quick) -> Section`. Where a tool is
 absent the section has no rows, and a note that says which."""
 Tell = Callable[[str, float], None]
