@@ -94,7 +94,9 @@ def compiled(texts: Mapping[str, str], identifier: str, fmi: int) -> Binary:
     """
     compiler = find_compiler()
     name = f"binaries/{platform_name(fmi)}/{shared_name(identifier)}"
-    if compiler is None or sys.platform == "win32":
+    if sys.platform == "win32":
+        return Binary(name, b"", "units are compiled on Linux and macOS; compile sources/all.c")
+    if compiler is None:
         return Binary(name, b"", "no C compiler ($CC, gcc, clang or cc) was found")
     with tempfile.TemporaryDirectory(prefix="symfric-fmu-") as folder:
         place = Path(folder)

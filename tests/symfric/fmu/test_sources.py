@@ -26,7 +26,7 @@ compilers = [pytest.param(Compiler((path,)), id=name) for name in ("gcc", "clang
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize(
     "what",
-    [Drive(LuGre()), Pendulum(ExactCoulomb()),
+    [Drive(LuGre()), pytest.param(Pendulum(ExactCoulomb()), marks=pytest.mark.heavy),
      pytest.param(SliderCrank(ExactCoulomb()), marks=pytest.mark.heavy)],
     ids=["ode", "events", "loops"],
 )  # fmt: skip
