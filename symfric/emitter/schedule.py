@@ -10,9 +10,9 @@ IDLE = 2
 def ordered(takes: Sequence[Iterable[int]], makes: Sequence[Iterable[int]]) -> list[int]:
     """An order of statements 0, 1, ... in which what is taken has been made before.
 
-    Of those that are ready the one comes next that adds least to the values that are live, the
-    first of several: it makes some, and ends those that nobody else takes. The time is that of
-    sorting all that is taken.
+    Of those that are ready the one comes next that adds least to the values that are live: it makes
+    some, and ends those that nobody else takes. Of several it is the first that takes a single
+    value, which is often a call, else the first. The time is that of sorting all that is taken.
 
     Args:
         takes: values that each statement takes; those that none makes are there from the beginning.
@@ -34,19 +34,19 @@ def ordered(takes: Sequence[Iterable[int]], makes: Sequence[Iterable[int]]) -> l
         for j in before:
             next_ones[j].append(i)
 
-    def growth(i: int) -> int:
+    def rank(i: int) -> tuple[int, int, int]:
         made = sum(bool(takers.get(value)) for value in makes[i])
         ended = sum(len(takers[value]) == 1 for value in set(takes[i]))
-        return made - ended if made or ended else IDLE
+        return made - ended if made or ended else IDLE, min(len(set(takes[i])), 2), i
 
-    heap: list[tuple[int, int]] = []
+    heap: list[tuple[int, int, int]] = []
     for i, count in enumerate(waits):
         if count == 0:
-            heappush(heap, (growth(i), i))
+            heappush(heap, rank(i))
     found: list[int] = []
     done = [False] * len(takes)
     while heap:
-        _, i = heappop(heap)
+        _, _, i = heappop(heap)
         if done[i]:
             continue
         done[i] = True
@@ -59,8 +59,8 @@ def ordered(takes: Sequence[Iterable[int]], makes: Sequence[Iterable[int]]) -> l
         for j in next_ones[i]:
             waits[j] -= 1
             if waits[j] == 0:
-                heappush(heap, (growth(j), j))
+                heappush(heap, rank(j))
         for j in fewer:
             if waits[j] == 0 and not done[j]:
-                heappush(heap, (growth(j), j))
+                heappush(heap, rank(j))
     return found

@@ -70,7 +70,7 @@ EMITTED = (
     ),
     Mutant(
         "the order of statements does not look at what they end", SCHEDULE,
-        "return made - ended if made or ended else IDLE", "return 0", T_SCHEDULE,
+        "return made - ended if made or ended else IDLE,", "return 0,", T_SCHEDULE,
     ),
     Mutant(
         "a state is written before it is read", EMIT,
