@@ -132,10 +132,15 @@ class Armstrong(Law):
         return exp(x), -expm1(x)
 
     def _balance(self, v: Scalar) -> Scalar:
-        """Where the dwell grows as fast as it is lost."""
+        """Where the dwell grows as fast as it is lost.
+
+        The root of what is lost, `slip` gamma, is written with |v|: it has a slope at rest, too.
+        """
         rest, slip = self._shares(v)
         grow, lose = rest * self.tau_r, slip * self.gamma
-        return 2 * grow / (2 * grow + lose + sqrt(lose * (lose + 4 * grow)))
+        of_speed = self.gamma * smooth.phi1(-((v / self.v_e) ** 2))
+        root = smooth.magnitude(v, 0.0) / self.v_e * sqrt(of_speed * (lose + 4 * grow))
+        return 2 * grow / (2 * grow + lose + root)
 
     def _yielded(self, v: Scalar, N: Scalar, w: Scalar, q: Scalar) -> Scalar:
         """Stretch of the spring at its level."""
