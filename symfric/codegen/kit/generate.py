@@ -14,8 +14,8 @@ from symfric.codegen.kit.cmake import EVERY, of_block
 from symfric.codegen.kit.footprint import footprint
 from symfric.codegen.kit.loader import loader
 from symfric.codegen.kit.manifest import manifest
+from symfric.codegen.kit.self_check import table, unit_test, vector_header
 from symfric.codegen.kit.simulink import wrapper
-from symfric.codegen.kit.unit_test import table, unit_test, vector_header
 from symfric.codegen.kit.vectors import vectors
 from symfric.codegen.writing.header import header
 from symfric.codegen.writing.layout import prefix

@@ -22,7 +22,16 @@ def robot(tmp_path: Path) -> Path:
 @compiled
 def test_a_robot_becomes_one_function_with_a_payload(robot, tmp_path, capsys):
     out = tmp_path / "c"
-    line = ["codegen", str(robot), "--inverse-dynamics", "--payload", "arm", "--out", str(out)]
+    line = [
+        "codegen",
+        str(robot),
+        "--inverse-dynamics",
+        "--payload",
+        "arm",
+        "--no-kit",
+        "--out",
+        str(out),
+    ]
     assert main([*line, "--json", "-"]) == 0
     manifest = json.loads(capsys.readouterr().out)["manifest"]
     assert [v["name"] for v in manifest["inputs"]] == ["q_1", "qd_1", "qdd_1"]
@@ -33,6 +42,7 @@ def test_a_robot_becomes_one_function_with_a_payload(robot, tmp_path, capsys):
 
 
 @compiled
+@pytest.mark.heavy
 def test_a_scene_has_the_law_that_is_asked_for(tmp_path, capsys):
     line = f"codegen --scene pendulum --law lugre --inverse-dynamics --out {tmp_path / 'c'}"
     assert main(line.split()) == 0

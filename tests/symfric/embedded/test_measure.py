@@ -31,6 +31,7 @@ def test_instructions_are_counted_one_by_one():
 
 
 @on_target
+@pytest.mark.heavy
 @pytest.mark.parametrize("core", CORES)
 def test_every_core_gives_what_the_host_gives(core):
     found = measure(law_block(VelocityBased()), core=core, steps=100)
