@@ -58,6 +58,7 @@ def test_each_of_the_forces_is_nearer_to_what_it_is_for():
     assert np.abs(by_end).max() == pytest.approx(0.026, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [LuGre(), ElastoPlastic()], ids=["lugre", "ep"])
 def test_the_mean_is_of_second_order_and_the_force_at_the_end_of_first(law):
     coarse, fine = (errors(law, 2e-3, 1.0, h, within=10) for h in (1e-3, 5e-4))

@@ -8,11 +8,13 @@ import pytest
 from symfric import BrownMcPhee, LuGre
 from symfric.codegen import generate
 
+pytestmark = pytest.mark.heavy
+
 needs_cmake = pytest.mark.skipif(shutil.which("cmake") is None, reason="needs cmake")
 
 
 def test_kits_in_one_folder_do_not_overwrite_each_other(tmp_path):
-    first = {path: path.read_bytes() for path in generate(LuGre(), tmp_path).files}
+    first = {path: path.read_bytes() for path in generate(LuGre(), tmp_path, real="float").files}
     second = generate(BrownMcPhee(), tmp_path, real="float").files
     assert {path.name for path in first} & {path.name for path in second} == {"CMakeLists.txt"}
     assert all(path.read_bytes() == text for path, text in first.items())

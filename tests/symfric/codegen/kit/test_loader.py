@@ -15,7 +15,7 @@ from symfric.emitter.c99 import REALS
 from symfric.laws import GMS
 from symfric.scenes import Drive
 
-pytestmark = pytest.mark.usefixtures("compiler")
+pytestmark = [pytest.mark.usefixtures("compiler"), pytest.mark.heavy]
 
 BLOCKS = {
     "lugre": law_block(LuGre()),
@@ -33,7 +33,10 @@ def loaded(made):
     return module
 
 
-@pytest.mark.parametrize("name", BLOCKS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=[] if n in ("lugre", "drive") else pytest.mark.slow) for n in BLOCKS],
+)
 def test_it_has_the_bits_of_the_virtual_machine(name, tmp_path):
     block = BLOCKS[name]
     module = loaded(generate(block, tmp_path, real="double"))
@@ -72,18 +75,15 @@ def test_guards_speak_through_the_status(tmp_path):
     assert np.isfinite(found["F"]).all()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
+def test_names_that_are_not_there_are_refused(tmp_path):
+    module = loaded(generate(LuGre(), tmp_path, real="double"))
+    for arguments, message in (
         ({"real": "half"}, "expected one of double"),
         ({"mu": 1.0}, "expected one of mu_s"),
         ({"start": {"y": 1.0}}, "expected one of z"),
-    ],
-)
-def test_names_that_are_not_there_are_refused(arguments, message, tmp_path):
-    module = loaded(generate(LuGre(), tmp_path, real="double"))
-    with pytest.raises(ValueError, match=message):
-        module.Block(**arguments)
+    ):
+        with pytest.raises(ValueError, match=message):
+            module.Block(**arguments)
     with pytest.raises(ValueError, match="expected the inputs v, N, got v"):
         module.Block().step(v=1.0)
 

@@ -17,6 +17,8 @@ from symfric.foundation.files import write_text
 from symfric.laws import GMS
 from symfric.scenes import ALL_SCENES, Drive, Rabinowicz
 
+pytestmark = pytest.mark.heavy
+
 LAWS = {name: law for name, law in CASES.items() if name not in NO_STEP}
 EACH = 20
 """Steps with one parameter changed, before the next one is."""
@@ -45,8 +47,9 @@ def followed(block: Block, compiler: Compiler, folder: Path) -> None:
 @pytest.mark.parametrize(
     "block",
     [
-        law_block(LuGre()), law_block(BrownMcPhee()), law_block(GMS(form="event")),
-        plant_block(Drive(LuGre())), plant_block(Rabinowicz(BrownMcPhee())),
+        law_block(LuGre()), plant_block(Drive(LuGre())),
+        pytest.param(law_block(GMS(form="event")), marks=pytest.mark.slow),
+        pytest.param(plant_block(Rabinowicz(BrownMcPhee())), marks=pytest.mark.slow),
     ],
     ids=lambda block: block.name,
 )  # fmt: skip

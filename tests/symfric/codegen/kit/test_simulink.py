@@ -7,12 +7,15 @@ import pytest
 
 from symfric import BrownMcPhee, LuGre
 from symfric.codegen import generate, law_block, plant_block
+from symfric.codegen.kit.simulink import wrapper
 from symfric.codegen.kit.vectors import excitation
 from symfric.codegen.running.compiler import FLAGS, WARNINGS
 from symfric.codegen.running.runner import run_vm
 from symfric.emitter.c99 import REALS
 from symfric.laws import GMS
 from symfric.scenes import Drive
+
+pytestmark = pytest.mark.heavy
 
 SIMSTRUC = """
 typedef double real_T;
@@ -108,8 +111,17 @@ BLOCKS = {
 }
 
 
-@pytest.mark.parametrize("name", BLOCKS)
-@pytest.mark.parametrize("own", [False, True], ids=["defaults", "own parameters"])
+FEW = {("lugre", True), ("brown_mcphee", False)}
+
+
+@pytest.mark.parametrize(
+    ("name", "own"),
+    [
+        pytest.param(name, own, marks=[] if (name, own) in FEW else pytest.mark.slow)
+        for name in BLOCKS
+        for own in (False, True)
+    ],
+)
 def test_it_steps_like_the_block(name, own, compiler, tmp_path):
     block = BLOCKS[name]
     program = built(generate(block, tmp_path, real="double"), compiler, tmp_path)
@@ -136,9 +148,9 @@ def test_a_wrong_number_of_parameters_is_said(compiler, tmp_path):
     assert b"lugre: argument 2: expected [] or 8 parameters" in done.stderr
 
 
-def test_the_head_names_the_ports_and_how_to_build(tmp_path):
-    generate(LuGre(), tmp_path)
-    text = (tmp_path / "lugre_sfun.c").read_text()
+def test_the_head_names_the_ports_and_how_to_build():
+    block = law_block(LuGre())
+    text = wrapper(block, list(REALS.values()), guards=True)
     assert "mex lugre_sfun.c lugre_f64.c" in text
     assert "Outputs: F [N], F_end [N], status." in text
     assert ".a" not in text.split("#define")[0]

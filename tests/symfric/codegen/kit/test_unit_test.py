@@ -6,13 +6,16 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from law_cases import CASES, NO_STEP
 
 from symfric import BrownMcPhee, LuGre, law_from_text
 from symfric.codegen import Generated, generate, plant_block
 from symfric.codegen.running.compiler import FLAGS, WARNINGS
 from symfric.foundation.compiler import Compiler
 from symfric.laws import GMS, MaxwellSlip
-from symfric.scenes import Rabinowicz
+from symfric.scenes import ALL_SCENES, Rabinowicz
+
+pytestmark = pytest.mark.heavy
 
 STRICT = [*FLAGS, *WARNINGS, "-Werror"]
 LAWS = {
@@ -34,8 +37,19 @@ def passes(program: Path) -> bool:
     return subprocess.run([program], check=False, timeout=20).returncode == 0
 
 
-@pytest.mark.parametrize("guards", [True, False], ids=["guards", "no guards"])
-@pytest.mark.parametrize("name", LAWS)
+slow = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    ("name", "guards"),
+    [
+        ("lugre", True),
+        ("brown_mcphee", True),
+        ("brown_mcphee", False),
+        *(pytest.param(name, g, marks=slow) for name in ("gms", "sum") for g in (True, False)),
+        pytest.param("lugre", False, marks=slow),
+    ],
+)
 def test_it_passes_here_without_a_warning(
     name: str, guards: bool, compiler: Compiler, tmp_path: Path
 ) -> None:
@@ -44,6 +58,7 @@ def test_it_passes_here_without_a_warning(
         assert passes(built(made, real, compiler, tmp_path))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["rabinowicz", "maxwell_slip"])
 def test_it_passes_for_plants_and_forms_that_yield(
     name: str, compiler: Compiler, tmp_path: Path
@@ -145,3 +160,22 @@ def test_the_table_holds_the_same_rows_with_names_and_units(tmp_path: Path) -> N
     assert f"#define LUGRE_F64_VECTORS {len(rows)}\n" in text
     assert any(row[3] == "sigma_1" and float(row[4]) == 237.5 for row in rows)
     assert all(len(row) == len(head) for row in rows)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in CASES if name not in NO_STEP])
+def test_the_kit_of_every_law_passes(name: str, compiler: Compiler, tmp_path: Path) -> None:
+    made = generate(CASES[name], tmp_path)
+    for real in made.reals:
+        assert passes(built(made, real, compiler, tmp_path))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", [BrownMcPhee(), LuGre()], ids=["brown_mcphee", "lugre"])
+@pytest.mark.parametrize("name", [name for name in ALL_SCENES if name != "arm"])
+def test_the_kit_of_every_scene_passes(
+    name: str, law: LuGre, compiler: Compiler, tmp_path: Path
+) -> None:
+    made = generate(plant_block(ALL_SCENES[name](law)), tmp_path)
+    for real in made.reals:
+        assert passes(built(made, real, compiler, tmp_path))
