@@ -44,8 +44,8 @@ class Compensation:
         inertia: mass [kg] times the reference acceleration is added, too.
         delay: time [s] by which the reference is looked ahead with its acceleration: the lag of the
             drive, and half a step of the law.
-        stick: (force [N], time [s], velocity [m/s]): added while the reference moves and the axis,
-            slower than this, does not; it comes and goes over the time.
+        stick: (force [N], time [s], velocity [m/s]): added while the reference moves, faster than
+            twice this, and the axis, slower than this, does not; it comes and goes over the time.
         dither: (amplitude [N], frequency [Hz]) of a sine.
         ramp: time [s] of fading in and out at the input `enable`; None: no such input.
         limit: largest force [N].
@@ -146,6 +146,9 @@ def chosen_settings(
         )
     _check_numbers(f"{where}: hold", s.hold, "(error [m], velocity [m/s])", 2)
     _check_numbers(f"{where}: stick", s.stick, "(force [N], time [s], velocity [m/s])", 3)
+    if s.stick is not None:
+        checks.number(f"{where}: stick: velocity", s.stick[2], unit="m/s", above=0.0)
+        checks.number(f"{where}: stick: time", s.stick[1], unit="s", above=0.0)
     _check_numbers(f"{where}: dither", s.dither, "(amplitude [N], frequency [Hz])", 2)
     _check_table(f"{where}: build_up_table", s)
     checks.names(f"{where}: without", s.without, TERMS)

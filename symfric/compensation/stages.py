@@ -19,7 +19,8 @@ def blended(parts: Parts, wanted: ca.SX, v: ca.SX, v_blend: float) -> Through:
         lower=1e-12,
     )  # fmt: skip
     share = smooth.step5(ca.fabs(v) / width - 1)
-    return parts, ca.SX(wanted + share * (v - wanted))
+    # each exactly at its end, whatever the other is
+    return parts, ca.SX(share * v + (1 - share) * wanted)
 
 
 def beyond_dead_zone(parts: Parts, v: ca.SX, dead_zone: float) -> Through:
@@ -62,17 +63,21 @@ def freed(
 ) -> Through:
     """A further force that grows while the desired velocity moves and the axis does not.
 
-    Its share q in [-1, 1] goes towards sign(v_ref) while |v| < v_stick < |v_ref|, else towards 0,
-    with the pace 1/t_stick.
+    Its share q in [-1, 1] goes with the pace 1/t_stick towards sign(v_ref) while |v| is below
+    v_stick and |v_ref| beyond 2 v_stick, and towards 0 where |v| is beyond 2 v_stick or |v_ref|
+    below v_stick, with straight lines in between.
     """
     parts, most = parts.parameter("F_stick", force, "N", "further force while the axis sticks")
     parts, pace = parts.parameter(
         "t_stick", time, "s", "time over which that force comes and goes", lower=1e-9
     )
-    parts, slow = parts.parameter("v_stick", rest, "m/s", "slower than this is rest")
+    parts, slow = parts.parameter(
+        "v_stick", rest, "m/s", "slower than this is rest, twice as fast is motion", lower=1e-12
+    )
     parts, q = parts.state("stuck", "1", "share of the further force, -1 to 1")
-    sticks = ca.logic_and(ca.fabs(v) < slow, ca.fabs(wanted) > slow)
-    goal = ca.if_else(sticks, ca.sign(wanted), 0)
+    rests = smooth.clip(2 - ca.fabs(v) / slow, 0.0, 1.0)
+    moves = smooth.clip(ca.fabs(wanted) / slow - 1, 0.0, 1.0)
+    goal = ca.sign(wanted) * moves * rests
     end = q + smooth.clip(goal - q, -h / pace, h / pace)
     return parts.following(ca.SX(end)), ca.SX(most * end)
 

@@ -10,8 +10,9 @@ import numpy as np
 from symfric.codegen import Block
 from symfric.foundation.numeric import is_symbolic
 from symfric.foundation.parameters import parameters, with_values
-from symfric.laws import Law
+from symfric.laws import GMS, Law
 from symfric.laws.composed.wrapper import Wrapper
+from symfric.laws.dynamic.bristle import Bristle
 from symfric.model import Variables
 
 TERMS = {
@@ -82,8 +83,8 @@ class Terms:
             return self.force
         dry = self.dry
         if "bristle" in scales:
-            steady = self._steady()
-            dry = steady + scales["bristle"] * (dry - steady)
+            share = scales["bristle"]
+            dry = share * dry + (1 - share) * self._steady()
         coulomb = scales.get("coulomb", 1.0)
         stribeck = scales.get("stribeck", coulomb if not self.peaks else 1.0)
         if "force" in scales:
@@ -139,8 +140,7 @@ def level_of(law: Law, v: ca.SX) -> ca.SX | None:
     """
     if isinstance(law, Wrapper):
         return level_of(law.inner_at(v), v)
-    level = getattr(law, "level", None)
-    return None if level is None else ca.SX(level(v, 1.0))
+    return ca.SX(law.level(v, 1.0)) if isinstance(law, Bristle | GMS) else None
 
 
 def terms(law: Law, block: Block) -> Terms:

@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from law_cases import CASES
+from proofs import prove
 
 from symfric import (
     GMS,
@@ -21,7 +22,7 @@ from symfric import (
     Table,
     Viscous,
 )
-from symfric.codegen import Block, generate, law_block, verify
+from symfric.codegen import Block, law_block
 from symfric.compensation import TERMS, Compensation, compensator, settings_from_text
 from symfric.foundation.graph import graph
 from symfric.scenes import Drive
@@ -227,6 +228,10 @@ def test_a_stuck_axis_is_freed_and_let_go() -> None:
     assert free[49] == pytest.approx(1.0)
     assert free[-1] == 0.0
     assert machine(v_ref=-0.1) < 0.0
+    between = Machine(compensator(law, **(BARE | {"stick": (2.0, 0.1, 1e-3)})))
+    assert [between(v_ref=1.5e-3, v=1.2e-3) for _ in range(200)][-1] == pytest.approx(
+        2.0 * 0.5 * 0.8
+    )
 
 
 def test_dither_is_a_sine_of_its_own() -> None:
@@ -304,8 +309,7 @@ FULL = Compensation(
 @pytest.mark.parametrize("law", [LuGre(**CURVE), GMS(form="event")])
 def test_the_c_of_a_full_compensator_has_the_bits_of_casadi(law, tmp_path, compiler) -> None:
     block = compensator(law, settings=FULL, scales=["coulomb", "stribeck", "viscous", "bristle"])
-    found = verify(generate(block, tmp_path))
-    assert found.ok, found
+    prove(block, tmp_path)
 
 
 @pytest.mark.heavy
@@ -313,8 +317,7 @@ def test_the_c_of_a_built_up_compensator_has_the_bits_of_casadi(tmp_path, compil
     block = compensator(
         STEP, settings=FULL, build_up=1e-4, build_up_table=((0, 0), (0.3, 0.6), (1, 1))
     )
-    found = verify(generate(block, tmp_path))
-    assert found.ok, found
+    prove(block, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -330,6 +333,7 @@ def test_the_c_of_a_built_up_compensator_has_the_bits_of_casadi(tmp_path, compil
         ({"build_up": 1e-4}, "expected a law without states"),
         ({"build_up_table": ((0, 0), (1, 1))}, "expected with build_up only"),
         ({"stick": (1.0, 0.1)}, "stick: expected (force [N], time [s], velocity [m/s])"),
+        ({"stick": (1.0, 0.1, 0.0)}, "stick: velocity: expected a number > 0"),
         ({"dither": (1.0, -1.0)}, "dither: expected (amplitude [N], frequency [Hz])"),
         ({"velocity": "measured", "delay": 1e-3}, "with a desired velocity only"),
         ({"limt": 3.0}, "did you mean limit?"),
