@@ -4,7 +4,7 @@ The program makes its inputs itself. In three steps of four they are valid (the 
 ranges, zeros, denormals and step sizes of 1e-9 ... 1e3 s among them); in the others an input, a
 parameter or a state is NaN, infinite, huge, denormal or negative. Of every step is demanded:
 
-    outputs and states are finite,
+    outputs are finite (a state that is not is found by the next step, which says so),
     the status is what the ranges of inputs, parameters and states before the step say, and
     where that is 0, all bits are those of the same step generated without guards.
 
@@ -48,7 +48,7 @@ class Fuzzed:
         repaired: steps with another status.
         altered: valid steps whose bits are not those of the C without guards.
         unflagged: steps whose status is not what it must be.
-        unfinished: steps after which an output or a state is not finite.
+        unfinished: steps after which an output is not finite.
         last_resort: steps with default parameters in which an output was not finite and has been
             replaced by 0; with others, such as mu_s = 0, an output may have no value.
         report: what a sanitizer said, "" for nothing.

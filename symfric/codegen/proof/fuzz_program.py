@@ -83,7 +83,7 @@ static void bare(void)
 static int differs(const real *a, const real *b, int n) /* but for the sign of a zero */
 {{
     for (int i = 0; i < n; i++) {{
-        if (!(a[i] == b[i] || memcmp(a + i, b + i, sizeof *a) == 0)) {{ return 1; }}
+        if (!(a[i] == b[i] || (a[i] != a[i] && b[i] != b[i]))) {{ return 1; }}
     }}
     return 0;
 }}
@@ -148,10 +148,7 @@ int main(int argc, char **argv)
         memcpy(before, state, sizeof before);
         status = 0u;
         guarded();
-        if (!all_finite(state, STATES) || !all_finite(out, OUTPUTS)) {{
-            unfinished++;
-            memcpy(state, STATE_START, sizeof(real) * STATES);
-        }}
+        if (!all_finite(out, OUTPUTS)) {{ unfinished++; }}
         if ((status & 16u) != 0u && !own) {{ last++; }}
         if ((status & 15u) != must) {{ unflagged++; }}
         if (status != 0u) {{ repaired++; continue; }}

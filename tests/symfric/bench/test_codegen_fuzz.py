@@ -10,7 +10,7 @@ from symfric.laws import Dahl
 @pytest.mark.heavy
 def test_a_row_for_every_law_and_type(monkeypatch: pytest.MonkeyPatch, compiler: object) -> None:
     blocks = [(law_block(Dahl()), 2000)]
-    monkeypatch.setattr(codegen_fuzz, "_blocks", lambda quick: blocks)
+    monkeypatch.setattr(codegen_fuzz, "_blocks", lambda _: blocks)
     found = codegen_fuzz.measure(quick=True)
     rows = found.to_dict()["rows"]
     assert [row["type"] for row in rows] == ["double", "float"]

@@ -6,13 +6,16 @@ from law_cases import CASES, NO_STEP
 from symfric import LuGre
 from symfric.codegen import law_block, plant_block
 from symfric.codegen.proof.fuzz import fuzz
-from symfric.codegen.writing import guards
+from symfric.codegen.writing import guards, routines
 from symfric.scenes import Drive
 
 pytestmark = pytest.mark.heavy
 
 LAWS = [name for name in CASES if name not in NO_STEP]
 QUICK = {"brown_mcphee", "lugre", "maxwell_slip, event", "haessig_friedland", "dahl, n 0.5"}
+
+LIMITED = {"quarter_car_general", "rate_and_state", "rate_and_state, slip"}
+"""Without a value for every argument: a stroke beyond the damper's length, exp of any age."""
 
 each_law = pytest.mark.parametrize(
     "name",
@@ -25,7 +28,7 @@ each_law = pytest.mark.parametrize(
 def test_a_law_survives_random_steps(name, real, compiler):
     found = fuzz(law_block(CASES[name]), real, compiler, steps=20_000)
     assert found.ok, found
-    assert found.last_resort == 0, found
+    assert found.last_resort == 0 or name in LIMITED, found
     assert found.valid > 15_000
     assert found.repaired > 1000
 
@@ -46,7 +49,9 @@ def test_a_guard_that_is_silent_is_found(compiler, monkeypatch):
 
 
 def test_a_guard_that_alters_what_is_valid_is_found(compiler, monkeypatch):
-    text = guards.HELPERS.replace("return {name}_bits(x) - ", "x = x + x; return {name}_bits(x) - ")
-    again = text.replace("    return x;", "    return 2 * x;")
-    monkeypatch.setattr(guards, "HELPERS", again.replace("> span && x != low", "> 0"))
-    assert fuzz(law_block(LuGre()), "double", compiler, steps=5000).altered > 0
+    def doubled(block, real, variable, *rest):
+        name = variable.name
+        return [*guards.mended(block, real, variable, *rest), f"{name} = {name} + {name};"]
+
+    monkeypatch.setattr(routines, "mended", doubled)
+    assert fuzz(law_block(LuGre()), "double", compiler, steps=5000).altered > 1000
