@@ -12,6 +12,7 @@ from symfric import Law, any_from_text, law_from_text, with_values
 from symfric.cli import output
 from symfric.cli.codegen_compensator import compensator_block
 from symfric.cli.codegen_robot import robot_block
+from symfric.cli.codegen_shown import show_sizes, show_verification
 from symfric.cli.options import (
     JsonOption,
     SetOption,
@@ -136,8 +137,9 @@ def codegen(
 ) -> None:
     """Write a friction law, a plant or inverse dynamics as C99, and verify it.
 
-    The C is compiled and compared with CasADi over 20 000 steps. The exit status is 1 where it
-    could not be verified, as without a compiler, or differs; the files are written all the same.
+    The C is compiled and compared with CasADi over more than 20 000 steps, bad inputs and other
+    parameters among them. The exit status is 1 where it could not be verified, as without a
+    compiler, or differs; the files are written all the same.
     The law of a fit has the fitted numbers, and so has its drive with `--scene drive`.
 
     Example: symfric codegen --law lugre --out build --step-size 0.001
@@ -165,15 +167,16 @@ def codegen(
     check_applicable(subject, [option for option, there in given.items() if there])
     own: dict[str, Any] = {"fold": fold or None, "free": free or None, "name": name, "h": step_size}
     own = {option: value for option, value in own.items() if value is not None}
-    values, adjustable, forces = numbers("--set", settings), None, ()
+    adjustable, forces = None, ()
     if chosen is None:
+        values = numbers("--set", settings)
         made: Block | AnyLaw = robot_block(
             fit, scene, law, values,
             name=name, h=step_size, fold=fold, payload=payload, tunable_gravity=tunable_gravity,
         )  # fmt: skip
         text, own = law or made.name, {}
     elif scene is not None:
-        machine = machine_of(scene, chosen, values)
+        machine = machine_of(scene, chosen, numbers("--set", settings))
         own["method"] = "auto" if method is None else method
         made = plant_block(machine, **own)
         adjustable = partial(plant_block, machine, **{n: v for n, v in own.items() if n != "h"})
@@ -268,7 +271,8 @@ def _proved(
     if json != "-":
         show_verification(verification)
         show_sizes(generated, measured)
-    output.say_written(*generated.files, json)
+    output.say_folder(generated.folder, generated.files)
+    output.say_written(json)
     if not verification.ok:
         raise typer.Exit(1)
 
@@ -280,23 +284,6 @@ def on_cores(generated: Generated, cores: Sequence[str]) -> list[Measured]:
         for core in cores
         for real in generated.reals
     ]
-
-
-def show_sizes(generated: Generated, measured: Sequence[Measured]) -> None:
-    """Print what the C needs here, by size and -fstack-usage, and on other cores, by QEMU."""
-    rows: list[tuple[str | float, ...]] = []
-    for real in generated.reals:
-        found = generated.manifest["real"][real].get("measured")
-        if found is not None:
-            stack = max(found["stack"].values(), default="-")
-            rows.append((real, found["compiler"], found["text"] or "-", stack, "-", "-"))
-    for m in measured:
-        cells = (m.text, m.stack, m.average, m.maximum) if m.ok else (m.status, "-", "-", "-")
-        numbers = (f"{x:.0f}" if isinstance(x, float) else x for x in cells)
-        rows.append((m.real, m.core, *numbers))
-    if rows:
-        head = ["type", "built by, for", "code [B]", "stack [B]", "instructions", "at most"]
-        output.show_table(head, rows)
 
 
 @final
@@ -326,7 +313,7 @@ def chosen_law(fit: Path | None, law: str | None) -> Chosen:
     """The law of a fit, or the one that a name means.
 
     Raises:
-        ValueError: both or none, no fit in the file, a fit without a law.
+        ValueError: both or none, a robot, no fit in the file, a fit without a law.
     """
     if (fit is None) == (law is None):
         got = "neither" if fit is None else "both"
@@ -336,6 +323,11 @@ def chosen_law(fit: Path | None, law: str | None) -> Chosen:
         return Chosen(text, any_from_text(text))
     from identification.result.fitted import Fitted  # noqa: PLC0415  (SciPy is slow to import)
 
+    if fit.suffix.lower() == ".urdf":
+        raise ValueError(
+            f"codegen '{fit}': expected --inverse-dynamics with a robot, got none; "
+            "its plant is --scene FILE.urdf --law NAME"
+        )
     found = Fitted.from_json(fit)
     if found.law is None:
         raise ValueError(
@@ -369,32 +361,3 @@ def to_dict(
         "verification": verification.to_dict(),
         "cores": [m.to_dict() for m in measured],
     }
-
-
-def show_verification(verification: Verification) -> None:
-    """Print how the C compares with CasADi, one row a floating point type."""
-    compiler = f" ({verification.compiler})" if verification.compiler else ""
-    output.show(f"{verification.name}: {verification.status}{compiler}")
-    if verification.checks:
-        output.show_table(
-            ["type", "steps", "warnings", "against CasADi", "error", "of", "foreign symbols"],
-            [
-                (
-                    check.real,
-                    check.steps,
-                    len(check.warnings),
-                    bits(check.ulp),
-                    f"{check.error:.2g}",
-                    check.worst or "-",
-                    ", ".join(check.foreign or ()) or "none",
-                )
-                for check in verification.checks
-            ],
-        )
-
-
-def bits(ulp: int | None) -> str:
-    """How near the C in double is to CasADi, in words."""
-    if ulp is None:
-        return "within rounding"
-    return "bit for bit equal" if ulp == 0 else f"{ulp} ulp apart"

@@ -15,7 +15,7 @@ from identification.result.fitted import Fitted
 from ocp import Free, Solution, rest_to_rest, solve
 from symfric import ALL_LAWS, LuGre, simulate
 from symfric.cli import output
-from symfric.cli.codegen import show_verification
+from symfric.cli.codegen_shown import show_verification
 from symfric.cli.options import check_folder
 from symfric.cli.run import show_trajectory
 from symfric.codegen import generate, verify

@@ -2,6 +2,7 @@
 
 import json
 import math
+import textwrap
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -101,6 +102,22 @@ def say_written(*paths: str | Path | None) -> None:
     names = [str(path) for path in paths if path is not None and str(path) != "-"]
     if names:
         note(f"wrote {', '.join(names)}")
+
+
+def say_folder(folder: Path, paths: Sequence[Path]) -> None:
+    """Name the files written into one folder, on standard error, in lines of a terminal's width."""
+    names = "  ".join(str(path.relative_to(folder)) for path in paths)
+    note(f"wrote {len(paths)} files into {folder}:")
+    note(
+        textwrap.fill(
+            names,
+            78,
+            initial_indent="  ",
+            subsequent_indent="  ",
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+    )
 
 
 def plain(value: Any) -> Any:

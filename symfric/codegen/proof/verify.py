@@ -71,10 +71,14 @@ class Check:
     rounding: float | None = None
 
     @property
+    def near(self) -> bool:
+        """Equal bits in double, small errors in float."""
+        return self.error <= TOLERANCE if self.ulp is None else self.ulp == 0
+
+    @property
     def ok(self) -> bool:
         """No warnings, nothing foreign, equal bits in double, small errors in float, all finite."""
-        exact = self.error <= TOLERANCE if self.ulp is None else self.ulp == 0
-        return exact and not self.warnings and not self.foreign and self.runs_away is None
+        return self.near and not self.warnings and not self.foreign and self.runs_away is None
 
     @property
     def why(self) -> str:

@@ -114,8 +114,11 @@ def constants(block: Block, real: Real) -> str:
     kinds = [s for s in Status if block.states or s != Status.STATE]
     kinds = [s for s in kinds if block.parameters or s != Status.PARAMETER]
     width = max(len(s.name or "") for s in kinds)
+    meaning = dict(MEANING)
+    if not block.states:
+        meaning[Status.OUTPUT] = "a result was not finite; outputs are 0"
     return "".join(
-        f"#define {stem}_{s.name:<{width}} {s.value}u /* {MEANING[s]} */\n" for s in kinds
+        f"#define {stem}_{s.name:<{width}} {s.value}u /* {meaning[s]} */\n" for s in kinds
     )
 
 

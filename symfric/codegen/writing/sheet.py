@@ -78,8 +78,9 @@ def _constants(block: Block) -> Iterator[str]:
     """The numbers that were folded into the formulas, a line each."""
     texts = {name: f"{name} = {value:g}" for name, value in block.constants.items()}
     width = max(map(len, texts.values()), default=0)
+    about = {"h": "step size [s]"} | dict(block.about)
     for name, text in texts.items():
-        yield f"{text:<{width}}  {block.about.get(name, '')}"
+        yield f"{text:<{width}}  {about.get(name, '')}"
 
 
 def _inputs(block: Block, guards: bool) -> Iterator[str]:

@@ -2,13 +2,15 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from robots import SMALL
 
 from symfric.cli import main
-from symfric.cli.codegen import bits
+from symfric.cli.codegen_shown import bits, compared
+from symfric.codegen.proof.verify import Check
 
 compiled = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
@@ -32,11 +34,27 @@ def test_files_are_written_and_proved_equal(
 def test_the_table_shows_every_type(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     line = f"codegen --law coulomb+viscous --out {tmp_path} --real double --name stage"
     assert main(line.split()) == 0
-    out = capsys.readouterr().out
+    out, err = capsys.readouterr()
+    assert max(map(len, err.splitlines()[1:])) <= 80
     assert "stage: verified" in out
     assert "bit for bit equal" in out
     assert "float " not in out
     assert max(map(len, out.splitlines())) <= 80
+
+
+@compiled
+def test_a_law_with_forms_has_the_one_that_is_set(tmp_path: Path) -> None:
+    line = f"codegen --law gms --set form=event --set mu_s=0.2 --out {tmp_path} --real double"
+    assert main(line.split()) == 0
+    header = (tmp_path / "gms_f64.h").read_text()
+    assert "default 0.2" in header
+
+
+def test_a_float_that_differs_is_not_called_within_rounding() -> None:
+    alike = Check("float", 1, (), None, 1e-7, (), worst="F", rounding=1e-7)
+    assert compared(alike) == "within rounding"
+    assert compared(replace(alike, error=1e-2)) == "differs"
+    assert compared(replace(alike, ulp=0, error=0.0)) == "bit for bit equal"
 
 
 def test_set_parameters_and_a_fixed_step_become_constants(tmp_path: Path) -> None:

@@ -63,6 +63,7 @@ def test_the_plant_of_a_fit_holds_the_law_and_settings_change_it(fit: Path, tmp_
         ([], "expected --law NAME or the file of a fit, got neither"),
         (["FIT", "--law", "lugre"], "got both"),
         (["none.json"], "no such file"),
+        (["robot.urdf"], "expected --inverse-dynamics with a robot"),
         (["FIT", "--set", "mu_z=1"], "mu_s"),
     ],
 )

@@ -2,6 +2,7 @@
 
 import json
 from math import inf, nan
+from pathlib import Path
 
 import pytest
 
@@ -41,6 +42,18 @@ def test_docstrings_keep_equations_and_wrap_sentences_anew(
 def test_only_files_are_named_as_written(capsys: pytest.CaptureFixture[str]) -> None:
     output.say_written("a.csv", None, "-")
     assert capsys.readouterr().err == "wrote a.csv\n"
+
+
+def test_files_of_a_folder_are_named_in_lines_of_a_terminal(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    folder = Path("a folder with blanks")
+    files = [folder / f"friction_compensator_{i}.c" for i in range(9)]
+    output.say_folder(folder, files)
+    head, *lines = capsys.readouterr().err.splitlines()
+    assert head == "wrote 9 files into a folder with blanks:"
+    assert max(map(len, lines)) <= 80
+    assert " ".join(lines).split() == [file.name for file in files]
 
 
 def test_progress_is_silent_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
