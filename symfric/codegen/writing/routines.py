@@ -63,6 +63,7 @@ def routines(block: Block, real: Real, guards: bool = True) -> tuple[Routine, ..
         (output,) = block.outputs.values()
         (shown,) = block.outputs
         doc = f"{shown} [{output.unit}]: {output.doc}".rstrip(": ") + "."
+        doc += " Sets bits of *status, clears none: begin with 0." if guards else ""
         ends = f"const {real.name} {shown} = {{}};" if guards else "return {};"
         return (_routine(block, real, name, doc, block.step, [[], [ends]], guards),)
     store = [f"state->{place} = {{}};" for place in places(block, "state")]
