@@ -340,13 +340,25 @@ def chosen_law(fit: Path | None, law: str | None) -> Chosen:
 
 
 def machine_of(scene: str, chosen: Chosen, values: dict[str, float]) -> Scene:
-    """The scene with the law; of a fitted drive with its mass and offset, too."""
+    """The scene with the law; of a fitted drive with its mass and offset, too.
+
+    Raises:
+        ValueError: coefficients that are forces in a scene that has a load of its own; unknown
+            names.
+    """
     kind = kind_of(scene, "--scene")
     if kind is Drive and chosen.drive is not None:
         machine: Scene = chosen.drive
     else:  # a population is refused by its name
         machine = kind(chosen.law if isinstance(chosen.law, Law) else law_from_text(chosen.text))
     check_names(f"--set of {scene}", values, parameters(machine))
+    if chosen.forces and machine is not chosen.drive and values.get("N") != 1.0:
+        names = ", ".join(chosen.forces)
+        hint = "--set N=1" if "N" in parameters(machine) else "fit it with --normal-force"
+        raise ValueError(
+            f"codegen: --scene {scene}: expected coefficients of friction, got forces {names}, "
+            f"fitted under a load of 1 N; {hint}"
+        )
     return with_values(machine, values)
 
 

@@ -101,7 +101,7 @@ def generate(
 
     Raises:
         ValueError: bad input, a law that has no step, an operation that C99 lacks, a
-            constant outside the range of float.
+            constant above the range of float (one below it becomes the smallest that is not 0).
     """
     several = (real,) if isinstance(real, str) else checks.many("codegen: real", real, "types")
     check_names("codegen: real", several, REALS)

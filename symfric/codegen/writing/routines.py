@@ -18,6 +18,7 @@ from symfric.codegen.writing.layout import indexed, members, places, prefix
 from symfric.codegen.writing.text import WIDTH
 from symfric.emitter.arrays import emit_rolled
 from symfric.emitter.c99 import Real
+from symfric.emitter.vanishing import representable
 from symfric.foundation.graph import graph
 
 
@@ -101,7 +102,7 @@ def _routine(
     guards: bool,
 ) -> Routine:
     groups = (block.states, block.parameters, block.inputs)
-    source = graph(function)
+    source = representable(graph(function), real)
     scalars, steps = block.is_function, len(targets) > 1
     later = {
         (i, j): f"{GROUPS[i]}->{place}"

@@ -5,18 +5,15 @@ arrays, no integers of CasADi's, no calls between functions. Double precision ha
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import final
 
 import casadi as ca
-import numpy as np
 
 from symfric.emitter.c99 import DOUBLE, TRANSCENDENTAL, Real, macro
 from symfric.emitter.emit import emit
-from symfric.foundation.graph import Graph, Node, graph
-
-LEAST = float(np.finfo(np.float32).tiny)
-"""What keeps a divisor from zero in single precision where in double a smaller number does."""
+from symfric.emitter.vanishing import representable
+from symfric.foundation.graph import graph
 
 
 @final
@@ -68,9 +65,7 @@ def in_c(
     results = results or function.name_out()
     kept = [k for k, result in enumerate(results) if result]
     source = _dense(function, kept)
-    whole = graph(source)
-    if real.size < 8:
-        whole = _representable(whole)
+    whole = representable(graph(source), real)
     places = [[f"{x}[{i}]" for i in range(source.numel_in(k))] for k, x in enumerate(arguments)]
     targets = [
         [f"{results[k]}[{i}] = {{}};" for i in range(source.numel_out(j))]
@@ -102,14 +97,3 @@ def _dense(function: ca.Function, kept: Sequence[int]) -> ca.Function:
     symbols = [ca.SX.sym(name, *function.size_in(k)) for k, name in enumerate(function.name_in())]
     values = function.call(symbols, True, False)
     return ca.Function(function.name(), symbols, [ca.densify(values[k]) for k in kept])
-
-
-def _representable(whole: Graph) -> Graph:
-    """Constants that vanish in single precision as the smallest ones that do not."""
-
-    def one(node: Node) -> Node:
-        if not 0.0 < abs(node.value) < LEAST:
-            return node
-        return replace(node, value=float(np.copysign(LEAST, node.value)))
-
-    return Graph(tuple(map(one, whole.nodes)), whole.results)

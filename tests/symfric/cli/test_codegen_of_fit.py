@@ -65,6 +65,7 @@ def test_the_plant_of_a_fit_holds_the_law_and_settings_change_it(fit: Path, tmp_
         (["none.json"], "no such file"),
         (["robot.urdf"], "expected --inverse-dynamics with a robot"),
         (["FIT", "--set", "mu_z=1"], "mu_s"),
+        (["FIT", "--scene", "drive", "--set", "m=3"], "got forces mu_s, mu_d"),
     ],
 )
 def test_bad_requests_are_one_sentence(
