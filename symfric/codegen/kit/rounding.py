@@ -65,13 +65,21 @@ OPERATIONS: dict[int, Callable[..., Any]] = {
 """Those of C99 that NumPy has, by CasADi's numbers."""
 
 
-def in_type(function: ca.Function, arguments: list[Array], kind: str) -> Array | None:
+def in_type(
+    function: ca.Function,
+    arguments: list[Array],
+    kind: str,
+    random: np.random.Generator | None = None,
+) -> Array | None:
     """The results of a function, below each other, with every operation rounded to a type.
 
     Args:
         function: of SX, with dense arguments and results.
         arguments: rows of numbers, shape (rows, size of the argument).
         kind: NumPy's name of the type, such as "f4".
+        random: rounds each result that is not exact up or down by chance, one of the last bits on
+            both sides of it, instead of to the nearest. What differs between runs is rounding.
+            Source: Vignes, Mathematics and Computers in Simulation 35 (1993), CESTAC.
 
     Returns:
         Shape (rows, results), in double; None where NumPy lacks an operation (erf, remainder).
@@ -87,9 +95,23 @@ def in_type(function: ca.Function, arguments: list[Array], kind: str) -> Array |
                 value = np.full(count, node.value)
             elif node.op in (SELECT, ca.OP_IF_ELSE_ZERO):
                 value = np.where(given[0] != 0, given[1], given[2] if len(given) > 2 else 0.0)
-            elif node.op in OPERATIONS:
+            elif node.op not in OPERATIONS:
+                return None
+            elif random is None:
                 value = OPERATIONS[node.op](*given)
             else:
-                return None
+                exact = np.asarray(OPERATIONS[node.op](*(x.astype(float) for x in given)), float)
+                value = _up_or_down(exact, kind, random)
             found.append(np.asarray(value).astype(kind))
     return np.column_stack([found[i] for row in source.results for i in row]).astype(float)
+
+
+def _up_or_down(exact: Array, kind: str, random: np.random.Generator) -> Array:
+    """Numbers of the type on a side of each number taken by chance, or the number where it is one.
+
+    The double nearest to a result of an operation on floats stands for the result itself.
+    """
+    nearest = exact.astype(kind)
+    beyond = np.where(exact > nearest, np.inf, -np.inf).astype(kind)
+    other = (exact != nearest) & (random.random(exact.shape) < 0.5)
+    return np.where(other, np.nextafter(nearest, beyond), nearest)

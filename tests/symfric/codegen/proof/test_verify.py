@@ -132,7 +132,7 @@ def test_rounding_is_told_from_a_wrong_formula(compiler, tmp_path):
     )  # fmt: skip
     found = verify(generate(block, tmp_path, real="float"))
     assert found.status.startswith("failed in float: F is off by ")
-    assert ", by rounding: a last bit of the inputs and states moves it by " in found.status
+    assert ", by rounding: float moves it by " in found.status
 
 
 def test_what_is_left_of_a_difference_is_judged_by_its_terms(compiler, tmp_path):
