@@ -4,12 +4,15 @@ Where the line of a mutant is rewritten, rewrite the mutant: `tests/test_mutants
 """
 
 from mutants.beside import BESIDE
+from mutants.compensated import COMPENSATED
 from mutants.derivatives import DERIVATIVES
 from mutants.devices import DEVICES
 from mutants.dry import DRY
 from mutants.emitted import EMITTED
 from mutants.ensembles import ENSEMBLES
+from mutants.exported import EXPORTED
 from mutants.fits import FITS
+from mutants.generated import GENERATED
 from mutants.loops import LOOPS
 from mutants.mutant import Mutant
 from mutants.plants import PLANTS
@@ -346,6 +349,6 @@ LEFT_OUT = (
 
 MUTANTS = (
     *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
-    *BESIDE, *CACHES, *DEVICES, *DRY, *EMITTED, *ENSEMBLES, *LEFT_OUT, *LOOPS, *DERIVATIVES,
-    *PLANTS, *RESULTS, *ROBOTS, *SOLVERS,
+    *BESIDE, *CACHES, *COMPENSATED, *DEVICES, *DRY, *EMITTED, *ENSEMBLES, *EXPORTED,
+    *GENERATED, *LEFT_OUT, *LOOPS, *DERIVATIVES, *PLANTS, *RESULTS, *ROBOTS, *SOLVERS,
 )  # fmt: skip

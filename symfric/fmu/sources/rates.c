@@ -116,12 +116,8 @@ static Outcome carried_out(Instance *unit, int *again, int *moved)
             if (which[i]) m->events[i] = (double)NAN;
         }
         m->seen = m->rated = 0;
-        m->stopped += 1; /* rounds at this time */
+        m->stopped = 1; /* other rounds at this time end: no event takes part in two of them */
         if (over) return OVER;
-        if (m->stopped > 100) {
-            explain(unit, STORM);
-            return FAILED;
-        }
         missing = *moved ? consistent(y, m->R + DATA, CLOSES) : "";
         if (*missing) {
             explain(unit, UNSOLVED);

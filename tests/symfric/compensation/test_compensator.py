@@ -1,6 +1,6 @@
 """Friction compensators as blocks: stage by stage, and what is refused."""
 
-from math import exp, pi
+from math import exp, inf, pi
 
 import casadi as ca
 import numpy as np
@@ -250,19 +250,27 @@ def test_it_fades_in_and_out_without_a_bump() -> None:
     assert course[199] == course[299] == pytest.approx(full)
     assert course[-1] == 0.0
     assert np.abs(np.diff(course)).max() < 1.6 * full * H / 0.1
+    assert np.abs(np.diff(course, 2)).max() < 0.1 * full * H / 0.1  # no corner where it begins
+    half = Machine(compensator(STEP, velocity="reference", ramp=0.1))
+    assert [half(v_ref=0.1, enable=0.5) for _ in range(50)][-1] == 0.0
 
 
 def test_force_and_its_pace_are_limited() -> None:
     assert force(STEP, {"v_ref": 1.0}, limit=3.0) == 3.0
+    assert force(STEP, {"v_ref": -1.0}, limit=3.0) == -3.0
     machine = Machine(compensator(STEP, **(BARE | {"slew": 100.0})))
     forth = [machine(v_ref=0.1) for _ in range(100)]
     assert np.allclose(np.diff([0.0, *forth])[:59], 0.1)
     assert forth[-1] == pytest.approx(force(STEP, {"v_ref": 0.1}))
+    back = [machine(v_ref=-0.1) for _ in range(100)]
+    assert np.allclose(np.diff([forth[-1], *back]), -0.1)
 
 
 def test_offset_and_inertia_are_added() -> None:
     found = force(STEP, {"a_ref": 2.0}, offset=-0.5, inertia=3.0)
     assert found == pytest.approx(-0.5 + 6.0)
+    lower = {p.name: p.lower for p in compensator(STEP, offset=-0.5).parameters}
+    assert lower["offset"] == -inf  # or the guards would refuse it
 
 
 def test_the_integrator_is_held_at_rest_near_the_goal() -> None:

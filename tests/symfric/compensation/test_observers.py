@@ -80,6 +80,16 @@ def test_an_error_that_stands_bends_the_bristles() -> None:
     assert forces == pytest.approx(law.sigma_0 * mean + law.sigma_1 * 20.0 * e)
 
 
+def test_an_error_that_stands_stretches_the_springs() -> None:
+    """At rest F_i+ = F_i + k_i h k e, and the force is that of the middle of the step."""
+    e, gain, k = 1e-6, 20.0, np.array([float(element.k) for element in SPRINGS.elements])
+    rows = np.tile([0.0, e], (10, 1))
+    states, forces = rolled(gms_observer(SPRINGS, gain, ramp=None), rows)
+    more = k * H * gain * e
+    assert states[:, : k.size] == pytest.approx(np.outer(np.arange(1, 11), more))
+    assert forces == pytest.approx(more.sum() * (np.arange(10) + 0.5))
+
+
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_disturbance_is_found_by_the_balance_of_impulse(order: int) -> None:
     """Mass 2 kg under u = 5 N against 3 N, held: d_k = 3 (1 - q^k), or twice filtered."""

@@ -77,6 +77,8 @@ def test_events_are_seen_carried_out_and_end_the_run(unit_of):
     assert signs[0] > 0 > signs[1]
     unit.at(0.1, np.array([0.5, -2.0]))
     assert not unit.completed()
+    unit.at(0.15, np.array([-5e-10, -2.0]))  # too near for others to be sure that it is beyond
+    assert unit.column("GetEventIndicators", 2)[0] > 0
     unit.at(0.2, np.array([-1e-8, -2.0]))
     assert unit.column("GetEventIndicators", 2)[0] < 0
     assert unit.completed()

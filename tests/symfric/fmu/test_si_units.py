@@ -26,6 +26,17 @@ def test_products_of_units_have_exponents(text, expected):
 
 
 @pytest.mark.parametrize(
+    ("text", "same"),
+    [
+        ("J", "N m"), ("W", "J/s"), ("Pa", "N/m^2"), ("Hz", "1/s"), ("V", "W/A"), ("C", "A s"),
+        ("N", "kg m/s^2"),
+    ],
+)  # fmt: skip
+def test_names_of_units_are_what_they_stand_for(text, same):
+    assert exponents(text) == exponents(same)
+
+
+@pytest.mark.parametrize(
     ("text", "expected"),
     [("m", "m/s"), ("m/s", "m/s^2"), ("1", "1/s"), ("rad/(s K)", "rad/(s K s)")],
 )

@@ -88,6 +88,32 @@ def test_an_output_that_an_input_reaches_through_equations_depends_on_it():
     assert direct(model) == {"z": ("u",), "w": ("x",), "a": ("u",), "b": ("x",), "c": ()}
 
 
+def test_what_equations_share_passes_on_through_all_of_them():
+    """z - w = u, w - q = 0, q = x: each unknown may depend on all that drives any of them."""
+    x, z, w, q, u = (Variable(n, "m") for n in "xzwqu")
+    alg = ca.vertcat(z.symbol - w.symbol - u.symbol, w.symbol - q.symbol, q.symbol - x.symbol)
+    model = Model(name="m", x=(x,), z=(z, w, q), u=(u,), ode=-x.symbol, alg=alg)
+    assert direct(model) == dict.fromkeys("zwq", ("u", "x"))
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_degrees_count_from_where_water_freezes(fmi, tmp_path, monkeypatch):
+    T = Variable("T", "degC", start=20.0)
+    model = Model(name="m", x=(T,), ode=-T.symbol)
+    root, _ = described(model, tmp_path, monkeypatch, fmi)
+    bases = [unit[0].attrib for unit in root.iter("Unit") if unit.get("name") == "degC"]
+    assert bases == [{"K": "1", "offset": "273.15"}]
+
+
+@pytest.mark.parametrize(("step", "variability"), [(None, "tunable"), (1e-3, "fixed")])
+def test_a_tolerance_is_set_where_there_is_one(step, variability, tmp_path, monkeypatch):
+    monkeypatch.setattr("symfric.fmu.package.find_compiler", lambda: None)
+    unit = export_fmu(Drive(LuGre()), tmp_path / "unit.fmu", step=step)
+    (tolerance,) = (entry for entry in unit.variables if entry.name == "rtol")
+    assert tolerance.variability == variability
+    assert ("without effect" in tolerance.doc) is (step is not None)
+
+
 @pytest.mark.skipif(find_compiler() is None, reason="compiles")
 def test_a_broken_compiler_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("symfric.fmu.package.find_compiler", lambda: Compiler(("false",)))

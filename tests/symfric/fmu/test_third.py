@@ -63,6 +63,10 @@ def test_steps_of_a_fixed_length_are_those_of_the_plant(tmp_path):
     for i, name in enumerate(("x", "v")):
         column = same[31::32, names.index(name)]
         assert np.abs(found[1:, i] - column).max() <= 1e-13
+    assert unit.step(1.0, 0.3) == OK
+    before = unit.get("attempts")[0]
+    assert unit.step(1.3, 0.1) == OK  # 1.4 less 1.3 is a little more than 0.1
+    assert unit.get("attempts")[0] == before + 100
     unit.free()
 
 

@@ -1,0 +1,95 @@
+"""The closed loop against a mass without friction, whose motion is known sample by sample."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric import Model, Output, Variable
+from symfric.codegen import Block
+from symfric.compensation import Cascade, Reference, close_loop
+
+H, STEPS = 1e-3, 40
+STILL = Cascade(h=H, kp=0.0, kv=0.0, ki=0.0, inertia=1.0, limit=2.0)
+"""Commands a_ref times its inertia, whatever is measured."""
+
+
+def mass() -> Model:
+    x, v, f = Variable("x", "m"), Variable("v", "m/s"), Variable("f", "N")
+    return Model("mass", x=(x, v), u=(f,), ode=ca.vertcat(v.symbol, f.symbol))
+
+
+def reference(a: np.ndarray) -> Reference:
+    return Reference(0 * a, 0 * a, a, H)
+
+
+def push(name: str, force: float, **outputs: Output) -> Block:
+    """A block with a constant force."""
+    e = Variable("e", "m")
+    return Block(
+        name, inputs=(e,), outputs={"F": Output(force + 0 * e.symbol, "N"), **outputs},
+    )  # fmt: skip
+
+
+def closed(a: np.ndarray, blocks: object, **how: object):
+    settings = {"controller": STILL, "backend": "vm", **how}
+    return close_loop(mass(), reference(a), blocks, **settings)
+
+
+@pytest.mark.parametrize("delay", [0, 1, 3])
+def test_a_force_acts_as_many_samples_later_as_it_is_delayed(delay: int) -> None:
+    a = np.random.default_rng(0).uniform(-1.0, 1.0, STEPS)
+    found = closed(a, push("push", 0.5), delay=delay)
+    for name, extra in (("without", 0.0), ("compensated", 0.5)):
+        late = np.concatenate([np.zeros(delay), (a + extra)[: STEPS - delay]])
+        assert found[name].force == pytest.approx(late, abs=1e-12)
+        v = H * np.cumsum(late)
+        assert found[name].v[1:] == pytest.approx(v, abs=1e-9)
+        x = np.cumsum(H * np.append(0.0, v[:-1]) + H**2 / 2 * late)
+        assert found[name].x[1:] == pytest.approx(x, abs=1e-9)
+        assert found[name].added == pytest.approx(extra)
+
+
+def test_all_forces_together_stay_within_the_limit_of_the_drive() -> None:
+    found = closed(np.full(STEPS, 1.0), [push("one", 0.8), push("other", 0.9)])
+    assert found["without"].force[1:] == pytest.approx(1.0)
+    assert found["compensated"].force[1:] == pytest.approx(2.0)
+    assert found["compensated"].added == pytest.approx(1.7)
+    assert found["compensated"].saturated > 0.9
+
+
+def test_an_observer_of_forces_sees_its_own_force_but_not_that_of_others() -> None:
+    """A block that returns the u that it is given: what acted, less what others added to it."""
+    u = Variable("u", "N")
+    echo = Block("echo", inputs=(u,), outputs={"F": Output(0.5 * u.symbol + 0.1, "N")})
+    found = closed(np.full(STEPS, 0.3), [push("push", 0.4), echo])["compensated"]
+    own = [0.1, 0.1]  # what acts is one sample late, and seen one sample later
+    for _ in range(STEPS - 2):
+        own.append(0.5 * (0.3 + own[-2]) + 0.1)
+    assert found.added == pytest.approx(0.4 + np.array(own))
+
+
+def test_a_block_holds_the_integrator_of_the_controller() -> None:
+    """From the sample on that follows; what the first one added stays."""
+    own = Cascade(h=H, kp=0.0, kv=1.0, ki=10.0, inertia=0.0, count=1e-15, share=1.0)
+    rest = Reference(np.zeros(STEPS), np.full(STEPS, 0.5), np.zeros(STEPS), H)
+    runs = [
+        close_loop(mass(), rest, push(name, 0.0, **more), controller=own, backend="vm", delay=0)
+        for name, more in (("free", {}), ("held", {"hold": Output(1.0, "1")}))
+    ]
+    free, held = (run["compensated"] for run in runs)
+    assert free.force == pytest.approx(runs[1]["without"].force)
+    slow = 0.5 - np.diff(held.x[:STEPS], prepend=0.0) / H
+    integral = np.where(np.arange(STEPS) > 0, 10 * H * 0.5, 0.0)
+    assert held.force == pytest.approx(slow + integral, abs=1e-9)
+    assert (free.force[5:] > held.force[5:] + 1e-4).all()
+
+
+def test_what_is_counted_begins_after_a_tenth_of_the_time() -> None:
+    """The error is 1 mm before and 1 um after that, on a mass that stands."""
+    x = np.where(np.arange(STEPS) < STEPS // 10, 1e-3, 1e-6)
+    zero = np.zeros(STEPS)
+    found = close_loop(
+        mass(), Reference(x, zero, zero, H), push("push", 0.0), controller=STILL, backend="vm"
+    )
+    assert found["without"].rms == pytest.approx(1e-6)
+    assert found["without"].peak == pytest.approx(1e-6)
