@@ -21,16 +21,17 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="units are run a
 def gate() -> Model:
     """A point at 1 m/s that passes gates: which and where. The last one ends it."""
     x, u = Variable("x", "m"), Variable("u", "m", start=9.0)
-    begun, at, falls = (Variable(n, "m") for n in ("begun", "at", "falls"))
+    begun, at, falls, caught = (Variable(n, "m") for n in ("begun", "at", "falls", "caught"))
     return Model(
         "gate",
-        x=(x, begun, at, falls),
+        x=(x, begun, at, falls, caught),
         u=(u,),
-        ode=ca.vertcat(1.0, 0.0, 0.0, 0.0),
+        ode=ca.vertcat(1.0, 0.0, 0.0, 0.0, 0.0),
         events=(
             Event("begin", x.symbol + 1.0, 1, reset={"begun": begun.symbol + 1}, at_start=True),
             Event("moved", x.symbol - u.symbol, 1, reset={"at": x.symbol}, rtol=1e-5),
             Event("fall", x.symbol - 0.6, -1, reset={"falls": falls.symbol + 1}),
+            Event("catch", u.symbol - x.symbol, 1, reset={"caught": caught.symbol + 1}),
             Event("end", x.symbol - 1.0, 1, terminal=True),
         ),
     )
@@ -58,9 +59,12 @@ def test_an_input_that_jumps_over_an_event_lets_it_happen_there(archives):
     for k in range(4):
         assert unit.step(k / 8, 1 / 8) == OK
     assert unit.set(u=0.2) == OK
-    for k in range(4, 7):
+    for k in range(4, 6):
         assert unit.step(k / 8, 1 / 8) == OK
-    assert unit.get("begun", "at", "falls") == pytest.approx([1.0, 0.5, 0.0], abs=1e-12)
+    assert unit.get("begun", "at", "falls", "caught") == pytest.approx([1, 0.5, 0, 0], abs=1e-12)
+    assert unit.set(u=0.75 + 1e-9) == OK  # ahead of the point for a nanosecond
+    assert unit.step(6 / 8, 1 / 8) == OK
+    assert unit.get("caught")[0] == 1.0
     unit.free()
 
 

@@ -132,6 +132,13 @@ def test_a_wrong_default_status_or_parameter_is_found(
     assert found is (old == "_start;")  # the start value of z is 0: that one changes nothing
 
 
+def test_a_result_that_is_no_number_is_wrong(compiler: Compiler, tmp_path: Path) -> None:
+    made = generate(BrownMcPhee(), tmp_path, real="double", guards=False)
+    text = made.source("double").read_text()
+    made.source("double").write_text(text.replace("return ", "return 0.0 * HUGE_VAL + "))
+    assert not passes(built(made, "double", compiler, tmp_path))
+
+
 def test_it_is_called_by_others_and_prints_what_is_wrong(
     compiler: Compiler, tmp_path: Path
 ) -> None:

@@ -2,13 +2,16 @@
 
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 
-from symfric import BrownMcPhee, Law, LuGre, Variable
-from symfric.codegen import generate, law_block
+from symfric import BrownMcPhee, Law, LuGre, Output, Variable
+from symfric.codegen import Block, generate, law_block
+from symfric.codegen.blocks.elements import arranged
+from symfric.codegen.running.compiler import link_program
 from symfric.codegen.running.guarded import Model
-from symfric.codegen.running.runner import program, run_c, signals
+from symfric.codegen.running.runner import program, run_c, run_vm, signals
 from symfric.codegen.writing.guards import (
     Status,
     parameter_range,
@@ -61,6 +64,7 @@ def test_ranges_are_the_bounds_or_a_million_times_the_nominal_value() -> None:
     assert (load.low, load.high, load.safe) == (0.0, 1e7, 0.0)
     valve = range_of(Variable("u", "V", start=2.0, lower=1.0, upper=5.0))
     assert (valve.low, valve.high, valve.safe) == (1.0, 5.0, 2.0)
+    assert range_of(Variable("w", "m/s", nominal=1e28)).high == 1e30  # half of it has a square
     small = parameter_range(Variable("v_eps", "m/s", start=1e-15, nominal=1e-15, lower=0.0))
     assert small.low == 0.0
     assert small.high == pytest.approx(1e6)
@@ -68,6 +72,69 @@ def test_ranges_are_the_bounds_or_a_million_times_the_nominal_value() -> None:
     assert (step.low, step.high) == (1e-9, 1e3)
     assert parameter_range(Variable("h", "s", start=1e-10)).low == 1e-10
     assert state_limit(Variable("z", "m", nominal=1e-5)) == pytest.approx(1e5)
+    assert state_limit(Variable("z", "m", start=-1e4)) == pytest.approx(1e14)
+
+
+def bench() -> Block:
+    """Ranges of every shape, eight alike states and parameters, and a result that may have none."""
+    valve = Variable("valve", "V", start=2.0, lower=1.0, upper=5.0)
+    lever = Variable("lever", "1", lower=-1.0, upper=3.0)
+    big = Variable("big", "1", start=1e4)
+    F = tuple(Variable(f"F_{i + 1}", "N") for i in range(8))
+    k = tuple(Variable(f"k_{i + 1}", "N", start=1.0) for i in range(8))
+    gain = Variable("gain", "1", start=0.5, lower=-2.0, upper=1.0)
+    h = Variable("h", "s", start=1e-3, lower=0.0)
+    ends = [f.symbol + 1e6 * lever.symbol * ca.tanh(b.symbol) * b.symbol
+            for f, b in zip(F, k, strict=True)]  # fmt: skip
+    return arranged(Block(
+        "bench", states=(*F, big), inputs=(valve, lever), parameters=(*k, gain, h),
+        next=ca.vertcat(*ends, big.symbol + 1e15 * h.symbol * lever.symbol),
+        outputs={"y": Output(valve.symbol / (gain.symbol - 0.25), "V")},
+    ))  # fmt: skip
+
+
+STEPS: dict[str, tuple[list[float], dict[str, float], int]] = {
+    "fine": ([2.0, 0.0], {}, 0),
+    "ends": ([5.0, -1.0], {"gain": 1.0}, 0),
+    "other ends": ([1.0, 3.0], {"gain": -2.0}, 0),
+    "within the wider end": ([2.0, -1.5], {}, Status.CLAMPED),
+    "above": ([2.0, 3.5], {}, Status.CLAMPED),
+    "below": ([0.5, 0.0], {}, Status.CLAMPED),
+    "no voltage": ([np.nan, 0.0], {}, Status.NOT_FINITE),
+    "gain": ([2.0, 0.0], {"gain": 1.5}, Status.PARAMETER),
+    "an element": ([2.0, 0.0], {"k_5": np.nan}, Status.PARAMETER),
+    "step size": ([2.0, 0.0], {"h": 1e4}, Status.PARAMETER),
+    "force": ([2.0, 1.0], {"k_5": 1e6}, 0),
+    "lost": ([2.0, 0.0], {}, Status.STATE),
+    "big": ([2.0, 1.0], {}, 0),
+    "still": ([2.0, 1.0], {}, 0),
+    "no result": ([2.0, 1.0], {"gain": 0.25}, Status.OUTPUT),
+    "again": ([2.0, 0.0], {}, 0),
+}
+
+
+def test_numbers_of_every_range_are_mended_in_c_as_beside_casadi(compiler, tmp_path) -> None:
+    block = bench()
+    assert {a.name for a in block.arrays} == {"F", "k"}
+    made = generate(block, tmp_path, real="double", kit=False)
+    (tmp_path / "main.c").write_text(program(block, DOUBLE))
+    link_program(compiler, [tmp_path / "main.c", made.source("double")], tmp_path, tmp_path / "m")
+    inputs = np.array([given for given, _, _ in STEPS.values()])
+    parameters = np.array(
+        [[own.get(v.name, v.start) for v in block.parameters] for _, own, _ in STEPS.values()]
+    )
+    c = run_c(block, DOUBLE, tmp_path / "m", inputs, parameters)
+    assert c[:, -1].astype(int).tolist() == [int(status) for _, _, status in STEPS.values()]
+    assert np.array_equal(c, run_vm(block, DOUBLE, inputs, parameters=parameters))
+    rows = dict(zip(STEPS, c, strict=True))
+    F, big, y = slice(0, 8), 8, 9
+    assert rows["no voltage"][y] == 2.0 / 0.25
+    assert rows["step size"][y] == 2.0 / 0.25  # the other parameters stay
+    assert rows["force"][4] > 1e10
+    assert not rows["lost"][F].any()
+    assert rows["still"][big] > 1e12
+    assert rows["no result"].tolist() == [*[0.0] * 8, 1e4, 0.0, Status.OUTPUT]
+    assert rows["again"][big] == 1e4
 
 
 def test_parameters_out_of_range_give_way_to_the_defaults() -> None:

@@ -12,8 +12,10 @@ from symfric.codegen import Block, generate, law_block
 from symfric.codegen.running.compiler import FLAGS, WARNINGS, compile_object
 from symfric.codegen.writing.header import header
 from symfric.codegen.writing.routines import routines
+from symfric.codegen.writing.sheet import interval
 from symfric.codegen.writing.source import source
 from symfric.emitter.c99 import DOUBLE, FLOAT
+from symfric.laws import GMS
 
 STRICT = [*WARNINGS, "-Werror"]
 GENERATED = {name: law for name, law in SYMMETRIC.items() if name not in NO_STEP}
@@ -100,6 +102,23 @@ def test_a_law_with_states_has_structs_and_a_step():
     assert "dz/dt = v - sigma_0 |v| z / g" in text
     assert "    delta = 2  Stribeck exponent [1]\n" in text
     assert "SPDX-License-Identifier: MIT-0" in text
+
+
+def test_a_range_is_where_all_numbers_of_a_member_are_valid():
+    a, b = Variable("a", "1"), Variable("b", "1", nominal=10.0)
+    assert interval([a, b], "param", guards=True) == "+-1e+06"
+    assert interval([a, b], "param", guards=False) == ""
+    load = Variable("c", "1", lower=0.5)
+    assert interval([load], "in", guards=False) == ">= 0.5"
+    assert interval([load], "in", guards=True) == "0.5 to 1e+06"
+    assert interval([Variable("d", "1", upper=2.0)], "state", guards=True) == "<= 2"
+    assert interval([Variable("e", "1", lower=-2.0, upper=2.0)], "in", guards=True) == "+-2"
+
+
+def test_defaults_of_an_array_that_differ_are_its_ends():
+    text = header(law_block(GMS(form="event")), DOUBLE)
+    k = GMS(form="event").elements
+    assert f"default {k[0].k:g} ... {k[-1].k:g}, " in text
 
 
 def test_a_static_law_is_a_function_of_scalars():
