@@ -125,13 +125,22 @@ def test_the_state_of_another_model_is_refused(archives):
 
 @pytest.mark.parametrize(("k", "x"), [(0.0, 1.0), (5.0, 2.0), (50.0, 3.9), (0.2, 0.01)])
 def test_algebraic_variables_are_found_from_far_away(archives, k, x):
-    """Undamped, Newton's method goes to and fro between -13.4 and 13.4."""
     unit = Second(archives("wire", 2))
     for guess in (0.5, 470.0, -470.0):
         assert unit.call("Reset") == OK
         assert unit.begin(k=k, x=x, z=guess) == OK
         wanted = brentq(lambda z: np.arctan(z) + 0.1 * z - k * x / 4.0, -1e3, 1e3, xtol=1e-13)
         assert unit.get("z")[0] == pytest.approx(wanted, abs=1e-10)
+    unit.free()
+
+
+def test_algebraic_variables_follow_a_parameter_that_falls_to_zero(archives):
+    """From 470: undamped, Newton's method goes to and fro between -13.4 and 13.4."""
+    unit = Second(archives("wire", 2))
+    assert unit.begin(k=50.0, x=3.9) == OK
+    assert unit.get("z")[0] > 400.0
+    assert unit.set(k=0.0) == OK
+    assert unit.get("z")[0] == pytest.approx(0.0, abs=1e-10)
     unit.free()
 
 

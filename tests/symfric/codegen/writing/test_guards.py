@@ -83,13 +83,14 @@ def bench() -> Block:
     F = tuple(Variable(f"F_{i + 1}", "N") for i in range(8))
     k = tuple(Variable(f"k_{i + 1}", "N", start=1.0) for i in range(8))
     gain = Variable("gain", "1", start=0.5, lower=-2.0, upper=1.0)
+    bias = Variable("bias", "V", lower=0.0)
     h = Variable("h", "s", start=1e-3, lower=0.0)
     ends = [f.symbol + 1e6 * lever.symbol * ca.tanh(b.symbol) * b.symbol
             for f, b in zip(F, k, strict=True)]  # fmt: skip
     return arranged(Block(
-        "bench", states=(*F, big), inputs=(valve, lever), parameters=(*k, gain, h),
+        "bench", states=(*F, big), inputs=(valve, lever), parameters=(*k, gain, bias, h),
         next=ca.vertcat(*ends, big.symbol + 1e15 * h.symbol * lever.symbol),
-        outputs={"y": Output(valve.symbol / (gain.symbol - 0.25), "V")},
+        outputs={"y": Output(bias.symbol + valve.symbol / (gain.symbol - 0.25), "V")},
     ))  # fmt: skip
 
 
@@ -101,6 +102,8 @@ STEPS: dict[str, tuple[list[float], dict[str, float], int]] = {
     "above": ([2.0, 3.5], {}, Status.CLAMPED),
     "below": ([0.5, 0.0], {}, Status.CLAMPED),
     "no voltage": ([np.nan, 0.0], {}, Status.NOT_FINITE),
+    "minus zero": ([2.0, 0.0], {"bias": -0.0}, 0),
+    "bias": ([2.0, 0.0], {"bias": -1e-300}, Status.PARAMETER),
     "gain": ([2.0, 0.0], {"gain": 1.5}, Status.PARAMETER),
     "an element": ([2.0, 0.0], {"k_5": np.nan}, Status.PARAMETER),
     "step size": ([2.0, 0.0], {"h": 1e4}, Status.PARAMETER),
