@@ -189,7 +189,7 @@ GENERATED = (
     ),
     Mutant(
         "proof: the warnings of a compiler are no failure", VERIFY,
-        "return exact and not self.warnings and not", "return exact and not",
+        "return self.near and not self.warnings and not", "return self.near and not",
         (f"{T_VERIFY}::test_a_warning_is_found",),
     ),
     Mutant(
