@@ -106,7 +106,10 @@ class Block:
                 known = ", ".join(n for n, _ in struct._fields_)
                 raise ValueError(f"expected one of {{known}}, got {{name}}")
             kind = dict(struct._fields_)[name]
-            setattr(struct, name, kind(*value) if np.ndim(value) else kind(value))
+            size = getattr(kind, "_length_", 0)
+            if np.shape(value) != ((size,) if size else ()):
+                raise ValueError(f"{{name}}: expected {{size or 'one'}} number(s), got {{value}}")
+            setattr(struct, name, kind(*value) if size else kind(value))
 
     def reset(self, start=None):
         """Begin anew, from the start values of the model or from others, by name."""
@@ -131,10 +134,14 @@ class Block:
     def step(self, **inputs):
         """One step: the outputs by name. What the guards did is then in `status`."""
         result = self.run(**inputs)
-        return {{name: values.item() for name, values in result.items()}}
+        return {{name: values[0].tolist() for name, values in result.items()}}
 
     def run(self, steps=1, **inputs):
-        """A step for each number in the arrays of inputs: arrays of outputs by name, and status."""
+        """A step for each number in the arrays of inputs: arrays of outputs by name, and status.
+
+        What is an array in C is one here, too: q of shape (size,) or (steps, size), or q_1, q_2 ...
+        """
+        inputs = self._each(inputs)
         missing = [n for n in INPUTS if n not in inputs]
         if missing or len(inputs) > len(INPUTS):
             given = ", ".join(inputs) or "none"
@@ -149,7 +156,27 @@ class Block:
             found[k], status[k] = once(row)
         self.status = int(np.bitwise_or.reduce(status, initial=0))
         result = {{name: found[:, i] for i, name in enumerate(OUTPUTS)}}
+        result |= {{name: found[:, rows] for name, rows in self._arrays("out")}}
         return result | ({{"status": status}} if HAS_STATUS else {{}})
+
+    def _arrays(self, group):
+        """Arrays of a struct and which of its numbers they hold."""
+        first = 0
+        for name, size in MEMBERS.get(group, ()):
+            if size:
+                yield name, slice(first, first + size)
+            first += size or 1
+
+    def _each(self, inputs):
+        """Inputs with arrays taken apart."""
+        single = dict(inputs)
+        for name, rows in self._arrays("in"):
+            if name in single:
+                own, values = INPUTS[rows], np.asarray(single.pop(name), float)
+                if values.shape[-1:] != (len(own),):
+                    raise ValueError(f"{{name}}: expected {{len(own)}} numbers, got {{values}}")
+                single |= dict(zip(own, values.T))
+        return single
 
     def _step(self, row):
         call = getattr(Block._library, f"{{self.stem}}_step")

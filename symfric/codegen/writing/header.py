@@ -1,13 +1,14 @@
 """The header file of a block: its data sheet, structs and prototypes."""
 
 from collections.abc import Iterator, Sequence
+from textwrap import wrap
 
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.writing.guards import constants
 from symfric.codegen.writing.layout import Member, members, prefix
 from symfric.codegen.writing.routines import routines
 from symfric.codegen.writing.sheet import interval, meaning, sheet
-from symfric.codegen.writing.text import banner, block_comment, comment
+from symfric.codegen.writing.text import WIDTH, banner, block_comment, comment
 from symfric.emitter.c99 import Real
 from symfric.foundation.parameters import Variable
 
@@ -18,6 +19,9 @@ MEANING = {
     "out": "Outputs of a step.",
 }
 """Of the structs."""
+
+NARROW = 30
+"""Columns that a comment beside a member has at least."""
 
 
 def header(block: Block, real: Real, guards: bool = True) -> str:
@@ -57,7 +61,10 @@ def _struct(block: Block, group: str, rows: Sequence[Member], real: Real, guards
     for row in rows:
         own = variables[row.first : row.first + row.count]
         text = meaning(row.doc, row.unit, *_numbers(group, own, guards))
-        lines += f"    {real.name} {row.declared + ';':<{width}} /* {comment(text)} */\n"
+        start = f"    {real.name} {row.declared + ';':<{width}} /* "
+        room = max(WIDTH - len(start) - 3, NARROW)
+        whole = wrap(comment(text), room, break_long_words=False, break_on_hyphens=False)
+        lines += start + ("\n" + " " * len(start)).join(whole) + " */\n"
     name = f"{prefix(block, real)}_{group}_t"
     return f"/* {MEANING[group]} */\ntypedef struct {{\n{lines}}} {name};\n\n"
 

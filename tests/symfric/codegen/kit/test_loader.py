@@ -6,9 +6,10 @@ import sys
 
 import numpy as np
 import pytest
+from robots import SMALL
 
 from symfric import BrownMcPhee, LuGre
-from symfric.codegen import generate, law_block, plant_block
+from symfric.codegen import generate, inverse_dynamics_block, law_block, plant_block
 from symfric.codegen.kit.vectors import excitation
 from symfric.codegen.running.runner import run_vm
 from symfric.emitter.c99 import REALS
@@ -23,6 +24,14 @@ BLOCKS = {
     "gms": law_block(GMS(form="event")),
     "drive": plant_block(Drive(BrownMcPhee())),
 }
+
+
+TWO = SMALL.replace(
+    "</robot>",
+    '<link name="hand"><inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" '
+    'ixz="0" iyz="0"/></inertial></link><joint name="elbow" type="continuous"><parent link="arm"/>'
+    '<child link="hand"/><origin xyz="0 0 -0.5"/><axis xyz="0 1 0"/></joint></robot>',
+)
 
 
 def loaded(made):
@@ -86,6 +95,29 @@ def test_names_that_are_not_there_are_refused(tmp_path):
             module.Block(**arguments)
     with pytest.raises(ValueError, match="expected the inputs v, N, got v"):
         module.Block().step(v=1.0)
+
+
+def test_arrays_of_the_c_are_arrays_here(tmp_path):
+    block = inverse_dynamics_block(TWO)
+    names = [v.name for v in block.inputs]
+    assert names == ["q_1", "q_2", "qd_1", "qd_2", "qdd_1", "qdd_2"]
+    made = loaded(generate(block, tmp_path, real="double")).Block()
+    rows = np.random.default_rng(0).normal(size=(5, 6))
+    single = made.run(**dict(zip(names, rows.T, strict=True)))
+    whole = made.run(q=rows[:, :2], qd=rows[:, 2:4], qdd=rows[:, 4:])
+    assert np.array_equal(whole["tau"], np.column_stack([single["tau_1"], single["tau_2"]]))
+    once = made.step(q=[0, 1], qd=[0, 0], qdd=[0, 0])
+    assert once["tau"] == [once["tau_1"], once["tau_2"]]
+    with pytest.raises(ValueError, match="q: expected 2 numbers"):
+        made.step(q=[0, 1, 2], qd=[0, 0], qdd=[0, 0])
+
+
+@pytest.mark.parametrize("value", [3.0, [1e5, 1e5], [1e5] * 5])
+def test_no_array_is_filled_in_part(value, tmp_path):
+    made = loaded(generate(law_block(GMS(form="event")), tmp_path, real="double")).Block
+    assert [*made(k=[1e5, 2e5, 3e5, 4e5]).param.k] == [1e5, 2e5, 3e5, 4e5]
+    with pytest.raises(ValueError, match=r"k: expected 4 number\(s\), got"):
+        made(k=value)
 
 
 def test_a_library_beside_it_is_opened_and_nothing_of_symfric_is_needed(compiler, tmp_path):
