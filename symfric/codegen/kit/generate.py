@@ -100,8 +100,8 @@ def generate(
         kit: False leaves sources and manifest, without sizes.
 
     Raises:
-        ValueError: bad input, a law that has no step, an operation that C99 lacks, a
-            constant above the range of float (one below it becomes the smallest that is not 0).
+        ValueError: bad input, a law that has no step, an operation that C99 lacks, a number
+            outside the range of float (a computed one below it becomes the smallest that is not 0).
     """
     several = (real,) if isinstance(real, str) else checks.many("codegen: real", real, "types")
     check_names("codegen: real", several, REALS)
@@ -113,6 +113,7 @@ def generate(
     given = {"name": name, "h": h, "free": free, "fold": fold, "turning": turning or None}
     block = _block(law, {option: value for option, value in given.items() if value is not None})
     reals = [REALS[n] for n in names]
+    _check_constants(block, reals)
     texts = _sources(block, reals, guards) | (_kit(block, reals, guards) if kit else {})
     for file, text in texts.items():
         write_text(folder / file, text)
@@ -121,6 +122,13 @@ def generate(
     write_text(folder / last, json.dumps(content, indent=2) + "\n")
     files = tuple(folder / file for file in (*texts, last))
     return Generated(block, folder, names, files, content, guards)
+
+
+def _check_constants(block: Block, reals: Sequence[Real]) -> None:
+    """Refuse numbers that were given and would be rounded to 0 or infinity."""
+    for real in reals:
+        for value in block.constants.values():
+            real.literal(value)
 
 
 def with_cores(generated: Generated, measured: Sequence[Mapping[str, Any]]) -> Generated:

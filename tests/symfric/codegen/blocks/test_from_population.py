@@ -34,10 +34,23 @@ int main(void)
 """
 
 
-@pytest.mark.parametrize("law", [GenericAsperity(), RandomBristles()])
-def test_a_contact_is_verified(law, compiler, tmp_path):
-    found = verify(generate(law, tmp_path))
+@pytest.mark.parametrize(
+    ("law", "real"),
+    [(GenericAsperity(), "double"), (RandomBristles(), "double"), (RandomBristles(), "float")],
+)
+def test_a_contact_is_verified(law, real, compiler, tmp_path):
+    found = verify(generate(law, tmp_path, real=real))
     assert found.ok, found.table()
+
+
+def test_float_does_not_hold_the_phase_of_an_asperity_at_its_ends(compiler, tmp_path):
+    """Where an asperity leaves, its stiffness and load jump: a last bit of the phase decides."""
+    found = verify(generate(GenericAsperity(), tmp_path, real="float"))
+    (check,) = found.checks
+    assert not found.ok
+    assert check.rounding is not None
+    assert check.error < check.rounding
+    assert "by rounding" in check.why
 
 
 def test_a_loop_in_c_is_the_population_of_numpy(compiler, tmp_path):
