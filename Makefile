@@ -30,7 +30,7 @@ newest:
 # What other tools say of units, kernels and robots; where their wheels cannot be had, it says so.
 extras:
 	@$(MAKE) VENV=.venv-extras .venv-extras/.test
-	@if .venv-extras/bin/python -m pip install --quiet --editable ".[fmu,cuda-check,urdf-check]"; then \
+	@if .venv-extras/bin/python -m pip install --quiet --editable ".[fmu,cuda-check,pinocchio]"; then \
 		.venv-extras/bin/python -m pytest -n auto --dist loadfile -p no:cacheprovider \
 			tests/symfric/fmu tests/symfric/integrator/cuda tests/symfric/codegen/blocks \
 			tests/symfric/multibody/test_urdf_pinocchio.py tests/symfric/multibody/urdf; \

@@ -15,7 +15,7 @@ from symfric.multibody.spatial import euler_g, rotation
 from symfric.multibody.urdf.file import parse
 from symfric.multibody.urdf.read import read_urdf
 
-pin: Any = pytest.importorskip("pinocchio", reason="needs Pinocchio (extra urdf-check)")
+pin: Any = pytest.importorskip("pinocchio", reason="needs Pinocchio (extra pinocchio)")
 Array = NDArray[np.float64]
 LIMIT = '<limit lower="-9" upper="9" effort="9" velocity="9"/></joint>'
 EASY = Coulomb(mu_d=1.0, v_eps=0.1)

@@ -243,7 +243,7 @@ def test_a_robot_whose_name_begins_with_a_digit_gets_one_of_c():
 
 @pytest.mark.parametrize("seed", range(4))
 def test_random_robots_are_those_of_pinocchio_with_a_payload(seed):
-    pin: Any = pytest.importorskip("pinocchio", reason="needs Pinocchio (extra urdf-check)")
+    pin: Any = pytest.importorskip("pinocchio", reason="needs Pinocchio (extra pinocchio)")
     text = random_robot(seed, n=5 + seed)
     limit = '<limit lower="-9" upper="9" effort="9" velocity="9"/></joint>'
     model = pin.buildModelFromXML(text.replace("</joint>", limit))

@@ -18,7 +18,7 @@ from symfric import simulate
 from symfric.multibody import functions
 from symfric.multibody.urdf.read import read_urdf
 
-pin: Any = pytest.importorskip("pinocchio", reason="needs Pinocchio (extra urdf-check)")
+pin: Any = pytest.importorskip("pinocchio", reason="needs Pinocchio (extra pinocchio)")
 Array = NDArray[np.float64]
 WITHOUT_A_MACHINE = ("quadrotor_base", "iris_simple", "ur3")
 """Single bodies that only `floating=True` moves, and a file without a link."""
