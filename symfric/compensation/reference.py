@@ -37,6 +37,10 @@ class Reference:
         h = checks.number("Reference: h", self.h, unit="s", above=0.0)
         object.__setattr__(self, "h", h)
 
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<Reference: {self.x.size} samples of {self.h:g} s>"
+
     @property
     def t(self) -> Array:
         """Times of the samples [s]."""

@@ -47,6 +47,14 @@ class Loop:
     ended: str = ""
     status: int = 0
 
+    def __repr__(self) -> str:
+        """One line."""
+        ended = f", {self.ended}" if self.ended else ""
+        return (
+            f"<Loop '{self.name}': {self.force.size} samples, RMS error {self.rms:.3g}, "
+            f"peak {self.peak:.3g}{ended}>"
+        )
+
     @property
     def t(self) -> Array:
         """Times of the samples [s]."""
@@ -116,6 +124,10 @@ class Comparison:
     count: float
     engine: str
     units: tuple[str, str] = ("m", "N")
+
+    def __repr__(self) -> str:
+        """The table."""
+        return self.table()
 
     def __getitem__(self, name: str) -> Loop:
         checks.check_names("comparison", [name], self.loops)
