@@ -20,7 +20,7 @@ T_RANGES = (f"{T_GUARDS}::test_ranges_are_the_bounds_or_a_million_times_the_nomi
 T_INTERVAL = (f"{T_SOURCE}::test_a_range_is_where_all_numbers_of_a_member_are_valid",)
 T_DEFAULTS = (f"{T_SOURCE}::test_defaults_of_an_array_that_differ_are_its_ends",)
 T_VECTORS = "tests/symfric/codegen/kit/test_vectors.py"
-T_MANIFEST = ("tests/symfric/codegen/kit/test_generate.py",)
+T_MANIFEST = "tests/symfric/codegen/kit/test_generate.py"
 T_LOADER = "tests/symfric/codegen/kit/test_loader.py"
 T_SIMULINK = ("tests/symfric/codegen/kit/test_simulink.py",)
 T_SELF = "tests/symfric/codegen/kit/test_unit_test.py"
@@ -148,7 +148,8 @@ GENERATED = (
     Mutant(
         "kit: the manifest has the bounds of the law, not those of the guards", MANIFEST,
         "if within is None else (within.low, within.high)",
-        "if True else (within.low, within.high)", T_MANIFEST,
+        "if True else (within.low, within.high)",
+        (f"{T_MANIFEST}::test_the_manifest_has_the_ranges_that_are_kept",),
     ),
     Mutant(
         "kit: the S-function steps when it shows its outputs", SIMULINK,

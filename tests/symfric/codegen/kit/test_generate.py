@@ -45,6 +45,15 @@ def test_the_manifest_names_everything_with_its_unit(tmp_path):
     assert manifest["real"]["double"]["bytes"]["param"] == 16
 
 
+@pytest.mark.parametrize("guards", [True, False])
+def test_the_manifest_has_the_ranges_that_are_kept(guards, tmp_path):
+    found = generate(LuGre(), tmp_path, real="float", kit=False, guards=guards).manifest
+    v, N = (variable["range"] for variable in found["inputs"])
+    assert v == ([-1e6, 1e6] if guards else [None, None])
+    assert N == ([0.0, 1e7] if guards else [0.0, None])
+    assert found["states"][0]["range"] == [None, None]
+
+
 def test_the_manifest_counts_operations_and_calls(tmp_path):
     step = generate(LuGre(), tmp_path, kit=False).manifest["real"]["float"]["functions"][
         "lugre_f32_step"

@@ -1,5 +1,6 @@
 """Rows of test vectors: every comparison, every parameter, bad inputs; tolerances that mean it."""
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -94,14 +95,24 @@ def test_tolerance_is_relative_to_the_peak_or_to_what_rounding_changes():
     peak = np.abs(found.results).max(axis=0)
     assert (found.tolerance >= 0.1 * BASE[4] * peak).all()
     assert (found.tolerance <= 10 * BASE[4] * peak).all()
-    a, b = Variable("a", "1", start=1.0), Variable("b", "1")
+    a, c, b = Variable("a", "1", start=1.0), Variable("c", "1", start=1.0), Variable("b", "1")
     difference = Block(
-        "difference", inputs=(b,), parameters=(a,),
-        outputs={"y": Output((1e3 * a.symbol + 1e-3 * b.symbol) - 1e3 * a.symbol, "1"),
+        "difference", inputs=(b,), parameters=(a, c),
+        outputs={"y": Output((1e3 * a.symbol + 1e-3 * b.symbol) - 1e3 * c.symbol, "1"),
                  "z": Output(b.symbol, "1")},
     )  # fmt: skip
     tolerance = vectors(difference, FLOAT, guards=False).tolerance
     assert tolerance[1] == pytest.approx(BASE[4] * 2.0, rel=0.5)
+    assert 1e-5 < tolerance[0] < 1e-2  # a last digit of 1000, of a number of 2e-3
+
+
+def test_rows_at_a_jump_that_rounding_decides_are_left_out():
+    b, edge = Variable("b", "1"), float(np.float32(0.1))
+    outputs = {"y": Output(ca.if_else(b.symbol >= edge, 1.0, 0.0), "1")}
+    found = vectors(Block("jump", inputs=(b,), outputs=outputs), FLOAT, guards=False)
+    assert found.tolerance[0] < 0.1
+    assert not (found.steps.inputs[:, 0] == edge).any()
+    assert set(found.results[:, 0]) == {0.0, 1.0}
 
 
 def test_a_run_that_ends_in_infinity_is_used_as_far_as_it_goes():
