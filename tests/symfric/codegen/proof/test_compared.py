@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 
 from symfric import Output, Variable
-from symfric.codegen import Block
-from symfric.codegen.proof.compared import ulp
+from symfric.codegen import Block, generate
+from symfric.codegen.proof.compared import Run, ulp
 from symfric.codegen.proof.magnitude import magnitudes, terms
+from symfric.codegen.running.runner import run_vm
+from symfric.emitter.c99 import FLOAT
 from symfric.model.kinds import CONSTRAINTS
 
 LARGE = 1e6
@@ -66,3 +68,18 @@ def test_a_state_has_its_nominal_value_at_least() -> None:
     block = Block("b", states=(x,), next=1e-3 * x.symbol)
     found = magnitudes(terms(block), block, np.ones((3, 1)), np.zeros(0), np.zeros((3, 0)))
     assert found.tolist() == [5.0]
+
+
+def test_the_worst_signal_is_the_one_that_is_off_by_most_of_its_magnitude(tmp_path) -> None:
+    """Not the one with the largest numbers; and rounding is that of its own operations."""
+    outputs = {"large": Output(1e3 * A.symbol, "1"), "small": Output(A.symbol**2 - 1.0, "1")}
+    block = Block("pair", inputs=(A,), outputs=outputs)
+    made = generate(block, tmp_path, real="float", kit=False)
+    inputs = np.array([[3.0], [1.1], [2.0]])
+    expected = run_vm(block, FLOAT, inputs)
+    rows = expected.copy()
+    rows[1] += [1e-2, 1e-3, 0.0]
+    run = Run(made, FLOAT, inputs, None, rows, expected, lambda: terms(block))
+    assert run.worst == "small"
+    assert run.error == pytest.approx(1e-3 / 9.0)  # of 3 squared
+    assert 0.0 < run.rounding < 1e-7

@@ -5,7 +5,7 @@ from law_cases import CASES, NO_STEP
 
 from symfric import LuGre
 from symfric.codegen import law_block, plant_block
-from symfric.codegen.proof.fuzz import fuzz
+from symfric.codegen.proof.fuzz import Fuzzed, fuzz
 from symfric.codegen.writing import guards, routines
 from symfric.scenes import Drive
 
@@ -36,6 +36,12 @@ def test_a_law_survives_random_steps(name, real, compiler):
 def test_a_plant_survives_random_steps(compiler):
     found = fuzz(plant_block(Drive(LuGre()).model()), "float", compiler, steps=5000)
     assert found.ok, found
+
+
+def test_what_is_found_is_a_failure():
+    assert Fuzzed("f", "float", 10, valid=8, repaired=2, last_resort=1).ok
+    for found in ({"altered": 1}, {"unflagged": 1}, {"unfinished": 1}, {"report": "overflow"}):
+        assert not Fuzzed("f", "float", 10, valid=8, repaired=2, **found).ok
 
 
 def test_a_range_that_the_c_does_not_know_is_found(compiler, monkeypatch):
