@@ -28,6 +28,12 @@ def show_verification(verification: Verification) -> None:
                 for check in verification.checks
             ],
         )
+    for check in verification.checks:
+        if check.ties:
+            output.show(
+                f"{check.real}: in {check.ties} of {check.steps} steps a mode ties and rounding "
+                "decides it, in CasADi as in C"
+            )
 
 
 def compared(check: Check) -> str:

@@ -9,8 +9,8 @@ import pytest
 from robots import SMALL
 
 from symfric.cli import main
-from symfric.cli.codegen_shown import bits, compared
-from symfric.codegen.proof.verify import Check
+from symfric.cli.codegen_shown import bits, compared, show_verification
+from symfric.codegen.proof.verify import Check, Verification
 
 compiled = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
@@ -187,3 +187,14 @@ def test_a_step_that_is_too_long_is_named_with_one_that_is_not(
     assert "steps of 0.05 s it runs away, in CasADi as in C: that step is too long, 0.0" in status
     shorter = status.rsplit(", ", 1)[1].split()[0]
     assert main(f"{line} --step-size {shorter}".split()) == 0
+
+
+def test_ties_are_told_where_there_are_some(capsys):
+    checks = (
+        Check("double", 28000, (), 0, 0.0, ()),
+        Check("float", 28000, (), None, 0.0, (), ties=3),
+    )
+    show_verification(Verification("springs", "verified", "gcc", checks))
+    said = " ".join(capsys.readouterr().out.split())
+    assert said.count("a mode ties") == 1
+    assert "float: in 3 of 28000 steps a mode ties and rounding decides it" in said

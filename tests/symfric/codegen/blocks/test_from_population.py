@@ -34,6 +34,7 @@ int main(void)
 """
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     ("law", "real"),
     [(GenericAsperity(), "double"), (RandomBristles(), "double"), (RandomBristles(), "float")],
@@ -43,6 +44,7 @@ def test_a_contact_is_verified(law, real, compiler, tmp_path):
     assert found.ok, found.table()
 
 
+@pytest.mark.heavy
 def test_float_does_not_hold_the_phase_of_an_asperity_at_its_ends(compiler, tmp_path):
     """Where an asperity leaves, its stiffness and load jump: a last bit of the phase decides."""
     found = verify(generate(GenericAsperity(), tmp_path, real="float"))

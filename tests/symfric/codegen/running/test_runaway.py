@@ -59,6 +59,7 @@ def test_the_status_says_how_long_a_step_may_be(compiler: Compiler, tmp_path: Pa
     assert verify(generate(decay(2e-3), tmp_path, real="double")).ok
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("law", [BrownMcPhee(), LuGre()], ids=["brown_mcphee", "lugre"])
 def test_a_falling_arm_stays_bounded_by_the_method_of_mechanisms(law: BrownMcPhee | LuGre) -> None:
     """By rodas3 it is lost within 3 s at 1 ms."""
