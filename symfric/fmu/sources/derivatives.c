@@ -33,11 +33,16 @@ static int directional(Instance *unit, const unsigned int *unknown, size_t n_unk
                        double *values)
 {
     Memory *m = &unit->m;
+    const char *missing = "";
     double y[N], along[N + ND], found[NX + NS + EQUATIONS];
     size_t k;
     if (!settled(unit)) return 0;
     unknowns(m, y);
-    if (EXCHANGE || driven_otherwise(m)) (void)consistent(y, m->set, 0);
+    if (EXCHANGE || driven_otherwise(m)) missing = consistent(y, m->set, 0);
+    if (*missing) {
+        snprintf(unit->said, SAID, "%s: at t = %.9g s %s", MODEL_NAME, m->t, missing);
+        return 0;
+    }
     memset(along, 0, sizeof along);
     for (k = 0; k < n_known; ++k) {
         const int place = place_of_known(known[k]);

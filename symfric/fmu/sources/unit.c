@@ -112,15 +112,23 @@ static int driven_otherwise(const Memory *m)
     return memcmp(m->set, m->R + DATA, ND * sizeof(double)) != 0;
 }
 
-/* All signals at the communication point, with inputs and parameters as they are set. */
-static void look(Memory *m)
+/* All signals at the communication point, with inputs and parameters as they are set; 0 where
+   algebraic variables have no solution with these. */
+static int look(Instance *unit)
 {
+    Memory *m = &unit->m;
+    const char *missing = "";
     double y[N];
-    if (m->seen) return;
+    if (m->seen) return 1;
     unknowns(m, y);
-    if (EXCHANGE || driven_otherwise(m)) (void)consistent(y, m->set, 0);
+    if (EXCHANGE || driven_otherwise(m)) missing = consistent(y, m->set, 0);
+    if (*missing) {
+        snprintf(unit->said, SAID, "%s: at t = %.9g s %s", MODEL_NAME, m->t, missing);
+        return 0;
+    }
     model_signals(&m->t, y, m->set, m->out);
     m->seen = 1;
+    return 1;
 }
 
 #if EXCHANGE
@@ -137,8 +145,7 @@ static int get(Instance *unit, unsigned int reference, double *value)
         return 0;
     }
     if (reference >= OF_SIGNALS && reference < OF_P) {
-        if (!settled(unit)) return 0;
-        look(m);
+        if (!settled(unit) || !look(unit)) return 0;
         *value = m->out[reference - OF_SIGNALS];
 #if EXCHANGE
     } else if (reference >= OF_RATES) {

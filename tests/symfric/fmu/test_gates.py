@@ -37,10 +37,17 @@ def gate() -> Model:
     )
 
 
+def root() -> Model:
+    """An algebraic variable that an input takes away."""
+    x, z, u = Variable("x", "m"), Variable("z", "1", start=1.0), Variable("u", "1")
+    equation = z.symbol**2 + u.symbol - 1.0
+    return Model("root", x=(x,), z=(z,), u=(u,), ode=-x.symbol, alg=equation)
+
+
 @pytest.fixture(scope="module")
 def archives(tmp_path_factory):
     """Archives by the name of the model and the version, exported once."""
-    known, models = {}, {"gate": gate, "wire": wire, "wedge": wedge}
+    known, models = {}, {"gate": gate, "wire": wire, "wedge": wedge, "root": root}
 
     def make(name: str, fmi: int) -> Archive:
         if (name, fmi) not in known:
@@ -141,6 +148,22 @@ def test_algebraic_variables_follow_a_parameter_that_falls_to_zero(archives):
     assert unit.get("z")[0] > 400.0
     assert unit.set(k=0.0) == OK
     assert unit.get("z")[0] == pytest.approx(0.0, abs=1e-10)
+    unit.free()
+
+
+def test_signals_without_a_solution_are_refused_and_come_back(archives):
+    """z^2 = 1 - u: the step would say so, and what is read before it does, too."""
+    unit = Second(archives("root", 2))
+    assert unit.begin() == OK
+    assert unit.set(u=0.75) == OK
+    assert unit.get("z")[0] == pytest.approx(0.5)
+    assert unit.set(u=2.0) == OK
+    reference, number = (c.c_uint * 1)(unit.archive.reference["z"]), (c.c_double * 1)()
+    assert unit.call("GetReal", reference, c.c_size_t(1), number) == ERROR
+    assert "no solution" in unit.said[-1][1]
+    assert unit.set(u=0.0) == OK
+    assert unit.get("z")[0] == pytest.approx(1.0)
+    assert unit.step(0.0, 0.1) == OK
     unit.free()
 
 
