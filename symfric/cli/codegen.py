@@ -28,6 +28,7 @@ from symfric.embedded import CORES, Measured, measure
 from symfric.foundation import checks
 from symfric.foundation.compiler import find_compiler
 from symfric.foundation.parameters import check_names, parameters
+from symfric.foundation.status import Status
 from symfric.laws import AnyLaw
 from symfric.scenes import Drive, Scene
 
@@ -334,6 +335,8 @@ def chosen_law(fit: Path | None, law: str | None) -> Chosen:
             f"fit '{fit}': expected a law, got {found.name}, a model without one or with several, "
             "or a law of your own; generate it in Python: symfric.codegen.generate(fit.law, out)"
         )
+    if found.status is not Status.SOLVED:
+        output.note(f"{fit}: the fit ended {found.status.name}: {found.message}")
     units = {n: p.unit for n, p in parameters(found.law).items()}
     forces = [n for n, e in found.parameters.items() if units.get(n) == "1" and e.unit != "1"]
     return Chosen(found.name, found.law, found.drive, tuple(forces))

@@ -78,3 +78,15 @@ def test_bad_requests_are_one_sentence(
     assert out == ""
     assert message in err
     assert err.count("\n") == 1
+
+
+def test_a_fit_that_is_doubtful_becomes_c_with_a_word(
+    fit: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = ["codegen", "--real", "double", "--no-kit", "--out", str(tmp_path / "c")]
+    for status, said in (("SOLVED", False), ("DOUBTFUL", True)):
+        changed = json.loads(fit.read_text(encoding="utf-8"))
+        changed["status"] = status
+        (tmp_path / "f.json").write_text(json.dumps(changed), encoding="utf-8")
+        main([*line, str(tmp_path / "f.json")])
+        assert ("the fit ended DOUBTFUL" in " ".join(capsys.readouterr().err.split())) is said
