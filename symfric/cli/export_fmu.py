@@ -1,8 +1,5 @@
 """`symfric export-fmu`: a scene, or a model in a Python file, as a Functional Mock-up Unit."""
 
-import runpy
-import traceback
-from inspect import signature
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,11 +8,10 @@ import typer
 from symfric.cli import output
 from symfric.cli.options import JsonOption, SetOption, check_outputs, numbers
 from symfric.cli.run import scenes_with
+from symfric.cli.user_file import held_by_file
 from symfric.fmu import Exported
 from symfric.fmu import export_fmu as exported
 from symfric.fmu.export import KINDS
-from symfric.foundation import checks
-from symfric.foundation.parameters import check_names
 from symfric.model import Model
 from symfric.scenes import Scene
 
@@ -120,34 +116,8 @@ def from_file(what: str, law: str | None, values: dict[str, float]) -> Model | S
     """
     if law is not None:
         raise ValueError(f"--law: expected none with '{what}', which has its laws")
-    path, _, name = what.partition(".py")
-    file, name = Path(f"{path}.py"), name.removeprefix(":") or DEFAULT_NAME
-    if not file.is_file():
-        raise ValueError(f"export-fmu: expected a Python file, got '{file}', which does not exist")
-    try:
-        held = runpy.run_path(str(file))
-    except Exception as error:
-        frames = traceback.extract_tb(error.__traceback__)
-        line = next((f.lineno for f in reversed(frames) if f.filename == str(file)), None)
-        raise ValueError(
-            f"export-fmu: expected a file that runs, got {type(error).__name__} in line {line} of "
-            f"'{file}': {error}"
-        ) from error
-    if name not in held:
-        there = [n for n, value in held.items() if isinstance(value, Model | Scene)]
-        hint = f"; it holds {', '.join(there)}" if there else "; name one after a colon"
-        raise ValueError(f"export-fmu: expected '{name}' in '{file}', got none{hint}")
-    found: Any = held[name]
-    if callable(found):
-        check_names(f"--set of {what}", values, list(signature(found).parameters))
-        found = found(**values)
-    elif values:
-        raise ValueError(f"--set: expected none for '{name}', which is no function")
-    if not isinstance(found, Model | Scene):
-        raise checks.refused(
-            f"export-fmu '{what}'", "a Model, or a function that returns one", found
-        )
-    return found
+    kind = Model | Scene
+    return held_by_file("export-fmu", what, DEFAULT_NAME, values, "Model", kind)
 
 
 def to_dict(unit: Exported) -> dict[str, Any]:

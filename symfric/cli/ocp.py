@@ -1,8 +1,5 @@
 """`symfric ocp`: solve a ready optimal control problem, or one that a Python file holds."""
 
-import runpy
-import traceback
-from inspect import signature
 from pathlib import Path
 from typing import Annotated, Any, cast, get_args
 
@@ -19,6 +16,7 @@ from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
 from symfric import SolveError
 from symfric.cli import output
 from symfric.cli.options import JsonOption, PlotOption, SetOption, check_outputs, numbers
+from symfric.cli.user_file import held_by_file, made
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
 
@@ -119,42 +117,11 @@ def problem_of(text: str, values: dict[str, float]) -> tuple[Ready | None, Probl
     Raises:
         ValueError: no such problem or file, a file that fails, a name in it that is no problem.
     """
-    path, _, name = text.partition(".py")
+    _, _, name = text.partition(".py")
     if not (name == "" and text.endswith(".py")) and not name.startswith(":"):
         check_names("ocp", [text], READY)
         return READY[text], made(text, READY[text].make, values)
-    file = Path(f"{path}.py")
-    if not file.is_file():
-        raise ValueError(f"ocp: expected a Python file, got '{file}', which does not exist")
-    name = name.removeprefix(":") or DEFAULT_NAME
-    try:
-        held = runpy.run_path(str(file))
-    except Exception as error:
-        line = next((f.lineno for f in reversed(traceback.extract_tb(error.__traceback__))
-                     if f.filename == str(file)), getattr(error, "lineno", None))  # fmt: skip
-        raise ValueError(
-            f"ocp: expected a file that runs, got {type(error).__name__} in line {line} of "
-            f"'{file}': {error}"
-        ) from error
-    if name not in held:
-        there = [n for n, value in held.items() if isinstance(value, Problem)]
-        hint = f"; it holds {', '.join(there)}" if there else "; name one after a colon"
-        raise ValueError(f"ocp: expected '{name}' in '{file}', got none{hint}")
-    found = held[name]
-    if callable(found):
-        found = made(text, found, values)
-    elif values:
-        raise ValueError(f"--set: expected none for '{name}', which is no function")
-    if not isinstance(found, Problem):
-        raise checks.refused(f"ocp '{text}'", "a Problem, or a function that returns one", found)
-    return None, found
-
-
-def made(text: str, make: Any, values: dict[str, float]) -> Problem:
-    """What a function makes of the numbers of --set."""
-    known = [p.name for p in signature(make).parameters.values()]
-    check_names(f"--set of {text}", values, known)
-    return make(**values)
+    return None, held_by_file("ocp", text, DEFAULT_NAME, values, "Problem", Problem)
 
 
 def scheme_of(text: str) -> Scheme:

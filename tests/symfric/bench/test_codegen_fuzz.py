@@ -13,7 +13,7 @@ def test_a_row_for_every_law_and_type(monkeypatch: pytest.MonkeyPatch, compiler:
     monkeypatch.setattr(codegen_fuzz, "_blocks", lambda _: blocks)
     found = codegen_fuzz.measure(quick=True)
     rows = found.to_dict()["rows"]
-    assert [row["type"] for row in rows] == ["double", "float"]
+    assert [row["type"] for row in rows] == ["f64", "f32"]
     assert all(row["valid"] + row["repaired"] == 2000 for row in rows)
     assert all(goal.met for goal in found.goals)
 

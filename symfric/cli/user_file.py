@@ -1,0 +1,66 @@
+"""A model or problem that stands in a Python file of the user: FILE.py, or FILE.py:NAME."""
+
+import runpy
+import traceback
+from inspect import signature
+from pathlib import Path
+from typing import Any
+
+from symfric.foundation import checks
+from symfric.foundation.parameters import check_names
+
+
+def held_by_file(
+    command: str, text: str, default: str, values: dict[str, float], wanted: str, kind: Any
+) -> Any:
+    """What FILE.py[:NAME] holds, or what the function of that name makes of the numbers of --set.
+
+    Args:
+        command: who asks.
+        text: FILE.py or FILE.py:NAME.
+        default: the name where none is given.
+        values: of --set.
+        wanted, kind: what it is to be, in words and as types.
+
+    Raises:
+        ValueError: no such file or name, a file that fails, numbers that do not fit, something else
+            than what is wanted.
+    """
+    path, _, name = text.partition(".py")
+    file, name = Path(f"{path}.py"), name.removeprefix(":") or default
+    if not file.is_file():
+        raise ValueError(f"{command}: expected a Python file, got '{file}', which does not exist")
+    held = _run(command, file)
+    if name not in held:
+        there = [n for n, value in held.items() if isinstance(value, kind)]
+        hint = f"; it holds {', '.join(there)}" if there else "; name one after a colon"
+        raise ValueError(f"{command}: expected '{name}' in '{file}', got none{hint}")
+    found = held[name]
+    if callable(found):
+        found = made(text, found, values)
+    elif values:
+        raise ValueError(f"--set: expected none for '{name}', which is no function")
+    if not isinstance(found, kind):
+        what = f"a {wanted}, or a function that returns one"
+        raise checks.refused(f"{command} '{text}'", what, found)
+    return found
+
+
+def _run(command: str, file: Path) -> dict[str, Any]:
+    """The names of a file that was run; an error in it says its line."""
+    try:
+        return runpy.run_path(str(file))
+    except Exception as error:
+        frames = reversed(traceback.extract_tb(error.__traceback__))
+        own = getattr(error, "lineno", None)  # of a syntax error
+        line = next((f.lineno for f in frames if f.filename == str(file)), own)
+        raise ValueError(
+            f"{command}: expected a file that runs, got {type(error).__name__} in line {line} of "
+            f"'{file}': {error}"
+        ) from error
+
+
+def made(text: str, make: Any, values: dict[str, float]) -> Any:
+    """What a function makes of the numbers of --set."""
+    check_names(f"--set of {text}", values, list(signature(make).parameters))
+    return make(**values)
