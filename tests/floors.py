@@ -23,6 +23,7 @@ FLOORS: dict[str, set[str]] = {
     },
     "symfric.results": {"symfric.foundation", "symfric.model"},
     "symfric.emitter": {"symfric.foundation"},
+    "symfric.page": {"symfric.foundation"},
     "symfric.integrator.compiled": {"symfric.foundation"},
     "symfric.integrator.equations": {
         "symfric.foundation",
@@ -162,6 +163,7 @@ FLOORS: dict[str, set[str]] = {
         "symfric.figures",
         "symfric.emitter",
         "symfric.codegen",
+        "symfric.page",
     },
     "ocp.text": {"symfric"},
     "ocp.transcription": {"symfric", "ocp.text"},
@@ -206,7 +208,6 @@ FLOORS: dict[str, set[str]] = {
         "identification.residuals",
         "identification.solving",
     },
-    "identification.report": {"symfric"},
     "identification.result": {
         "symfric",
         "identification.data",
@@ -215,7 +216,6 @@ FLOORS: dict[str, set[str]] = {
         "identification.residuals",
         "identification.solving",
         "identification.verdict",
-        "identification.report",
     },
     "identification": {"symfric"},
 }

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.report.scale import Axis, around
-from identification.report.svg import Band, Dots, Level, Mark, Path, Stems, chart
 from identification.result.curve import Curve
 from identification.result.picture import limits
 from identification.result.series import Series
 from identification.result.text import SAME, number
+from symfric.page.scale import Axis, around
+from symfric.page.svg import Band, Dots, Level, Mark, Path, Stems, chart
 
 if TYPE_CHECKING:
     from identification.result.fitted import Fitted

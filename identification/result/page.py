@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Protocol
 
-from identification.report import html
 from identification.result import charts
 from identification.result.estimate import Errors, Estimate
 from identification.result.law_data import source_of
@@ -22,6 +21,7 @@ from identification.result.text import (
     unit_of,
     with_unit,
 )
+from symfric.page import html
 
 if TYPE_CHECKING:
     from identification.result.fitted import Fitted

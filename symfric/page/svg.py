@@ -13,7 +13,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.report.scale import Axis
+from symfric.page.scale import Axis
 
 Array = NDArray[np.float64]
 

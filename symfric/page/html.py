@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from html import escape
 
-from identification.report.style import STYLE
+from symfric.page.style import STYLE
 
 
 def page(title: str, language: str, body: str) -> str:

@@ -7,9 +7,9 @@ from re import findall
 import numpy as np
 import pytest
 
-from identification.report import html
-from identification.report.scale import Axis, around
-from identification.report.svg import (
+from symfric.page import html
+from symfric.page.scale import Axis, around
+from symfric.page.svg import (
     BOTTOM,
     LEFT,
     RIGHT,
