@@ -67,10 +67,13 @@ SETTINGS: dict[str, Any] = {
     "rich_markup_mode": None,  # units in brackets are not markup
     "context_settings": {"help_option_names": ["-h", "--help"]},
 }
+COMPLETED: dict[str, Any] = {"add_completion": True}
 app = typer.Typer(
     cls=Commands,
     help="Friction laws from formula to simulation, identification, optimal control and C.",
-    **SETTINGS,
+    epilog="Exit status: 0 done; 1 a solve or a proof failed, what there is is written; 2 what is "
+    "asked for cannot be done as it stands, nothing is written; 130 interrupted, otherwise as 1.",
+    **SETTINGS | COMPLETED,
 )
 
 

@@ -26,9 +26,17 @@ TABLES = ("calls", "ensemble", "embedded")
 """Subjects without a picture."""
 
 
+def _completed(incomplete: str) -> list[str]:
+    return [subject for subject in SUBJECTS if subject.startswith(incomplete)]
+
+
 def bench(
     subject: Annotated[
-        str, typer.Argument(help=f"What to measure: {', '.join(SUBJECTS)}.")
+        str,
+        typer.Argument(
+            help=f"What to measure: {', '.join(SUBJECTS)}.",
+            autocompletion=_completed,
+        ),
     ] = "integrator",
     quick: Annotated[bool, typer.Option("--quick", help="Fewer points, fewer others.")] = False,
     links: Annotated[

@@ -9,7 +9,7 @@ from typing import Annotated, Any, final
 import typer
 
 from symfric import Law, any_from_text, law_from_text, with_values
-from symfric.cli import output
+from symfric.cli import completions, output
 from symfric.cli.codegen_compensator import compensator_block
 from symfric.cli.codegen_robot import robot_block
 from symfric.cli.codegen_shown import show_sizes, show_verification
@@ -46,13 +46,21 @@ def codegen(
     ] = None,
     law: Annotated[
         str | None,
-        typer.Option("--law", metavar="NAME", help="Friction law, such as lugre; or FIT.json."),
+        typer.Option(
+            "--law",
+            metavar="NAME",
+            help="Friction law, such as lugre; or FIT.json.",
+            autocompletion=completions.laws,
+        ),
     ] = None,
     settings: SetOption = None,
     scene: Annotated[
         str | None,
         typer.Option(
-            "--scene", metavar="NAME", help="The plant of this scene, or FILE.urdf, with the law."
+            "--scene",
+            metavar="NAME",
+            help="The plant of this scene, or FILE.urdf, with the law.",
+            autocompletion=completions.scenes,
         ),
     ] = None,
     method: Annotated[

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from symfric.cli import output
+from symfric.cli import completions, output
 from symfric.cli.options import JsonOption, SetOption, check_outputs, numbers
 from symfric.cli.run import scenes_with
 from symfric.cli.user_file import held_by_file
@@ -25,6 +25,7 @@ def export_fmu(
         typer.Argument(
             metavar="SCENE|FILE.urdf|FILE.py[:NAME]",
             help="A scene, a robot, or a `Model`, or a function that returns one, in a file.",
+            autocompletion=completions.scenes,
         ),
     ],
     out: Annotated[
@@ -32,7 +33,13 @@ def export_fmu(
         typer.Option("--out", metavar="FILE.fmu", help="Default: the name of the model."),
     ] = None,
     law: Annotated[
-        str | None, typer.Option("--law", metavar="NAME", help="Friction law of a scene.")
+        str | None,
+        typer.Option(
+            "--law",
+            metavar="NAME",
+            help="Friction law of a scene.",
+            autocompletion=completions.laws,
+        ),
     ] = None,
     settings: SetOption = None,
     free: Annotated[

@@ -16,7 +16,7 @@ from identification.result.fitted import Fitted
 from identification.select import INTERRUPTED, Ranking, select
 from identification.verdict.profile import Profile
 from symfric import SolveError, Status
-from symfric.cli import output
+from symfric.cli import completions, output
 from symfric.cli.fitting import KINDS, free_in, kind_of, laws_in, reading
 from symfric.cli.options import JsonOption, PlotOption, check_outputs, numbers
 from symfric.foundation import checks
@@ -32,7 +32,12 @@ def identify(
     ],
     law: Annotated[
         str,
-        typer.Option("--law", metavar="NAME[,NAME]", help="Friction law; several are ranked."),
+        typer.Option(
+            "--law",
+            metavar="NAME[,NAME]",
+            help="Friction law; several are ranked.",
+            autocompletion=completions.each_law,
+        ),
     ],
     validate: Annotated[
         list[str] | None,

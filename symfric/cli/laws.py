@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from symfric import ALL_LAWS, parameters
-from symfric.cli import output
+from symfric.cli import completions, output
 from symfric.cli.options import JsonOption, PlotOption, SetOption, all_with, any_with, check_outputs
 from symfric.figures import FIGURES, FigureData, compare
 from symfric.figures.requirements import parts, phenomena
@@ -24,17 +24,32 @@ from symfric.scenes import ALL_SCENES
 
 def laws(
     name: Annotated[
-        str | None, typer.Argument(metavar="[NAME]", help="One law, such as lugre.")
+        str | None,
+        typer.Argument(
+            metavar="[NAME]",
+            help="One law, such as lugre.",
+            autocompletion=completions.all_laws,
+        ),
     ] = None,
     settings: SetOption = None,
     plot: PlotOption = None,
     figure: Annotated[
         str | None,
-        typer.Option("--figure", metavar="FIGURE", help=f"Behaviour: {', '.join(FIGURES)}."),
+        typer.Option(
+            "--figure",
+            metavar="FIGURE",
+            help=f"Behaviour: {', '.join(FIGURES)}.",
+            autocompletion=completions.figures,
+        ),
     ] = None,
     others: Annotated[
         list[str] | None,
-        typer.Option("--compare", metavar="LAW", help="Overlay another law; may be repeated."),
+        typer.Option(
+            "--compare",
+            metavar="LAW",
+            help="Overlay another law; may be repeated.",
+            autocompletion=completions.all_laws,
+        ),
     ] = None,
     normal_force: Annotated[
         float | None,
@@ -154,16 +169,15 @@ def title(law: AnyLaw) -> str:
 def show_list(chosen: dict[str, AnyLaw]) -> None:
     """All laws, one a line, and what the codes mean."""
     output.show_table(
-        ["law", "shows", "z", "", "value", "slope", "formula"],
+        ["law", "shows", "z", "value", "slope", "formula"],
         [
             (
                 name,
                 " ".join(phenomena(law)),
-                len(law.states),
-                law.facts.smoothness.split()[0],
+                f"{len(law.states)} {law.facts.smoothness.split()[0].removesuffix('-valued')}",
                 cost(law).value,
                 cost(law).gradient,
-                split(r"[;,]| \(| for | from ", law.facts.confidence)[0],
+                _confirmed(law.facts.confidence),
             )
             for name, law in chosen.items()
         ],
@@ -172,15 +186,22 @@ def show_list(chosen: dict[str, AnyLaw]) -> None:
     others = ", ".join(f"{alias} = {name}" for alias, name in ALIASES.items())
     output.show(
         f"\nshows:\n{codes}\n"
-        "z: number of states, then smoothness\n"
+        "z: number of states, then smoothness (set: set-valued)\n"
         "value, slope: CasADi instructions for force and rate, and for their derivatives\n"
-        "formula: how it was confirmed\n"
+        "formula: how it was confirmed; rebuilt: from what its paper says about it\n"
         "symfric laws NAME shows equation, parameters and more;\n"
         f"symfric laws NAME --figure draws {', '.join(FIGURES)}.\n"
         f"Other names: {others}.\n"
         "Sums are written coulomb+viscous, wrappers asymmetric(lugre), load_dependent(lugre),\n"
         "lagged(stribeck), temperature_dependent(lugre)."
     )
+
+
+def _confirmed(confidence: str) -> str:
+    """How a formula was confirmed, in a word or two."""
+    if "construct" in confidence:
+        return "rebuilt"
+    return split(r"[;,]| \(| for | from ", confidence)[0]
 
 
 def show_law(name: str, law: AnyLaw) -> None:

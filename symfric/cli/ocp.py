@@ -14,7 +14,7 @@ from ocp.solvers.ipopt import Ipopt
 from ocp.solvers.sqp import Sqp
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
 from symfric import SolveError
-from symfric.cli import output
+from symfric.cli import completions, output
 from symfric.cli.options import JsonOption, PlotOption, SetOption, check_outputs, numbers
 from symfric.cli.user_file import held_by_file, made
 from symfric.foundation import checks
@@ -31,6 +31,7 @@ def ocp(
         typer.Argument(
             metavar="[NAME|FILE.py[:NAME]]",
             help="A ready problem, or a `Problem`, or a function that returns one, in a file.",
+            autocompletion=completions.problems,
         ),
     ] = None,
     settings: SetOption = None,

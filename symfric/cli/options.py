@@ -8,6 +8,7 @@ from typing import Annotated, TypeVar
 import typer
 
 from symfric import Law, law_from_text, parameters, with_values
+from symfric.cli import completions
 from symfric.foundation import checks
 from symfric.foundation.files import check_file
 from symfric.foundation.files import check_folder as check_folder
@@ -23,11 +24,21 @@ PlotOption = Annotated[
 ]
 LawOption = Annotated[
     str,
-    typer.Option("--law", metavar="NAME", help="Friction law, such as lugre or coulomb+viscous."),
+    typer.Option(
+        "--law",
+        metavar="NAME",
+        help="Friction law, such as lugre or coulomb+viscous.",
+        autocompletion=completions.laws,
+    ),
 ]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter; may be repeated."),
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="Set a parameter; may be repeated.",
+        autocompletion=completions.settings,
+    ),
 ]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 from symfric import Law, SolveError, Trajectory, law_from_text, parameters, simulate, with_values
-from symfric.cli import output
+from symfric.cli import completions, output
 from symfric.cli.inputs import input_from_text
 from symfric.cli.options import (
     JsonOption,
@@ -33,12 +33,19 @@ def run(
     scene: Annotated[
         str,
         typer.Argument(
-            metavar="SCENE", help=f"One of {', '.join(ALL_SCENES)}, or a robot's FILE.urdf."
+            metavar="SCENE",
+            help=f"One of {', '.join(ALL_SCENES)}, or a robot's FILE.urdf.",
+            autocompletion=completions.scenes,
         ),
     ],
     law: Annotated[
         list[str],
-        typer.Option("--law", metavar="NAME", help="Friction law; repeat it to compare several."),
+        typer.Option(
+            "--law",
+            metavar="NAME",
+            help="Friction law; repeat it to compare several.",
+            autocompletion=completions.laws,
+        ),
     ],
     settings: SetOption = None,
     inputs: Annotated[

@@ -183,3 +183,14 @@ def test_what_the_numbers_give_away_is_shown(capsys: pytest.CaptureFixture[str])
     assert described(capsys, "lugre", "--set", "sigma_2=100")["warnings"] == []
     assert main(["laws", "lugre"]) == 0
     assert "Warning: not passive from v to F" in capsys.readouterr().out
+
+
+def test_the_list_is_one_line_a_law_in_eighty_columns(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["laws"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    table = lines[2 : lines.index("")]
+    assert [line.split()[0] for line in table] == [*ALL_LAWS, *POPULATIONS]
+    assert max(map(len, lines)) <= 80
