@@ -28,6 +28,7 @@ COMMANDS = {
     "export-fmu": "Write a scene or a model as a Functional Mock-up Unit.",
     "ocp": "Solve an optimal control problem and check it.",
     "demo": "Simulate, identify, optimise and generate C.",
+    "gallery": "Compute the figures of the papers again.",
     "bench": "Measure symfric beside other integrators.",
     "stress": "Judge runs of random laws in random scenes.",
 }

@@ -1,1 +1,14 @@
-"""The figures of the source papers, a script each, with what is compared and how far we are."""
+"""The figures of the source papers, a script each, with what is compared and how far we are.
+
+from symfric.gallery import plates
+
+plate = plates()["self_tuning/fig_07_shape_factor"](quick=True)
+plate.picture.savefig("fig_07.png")
+"""
+
+from symfric.gallery.plate import Plate as Plate
+from symfric.gallery.plate import chosen as chosen
+from symfric.gallery.plate import plate_of as plate_of
+from symfric.gallery.plate import plates as plates
+from symfric.gallery.plate import scripts as scripts
+from symfric.gallery.plate import short as short

@@ -1,0 +1,187 @@
+"""A plate: one figure of a paper computed again, and how far we are from it."""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from inspect import cleandoc
+from math import isfinite
+from pathlib import Path
+from sys import modules
+from typing import Any, final
+
+from matplotlib.figure import Figure
+
+from symfric.foundation.parameters import check_names
+
+SECTIONS = ("Compared", "Distance", "Evidence")
+"""What the docstring of every script says under these words."""
+SCRIPT = re.compile(r"fig_(\d+)(?:_(\d+))?_\w+")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Plate:
+    """One figure of a paper, computed again.
+
+    Everything but the last four is said once, in the docstrings of the script and of its folder.
+
+    Attributes:
+        paper: authors and title.
+        figure: such as "Figure 7".
+        title: what it shows.
+        text: what else there is to say; may be empty.
+        compared: what is compared with what.
+        measure: what `distance` measures.
+        evidence: what was refuted, and by what evidence.
+        distance: how far we are, in `unit`; computed by the script.
+        unit: SI, "1" for a ratio.
+        picture: made outside pyplot.
+        numbers: name with unit, such as "period [s]" -> value; what the evidence stands on.
+    """
+
+    paper: str
+    figure: str
+    title: str
+    text: str
+    compared: str
+    measure: str
+    evidence: str
+    distance: float
+    unit: str
+    picture: Figure
+    numbers: Mapping[str, float]
+
+    @property
+    def how_far(self) -> str:
+        """The distance with its unit."""
+        return f"{self.distance:.2g} {self.unit}" if self.unit != "1" else f"{self.distance:.2g}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but the picture as plain data."""
+        texts = ("paper", "figure", "title", "text", "compared", "measure", "evidence")
+        return {name: getattr(self, name) for name in texts} | {
+            "distance": float(self.distance),
+            "unit": self.unit,
+            "how_far": self.how_far,
+            "numbers": {name: float(value) for name, value in self.numbers.items()},
+        }
+
+
+def plate_of(
+    script: str, picture: Figure, distance: float, unit: str, numbers: Mapping[str, float]
+) -> Plate:
+    """The plate of a script, its texts taken from the docstrings.
+
+    Args:
+        script: `__name__` of the script; its folder names the paper.
+        picture: the figure.
+        distance: how far we are.
+        unit: of the distance; "1" for a ratio.
+        numbers: what the evidence stands on.
+
+    Raises:
+        ValueError: a docstring without one of its sections, numbers that are not finite.
+    """
+    said = sections(modules[script].__doc__ or "")
+    missing = [name for name in ("title", *SECTIONS) if not said.get(name)]
+    if missing:
+        raise ValueError(
+            f"gallery '{script}': expected a docstring with {', '.join(missing)}, got none"
+        )
+    odd = [name for name, v in {"distance": distance, **numbers}.items() if not isfinite(v)]
+    if odd:
+        raise ValueError(f"gallery '{script}': expected finite numbers, got {', '.join(odd)}")
+    folder, _, name = script.rpartition(".")
+    return Plate(
+        paper=paper_of(folder),
+        figure=figure_of(name),
+        title=said["title"],
+        text=said["text"],
+        compared=said["Compared"],
+        measure=said["Distance"],
+        evidence=said["Evidence"],
+        distance=float(distance),
+        unit=unit,
+        picture=picture,
+        numbers=dict(numbers),
+    )
+
+
+def sections(doc: str) -> dict[str, str]:
+    """A docstring in parts: "title" (its first line), "text", and what follows each of SECTIONS."""
+    title, _, rest = cleandoc(doc).partition("\n")
+    found = {"title": title.rstrip("."), "text": ""}
+    at = "text"
+    for paragraph in re.split(r"\n\s*\n|\n(?=[A-Z][a-z]+:)", rest):
+        name, colon, body = paragraph.strip().partition(":")
+        at, body = (name, body) if colon and name in SECTIONS else (at, paragraph)
+        found[at] = f"{found.get(at, '')}\n\n{' '.join(body.split())}".strip()
+    return found
+
+
+def figure_of(name: str) -> str:
+    """The figure that a script is named after: fig_07_... is Figure 7, fig_3_2_... Figure 3.2."""
+    match = SCRIPT.fullmatch(name)
+    if match is None:
+        raise ValueError(f"gallery: expected a script named fig_07_what_it_shows, got {name}")
+    return "Figure " + ".".join(str(int(part)) for part in match.groups() if part)
+
+
+def paper_of(folder: str) -> str:
+    """Authors and title: the first paragraph of the folder's docstring."""
+    doc = cleandoc(import_module(folder).__doc__ or "")
+    return " ".join(doc.split("\n\n")[0].split()).rstrip(".")
+
+
+@cache
+def scripts() -> dict[str, str]:
+    """Name of every plate, such as self_tuning/fig_07_shape_factor -> its module."""
+    here = Path(__file__).parent
+    found = [path for path in sorted(here.glob("*/fig_*.py")) if SCRIPT.fullmatch(path.stem)]
+    return {
+        f"{path.parent.name}/{path.stem}": f"symfric.gallery.{path.parent.name}.{path.stem}"
+        for path in found
+    }
+
+
+def plates() -> dict[str, Callable[..., Plate]]:
+    """Every figure of the gallery: name -> function `plate(quick=False)` that computes it.
+
+    With `quick` it is computed in a second at most: shorter, coarser, or with fewer laws.
+    """
+    return {name: import_module(module).plate for name, module in scripts().items()}
+
+
+def short(name: str) -> str:
+    """A name without what the figure shows, such as self_tuning/fig_07; `chosen` takes it, too."""
+    return re.sub(r"(fig_\d+(?:_\d+(?=_))?)_.*", r"\1", name)
+
+
+def chosen(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of all plates that begin with one of `names`, in the order of the gallery; () is all.
+
+    Raises:
+        ValueError: a name that begins none.
+    """
+    known = [*scripts()]
+    found = {name: [k for k in known if k == name or begins(k, name)] for name in names}
+    wrong = [name for name, hits in found.items() if not hits]
+    folders = dict.fromkeys(name.partition("/")[0] for name in known)
+    check_names("gallery", wrong, [*folders, *map(short, known)])
+    wanted = {hit for hits in found.values() for hit in hits} or {*known}
+    return tuple(name for name in known if name in wanted)
+
+
+def begins(name: str, start: str) -> bool:
+    """Whether `start` is the first words of a plate's name; fig_1 does not begin fig_10."""
+    return name.startswith(start) and name[len(start)] in "/_"
+
+
+def about(name: str) -> dict[str, str]:
+    """What the docstrings say of a plate, without computing it: paper, figure, title, sections."""
+    module = scripts()[name]
+    folder, _, stem = module.rpartition(".")
+    said = sections(import_module(module).__doc__ or "")
+    return {"paper": paper_of(folder), "figure": figure_of(stem)} | said

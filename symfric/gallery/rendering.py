@@ -1,0 +1,165 @@
+"""Plates on disk: pictures and numbers, computed in parallel, one that fails beside the others."""
+
+import ast
+import json
+import os
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from time import perf_counter, time
+from typing import Any, final
+
+from symfric import __version__
+from symfric.foundation.files import write_text
+from symfric.foundation.panels import save
+from symfric.gallery.pages import index_page
+from symfric.gallery.plate import Plate, chosen, scripts
+from symfric.stress.crew import Crew, Died, Hung
+
+LIMIT = 600.0
+"""Seconds that the figures of one process may take before they count as hanging."""
+
+Record = dict[str, Any]
+"""A plate as plain data, with its name, picture and seconds."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Gallery:
+    """What came of a rendering.
+
+    Attributes:
+        folder: where pictures, numbers and `index.html` are.
+        asked: names of the plates that were to be computed.
+        records: name -> plate as plain data, of what was computed now.
+        failures: name -> why it was not; neither is what an interrupt left undone.
+    """
+
+    folder: Path
+    asked: tuple[str, ...]
+    records: dict[str, Record]
+    failures: dict[str, str]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every plate that was asked for is there."""
+        return len(self.records) == len(self.asked)
+
+
+def render(
+    folder: Path,
+    names: Sequence[str] = (),
+    *,
+    quick: bool = False,
+    workers: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Gallery:
+    """Compute plates and write a picture and a JSON file of each, and `index.html` of all there.
+
+    Plates that stand on the same runs share a process and its cache. An interrupt (Ctrl-C) ends
+    with what there is.
+
+    Args:
+        folder: what is written into.
+        names: of plates, or how their names begin, such as a paper; all if none is given.
+        quick: at reduced size.
+        workers: processes; default one a core.
+        progress: called with the fraction done.
+
+    Raises:
+        ValueError: a name that no plate has.
+    """
+    asked = chosen(tuple(names))
+    began, groups = time(), together(asked)
+    for name in asked:  # what is there afterwards is of now
+        for ending in (".json", ".png"):
+            with suppress(FileNotFoundError):
+                place(folder, name, ending).unlink()
+    tasks = ((i, (group, str(folder), quick)) for i, group in enumerate(groups))
+    size = min(workers or os.cpu_count() or 1, len(groups))
+    crew = Crew(_rendered, tasks, size, LIMIT)
+    failures, done = dict[str, str](), 0
+    try:
+        for number, outcome in crew.outcomes():
+            failures |= _failures(groups[number], folder, outcome)
+            done += len(groups[number])
+            if progress is not None:
+                progress(done / len(asked))
+    except KeyboardInterrupt:
+        pass
+    finally:
+        crew.dismiss()
+    there = read(folder)
+    write_text(folder / "index.html", index_page([*there.values()]))
+    records = {name: there[name] for name in asked if name in there}
+    fresh = {n: r for n, r in records.items() if place(folder, n, ".json").stat().st_mtime >= began}
+    return Gallery(folder, asked, fresh, failures)
+
+
+def place(folder: Path, name: str, ending: str) -> Path:
+    """Where the file of a plate is."""
+    return folder / f"{name}{ending}"
+
+
+def read(folder: Path) -> dict[str, Record]:
+    """The plates that were written into `folder`, in the order of the gallery."""
+    found: dict[str, Record] = {}
+    for name in scripts():
+        with suppress(FileNotFoundError):
+            found[name] = json.loads(place(folder, name, ".json").read_text(encoding="utf-8"))
+    return found
+
+
+def draw(name: str, folder: Path, quick: bool = False) -> Record:
+    """Compute one plate and write its picture and numbers.
+
+    Returns:
+        What its JSON file holds.
+    """
+    began = perf_counter()
+    plate: Plate = import_module(scripts()[name]).plate(quick=quick)
+    save(plate.picture, place(folder, name, ".png"))
+    about = {"name": name, "picture": f"{name}.png", "quick": quick, "symfric": __version__}
+    record = about | {"seconds": round(perf_counter() - began, 2)} | plate.to_dict()
+    write_text(place(folder, name, ".json"), json.dumps(record, indent=2, allow_nan=False) + "\n")
+    return record
+
+
+def together(names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Plates by process: those of a paper that import the same helper _runs... share its cache."""
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault(_runs(name) or name, []).append(name)
+    return [tuple(group) for group in sorted(groups.values(), key=len, reverse=True)]
+
+
+def _runs(name: str) -> str:
+    """The first helper _runs... of its folder that a script imports, "" if there is none."""
+    module = import_module(scripts()[name])
+    tree = ast.parse(Path(str(module.__file__)).read_text(encoding="utf-8"))
+    imported = [node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    return next((m for m in imported if m.startswith(f"{module.__package__}._runs")), "")
+
+
+def _rendered(task: tuple[tuple[str, ...], str, bool]) -> dict[str, str]:
+    """Draw the plates of one process; why those that failed did."""
+    names, folder, quick = task
+    failures: dict[str, str] = {}
+    for name in names:
+        try:
+            draw(name, Path(folder), quick)
+        except Exception as error:  # noqa: BLE001  (whatever it is, it is told beside the others)
+            failures[name] = f"{type(error).__name__}: {' '.join(str(error).split())}"
+    return failures
+
+
+def _failures(
+    group: tuple[str, ...], folder: Path, outcome: dict[str, str] | Died | Hung
+) -> dict[str, str]:
+    if isinstance(outcome, dict):
+        return outcome
+    died = isinstance(outcome, Died)
+    why = f"its process died, {outcome.how}: {outcome.words}" if died else "no end within its time"
+    return {name: why for name in group if not place(folder, name, ".json").exists()}

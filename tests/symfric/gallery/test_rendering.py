@@ -1,0 +1,101 @@
+"""Plates on disk: all that work, and why the others do not."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from symfric.gallery import rendering
+from symfric.gallery.pages import index_page
+from symfric.gallery.plate import chosen, figure_of, plate_of, sections, short
+from symfric.gallery.rendering import draw, read, render, together
+
+NAME = "self_tuning/fig_07_shape_factor"
+
+
+def test_a_docstring_falls_into_its_parts() -> None:
+    doc = """Force.
+
+        Some
+        text.
+
+        Compared: this
+        with that.
+        Distance: of both.
+
+        Evidence: none
+
+        but this.
+        """
+    assert sections(doc) == {
+        "title": "Force",
+        "text": "Some text.",
+        "Compared": "this with that.",
+        "Distance": "of both.",
+        "Evidence": "none\n\nbut this.",
+    }
+
+
+def test_a_script_is_named_after_its_figure() -> None:
+    assert figure_of("fig_07_shape_factor") == "Figure 7"
+    assert figure_of("fig_3_2_forces") == "Figure 3.2"
+    assert short("thesis/fig_3_2_forces") == "thesis/fig_3_2"
+    assert short(NAME) == "self_tuning/fig_07"
+    with pytest.raises(ValueError, match="expected a script named fig_07_what_it_shows"):
+        figure_of("figure_seven")
+
+
+def test_a_name_may_be_a_figure_or_a_paper() -> None:
+    assert chosen((NAME,)) == chosen(("self_tuning/fig_07",)) == (NAME,)
+    assert NAME in chosen(("self_tuning",))
+    assert {*chosen(("self_tuning",))} <= {*chosen(())}
+    with pytest.raises(ValueError, match="did you mean self_tuning/fig_07"):
+        chosen(("self_tuning/fig_0",))
+
+
+def test_a_plate_refuses_numbers_that_are_not_finite() -> None:
+    import symfric.gallery.self_tuning.fig_07_shape_factor as script  # noqa: PLC0415
+
+    with pytest.raises(ValueError, match="expected finite numbers, got distance, period"):
+        plate_of(script.__name__, None, float("nan"), "m", {"period [s]": float("inf")})  # type: ignore[arg-type]
+
+
+def test_a_plate_is_written_whole(tmp_path: Path) -> None:
+    record = draw(NAME, tmp_path, quick=True)
+    assert (tmp_path / f"{NAME}.png").stat().st_size > 10_000
+    assert json.loads((tmp_path / f"{NAME}.json").read_text()) == record == read(tmp_path)[NAME]
+    page = index_page([record])
+    assert f'src="{NAME}.png"' in page
+    assert record["how_far"] in page
+    assert "reduced size" in page
+
+
+def test_figures_of_the_same_runs_share_a_process() -> None:
+    groups = together(chosen(()))
+    assert sorted(name for group in groups for name in group) == sorted(chosen(()))
+    assert all(len({name.split("/")[0] for name in group}) == 1 for group in groups)
+
+
+def test_one_that_fails_is_told_beside_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(name: str, folder: Path, quick: bool = False) -> None:
+        raise ArithmeticError(f"no {name}")
+
+    monkeypatch.setattr(rendering, "draw", broken)
+    task = ((NAME, "other"), str(tmp_path), True)
+    assert rendering._rendered(task) == {  # pyright: ignore[reportPrivateUsage]
+        NAME: f"ArithmeticError: no {NAME}",
+        "other": "ArithmeticError: no other",
+    }
+
+
+@pytest.mark.heavy
+def test_a_gallery_is_rendered_in_processes(tmp_path: Path) -> None:
+    told: list[float] = []
+    done = render(tmp_path, [NAME], quick=True, workers=1, progress=told.append)
+    assert done.passed
+    assert told == [1.0]
+    assert {*done.records} == {NAME}
+    assert not done.failures
+    assert "Figure 7" in (tmp_path / "index.html").read_text(encoding="utf-8")
