@@ -1,4 +1,4 @@
-# make demo, test, check, stress, mutants, embedded: each makes its own virtual environment .venv when
+# make demo, test, docs, check, stress, mutants, embedded: each makes its own virtual environment .venv when
 # there is none. PYTHON=... chooses the interpreter (3.11 or newer). make newest: the fast half of the
 # tests on the newest interpreter there is, with the newest NumPy, in .venv-newest. make extras: tests
 # beside other tools (FMPy, NVRTC, Pinocchio) in .venv-extras.
@@ -9,13 +9,18 @@ VENV := .venv
 ONE_THREAD := OPENBLAS_NUM_THREADS=1
 BIN := $(VENV)/bin
 
-.PHONY: demo test newest extras check stress mutants embedded clean
+.PHONY: demo test docs newest extras check stress mutants embedded clean
 
 demo: $(VENV)/.runtime
 	$(BIN)/symfric demo --out out
 
 test: $(VENV)/.test
 	$(ONE_THREAD) $(BIN)/python -m pytest -n auto --dist loadfile
+
+# Pages in out/docs/index.html. SYMFRIC_DOCS=quick takes the gallery of the papers at reduced size.
+docs: $(VENV)/.docs
+	$(ONE_THREAD) $(BIN)/python -m sphinx -W --keep-going -n -q -d out/doctrees docs out/docs
+	@echo "docs: out/docs/index.html"
 
 newest:
 	@newest="$$(sh .ci/newest-python "$(PYTHON)")"; \
@@ -56,6 +61,7 @@ check: $(VENV)/.dev
 
 clean:
 	rm -rf $(VENV) .venv-newest .venv-extras out dist build .pytest_cache .ruff_cache .hypothesis
+	rm -rf docs/made docs/laws docs/scenes docs/gallery docs/examples docs/reference
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The stages build on each other, so that `make -j` never runs two installers at once.
@@ -75,7 +81,12 @@ $(VENV)/.test: $(VENV)/.runtime
 	$(BIN)/python -m pip install --quiet --editable ".[test]"
 	@touch $@
 
-$(VENV)/.dev: $(VENV)/.test
+$(VENV)/.docs: $(VENV)/.test
+	@echo "installing what 'docs' needs into $(VENV)"
+	$(BIN)/python -m pip install --quiet --editable ".[docs]"
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/.docs
 	@echo "installing what 'dev' needs into $(VENV)"
 	$(BIN)/python -m pip install --quiet --editable ".[dev]"
 	@touch $@

@@ -1,0 +1,99 @@
+"""Blocks of code in a page: what runs, what it prints, and which pictures it leaves.
+
+A page is text with fenced blocks. Its `python` and `console` blocks run one after the other, in
+one namespace and one empty folder. A `text` block right behind Python is what that prints. A
+`console` block holds lines `$ symfric ...`, each followed by what it prints. In what is printed
+`...` stands for anything. Blocks of other languages (`bash`, `c`, `yaml`, ...) are only shown.
+
+`<!-- test: heavy -->` in a page says that it runs for more than some seconds.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import final
+
+DOCS = Path(__file__).resolve().parents[1]
+ROOT = DOCS.parent
+FENCE = re.compile(
+    r"^(?P<fence>```+)(?P<language>[\w-]+)[ \t]*\n(?P<body>.*?)^(?P=fence)[ \t]*$", re.M | re.S
+)
+MARK = re.compile(r"^<!-- test: (\w+) -->$", re.M)
+PICTURE = re.compile(r"(!\[[^\]]*\]\()([\w-]+\.(?:png|svg|gif))(\))")
+
+
+@final
+@dataclass(frozen=True)
+class Block:
+    """One block of code of a page.
+
+    Attributes:
+        language: what stands behind the fence.
+        body: the code.
+        line: where it begins in the page.
+        prints: the `text` block right behind, None where there is none.
+    """
+
+    language: str
+    body: str
+    line: int
+    prints: str | None = None
+
+
+def blocks(text: str) -> list[Block]:
+    """The blocks of a page; output stands with the block that prints it."""
+    found: list[Block] = []
+    end = 0
+    for match in FENCE.finditer(text):
+        between = text[end : match.start()]
+        language, body = match["language"], match["body"]
+        line = text.count("\n", 0, match.start()) + 1
+        if language == "text" and found and found[-1].language == "python" and not between.strip():
+            last = found.pop()
+            found.append(Block(last.language, last.body, last.line, body))
+        else:
+            found.append(Block(language, body, line))
+        end = match.end()
+    return found
+
+
+def written_pages() -> Iterator[Path]:
+    """Every page that somebody wrote, and the README."""
+    yield ROOT / "README.md"
+    for folder in (DOCS, *(DOCS / name for name in ("start", "tutorials", "howto", "theory"))):
+        yield from sorted(p for p in folder.glob("*.md") if p != DOCS / "README.md")
+
+
+def mark(text: str) -> str:
+    """What the page says about its tests, "" for nothing."""
+    found = MARK.search(text)
+    return found[1] if found else ""
+
+
+def commands(block: Block) -> list[tuple[str, str]]:
+    """The lines behind `$` of a `console` block, each with what it prints."""
+    parts = re.split(r"^\$ ", block.body, flags=re.M)
+    if parts[0].strip():
+        raise ValueError(f"line {block.line}: expected a command behind '$ ' first")
+    found: list[tuple[str, str]] = []
+    for part in parts[1:]:
+        command, _, printed = part.replace("\\\n", " ").partition("\n")
+        found.append((command, printed))
+    return found
+
+
+def agrees(printed: str, expected: str) -> bool:
+    """Whether `printed` is what a page says, where `...` stands for anything."""
+    wanted = [re.escape(part) for part in plain(expected).split("...")]
+    return re.fullmatch(".*".join(wanted), plain(printed), re.S) is not None
+
+
+def plain(text: str) -> str:
+    """Without blanks at the ends of lines and of the text."""
+    return "\n".join(line.rstrip() for line in text.strip().splitlines())
+
+
+def made_pictures(text: str, folder: Path) -> list[str]:
+    """Names of the pictures that blocks of the page in `folder` leave: those not beside it."""
+    return [name for _, name, _ in PICTURE.findall(text) if not (folder / name).exists()]
