@@ -30,7 +30,9 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture(autouse=True)
 def pictures_are_closed() -> Iterator[None]:
-    """Whatever a test has drawn: Matplotlib keeps it, and warns at the twenty-first."""
+    """Figures are made outside pyplot, which would keep them: whatever a test has drawn."""
     yield
     if "matplotlib.pyplot" in sys.modules:
+        kept = sys.modules["matplotlib.pyplot"].get_fignums()
         sys.modules["matplotlib.pyplot"].close("all")
+        assert not kept, "a figure of pyplot was left open"

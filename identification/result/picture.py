@@ -12,6 +12,7 @@ from identification.result.curve import Curve
 from identification.result.series import Series
 from symfric.foundation import checks
 from symfric.foundation.panels import panels, save
+from symfric.foundation.style import colour
 
 if TYPE_CHECKING:
     from identification.result.fitted import Fitted
@@ -64,7 +65,7 @@ def _curve(axis: Axes, curve: Curve, name: str) -> None:
     for line in curve.measured.values():
         axis.plot(line.t, line.y, ".", color="0.6", ms=1.8, alpha=0.6, rasterized=True)
     axis.plot([], [], ".", color="0.6", label=curve.says)
-    axis.plot(curve.law.t, curve.law.y, color="C3", lw=1.5, label=name)
+    axis.plot(curve.law.t, curve.law.y, color=colour(1), lw=1.5, label=name)
     low, high = limits(curve)
     axis.set_ylim(low, high)
     axis.set_xlabel(f"v [{curve.v_unit}]")
@@ -84,7 +85,7 @@ def limits(curve: Curve) -> tuple[float, float]:
 def _data(axis: Axes, one: Series) -> None:
     style = "-" if one.ordered else "."
     axis.plot(one.measured.t, one.measured.y, style, color="0.6", lw=2.2, label="measured")
-    axis.plot(one.predicted.t, one.predicted.y, style, color="C3", lw=0.9, label="fitted")
+    axis.plot(one.predicted.t, one.predicted.y, style, color=colour(1), lw=0.9, label="fitted")
     axis.set_ylabel(f"{one.signal} [{one.unit}]")
     axis.set_xlabel(one.abscissa)
     axis.text(0.005, 1.02, one.record, transform=axis.transAxes, fontsize="small")
@@ -92,7 +93,7 @@ def _data(axis: Axes, one: Series) -> None:
 
 
 def _left(axis: Axes, one: Series) -> None:
-    axis.plot(one.residual.t, one.residual.y, "-" if one.ordered else ".", color="C0", lw=0.7)
+    axis.plot(one.residual.t, one.residual.y, "-" if one.ordered else ".", color=colour(0), lw=0.7)
     axis.axhline(0.0, color="0.4", lw=0.6)
     axis.set_ylabel(f"fitted - measured [{one.unit}]")
     axis.set_xlabel(one.abscissa)
@@ -100,9 +101,9 @@ def _left(axis: Axes, one: Series) -> None:
 
 def _lags(axis: Axes, one: Series) -> None:
     axis.fill_between(
-        one.lags, one.low, one.high, color="C0", alpha=0.15, lw=0, label="white: 95 %"
+        one.lags, one.low, one.high, color=colour(0), alpha=0.15, lw=0, label="white: 95 %"
     )
-    axis.vlines(one.lags, 0.0, one.correlation, color="C0", lw=1.2)
+    axis.vlines(one.lags, 0.0, one.correlation, color=colour(0), lw=1.2)
     axis.axhline(0.0, color="0.4", lw=0.6)
     axis.set_ylim(min(-0.3, 1.1 * one.correlation.min()), 1.0)
     axis.set_ylabel("autocorrelation")

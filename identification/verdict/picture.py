@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 from identification.verdict.whiteness import Whiteness
-from symfric.foundation.panels import panels, save
+from symfric.foundation.panels import grid, panels, save
+from symfric.foundation.style import colour
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,11 +20,11 @@ def plot_profile(found: "Profile", path: str | Path | None = None) -> "Figure":
     """The rise of the cost over the value, with the limit of 95 %."""
     figure, (axis,) = panels(1, width=5.5, height=3.2)
     axis.plot(found.values, found.rise, "o-", ms=4, lw=1.3, label="profile")
-    axis.axhline(found.limit, color="C3", lw=1, ls="--", label="limit of 95 %")
+    axis.axhline(found.limit, color=colour(1), lw=1, ls="--", label="limit of 95 %")
     axis.plot([found.best], [0.0], "k|", ms=14, label="fit")
     for end in (found.low, found.high):
         if end is not None:
-            axis.axvline(end, color="C3", lw=0.8, ls=":")
+            axis.axvline(end, color=colour(1), lw=0.8, ls=":")
     if found.logarithmic and found.values.max() > 5 * found.values.min():
         axis.set_xscale("log")
     top = max(1.6 * found.limit, 0.0)
@@ -42,8 +42,8 @@ def plot_lags(found: Mapping[str, Whiteness], path: str | Path | None = None) ->
     figure, axes = panels(max(1, len(some)), width=6.5, height=1.9)
     for axis, (name, w) in zip(axes, some.items(), strict=False):
         axis.fill_between(w.lags, w.low, w.high, color="0.85", label="white: 95 %")
-        axis.vlines(w.lags, 0.0, w.correlation, color="C0", lw=1.5)
-        axis.plot(w.lags, w.correlation, "o", color="C0", ms=3)
+        axis.vlines(w.lags, 0.0, w.correlation, color=colour(0), lw=1.5)
+        axis.plot(w.lags, w.correlation, "o", color=colour(0), ms=3)
         axis.axhline(0.0, color="k", lw=0.6)
         axis.set_ylim(min(-0.3, float(np.min(w.correlation)) - 0.1), 1.05)
         axis.set_ylabel(name)
@@ -56,22 +56,20 @@ def plot_lags(found: Mapping[str, Whiteness], path: str | Path | None = None) ->
 def plot_ranking(found: Mapping[str, Any], path: str | Path | None = None) -> "Figure":
     """Errors and BIC of several laws, a bar for each, the best one on top."""
     rows = [row for row in found["rows"] if row["status"]]
-    figure, (errors, criterion) = plt.subplots(
-        1, 2, figsize=(8.5, 1.2 + 0.42 * max(1, len(rows))), sharey=True, layout="constrained"
-    )
+    figure, ((errors, criterion),) = grid(1, 2, 8.5, 1.2 + 0.42 * max(1, len(rows)), sharey=True)
     places = np.arange(len(rows))[::-1]
-    for shift, key, label, colour in (
-        (0.2, "validation [%]", "not fitted to", "C0"), (-0.2, "fit [%]", "fitted to", "0.7"),
+    for shift, key, label, shade in (
+        (0.2, "validation [%]", "not fitted to", colour(0)), (-0.2, "fit [%]", "fitted to", "0.7"),
     ):  # fmt: skip
         values = [row[key] or 0.0 for row in rows]
-        errors.barh(places + shift, values, height=0.38, color=colour, label=label)
+        errors.barh(places + shift, values, height=0.38, color=shade, label=label)
     errors.set_yticks(
         places,
         labels=[f"{row['law']}\n{row['parameters']} par., {_operations(row)}" for row in rows],
     )
     errors.set_xlabel("rms error over the spread [%]")
     errors.legend(fontsize="small")
-    colours = ["C2" if row["status"] == "SOLVED" else "C1" for row in rows]
+    colours = [colour(2) if row["status"] == "SOLVED" else colour(1) for row in rows]
     criterion.barh(places, [row["BIC"] or 0.0 for row in rows], height=0.5, color=colours)
     for place, row in zip(places, rows, strict=True):
         criterion.annotate(
@@ -84,7 +82,7 @@ def plot_ranking(found: Mapping[str, Any], path: str | Path | None = None) -> "F
         )
     criterion.set_xlabel("BIC over that of the best")
     for axis in (errors, criterion):
-        axis.grid(alpha=0.3, axis="x")
+        axis.grid(visible=False, axis="y")
     figure.suptitle(f"{found['data']}: {found['how']}", fontsize="medium")
     return save(figure, path)
 

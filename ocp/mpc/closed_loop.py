@@ -16,6 +16,7 @@ from ocp.mpc.session import Session
 from symfric.foundation import checks
 from symfric.foundation.files import written
 from symfric.foundation.panels import panels, save
+from symfric.foundation.style import colour
 from symfric.integrator.plant import Plant
 from symfric.integrator.stepper import stepper
 from symfric.model import Model, check_model
@@ -184,17 +185,17 @@ def plot_loops(
     shown = list(names) or shared
     figure, axes = panels(len(shown) + 1)
     for number, (label, one) in enumerate(loops.items()):
-        colour, edges = f"C{number}", np.append(one.t, one.t_end)
+        shade, edges = colour(number), np.append(one.t, one.t_end)
         for axis, name in zip(axes, shown, strict=False):
             if name in one.controls:
-                axis.stairs(one.controls[name], edges, baseline=None, color=colour, label=label)
+                axis.stairs(one.controls[name], edges, baseline=None, color=shade, label=label)
             else:
-                axis.plot(edges, one.signals[name], color=colour, linewidth=1.2, label=label)
+                axis.plot(edges, one.signals[name], color=shade, linewidth=1.2, label=label)
             axis.set_ylabel(f"{name} [{one.units[name]}]")
-        axes[-1].semilogy(one.t, 1e3 * one.cpu, ".", ms=3, color=colour)
+        axes[-1].semilogy(one.t, 1e3 * one.cpu, ".", ms=3, color=shade)
         for k in np.flatnonzero(one.status != CycleStatus.CONVERGED).tolist():
             for axis in axes:
-                axis.axvspan(edges[k], edges[k + 1], color=colour, alpha=0.15, linewidth=0)
+                axis.axvspan(edges[k], edges[k + 1], color=shade, alpha=0.15, linewidth=0)
     axes[-1].set_ylabel("cycle [ms]")
     axes[-1].set_xlabel("t [s]")
     if len(loops) > 1:

@@ -13,6 +13,7 @@ from ocp.result.solution import Solution
 from symfric.foundation import checks
 from symfric.foundation.panels import panels, save
 from symfric.foundation.parameters import check_names
+from symfric.foundation.style import colour
 from symfric.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SHADES = {"slip+": "#6baed6", "stick": "#fc9272", "slip-": "#74c476"}
+SHADES = {"slip+": colour(6), "stick": "0.45", "slip-": colour(1)}
 """Kind of mode -> colour of its background."""
 ASKED = "0.35"
 """Colour of bounds and of what is asked for."""
@@ -63,7 +64,7 @@ def plot_solutions(
     figure, axes = panels(len(shown))
     for axis, name in zip(axes, shown, strict=True):
         for number, (_, solution, motion) in enumerate(drawn):
-            _signal(axis, solution, motion, name, f"C{number % 10}")
+            _signal(axis, solution, motion, name, colour(number))
         for phase in first.phases[1:]:
             axis.axvline(phase.begin, color="0.6", linewidth=0.6, zorder=0)
         if len(solutions) == 1:
@@ -92,7 +93,7 @@ def _explain(
     handles: list[Artist] = []
     if len(entries) > 1:
         for number, entry in enumerate(entries):
-            handles += axis.plot([], [], color=f"C{number % 10}", label=entry)
+            handles += axis.plot([], [], color=colour(number), label=entry)
     else:
         axis.set_title(entries[0])
     if alone is not None and alone.modes:
@@ -109,20 +110,20 @@ def _explain(
         axis.legend(handles=handles, fontsize="small", loc="best", ncols=len(handles))
 
 
-def _signal(axis: "Axes", solution: Solution, motion: Motion, name: str, colour: str) -> None:
+def _signal(axis: "Axes", solution: Solution, motion: Motion, name: str, shade: str) -> None:
     if name in motion.controls:
         edges = np.append(motion.t_control, motion.phases[-1].end)
-        axis.stairs(motion.controls[name], edges, baseline=None, color=colour, linewidth=1.2)
+        axis.stairs(motion.controls[name], edges, baseline=None, color=shade, linewidth=1.2)
         return
     at = motion.nodes
     nodes = np.arange(motion.t.size)[at][:: max(1, np.size(motion.t[at]) // CIRCLES)]
-    axis.plot(motion.t[nodes], motion[name][nodes], "o", color=colour, ms=3.5, mfc="none")
+    axis.plot(motion.t[nodes], motion[name][nodes], "o", color=shade, ms=3.5, mfc="none")
     runs = simulated(solution, motion)
     for run in runs:
         if name in run.units:
-            axis.plot(run.t, run[name], color=colour, linewidth=1.0)
+            axis.plot(run.t, run[name], color=shade, linewidth=1.0)
     if not runs:
-        axis.plot(motion.t, motion[name], color=colour, linewidth=1.0)
+        axis.plot(motion.t, motion[name], color=shade, linewidth=1.0)
 
 
 def simulated(solution: Solution, motion: Motion) -> list[Trajectory]:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from symfric.figures import FigureData
 from symfric.figures.data import Curve
+from symfric.foundation.style import colour
 from symfric.integrator.equations.blocks import refinement
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
@@ -100,7 +101,7 @@ def plot_jitter(data: FigureData, path: str | Path | None = None) -> "Figure":
         for c in data.curves:
             law = laws.index(c.law)
             axis.semilogx(
-                c[x], c[y], "-o" if law == 0 else "--s", color=f"C{cases.index(c.case)}",
+                c[x], c[y], "-o" if law == 0 else "--s", color=colour(cases.index(c.case)),
                 linewidth=1.2, markersize=5 if law == 0 else 4, label=c.label,
                 markerfacecolor=None if law == 0 else "none",
             )  # fmt: skip

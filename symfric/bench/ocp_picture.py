@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from symfric.foundation.panels import panels, save
+from symfric.foundation.style import colour
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,9 +28,9 @@ def plot_ocp(rows: "Sequence[OcpRow]", path: str | Path | None = None) -> "Figur
         for row in rows:
             if row.case != case or row.starts == "far" or not isfinite(row.exact):
                 continue
-            colour = f"C{('symfric', 'Opti', 'rockit').index(row.solver.split()[0])}"
+            shade = colour(("symfric", "Opti", "rockit").index(row.solver.split()[0]))
             marker = "o" if row.best > 0.5 else "x"
-            axis.loglog(row.time_s, max(row.exact, LEAST), marker, color=colour)
+            axis.loglog(row.time_s, max(row.exact, LEAST), marker, color=shade)
             axis.annotate(
                 row.solver, (row.time_s, max(row.exact, LEAST)), xytext=(4, 3),
                 textcoords="offset points", fontsize="x-small",

@@ -13,6 +13,7 @@ from symfric.compensation.reference import Reference
 from symfric.foundation import checks
 from symfric.foundation.files import written
 from symfric.foundation.panels import panels, save
+from symfric.foundation.style import line
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -233,12 +234,12 @@ class Comparison:
         near = slice(window.start, window.stop)
         axes[0].plot(self.reference.t, 1e3 * self.reference.x, "k--", lw=0.8, label="reference")
         for number, loop in enumerate(shown):
-            t, n, colour = loop.t, loop.force.size, f"C{number}"
-            axes[0].plot(t, 1e3 * loop.x[:n], label=loop.name, color=colour, lw=1.0)
-            axes[1].plot(t, 1e6 * loop.error, color=colour, lw=1.0)
-            axes[2].step(t, loop.force, where="post", color=colour, lw=1.0)
-            axes[3].step(t, loop.added, where="post", color=colour, lw=1.0)
-            axes[4].plot(t[near], 1e6 * loop.error[near], color=colour, lw=1.0)
+            t, n, look = loop.t, loop.force.size, line(number)
+            axes[0].plot(t, 1e3 * loop.x[:n], label=loop.name, **look, lw=1.0)
+            axes[1].plot(t, 1e6 * loop.error, **look, lw=1.0)
+            axes[2].step(t, loop.force, where="post", **look, lw=1.0)
+            axes[3].step(t, loop.added, where="post", **look, lw=1.0)
+            axes[4].plot(t[near], 1e6 * loop.error[near], **look, lw=1.0)
         for axis, label in zip(
             axes,
             (f"x [m{x}]", f"error [u{x}]", f"force [{force}]", f"added [{force}]", f"error [u{x}]"),

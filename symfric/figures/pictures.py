@@ -1,15 +1,16 @@
 """Pictures of laws and of what they do, with units."""
 
 from collections.abc import Mapping
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from symfric.foundation.panels import panels, save
+from symfric.foundation.panels import grid, panels, save
 from symfric.foundation.parameters import parameters
+from symfric.foundation.style import DASHES, colour, line
 from symfric.laws import steady_force
 
 if TYPE_CHECKING:
@@ -27,18 +28,17 @@ def plot_laws(
         N: normal force [N].
         path: image file.
     """
-    figure, (near, far) = plt.subplots(1, 2, sharey=True, figsize=(7.5, 3.2), layout="constrained")
+    figure, ((near, far),) = grid(1, 2, 7.5, 3.2, sharey=True)
     scales = [scale for law in laws.values() for scale in _velocity_scales(law)]
     scale = max(scales, default=0.1)
     decades = np.geomspace(1e-3 * scale, max(1.0, 10 * scale), 1201)
     around = np.linspace(-10 * scale, 10 * scale, 2001)
-    for label, law in laws.items():
+    for k, (label, law) in enumerate(laws.items()):
         for axis, v in ((near, around), (far, decades)):
-            axis.plot(v, steady_force(law, v, N), label=label, linewidth=1.3)
+            axis.plot(v, steady_force(law, v, N), label=label, linewidth=1.3, **line(k))
     near.ticklabel_format(axis="x", style="sci", scilimits=(-2, 3), useMathText=True)
     far.set_xscale("log")
     for axis in (near, far):
-        axis.grid(alpha=0.3)
         axis.set_xlabel("v [m/s]")
     near.set_ylabel("F in steady sliding [N]")
     near.set_title(f"near rest, N = {N:g} N", fontsize="medium")
@@ -59,12 +59,11 @@ def plot_catalogue(
     """
     columns = 6
     rows = -(-len(laws) // columns)
-    figure, grid = plt.subplots(
-        rows, columns, squeeze=False, figsize=(11, 0.6 + 1.3 * rows), layout="constrained"
-    )
-    for axis in grid.flat[len(laws) :]:
+    figure, tiles = grid(rows, columns, 11.0, 0.6 + 1.3 * rows)
+    axes = list(chain(*tiles))
+    for axis in axes[len(laws) :]:
         axis.set_visible(False)
-    for axis, (label, law) in zip(grid.flat, laws.items(), strict=False):
+    for axis, (label, law) in zip(axes, laws.items(), strict=False):
         edge = 5 * max(_velocity_scales(law), default=0.1)
         v = np.linspace(-edge, edge, 1001)
         axis.plot(v, steady_force(law, v, N), linewidth=1.1)
@@ -73,7 +72,6 @@ def plot_catalogue(
         axis.locator_params(axis="y", nbins=4)
         axis.tick_params(labelsize="xx-small")
         axis.yaxis.get_offset_text().set_fontsize("xx-small")
-        axis.grid(alpha=0.3)
     figure.supxlabel("v [m/s or rad/s]", fontsize="small")
     figure.supylabel(f"F in steady sliding [N or N m], N = {N:g}", fontsize="small")
     return save(figure, path)
@@ -100,17 +98,16 @@ def plot_figure(data: "FigureData", path: str | Path | None = None) -> Figure:
     abscissae = {x for x, _ in data.panels}
     height = {1: 4.0, 2: 2.6}.get(len(data.panels), 1.7)
     figure, axes = panels(len(data.panels), 7.0, height, shared=len(abscissae) == 1)
-    dashes = ["-", "--", ":", "-."]
     for axis in axes:  # before any of those that share their abscissa is logarithmic
         axis.ticklabel_format(axis="both", style="sci", scilimits=(-2, 4), useMathText=True)
     for axis, (x, y) in zip(axes, data.panels, strict=True):
         for c in data.curves:
             case = cases.index(c.case)
-            dash = dashes[case % len(dashes)] if len(laws) > 1 else "--" if c.reference else "-"
+            dash = DASHES[case % len(DASHES)] if len(laws) > 1 else DASHES[c.reference]
             number = laws.index(c.law) if len(laws) > 1 else case
             label = c.label if len(laws) > 1 else c.case or "as it is"
             axis.plot(
-                c[x], c[y], dash, color=f"C{number % 10}", linewidth=1.2,
+                c[x], c[y], linestyle=dash, color=colour(number), linewidth=1.2,
                 marker="o" if data.dots else None, markersize=4, label=label,
             )  # fmt: skip
         if x in data.log:

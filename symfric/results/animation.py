@@ -8,7 +8,6 @@ from string import Template
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.figure import Figure
@@ -18,6 +17,8 @@ from numpy.typing import NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.files import write_text, written
+from symfric.foundation.panels import blank, grid
+from symfric.foundation.style import colour
 from symfric.model.sketch import Sketch
 from symfric.results.strokes import AZIMUTH, ELEVATION, Poses, Stroke, View, look, strokes
 
@@ -61,13 +62,10 @@ def animate(
         if progress is not None:
             progress((k + 1) / times.size)
 
-    try:
-        if Path(path).suffix.lower() == ".html":
-            write_text(path, _page(figure, show, times.size, fps))
-        else:
-            _film(figure, show, times.size, fps, path)
-    finally:
-        plt.close(figure)
+    if Path(path).suffix.lower() == ".html":
+        write_text(path, _page(figure, show, times.size, fps))
+    else:
+        _film(figure, show, times.size, fps, path)
 
 
 def check_format(path: str | Path) -> None:
@@ -235,13 +233,10 @@ def _flat(view: View) -> tuple[Figure, Canvas]:
     low, high = low - more, high + more
     width, height = high - low
     scale = 6.4 / max(width, height)
-    figure, ax = plt.subplots(
-        figsize=(scale * width + 0.9, scale * height + 0.9), layout="constrained"
-    )
+    figure, ((ax,),) = grid(1, 1, scale * width + 0.9, scale * height + 0.9)
     ax.set_aspect("equal")
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     ax.set(xlabel=f"{_direction(view.right)} [m]", ylabel=f"{_direction(view.up)} [m]")
-    ax.grid(alpha=0.3)
 
     def add(stroke: Stroke) -> Callable[[int], None]:
         points = np.einsum("ac,nck->ank", axes, stroke.points)
@@ -258,7 +253,7 @@ def _flat(view: View) -> tuple[Figure, Canvas]:
 
 def _spatial(view: View) -> tuple[Figure, Canvas]:
     """Axes with three directions of one scale."""
-    figure = plt.figure(figsize=(7.2, 6.4))
+    figure = blank(7.2, 6.4, free=True)
     ax: Any = figure.add_subplot(projection="3d", proj_type="ortho")
     size = view.high - view.low
     size = np.maximum(size, 0.15 * size.max())
@@ -295,13 +290,13 @@ def _direction(axis: Array) -> str:
 
 def _style(stroke: Stroke) -> dict[str, Any]:
     """How a stroke looks."""
-    colour = f"C{stroke.body % 10}" if stroke.body >= 0 else EDGE
+    shade = colour(stroke.body) if stroke.body >= 0 else EDGE
     styles: dict[str, dict[str, Any]] = {
-        "path": {"color": colour, "linewidth": 0.8, "alpha": 0.35},
-        "body": {"color": colour, "linewidth": 4.0, "solid_capstyle": "round"},
-        "arm": {"color": colour, "linewidth": 1.2},
-        "centre": {"color": colour, "marker": "o", "markersize": 7.0},
-        "block": {"color": colour, "linewidth": 1.2},
+        "path": {"color": shade, "linewidth": 0.8, "alpha": 0.35},
+        "body": {"color": shade, "linewidth": 4.0, "solid_capstyle": "round"},
+        "arm": {"color": shade, "linewidth": 1.2},
+        "centre": {"color": shade, "marker": "o", "markersize": 7.0},
+        "block": {"color": shade, "linewidth": 1.2},
         "axis": {"color": EDGE, "linewidth": 1.2},
         "guide": {"color": EDGE, "linewidth": 1.0, "linestyle": "-."},
         "ground": {"color": GROUND, "linewidth": 3.0, "alpha": 0.6},

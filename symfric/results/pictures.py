@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import Figure
 
 from symfric.foundation.panels import panels, save
+from symfric.foundation.style import colour, line
 from symfric.model.kinds import CONSTRAINTS
 from symfric.results.kinds import is_mechanism, kinds
 
@@ -41,8 +42,10 @@ def plot_trajectories(
         return save(_grouped(trajectories, shown), path)
     figure, axes = panels(len(shown))
     for axis, name in zip(axes, shown, strict=True):
-        for label, trajectory in trajectories.items():
-            axis.plot(trajectory.looks, trajectory.at_looks(name), label=label, linewidth=1.2)
+        for k, (label, trajectory) in enumerate(trajectories.items()):
+            axis.plot(
+                trajectory.looks, trajectory.at_looks(name), label=label, linewidth=1.2, **line(k)
+            )
         axis.set_ylabel(f"{name} [{first.unit(name)}]")
     axes[0].set_title(first.scene, loc="left")
     if list(trajectories) != [first.scene]:
@@ -83,7 +86,7 @@ def _grouped(trajectories: "Mapping[str, Trajectory]", shown: Sequence[str]) -> 
                     trajectory.t if dots else trajectory.looks,
                     trajectory[name] if dots else trajectory.at_looks(name),
                     "." if dots else style,
-                    color=f"C{k % 10}",
+                    color=colour(k),
                     label=label,
                     linewidth=1.1,
                     markersize=1.5,

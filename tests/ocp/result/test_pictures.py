@@ -1,9 +1,7 @@
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
@@ -29,12 +27,6 @@ class Verdict:
 def move() -> Solution:
     problem = there_and_back(bounds={"a": (-20.0, 20.0), "power": (None, 50.0)})
     return solve_once(problem, 5)
-
-
-@pytest.fixture(autouse=True)
-def closed() -> Iterator[None]:
-    yield
-    plt.close("all")
 
 
 def curves(axis: Axes) -> list[np.ndarray]:

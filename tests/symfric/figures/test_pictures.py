@@ -1,16 +1,9 @@
 """Pictures of laws carry names and units and choose their scales."""
 
-import matplotlib.pyplot as plt
 import pytest
 
 from symfric import BrownMcPhee, Viscous
 from symfric.figures.pictures import plot_catalogue, plot_laws
-
-
-@pytest.fixture(autouse=True)
-def closed_figures() -> object:
-    yield
-    plt.close("all")
 
 
 def test_laws_are_plotted_near_rest_and_over_decades() -> None:

@@ -113,7 +113,6 @@ def test_planar_mechanisms_are_flat_and_labelled(runs: dict[str, Trajectory]) ->
     (axis,) = figure.axes
     assert (axis.get_xlabel(), axis.get_ylabel()) == ("x [m]", "z [m]")
     assert axis.get_aspect() == 1.0
-    plt.close(figure)
 
 
 def test_spatial_mechanisms_have_one_scale_on_three_axes(runs: dict[str, Trajectory]) -> None:
@@ -123,7 +122,6 @@ def test_spatial_mechanisms_have_one_scale_on_three_axes(runs: dict[str, Traject
     spans = np.array([np.ptp(getattr(axis, f"get_{a}lim")()) for a in "xyz"])
     box = axis._box_aspect  # type: ignore[attr-defined]
     assert spans / spans.max() == pytest.approx(box / box.max())
-    plt.close(figure)
 
 
 def test_time_and_speed_stand_above_and_joints_show_whether_they_stick() -> None:
@@ -138,4 +136,3 @@ def test_time_and_speed_stand_above_and_joints_show_whether_they_stick() -> None
         fills += [fill for fill in found if fill in (STICKS, SLIDES)]
     assert fills == [STICKS, SLIDES]
     assert axis.get_title(loc="left") == "pendulum   t = 0.500 s  (0.1 x)"
-    plt.close(figure)

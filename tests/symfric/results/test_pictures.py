@@ -7,15 +7,8 @@ import pytest
 from matplotlib.image import imread
 
 from symfric import BrownMcPhee, LuGre, Trajectory, rabinowicz, simulate
-from symfric.foundation.panels import panels, save
 from symfric.results.pictures import plot_trajectories
 from symfric.scenes import FourMass
-
-
-@pytest.fixture(autouse=True)
-def closed_figures() -> object:
-    yield
-    plt.close("all")
 
 
 @pytest.fixture(scope="module")
@@ -56,12 +49,12 @@ def test_several_trajectories_share_panels_and_a_legend(runs: dict[str, Trajecto
     assert [text.get_text() for text in legend.get_texts()] == list(runs)
 
 
-def test_picture_is_written_and_its_figure_closed(
+def test_picture_is_written_and_pyplot_keeps_none(
     runs: dict[str, Trajectory], tmp_path: Path
 ) -> None:
-    figure = runs["lugre"].plot("x", path=tmp_path / "new" / "x.png")
+    runs["lugre"].plot("x", path=tmp_path / "new" / "x.png")
     assert imread(tmp_path / "new" / "x.png").shape[2] == 4
-    assert not plt.fignum_exists(figure.number)  # type: ignore[attr-defined]
+    assert plt.get_fignums() == []
     assert [p.name for p in (tmp_path / "new").iterdir()] == ["x.png"]
 
 
@@ -77,13 +70,6 @@ def test_format_follows_the_ending(
 def test_unknown_signal_is_refused_with_a_hint(runs: dict[str, Trajectory]) -> None:
     with pytest.raises(ValueError, match=r"got frction; did you mean friction"):
         runs["lugre"].plot("frction")
-
-
-def test_figure_without_a_path_stays_open() -> None:
-    figure, axes = panels(3)
-    assert save(figure, None) is figure
-    assert plt.fignum_exists(figure.number)  # type: ignore[attr-defined]
-    assert len(axes) == 3
 
 
 def test_mechanisms_have_a_panel_per_kind_and_constraints_on_a_logarithmic_scale() -> None:
