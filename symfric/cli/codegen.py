@@ -13,6 +13,7 @@ from symfric.cli import completions, output
 from symfric.cli.codegen_compensator import compensator_block
 from symfric.cli.codegen_robot import robot_block
 from symfric.cli.codegen_shown import show_sizes, show_verification
+from symfric.cli.machines import kind_of
 from symfric.cli.options import (
     JsonOption,
     SetOption,
@@ -21,7 +22,6 @@ from symfric.cli.options import (
     numbers,
     with_settings,
 )
-from symfric.cli.run import kind_of
 from symfric.codegen import Block, Generated, Verification, generate, plant_block, verify
 from symfric.codegen.kit.generate import with_cores
 from symfric.embedded import CORES, Measured, measure

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from symfric import law_from_text, with_values
-from symfric.cli.run import kind_of
+from symfric.cli.machines import kind_of
 from symfric.codegen import Block, inverse_dynamics_block
 from symfric.foundation.parameters import check_names, parameters
 from symfric.multibody import Mechanism, read_urdf

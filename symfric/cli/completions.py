@@ -4,6 +4,7 @@ Nothing is said and nothing raised here: a completion that cannot be found is no
 """
 
 from collections.abc import Iterable
+from typing import Any
 
 import typer
 
@@ -37,6 +38,26 @@ def scenes(incomplete: str) -> list[str]:
     from symfric.scenes import ALL_SCENES  # noqa: PLC0415  (of these commands only)
 
     return _of(ALL_SCENES, incomplete)
+
+
+def presets(context: typer.Context, incomplete: str) -> list[str]:
+    """Papers whose numbers the scene on the line has."""
+    return _of((name for kind in _machines(context) for name in kind.presets), incomplete)
+
+
+def places(context: typer.Context, incomplete: str) -> list[str]:
+    """`PLACE=` and a law, of the scene on the line."""
+    place, equals, law = incomplete.partition("=")
+    if equals:
+        return [f"{place}={name}" for name in laws(law)]
+    return _of((f"{name}=" for kind in _machines(context) for name in kind.places()), incomplete)
+
+
+def _machines(context: typer.Context) -> list[Any]:
+    from symfric.scenes import ALL_SCENES  # noqa: PLC0415  (of these commands only)
+
+    words = (context.params.get("scene"), context.params.get("what"), *map(str, context.args))
+    return [ALL_SCENES[word] for word in words if word in ALL_SCENES]
 
 
 def figures(incomplete: str) -> list[str]:

@@ -6,8 +6,8 @@ from typing import Annotated, Any
 import typer
 
 from symfric.cli import completions, output
+from symfric.cli.machines import LawOfOption, PresetOption, scenes_with
 from symfric.cli.options import JsonOption, SetOption, check_outputs, numbers
-from symfric.cli.run import scenes_with
 from symfric.cli.user_file import held_by_file
 from symfric.fmu import Exported
 from symfric.fmu import export_fmu as exported
@@ -42,6 +42,8 @@ def export_fmu(
         ),
     ] = None,
     settings: SetOption = None,
+    preset: PresetOption = None,
+    law_of: LawOfOption = None,
     free: Annotated[
         list[str] | None,
         typer.Option(
@@ -79,8 +81,8 @@ def export_fmu(
     Example: symfric export-fmu press.py:model --rtol 1e-8
     """
     check_outputs(out, json)
-    values = numbers("--set", settings)
-    model = from_file(what, law, values) if ".py" in what else scene_of(what, law, values)
+    make = from_file if ".py" in what else scene_of
+    model = make(what, law, numbers("--set", settings), preset, law_of)
     unit = exported(
         model,
         Path(f"{named(model, what)}.fmu") if out is None else out,
@@ -104,7 +106,13 @@ def named(model: Model | Scene, what: str) -> str:
     return model.name if isinstance(model, Model) else Path(what).stem
 
 
-def scene_of(what: str, law: str | None, values: dict[str, float]) -> Scene:
+def scene_of(
+    what: str,
+    law: str | None,
+    values: dict[str, float],
+    preset: str | None,
+    law_of: list[str] | None,
+) -> Scene:
     """The scene or robot with its law.
 
     Raises:
@@ -112,17 +120,25 @@ def scene_of(what: str, law: str | None, values: dict[str, float]) -> Scene:
     """
     if law is None:
         raise ValueError(f"export-fmu {what}: expected --law NAME, got none; such as --law lugre")
-    return scenes_with(what, [law], values)[law]
+    return scenes_with(what, [law], values, preset, law_of)[law]
 
 
-def from_file(what: str, law: str | None, values: dict[str, float]) -> Model | Scene:
+def from_file(
+    what: str,
+    law: str | None,
+    values: dict[str, float],
+    preset: str | None,
+    law_of: list[str] | None,
+) -> Model | Scene:
     """The model that a Python file holds.
 
     Raises:
         ValueError: no such file or name, a file that fails, something that is no model.
     """
-    if law is not None:
-        raise ValueError(f"--law: expected none with '{what}', which has its laws")
+    given = {"--law": law, "--preset": preset, "--law-of": law_of}
+    for option, value in given.items():
+        if value:
+            raise ValueError(f"{option}: expected none with '{what}', which has its laws")
     kind = Model | Scene
     return held_by_file("export-fmu", what, DEFAULT_NAME, values, "Model", kind)
 

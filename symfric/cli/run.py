@@ -1,6 +1,5 @@
 """`symfric run`: simulate a scene with one friction law, or compare several."""
 
-from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any
@@ -8,9 +7,10 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from symfric import Law, SolveError, Trajectory, law_from_text, parameters, simulate, with_values
+from symfric import Law, SolveError, Trajectory, parameters, simulate
 from symfric.cli import completions, output
 from symfric.cli.inputs import input_from_text
+from symfric.cli.machines import LawOfOption, PresetOption, kind_of, scenes_with
 from symfric.cli.options import (
     JsonOption,
     PlotOption,
@@ -24,9 +24,8 @@ from symfric.foundation.parameters import check_names
 from symfric.integrator import Input, simulate_by_peer
 from symfric.integrator.equations.inputs import Sampled
 from symfric.model import Model
-from symfric.multibody.urdf.read import relative
 from symfric.results.kinds import is_mechanism, kinds, norms
-from symfric.scenes import ALL_SCENES, MECHANISMS, Robot, Scene
+from symfric.scenes import ALL_SCENES, MECHANISMS, Scene
 
 
 def run(
@@ -48,6 +47,8 @@ def run(
         ),
     ],
     settings: SetOption = None,
+    preset: PresetOption = None,
+    law_of: LawOfOption = None,
     inputs: Annotated[
         list[str] | None,
         typer.Option(
@@ -110,9 +111,11 @@ def run(
 
     Example: symfric run rabinowicz --law lugre --set mu_s=0.2 --plot stick_slip.png
 
+    Example: symfric run pendulum_box --law lugre --preset jing_mi_table_7 --plot box.png
+
     Example: symfric run arm.urdf --law lugre --x0 elbow=0.3 --input tau_elbow=2 --out arm.csv
     """
-    kind_of(scene)
+    kind_of(scene, preset=preset, law_of=law_of)
     how: Any = {"max_step": max_step, "times": seconds("--times", times)}
     if peer is not None and (method, backend, max_step, times) != ("auto", "auto", None, None):
         raise ValueError(
@@ -125,7 +128,7 @@ def run(
         )
     check_outputs(out, json, movie, picture=plot)
     check_movie(movie, scene)
-    machines = scenes_with(scene, law, numbers("--set", settings))
+    machines = scenes_with(scene, law, numbers("--set", settings), preset, law_of)
     models = {name: machine.model() for name, machine in machines.items()}
     machine = next(iter(machines.values()))
     signals, described = _inputs(machine, models[law[0]], inputs)
@@ -158,36 +161,6 @@ def run(
     for trajectory in found.values():
         if not trajectory.status.ok:
             raise SolveError(trajectory.message, trajectory.status, trajectory)
-
-
-def kind_of(scene: str, where: str = "scene") -> Callable[[Law], Scene]:
-    """What makes the scene of a law: a scene by its name, or the robot of a URDF file.
-
-    Raises:
-        ValueError: neither.
-    """
-    if scene.endswith(".urdf"):
-        return lambda law: Robot(relative(law), scene)
-    check_names(where, [scene], ALL_SCENES)
-    return ALL_SCENES[scene]
-
-
-def scenes_with(scene: str, laws: list[str], values: dict[str, float]) -> dict[str, Scene]:
-    """The scene with each of the laws by name, parameters set wherever they occur.
-
-    Raises:
-        ValueError: unknown law, a law given twice, a parameter that none of the scenes has.
-    """
-    if len(set(laws)) != len(laws):
-        raise ValueError(f"--law: expected every law once, got {', '.join(laws)}")
-    kind = kind_of(scene)
-    machines = {text: kind(law_from_text(text)) for text in laws}
-    known = {text: parameters(machine) for text, machine in machines.items()}
-    check_names(f"--set of {scene}", values, {n: None for names in known.values() for n in names})
-    return {
-        text: with_values(machine, {n: v for n, v in values.items() if n in known[text]})
-        for text, machine in machines.items()
-    }
 
 
 def check_movie(path: Path | None, scene: str) -> None:

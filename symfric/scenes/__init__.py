@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from symfric.scenes.base import GivenInput as GivenInput
     from symfric.scenes.base import Scene as Scene
     from symfric.scenes.base import friction_states as friction_states
+    from symfric.scenes.base import other_law as other_law
     from symfric.scenes.catalogue import ALL_SCENES as ALL_SCENES
     from symfric.scenes.catalogue import MECHANISMS as MECHANISMS
     from symfric.scenes.drive import Drive as Drive
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from symfric.scenes.pendulum import DoublePendulum as DoublePendulum
     from symfric.scenes.pendulum import Pendulum as Pendulum
     from symfric.scenes.pendulum_box import PendulumBox as PendulumBox
+    from symfric.scenes.presets import Numbers as Numbers
+    from symfric.scenes.presets import Preset as Preset
     from symfric.scenes.quarter_car import QuarterCar as QuarterCar
     from symfric.scenes.rabinowicz import Rabinowicz as Rabinowicz
     from symfric.scenes.rabinowicz import rabinowicz as rabinowicz
@@ -29,7 +32,7 @@ else:
         __name__,
         {
             "symfric.scenes.arm": "Arm",
-            "symfric.scenes.base": "GivenInput Scene friction_states",
+            "symfric.scenes.base": "GivenInput Scene friction_states other_law",
             "symfric.scenes.catalogue": "ALL_SCENES MECHANISMS",
             "symfric.scenes.drive": "Drive drive",
             "symfric.scenes.four_bar": "FourBar",
@@ -37,6 +40,7 @@ else:
             "symfric.scenes.mechanism": "MechanismScene",
             "symfric.scenes.pendulum": "DoublePendulum Pendulum",
             "symfric.scenes.pendulum_box": "PendulumBox",
+            "symfric.scenes.presets": "Numbers Preset",
             "symfric.scenes.quarter_car": "QuarterCar",
             "symfric.scenes.rabinowicz": "Rabinowicz rabinowicz",
             "symfric.scenes.robot": "Robot",

@@ -2,9 +2,9 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
-from typing import Any, ClassVar, final
+from typing import Any, ClassVar, Self, final
 
 import casadi as ca
 import numpy as np
@@ -17,6 +17,7 @@ from symfric.foundation.units import turned
 from symfric.laws import Law
 from symfric.laws.base.law import check_law
 from symfric.model import Contact, Model, Variables
+from symfric.scenes.presets import Preset
 
 
 @final
@@ -43,10 +44,48 @@ class Scene(Parametric, ABC):
     inputs: ClassVar[Mapping[str, GivenInput]] = {}
     """Inputs by name, where none are given."""
 
+    presets: ClassVar[Mapping[str, Preset]] = {}
+    """Numbers of papers by name, see `preset`."""
+
     law: Law
+
+    @classmethod
+    def places(cls) -> dict[str, str]:
+        """Where laws other than `law` may rub: the keyword, and what it is, see `other_law`."""
+        return {item.name: item.metadata["place"] for item in fields(cls) if _is_place(item)}
+
+    @classmethod
+    def preset(cls, name: str, law: Law, **others: Any) -> Self:
+        """The scene with the numbers of a paper, and `law` with those that the paper gives it.
+
+        Args:
+            name: one of `presets`.
+            law: any law; one that the paper does not use gets the levels of friction only.
+            others: further fields of the scene, such as `hinge`, a law that gets the numbers of
+                its place, too, or parameters in place of the paper's.
+
+        Raises:
+            ValueError: no such preset, or what the scene refuses.
+        """
+        where = f"{cls.__name__}: preset"
+        checks.text(where, name, "the name of a preset")
+        checks.check_names(where, [name], cls.presets)
+        check_law(cls.__name__, law)
+        chosen = cls.presets[name]
+        laws = {"law": law} | {place: law for place in cls.places() if place in chosen.friction}
+        laws |= {n: value for n, value in others.items() if isinstance(value, Law)}
+        given = {
+            n: chosen.friction[n].given(held) if n in chosen.friction else held
+            for n, held in laws.items()
+        }
+        arguments: dict[str, Any] = {**chosen.values, **others, **given}
+        return cls(**arguments)
 
     def __post_init__(self) -> None:
         check_law(type(self).__name__, self.law)
+        for place in type(self).places():
+            if getattr(self, place) is not None:
+                check_law(f"{type(self).__name__}: {place}", getattr(self, place))
         super().__post_init__()
         several = [n for n, p in parameters(self).items() if not _is_scalar(p.value)]
         if several:
@@ -66,6 +105,21 @@ class Scene(Parametric, ABC):
         """
         scene, p = symbolise(self, *checks.names(f"{type(self).__name__}: free", free))
         return scene.equations(p)
+
+
+def other_law(doc: str) -> Any:
+    """Declare a field of a scene that holds the law of another place, or None.
+
+    Its parameters stand beside those of `law`, with the endings _1 and _2 where names are shared.
+
+    Args:
+        doc: the place, and what it has without a law of its own.
+    """
+    return field(default=None, metadata={"place": doc})
+
+
+def _is_place(item: Any) -> bool:
+    return "place" in item.metadata
 
 
 def _is_scalar(value: Scalar) -> bool:

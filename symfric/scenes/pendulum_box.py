@@ -1,14 +1,19 @@
 """A pendulum hinged to a box that slides on the ground."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from math import pi
 from typing import ClassVar, final
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import param
 from symfric.laws import Law
 from symfric.multibody import JointFriction, Mechanism, Prismatic, Revolute
+from symfric.scenes import jing_mi
+from symfric.scenes.base import other_law
 from symfric.scenes.mechanism import MechanismScene
 from symfric.scenes.pendulum import HINGE
+from symfric.scenes.presets import Preset
 
 
 @final
@@ -28,8 +33,17 @@ class PendulumBox(MechanismScene):
     """
 
     t_end: ClassVar[float] = 15.0
+    presets: ClassVar[Mapping[str, Preset]] = {
+        "jing_mi_table_7": Preset(
+            "box and pendulum of table 6, every law with its own numbers in floor and hinge; the "
+            "radius of the hinge, over which those of the hinge act, is not given: 0.01 m here",
+            jing_mi.SOURCE + "6 and 7",
+            {"m_box": 6.0, "m": 20.0, "L": 0.3, "J": 1e-9, "R": 0.01, "phi_0": pi / 6, "g": 9.81},
+            {"law": jing_mi.BOX, "hinge": jing_mi.HINGE},
+        )
+    }
 
-    hinge: Law | None = None
+    hinge: Law | None = other_law("hinge of the pendulum; the law of the box without")
     m_box: Scalar = param(6.0, unit="kg", role="mass", doc="mass of the box", lower=1e-12)
     m: Scalar = param(20.0, unit="kg", role="mass", doc="mass of the pendulum", lower=1e-12)
     L: Scalar = param(0.3, unit="m", role="geometry", doc="distance of hinge and mass", lower=1e-12)
@@ -37,7 +51,7 @@ class PendulumBox(MechanismScene):
         1e-9, unit="kg m^2", role="inertia", doc="inertia about the mass", lower=1e-12
     )
     R: Scalar = param(0.01, unit="m", role="geometry", doc="radius of the hinge", lower=1e-12)
-    phi_0: Scalar = param(0.5235987755982988, unit="rad", role="motion", doc="angle at the start")
+    phi_0: Scalar = param(pi / 6, unit="rad", role="motion", doc="angle at the start")
     g: Scalar = param(9.81, unit="m/s^2", role="gravity", doc="gravity", lower=0.0)
 
     def mechanism(self) -> Mechanism:

@@ -1,5 +1,6 @@
 """Quarter-car test rig: body and wheel on vertical guides, friction where the body is guided."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi
 from typing import ClassVar, final
@@ -9,14 +10,26 @@ import casadi as ca
 from symfric.foundation.numeric import Scalar, sqrt, tan
 from symfric.foundation.parameters import Variable, param, parameters, with_values
 from symfric.laws.base import smooth
-from symfric.laws.static.quarter_car import tilt
+from symfric.laws.static.quarter_car import QuarterCarGeneral, tilt
 from symfric.model import Model, Monitor, Output, Variables
 from symfric.scenes.base import Scene, contact
+from symfric.scenes.presets import Numbers, Preset
 
 ANY = 1e100
 """Scale [N] of a load that error control does not resolve, but looks at for being a number."""
 LINKAGE = ("k_s", "b_d", "theta", "L_d")
 """Numbers of the rig that a law of its guide may contain, too."""
+
+
+def _road(millimetres: int) -> Preset:
+    """The rig of section 3 on the road with this amplitude."""
+    return Preset(
+        f"rig of section 3, road of {millimetres} mm; C_e, e_1, mu, sigma_v and L_d are not given",
+        "Al-Zughaibi, quarter-car friction, sections 3 and 8.1",
+        {"M_b": 240.0, "M_w": 40.0, "k_s": 28900.0, "b_d": 260.0, "k_t": 920000.0, "b_t": 3886.0}
+        | {"theta": pi / 4, "amplitude": millimetres / 1000},
+        {"law": Numbers({}, {QuarterCarGeneral: {"F_brk": 193.8}})},
+    )
 
 
 @final
@@ -44,6 +57,9 @@ class QuarterCar(Scene):
     """
 
     t_end: ClassVar[float] = 10.0
+    presets: ClassVar[Mapping[str, Preset]] = {
+        f"al_zughaibi_{a}_mm": _road(a) for a in (30, 50, 70)
+    }
 
     M_b: Scalar = param(240.0, unit="kg", role="mass", doc="mass of the body", lower=1e-12)
     M_w: Scalar = param(40.0, unit="kg", role="mass", doc="mass of the wheel", lower=1e-12)

@@ -1,6 +1,6 @@
 """Rabinowicz's stick-slip test: a block on a moving belt, held by a spring."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, final
 
@@ -8,9 +8,11 @@ import casadi as ca
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable, param, with_values
-from symfric.laws import Law
+from symfric.laws import BrownMcPhee, Law, LuGre
 from symfric.model import Model, Output, Variables
+from symfric.scenes import jing_mi
 from symfric.scenes.base import Scene, contact
+from symfric.scenes.presets import Numbers, Preset
 
 
 @final
@@ -29,6 +31,32 @@ class Rabinowicz(Scene):
     """
 
     t_end: ClassVar[float] = 20.0
+    presets: ClassVar[Mapping[str, Preset]] = {
+        "jing_mi_table_3": Preset(
+            "block of table 2, every law with its own numbers of table 3",
+            jing_mi.SOURCE + "2 and 3",
+            {"m": 0.8, "k": 2.1, "v_belt": 0.1, "g": 9.81},
+            {"law": jing_mi.BELT},
+        ),
+        "canudas_de_wit": Preset(
+            "stick-slip of the LuGre paper: F_C = 1 N and F_S = 1.5 N as coefficients under 10 N",
+            "Canudas de Wit, Olsson, Astrom, Lischinsky, A New Model for Control of Systems with "
+            "Friction",
+            {"m": 1.0, "k": 2.0, "v_belt": 0.1, "g": 10.0},
+            {
+                "law": Numbers(
+                    {"mu_s": 0.15, "mu_d": 0.1, "sigma_2": 0.4},
+                    {LuGre: {"sigma_0": 1e5, "sigma_1": 1e5**0.5, "v_s": 1e-3}},
+                )
+            },
+        ),
+        "nikravesh": Preset(
+            "block on a belt with Brown-McPhee friction",
+            "Nikravesh, Planar Multibody Dynamics, 2nd edition, example 14.3",
+            {"m": 1.0, "k": 10.0, "v_belt": 0.1, "g": 9.81},
+            {"law": Numbers({"mu_s": 0.2, "mu_d": 0.15}, {BrownMcPhee: {"v_t": 1e-3}})},
+        ),
+    }
 
     m: Scalar = param(0.8, unit="kg", role="mass", doc="mass of the block", lower=1e-12)
     k: Scalar = param(2.1, unit="N/m", role="stiffness", doc="spring stiffness", lower=0.0)

@@ -16,6 +16,8 @@ COMPLETED = {
     "symfric laws lugre --figure hyst": ["hysteresis"],
     "symfric laws lugre --compare random_": ["random_bristles"],
     "symfric identify a.csv --law dahl,gm": ["dahl,gms"],
+    "symfric run rabinowicz --law dahl --preset jing": ["jing_mi_table_3"],
+    "symfric run pendulum_box --law dahl --law-of hi": ["hinge="],
     "symfric ocp swing_up_of_nothing": [],
     "symfric bench iv": ["ivp"],
 }

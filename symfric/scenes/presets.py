@@ -1,0 +1,62 @@
+"""Presets: the numbers of a source for a scene, with each law's own at each place that rubs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import TypeVar, final
+
+from symfric.foundation.parameters import parameters, with_values
+from symfric.laws import Law
+
+L = TypeVar("L", bound=Law)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """What a source says of the friction at one place.
+
+    Attributes:
+        common: numbers that mean the same in every law, such as mu_s.
+        laws: further ones of a kind of law, which names them as it likes.
+    """
+
+    common: Mapping[str, float]
+    laws: Mapping[type[Law], Mapping[str, float]] = field(
+        default_factory=dict[type[Law], dict[str, float]]
+    )
+
+    def given(self, law: L) -> L:
+        """`law` with these numbers, also inside a sum or a wrapper; its other ones and forms stay.
+
+        A law that the source does not use gets the common ones that it has.
+        """
+        held: dict[str, Law | tuple[Law, ...]] = {}
+        for item in fields(law):
+            value = getattr(law, item.name)
+            if isinstance(value, Law):
+                held[item.name] = self.given(value)
+            elif item.name == "laws":  # the terms of a sum
+                held[item.name] = tuple(self.given(term) for term in value)
+        if held:
+            return replace(law, **held)
+        known = parameters(law)
+        own = {name: value for name, value in self.common.items() if name in known}
+        return with_values(law, own | dict(self.laws.get(type(law), {})))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Preset:
+    """The numbers of a source for a scene.
+
+    Attributes:
+        doc: what it is, and what the source leaves open.
+        source: authors, title, table.
+        values: parameters of the machine.
+        friction: place that rubs -> its numbers; "law" is where the scene's law is.
+    """
+
+    doc: str
+    source: str
+    values: Mapping[str, float]
+    friction: Mapping[str, Numbers] = field(default_factory=dict[str, Numbers])

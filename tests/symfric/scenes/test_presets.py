@@ -1,0 +1,145 @@
+"""Presets: the printed numbers reach the laws of every place, wherever the law has them."""
+
+import json
+from math import atan, pi, sqrt
+
+import pytest
+from law_cases import CASES
+
+from symfric import (
+    ALL_LAWS,
+    BrownMcPhee,
+    Coulomb,
+    ExactCoulomb,
+    LoadDependent,
+    LuGre,
+    Sum,
+    Viscous,
+    law_from_text,
+    parameters,
+    simulate,
+)
+from symfric.cli import main
+from symfric.scenes import ALL_SCENES, PendulumBox, QuarterCar, Rabinowicz
+
+ELEVEN = (
+    "coulomb", "threlfall", "bengisu_akay", "karnopp", "velocity_based", "awrejcewicz",
+    "dahl", "lugre", "elasto_plastic", "stick_slip", "gonthier",
+)  # fmt: skip
+"""The laws of Jing and Mi, tables 4 and 8."""
+
+
+def test_defaults_of_the_belt_are_its_preset() -> None:
+    """As the docstrings of scene and laws say; LuGre and ten others by tables 2 and 3."""
+    for name in ELEVEN:
+        own = parameters(Rabinowicz(ALL_LAWS[name]()))
+        of_paper = parameters(Rabinowicz.preset("jing_mi_table_3", ALL_LAWS[name]()))
+        off = {n for n, p in own.items() if p.value != of_paper[n].value}
+        assert off <= {"v_s"} & ({"v_s"} if name == "awrejcewicz" else set()), name
+
+
+@pytest.mark.parametrize("name", ELEVEN)
+def test_box_and_hinge_break_away_at_the_levels_of_table_7(name: str) -> None:
+    scene = PendulumBox.preset("jing_mi_table_7", law_from_text(name))
+    assert scene.hinge is not None
+    shows_stiction = "S" in type(scene.law).facts.phenomena
+    for law, static, dynamic in ((scene.law, 0.03, 0.02), (scene.hinge, 0.003, 0.002)):
+        level = static if shows_stiction else dynamic
+        assert law.static_level(100.0) == pytest.approx(100.0 * level), law
+        assert law.sliding(0.2, 100.0, 1) == pytest.approx(100.0 * dynamic, rel=1e-9), law
+    own = {n: p.value for n, p in parameters(scene).items() if n in ("m", "m_box", "L", "phi_0")}
+    assert own == {"m_box": 6.0, "m": 20.0, "L": 0.3, "phi_0": pi / 6}
+
+
+def test_rows_of_table_7_differ_between_box_and_pendulum() -> None:
+    scene = PendulumBox.preset("jing_mi_table_7", ALL_LAWS["velocity_based"]())
+    found = {n: p.value for n, p in parameters(scene).items()}
+    assert (found["v_s_1"], found["v_d_1"]) == (5e-4, 0.06)
+    assert (found["v_s_2"], found["v_d_2"]) == (1e-3, 1e-2)
+    gonthier = PendulumBox.preset("jing_mi_table_7", ALL_LAWS["gonthier"]())
+    assert parameters(gonthier.law)["v_s"].value == 1e-5
+    assert parameters(gonthier.law)["tau_dw"].value == 0.01
+
+
+def test_numbers_reach_into_sums_and_wrappers_and_leave_the_rest() -> None:
+    law = LoadDependent(Sum((LuGre(delta=1.0), Viscous(sigma_2=3.0))))
+    found = parameters(PendulumBox.preset("jing_mi_table_7", law).law)
+    assert (found["sigma_0"].value, found["sigma_1"].value) == (1e4, 2.0)
+    assert found["delta"].value == 1.0
+    assert found["sigma_2_2"].value == 0.0
+
+
+def test_a_law_that_the_paper_does_not_use_gets_its_levels() -> None:
+    scene = Rabinowicz.preset("canudas_de_wit", BrownMcPhee(v_t=7e-3))
+    found = parameters(scene)
+    assert {n: found[n].value for n in ("mu_s", "mu_d", "v_t", "m", "k")} == {
+        "mu_s": 0.15, "mu_d": 0.1, "v_t": 7e-3, "m": 1.0, "k": 2.0,
+    }  # fmt: skip
+
+
+def test_what_is_given_beside_a_preset_comes_after_it() -> None:
+    scene = PendulumBox.preset("jing_mi_table_7", LuGre(), hinge=Coulomb(), m=30.0)
+    assert isinstance(scene.hinge, Coulomb)
+    assert (scene.hinge.mu_d, scene.m, scene.m_box) == (0.002, 30.0, 6.0)
+
+
+@pytest.mark.parametrize("amplitude", [30, 50, 70])
+def test_roads_of_the_rig(amplitude: int) -> None:
+    scene = QuarterCar.preset(f"al_zughaibi_{amplitude}_mm", ALL_LAWS["quarter_car_general"]())
+    assert [float(scene.road(t)) for t in (0.0, 3.0, 6.0, 9.0)] == pytest.approx(
+        [0.0, 0.085, 0.085 + amplitude / 1000, 0.085 - amplitude / 1000]
+    )
+    assert scene.law.static_level(0.0) == 193.8
+
+
+def test_every_law_takes_every_preset() -> None:
+    """Levels and velocities that contradict each other are refused when a law is made."""
+    for kind in ALL_SCENES.values():
+        for name, preset in kind.presets.items():
+            assert preset.doc
+            assert preset.source
+            assert set(preset.friction) <= {"law", *kind.places()}, name
+            for law in CASES.values():
+                scene = kind.preset(name, law)
+                known = {n: p.value for n, p in parameters(scene).items()}
+                assert all(known[n] == x for n, x in preset.values.items()), name
+
+
+def test_the_period_of_stick_slip_is_that_of_dry_friction() -> None:
+    """Sticking 2 A/v, sliding (2/w)(pi - atan(A w/v)), A = (mu_s - mu_d) m g/k, w^2 = k/m."""
+    A, w, v = 0.05 * 9.81 / 10.0, sqrt(10.0), 0.1
+    run = simulate(Rabinowicz.preset("nikravesh", ExactCoulomb()).model(), 20.0, rtol=1e-9)
+    period = 2 * A / v + 2 / w * (pi - atan(A * w / v))
+    slides = run.t[1:][(run["v_rel"][1:] < -1e-6) & (run["v_rel"][:-1] >= -1e-6)]
+    assert slides[-1] - slides[-2] == pytest.approx(period, abs=0.011)  # between two samples
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: Rabinowicz.preset("jing", LuGre()), "did you mean jing_mi_table_3"),
+        (lambda: Rabinowicz.preset("jing_mi_table_3", LuGre), "expected a law such as"),  # type: ignore[arg-type]
+        (lambda: Rabinowicz.preset(3, LuGre()), "Rabinowicz: preset: expected the name"),  # type: ignore[arg-type]
+        (lambda: PendulumBox(LuGre(), hinge="lugre"), "PendulumBox: hinge: expected a law"),  # type: ignore[arg-type]
+    ],
+)
+def test_mistakes_are_refused(call: object, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        call()  # type: ignore[operator]
+
+
+def test_command_line_takes_presets_and_laws_of_places(capsys: pytest.CaptureFixture[str]) -> None:
+    line = "run pendulum_box --law lugre --preset jing_mi_table_7 --t-end 0.01 --json -"
+    assert main([*line.split(), "--law-of", "hinge=coulomb", "--set", "mu_s=0.1"]) == 0
+    found = json.loads(capsys.readouterr().out)["parameters"]
+    assert (found["mu_s"], found["mu_d_1"], found["mu_d_2"]) == (0.1, 0.02, 0.002)
+    for options, message in (
+        ("--preset jing", "--preset of pendulum_box: expected one of jing_mi_table_7, got jing"),
+        ("--law-of hing=dahl", "did you mean hinge"),
+        ("--law-of hinge=coulom", "did you mean coulomb"),
+        ("--law-of hinge", "expected NAME=VALUE"),
+    ):
+        assert main([*["run", "pendulum_box", "--law", "lugre"], *options.split()]) == 2
+        assert message in capsys.readouterr().err
+    assert main(["run", "rabinowicz", "--law", "lugre", "--law-of", "hinge=dahl"]) == 2
+    assert "--law is the law of what rubs there" in capsys.readouterr().err
