@@ -105,6 +105,7 @@ if TYPE_CHECKING:
     from symfric.model import Model as Model
     from symfric.model import Monitor as Monitor
     from symfric.model import Output as Output
+    from symfric.results.report import report as report
     from symfric.scenes import drive as drive
     from symfric.scenes import rabinowicz as rabinowicz
 else:
@@ -133,6 +134,7 @@ else:
                 VelocityBased Viscous Wojewoda any_from_text law_from_text law_name
             """,
             "symfric.model": "Contact Event Model Monitor Output",
+            "symfric.results.report": "report",
             "symfric.scenes": "drive rabinowicz",
         },
     )

@@ -21,7 +21,7 @@ FLOORS: dict[str, set[str]] = {
         "symfric.model",
         "symfric.multibody",
     },
-    "symfric.results": {"symfric.foundation", "symfric.model"},
+    "symfric.results": {"symfric.foundation", "symfric.model", "symfric.page"},
     "symfric.emitter": {"symfric.foundation"},
     "symfric.page": {"symfric.foundation"},
     "symfric.integrator.compiled": {"symfric.foundation"},

@@ -23,6 +23,7 @@ USAGE_ERROR = cast("type[typer.BadParameter]", typer.BadParameter.__mro__[2])
 COMMANDS = {
     "laws": "List the friction laws, or show one in full.",
     "run": "Simulate SCENE with a friction law.",
+    "report": "Simulate SCENE and write one page: signals, friction, error, laws.",
     "identify": "Fit friction laws to measured data, and say what they are worth.",
     "codegen": "Write a friction law, a plant or inverse dynamics as C99, and verify it.",
     "export-fmu": "Write a scene or a model as a Functional Mock-up Unit.",

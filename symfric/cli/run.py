@@ -131,8 +131,8 @@ def run(
     machines = scenes_with(scene, law, numbers("--set", settings), preset, law_of)
     models = {name: machine.model() for name, machine in machines.items()}
     machine = next(iter(machines.values()))
-    signals, described = _inputs(machine, models[law[0]], inputs)
-    until = _default_t_end(machine, signals) if t_end is None else t_end
+    signals, described = inputs_of(machine, models[law[0]], inputs)
+    until = shown_until(machine, signals) if t_end is None else t_end
     start = numbers("--x0", x0)
     found: dict[str, Trajectory] = {}
     common: Any = {"x0": start, "u": signals, "rtol": rtol, "samples": samples, "throw": False}
@@ -178,7 +178,7 @@ def check_movie(path: Path | None, scene: str) -> None:
     check_format(path)
 
 
-def _inputs(
+def inputs_of(
     scene: Scene, model: Model, texts: list[str] | None
 ) -> tuple[dict[str, Input], dict[str, str]]:
     """Inputs by name, and the texts that describe them; without any those of the scene."""
@@ -190,7 +190,7 @@ def _inputs(
     return {n: input_from_text(n, text, units[n]) for n, text in given.items()}, given
 
 
-def _default_t_end(scene: Scene, signals: dict[str, Input]) -> float:
+def shown_until(scene: Scene, signals: dict[str, Input]) -> float:
     """The last sample of the inputs, else what shows the scene."""
     ends = [float(np.max(s.t)) for s in signals.values() if isinstance(s, Sampled)]
     return max(ends, default=scene.t_end)

@@ -1,0 +1,81 @@
+"""`symfric report`: one HTML page of simulations, for the drawer and for others."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from symfric import SolveError, Trajectory, parameters, simulate
+from symfric.cli import completions, output
+from symfric.cli.options import SetOption, check_outputs, numbers
+from symfric.cli.run import inputs_of, scenes_with, shown_until
+from symfric.results.report import report as write_report
+from symfric.scenes import ALL_SCENES
+
+
+def report(
+    scene: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENE",
+            help=f"One of {', '.join(ALL_SCENES)}, or a robot's FILE.urdf.",
+            autocompletion=completions.scenes,
+        ),
+    ],
+    law: Annotated[
+        list[str],
+        typer.Option(
+            "--law",
+            metavar="NAME",
+            help="Friction law; repeat it to compare several.",
+            autocompletion=completions.laws,
+        ),
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.html", help="The page.")] = Path(
+        "report.html"
+    ),
+    settings: SetOption = None,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option("--input", metavar="NAME=VALUE", help="Input, as of `run`."),
+    ] = None,
+    x0: Annotated[
+        list[str] | None,
+        typer.Option("--x0", metavar="NAME=VALUE", help="Start value of a state."),
+    ] = None,
+    t_end: Annotated[
+        float | None, typer.Option("--t-end", help="Last time [s]; default as of `run`.")
+    ] = None,
+    rtol: Annotated[float, typer.Option("--rtol", help="Relative tolerance of a step.")] = 1e-6,
+) -> None:
+    """Simulate SCENE and write one page: signals, friction, error, laws.
+
+    The error of every run is measured by another formula at a hundredth of the tolerance. The page
+    needs nothing from elsewhere; it holds the laws with their limits and how to run it again.
+
+    Example: symfric report rabinowicz --law lugre --law brown_mcphee --out report.html
+    """
+    check_outputs(out)
+    machines = scenes_with(scene, law, numbers("--set", settings))
+    models = {name: machine.model() for name, machine in machines.items()}
+    machine = next(iter(machines.values()))
+    signals, _ = inputs_of(machine, models[law[0]], inputs)
+    until = shown_until(machine, signals) if t_end is None else t_end
+    start = numbers("--x0", x0)
+    how: Any = {"x0": start, "u": signals, "rtol": rtol, "samples": 2001, "throw": False}
+    found: dict[str, Trajectory] = {}
+    for name, model in models.items():
+        with output.progress(f"{scene} with {name}") as tell:
+            found[name] = simulate(model, until, **how, measure_error=True, progress=tell)
+    write_report(
+        found,
+        out,
+        settings={name: parameters(machine) for name, machine in machines.items()},
+        command=shlex.join(["symfric", *sys.argv[1:]]),
+    )
+    output.say_written(out)
+    for trajectory in found.values():
+        if not trajectory.status.ok:
+            raise SolveError(trajectory.message, trajectory.status, trajectory)

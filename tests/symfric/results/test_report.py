@@ -1,0 +1,77 @@
+"""Runs as one page."""
+
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from symfric import BrownMcPhee, LuGre, parameters, report, simulate
+from symfric.cli import main
+from symfric.scenes import Pendulum, Rabinowicz
+
+EMPTY = {"meta", "img", "path", "rect", "br"}
+
+
+class Page(HTMLParser):
+    """Tags that close, and the cells of tables."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.cells: list[str] = []
+        self.sources: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.sources += [value or "" for name, value in attrs if name in ("src", "href")]
+        if tag not in EMPTY:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        pass
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] in ("td", "th"):
+            self.cells.append(data)
+
+
+def test_a_page_holds_the_numbers_of_the_runs_and_needs_nothing(tmp_path: Path) -> None:
+    scenes = {"LuGre": Rabinowicz(LuGre()), "<b>": Rabinowicz(BrownMcPhee(mu_s=0.17))}
+    runs = {n: simulate(s.model(), 8.0, measure_error=True) for n, s in scenes.items()}
+    text = report(runs, tmp_path / "p.html", settings={n: parameters(s) for n, s in scenes.items()})
+    assert (tmp_path / "p.html").read_text("utf-8") == text
+    page = Page(text)
+    assert page.open == []
+    assert all(s.startswith(("#", "data:")) for s in page.sources)
+    assert "<b>" not in text.replace("&lt;b&gt;", "")
+    for run in runs.values():
+        assert f"{run.extremes['x'][1]:.6g}" in page.cells
+        assert f"{run.final['friction']:.6g}" in page.cells
+        assert f"{run.statistics.error:.1e}" in page.cells
+    assert "0.17" in page.cells
+    assert text.count("Source:") == len(runs)
+
+
+def test_a_run_that_failed_is_not_called_done() -> None:
+    run = simulate(Pendulum(BrownMcPhee()).model(), 5.0, max_steps=5, throw=False)
+    text = report({"pendulum": run})
+    assert "Not finished" in text and "verdict good" not in text
+
+
+@pytest.mark.parametrize("bad", [{}, {"x": 1.0}])
+def test_what_is_no_run_is_refused(bad: dict[str, object]) -> None:
+    with pytest.raises(ValueError, match="report"):
+        report(bad)  # pyright: ignore[reportArgumentType]
+
+
+def test_the_command_writes_one_page_of_several_laws(tmp_path: Path) -> None:
+    out = tmp_path / "r.html"
+    words = "report rabinowicz --law dahl --law coulomb --t-end 2 --set m=0.5 --out"
+    assert main([*words.split(), str(out)]) == 0
+    cells = Page(out.read_text("utf-8")).cells
+    assert {"dahl", "coulomb", "0.5", "sigma_0"} <= set(cells)
+    assert main([*words.split()[:-3], "--set", "mm=1", "--out", str(tmp_path / "n.html")]) == 2
+    assert not (tmp_path / "n.html").exists()
