@@ -5,7 +5,9 @@ from typing import ClassVar, final
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import param
+from symfric.laws import Law
 from symfric.multibody import JointFriction, JointSpringDamper, Mechanism, Revolute
+from symfric.scenes.base import other_law
 from symfric.scenes.mechanism import MechanismScene
 
 UP, SIDE, OUT = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)
@@ -28,6 +30,11 @@ class Arm(MechanismScene):
 
     t_end: ClassVar[float] = 1.0
 
+    q2: Law | None = other_law("joint q2, shoulder; `law` without")
+    q3: Law | None = other_law("joint q3, elbow; `law` without")
+    q4: Law | None = other_law("joint q4, first of the wrist; `law` without")
+    q5: Law | None = other_law("joint q5, second of the wrist; `law` without")
+    q6: Law | None = other_law("joint q6, third of the wrist; `law` without")
     load: Scalar = param(0.0, unit="kg", role="mass", doc="mass at the end of the arm", lower=0.0)
     R: Scalar = param(0.03, unit="m", role="geometry", doc="radius of the bearings", lower=1e-12)
     a: Scalar = param(
@@ -38,7 +45,6 @@ class Arm(MechanismScene):
     def mechanism(self) -> Mechanism:
         """Six bodies in a chain."""
         m = Mechanism("arm", gravity=(0.0, 0.0, -self.g))
-        friction = JointFriction(self.law, radius=self.R, length=self.a)
         m.frame("ground.tip", at=(0.0, 0.0, 0.5), z=UP)
         before = "ground"
         for i, (axis, length, mass) in enumerate(zip(AXES, LENGTHS, MASSES, strict=True), start=1):
@@ -49,6 +55,8 @@ class Arm(MechanismScene):
             m.frame(f"{body}.root", z=axis)
             if i < len(AXES):
                 m.frame(f"{body}.tip", at=(length, 0.0, 0.0), z=AXES[i])
+            law = self.law if i == 1 else self.law_of(f"q{i}")
+            friction = JointFriction(law, radius=self.R, length=self.a)
             joint = Revolute(f"q{i}", f"{before}.tip", f"{body}.root", STARTS[i - 1], 0.0, friction)
             m.joint(joint)
             torque = m.input(f"tau{i}", "N m", nominal=10.0)

@@ -81,6 +81,11 @@ class Scene(Parametric, ABC):
         arguments: dict[str, Any] = {**chosen.values, **others, **given}
         return cls(**arguments)
 
+    def law_of(self, place: str) -> Law:
+        """The law of one of `places`; `law` where that has none of its own."""
+        own = getattr(self, place)
+        return self.law if own is None else own
+
     def __post_init__(self) -> None:
         check_law(type(self).__name__, self.law)
         for place in type(self).places():

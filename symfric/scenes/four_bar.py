@@ -7,6 +7,7 @@ from symfric.foundation.numeric import Scalar, atan, cos, equals, sin
 from symfric.foundation.parameters import param
 from symfric.laws import Law
 from symfric.multibody import JointFriction, Mechanism, PlanarRevolute, Revolute
+from symfric.scenes.base import other_law
 from symfric.scenes.mechanism import MechanismScene, reach
 from symfric.scenes.pendulum import HINGE
 
@@ -19,14 +20,17 @@ class FourBar(MechanismScene):
     crank and rocker are angles against x, coupler the angle of the coupler against the crank. The
     fourth hinge, between coupler and rocker, closes the loop as a `PlanarRevolute`: a `Revolute`
     would fix what the plane fixes already, and leave the reactions out of the plane open. `pin` is
-    the law of its friction, with its own parameters (endings _1 and _2); without it it has none.
+    the law of its friction; without it it has none. Laws of other places have their own parameters,
+    with the endings _1, _2, ... where they share a name.
 
     Defaults: a crank-rocker (0.1 + 0.4 < 0.3 + 0.35 m) that starts with 10 rad/s.
     """
 
     t_end: ClassVar[float] = 3.0
 
-    pin: Law | None = None
+    hinge_coupler: Law | None = other_law("hinge between crank and coupler; `law` without")
+    hinge_rocker: Law | None = other_law("hinge of the rocker at the ground; `law` without")
+    pin: Law | None = other_law("pin between coupler and rocker; without friction where not given")
     crank: Scalar = param(0.1, unit="m", role="geometry", doc="length of the crank", lower=1e-12)
     coupler: Scalar = param(
         0.35, unit="m", role="geometry", doc="length of the coupler", lower=1e-12
@@ -84,14 +88,15 @@ class FourBar(MechanismScene):
             m.frame(f"{name}_rod.near", z=HINGE, x=(1.0, 0.0, 0.0))
             m.frame(f"{name}_rod.far", at=(length, 0.0, 0.0), z=HINGE, x=(1.0, 0.0, 0.0))
         beta, gamma, beta_rate, gamma_rate = self.closed()
-        friction = JointFriction(self.law, radius=self.R)
         hinges = (
-            ("theta_crank", "ground.left", "crank_rod.near", self.angle, self.omega),
+            ("theta_crank", "ground.left", "crank_rod.near", self.angle, self.omega, self.law),
             ("theta_coupler", "crank_rod.far", "coupler_rod.near",
-             beta - self.angle, beta_rate - self.omega),
-            ("theta_rocker", "ground.right", "rocker_rod.near", gamma, gamma_rate),
+             beta - self.angle, beta_rate - self.omega, self.law_of("hinge_coupler")),
+            ("theta_rocker", "ground.right", "rocker_rod.near", gamma, gamma_rate,
+             self.law_of("hinge_rocker")),
         )  # fmt: skip
-        for name, parent, child, start, rate in hinges:
+        for name, parent, child, start, rate, law in hinges:
+            friction = JointFriction(law, radius=self.R)
             m.joint(Revolute(name, parent, child, start, rate, friction))
         closing = None if self.pin is None else JointFriction(self.pin, radius=self.R)
         m.joint(PlanarRevolute("pin", "rocker_rod.far", "coupler_rod.far", friction=closing))

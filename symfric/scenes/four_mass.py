@@ -1,12 +1,16 @@
 """Spatial four-mass system: sliders on three axes, coupled by rods and springs."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, final
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import param
+from symfric.laws import BrownMcPhee, Law
 from symfric.multibody import Distance, JointFriction, Mechanism, Prismatic, SpringDamper
+from symfric.scenes.base import other_law
 from symfric.scenes.mechanism import MechanismScene
+from symfric.scenes.presets import Numbers, Preset
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
@@ -24,7 +28,19 @@ class FourMass(MechanismScene):
     """
 
     t_end: ClassVar[float] = 4.0
+    presets: ClassVar[Mapping[str, Preset]] = {
+        "haug": Preset(
+            "sliders of the spatial example with friction in all guides; laws without a transition "
+            "velocity get the coefficients",
+            "Haug, spatial four-mass example, data as in public codes",
+            {"m_1": 2.0, "m_3": 6.0, "k": 2.0, "k_4": 10.0, "v_4": -1.0, "a": 0.1, "g": 9.8},
+            {"law": Numbers({"mu_s": 0.12, "mu_d": 0.1}, {BrownMcPhee: {"v_t": 0.01}})},
+        )
+    }
 
+    guide_2: Law | None = other_law("guide of slider 2 (y2); `law` without")
+    guide_3: Law | None = other_law("guide of slider 3 (z3); `law` without")
+    guide_4: Law | None = other_law("guide of slider 4 (x4); `law` without")
     m_1: Scalar = param(2.0, unit="kg", role="mass", doc="mass of sliders 1 and 2", lower=1e-12)
     m_3: Scalar = param(6.0, unit="kg", role="mass", doc="mass of sliders 3 and 4", lower=1e-12)
     k: Scalar = param(
@@ -45,10 +61,11 @@ class FourMass(MechanismScene):
         masses = (self.m_1, self.m_1, self.m_3, self.m_3)
         starts = (("x1", 4.0, 0.0), ("y2", 3.0, 0.0), ("z3", 40.0**0.5, 0.0), ("x4", 5.0, self.v_4))
         axes = ((X, Z), (Y, X), (Z, X), (X, Z))
-        friction = JointFriction(self.law, length=self.a, width=self.a)
+        laws = (self.law, *(self.law_of(f"guide_{i}") for i in (2, 3, 4)))
         for i, (name, start, rate) in enumerate(starts):
             body, (z, x) = f"slider_{i + 1}", axes[i]
             m.body(body, masses[i], (1.0, 1.0, 1.0))
+            friction = JointFriction(laws[i], length=self.a, width=self.a)
             m.frame(f"{body}.guide", z=z, x=x)
             m.frame(f"ground.guide_{i + 1}", z=z, x=x)
             m.joint(

@@ -5,7 +5,9 @@ from typing import ClassVar, final
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import param
+from symfric.laws import Law
 from symfric.multibody import JointFriction, Mechanism, Revolute
+from symfric.scenes.base import other_law
 from symfric.scenes.mechanism import MechanismScene
 
 HINGE = (0.0, -1.0, 0.0)
@@ -58,6 +60,7 @@ class DoublePendulum(MechanismScene):
 
     t_end: ClassVar[float] = 5.0
 
+    lower: Law | None = other_law("hinge phi_2 between the rods; `law` without")
     m: Scalar = param(1.0, unit="kg", role="mass", doc="mass of each rod", lower=1e-12)
     L: Scalar = param(1.0, unit="m", role="geometry", doc="length of each rod", lower=1e-12)
     R: Scalar = param(0.02, unit="m", role="geometry", doc="radius of the bearings", lower=1e-12)
@@ -76,7 +79,7 @@ class DoublePendulum(MechanismScene):
             m.body(body, self.m, (J, J, J))
             m.frame(f"{body}.top", at=(0.0, 0.0, self.L / 2), z=HINGE, x=down)
             m.frame(f"{body}.end", at=(0.0, 0.0, -self.L / 2), z=HINGE, x=down)
-        friction = JointFriction(self.law, radius=self.R)
-        m.joint(Revolute("phi_1", "ground.hinge", "upper.top", start=self.phi_0, friction=friction))
-        m.joint(Revolute("phi_2", "upper.end", "lower.top", friction=friction))
+        upper, lower = (JointFriction(of, radius=self.R) for of in (self.law, self.law_of("lower")))
+        m.joint(Revolute("phi_1", "ground.hinge", "upper.top", start=self.phi_0, friction=upper))
+        m.joint(Revolute("phi_2", "upper.end", "lower.top", friction=lower))
         return m

@@ -23,8 +23,8 @@ class PendulumBox(MechanismScene):
 
     x is the position of the box, phi the angle of the pendulum from hanging; the normal force
     under the box is the whole vertical reaction, that of the hinge the size of its reaction.
-    `hinge` is the law of the hinge, with its own parameters (endings _1 and _2); without it the
-    hinge has the law of the box.
+    `hinge` is the law of the hinge, with its own parameters (endings _1 and _2 where box and hinge
+    share a name); without it the hinge has the law of the box.
 
     Defaults: Jing and Mi, Selection Mechanism of Friction Models, tables 6 and 7 (box 6 kg,
     pendulum 20 kg on 0.3 m, from 30 degrees). There the pendulum's inertia is that of a point mass,
@@ -65,7 +65,7 @@ class PendulumBox(MechanismScene):
         m.frame("box.hinge", at=(0.0, 0.0, 0.4), z=HINGE, x=down)
         m.frame("pendulum.hinge", at=(0.0, 0.0, self.L), z=HINGE, x=down)
         floor = JointFriction(self.law)
-        bearing = JointFriction(self.law if self.hinge is None else self.hinge, radius=self.R)
+        bearing = JointFriction(self.law_of("hinge"), radius=self.R)
         m.joint(Prismatic("x", "ground.floor", "box.floor", friction=floor))
         m.joint(Revolute("phi", "box.hinge", "pendulum.hinge", start=self.phi_0, friction=bearing))
         return m

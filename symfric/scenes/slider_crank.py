@@ -1,13 +1,18 @@
 """Spatial slider-crank: a crank that turns about x drives a slider along x over a skew rod."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, final
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import param
+from symfric.laws import BrownMcPhee, Law
 from symfric.multibody import Distance, JointFriction, Mechanism, Prismatic, Revolute
+from symfric.scenes.base import other_law
 from symfric.scenes.mechanism import MechanismScene, reach
+from symfric.scenes.presets import Numbers, Preset
 
+BEARING = Numbers({"mu_s": 0.1, "mu_d": 0.08}, {BrownMcPhee: {"v_t": 0.01}})
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
@@ -24,11 +29,30 @@ class SliderCrank(MechanismScene):
     The slider swings back and forth and gathers and returns most of the crank's energy, so the
     rod's force changes its sign and its size by orders of magnitude.
 
+    `guide` is the law of the slider's guide, whose stations and width are `a`; without it only the
+    crank's bearing rubs.
+
     Defaults: Haug's spatial example, friction in the bearing of the crank; t_end = 0.25 s.
     """
 
     t_end: ClassVar[float] = 0.25
+    presets: ClassVar[Mapping[str, Preset]] = {
+        "haug": Preset(
+            "crank of the spatial example with friction in its bearing",
+            "Haug, spatial slider-crank example, data as in public codes",
+            {"m_crank": 0.5, "m_slider": 5.0, "J": 0.2, "r": 0.08, "l": 0.3, "b": 0.1, "c": 0.12}
+            | {"e": 0.02, "a": 0.1, "R": 0.1, "omega": 120.0, "g": 9.8},
+            {"law": BEARING},
+        ),
+        "haug_with_guide": Preset(
+            "the same with friction in the guide of the slider, too",
+            "Haug, spatial slider-crank example; the coefficients of its bearing",
+            {"omega": 120.0, "g": 9.8},
+            {"law": BEARING, "guide": BEARING},
+        ),
+    }
 
+    guide: Law | None = other_law("guide of the slider; without friction where not given")
     m_crank: Scalar = param(0.5, unit="kg", role="mass", doc="mass of the crank", lower=1e-12)
     m_slider: Scalar = param(5.0, unit="kg", role="mass", doc="mass of the slider", lower=1e-12)
     J: Scalar = param(
@@ -65,6 +89,9 @@ class SliderCrank(MechanismScene):
         speed = self.b * self.r * self.omega / start
         bearing = JointFriction(self.law, radius=self.R, length=self.a)
         m.joint(Revolute("crank", "ground.bearing", "wheel.bearing", 0.0, self.omega, bearing))
-        m.joint(Prismatic("slider", "ground.guide", "block.guide", start, speed))
+        guide = (
+            None if self.guide is None else JointFriction(self.guide, length=self.a, width=self.a)
+        )
+        m.joint(Prismatic("slider", "ground.guide", "block.guide", start, speed, guide))
         m.joint(Distance("rod", "wheel.pin", "block.pin", length=self.l))
         return m
