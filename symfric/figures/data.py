@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.parameters import check_names
+from symfric.foundation.shown import Showing, Shown, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Curve:
     """One curve: columns of equal length by name, shape (n,) each.
 
@@ -33,6 +34,10 @@ class Curve:
     columns: Mapping[str, Array]
     reference: bool = False
 
+    def __repr__(self) -> str:
+        size = len(next(iter(self.columns.values()), ()))
+        return f"<curve '{self.label}': {', '.join(self.columns)}, {size} points>"
+
     @property
     def label(self) -> str:
         """How a legend names the curve: its law and, where there are several, its case."""
@@ -44,8 +49,8 @@ class Curve:
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class FigureData:
+@dataclass(frozen=True, eq=False, repr=False)
+class FigureData(Showing):
     """The data of one figure.
 
     `figure["2 Hz"]` is the curve of that case, law or label; its columns come by name.
@@ -67,6 +72,19 @@ class FigureData:
     curves: tuple[Curve, ...]
     log: tuple[str, ...] = ()
     dots: bool = False
+
+    def shown(self) -> Shown:
+        """Its curves, with the range of each column."""
+        rows = tuple(
+            (c.label, *(_range(c.columns[u]) if u in c.columns else "" for u in self.units))
+            for c in self.curves
+        )
+        header = ("curve", *(f"{name} [{unit}]" for name, unit in self.units.items()))
+        return Shown(f"figure '{self.name}': {self.title}", (), Table(header, rows))
+
+    def thumbnail(self) -> "Figure":
+        """What `plot` draws, small."""
+        return self.plot()
 
     def __getitem__(self, name: str) -> Curve:
         found = {c.label: c for c in self.curves}
@@ -102,3 +120,9 @@ class FigureData:
                 for c in self.curves
             ],
         }
+
+
+def _range(values: Array) -> str:
+    """From where to where a column goes."""
+    finite = values[np.isfinite(values)]
+    return f"{finite.min():.4g} ... {finite.max():.4g}" if finite.size else ""

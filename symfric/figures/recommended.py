@@ -22,6 +22,7 @@ from symfric.figures.regularisation import (
 )
 from symfric.foundation import checks
 from symfric.foundation.parameters import parameters
+from symfric.foundation.shown import Shown
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.equations.inputs import Input
 from symfric.laws import Law
@@ -47,7 +48,7 @@ FINEST = 1e-11
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Recommendation:
     """A law as smooth as a wanted error allows.
 
@@ -88,6 +89,12 @@ class Recommendation:
             f"{type(self.law).__name__}: {found} is off {self.reference} by {self.error:.2g} "
             f"({self.wanted:g} wanted) at rtol = {self.rtol:g}, in {self.steps} steps"
         )
+
+    def __repr__(self) -> str:
+        return f"<Recommendation {self}>"
+
+    def _repr_html_(self) -> str:
+        return Shown("recommended", (str(self),)).html(self.plot())
 
     def plot(self, path: str | Path | None = None) -> "Figure":
         """Draw the curve; save it to `path` if given."""

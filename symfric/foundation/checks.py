@@ -51,7 +51,7 @@ def shown(value: object) -> str:
         value = value.item()
     if callable(value) and hasattr(value, "__name__"):
         return f"the function {value.__name__}"
-    text = repr(value)
+    text = " ".join(repr(value).split()) if hasattr(value, "_repr_html_") else repr(value)
     if text.startswith("<") or "\n" in text:
         return f"an object of type {type(value).__name__}"
     return _cut(text)

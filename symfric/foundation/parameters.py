@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from math import inf
-from typing import Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -18,6 +18,10 @@ from numpy.typing import NDArray
 from symfric.foundation import checks
 from symfric.foundation.checks import check_names as check_names
 from symfric.foundation.numeric import Scalar, is_casadi, is_number, is_symbolic
+from symfric.foundation.shown import Shown, Table, figure_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 ROLES = {
     "level": "a dry friction level: a coefficient, or a force or torque",
@@ -98,7 +102,7 @@ class Parameter:
     width: int = 0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Variable:
     """A named scalar of a model: its symbol, unit and the numbers that belong to it.
 
@@ -137,6 +141,10 @@ class Variable:
             shown = f"{checks.shown(self.lower)} and {checks.shown(self.upper)}"
             raise ValueError(f"{where}: expected numbers lower <= upper, got {shown}")
 
+    def __repr__(self) -> str:
+        said = f": {self.doc}" if self.doc else ""
+        return f"<variable '{self.name}' [{self.unit}], start {figure_of(self.start)}{said}>"
+
     def within(self, where: str, value: object) -> float:
         """`value` as a finite number inside the bounds."""
         return checks.number(where, value, unit=self.unit, lower=self.lower, upper=self.upper)
@@ -162,6 +170,17 @@ class Parametric:
         problems = list(_problems(self))
         if problems:
             raise ValueError(f"{type(self).__name__}: " + "; ".join(problems))
+
+    def _repr_html_(self) -> str:
+        """For notebooks: parameters with units, a picture."""
+        rows = [(p.name, figure_of(p.value), p.unit, p.doc) for p in parameters(self).values()]
+        rows += [(o.name, o.value, "", o.doc) for o in options(self).values()]
+        first = (self.__doc__ or "").partition("\n")[0]
+        table = Table(("parameter", "value", "unit", ""), tuple(rows), numbers=(1,))
+        return Shown(type(self).__name__, (first,), table).html(self.thumbnail())
+
+    def thumbnail(self) -> "Figure | None":
+        """A small picture, if there is one."""
 
 
 P = TypeVar("P", bound=Parametric)

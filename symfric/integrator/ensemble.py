@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError
+from symfric.foundation.shown import Showing, Shown
 from symfric.foundation.status import Status
 from symfric.integrator.arguments import (
     BACKENDS,
@@ -37,6 +38,8 @@ from symfric.integrator.step.layout import State
 from symfric.model import Model
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from symfric.integrator.cuda.on_device import OnDevice
 
 Array = NDArray[np.float64]
@@ -46,8 +49,8 @@ CHUNK = 500
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class Ensemble:
+@dataclass(frozen=True, eq=False, repr=False)
+class Ensemble(Showing):
     """Results of many runs.
 
     Attributes:
@@ -73,6 +76,18 @@ class Ensemble:
     reached: Array
     failed: dict[int, str]
     status: Status
+
+    def shown(self) -> Shown:
+        """Members, failures, and where signals end."""
+        from symfric.integrator.shown import shown  # noqa: PLC0415  (only who looks needs it)
+
+        return shown(self)
+
+    def thumbnail(self) -> "Figure | None":
+        """The first signal of members, small."""
+        from symfric.integrator.shown import picture  # noqa: PLC0415  (only who looks needs it)
+
+        return picture(self)
 
     def __getitem__(self, name: str) -> Array:
         checks.check_names(f"ensemble of '{self.scene}'", [name], self.signals)

@@ -52,7 +52,7 @@ class FrictionLaw(Protocol):
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Contact:
     """Friction at one place of a model, along one direction.
 
@@ -109,6 +109,10 @@ class Contact:
             object.__setattr__(self, "force", ca.SX.sym(f"{self.name}_F"))
         if self.law.states and not self.states:
             object.__setattr__(self, "states", self._made())
+
+    def __repr__(self) -> str:
+        kept = f", states {', '.join(v.name for v in self.states)}" if self.states else ""
+        return f"<contact '{self.name}' by {type(self.law).__name__}{kept}>"
 
     def unit(self, of_sliding: str) -> str:
         """A unit of the law: that of sliding, or of turning."""

@@ -15,21 +15,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import Scalar, evaluate, evaluate_all
+from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable, check_names
+from symfric.foundation.shown import Showing, Shown
 from symfric.foundation.symbols import stacked, symbols_of
 from symfric.model.contact import Contact, closed, opened, reopened, with_forces
 from symfric.model.holonomic import Holonomic
 from symfric.model.parts import Event, Monitor, Output
 from symfric.model.problems import GROUPS, equation_problems, kind_problems, naming_problems
+from symfric.model.shown import shown
 from symfric.model.sketch import Sketch
-from symfric.model.start import start_function
+from symfric.model.start import Starting
 
 Variables = tuple[Variable, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Model:
+@dataclass(frozen=True, eq=False, repr=False)
+class Model(Showing, Starting):
     """A dynamic system 0 = F(t, x', x, z, u, p), explicit where it can be.
 
     Explicit form (semi-explicit DAE of index 1; an ODE where there is no z):
@@ -104,6 +106,10 @@ class Model:
                     self, "residual", ca.vertcat(self.xdot - ca.vec(self.ode), self.alg)
                 )
         self._refuse([*naming_problems(self), *equation_problems(self, self._symbols())])
+
+    def shown(self) -> Shown:
+        """What it consists of, without its expressions."""
+        return shown(self)
 
     def _refuse(self, problems: list[str]) -> None:
         if problems:
@@ -263,120 +269,6 @@ class Model:
         free = f"free it when the model is made, as in rabinowicz(law, free=[{fixed}])"
         checks.check_names(f"model '{self.name}' {what}", values, known, free * (what == "p"))
         return values
-
-    def initial_state(
-        self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None
-    ) -> NDArray[np.float64]:
-        """Start values of x, shape (nx,), replaced by those `given` by name.
-
-        A start value that is an expression (a bristle at steady state depends on the sliding
-        velocity) is evaluated with the given values of the other states and parameters.
-        """
-        if not given and not (p and self._start_by_p):
-            if p:
-                self.values("p", p)
-            return self._default_state.copy()
-        if self._starts_alone:
-            state, places = self._default_state.copy(), self._places
-            for name, x in self.named("x0", given).items():
-                state[places[name]] = checks.number(f"{self.name}.{name}", x)
-            if p:
-                self.values("p", p)
-            return state
-        return self._checked(evaluate(self._start, *self._start_arguments(given, p)))
-
-    def _checked(self, start: NDArray[np.float64]) -> NDArray[np.float64]:
-        named = zip(self.x, start.tolist(), strict=True)
-        return np.array([checks.number(f"{self.name}.{v.name}", x) for v, x in named], float)
-
-    def initial_states(
-        self,
-        given: Mapping[str, NDArray[np.float64]],
-        p: Mapping[str, NDArray[np.float64]],
-        count: int,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Start values (count, nx) and parameters (count, n_p) of many members at once."""
-        given, p = self.named("x0", given), self.named("p", p)
-        parameters = np.tile(self.values("p")[:, None], (1, count))
-        for i, v in enumerate(self.p):
-            parameters[i] = p.get(v.name, parameters[i])
-        if self._starts_alone:
-            alone = np.tile(self._default_state[:, None], (1, count))
-            for i, v in enumerate(self.x):
-                alone[i] = given.get(v.name, alone[i])
-            return alone.T, parameters.T
-        known = np.zeros((len(self.x), count))
-        chosen = np.array([float(v.name in given) for v in self.x])
-        for i, v in enumerate(self.x):
-            known[i] = given.get(v.name, known[i])
-        every = np.tile(chosen[:, None], (1, count))
-        inputs = np.tile(self.values("u")[:, None], (1, count))
-        start = self._start.map(count)(known, every, inputs, parameters).full()
-        return start.T, parameters.T
-
-    def start_by_parameters(
-        self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None
-    ) -> NDArray[np.float64]:
-        """Derivative of `initial_state` with respect to p, shape (nx, n_p)."""
-        if not self._start_follows:
-            return np.zeros((len(self.x), len(self.p)))
-        return evaluate_all(self._start_slopes, *self._start_arguments(given, p))[0]
-
-    def start_by_state(
-        self,
-        name: str,
-        given: Mapping[str, float] | None = None,
-        p: Mapping[str, float] | None = None,
-    ) -> NDArray[np.float64]:
-        """Derivative of `initial_state` with respect to the start value of a state, shape (nx,)."""
-        i = [v.name for v in self.x].index(name)
-        chosen = dict(given or {}) | {name: float(self.initial_state(given, p)[i])}
-        return evaluate_all(self._start_slopes, *self._start_arguments(chosen, p))[1][:, i]
-
-    def _start_arguments(
-        self, given: Mapping[str, float] | None, p: Mapping[str, float] | None
-    ) -> tuple[NDArray[np.float64], ...]:
-        numbers = self.named("x0", given)
-        given = {name: checks.number(f"{self.name}.{name}", x) for name, x in numbers.items()}
-        known = np.array([given.get(v.name, 0.0) for v in self.x])
-        chosen = np.array([float(v.name in given) for v in self.x])
-        return known, chosen, self.values("u"), self.values("p", p)
-
-    @cached_property
-    def _default_state(self) -> NDArray[np.float64]:
-        return self._checked(evaluate(self._start, *self._start_arguments(None, None)))
-
-    @cached_property
-    def _places(self) -> dict[str, int]:
-        return {v.name: i for i, v in enumerate(self.x)}
-
-    @cached_property
-    def _starts_alone(self) -> bool:
-        """Whether each state starts at a number, whatever the others and the parameters are."""
-        return all(ca.SX(v.start).is_constant() for v in self.x)
-
-    @cached_property
-    def _start_by_p(self) -> bool:
-        """Whether start values depend on parameters."""
-        return self._start.jac_sparsity(0, 3).nnz() > 0
-
-    @cached_property
-    def _start(self) -> ca.Function:
-        """Start values as a Function of (values given, which are given, u, p)."""
-        return start_function(self.x, self.vector("u"), self.vector("p"))
-
-    @cached_property
-    def _start_follows(self) -> bool:
-        """Whether some start value is an expression in p."""
-        return bool(ca.depends_on(stacked(ca.SX(v.start) for v in self.x), self.vector("p")))
-
-    @cached_property
-    def _start_slopes(self) -> ca.Function:
-        """Derivatives of `_start` by p and by the values given."""
-        arguments = self._start.sx_in()
-        x = self._start(*arguments)
-        slopes = [ca.densify(ca.jacobian(x, arguments[i])) for i in (3, 0)]
-        return ca.Function("slopes", arguments, slopes)
 
 
 def _same(a: ca.SX, b: ca.SX) -> bool:

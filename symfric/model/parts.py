@@ -6,9 +6,10 @@ from math import inf
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, is_casadi
+from symfric.foundation.shown import figure_of
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Output:
     """A named result of a model: an expression in t, x, z, u, p, with its unit.
 
@@ -25,8 +26,11 @@ class Output:
         if not isinstance(self.unit, str):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise checks.refused("Output: unit", "a text such as 'N'", self.unit)
 
+    def __repr__(self) -> str:
+        return f"<output [{self.unit}]{': ' * bool(self.doc)}{self.doc}>"
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Monitor:
     """An expression in t, x, z, u, p whose relative error is controlled along with the states.
 
@@ -49,8 +53,11 @@ class Monitor:
         else:
             checks.number("Monitor: nominal", self.nominal, above=0.0)
 
+    def __repr__(self) -> str:
+        return f"<monitor on the scale {figure_of(self.nominal)}>"
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Event:
     """Something that happens when an expression passes through zero.
 
@@ -88,3 +95,8 @@ class Event:
             checks.number(f"{where}: rtol", self.rtol, above=0.0)
         for name, value in checks.named(f"{where}: reset", self.reset).items():
             checks.expression(f"{where}: reset of {name}", value)
+
+    def __repr__(self) -> str:
+        way = {1: ", rising", -1: ", falling"}.get(self.direction, "")
+        after = f", sets {', '.join(self.reset)}" if self.reset else ""
+        return f"<event '{self.name}'{way}{after}{', ends the run' * self.terminal}>"

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from symfric.foundation.checks import kind, many, number, shown
 from symfric.foundation.numeric import Scalar, equals
 from symfric.foundation.parameters import Variable, check_names
+from symfric.foundation.shown import Showing, Shown
 from symfric.foundation.symbols import starts_of, symbols_of
 from symfric.model import Model, Variables
 from symfric.multibody import checks
@@ -31,15 +32,19 @@ from symfric.multibody.prepare import (
     written,
 )
 from symfric.multibody.results import results
+from symfric.multibody.shown import shown as shown_of
 from symfric.multibody.sketch import sketch
 from symfric.multibody.spatial import Frame, Vector, is_vector
 from symfric.multibody.topology import Topology, absolute, spanning_tree
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 FORMULATIONS = ("joint", "absolute")
 
 
-class Mechanism:
+class Mechanism(Showing):
     """Collects bodies, joints, forces and constraints; `build` writes the `Model`.
 
     Example:
@@ -64,6 +69,16 @@ class Mechanism:
             self._wrong.append(f"gravity: expected three numbers [m/s^2], got {gravity!r}")
         elif not all(equals(gravity[i], 0.0) for i in range(3)):
             self.forces.append(Gravity("gravity", gravity))
+
+    def shown(self) -> Shown:
+        """What was added so far."""
+        return shown_of(self)
+
+    def thumbnail(self) -> "Figure | None":
+        """The machine at its start, small; nothing where it cannot be built yet."""
+        from symfric.multibody.thumbnail import picture  # noqa: PLC0415  (matplotlib is slow to import)
+
+        return picture(self)
 
     def body(
         self,

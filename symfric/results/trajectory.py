@@ -16,11 +16,13 @@ from symfric.foundation import checks
 from symfric.foundation.files import write_text, written
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import check_names
+from symfric.foundation.shown import Showing, Shown
 from symfric.foundation.status import Status
 from symfric.foundation.symbols import strays
 from symfric.model import Model
 from symfric.results.energy import EnergyBalance, energy_balance, integrals
 from symfric.results.extremes import extremes, looks
+from symfric.results.shown import shown
 from symfric.results.statistics import Statistics
 
 if TYPE_CHECKING:
@@ -29,8 +31,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory(Showing):
     """Named signals of a simulated model.
 
     `trajectory["v"]` is a signal at the times `trajectory.t`; `trajectory.at(times)` evaluates
@@ -72,6 +74,16 @@ class Trajectory:
     differentiate: Callable[[Array], dict[str, dict[str, Array]]] | None = None
     pull_back: Callable[[Mapping[str, Array]], dict[str, float]] | None = None
     delays: Callable[[], dict[str, Array]] | None = None
+
+    def shown(self) -> Shown:
+        """How it ended, and every signal with its extremes."""
+        return shown(self)
+
+    def thumbnail(self) -> "Figure":
+        """Some signals, small."""
+        from symfric.results.thumbnail import picture  # noqa: PLC0415  (matplotlib is slow to import)
+
+        return picture(self)
 
     @cached_property
     def statistics(self) -> Statistics:

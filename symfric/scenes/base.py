@@ -4,7 +4,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
-from typing import Any, ClassVar, Self, final
+from textwrap import fill
+from typing import TYPE_CHECKING, Any, ClassVar, Self, final
 
 import casadi as ca
 import numpy as np
@@ -12,12 +13,16 @@ import numpy as np
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, is_number
 from symfric.foundation.parameters import Parametric, Variable, parameters, symbolise
+from symfric.foundation.shown import WIDTH
 from symfric.foundation.symbols import symbols_of
 from symfric.foundation.units import turned
 from symfric.laws import Law
 from symfric.laws.base.law import check_law
 from symfric.model import Contact, Model, Variables
 from symfric.scenes.presets import Preset
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @final
@@ -85,6 +90,20 @@ class Scene(Parametric, ABC):
         """The law of one of `places`; `law` where that has none of its own."""
         own = getattr(self, place)
         return self.law if own is None else own
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        super().__init_subclass__(**keywords)
+        cls.__repr__ = Scene.__repr__  # or each dataclass would write one of a single line
+
+    def __repr__(self) -> str:
+        """The call that makes it, in lines of a screen."""
+        values = ", ".join(f"{item.name}={getattr(self, item.name)!r}" for item in fields(self))
+        text = f"{type(self).__name__}({values})"
+        return fill(text, WIDTH, subsequent_indent="    ", break_long_words=False)
+
+    def thumbnail(self) -> "Figure | None":
+        """Its law, small."""
+        return self.law.thumbnail()
 
     def __post_init__(self) -> None:
         check_law(type(self).__name__, self.law)

@@ -4,11 +4,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, empty, equals
 from symfric.foundation.parameters import Parametric, parameters
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PHENOMENA = {
     "D": "dynamic (kinetic) friction",
@@ -208,6 +211,12 @@ class Law(Parametric, ABC):
     def warnings(self) -> tuple[str, ...]:
         """What the present numbers give away, such as passivity, one sentence each."""
         return ()
+
+    def thumbnail(self) -> "Figure | None":
+        """The force in steady sliding, small; nothing for a law with symbols."""
+        from symfric.laws.base.thumbnail import picture  # noqa: PLC0415  (matplotlib is slow to import)
+
+        return picture(self)
 
 
 def one_sided(law: Law, reason: str) -> ValueError:

@@ -1,0 +1,171 @@
+"""How an object shows itself: one description, as text of one screen and as HTML of a notebook.
+
+Everything that comes from a user is escaped; there are no scripts, and pictures lie inside.
+"""
+
+from abc import ABC, abstractmethod
+from base64 import b64encode
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from html import escape
+from io import BytesIO
+from typing import TYPE_CHECKING, final
+
+from symfric.foundation.numeric import Scalar, is_casadi, is_number
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+WIDTH, HEIGHT = 100, 25
+"""Columns and lines of a screen."""
+WORDS = 48
+"""Letters of the last column of a table of text."""
+DOTS_PER_INCH = 80
+"""Of pictures in notebooks."""
+BOX = "font-family:sans-serif;font-size:13px;line-height:1.35;max-width:64em"
+TABLE = "border-collapse:collapse;font-size:13px"
+CELL = "padding:1px 10px 1px 0;vertical-align:top"
+HEAD = f"{CELL};border-bottom:1px solid #888;font-weight:600"
+
+
+class Showing(ABC):
+    """What shows itself: `repr` in one screen, and as HTML in notebooks."""
+
+    @abstractmethod
+    def shown(self) -> "Shown":
+        """What is to be said, without work that nobody asked for."""
+
+    def thumbnail(self) -> "Figure | None":
+        """A small picture for notebooks, if there is one."""
+        return None
+
+    def __repr__(self) -> str:
+        return self.shown().text()
+
+    def _repr_html_(self) -> str:
+        return self.shown().html(self.thumbnail())
+
+
+@final
+@dataclass(frozen=True)
+class Table:
+    """Rows of texts below a header.
+
+    Attributes:
+        header: names of the columns; none where all are "".
+        numbers: columns that stand at the right.
+        rest: what stands below a table that was cut, "{n}" and "{names}" for what is left out.
+    """
+
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    numbers: tuple[int, ...] = ()
+    rest: str = "... {n} more: {names}"
+
+
+@final
+@dataclass(frozen=True)
+class Shown:
+    """What is to be said of an object.
+
+    Attributes:
+        title: its name and what it is, in a line.
+        lines: sentences below.
+        table: its parts.
+        after: sentences below the table.
+    """
+
+    title: str
+    lines: tuple[str, ...] = ()
+    table: Table = Table((), ())
+    after: tuple[str, ...] = ()
+
+    def text(self) -> str:
+        """All of it within a screen."""
+        top = [cut(line) for line in (self.title, *self.lines)]
+        bottom = [cut(line) for line in self.after]
+        return "\n".join([*top, *_rows(self.table, HEIGHT - len(top) - len(bottom)), *bottom])
+
+    def html(self, picture: "Figure | None" = None) -> str:
+        """All of it as HTML, with a picture at its end where there is one."""
+        parts = [f"<div><b>{escape(self.title)}</b></div>"]
+        parts += [f"<div>{escape(line)}</div>" for line in self.lines]
+        parts += [_html_table(self.table)] if self.table.rows else []
+        parts += [f"<div>{escape(line)}</div>" for line in self.after]
+        parts += [_image(picture, self.title)] if picture is not None else []
+        return f'<div style="{BOX}">{"".join(parts)}</div>'
+
+
+def cut(line: str, width: int = WIDTH) -> str:
+    """`line` within `width` letters."""
+    return line if len(line) <= width else f"{line[: width - 4].rstrip(', ')} ..."
+
+
+def figure_of(value: object) -> str:
+    """A number in six digits, of an expression that it is one."""
+    if is_casadi(value):
+        return str(value) if value.is_constant() else "(expression)"  # pyright: ignore
+    return f"{value:.6g}" if is_number(value) else str(value)
+
+
+def valued(named: Iterable[tuple[str, Scalar, str]]) -> str:
+    """Numbers with names and units, such as "m = 0.8 kg, mu_s = 0.2"."""
+    units = ((n, v, "" if u in ("", "1") else f" {u}") for n, v, u in named)
+    return ", ".join(f"{n} = {figure_of(v)}{u}" for n, v, u in units)
+
+
+def counted(n: int, one: str, many: str = "") -> str:
+    """A count with its noun: "1 state", "3 states", "no states"."""
+    return f"{n or 'no'} {one if n == 1 else many or one + 's'}"
+
+
+def among(names: Iterable[str], most: int = 8) -> str:
+    """Names with commas; of many the first ones, and how many more there are."""
+    every = list(names)
+    more = f", ... {len(every) - most} more" if len(every) > most else ""
+    return ", ".join(every[:most]) + more
+
+
+def _rows(table: Table, most: int) -> list[str]:
+    """Aligned lines, at most `most` of them."""
+    rows, lines = list(table.rows), [table.header] if any(table.header) else []
+    room = most - len(lines)
+    shown = rows if len(rows) <= room else rows[: max(0, room - 1)]
+    lines += shown
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)] if lines else []
+    found = [
+        "  ".join(
+            text.rjust(w) if j in table.numbers else text.ljust(w)
+            for j, (text, w) in enumerate(zip(line, widths, strict=True))
+        )
+        for line in lines
+    ]
+    left = [row[0] for row in rows[len(shown) :]]
+    if left:
+        found.append(table.rest.format(n=len(left), names=", ".join(left)))
+    return [cut(f"  {line}".rstrip()) for line in found]
+
+
+def _html_table(table: Table) -> str:
+    def cells(row: Sequence[str], mark: str, style: str) -> str:
+        right = ";text-align:right"
+        return "".join(
+            f'<{mark} style="{style}{right if j in table.numbers else ";text-align:left"}">'
+            f"{escape(text)}</{mark}>"
+            for j, text in enumerate(row)
+        )
+
+    head = f"<thead><tr>{cells(table.header, 'th', HEAD)}</tr></thead>" * any(table.header)
+    body = "".join(f"<tr>{cells(row, 'td', CELL)}</tr>" for row in table.rows)
+    return f'<table style="{TABLE}">{head}<tbody>{body}</tbody></table>'
+
+
+def _image(figure: "Figure", words: str) -> str:
+    """A figure as an image inside the page."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=DOTS_PER_INCH)
+    data = b64encode(buffer.getvalue()).decode("ascii")
+    return (
+        f'<img alt="{escape(words, quote=True)}" style="max-width:100%;margin-top:6px" '
+        f'src="data:image/png;base64,{data}">'
+    )

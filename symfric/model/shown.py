@@ -1,0 +1,55 @@
+"""How a model shows itself: what it consists of, without its expressions."""
+
+from typing import TYPE_CHECKING
+
+from symfric.foundation.shown import Shown, Table, among, counted, figure_of
+
+if TYPE_CHECKING:
+    from symfric.foundation.parameters import Variable
+    from symfric.model.model import Model
+
+GROUPS = {
+    "x": ("state", "states"),
+    "z": ("algebraic variable", "algebraic variables"),
+    "u": ("input", "inputs"),
+    "p": ("parameter", "parameters"),
+}
+
+
+def shown(model: "Model") -> Shown:
+    """Names, units and start values of everything, and where there is friction by which law."""
+    counts = [counted(len(getattr(model, g)), *words) for g, words in GROUPS.items()]
+    counts += [counted(len(model.outputs), "output")]
+    return Shown(
+        f"model '{model.name}': {', '.join(c for c in counts if not c.startswith('no '))}",
+        table=Table(("name", "what", "unit", "start", ""), tuple(_rows(model)), numbers=(3,)),
+        after=tuple(_after(model)),
+    )
+
+
+def _rows(model: "Model") -> list[tuple[str, ...]]:
+    rows = [_row(v, one) for g, (one, _) in GROUPS.items() for v in getattr(model, g)]
+    return rows + [(name, "output", o.unit, "", o.doc) for name, o in model.outputs.items()]
+
+
+def _row(v: "Variable", what: str) -> tuple[str, ...]:
+    return v.name, what, v.unit, figure_of(v.start), v.doc
+
+
+def _after(model: "Model") -> list[str]:
+    found = list[str]()
+    if model.contacts:
+        found.append(f"friction: {friction(model)}")
+    if model.events:
+        found.append(f"events: {among(e.name for e in model.events)}")
+    if "further" in model.__dict__:
+        found.append(f"further results: {among(model.further)}")
+    return found
+
+
+def friction(model: "Model") -> str:
+    """Where there is friction by which law: "belt by LuGre"; all contacts of a law together."""
+    laws: dict[str, list[str]] = {}
+    for contact in model.contacts:
+        laws.setdefault(type(contact.law).__name__, []).append(contact.name)
+    return "; ".join(f"{among(places, 4)} by {law}" for law, places in laws.items())

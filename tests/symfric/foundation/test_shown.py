@@ -1,0 +1,90 @@
+"""What objects say of themselves: within a screen, and as HTML that no name can break."""
+
+import numpy as np
+import pytest
+from pages import on_a_screen, parsed, shown
+
+from symfric.foundation.parameters import Variable
+from symfric.foundation.shown import WIDTH, Shown, Table, among, counted, cut, valued
+from symfric.laws import ALL_LAWS, LuGre
+from symfric.model import Contact, Event, Model, Monitor, Output
+from symfric.scenes import ALL_SCENES, QuarterCar
+
+EVIL = '<script>alert("&")</script>'
+
+
+def test_everything_of_a_user_is_escaped() -> None:
+    page = parsed(Shown(EVIL, (EVIL,), Table((EVIL, ""), ((EVIL, "1"),)), (EVIL,)).html())
+    assert page.words.count(EVIL) == 5
+
+
+def test_a_long_table_names_what_it_leaves_out() -> None:
+    rows = tuple((f"row{k}", f"{k}") for k in range(40))
+    text = Shown("many", ("one",), Table(("name", "n"), rows, numbers=(1,)), ("last",)).text()
+    assert on_a_screen(text)
+    assert text.splitlines()[-1] == "last"
+    assert "... 20 more: row20, row21" in text
+    assert text.splitlines()[2:4] == ["  name    n", "  row0    0"]
+    assert parsed(Shown("many", (), Table(("name", "n"), rows)).html()).words.count("row") == 40
+
+
+def test_words_for_counts_and_values() -> None:
+    assert [counted(n, "body", "bodies") for n in (0, 1, 2)] == ["no bodies", "1 body", "2 bodies"]
+    assert among("abcd", 2) == "a, b, ... 2 more"
+    assert valued([("m", 0.8, "kg"), ("mu", 0.2, "1")]) == "m = 0.8 kg, mu = 0.2"
+    assert len(cut("x" * 300)) == WIDTH
+
+
+def test_laws_show_parameters_and_a_picture() -> None:
+    for name, law in ALL_LAWS.items():
+        figure = law().thumbnail()
+        assert figure is not None, name
+        (line,) = figure.axes[0].lines
+        assert np.isfinite(line.get_ydata()).all(), name
+    assert len(shown(ALL_LAWS["gms"]()).pictures) == 1
+    assert "static friction coefficient" in shown(LuGre()).words
+
+
+def test_scenes_are_the_call_that_makes_them() -> None:
+    for kind in ALL_SCENES.values():
+        scene = kind(LuGre())
+        assert on_a_screen(repr(scene))
+        assert repr(eval(repr(scene), {**vars(__import__("symfric.laws").laws), kind.__name__: kind,
+                                       "LuGre": LuGre})) == repr(scene)  # fmt: skip
+    assert "QuarterCar(law=LuGre(" in repr(QuarterCar(LuGre()))
+    assert shown(QuarterCar(LuGre())).pictures
+
+
+def test_models_show_what_they_consist_of_without_expressions() -> None:
+    for kind in ALL_SCENES.values():
+        model = kind(LuGre()).model()
+        assert on_a_screen(repr(model))
+        assert "SX(" not in repr(model)
+        assert "@1" not in repr(model)
+        assert "by LuGre" in repr(model)
+        assert "further" not in model.__dict__, "showing must not write the details"
+
+
+def test_names_of_a_user_model_are_escaped() -> None:
+    x = Variable("x", EVIL, doc=EVIL)
+    model = Model(EVIL, x=(x,), ode=-x.symbol, outputs={"y": Output(2 * x.symbol, "m", EVIL)})
+    assert shown(model).words.count(EVIL) == 4
+
+
+@pytest.mark.parametrize(
+    ("thing", "words"),
+    [
+        (Variable("x", "m", doc="way"), "<variable 'x' [m], start 0: way>"),
+        (Output(1.0, "N"), "<output [N]>"),
+        (Monitor(1.0, 1e-3), "<monitor on the scale 0.001>"),
+        (Event("hit", 1.0, -1, terminal=True), "<event 'hit', falling, ends the run>"),
+    ],
+)
+def test_parts_of_a_model_in_a_line(thing: object, words: str) -> None:
+    assert repr(thing) == words
+
+
+def test_a_contact_in_a_line() -> None:
+    v = Variable("v", "m/s")
+    made = Contact("belt", v.symbol, 1.0, LuGre(), bare=True)
+    assert repr(made) == "<contact 'belt' by LuGre, states z>"
