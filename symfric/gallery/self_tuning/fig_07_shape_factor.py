@@ -16,6 +16,7 @@ import numpy as np
 
 from symfric import SelfTuning
 from symfric.foundation.panels import panels
+from symfric.gallery.drawing import shade
 from symfric.gallery.plate import Plate, plate_of
 from symfric.gallery.self_tuning._formula import force
 
@@ -27,10 +28,10 @@ def plate(quick: bool = False) -> Plate:
 
     figure, (axis,) = panels(1, height=3.6)
     for C, F in curves.items():
-        axis.plot(v, -F, label=f"C = {C:.1f}")
+        axis.plot(v, -F, label=f"{C:.1f}", color=shade(C / 2), linewidth=1.8)
     axis.set_xlabel("sliding velocity [mm/s]")
-    axis.set_ylabel("friction force / (mu_s N) [1]")
-    figure.legend(loc="outside right center")
+    axis.set_ylabel("friction on the body / $\\mu_s N$ [1]")
+    figure.legend(loc="outside right center", title="C [1]", frameon=False)
 
     right = v > 0
     rises = {C: bool(np.all(np.diff(F[right]) >= 0)) for C, F in curves.items()}

@@ -1,0 +1,103 @@
+"""Haug's machines again, in one or two angles, with equations written by hand.
+
+Nothing but CasADi is used here, so that a mistake of the library cannot stand on both sides. The
+normal forces are unknowns beside the accelerations, since friction acts back on them.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import final
+
+import casadi as ca
+import numpy as np
+
+Coefficient = Callable[[ca.SX], ca.SX]
+"""F/N at a sliding velocity [m/s]."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """y' = rates(y, unknown) with balance(y, unknown) = 0 from y = start; shown are named."""
+
+    y: ca.SX
+    rates: ca.SX
+    unknown: ca.SX
+    balance: ca.SX
+    names: tuple[str, ...]
+    shown: ca.SX
+    start: list[float]
+
+
+def brown_mcphee(mu_s: float, mu_d: float, v_t: float) -> Coefficient:
+    """Brown and McPhee's coefficient of friction."""
+
+    def mu(v: ca.SX) -> ca.SX:
+        x = v / v_t
+        return mu_d * ca.tanh(4 * x) + (mu_s - mu_d) * x / (x**2 / 4 + 0.75) ** 2
+
+    return mu
+
+
+def self_tuning(mu_s: float, mu_d: float, v_t: float) -> Coefficient:
+    """The self-tuning coefficient with E = 0 and its peak at v_t."""
+    C = 2 - 2 / np.pi * np.arcsin(mu_d / mu_s)
+
+    def mu(v: ca.SX) -> ca.SX:
+        return mu_s * ca.sin(C * ca.atan(np.tan(np.pi / 2 / C) * v / v_t))
+
+    return mu
+
+
+def four_mass(mu: Coefficient) -> Machine:
+    """The four sliders; shown are positions [m], velocities and accelerations."""
+    g, th, x4, w, v4, a, l5, l6 = 9.8, *map(ca.SX.sym, ("th", "x4", "w", "v4", "a", "l5", "l6"))
+    x1, y2 = 5 * ca.cos(th), 5 * ca.sin(th)
+    z3 = ca.sqrt(49 - y2**2)
+    v1, v2 = -y2 * w, x1 * w
+    v3 = -y2 * v2 / z3
+    a1, a2 = -y2 * a - x1 * w**2, x1 * a - y2 * w**2
+    a3 = -(v2**2 + y2 * a2 + v3**2) / z3
+    a4 = (-10 * (x4 - x1 - 1) - size(6 * g) * mu(v4)) / 6
+    N1, N2 = size(l5 * y2) + size(2 * g), size(l5 * x1) + size(l6 * z3 - 2 * g)
+    balance = ca.vertcat(
+        2 * a1 + 2 * (x1 - 3) - 10 * (x4 - x1 - 1) + l5 * x1 + N1 * mu(v1),
+        2 * a2 + 2 * (y2 - 4) + (l5 + l6) * y2 + N2 * mu(v2),
+        6 * (a3 + g) + 2 * (z3 - 3) + l6 * z3 + size(l6 * y2) * mu(v3),
+    )
+    names = ("x1", "y2", "z3", "x4", "x1'", "y2'", "z3'", "x4'", "x1''", "y2''", "z3''", "x4''")
+    shown = ca.vertcat(x1, y2, z3, x4, v1, v2, v3, v4, a1, a2, a3, a4)
+    y, rates, unknown = ca.vertcat(th, x4, w, v4), ca.vertcat(w, v4, a, a4), ca.vertcat(a, l5, l6)
+    start = [float(np.arctan2(3, 4)), 5.0, 0.0, -1.0]
+    return Machine(y, rates, unknown, balance, names, shown, start)
+
+
+def slider_crank(mu: Coefficient, R: float = 0.1, a: float = 0.1) -> Machine:
+    """Crank and slider; shown are angle [rad], position [m] and their rates."""
+    m_crank, m_slider, J, r, length, g = 0.5, 5.0, 0.2, 0.08, 0.3, 9.8
+    th, w, alpha, rod, N = map(ca.SX.sym, ("th", "w", "alpha", "rod", "N"))
+    c, s = ca.cos(th), ca.sin(th)
+    py, pz = 0.1 - r * s, 0.1 + r * c
+    x = ca.sqrt(length**2 - py**2 - pz**2)
+    v = ca.jacobian(x, th) * w
+    acc = ca.jacobian(x, th) * alpha + ca.jacobian(v, th) * w
+    f = rod * ca.vertcat(-x, py, pz)  # on the pin of the crank
+    moment = ca.cross(ca.vertcat(0, -r * s, r * c), f)
+    F, T = -f - ca.vertcat(0, 0, -m_crank * g), -moment  # what the bearing takes
+    along, across = ca.vertcat(0, -s, c), ca.vertcat(0, -c, -s)
+    f2 = ca.vertcat(-ca.dot(across, T) / a, ca.dot(along, T) / a)
+    f1 = ca.vertcat(-ca.dot(along, F), -ca.dot(across, F)) - f2
+    balance = ca.vertcat(
+        J * alpha - moment[0] + R * N * mu(R * w),
+        m_slider * acc - rod * x,
+        N - size(f1) - size(f2) - size(F[0]),
+    )
+    names = ("crank", "crank'", "crank''", "slider", "slider'", "slider''")
+    shown, unknown = ca.vertcat(th, w, alpha, x, v, acc), ca.vertcat(alpha, rod, N)
+    y, rates, start = ca.vertcat(th, w), ca.vertcat(w, alpha), [0.0, 120.0]
+    return Machine(y, rates, unknown, balance, names, shown, start)
+
+
+def size(f: ca.SX | float) -> ca.SX:
+    """Length of a force, smooth at zero as in the reference data."""
+    return ca.sqrt(ca.sumsqr(f) + 1e-8) - 1e-4

@@ -1,0 +1,69 @@
+"""Sensitivity of the friction force to the parameters of the law.
+
+The symbol in the paper's caption is lost; here are all parameters, of both laws. A curve shows
+p dF/dp / (mu_s N): by how much the force changes where a parameter changes by its own size.
+
+Compared: derivatives by CasADi with central differences; the self-tuning law with Brown-McPhee.
+
+Distance: largest difference of the derivatives, relative to mu_s N.
+
+Evidence: that only Brown-McPhee is sensitive to a parameter of velocity is refuted. The law depends
+on B and v by their product alone, so B dF/dB = v dF/dv, as v_t dF/dv_t = -v dF/dv there; the
+largest values are 0.47 and 0.41. mu_d acts through C, whose slope by mu_d / mu_s grows without
+bound as that tends to 1.
+"""
+
+import casadi as ca
+import numpy as np
+
+from symfric import BrownMcPhee, Law, SelfTuning, symbolise
+from symfric.foundation.panels import grid
+from symfric.foundation.style import line
+from symfric.gallery.plate import Plate, plate_of
+from symfric.gallery.signals import largest
+
+V_T = 0.015  # m/s
+MU_S, MU_D = 0.15, 0.1
+
+
+def plate(quick: bool = False) -> Plate:
+    """All parameters of both laws from -100 to 100 mm/s."""
+    v = np.linspace(-0.1, 0.1, 201 if quick else 2001)
+    laws: dict[str, tuple[Law, tuple[str, ...]]] = {
+        "self-tuning": (
+            SelfTuning.from_peak_velocity(V_T, mu_s=MU_S, mu_d=MU_D),
+            ("B", "mu_s", "mu_d"),
+        ),
+        "Brown-McPhee": (BrownMcPhee(mu_s=MU_S, mu_d=MU_D, v_t=V_T), ("v_t", "mu_s", "mu_d")),
+    }
+    figure, [axes] = grid(1, 2, height=3.6, sharey=True)
+    numbers: dict[str, float] = {}
+    errors: list[float] = []
+    for axis, (title, (law, names)) in zip(axes, laws.items(), strict=True):
+        for k, name in enumerate(names):
+            by_casadi, by_differences = sensitivity(law, name, v)
+            axis.plot(1e3 * v, -by_casadi, label=f"to {name}", **line(k))
+            errors.append(largest(by_casadi - by_differences))
+            numbers[f"largest sensitivity of {title} to {name} [1]"] = largest(by_casadi)
+        axis.set_title(title, fontsize="medium")
+        axis.set_xlabel("slip velocity [mm/s]")
+        axis.legend(loc="upper right", frameon=False)
+    axes[0].set_ylabel("sensitivity of friction / $\\mu_s N$ [1]")
+    for ratio in (0.8, 0.99):
+        numbers[f"dC / d(mu_d/mu_s) at mu_d/mu_s = {ratio} [1]"] = (
+            -2 / np.pi / np.sqrt(1 - ratio**2)
+        )
+    return plate_of(__name__, figure, max(errors), "1", numbers)
+
+
+def sensitivity(law: Law, name: str, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """P dF/dp / (mu_s N) by CasADi and by central differences, at the velocities v [m/s]."""
+    value, speed = float(getattr(law, name)), ca.SX.sym("v")
+    free, (parameter,) = symbolise(law, name)
+    force = free.force(speed, 1.0)
+    p = parameter.symbol
+    F = ca.Function("F", [speed, p], [force])
+    dF = ca.Function("dF", [speed, p], [ca.jacobian(force, p)])
+    h = 1e-5 * value
+    differences = (F(v[None], value + h) - F(v[None], value - h)).full()[0] / (2 * h)
+    return dF(v[None], value).full()[0] * value / MU_S, differences * value / MU_S

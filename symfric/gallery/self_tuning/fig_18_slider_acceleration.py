@@ -1,0 +1,22 @@
+"""Acceleration of the slider.
+
+Compared: both laws, each with the same machine in the crank's angle, written by hand and solved by
+SUNDIALS; and with each other.
+
+Distance: largest difference from that by hand over 0.25 s, both laws.
+
+Evidence: nothing is refuted: both laws overlap, as the text says.
+"""
+
+from symfric.gallery.plate import Plate, plate_of
+from symfric.gallery.self_tuning._runs_crank import apart, distance, picture, run
+from symfric.gallery.signals import largest
+
+
+def plate(quick: bool = False) -> Plate:
+    """0.25 s from 120 rad/s, four turns of the crank."""
+    t_end = 0.05 if quick else 0.25
+    numbers = {"laws apart [m/s^2]": largest(apart("slider''", t_end))}
+    numbers["largest acceleration [m/s^2]"] = largest(run("Brown-McPhee", t_end)["slider''"])
+    figure = picture("slider''", "slider acceleration\n[m/s²]", t_end)
+    return plate_of(__name__, figure, distance("slider''", t_end), "m/s^2", numbers)

@@ -1,0 +1,26 @@
+"""Velocity of the slider.
+
+Compared: both laws, each with the same machine in the crank's angle, written by hand and solved by
+SUNDIALS; and with each other.
+
+Distance: largest difference from that by hand over 0.25 s, both laws.
+
+Evidence: nothing is refuted: both laws overlap, as the text says. What it observes after some time,
+the instant is lost, is that they drift apart: the difference grows over the run.
+"""
+
+from symfric.gallery.plate import Plate, plate_of
+from symfric.gallery.self_tuning._runs_crank import apart, distance, picture
+from symfric.gallery.signals import largest
+
+
+def plate(quick: bool = False) -> Plate:
+    """0.25 s from 120 rad/s, four turns of the crank."""
+    t_end = 0.05 if quick else 0.25
+    numbers = {"laws apart [m/s]": largest(apart("slider'", t_end))}
+    differences = apart("slider'", t_end)
+    half = differences.size // 2
+    numbers["laws apart in the first half [m/s]"] = largest(differences[:half])
+    numbers["laws apart in the second half [m/s]"] = largest(differences[half:])
+    figure = picture("slider'", "slider velocity\n[m/s]", t_end)
+    return plate_of(__name__, figure, distance("slider'", t_end), "m/s", numbers)

@@ -1,0 +1,26 @@
+"""Velocity of the crank.
+
+Compared: both laws, each with the same machine in the crank's angle, written by hand and solved by
+SUNDIALS; and with each other.
+
+Distance: largest difference from that by hand over 0.25 s, both laws.
+
+Evidence: nothing is refuted. In sliding both laws are mu_d N but for their tails, so they
+overlap at any velocity of the peak; this machine tells nothing about the transition to rest.
+"""
+
+from symfric.gallery.plate import Plate, plate_of
+from symfric.gallery.self_tuning._runs_crank import LAWS, apart, distance, picture, run
+from symfric.gallery.signals import largest
+
+
+def plate(quick: bool = False) -> Plate:
+    """0.25 s from 120 rad/s, four turns of the crank."""
+    t_end = 0.05 if quick else 0.25
+    numbers = {"laws apart [rad/s]": largest(apart("crank'", t_end))}
+    for law in LAWS:
+        one = run(law, t_end)
+        numbers[f"velocity at the end, {law} [rad/s]"] = float(one["crank'"][-1])
+        numbers[f"energy lost, {law} [J]"] = float(one["energy"][0] - one["energy"][-1])
+    figure = picture("crank'", "crank velocity\n[rad/s]", t_end)
+    return plate_of(__name__, figure, distance("crank'", t_end), "rad/s", numbers)

@@ -1,0 +1,53 @@
+"""What the gallery compares with: exact dry friction on the belt, and machines written by hand."""
+
+import numpy as np
+import pytest
+from mechanics import brown_mcphee, four_mass, slider_crank
+from numpy.typing import NDArray
+from oracles import rabinowicz_coulomb, rabinowicz_motion
+from scipy.integrate import solve_ivp
+
+from symfric.gallery.belt import Belt
+from symfric.gallery.self_tuning import _machines as machines
+from symfric.gallery.self_tuning._oracle import fixed_steps, solve
+
+
+def test_the_belt_has_the_period_and_the_extremes_of_the_closed_form() -> None:
+    belt = Belt(m=0.8, k=2.1, v_belt=0.1, F_S=1.1772, F_C=0.7848)
+    times = np.linspace(0.0, 40.0, 40001)
+    motion = belt.motion(times)
+    known = rabinowicz_coulomb(0.15, 0.1, 0.8, 2.1, 0.1, 9.81)
+    assert np.allclose(np.diff(belt.leaves), known.period, rtol=1e-12)
+    assert motion["x"].max() == pytest.approx(known.x_max, rel=1e-6)
+    assert motion["x"][20000:].min() == pytest.approx(known.x_min, rel=1e-6)
+    assert motion["friction"].min() == pytest.approx(-1.1772, rel=1e-3)
+    for t in (0.5, 7.0, 33.3):
+        x, _ = rabinowicz_motion(0.0, t, (0.15, 0.1, 0.8, 2.1, 0.1, 9.81))
+        assert motion["x"][round(1000 * t)] == pytest.approx(x, rel=1e-10)
+
+
+@pytest.mark.parametrize("name", ["four_mass", "slider_crank"])
+def test_machines_by_hand_have_the_accelerations_of_the_other_ones_by_hand(name: str) -> None:
+    mu_s, mu_d, v_t = 0.12, 0.1, 0.01
+    machine = getattr(machines, name)(machines.brown_mcphee(mu_s, mu_d, v_t))
+    written = {"four_mass": four_mass, "slider_crank": slider_crank}[name]
+    rates = written(lambda v: brown_mcphee(v, mu_s, mu_d, v_t))
+    times = np.linspace(0.0, 0.02, 3)
+    shown = solve(machine, times)
+    start = np.array(machine.start)
+    found = solve_ivp(rates, (0.0, 0.02), start, method="Radau", rtol=1e-9, atol=1e-11)
+    last: NDArray[np.float64] = found.y[:, -1]
+    if name == "four_mass":
+        assert 5 * np.cos(last[0]) == pytest.approx(shown["x1"][-1], rel=1e-8)
+        assert last[1] == pytest.approx(shown["x4"][-1], rel=1e-8)
+        assert rates(0.0, last)[3] == pytest.approx(shown["x4''"][-1], rel=1e-6)
+    else:
+        assert last == pytest.approx([shown["crank"][-1], shown["crank'"][-1]], rel=1e-7)
+        assert rates(0.0, last)[1] == pytest.approx(shown["crank''"][-1], rel=1e-5)
+
+
+def test_fixed_steps_are_of_order_four() -> None:
+    machine = machines.slider_crank(lambda v: 0 * v)
+    exact = solve(machine, np.array([0.0, 0.02]))["crank"][-1]
+    coarse, fine = (abs(fixed_steps(machine, h, 0.02)["crank"][-1] - exact) for h in (4e-3, 2e-3))
+    assert coarse / fine == pytest.approx(16, rel=0.1)
