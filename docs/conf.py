@@ -26,6 +26,15 @@ myst_enable_extensions = ["dollarmath", "deflist", "colon_fence", "attrs_inline"
 myst_heading_anchors = 4
 myst_links_external_new_tab = False
 
+autodoc_typehints = "signature"
+autodoc_preserve_defaults = True
+autodoc_member_order = "bysource"
+autodoc_class_signature = "mixed"
+python_use_unqualified_type_names = True
+python_maximum_signature_line_length = 80
+add_module_names = False
+toc_object_entries = False
+
 html_theme = "furo"
 html_title = f"symfric {release}"
 html_static_path = ["static"]

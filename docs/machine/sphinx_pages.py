@@ -5,7 +5,10 @@ from typing import Any
 
 from sphinx.util import logging
 
+from docs.machine.docstrings import to_rst
+from docs.machine.generated import make_all
 from docs.machine.making import MADE, make_page_pictures, place
+from docs.machine.names import known, linked
 from docs.machine.pages import DOCS, PICTURE
 
 log = logging.getLogger(__name__)
@@ -14,7 +17,7 @@ log = logging.getLogger(__name__)
 def make(app: Any) -> None:
     """Before any page is read: make what they show."""
     del app
-    for sentence in make_page_pictures(log.info):
+    for sentence in [*make_page_pictures(log.info), *make_all(log.info)]:
         log.warning(sentence)
 
 
@@ -32,9 +35,30 @@ def show_made(app: Any, name: str, content: list[str]) -> None:
     content[0] = PICTURE.sub(shown, content[0])
 
 
+def as_rst(app: Any, what: str, name: str, item: Any, options: Any, lines: list[str]) -> None:
+    """Docstrings are plain text; what they show as code stays so."""
+    del app, what, name, item, options
+    lines[:] = to_rst("\n".join(lines), linked, formulas=False).splitlines()
+
+
+def find_type(app: Any, env: Any, node: Any, content: Any) -> Any:
+    """A type in a signature: linked where it is public, as it stands where it is not."""
+    if node.get("refdomain") != "py" or node.get("reftype") not in ("class", "exc", "data"):
+        return None
+    target = str(node.get("reftarget", ""))
+    public = known().get(target.rpartition(".")[2])
+    if public is not None and public.full != target and not target.startswith(public.full):
+        domain, at = env.get_domain("py"), node.get("refdoc")
+        found = domain.resolve_xref(env, at, app.builder, "obj", public.full, node, content)
+        return found if found is not None else content
+    return content
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Connect the above."""
     MADE.mkdir(exist_ok=True)
     app.connect("builder-inited", make)
     app.connect("source-read", show_made)
+    app.connect("autodoc-process-docstring", as_rst)
+    app.connect("missing-reference", find_type)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

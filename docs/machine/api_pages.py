@@ -1,0 +1,92 @@
+"""The reference of Python, a page for each module that hands out names."""
+
+import ast
+import inspect
+from collections.abc import Iterable
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+from docs.machine import rst
+from docs.machine.docstrings import first_line
+from docs.machine.law_pages import MADE_OF_LAWS
+from docs.machine.names import FRONTS, Public, catalogue
+from symfric import ALL_LAWS, POPULATIONS
+from symfric.scenes import ALL_SCENES
+
+
+def pages() -> dict[str, str]:
+    """Name of each page, relative to `reference`, -> its text."""
+    return {front: page(front, names) for front, names in catalogue().items() if names}
+
+
+def index_rows() -> list[list[str]]:
+    """Module and subject of each page."""
+    return [[f":doc:`{f}`", rst.plain(FRONTS[f])] for f, names in catalogue().items() if names]
+
+
+def page(front: str, names: list[Public]) -> str:
+    """The names of one module: a table, then each in full."""
+    text = rst.title(front)
+    text += rst.plain(FRONTS[front]) + "\n\n"
+    elsewhere = own_pages()
+    laws = [p for p in names if elsewhere.get(id(p.object), "").startswith("/laws/")]
+    others = sorted((p for p in names if p not in laws), key=lambda p: p.name.lower())
+    rows = [[_link(p, elsewhere), rst.plain(summary(p))] for p in others]
+    text += rst.table(["name", "what it is"], rows)
+    if laws:
+        text += rst.title("Laws", "-") + "Each has a page of its own, with its equation.\n\n"
+        shown = [f":doc:`{p.name} <{elsewhere[id(p.object)]}>`" for p in laws]
+        text += ", ".join(shown) + "\n\n"
+    full = [p for p in others if id(p.object) not in elsewhere]
+    return text + "".join(entry(p) for p in full)
+
+
+@cache
+def own_pages() -> dict[int, str]:
+    """Objects that have a page of their own, and which."""
+    found: dict[int, str] = {}
+    for name, kind in (ALL_LAWS | POPULATIONS | MADE_OF_LAWS).items():
+        found[id(kind)] = f"/laws/{name}"
+    for name, kind in ALL_SCENES.items():
+        found[id(kind)] = f"/scenes/{name}"
+    return found
+
+
+def _link(public: Public, elsewhere: dict[int, str]) -> str:
+    if id(public.object) in elsewhere:
+        return f":doc:`{public.name} <{elsewhere[id(public.object)]}>`"
+    return f":py:obj:`{public.name} <{public.full}>`"
+
+
+def entry(public: Public) -> str:
+    """One name in full, from its docstring."""
+    item: Any = public.object
+    if inspect.isclass(item):
+        kind = "autoexception" if issubclass(item, BaseException) else "autoclass"
+        return rst.directive(kind, public.full, members="")
+    if callable(item) and hasattr(item, "__name__"):
+        return rst.directive("autofunction", public.full)
+    return rst.directive("py:data", public.full, rst.plain(summary(public)) + "\n")
+
+
+def summary(public: Public) -> str:
+    """The first line of its docstring; of data, the text below them in their source."""
+    item: Any = public.object
+    if inspect.isclass(item) or (callable(item) and hasattr(item, "__name__")):
+        return first_line(item.__doc__).rstrip(".")
+    return first_line(data_docs(public.module).get(public.name, "")).rstrip(".")
+
+
+@cache
+def data_docs(module: str) -> dict[str, str]:
+    """The texts below the data of a module."""
+    tree = ast.parse(inspect.getsource(import_module(module)))
+    found: dict[str, str] = {}
+    for before, behind in zip(tree.body, tree.body[1:], strict=False):
+        said = isinstance(behind, ast.Expr) and isinstance(behind.value, ast.Constant)
+        if said and isinstance(before, ast.Assign | ast.AnnAssign):
+            targets = before.targets if isinstance(before, ast.Assign) else [before.target]
+            names: Iterable[str] = (t.id for t in targets if isinstance(t, ast.Name))
+            found |= dict.fromkeys(names, str(behind.value.value))  # pyright: ignore
+    return found

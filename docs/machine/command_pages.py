@@ -1,0 +1,75 @@
+"""The reference of the command line, from the commands themselves."""
+
+from inspect import cleandoc
+from typing import Any
+
+import typer
+
+from docs.machine import rst
+from docs.machine.docstrings import to_rst
+from docs.machine.names import linked
+from symfric.cli.app import COMMANDS, app
+
+
+def page() -> str:
+    """All commands with their arguments and options."""
+    group = typer.main.get_command(app)
+    context = typer.Context(group, info_name="symfric")
+    text = rst.title("Command line")
+    text += "Names and units are those of Python. Exit status 0: done; 1: a solve failed, what "
+    text += "there is so far is written; 2: bad input; 130: Ctrl-C.\n\n"
+    rows = [[f"`symfric {name}`_", rst.plain(said)] for name, said in COMMANDS.items()]
+    text += rst.table(["command", "what it does"], rows)
+    for name in COMMANDS:
+        text += section(name, group.get_command(context, name))  # pyright: ignore
+    return text
+
+
+def section(name: str, command: Any) -> str:
+    """One command."""
+    text = rst.title(f"symfric {name}", "-")
+    positional = [p for p in command.params if not p.opts[0].startswith("-")]
+    named = [p for p in command.params if p.opts[0].startswith("-")]
+    words = [_argument(p) for p in positional]
+    text += rst.literal(" ".join([f"symfric {name}", *words, "[OPTIONS]"]), "text")
+    prose, examples = split(command.help or "")
+    text += to_rst(cleandoc(prose), linked, formulas=False)
+    if examples:
+        text += rst.literal("\n".join(f"$ {line}" for line in examples), "console")
+    if positional:
+        rows = [[rst.code(_argument(p)), rst.plain(p.help or "")] for p in positional]
+        text += rst.table(["argument", "meaning"], rows)
+    rows = [
+        [rst.code(_option(p)), rst.plain(p.help or ""), _default(p)]
+        for p in named
+        if not getattr(p, "hidden", False)
+    ]
+    return text + rst.table(["option", "meaning", "default"], rows)
+
+
+def split(text: str) -> tuple[str, list[str]]:
+    """What a command says of itself, and the lines of its examples."""
+    paragraphs = text.replace("\b\n", "").split("\n\n")
+    examples = [" ".join(p.split())[9:] for p in paragraphs if p.startswith("Example: ")]
+    return "\n\n".join(p for p in paragraphs if not p.startswith("Example: ")), examples
+
+
+def _argument(parameter: Any) -> str:
+    name = (parameter.metavar or parameter.name.upper()).strip("[]")
+    shown = name + ("..." if parameter.nargs == -1 and not name.endswith("...") else "")
+    return shown if parameter.required else f"[{shown}]"
+
+
+def _option(parameter: Any) -> str:
+    flag = ", ".join([*parameter.opts, *parameter.secondary_opts])
+    value = "" if parameter.is_flag else f" {parameter.metavar or 'VALUE'}"
+    return flag + value
+
+
+def _default(parameter: Any) -> str:
+    if parameter.required:
+        return "required"
+    value = parameter.default
+    if value is None or value is False or value in ((), [], ""):
+        return ""
+    return rst.code(str(getattr(value, "value", value)))

@@ -1,0 +1,114 @@
+"""A page of each figure of the papers: picture, what is compared, how far we are, what was refuted.
+
+`symfric gallery` computes them; here they are shown. SYMFRIC_DOCS=quick takes the reduced size.
+"""
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from docs.machine import rst
+from docs.machine.drawing import MADE
+from docs.machine.pages import ROOT
+from docs.machine.stamp import code_hash, code_of, digest
+from symfric.gallery import scripts
+from symfric.gallery.rendering import read, render
+
+FOLDER = MADE / "gallery"
+KEYS = FOLDER / "keys.json"
+
+
+def quick() -> bool:
+    """Whether figures are computed at reduced size."""
+    return os.environ.get("SYMFRIC_DOCS", "") == "quick"
+
+
+def keys() -> dict[str, str]:
+    """Plate -> what it depends on: the library, its paper's scripts, its size."""
+    found: dict[str, str] = {}
+    for name, module in scripts().items():
+        folder = ROOT.joinpath(*module.split(".")).parent
+        own = [code_of(p) for p in sorted(folder.glob("_*.py"))]
+        script = (folder / f"{module.rpartition('.')[2]}.py").read_text("utf-8")
+        found[name] = digest([code_hash(), *own, script, str(quick())])
+    return found
+
+
+def make(say: Callable[[str], None]) -> list[str]:
+    """Compute the figures that changed; sentences about what failed."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    before: dict[str, str] = json.loads(KEYS.read_text()) if KEYS.exists() else {}
+    now, there = keys(), read(FOLDER)
+    changed = [name for name, key in now.items() if before.get(name) != key or name not in there]
+    if not changed:
+        return []
+    say(f"computing {len(changed)} figures of the papers{' at reduced size' * quick()}")
+    done = render(FOLDER, changed, quick=quick())
+    kept = {n: k for n, k in now.items() if n not in changed or n in done.records}
+    KEYS.write_text(json.dumps(kept, indent=1))
+    return [f"gallery '{name}': {why}" for name, why in done.failures.items()]
+
+
+def pages() -> dict[str, str]:
+    """Name of each page, relative to `gallery`, -> its text."""
+    records = read(FOLDER)
+    papers: dict[str, list[Mapping[str, Any]]] = {}
+    for record in records.values():
+        papers.setdefault(record["paper"], []).append(record)
+    found = {name: page(record) for name, record in records.items()}
+    return found | {"index": index(papers)}
+
+
+def index(papers: Mapping[str, list[Mapping[str, Any]]]) -> str:
+    """All figures by paper, with how far we are."""
+    text = rst.title("Figures of the papers")
+    text += (
+        "Figures of the papers that the laws come from, computed again by scripts of less than a "
+        "hundred lines. Beside each: what is compared, how far we are, and what was refuted by "
+        "what evidence. ``symfric gallery`` computes them on your machine.\n\n"
+    )
+    if quick():
+        text += rst.directive("note", "", "These figures are computed at reduced size.\n")
+    for paper, records in papers.items():
+        text += rst.title(paper, "-")
+        rows = [
+            [
+                f":doc:`{r['figure']} <{r['name']}>`",
+                rst.plain(r["title"]),
+                rst.plain(r["how_far"]),
+                rst.plain(r["measure"]),
+            ]
+            for r in records
+        ]
+        text += rst.table(["figure", "what it shows", "how far", "measured as"], rows)
+        text += rst.pages((r["name"] for r in records), hidden="")
+    return text
+
+
+def page(record: Mapping[str, Any]) -> str:
+    """One figure."""
+    text = rst.title(f"{record['figure']}. {record['title']}")
+    text += f"*{rst.plain(record['paper'])}*\n\n"
+    text += "".join(f"{rst.plain(p)}\n\n" for p in record["text"].split("\n\n") if p)
+    if record["quick"]:
+        text += rst.directive("note", "", "Computed at reduced size.\n")
+    text += rst.directive(
+        "figure", f"/made/gallery/{record['picture']}", alt=rst.plain(record["title"])
+    )
+    said = {
+        "Compared": record["compared"],
+        "How far we are": f"{record['how_far']}: {record['measure']}",
+        "Refuted, and by what evidence": record["evidence"],
+    }
+    for name, words in said.items():
+        text += f"**{name}.** {rst.plain(words)}\n\n"
+    rows = [[rst.plain(name), f"{value:.6g}"] for name, value in record["numbers"].items()]
+    if rows:
+        text += rst.title("Numbers", "-") + rst.table(["", ""], rows).replace(
+            ":header-rows: 1", ":header-rows: 0"
+        ).replace("   * -\n     -\n", "", 1)
+    module = scripts()[record["name"]]
+    source = ROOT.joinpath(*module.split(".")).with_suffix(".py")
+    text += rst.title(f"The script, {source.relative_to(ROOT)}", "-")
+    return text + rst.literal(source.read_text("utf-8"), "python")

@@ -1,0 +1,54 @@
+"""Pieces of reStructuredText."""
+
+import re
+from collections.abc import Iterable, Sequence
+
+MARKUP = re.compile(r"([*|_\\<>`])")
+
+
+def plain(text: str) -> str:
+    """Text in which nothing is markup."""
+    return MARKUP.sub(r"\\\1", text)
+
+
+def code(text: str) -> str:
+    """Text as code."""
+    return f"``{text}``" if text.strip() and "``" not in text else plain(text)
+
+
+def title(text: str, line: str = "=") -> str:
+    """A heading."""
+    return f"{plain(text)}\n{line * (2 * len(text) + 4)}\n\n"
+
+
+def indented(text: str, by: int = 3) -> str:
+    """A text further to the right."""
+    return "".join(f"{' ' * by}{line}".rstrip() + "\n" for line in text.splitlines())
+
+
+def directive(name: str, argument: str = "", body: str = "", **options: str) -> str:
+    """A directive with its options and its body."""
+    said = "".join(f":{k.replace('_', '-')}: {v}\n" for k, v in options.items())
+    head = f".. {name}:: {argument}".rstrip() + "\n"
+    return head + indented(said) + ("\n" + indented(body) if body else "") + "\n"
+
+
+def literal(text: str, language: str = "text") -> str:
+    """Lines as they stand."""
+    return directive("code-block", language, text.rstrip() + "\n")
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], widths: str = "auto") -> str:
+    """A table; the cells are markup already. It scrolls by itself where it is too wide."""
+    lines: list[str] = []
+    for row in (head, *rows):
+        for k, cell in enumerate(row):
+            first, *others = cell.splitlines() or [""]
+            lines.append(f"{'* -' if k == 0 else '  -'} {first}".rstrip())
+            lines += [f"    {line}".rstrip() for line in others]
+    return directive("list-table", "", "\n".join(lines) + "\n", header_rows="1", widths=widths)
+
+
+def pages(names: Iterable[str], **options: str) -> str:
+    """A tree of contents."""
+    return directive("toctree", "", "\n".join(names) + "\n", **options)
