@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from symfric.integrator import Statistics as Statistics
     from symfric.integrator import Trajectory as Trajectory
     from symfric.integrator import flow as flow
+    from symfric.integrator import load_run as load_run
     from symfric.integrator import simulate as simulate
     from symfric.integrator import simulate_many as simulate_many
     from symfric.integrator import stepper as stepper
@@ -116,8 +117,8 @@ else:
             "symfric.foundation.parameters": "Parameter Variable parameters symbolise with_values",
             "symfric.foundation.status": "SolveError Status",
             "symfric.integrator": """
-                Ensemble Hold Linear Plant Statistics Trajectory flow simulate
-                simulate_many stepper
+                Ensemble Hold Linear Plant Statistics Trajectory flow load_run
+                simulate simulate_many stepper
             """,
             "symfric.laws": """
                 ALL_LAWS BAM GMS POPULATIONS Ambrosio Andersson Armstrong Asymmetric

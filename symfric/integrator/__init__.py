@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from symfric.integrator.plant import Plant as Plant
     from symfric.integrator.simulate import simulate as simulate
     from symfric.integrator.stepper import stepper as stepper
+    from symfric.integrator.stored import load_run as load_run
     from symfric.results.statistics import Statistics as Statistics
     from symfric.results.trajectory import Trajectory as Trajectory
 else:
@@ -28,6 +29,7 @@ else:
             "symfric.integrator.simulate": "simulate",
             "symfric.integrator.plant": "Plant",
             "symfric.integrator.stepper": "stepper",
+            "symfric.integrator.stored": "load_run",
             "symfric.results.statistics": "Statistics",
             "symfric.results.trajectory": "Trajectory",
         },

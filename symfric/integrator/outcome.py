@@ -11,6 +11,7 @@ from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Run
+from symfric.integrator.stored import Later, Stored
 from symfric.results.statistics import Statistics
 from symfric.results.trajectory import Trajectory
 
@@ -18,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 def trajectory_of(
-    integrator: Integrator,
+    integrator: Integrator | Later,
     inputs: InputData,
     run: Run,
     p: Array,
@@ -80,4 +81,5 @@ def trajectory_of(
         express,
         model,
         tuple(run.happened),
+        keep=partial(Stored.of, integrator, inputs, run, p, backend),
     )

@@ -3,9 +3,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import final
+from typing import Any, final
 
 import casadi as ca
+
+from symfric.foundation.packed import state_of
 
 
 @final
@@ -26,6 +28,19 @@ class Inner:
     values: ca.SX
     f: ca.SX
     groups: tuple[ca.SX, ...]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Solving:
+    """M^-1 r as an expression in the symbols r, SX (n, 1) both."""
+
+    r: ca.SX
+    result: ca.SX
+
+    def __call__(self, r: ca.SX) -> ca.SX:
+        """M^-1 r."""
+        return ca.substitute(self.result, self.r, ca.densify(r))
 
 
 @final
@@ -76,6 +91,14 @@ class Holonomic:
     pressed: tuple[str, ...] = ()
     advice: str = ""
     applied: int = 0
+
+    def to_pack(self) -> dict[str, Any]:
+        """The fields and what follows from them; `solve` as an expression."""
+        state = state_of(self)
+        if self.solve is not None:
+            right = ca.SX.sym("right", self.n)
+            state["solve"] = Solving(right, self.solve(right))
+        return state | {"explicit": self.explicit}
 
     @cached_property
     def explicit(self) -> tuple[ca.SX, ca.SX]:

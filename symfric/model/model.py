@@ -6,7 +6,7 @@ variables z, inputs u, parameters p.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
 
@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation import checks
+from symfric.foundation import checks, packed
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable, check_names
 from symfric.foundation.shown import Showing, Shown
@@ -159,7 +159,25 @@ class Model(Showing, Starting):
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields; a copy remembers nothing."""
-        return {item.name: getattr(self, item.name) for item in fields(self)}
+        return packed.state_of(self)
+
+    def __copy__(self) -> "Model":
+        """A model of the same symbols."""
+        made = object.__new__(Model)
+        vars(made).update(self.__getstate__())
+        return made
+
+    def to_pack(self) -> dict[str, Any]:
+        """The fields, with all that would be written when somebody asks."""
+        state, Given = self.__getstate__(), packed.Given
+        state["details"] = Given(dict(self.further))
+        state["sketch"] = None if self.sketch is None else Given(self.sketch())
+        state["opening"] = None if self.opening is None else Given(self.opening())
+        return state
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A pickle holds all that the model says; symbols of other objects are others there."""
+        return packed.loads, (packed.dumps(self),)
 
     def vector(self, letter: str) -> ca.SX:
         """The symbols of the group "x", "z", "u" or "p" as a column (n, 1)."""

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation import packed
 from symfric.foundation.checks import kind, many, number, shown
 from symfric.foundation.numeric import Scalar, equals
 from symfric.foundation.parameters import Variable, check_names
@@ -79,6 +80,14 @@ class Mechanism(Showing):
         from symfric.multibody.thumbnail import picture  # noqa: PLC0415  (matplotlib is slow to import)
 
         return picture(self)
+
+    def to_pack(self) -> dict[str, Any]:
+        """All that was added."""
+        return vars(self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A pickle holds all that was added; symbols of other objects are others there."""
+        return packed.loads, (packed.dumps(self),)
 
     def body(
         self,

@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symfric.foundation import checks
+from symfric.foundation import checks, packed
 from symfric.foundation.files import write_text, written
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import check_names
@@ -20,6 +20,8 @@ from symfric.foundation.shown import Showing, Shown
 from symfric.foundation.status import Status
 from symfric.foundation.symbols import strays
 from symfric.model import Model
+from symfric.results import tables
+from symfric.results.derivatives import Derivatives
 from symfric.results.energy import EnergyBalance, energy_balance, integrals
 from symfric.results.extremes import extremes, looks
 from symfric.results.shown import shown
@@ -29,10 +31,25 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+KIND, FORMAT = "symfric run", 1
+"""What files of runs call themselves; the number is raised when older programs would misread it."""
+
+
+class Kept(Protocol):
+    """A run as data, see `symfric.integrator.stored`."""
+
+    def trajectory(self) -> "Trajectory":
+        """The run again."""
+        ...
+
+
+def _again(data: bytes) -> "Trajectory":
+    """The run of a pickle."""
+    return packed.loads(data).trajectory()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(Showing):
+class Trajectory(Showing, Derivatives):
     """Named signals of a simulated model.
 
     `trajectory["v"]` is a signal at the times `trajectory.t`; `trajectory.at(times)` evaluates
@@ -56,6 +73,7 @@ class Trajectory(Showing):
         differentiate: derivatives of all signals at any times, where they were asked for.
         delays: derivatives of the times of `happened`, likewise.
         pull_back: gradient of a weighted sum of signals at `t`, likewise.
+        keep: what a file and a pickle hold of it.
     """
 
     scene: str
@@ -74,6 +92,7 @@ class Trajectory(Showing):
     differentiate: Callable[[Array], dict[str, dict[str, Array]]] | None = None
     pull_back: Callable[[Mapping[str, Array]], dict[str, float]] | None = None
     delays: Callable[[], dict[str, Array]] | None = None
+    keep: "Callable[[Trajectory], Kept] | None" = None
 
     def shown(self) -> Shown:
         """How it ended, and every signal with its extremes."""
@@ -134,68 +153,6 @@ class Trajectory(Showing):
     @cached_property
     def _own_states(self) -> dict[str, Array]:
         return self.states(self.t)
-
-    @cached_property
-    def sensitivities(self) -> dict[str, dict[str, Array]]:
-        """Derivatives at `t`: name as given to `simulate` -> signal -> values, shape (n,).
-
-        They jump where an event moves with the name; at its time they are those behind it.
-
-        Raises:
-            ValueError: none were asked for, or an event has none: its expression only touches
-                zero, it comes with a jump of an input, or with an event whose order matters.
-        """
-        if self.differentiate is None:
-            raise self._without_derivatives
-        return self.differentiate(self.t)
-
-    @cached_property
-    def event_sensitivities(self) -> dict[str, Array]:
-        """Derivatives of the times of `happened`: name -> [s per unit], shape (events,).
-
-        That of a terminal event is the derivative of the end time. Refused as `sensitivities` is.
-        """
-        if self.delays is None:
-            raise self._without_derivatives
-        return self.delays()
-
-    def gradient(self, weights: Mapping[str, ArrayLike]) -> dict[str, float]:
-        """Derivatives of the sum over signals s and times t_i of weights[s][i] s(t_i).
-
-        One sweep backwards over the steps, at a cost that does not grow with the number of names
-        given to `simulate`. For a cost J of the signals at `t`, the weights are dJ/ds(t_i).
-
-        Args:
-            weights: signal -> a number for every time of `t`, or one for all.
-
-        Returns:
-            Name as given to `simulate` -> derivative.
-
-        Raises:
-            ValueError: no sensitivities were asked for, an unknown signal, another length.
-        """
-        if self.pull_back is None:
-            raise self._without_derivatives
-        where = f"trajectory of '{self.scene}'"
-        named = checks.named(f"{where}: gradient", weights, self.units)
-        given = {
-            name: checks.array(f"{where}: gradient: {name}", w, ndim=None)
-            for name, w in named.items()
-        }
-        odd = {name: w.shape for name, w in given.items() if w.shape not in ((), self.t.shape)}
-        if odd:
-            raise ValueError(
-                f"{where}: gradient: expected numbers or arrays of {self.t.size} weights, got "
-                + ", ".join(f"{name} of shape {shape}" for name, shape in odd.items())
-            )
-        return self.pull_back({n: np.broadcast_to(w, self.t.shape) for n, w in given.items()})
-
-    @property
-    def _without_derivatives(self) -> ValueError:
-        return ValueError(
-            f"trajectory of '{self.scene}': expected sensitivities, got none; ask for them by "
-            "simulate(..., sensitivities=[...])"
-        )
 
     def __getitem__(self, name: str) -> Array:
         if name == "t":
@@ -347,6 +304,30 @@ class Trajectory(Showing):
 
         animate(self, path, fps=fps, speed=speed, progress=progress)
 
+    def save(self, path: str | Path) -> None:
+        """Write the whole run to one file, which `symfric.load_run` reads to the bit.
+
+        It holds the model, the signals at `t` and all accepted steps, those of a long run found by
+        another one. A loaded run does all that this one does: times in between, extremes, further
+        results, pictures, films, energy, another simulation of its `model`. Of derivatives there
+        are those at `t`. Functions are no data: inputs by functions are kept as expressions.
+
+        Raises:
+            ValueError: the file cannot be written, or a model holds what no file does.
+        """
+        with written(path) as temporary, temporary.open("wb") as file:
+            packed.dump(file, self._kept, KIND, FORMAT)
+
+    @property
+    def _kept(self) -> "Kept":
+        if self.keep is None:
+            raise ValueError(f"trajectory of '{self.scene}': expected one of simulate, got another")
+        return self.keep(self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A pickle holds what a file does."""
+        return _again, (packed.dumps(self._kept),)
+
     def to_csv(self, path: str | Path, *names: str) -> None:
         """Write signals as columns with units in the header, such as `v [m/s]`.
 
@@ -354,13 +335,28 @@ class Trajectory(Showing):
             path: file.
             names: signals or details; all signals if none is given.
         """
-        self.check(names)
-        columns = {name: self[name] for name in names} if names else self.signals
+        columns = tables.columns(self, names)
         header = ["t [s]", *(f"{name} [{self.unit(name)}]" for name in columns)]
         with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(header)
             writer.writerows(np.column_stack([self.t, *columns.values()]).tolist())
+
+    def to_dataframe(self, *names: str) -> Any:
+        """Signals or details, all signals if none is given, as a pandas table over t.
+
+        Raises:
+            ImportError: no pandas.
+        """
+        return tables.dataframe(self, names)
+
+    def to_xarray(self, *names: str) -> Any:
+        """The same as an xarray data set, with units as attributes.
+
+        Raises:
+            ImportError: no xarray.
+        """
+        return tables.dataset(self, names)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain data: scene, status, statistics, units, times and signals."""

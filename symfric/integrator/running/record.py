@@ -80,6 +80,10 @@ class Run:
         if self._held > self.most:
             self._before, self._kept = self.extent, [self.last]
 
+    def keep_all(self, steps: Dense) -> None:
+        """Take the steps of a run that is over, all that it counts already."""
+        self._kept = [steps]
+
     @property
     def kept(self) -> int:
         """How many accepted steps are in memory."""

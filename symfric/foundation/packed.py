@@ -1,0 +1,232 @@
+"""Frozen data with expressions in it as plain arrays: for files, and for pickles.
+
+A pack is an archive of arrays (NPZ): one holds JSON, in which objects are named by class and
+fields, one the expressions, as CasADi writes them, all together, so that symbols stay the same
+symbols; the others are arrays as they are. Nothing is run to read one: classes of symfric get their
+fields, and those of others only if they are handed over. Numbers come back to the bit.
+"""
+
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from enum import Enum
+from functools import partial
+from importlib import import_module
+from io import BytesIO
+from typing import IO, Any, cast, final
+from zipfile import BadZipFile
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation import checks
+
+OWN = ("symfric",)
+"""Packages whose classes are known."""
+ABOUT, EXPRESSIONS = "about", "expressions"
+Bytes = NDArray[np.uint8]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Given:
+    """A function without arguments that returns what it was given; a pack may hold it."""
+
+    value: Any
+
+    def __call__(self) -> Any:
+        """It."""
+        return self.value
+
+
+def dump(file: IO[bytes], thing: object, kind: str = "", form: int = 0) -> None:
+    """Write the pack of `thing` to an open file.
+
+    An object that has `to_pack()` says itself what its fields are in a pack.
+
+    Args:
+        file: open for writing.
+        thing: what is packed.
+        kind: what the file calls itself.
+        form: number of the format, raised whenever older programs would misread it.
+
+    Raises:
+        ValueError: something that no pack holds, such as a function, and where it is.
+    """
+    writer = _Writer()
+    content = writer.write("", thing)
+    about = json.dumps({"kind": kind, "format": form, "content": content}).encode()
+    arrays = {f"a{k}": array for k, array in enumerate(writer.arrays)}
+    words = {ABOUT: about, EXPRESSIONS: writer.expressions.encode().encode()}
+    plain = {name: np.frombuffer(text, np.uint8) for name, text in words.items()}
+    np.savez(file, **plain, **arrays)  # pyright: ignore[reportArgumentType]
+
+
+def dumps(thing: object) -> bytes:
+    """The pack of `thing`."""
+    buffer = BytesIO()
+    dump(buffer, thing)
+    return buffer.getvalue()
+
+
+def load(file: IO[bytes], kind: str = "", form: int = 0, own: Iterable[type] = ()) -> Any:
+    """What `dump` wrote.
+
+    Args:
+        file: open for reading.
+        kind, form: as they were given to `dump`.
+        own: classes in it that are not symfric's.
+
+    Raises:
+        ValueError: no pack of this kind, a damaged one, one of another format, or a class that is
+            not known.
+    """
+    try:
+        opened = np.load(file, allow_pickle=False)
+        if not isinstance(opened, np.lib.npyio.NpzFile):
+            raise _foreign
+        with opened as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        about = json.loads(arrays.pop(ABOUT).tobytes())
+        if about["kind"] != kind:
+            raise _foreign
+        if about["format"] != form:
+            raise UnreadableError(
+                f"expected format {form}, got {about['format']}; it was written by another version "
+                "of symfric"
+            )
+        return _Reader(arrays, {_path(one): one for one in own}).read(about["content"])
+    except (BadZipFile, KeyError, IndexError, EOFError, OSError, TypeError) as error:
+        raise _foreign from error
+    except (ValueError, RuntimeError) as error:
+        raise (error if isinstance(error, UnreadableError) else _foreign) from error
+
+
+def loads(data: bytes) -> Any:
+    """What `dumps` wrote, in a pickle: with classes of anybody."""
+    arrays = dict(np.load(BytesIO(data), allow_pickle=False))
+    return _Reader(arrays, None).read(json.loads(arrays[ABOUT].tobytes())["content"])
+
+
+class UnreadableError(ValueError):
+    """A pack of another version, or with a class that is neither symfric's nor handed over."""
+
+
+_foreign = ValueError("expected a file that symfric wrote, got something else or a damaged one")
+
+
+def _path(kind: type) -> str:
+    return f"{kind.__module__}:{kind.__qualname__}"
+
+
+@final
+class _Writer:
+    """Turns objects into JSON; arrays and expressions are put aside."""
+
+    def __init__(self) -> None:
+        self.arrays: list[NDArray[Any]] = []
+        self.expressions: Any = ca.StringSerializer()
+        self._known: dict[int, int] = {}
+        self._alive: list[object] = []
+
+    def write(self, where: str, value: Any) -> Any:
+        """`value` as JSON; what has more than a text or a number is {kind: content}."""
+        if value is None or isinstance(value, bool | str | int):
+            return value
+        if isinstance(value, float | np.floating | np.integer | np.bool_):
+            return value.item() if isinstance(value, np.generic) else value
+        if isinstance(value, ca.SX | ca.DM):
+            self.expressions.pack(value)
+            return {"casadi": None}
+        if isinstance(value, np.ndarray):
+            return self._array(where, cast(NDArray[Any], value))
+        if isinstance(value, Enum):
+            return {"enum": [_path(type(value)), value.name]}
+        if isinstance(value, tuple | list):
+            several = [self.write(f"{where}[{i}]", v) for i, v in enumerate(value)]  # pyright: ignore
+            return {type(value).__name__: several} if type(value) is tuple else several
+        if isinstance(value, Mapping):
+            pairs = cast(Mapping[Any, Any], value).items()
+            return {"dict": [[k, self.write(f"{where}[{k!r}]", v)] for k, v in pairs]}
+        return self._object(where, value)
+
+    def _array(self, where: str, value: NDArray[Any]) -> Any:
+        if value.dtype.kind not in "biufU":
+            raise checks.refused(f"pack{where}", "an array of numbers", value)
+        self.arrays.append(value)
+        return {"array": len(self.arrays) - 1}
+
+    def _object(self, where: str, value: Any) -> Any:
+        """An object by class and fields, once; "same" where it stands again."""
+        if id(value) in self._known:
+            return {"same": self._known[id(value)]}
+        kind = type(value)
+        if isinstance(value, type) or not (is_dataclass(kind) or hasattr(kind, "to_pack")):
+            what = "numbers, texts, expressions and objects made of them"
+            raise checks.refused(f"pack{where}", what, value)
+        self._known[id(value)] = len(self._known)
+        self._alive.append(value)
+        say: Callable[[], dict[str, Any]] = getattr(value, "to_pack", partial(state_of, value))
+        state = say()
+        has = {name: self.write(f"{where}.{name}", held) for name, held in state.items()}
+        return {"is": _path(kind), "has": has}
+
+
+def state_of(thing: Any) -> dict[str, Any]:
+    """The fields of a dataclass."""
+    return {item.name: getattr(thing, item.name) for item in fields(thing)}
+
+
+@final
+class _Reader:
+    """Makes objects of JSON; `own` None lets classes of anybody in."""
+
+    def __init__(self, arrays: Mapping[str, NDArray[Any]], own: Mapping[str, type] | None) -> None:
+        self._arrays, self._own = arrays, own
+        self._expressions: Any = ca.StringDeserializer(arrays[EXPRESSIONS].tobytes().decode())
+        self._known: list[object] = []
+        self._ways: dict[str, Callable[[Any], Any]] = {
+            "casadi": lambda _: self._expressions.unpack(),
+            "array": lambda k: self._arrays[f"a{k}"],
+            "enum": lambda named: getattr(self._class(named[0], Enum), named[1]),
+            "tuple": lambda several: tuple(map(self.read, several)),
+            "dict": lambda pairs: {name: self.read(value) for name, value in pairs},
+            "same": lambda k: self._known[k],
+        }
+
+    def read(self, value: Any) -> Any:
+        """The object that was written as `value`."""
+        if isinstance(value, list):
+            return [self.read(one) for one in value]  # pyright: ignore[reportUnknownVariableType]
+        if not isinstance(value, dict):
+            return value
+        if "is" in value:
+            return self._object(self._class(value["is"], object), value["has"])  # pyright: ignore
+        ((way, content),) = value.items()  # pyright: ignore[reportUnknownVariableType]
+        return self._ways[cast(str, way)](content)
+
+    def _object(self, kind: type, has: Mapping[str, Any]) -> Any:
+        made = object.__new__(kind)
+        self._known.append(made)
+        vars(made).update({name: self.read(held) for name, held in has.items()})
+        return made
+
+    def _class(self, path: str, wanted: type) -> type:
+        """The class of this name, if it is one that may be in a pack."""
+        place, _, name = path.partition(":")
+        if self._own is not None and path in self._own:
+            return self._own[path]
+        if self._own is not None and place.split(".")[0] not in OWN:
+            raise UnreadableError(
+                f"expected classes of symfric, got {name} of {place}; hand it over, as in "
+                f"load_run(path, own=[{name}])"
+            )
+        found: Any = import_module(place)
+        for part in name.split("."):
+            found = getattr(found, part)
+        if not (isinstance(found, type) and issubclass(found, wanted)):
+            raise _foreign
+        if not (is_dataclass(found) or hasattr(found, "to_pack") or issubclass(found, Enum)):
+            raise _foreign
+        return cast(type, found)

@@ -1,0 +1,98 @@
+"""Packs: frozen data with expressions as plain arrays."""
+
+from dataclasses import dataclass
+from io import BytesIO
+from math import inf, nan
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric.foundation import packed
+from symfric.foundation.parameters import Variable
+from symfric.foundation.status import Status
+from symfric.laws import GMS, LuGre, Table
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two things."""
+
+    a: Any
+    b: Any
+
+
+def again(thing: object) -> Any:
+    return packed.loads(packed.dumps(thing))
+
+
+def test_numbers_texts_and_containers_come_back_with_their_types() -> None:
+    values = (1, 2.5, 5e-324, -0.0, True, None, "µ", [1, (2,)], {"a": (), 3: "b"}, Status.JAMMED)
+    back = again(values)
+    assert back == values
+    assert list(map(type, back)) == list(map(type, values))
+    strange = again((inf, -inf, nan))
+    assert strange[:2] == (inf, -inf)
+    assert np.isnan(strange[2])
+    array = np.array([[1.0, nan], [5e-324, -0.0]])
+    assert again(array).tobytes() == array.tobytes()
+    assert again(np.float64(0.1)) == 0.1
+
+
+def test_symbols_stay_the_same_symbols_within_a_pack() -> None:
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    back = again(Pair((x, ca.sin(x) * y), ca.vertcat(y, x)))
+    f = ca.Function("f", [back.b], [back.a[1]])  # fails where symbols are others
+    assert float(f([2.0, 0.5])) == np.sin(0.5) * 2.0
+    assert again(ca.DM([[1, 0], [0, 2]])).sparsity().nnz() == 4
+
+
+def test_an_object_that_stands_twice_is_one_object() -> None:
+    shared = Pair(1, 2)
+    back = again(Pair(shared, [shared]))
+    assert back.a is back.b[0]
+
+
+def test_laws_and_variables() -> None:
+    law = again(GMS())
+    assert repr(law) == repr(GMS())
+    table = Table((0.0, 1.0), (0.2, 0.1))
+    assert repr(again(table)) == repr(table)
+    v = again(Variable("v", "m/s", lower=-1.0))
+    assert (v.name, v.lower, v.upper, v.symbol.name()) == ("v", -1.0, inf, "v")
+
+
+def test_what_no_pack_holds_is_refused_with_its_place() -> None:
+    with pytest.raises(ValueError, match=r"pack\.a\[1\]: expected numbers, texts.*the function"):
+        packed.dumps(Pair((1, lambda: 0), 2))
+    with pytest.raises(ValueError, match=r"pack\.b: expected numbers.*the class LuGre"):
+        packed.dumps(Pair(1, LuGre))
+    with pytest.raises(ValueError, match="expected an array of numbers"):
+        packed.dumps(np.array([object()]))
+
+
+def load(thing: object, **how: Any) -> Any:
+    buffer = BytesIO()
+    packed.dump(buffer, thing, "kind", 1)
+    buffer.seek(0)
+    return packed.load(buffer, "kind", 1, **how)
+
+
+def test_files_hold_classes_of_symfric_and_those_handed_over() -> None:
+    assert repr(load(LuGre())) == repr(LuGre())
+    with pytest.raises(ValueError, match=r"got Pair of .*own=\[Pair\]"):
+        load(Pair(1, 2))
+    assert load(Pair(1, 2), own=[Pair]).b == 2
+
+
+def test_a_file_cannot_name_what_is_no_data() -> None:
+    for path in ("symfric.foundation.files:write_text", "symfric.foundation.checks:Path",
+                 "symfric.cli.app:typer.Typer"):  # fmt: skip
+        text = f'{{"kind": "kind", "format": 1, "content": {{"is": "{path}", "has": {{}}}}}}'
+        words = {"about": text, "expressions": ca.StringSerializer().encode()}
+        buffer = BytesIO()
+        np.savez(buffer, **{n: np.frombuffer(w.encode(), np.uint8) for n, w in words.items()})  # pyright: ignore
+        buffer.seek(0)
+        with pytest.raises(ValueError, match="expected a file that symfric wrote"):
+            packed.load(buffer, "kind", 1)

@@ -1,0 +1,235 @@
+"""Runs in files and pickles: everything that a run answers, to the bit, in another process, too."""
+
+import pickle
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from symfric.foundation.parameters import Variable
+from symfric.foundation.status import SolveError, Status
+from symfric.integrator import Hold, load_run, simulate, simulate_by_peer, simulate_many
+from symfric.integrator.running import run as running
+from symfric.laws import BrownMcPhee, ExactCoulomb, LuGre
+from symfric.model import Event, Model, Output
+from symfric.results.trajectory import FORMAT, Trajectory
+from symfric.scenes import FourBar, drive, rabinowicz
+
+Array = NDArray[np.float64]
+
+
+def through_file(run: Trajectory, folder: Path) -> Trajectory:
+    run.save(folder / "run.npz")
+    return load_run(folder / "run.npz")
+
+
+def assert_same(one: Trajectory, other: Trajectory) -> None:
+    """All that can be asked is the same to the bit."""
+    times = np.linspace(*one.span, 137)
+    for a, b in ((one.at(times), other.at(times)), (one.signals, other.signals)):
+        assert list(a) == list(b)
+        for name in a:
+            np.testing.assert_array_equal(a[name], b[name])
+    for name in one.details:
+        np.testing.assert_array_equal(one[name], other[name])
+    np.testing.assert_array_equal(one.step_times, other.step_times)
+    assert one.extremes == other.extremes
+    assert one.final == other.final
+    assert one.happened == other.happened
+    assert one.statistics.steps == other.statistics.steps
+    assert repr(one) == repr(other)
+    assert one.to_dict()["signals"] == other.to_dict()["signals"]
+
+
+def own_model() -> Model:
+    """With what no pickle takes: a function inside a function."""
+    x = Variable("x", "V", start=1.0)
+    return Model(
+        "own",
+        x=(x,),
+        ode=-x.symbol,
+        events=(Event("half", x.symbol - 0.5, terminal=True),),
+        details=lambda: {"twice": Output(2 * x.symbol, "V")},
+    )
+
+
+def implicit() -> Model:
+    x, rate = Variable("x", "V", start=1.0), ca.SX.sym("rate")
+    return Model("rc", x=(x,), xdot=rate, residual=rate + x.symbol)
+
+
+def runs() -> dict[str, Trajectory]:
+    bar = FourBar(LuGre(), pin=BrownMcPhee())
+    push = {"force": Hold([0.0, 0.5], [1.0, 3.0])}
+    pull = {"force": lambda t: 5 * ca.sin(3 * t)}  # pyright: ignore
+    return {
+        "events": simulate(rabinowicz(ExactCoulomb()), 6.0, samples=101),
+        "loop": simulate(FourBar(BrownMcPhee()).model(), 0.3, samples=51),
+        "peer": simulate_by_peer(FourBar(BrownMcPhee()).model(), 0.1, samples=51),
+        "samples": simulate(drive(BrownMcPhee()), 1.0, u=push, samples=51),
+        "function": simulate(drive(BrownMcPhee()), 1.0, u=pull, samples=51),
+        "own": simulate(own_model(), 5.0, samples=51),
+        "implicit": simulate(implicit(), 1.0, samples=51),
+        "free": simulate(rabinowicz(LuGre(), free=["mu_s"]), 1.0, p={"mu_s": 0.2}, samples=51),
+        "jams": simulate(bar.model(), 0.3, samples=51, throw=False),
+    }
+
+
+def test_runs_come_back_to_the_bit_from_files_and_pickles(tmp_path: Path) -> None:
+    for name, run in runs().items():
+        try:
+            loaded = through_file(run, tmp_path)
+            assert_same(run, loaded)
+            assert run.statistics.to_dict() == loaded.statistics.to_dict()
+            assert_same(loaded, through_file(loaded, tmp_path))
+            assert_same(run, pickle.loads(pickle.dumps(run)))
+        except AssertionError as error:
+            error.add_note(name)
+            raise
+
+
+def test_the_model_of_a_loaded_run_simulates_to_the_bit(tmp_path: Path) -> None:
+    run = simulate(FourBar(ExactCoulomb()).model(), 0.3, samples=51)
+    loaded = through_file(run, tmp_path)
+    assert_same(run, simulate(loaded.model, 0.3, samples=51))
+    balance = loaded.energy_balance()
+    assert balance.to_dict() == run.energy_balance().to_dict()
+
+
+def test_a_run_of_many_steps_is_stored_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = rabinowicz(LuGre())
+    whole = simulate(model, 6.0, samples=11)
+    monkeypatch.setattr(running, "MOST_BYTES", 10_000)
+    cut = simulate(model, 6.0, samples=11)
+    loaded = through_file(cut, tmp_path)
+    monkeypatch.undo()
+    assert loaded.step_times.size == whole.step_times.size == whole.statistics.steps + 1
+    times = np.linspace(0.0, 6.0, 500)
+    np.testing.assert_array_equal(loaded.at(times)["v"], whole.at(times)["v"])
+
+
+def test_a_failed_run_is_stored_as_far_as_it_got(tmp_path: Path) -> None:
+    with pytest.raises(SolveError) as error:
+        simulate(rabinowicz(LuGre()), 6.0, max_steps=20)
+    loaded = through_file(error.value.partial, tmp_path)
+    assert loaded.status is Status.MAX_STEPS
+    assert_same(error.value.partial, loaded)
+
+
+def test_derivatives_at_the_times_of_the_result_are_stored(tmp_path: Path) -> None:
+    model = rabinowicz(LuGre(), free=["mu_s"])
+    run = simulate(model, 1.0, sensitivities=["mu_s", "x0.v"], samples=21)
+    loaded = through_file(run, tmp_path)
+    for name, slopes in run.sensitivities.items():
+        for signal, values in slopes.items():
+            np.testing.assert_array_equal(loaded.sensitivities[name][signal], values)
+    found = loaded.gradient({"x": 1.0, "v": np.linspace(0.0, 1.0, 21)})
+    wanted = run.gradient({"x": 1.0, "v": np.linspace(0.0, 1.0, 21)})
+    assert found == pytest.approx(wanted, rel=1e-9)
+    assert loaded.differentiate is not None
+    with pytest.raises(ValueError, match=r"expected derivatives at `t`.*simulate again"):
+        loaded.differentiate(np.array([0.5]))
+
+
+def test_an_interrupted_write_leaves_the_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = simulate(rabinowicz(BrownMcPhee()), 1.0, samples=11)
+    run.save(tmp_path / "run.npz")
+    before = (tmp_path / "run.npz").read_bytes()
+
+    def stopped(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(np, "savez", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        run.save(tmp_path / "run.npz")
+    assert (tmp_path / "run.npz").read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == ["run.npz"]
+
+
+def test_foreign_and_damaged_files_are_refused(tmp_path: Path) -> None:
+    run = simulate(rabinowicz(BrownMcPhee()), 1.0, samples=11)
+    run.save(tmp_path / "run.npz")
+    good, path = (tmp_path / "run.npz").read_bytes(), tmp_path / "bad.npz"
+    np.savez(tmp_path / "other.npz", a=np.zeros(3))
+    np.save(tmp_path / "single.npy", np.zeros(3))
+    pieces = [b"", b"text", good[: len(good) // 2], (tmp_path / "other.npz").read_bytes()]
+    pieces.append((tmp_path / "single.npy").read_bytes())
+    for bad in pieces:
+        path.write_bytes(bad)
+        with pytest.raises(ValueError, match=r"load_run '.*bad.npz': expected a file that symf"):
+            load_run(path)
+    refused = 0
+    for k in range(40, len(good), 997):  # what is not refused is a time stamp or the like
+        path.write_bytes(good[:k] + bytes([good[k] ^ 255]) + good[k + 1 :])
+        try:
+            assert_same(run, load_run(path))
+        except ValueError:
+            refused += 1
+    assert refused > len(good) / 1100
+    with pytest.raises(ValueError, match="expected a saved run, got no such file"):
+        load_run(tmp_path / "none.npz")
+    with pytest.raises(ValueError, match="expected a saved run, got a folder"):
+        load_run(tmp_path)
+
+
+def test_a_file_of_another_version_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = simulate(rabinowicz(BrownMcPhee()), 1.0, samples=11)
+    monkeypatch.setattr("symfric.results.trajectory.FORMAT", FORMAT + 1)
+    run.save(tmp_path / "run.npz")
+    with pytest.raises(ValueError, match=f"expected format {FORMAT}, got {FORMAT + 1}; it was"):
+        load_run(tmp_path / "run.npz")
+
+
+@dataclass(frozen=True, eq=False)
+class Mine(BrownMcPhee):  # pyright: ignore[reportGeneralTypeIssues]
+    """A law of a user."""
+
+
+def test_classes_of_a_user_are_handed_over(tmp_path: Path) -> None:
+    run = simulate(rabinowicz(Mine()), 1.0, samples=11)
+    with pytest.raises(ValueError, match=r"got Mine of .*load_run\(path, own=\[Mine\]\)"):
+        through_file(run, tmp_path)
+    assert_same(run, load_run(tmp_path / "run.npz", own=[Mine]))
+
+
+ELSEWHERE = """
+import pickle, sys
+from symfric import simulate
+model = pickle.loads(sys.stdin.buffer.read())
+run = simulate(model, 0.2, samples=51)
+sys.stdout.buffer.write(pickle.dumps((run, run.signals)))
+"""
+
+
+@pytest.mark.slow
+def test_a_model_simulates_to_the_same_bits_in_another_process() -> None:
+    model = FourBar(BrownMcPhee()).model()
+    there = subprocess.run(
+        [sys.executable, "-c", ELSEWHERE],
+        input=pickle.dumps(model),
+        capture_output=True,
+        check=True,
+    )
+    other, signals = pickle.loads(there.stdout)
+    here = simulate(model, 0.2, samples=51)
+    for name, values in here.signals.items():
+        np.testing.assert_array_equal(signals[name], values)
+    np.testing.assert_array_equal(other.step_times, here.step_times)
+
+
+def test_an_ensemble_is_pickled() -> None:
+    model = rabinowicz(BrownMcPhee(), free=["m"])
+    one = simulate_many(model, 1.0, p={"m": [0.5, 1.0]}, backend="vm")
+    other = pickle.loads(pickle.dumps(one))
+    assert repr(one) == repr(other)
+    for name in one.units:
+        np.testing.assert_array_equal(one[name], other[name])
