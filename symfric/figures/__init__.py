@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from symfric.figures.hysteresis import hysteresis as hysteresis
     from symfric.figures.lag import lag as lag
     from symfric.figures.profile import profile as profile
+    from symfric.figures.push import push as push
     from symfric.figures.recommended import Recommendation as Recommendation
     from symfric.figures.recommended import recommended as recommended
     from symfric.figures.requirements import phenomena as phenomena
@@ -37,6 +38,7 @@ else:
             "symfric.figures.hysteresis": "hysteresis",
             "symfric.figures.lag": "lag",
             "symfric.figures.profile": "profile",
+            "symfric.figures.push": "push",
             "symfric.figures.recommended": "Recommendation recommended",
             "symfric.figures.requirements": "phenomena",
             "symfric.figures.scales": "Scales scales",

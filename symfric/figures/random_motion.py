@@ -15,11 +15,14 @@ from symfric.integrator import Linear
 from symfric.integrator.equations.inputs import Input
 from symfric.laws import Population
 
+REST = 1e6
+"""How long the contacts have rested before a motion [s], so that all of them are old."""
+
 
 def slid(
     law: Population, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX], times: Array, pace: float
 ) -> dict[str, Array]:
-    """Columns t, x, v, F at `times` [s] of contacts slid from rest with `velocity(t, pace)`."""
+    """Columns t, x, v, F at `times` [s] of rested contacts slid with `velocity(t, pace)`."""
     t, p = ca.SX.sym("t"), ca.SX.sym("pace")
     function = ca.Function("v", [t, p], [velocity(t, p)])
     end = float(times[-1])
@@ -33,7 +36,7 @@ def slid(
         "t": times,
         "x": np.interp(times, grid, x),
         "v": function(times, pace).full().ravel(),
-        "F": np.interp(times, grid, law.force(grid, x, N)),
+        "F": np.interp(times, grid, law.force([-REST, *grid], [0.0, *x], N)[1:]),
     }
 
 
@@ -62,7 +65,7 @@ def shoved(
     h = 0.2 * sqrt(mass / law.stiffness)
     t = np.arange(0.0, t_end + h, h)
     load = _signal(force, t)
-    contacts, held = law.advance(law.begin(), 0.0, 0.0, N)
+    contacts, held = law.advance(law.begin(), 0.0, REST, N)
     x = v = 0.0
     rows = np.zeros((t.size, 3))
     for i in range(t.size):

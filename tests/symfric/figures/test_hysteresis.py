@@ -40,3 +40,12 @@ def test_virgin_curve_and_reversal_of_maxwell_slip_obey_masing() -> None:
     assert curve["F"][first] == pytest.approx(virgin(curve["x"][first]), abs=1e-4)
     x, branch = curve["x"][back], curve["F"][back]
     assert branch == pytest.approx(branch[0] - 2 * virgin((x[0] - x) / 2), abs=1e-4)
+
+
+def test_a_route_is_gone_through() -> None:
+    route = (0.0, 1.5e-6, 0.2e-6, 1.1e-6)
+    curve = hysteresis(MaxwellSlip(), speeds=(1.0,), route=route).curves[0]
+    turns = [int(np.argmin(np.abs(curve["t"] - 8.0 * k / 3))) for k in range(4)]
+    assert np.allclose(curve["x"][turns], route, atol=1e-11)
+    with pytest.raises(ValueError, match="route: expected at least two turning points"):
+        hysteresis(MaxwellSlip(), route=(0.0,))

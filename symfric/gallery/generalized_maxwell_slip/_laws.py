@@ -1,0 +1,64 @@
+"""The laws of the paper with the numbers of its table 1, under a load of 1 N.
+
+The generic model is `GenericAsperity`, a reconstruction from words. One number, the speed at which
+contacts live as long as they take to age, is fitted to the Stribeck curve of table 1; the period of
+the counterface makes the lag that table 1 has (C); its stiffness is free and chosen so that the
+paths of figures 4 and 5 reach break-away. `ELEMENTS` were found from its hysteresis by
+`identification.fit_elements`, which figure 5 repeats.
+The model of Bliman and Sorine, which is named in section 5.1 alone, has no numbers at all.
+"""
+
+from symfric import (
+    GMS,
+    Dahl,
+    ElastoPlastic,
+    Element,
+    GenericAsperity,
+    Leuven,
+    LuGre,
+    MaxwellSlip,
+    Slider,
+)  # fmt: skip
+from symfric.figures import Scales
+from symfric.laws import AnyLaw
+
+F_S, F_C, V_S, DELTA = 1.05, 0.2, 98e-6, 0.78  # N, N, m/s, 1
+SIGMA_0, SIGMA_1, Z_BA = 0.16e6, 0.08, 0.61e-6  # N/m, N s/m, m
+DELTA_L, C = 7.0, 24.0  # 1, N/s
+ELEMENTS = ((0.52e6, 0.09), (0.73e6, 0.27), (0.66e6, 0.33), (0.41e6, 0.31))
+"""Stiffness [N/m] and share of each element; not in the paper."""
+LIFE = 75.7e-6
+"""Way in contact over the time in which a contact ages [m/s]; not in the paper."""
+PERIOD, DUTY = 1e-5, 0.6
+"""Period of the counterface [m] and the share of it in contact; not in the paper."""
+
+PATH = tuple(1e-6 * x for x in (0.0, 1.5, 0.2, 1.1, 0.6, 1.1, 0.2, 1.5, 0.0))
+"""Turning points of the path of figure 4 [m]: a loop in a loop, up to 1.5 um; our reading."""
+SIGNALS = Scales(static=F_S, kinetic=F_C, elastic=F_C, stretch=1.5e-6, velocity=1e-4)
+"""What the figures of `symfric.figures` take their amplitudes from."""
+
+_STRIBECK = {"mu_s": F_S, "mu_d": F_C, "v_s": V_S, "delta": DELTA}
+_BRISTLE = _STRIBECK | {"sigma_0": SIGMA_0, "sigma_1": SIGMA_1, "sigma_2": 0.0}
+_SLIDERS = tuple(Slider(k, alpha * F_S) for k, alpha in ELEMENTS)
+
+
+def generic(count: int = 2000) -> GenericAsperity:
+    """The generic model of `count` asperities."""
+    ages = DUTY * PERIOD / LIFE
+    return GenericAsperity(
+        k=2.5e6, mu_0=F_C, mu_inf=F_S, tau_c=ages, lam=PERIOD, duty=DUTY, count=count
+    )
+
+
+def laws(count: int = 2000) -> dict[str, AnyLaw]:
+    """All laws by the names of the paper, the generic model of `count` asperities in front."""
+    elements = tuple(Element(k, alpha) for k, alpha in ELEMENTS)
+    return {
+        "generic model": generic(count),
+        "GMS": GMS(elements=elements, C=C, form="event", **_STRIBECK),
+        "Leuven": Leuven(elements=_SLIDERS, sigma_1=SIGMA_1, delta_l=DELTA_L, n=200.0, **_STRIBECK),
+        "LuGre": LuGre(**_BRISTLE),
+        "elasto-plastic": ElastoPlastic(z_ba=Z_BA, **_BRISTLE),
+        "Maxwell slip": MaxwellSlip(elements=_SLIDERS, form="event"),
+        "Dahl": Dahl(sigma_0=SIGMA_0, mu_d=F_C),
+    }
