@@ -40,6 +40,7 @@ html_title = f"symfric {release}"
 html_static_path = ["static"]
 html_css_files = ["symfric.css"]
 html_copy_source = False
+html_show_copyright = False
 html_show_sourcelink = False
 html_theme_options = {"navigation_with_keys": False}
 pygments_style = "a11y-high-contrast-light"

@@ -9,20 +9,32 @@ from collections.abc import Callable, Iterable, Iterator
 from inspect import cleandoc
 
 from docs.machine import rst
-from docs.machine.formula import latex
+from docs.machine.formula import GREEK, latex, name
 
 SECTIONS = ("Args", "Attributes", "Raises", "Returns", "Warns", "Yields", "Example")
 SECTION = re.compile(rf"^({'|'.join(SECTIONS)}):\s*(.*)$")
 ENTRY = re.compile(r"^((?:`[^`]+`|[\"'\w*]+)(?:(?:, | \| )(?:`[^`]+`|[\"'\w*]+))*):\s+(.*)$", re.S)
 TITLES = {"Args": "Arguments", "Returns": "Returns", "Raises": "Raises", "Warns": "Warns"}
+NAMED = re.compile(rf"(?<![\w.])(?:(?:{'|'.join(GREEK)}|[A-Za-z])_\w+|{'|'.join(GREEK)})(?![\w(])")
 WIDE = re.compile(r"\S {3,}\S")
 
 Linked = Callable[[str], str]
 """How a name between backticks is written: as code, or as a link to where it is documented."""
 
 
-def to_rst(docstring: str, linked: Linked = rst.code, formulas: bool = True) -> str:
-    """A docstring, cleaned by `inspect`, as reStructuredText; equations become formulas."""
+def to_rst(
+    docstring: str, linked: Linked = rst.code, formulas: bool = True, symbols: bool = False
+) -> str:
+    """A docstring, cleaned by `inspect`, as reStructuredText.
+
+    Args:
+        docstring: what `inspect.getdoc` returns.
+        linked: how a name between backticks is written.
+        formulas: whether indented equations become formulas.
+        symbols: whether names such as mu_s in sentences become symbols.
+    """
+    if symbols:
+        linked = Symbols(linked)
     return "".join(_blocks(docstring.splitlines(), linked, formulas))
 
 
@@ -31,18 +43,40 @@ def first_line(docstring: str | None) -> str:
     return " ".join(cleandoc(docstring or "").split("\n\n")[0].split())
 
 
+class Symbols:
+    """Writes names between backticks as `linked` does, and asks for symbols elsewhere."""
+
+    def __init__(self, linked: Linked) -> None:
+        self.linked = linked
+
+    def __call__(self, text: str) -> str:
+        """The name as before."""
+        return self.linked(text)
+
+
 def text(words: str, linked: Linked = rst.code) -> str:
     """A paragraph: markup nowhere but in names between backticks."""
     parts = re.split(r"`([^`]+)`", " ".join(words.split()))
     found = ""
     for k, part in enumerate(parts):
         if k % 2 == 0:
-            found += rst.plain(part)
+            found += with_symbols(part) if isinstance(linked, Symbols) else rst.plain(part)
         else:
             before = "" if not found or found[-1] in " (" else r"\ "
             after = "" if parts[k + 1][:1] in ("", " ", ".", ",", ";", ":", ")", "'") else r"\ "
             found += before + linked(part) + after
     return found
+
+
+def with_symbols(words: str) -> str:
+    """Words in which names such as mu_s, v_eps or alpha are symbols."""
+    found, end = "", 0
+    for match in NAMED.finditer(words):
+        before, after = words[end : match.start()], words[match.end() : match.end() + 1]
+        found += rst.plain(before) + (r"\ " if match.start() else "")
+        found += f":math:`{name(match[0])}`" + (r"\ " if after else "")
+        end = match.end()
+    return found + rst.plain(words[end:])
 
 
 def _blocks(lines: list[str], linked: Linked, formulas: bool) -> Iterator[str]:
@@ -74,9 +108,9 @@ def _paragraph(lines: list[str], linked: Linked) -> str:
     if sum(WIDE.search(line) is not None for line in lines) > 1:  # a table
         return rst.literal("\n".join(lines))
     words = " ".join(lines)
-    name = re.match(r"(Limits|Source|Defaults|Sign|Stability): (.*)", words)
-    if name:
-        return f"**{name[1]}.** {text(name[2], linked)}\n\n"
+    head = re.match(r"(Limits|Source|Defaults|Sign|Stability): (.*)", words)
+    if head:
+        return f"**{head[1]}.** {text(head[2], linked)}\n\n"
     return text(words, linked) + "\n\n"
 
 
@@ -93,12 +127,12 @@ def shown(block: str, formulas: bool = True) -> str:
     return rst.literal("\n".join(lines))
 
 
-def _section(name: str, behind: str, lines: list[str], linked: Linked) -> str:
-    head = f"**{TITLES.get(name, name)}**\n\n"
+def _section(title: str, behind: str, lines: list[str], linked: Linked) -> str:
+    head = f"**{TITLES.get(title, title)}**\n\n"
     body = cleandoc("\n".join(["", *lines]))
-    if name == "Example":
+    if title == "Example":
         return head + (text(behind, linked) + "\n\n" if behind else "") + rst.literal(body)
-    if name in ("Returns", "Yields") and not behind:
+    if title in ("Returns", "Yields") and not behind:
         return head + "".join(_blocks(body.splitlines(), linked, formulas=False))
     if behind:
         return head + text(f"{behind} {body}", linked) + "\n\n"

@@ -105,9 +105,7 @@ def page(record: Mapping[str, Any]) -> str:
         text += f"**{name}.** {rst.plain(words)}\n\n"
     rows = [[rst.plain(name), f"{value:.6g}"] for name, value in record["numbers"].items()]
     if rows:
-        text += rst.title("Numbers", "-") + rst.table(["", ""], rows).replace(
-            ":header-rows: 1", ":header-rows: 0"
-        ).replace("   * -\n     -\n", "", 1)
+        text += rst.title("Numbers", "-") + rst.table((), rows)
     module = scripts()[record["name"]]
     source = ROOT.joinpath(*module.split(".")).with_suffix(".py")
     text += rst.title(f"The script, {source.relative_to(ROOT)}", "-")

@@ -75,20 +75,22 @@ def index(laws: dict[str, AnyLaw]) -> str:
     text += (
         f"{len(laws)} laws with default parameters, each as an equation, a picture and a table; "
         f"and {len(MADE_OF_LAWS)} that are made of laws or data. Names are those of "
-        "``symfric laws NAME`` and of ``symfric run SCENE --law NAME``.\n\n"
+        "``symfric laws NAME`` and of ``symfric run SCENE --law NAME``. What the letters under "
+        "*shows* mean stands at the end; *instructions* are those of CasADi for force and rate, "
+        "and for their derivatives; *formula* says how it was confirmed.\n\n"
     )
     for title, about in FAMILIES.items():
         text += rst.title(title, "-") + about + "\n\n"
         if title == "Made of laws and data":
             rows = [
-                [f":doc:`{name}`", rst.plain(first_line(kind.__doc__))]
+                [f":doc:`{name} <{name}>`", rst.plain(first_line(kind.__doc__))]
                 for name, kind in MADE_OF_LAWS.items()
             ]
             text += rst.table(["law", "what it is"], rows)
-            text += rst.pages(MADE_OF_LAWS, hidden="")
+            text += rst.pages((f"{name} <{name}>" for name in MADE_OF_LAWS), hidden="")
             continue
         own = {name: law for name, law in laws.items() if family(law) == title}
-        text += overview(own) + cards(own) + rst.pages(own, hidden="")
+        text += cards(own) + overview(own) + rst.pages((f"{n} <{n}>" for n in own), hidden="")
     text += rst.title("Codes", "-")
     return text + rst.table(
         ["code", "phenomenon"], [[c, rst.plain(said)] for c, said in PHENOMENA.items()]
@@ -99,15 +101,18 @@ def overview(laws: dict[str, AnyLaw]) -> str:
     """A table of laws: what they show, how smooth they are and what they cost."""
     rows = [
         [
-            f":doc:`{name}`",
+            f":doc:`{name} <{name}>`",
             " ".join(phenomena(law)),
             str(len(law.states)),
             rst.plain(law.facts.smoothness.split()[0]),
             f"{cost(law).value} / {cost(law).gradient}",
+            rst.plain(law.facts.confidence),
         ]
         for name, law in laws.items()
     ]
-    return rst.table(["law", "shows", "states", "smoothness", "instructions"], rows)
+    return rst.table(
+        ["law", "shows", "states", "smoothness", "instructions", "formula"], rows, "numbers"
+    )
 
 
 def cards(laws: dict[str, AnyLaw]) -> str:
@@ -125,12 +130,14 @@ def cards(laws: dict[str, AnyLaw]) -> str:
 def law_page(name: str, law: AnyLaw) -> str:
     """One law in full."""
     kind = type(law)
-    text = rst.title(name)
-    text += rst.directive("py:class", f"symfric.{kind.__name__}{signature(kind)}")
-    text += to_rst(getdoc(kind) or "", linked)
-    text += rst.directive(
-        "figure", f"/made/laws/{name}.png", alt=f"{name}: what it does, with its default numbers"
+    doc = getdoc(kind) or ""
+    text = rst.title(first_line(doc).split(":")[0].rstrip("."))
+    text += (
+        f"``{name}`` on the command line, ``from symfric import {kind.__name__}`` in Python.\n\n"
     )
+    text += to_rst(without_title(doc), linked, symbols=True)
+    about = f"{name}: what it does, with its default numbers"
+    text += rst.directive("figure", f"/made/laws/{name}.png", alt=about)
     text += rst.title("Facts", "-") + facts(law)
     text += rst.title("Parameters", "-") + parameter_table(law)
     if options(law):
@@ -155,13 +162,20 @@ def law_page(name: str, law: AnyLaw) -> str:
 
 def wrapper_page(name: str, kind: type[Any]) -> str:
     """A law that takes laws or data."""
-    text = rst.title(name)
-    text += rst.directive("py:class", f"symfric.{kind.__name__}{signature(kind)}")
-    base = kind.__mro__[1]
-    text += to_rst(getdoc(kind) or "", linked)
+    doc = getdoc(kind) or ""
+    text = rst.title(first_line(doc).split(":")[0].rstrip("."))
+    text += to_rst(without_title(doc), linked, symbols=True)
     if kind in (PlanarSlip, SpatialSlip):
-        text += rst.title(base.__name__, "-") + to_rst(getdoc(base) or "", linked)
-    return text
+        base = kind.__mro__[1]
+        text += rst.title(base.__name__, "-") + to_rst(getdoc(base) or "", linked, symbols=True)
+    text += rst.title("In Python", "-")
+    return text + rst.directive("py:class", f"symfric.{kind.__name__}{signature(kind)}")
+
+
+def without_title(doc: str) -> str:
+    """A docstring without its first line, unless that says more than a title."""
+    first, _, rest = doc.partition("\n")
+    return doc if ":" in first else rest.lstrip("\n")
 
 
 def signature(kind: type[Any]) -> str:
@@ -189,7 +203,7 @@ def facts(law: AnyLaw) -> str:
         ["formula confirmed by", rst.plain(law.facts.confidence)],
     ]
     rows += [["warning", rst.plain(warning)] for warning in law.warnings()]
-    return rst.table(["", ""], rows, widths="22 78").replace(":header-rows: 1", ":stub-columns: 1")
+    return rst.table((), rows)
 
 
 def parameter_table(law: Any) -> str:
@@ -198,14 +212,14 @@ def parameter_table(law: Any) -> str:
         [
             rst.code(p.name),
             shown_symbol(p.name),
-            _number(float(p.value)),
+            number(float(p.value)),
             rst.plain(p.unit),
             _bounds(p.lower, p.upper),
             rst.plain(p.doc),
         ]
         for p in parameters(law).values()
     ]
-    return rst.table(["parameter", "", "default", "unit", "range", "meaning"], rows)
+    return rst.table(["parameter", "", "default", "unit", "range", "meaning"], rows, "numbers")
 
 
 def shown_symbol(name: str) -> str:
@@ -216,7 +230,8 @@ def shown_symbol(name: str) -> str:
         return ""
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
+    """Six digits."""
     return f"{value:.6g}"
 
 
@@ -235,4 +250,6 @@ def usage(name: str, law: AnyLaw) -> str:
         lines.append(f"$ symfric laws {name} --figure hysteresis --plot {name}.png")
     if type(law) in ALL_LAWS.values() and not getattr(law, "inputs", ()):
         lines.append(f"$ symfric run rabinowicz --law {name} --plot run.png")
-    return rst.title("More", "-") + rst.literal("\n".join(lines), "console")
+    text = rst.title("Use", "-") + rst.literal("\n".join(lines), "console")
+    kind = type(law)
+    return text + rst.directive("py:class", f"symfric.{kind.__name__}{signature(kind)}")

@@ -38,15 +38,23 @@ def literal(text: str, language: str = "text") -> str:
     return directive("code-block", language, text.rstrip() + "\n")
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[str]], widths: str = "auto") -> str:
-    """A table; the cells are markup already. It scrolls by itself where it is too wide."""
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") -> str:
+    """A table; the cells are markup already. It scrolls by itself where it is too wide.
+
+    Args:
+        head: its first row; () if its first column is the head instead.
+        rows: the others.
+        kind: its class: "numbers" breaks lines in the last column only.
+    """
     lines: list[str] = []
-    for row in (head, *rows):
+    for row in (head, *rows) if head else rows:
         for k, cell in enumerate(row):
             first, *others = cell.splitlines() or [""]
             lines.append(f"{'* -' if k == 0 else '  -'} {first}".rstrip())
             lines += [f"    {line}".rstrip() for line in others]
-    return directive("list-table", "", "\n".join(lines) + "\n", header_rows="1", widths=widths)
+    heads = {"header_rows": "1"} if head else {"stub_columns": "1", "class": "facts"}
+    options = heads | {"widths": "auto"} | ({"class": kind} if kind else {})
+    return directive("list-table", "", "\n".join(lines) + "\n", **options)
 
 
 def pages(names: Iterable[str], **options: str) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 from docs.machine import rst
 from docs.machine.docstrings import first_line, to_rst
-from docs.machine.law_pages import _number, shown_symbol, signature
+from docs.machine.law_pages import number, shown_symbol, signature, without_title
 from docs.machine.names import linked
 from symfric import BrownMcPhee, law_name, parameters
 from symfric.scenes import ALL_SCENES, Scene
@@ -32,22 +32,26 @@ def index() -> str:
     for name, kind in ALL_SCENES.items():
         model = kind(LAW()).model()
         presets = ", ".join(f"``{p}``" for p in kind.presets) or "-"
-        rows.append([f":doc:`{name}`", rst.plain(first_line(kind.__doc__)), str(len(model.x))])
+        rows.append(
+            [f":doc:`{name} <{name}>`", rst.plain(first_line(kind.__doc__)), str(len(model.x))]
+        )
         rows[-1].append(presets)
     text += rst.table(["scene", "what it is", "states", "presets"], rows)
-    return text + rst.pages(ALL_SCENES, hidden="")
+    return text + rst.pages((f"{name} <{name}>" for name in ALL_SCENES), hidden="")
 
 
 def page(name: str, kind: type[Scene]) -> str:
     """One scene in full."""
     scene = kind(LAW())
     model = scene.model()
-    text = rst.title(name)
-    text += rst.directive("py:class", f"symfric.scenes.{kind.__name__}{signature(kind)}")
-    text += to_rst(getdoc(kind) or "", linked)
+    doc = getdoc(kind) or ""
+    text = rst.title(first_line(doc).split(":")[0].rstrip("."))
+    text += f"``{name}`` on the command line, "
+    text += f"``from symfric.scenes import {kind.__name__}`` in Python.\n\n"
+    text += to_rst(without_title(doc), linked, symbols=True)
     if model.sketch is not None:
         about = f"{name} at an instant of this run"
-        text += rst.directive("figure", f"/made/scenes/{name}_sketch.png", alt=about)
+        text += rst.directive("figure", f"/made/scenes/{name}_sketch.png", alt=about, width="24rem")
     said = (
         f"{name} with {NAME} friction over {kind.t_end:g} s, by ``symfric run {name} --law {NAME}``"
     )
@@ -66,7 +70,8 @@ def page(name: str, kind: type[Scene]) -> str:
         text += rst.title("Places that rub", "-")
         text += "Each may have a law of its own: ``--law-of PLACE=LAW``.\n\n"
         text += rst.table(["place", "what it is"], rows)
-    return text + signals(kind, model)
+    text += signals(kind, model) + rst.title("In Python", "-")
+    return text + rst.directive("py:class", f"symfric.scenes.{kind.__name__}{signature(kind)}")
 
 
 def parameter_table(scene: Scene) -> str:
@@ -76,13 +81,13 @@ def parameter_table(scene: Scene) -> str:
         [
             rst.code(p.name),
             shown_symbol(p.name),
-            _number(float(p.value)),
+            number(float(p.value)),
             rst.plain(p.unit),
             rst.plain(p.doc),
         ]
         for p in own
     ]
-    return rst.table(["parameter", "", "default", "unit", "meaning"], rows)
+    return rst.table(["parameter", "", "default", "unit", "meaning"], rows, "numbers")
 
 
 def signals(kind: type[Scene], model: Any) -> str:
@@ -127,7 +132,6 @@ def draw(name: str, folder: Path) -> None:
     run = simulate(model, kind.t_end, u=inputs or None)
     run.plot(path=folder / f"{name}.png")
     if model.sketch is not None:
-        times = np.linspace(0.0, kind.t_end, 40)
-        figure, pose = picture(run, times)
-        pose(26)
+        figure, pose = picture(run, np.linspace(0.0, kind.t_end, 40))
+        pose(3)  # most machines move then
         figure.savefig(folder / f"{name}_sketch.png", dpi=110)
