@@ -124,6 +124,8 @@ def show_figure(data: FigureData) -> None:
         for name in drawn
     ]
     output.show_table(["curve", "column", "unit", "least", "greatest"], rows, data.title)
+    if data.note:
+        output.show(f"{data.note}.")
 
 
 def to_dict(law: AnyLaw) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from symfric.cli.options import (
     numbers,
     seconds,
 )
+from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
 from symfric.integrator import Input, simulate_by_peer
 from symfric.integrator.equations.inputs import Sampled
@@ -97,6 +98,12 @@ def run(
         Path | None, typer.Option("--out", metavar="FILE.csv", help="Write the signals.")
     ] = None,
     plot: PlotOption = None,
+    panels: Annotated[
+        str,
+        typer.Option(
+            "--panels", help="Of --plot: main (positions, friction, energy or power) or all."
+        ),
+    ] = "main",
     movie: Annotated[
         Path | None,
         typer.Option("--animate", metavar="FILE.gif", help="Film a mechanism: .gif, .html, .mp4."),
@@ -127,6 +134,7 @@ def run(
             "with --plot"
         )
     check_outputs(out, json, movie, picture=plot)
+    checks.choice("--panels", panels, ("main", "all"))
     check_movie(movie, scene)
     machines = scenes_with(scene, law, numbers("--set", settings), preset, law_of)
     models = {name: machine.model() for name, machine in machines.items()}
@@ -148,7 +156,7 @@ def run(
     if plot:
         from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
 
-        plot_trajectories(found, path=plot)
+        plot_trajectories(found, path=plot, panels=panels)
     if movie:
         with output.progress(f"{movie}") as tell:
             next(iter(found.values())).animate(movie, progress=tell)

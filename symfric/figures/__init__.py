@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from symfric.figures.data import Curve as Curve
     from symfric.figures.data import FigureData as FigureData
     from symfric.figures.drift import drift as drift
+    from symfric.figures.dwell import dwell as dwell
     from symfric.figures.hysteresis import hysteresis as hysteresis
     from symfric.figures.lag import lag as lag
     from symfric.figures.profile import profile as profile
@@ -22,10 +23,12 @@ if TYPE_CHECKING:
     from symfric.figures.scales import Scales as Scales
     from symfric.figures.scales import scales as scales
     from symfric.figures.steady_state import steady_state as steady_state
+    from symfric.figures.stiction import stiction as stiction
     from symfric.figures.sweeps import sweep_b as sweep_b
     from symfric.figures.sweeps import sweep_c as sweep_c
     from symfric.figures.sweeps import sweep_e as sweep_e
     from symfric.figures.transition import transition as transition
+    from symfric.figures.velocity_step import velocity_step as velocity_step
 else:
     hand_out(
         __name__,
@@ -35,6 +38,9 @@ else:
             "symfric.figures.compare": "compare",
             "symfric.figures.data": "Curve FigureData",
             "symfric.figures.drift": "drift",
+            "symfric.figures.dwell": "dwell",
+            "symfric.figures.stiction": "stiction",
+            "symfric.figures.velocity_step": "velocity_step",
             "symfric.figures.hysteresis": "hysteresis",
             "symfric.figures.lag": "lag",
             "symfric.figures.profile": "profile",

@@ -5,13 +5,16 @@ from typing import Protocol
 from symfric.figures.break_away import break_away
 from symfric.figures.data import FigureData
 from symfric.figures.drift import drift
+from symfric.figures.dwell import dwell
 from symfric.figures.hysteresis import hysteresis
 from symfric.figures.lag import lag
 from symfric.figures.profile import profile
 from symfric.figures.scales import NORMAL_FORCE, Scales
 from symfric.figures.steady_state import steady_state
+from symfric.figures.stiction import stiction
 from symfric.figures.sweeps import sweep_b, sweep_c, sweep_e
 from symfric.figures.transition import transition
+from symfric.figures.velocity_step import velocity_step
 from symfric.foundation.parameters import check_names
 from symfric.laws import AnyLaw
 
@@ -32,6 +35,9 @@ FIGURES: dict[str, MakeFigure] = {
     "hysteresis": hysteresis,
     "lag": lag,
     "transition": transition,
+    "velocity_step": velocity_step,
+    "stiction": stiction,
+    "dwell": dwell,
     "drift": drift,
     "break_away": break_away,
     "steady_state": steady_state,

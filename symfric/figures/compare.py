@@ -1,16 +1,18 @@
 """Several laws under the same excitation."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 from symfric.figures.catalogue import FIGURES
 from symfric.figures.data import FigureData
 from symfric.figures.requirements import check_any
 from symfric.figures.scales import NORMAL_FORCE, scales
-from symfric.figures.scene import scene_figure
+from symfric.figures.scene import in_scene, scene_figure
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, distinct
-from symfric.laws import AnyLaw, Law, Population, any_from_text, law_name, steady_inputs
+from symfric.foundation.status import SolveError
+from symfric.laws import AnyLaw, any_from_text, law_name, steady_inputs
 from symfric.scenes import ALL_SCENES
 
 
@@ -29,29 +31,50 @@ def compare(
         N: normal force [N] of a figure; a scene has its own.
 
     Returns:
-        One curve per law and case, each under the name of its law.
+        One curve per law and case, each under the name of its law. Laws that cannot show it, or
+        whose simulation failed, are left out, and `note` says why.
 
     Raises:
-        ValueError: no law, unknown scenario, a law that cannot show it.
-        SolveError: a simulation failed.
+        ValueError: no law, unknown scenario, no law that can show it.
+        SolveError: the simulations of all failed.
     """
     check_names("compare: scenario", [scenario], [*FIGURES, *ALL_SCENES])
     named = _named(laws)
+    first = next(iter(named.values()))
     if scenario in ALL_SCENES:
-        references = [name for name, law in named.items() if isinstance(law, Population)]
-        if references:
-            raise ValueError(
-                f"compare: expected laws with equations in the scene {scenario}, got "
-                f"{', '.join(references)}, a population of random contacts; it has figures"
-            )
-        machines = {name: law for name, law in named.items() if isinstance(law, Law)}
-        return scene_figure(machines, scenario)
-    given = scales(next(iter(named.values())), N)
-    shown = [FIGURES[scenario](law, N, given).named(name) for name, law in named.items()]
-    title = _title(list(named.values()), shown)
-    return replace(
-        shown[0], title=title, curves=tuple(curve for one in shown for curve in one.curves)
-    )
+        able, note = _able(named, lambda law: in_scene(law, scenario))
+        return replace(scene_figure(scenario, able), note=note)
+    given = scales(first, N)
+    able, note = _able(named, lambda law: FIGURES[scenario](law, N, given))
+    shown = [data.named(name) for name, data in able.items()]
+    title = _title([named[name] for name in able], shown)
+    curves = tuple(curve for one in shown for curve in one.curves)
+    said = "; ".join(text for text in (shown[0].note, note) if text)
+    return replace(shown[0], title=title, curves=curves, note=said)
+
+
+Result = TypeVar("Result")
+
+
+def _able(
+    laws: Mapping[str, AnyLaw], make: Callable[[AnyLaw], Result]
+) -> tuple[dict[str, Result], str]:
+    """What `make` makes of each law that can, and a note which were left out and why.
+
+    Raises:
+        ValueError, SolveError: those of the first law, where none can.
+    """
+    made: dict[str, Result] = {}
+    refused: dict[str, ValueError | SolveError] = {}
+    for name, law in laws.items():
+        try:
+            made[name] = make(law)
+        except (ValueError, SolveError) as error:
+            refused[name] = error
+    if not made:
+        raise next(iter(refused.values()))
+    why = [f"without {name}: {str(error).split('; ')[0]}" for name, error in refused.items()]
+    return made, "; ".join(why)
 
 
 def _title(laws: Sequence[AnyLaw], shown: Sequence[FigureData]) -> str:

@@ -63,6 +63,7 @@ class FigureData(Showing):
         curves: what is drawn.
         log: columns on a logarithmic axis.
         dots: whether single points are measured and shall be seen.
+        note: what else must be said: what is swept, or which law is left out and why.
     """
 
     name: str
@@ -72,6 +73,7 @@ class FigureData(Showing):
     curves: tuple[Curve, ...]
     log: tuple[str, ...] = ()
     dots: bool = False
+    note: str = ""
 
     def shown(self) -> Shown:
         """Its curves, with the range of each column."""
@@ -109,6 +111,7 @@ class FigureData(Showing):
         return {
             "name": self.name,
             "title": self.title,
+            "note": self.note,
             "units": dict(self.units),
             "panels": [list(panel) for panel in self.panels],
             "curves": [

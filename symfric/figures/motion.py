@@ -60,24 +60,43 @@ class Run(Protocol):
         ...
 
 
-def slides(
-    law: AnyLaw, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]
-) -> Callable[[str, Array, float], Curve]:
+class Slide(Protocol):
+    """What makes the curve of a motion; `jumps` are the times [s] at which the velocity jumps."""
+
+    def __call__(
+        self, case: str, times: Array, pace: float, /, jumps: Sequence[float] = ()
+    ) -> Curve:
+        """The curve of `case` at `times` [s]."""
+        ...
+
+
+def slides(law: AnyLaw, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]) -> Slide:
     """The motion `velocity(t, pace)` [m/s] as a function (case, times [s], pace) -> curve.
 
     A law starts from steady sliding at the first velocity, a population from unloaded contacts.
     """
     if isinstance(law, Population):
-        return lambda case, times, pace: Curve(
-            law_name(law), case, slid(law, N, velocity, times, pace)
-        )
+
+        def of_population(
+            case: str, times: Array, pace: float, /, jumps: Sequence[float] = ()
+        ) -> Curve:
+            return Curve(law_name(law), case, slid(law, N, velocity, times, pace))
+
+        return of_population
     model = prescribed(law, N, velocity)
-    return lambda case, times, pace: slide(model, law, case, times, pace)
+
+    def moved(case: str, times: Array, pace: float, /, jumps: Sequence[float] = ()) -> Curve:
+        return slide(model, law, case, times, pace, jumps)
+
+    return moved
 
 
-def slide(model: Model, law: Law, case: str, times: Array, pace: float) -> Curve:
+def slide(
+    model: Model, law: Law, case: str, times: Array, pace: float, jumps: Sequence[float] = ()
+) -> Curve:
     """One run of a `prescribed` motion, seen at `times` [s]."""
-    run = simulate(model, float(times[-1]), p={"pace": pace}, t_eval=times)
+    end = float(times[-1])
+    run = simulate(model, end, p={"pace": pace}, t_eval=times, times=[t for t in jumps if t < end])
     columns = {"t": run.t, "x": run["travel"], "v": run["slip_velocity"], "F": run["friction"]}
     return Curve(law_name(law), case, columns)
 

@@ -1,50 +1,176 @@
 """Pictures of laws and of what they do, with units."""
 
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Mapping, Sequence
 from itertools import chain
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from symfric.foundation.panels import grid, panels, save
+from symfric.figures.data import Curve
+from symfric.figures.nature import natures
+from symfric.figures.requirements import phenomena
+from symfric.figures.scales import scales
+from symfric.foundation.panels import blank, dressed, grid, panels, save
 from symfric.foundation.parameters import parameters
-from symfric.foundation.style import DASHES, colour, line
-from symfric.laws import steady_force
+from symfric.foundation.prefixes import readable
+from symfric.foundation.style import DASHES, colour, dash, line
+from symfric.foundation.units import turned
+from symfric.laws import Population, steady_force, steady_inputs
 
 if TYPE_CHECKING:
     from symfric.figures.data import FigureData
     from symfric.laws import AnyLaw
 
+Array = NDArray[np.float64]
+LAYERS = 50.0
+"""Half of the window around rest, in velocities over which the law is smooth, at most."""
+ABREAST = 3
+"""Behaviours beside each other."""
+
 
 def plot_laws(
     laws: "Mapping[str, AnyLaw]", N: float = 1.0, path: str | Path | None = None
 ) -> Figure:
-    """Friction force in steady sliding against velocity: near rest, and over many decades.
+    """One law, or several, in one picture: the steady curve, and what the law does beside it.
+
+    Above stands the force in steady sliding over the velocity, around rest on a window that fits
+    the law, and over decades of the velocity. Below stands what that curve cannot tell: hysteresis
+    in pre-sliding, frictional lag, dwell, stiction (`symfric.figures.nature`); a law of the
+    velocity alone has nothing there. Each panel has its own axes. Laws of a turning contact have
+    rad/s and N m.
 
     Args:
         laws: legend entry -> law, with numbers for parameters.
         N: normal force [N].
         path: image file.
     """
-    figure, ((near, far),) = grid(1, 2, 7.5, 3.2, sharey=True)
-    scales = [scale for law in laws.values() for scale in _velocity_scales(law)]
-    scale = max(scales, default=0.1)
-    decades = np.geomspace(1e-3 * scale, max(1.0, 10 * scale), 1201)
-    around = np.linspace(-10 * scale, 10 * scale, 2001)
-    for k, (label, law) in enumerate(laws.items()):
-        for axis, v in ((near, around), (far, decades)):
-            axis.plot(v, steady_force(law, v, N), label=label, linewidth=1.3, **line(k))
-    near.ticklabel_format(axis="x", style="sci", scilimits=(-2, 3), useMathText=True)
-    far.set_xscale("log")
-    for axis in (near, far):
-        axis.set_xlabel("v [m/s]")
-    near.set_ylabel("F in steady sliding [N]")
-    near.set_title(f"near rest, N = {N:g} N", fontsize="medium")
-    far.set_title("over decades", fontsize="medium")
-    near.legend(fontsize="small")
+    shown = natures(laws, N)
+    tiles = [(d, panel) for d in shown for panel in d.panels[: None if len(shown) == 1 else 1]]
+    rows = -(-len(tiles) // ABREAST)
+    figure = blank(7.5, 0.5 + 2.6 * (1 + rows) + 0.25 * (len(laws) > 1))
+    places = figure.add_gridspec(1 + rows, 6)
+    near, far = (dressed(figure.add_subplot(places[0, k : k + 3])) for k in (0, 3))
+    _steady(near, far, laws, N)
+    for k, (data, panel) in enumerate(tiles):
+        row, at = divmod(k, ABREAST)
+        width = 6 // min(ABREAST, len(tiles) - row * ABREAST)
+        axis = figure.add_subplot(places[1 + row, at * width : (at + 1) * width])
+        _behaviour(dressed(axis), data, panel, list(laws))
+    inputs = dict.fromkeys(steady_inputs(law) for law in laws.values())
+    figure.suptitle(
+        f"{', '.join(laws)}   N = {N:g} N{''.join(inputs)}", x=0.01, ha="left", fontsize="large"
+    )
+    if len(laws) > 1:
+        entries = near.get_legend_handles_labels()
+        figure.legend(*entries, loc="outside lower center", ncols=4, fontsize="small")
     return save(figure, path)
+
+
+def _steady(near: Axes, far: Axes, laws: "Mapping[str, AnyLaw]", N: float) -> None:
+    """The steady curves around rest, and over decades; both in the units that suit the first.
+
+    Thin, over decades: those while v < 0 of laws that are not odd.
+    """
+    half = max(window(law, N) for law in laws.values())
+    fine = half * np.geomspace(1e-5, 1.0, 600)
+    around = np.concatenate([-fine[::-1], [0.0], fine])
+    ends = [decades(law, N) for law in laws.values()]
+    over = np.geomspace(min(low for low, _ in ends), max(high for _, high in ends), 801)
+    forces = [[steady_force(law, v, N) for v in (around, over, -over)] for law in laws.values()]
+    (by_v, unit_v), (by_F, unit_F) = (
+        readable("m/s", [around]),
+        readable("N", [f[1] for f in forces]),
+    )
+    for k, (label, (F, ahead, back)) in enumerate(zip(laws, forces, strict=True)):
+        near.plot(by_v * around, by_F * F, label=label, linewidth=1.4, **line(k))
+        far.plot(by_v * over, by_F * ahead, label=label, linewidth=1.4, **line(k))
+        if np.abs(back + ahead).max() > 1e-6 * np.abs(ahead).max():
+            far.plot(
+                by_v * over, -by_F * back, label=f"{label}: -F(-v)",
+                linewidth=0.9, color=colour(k), linestyle=dash(k + 1),
+            )  # fmt: skip
+            far.legend(fontsize="x-small")
+    far.set_xscale("log")
+    low, high = far.dataLim.intervaly
+    far.set_ylim(min(0.0, 1.08 * low), 1.08 * max(high, 0.0) or 1.0)
+    if all(_turns(law) for law in laws.values()):
+        unit_v, unit_F = turned(unit_v), turned(unit_F)
+    for axis, title in ((near, "steady sliding, around rest"), (far, "over decades")):
+        axis.set_title(title, loc="left", fontsize="medium")
+        axis.set_xlabel(f"v [{unit_v}]")
+        axis.set_ylabel(f"F [{unit_F}]")
+
+
+def window(law: "AnyLaw", N: float) -> float:
+    """Half the window around rest [m/s]: 5 Stribeck velocities, 50 smoothing ones at most.
+
+    A law that is viscous and no more has no velocity of its own: 1 m/s.
+    """
+    if set(phenomena(law)) == {"V"}:
+        return 1.0
+    V = scales(law, N).velocity
+    layer = V if isinstance(law, Population) else float(law.velocity_scale)
+    return min(5 * V, LAYERS * layer) if isfinite(layer) else 5 * V
+
+
+def decades(law: "AnyLaw", N: float) -> tuple[float, float]:
+    """The velocities [m/s] between which the steady curve has all it has.
+
+    From a hundredth of the least velocity on which the law changes to a hundred times the greatest,
+    or to where viscous friction has doubled the peak.
+    """
+    if set(phenomena(law)) == {"V"}:
+        return 1e-3, 10.0
+    found = scales(law, N)
+    layer = found.velocity if isinstance(law, Population) else float(law.velocity_scale)
+    low = 1e-2 * min(found.velocity, layer)
+    v = np.geomspace(2 * found.velocity, 100 * found.velocity, 201)
+    over = np.flatnonzero(np.abs(steady_force(law, v, N)) > 2 * found.static)
+    return low, float(v[over[0]] if over.size else v[-1])
+
+
+def _turns(law: "AnyLaw") -> bool:
+    """Whether the parameters of a law say that its contact turns."""
+    return any(p.unit.startswith("rad/s") for p in parameters(law).values())
+
+
+def _behaviour(axis: Axes, data: "FigureData", panel: tuple[str, str], laws: Sequence[str]) -> None:
+    """One behaviour in a panel of its own, and a legend where its cases differ."""
+    several = len(laws) > 1
+    drawn = [c for c in data.curves if not several or c.case == _first_case(data, c.law)]
+    _curves(axis, data, panel, drawn, laws if several else ())
+    axis.set_title(
+        TITLES.get(data.name, f"sliding, over {panel[0]}"), loc="left", fontsize="medium"
+    )
+    if data.note:
+        axis.text(
+            0.02, 0.98, "\n".join(textwrap.wrap(data.note, 40)), transform=axis.transAxes,
+            va="top", fontsize="xx-small",
+        )  # fmt: skip
+    if not several and len(drawn) > 1:
+        axis.legend(fontsize="x-small", handlelength=1.8, framealpha=0.6)
+    axis.tick_params(labelsize="small")
+
+
+TITLES = {
+    "hysteresis": "pre-sliding, loops in a loop",
+    "lag": "lag, v up and down",
+    "transition": "reversals at 2 Hz",
+    "velocity_step": "v ten times, and back",
+    "dwell": "peak after a rest",
+    "stiction": "stiction, pulled to and fro",
+}
+"""Name of a figure -> title of its panel in the picture of a law."""
+
+
+def _first_case(data: "FigureData", law: str) -> str:
+    return next(c.case for c in data.curves if c.law == law)
 
 
 def plot_catalogue(
@@ -59,68 +185,87 @@ def plot_catalogue(
     """
     columns = 6
     rows = -(-len(laws) // columns)
-    figure, tiles = grid(rows, columns, 11.0, 0.6 + 1.3 * rows)
+    figure, tiles = grid(rows, columns, 11.0, 0.6 + 1.35 * rows)
     axes = list(chain(*tiles))
     for axis in axes[len(laws) :]:
         axis.set_visible(False)
     for axis, (label, law) in zip(axes, laws.items(), strict=False):
-        edge = 5 * max(_velocity_scales(law), default=0.1)
-        v = np.linspace(-edge, edge, 1001)
-        axis.plot(v, steady_force(law, v, N), linewidth=1.1)
-        axis.set_title(label, fontsize="x-small")
-        axis.set_xticks([-edge, 0.0, edge], labels=[f"{-edge:.3g}", "0", f"{edge:.3g}"])
+        edge = window(law, N)
+        v = np.concatenate([-(fine := edge * np.geomspace(1e-5, 1.0, 300))[::-1], [0.0], fine])
+        F = steady_force(law, v, N)
+        by_v, unit_v = readable("m/s", [v])
+        by_F, unit_F = readable("N", [F])
+        if _turns(law):
+            unit_v, unit_F = turned(unit_v), turned(unit_F)
+        axis.plot(by_v * v, by_F * F, linewidth=1.2)
+        axis.set_title(f"{label} [{unit_F}]", fontsize="x-small")
+        edge *= by_v
+        axis.set_xticks([-edge, 0.0, edge], labels=[f"{-edge:.3g}", unit_v, f"{edge:.3g}"])
         axis.locator_params(axis="y", nbins=4)
         axis.tick_params(labelsize="xx-small")
-        axis.yaxis.get_offset_text().set_fontsize("xx-small")
-    figure.supxlabel("v [m/s or rad/s]", fontsize="small")
-    figure.supylabel(f"F in steady sliding [N or N m], N = {N:g}", fontsize="small")
+    figure.supxlabel("sliding velocity v, each panel with its unit", fontsize="small")
+    figure.supylabel(f"force in steady sliding F, N = {N:g} N", fontsize="small")
     return save(figure, path)
 
 
-def _velocity_scales(law: "AnyLaw") -> list[float]:
-    """The velocities [m/s] among the parameters, on which the force changes."""
-    known = [(float(p.value), p.unit) for p in parameters(law).values()]
-    scales = [value for value, unit in known if unit in ("m/s", "rad/s")]
-    return scales + [1 / value for value, unit in known if unit == "s/m" and value > 0]
-
-
 def plot_figure(data: "FigureData", path: str | Path | None = None) -> Figure:
-    """A behaviour figure: a panel per pair of columns, a colour per law or, for one law, per case.
+    """A behaviour figure: a panel per pair of columns, a colour and line style per law or case.
 
-    With several laws the cases differ by their dashes.
+    Of several laws each has its colour, and the cases differ by their line styles.
 
     Args:
         data: its curves, panels and units.
         path: image file.
     """
     laws = list(dict.fromkeys(c.law for c in data.curves))
-    cases = list(dict.fromkeys(c.case for c in data.curves))
     abscissae = {x for x, _ in data.panels}
     height = {1: 4.0, 2: 2.6}.get(len(data.panels), 1.7)
     figure, axes = panels(len(data.panels), 7.0, height, shared=len(abscissae) == 1)
-    for axis in axes:  # before any of those that share their abscissa is logarithmic
-        axis.ticklabel_format(axis="both", style="sci", scilimits=(-2, 4), useMathText=True)
-    for axis, (x, y) in zip(axes, data.panels, strict=True):
-        for c in data.curves:
-            case = cases.index(c.case)
-            dash = DASHES[case % len(DASHES)] if len(laws) > 1 else DASHES[c.reference]
-            number = laws.index(c.law) if len(laws) > 1 else case
-            label = c.label if len(laws) > 1 else c.case or "as it is"
-            axis.plot(
-                c[x], c[y], linestyle=dash, color=colour(number), linewidth=1.2,
-                marker="o" if data.dots else None, markersize=4, label=label,
-            )  # fmt: skip
-        if x in data.log:
-            axis.set_xscale("log")
-        if y in data.log:
-            axis.set_yscale("log")
-        axis.set_ylabel(f"{y} [{data.units[y]}]")
-        if axis is axes[-1] or len(abscissae) > 1:
-            axis.set_xlabel(f"{x} [{data.units[x]}]")
+    for axis, panel in zip(axes, data.panels, strict=True):
+        _curves(axis, data, panel, data.curves, laws if len(laws) > 1 else ())
+        if axis is not axes[-1] and len(abscissae) == 1:
+            axis.set_xlabel("")
     title = data.title if len(laws) > 1 else f"{laws[0]}: {data.title}"
-    figure.suptitle(title, fontsize="medium")
+    figure.suptitle("\n".join(textwrap.wrap(title, 88)), fontsize="medium")
+    if data.note:
+        axes[0].set_title("\n".join(textwrap.wrap(data.note, 100)), loc="left", fontsize="small")
     if len(data.curves) > 1:
         entries = axes[0].get_legend_handles_labels()
         figure.legend(*entries, loc="outside lower center", ncols=3, fontsize="small")
     figure.align_ylabels(axes)
     return save(figure, path)
+
+
+def _curves(
+    axis: Axes,
+    data: "FigureData",
+    panel: tuple[str, str],
+    curves: Sequence[Curve],
+    laws: Sequence[str],
+) -> None:
+    """The curves of one panel, in units that are easily read.
+
+    Args:
+        laws: those that have a colour each, where several are compared; else the cases have.
+    """
+    x, y = panel
+    cases = list(dict.fromkeys(c.case for c in curves))
+    by_x, unit_x = readable(data.units[x], () if x in data.log else [c[x] for c in curves])
+    by_y, unit_y = readable(data.units[y], () if y in data.log else [c[y] for c in curves])
+    for c in curves:
+        case = cases.index(c.case)
+        if laws:
+            number = laws.index(c.law)
+            style = dash(case) if len(cases) > 1 else dash(number)
+        else:
+            number, style = case, DASHES[1] if c.reference else dash(case)
+        axis.plot(
+            by_x * c[x], by_y * c[y], linestyle=style, color=colour(number), linewidth=1.3,
+            marker="o" if data.dots else None, markersize=4,
+            label=c.label if laws else c.case or "as it is",
+        )  # fmt: skip
+    for on, scale in ((x, axis.set_xscale), (y, axis.set_yscale)):
+        if on in data.log:
+            scale("log")
+    axis.set_xlabel(f"{x} [{unit_x}]")
+    axis.set_ylabel(f"{y} [{unit_y}]")

@@ -4,28 +4,49 @@ from collections.abc import Mapping
 
 from symfric.figures.data import Curve, FigureData
 from symfric.integrator import Input, simulate
-from symfric.laws import Law
+from symfric.laws import AnyLaw, Population, law_name
+from symfric.laws.base.law import check_law
+from symfric.results.kinds import main
+from symfric.results.trajectory import Trajectory
 from symfric.scenes import ALL_SCENES
 
-PANELS = 5
-"""Signals drawn at most; all of them are columns."""
+PANELS = 2
+"""Signals of a kind that are drawn at most; all of them are columns."""
 
 
-def scene_figure(laws: Mapping[str, Law], scene: str) -> FigureData:
-    """The signals of `scene` that its runs with each of `laws` share, over the time that shows it.
+def in_scene(law: AnyLaw, scene: str) -> Trajectory:
+    """The run of `scene` with `law`, over the time that shows what it is about.
 
-    Columns t [s] and the shared signals; a curve for each legend entry of `laws`.
+    Raises:
+        ValueError: a population of contacts, a law that the scene refuses.
+        SolveError: the simulation failed.
     """
+    if isinstance(law, Population):
+        raise ValueError(
+            f"{scene} with {law_name(law)}: expected a law with equations, got a population of "
+            "random contacts; it has figures"
+        )
+    check_law(scene, law)
     kind = ALL_SCENES[scene]
     inputs: dict[str, Input] = {name: given.function for name, given in kind.inputs.items()}
-    runs = {label: simulate(kind(law).model(), kind.t_end, u=inputs) for label, law in laws.items()}
-    units = next(iter(runs.values())).units
-    shared = [name for name in units if all(name in run.units for run in runs.values())]
+    return simulate(kind(law).model(), kind.t_end, u=inputs)
+
+
+def scene_figure(scene: str, runs: Mapping[str, Trajectory]) -> FigureData:
+    """The signals that `runs` (legend entry -> run of `scene`) share.
+
+    Columns t [s] and the shared signals; a curve for each run. Drawn are positions, friction and
+    energy or power.
+    """
+    first = next(iter(runs.values()))
+    shared = {n: u for n, u in first.units.items() if all(n in run.units for run in runs.values())}
+    groups = main(first.model, shared)
+    drawn = [name for group in groups for name in list(group.names)[-PANELS:]]
     return FigureData(
         scene,
         scene,
-        {"t": "s"} | {name: units[name] for name in shared},
-        tuple(("t", name) for name in shared[:PANELS]),
+        {"t": "s"} | shared,
+        tuple(("t", name) for name in drawn or [*shared][: 2 * PANELS]),
         tuple(
             Curve(label, "", {"t": run.t} | {name: run[name] for name in shared})
             for label, run in runs.items()

@@ -12,6 +12,13 @@ SHAPES = (0.0, 0.5, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0)
 STIFFNESSES = (0.05, 0.1, 0.2, 0.3, 0.5, 1.0)
 CURVATURES = (-1.0, 0.0, 0.25, 0.5, 0.75, 0.95)
 
+SWEPT = {
+    "B": ("stiffness factor", "sets how steeply the force rises at rest, not how high the peak is"),
+    "C": ("shape factor", "sets what follows the rise: up to 1 none falls, above 1 a peak falls"),
+    "E": ("curvature factor", "moves the peak to another velocity and leaves height and slope"),
+}
+"""Factor -> what it is called, and what a figure says that it does."""
+
 
 def sweep_c(
     law: AnyLaw,
@@ -92,12 +99,14 @@ def _sweep(
         )
         for value in values
     ]
+    kind, does = SWEPT[factor]
     return FigureData(
         f"sweep_{factor.lower()}",
-        f"profiles for factors {factor}, N = {N:g} N",
+        f"profiles for values of the {kind} {factor}, N = {N:g} N",
         {"v": "m/s", "F": "N"},
         (("v", "F"),),
         tuple(curves),
+        note=f"{factor} {does}",
     )
 
 

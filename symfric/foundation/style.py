@@ -8,7 +8,7 @@ Nothing here changes the settings of Matplotlib: `symfric.foundation.panels` han
 the axes it makes, and whoever draws curves to be told apart says `axis.plot(x, y, **line(k))`.
 """
 
-from typing import TypedDict
+from typing import Literal, TypedDict
 
 COLOURS = (
     "#0033b0",  # blue
@@ -21,7 +21,7 @@ COLOURS = (
 )
 """Colours of curves, in this order."""
 
-Dash = str | tuple[float, tuple[float, ...]]
+Dash = Literal["-"] | tuple[float, tuple[float, ...]]
 DASHES: tuple[Dash, ...] = ("-", (0, (5, 1.6)), (0, (6, 1.5, 1.2, 1.5)), (0, (1.3, 1.3)))
 """Solid, dashed, dash-dotted, dotted; lengths in line widths."""
 
@@ -52,9 +52,12 @@ def dash(k: int) -> Dash:
     return DASHES[k % len(DASHES)]
 
 
-def line(k: int) -> Line:
-    """Colour and line style of curve number `k`, from 0; the first 28 are all different."""
-    return {"color": colour(k), "linestyle": dash(k)}
+def line(k: int, style: int | None = None) -> Line:
+    """Colour and line style of curve number `k`, from 0; the first 28 are all different.
+
+    With `style`, the line style has a number of its own, as where runs differ by it.
+    """
+    return {"color": colour(k), "linestyle": dash(k if style is None else style)}
 
 
 CYCLE = tuple(line(k) for k in range(len(COLOURS) * len(DASHES)))

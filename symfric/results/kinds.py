@@ -1,7 +1,13 @@
-"""What the signals of a mechanism are, so that tables and pictures put like to like."""
+"""What the signals of a run are, so that tables and pictures put like to like."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, final
 
 from symfric.model import Model
-from symfric.model.kinds import CONSTRAINTS, INPUT
+from symfric.model.kinds import CONSTRAINTS, ENERGY, FRICTION, INPUT, POSITION
+
+LENGTHS, FORCES, POWER = ("m", "rad"), ("N", "N m"), "W"
 
 
 def is_mechanism(model: Model) -> bool:
@@ -23,3 +29,106 @@ def kinds(model: Model) -> dict[str, str]:
     found |= {v.name: v.kind or INPUT for v in model.u}
     found |= {name: output.kind for name, output in model.outputs.items()}
     return {name: kind for name, kind in found.items() if kind}
+
+
+@final
+@dataclass(frozen=True)
+class Group:
+    """Signals that share a panel.
+
+    Attributes:
+        title: what they are; empty for one signal that is called by its name.
+        unit: of all of them.
+        names: signal -> how it is called in the panel.
+        norms: whether they are norms of constraints: dots on a logarithmic axis.
+    """
+
+    title: str
+    unit: str
+    names: dict[str, str]
+    norms: bool = False
+
+
+def main(model: Model, units: dict[str, str]) -> list[Group]:
+    """What a run is about: positions, friction, and energy or, without books of it, power.
+
+    Empty where the model has neither positions nor friction.
+
+    Args:
+        model: whose signals they are.
+        units: name -> unit of those that may be shown.
+    """
+    kind, own = kinds(model), {v.name for c in model.contacts for v in c.states}
+    rubs = {"friction" if c.bare else f"{c.name}_friction" for c in model.contacts}
+    places = [
+        v.name
+        for v in model.x
+        if v.kind == POSITION or (not v.kind and v.unit in LENGTHS and v.name not in own)
+    ]
+    forces = [n for n, u in units.items() if u in FORCES and (kind.get(n) == FRICTION or n in rubs)]
+    if not (places or forces):
+        return []
+    energies = [n for n in units if kind.get(n) == ENERGY]
+    powers = [] if energies else [n for n in model.outputs if units.get(n) == POWER]
+    return [
+        group
+        for title, names in (
+            ("position", places),
+            ("friction", forces),
+            ("energy", energies),
+            ("power of friction", powers),
+        )
+        for group in by_unit(title, [n for n in names if n in units], units)
+    ]
+
+
+def every(model: Model, units: dict[str, str], apart: int) -> list[Group]:
+    """All signals of `units`: one each where these are at most `apart`, else by kind and unit."""
+    kind = kinds(model)
+    norm = [n for n in units if kind.get(n) == CONSTRAINTS]
+    rest = [n for n in units if n not in norm]
+    if len(units) <= apart:
+        found = [Group("", units[n], {n: n}) for n in rest]
+    else:
+        named = {n: kind.get(n, "") for n in rest}
+        if is_mechanism(model):  # multipliers and sliding velocities say nothing of their own
+            named = {n: k for n, k in named.items() if k}
+        named = {n: f"power of {k}" if (k, units[n]) == (FRICTION, POWER) else k
+                 for n, k in named.items()}  # fmt: skip
+        titles = dict.fromkeys(named.values())
+        found = [
+            group
+            for title in titles
+            for group in by_unit(title, [n for n, k in named.items() if k == title], units)
+        ]
+    return [*found, *([Group(CONSTRAINTS, "", {n: n for n in norm}, norms=True)] if norm else [])]
+
+
+def by_unit(title: str, names: Iterable[str], units: dict[str, str]) -> list[Group]:
+    """Groups of one unit each; names lose the ending that all of a group have in common."""
+    found: dict[str, list[str]] = {}
+    for name in names:
+        found.setdefault(units[name], []).append(name)
+    return [
+        Group(title if len(own) > 1 else "", unit, dict(zip(own, shortened(own), strict=True)))
+        for unit, own in found.items()
+    ]
+
+
+def shortened(names: list[str]) -> list[str]:
+    """`names` without the last word that they share, as "_friction"; at most 28 letters each."""
+    ending = f"_{names[0].rpartition('_')[2]}"
+    if len(names) > 1 and all(n.endswith(ending) and n != ending for n in names):
+        names = [n.removesuffix(ending) for n in names]
+    return [n if len(n) <= 28 else f"{n[:13]}...{n[-12:]}" for n in names]
+
+
+def friction_laws(model: Model) -> str:
+    """The laws of its contacts, each once: "LuGre, Coulomb"; empty where there are none."""
+    return ", ".join(dict.fromkeys(_called(contact.law) for contact in model.contacts))
+
+
+def _called(law: Any) -> str:
+    """A law by its class, a sum by its terms."""
+    terms = getattr(law, "laws", ())
+    return "+".join(map(_called, terms)) if terms else type(law).__name__

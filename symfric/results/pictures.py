@@ -4,107 +4,152 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
-from symfric.foundation.panels import panels, save
-from symfric.foundation.style import colour, line
-from symfric.model.kinds import CONSTRAINTS
-from symfric.results.kinds import is_mechanism, kinds
+from symfric.foundation import checks
+from symfric.foundation.panels import panels as empty_panels
+from symfric.foundation.panels import save
+from symfric.foundation.prefixes import readable
+from symfric.foundation.style import COLOURS, EDGE, colour, line
+from symfric.model.kinds import ENERGY
+from symfric.results.kinds import Group, every, friction_laws, main
 
 if TYPE_CHECKING:
     from symfric.results.trajectory import Trajectory
 
-
-PANELS = 8
-"""More signals than this are drawn together, a panel per unit, unless they were named."""
+Array = NDArray[np.float64]
+CHOICES = ("main", "all")
+APART = 8
+"""Up to so many signals have a panel each where all are shown."""
+BLACK = COLOURS.index(EDGE)
+FLAT = 1e-6
+"""Change, relative to the magnitude, below which a signal counts as constant on an axis."""
 
 
 def plot_trajectories(
     trajectories: "Mapping[str, Trajectory]",
     names: Sequence[str] = (),
     path: str | Path | None = None,
+    panels: str = "main",
 ) -> Figure:
-    """Signals of one or several simulations over time, a panel each.
+    """Signals of one or several simulations over time, those of a kind in a panel.
 
     Args:
         trajectories: legend entry -> trajectory.
-        names: signals or details to show, a panel each; the signals that all trajectories share
-            if none is given. Where these are many there is a panel per unit; of mechanisms per
-            kind, without multipliers and sliding velocities.
+        names: signals or details to show, a panel each.
         path: image file.
+        panels: which are shown where none is named: "main" for positions, friction and energy (or
+            power, where the model keeps no books of its energy); "all" for every signal that all
+            trajectories share, those of a kind and unit together where they are many. A model
+            with neither positions nor friction shows all.
     """
+    checks.choice("plot: panels", panels, CHOICES)
     first = next(iter(trajectories.values()))
     for trajectory in trajectories.values():
         trajectory.check(names)
-    shared = [n for n in first.units if all(n in t.units for t in trajectories.values())]
-    shown = list(names) or shared
-    if len(shown) > PANELS and not names:
-        return save(_grouped(trajectories, shown), path)
-    figure, axes = panels(len(shown))
-    for axis, name in zip(axes, shown, strict=True):
-        for k, (label, trajectory) in enumerate(trajectories.items()):
-            axis.plot(
-                trajectory.looks, trajectory.at_looks(name), label=label, linewidth=1.2, **line(k)
-            )
-        axis.set_ylabel(f"{name} [{first.unit(name)}]")
-    axes[0].set_title(first.scene, loc="left")
-    if list(trajectories) != [first.scene]:
-        axes[0].legend(
-            loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize="small", ncols=3
-        )
+    units = {
+        n: u for n, u in first.units.items() if all(n in t.units for t in trajectories.values())
+    }
+    if names:
+        groups = [Group("", first.unit(name), {name: name}) for name in names]
+    else:
+        chosen = main(first.model, units) if panels == "main" else []
+        groups = chosen or every(first.model, units, APART)
+        if len(trajectories) > 1:
+            groups = split(groups)
+    tall = max((len(g.names) for g in groups), default=1) > 1
+    figure, axes = empty_panels(len(groups), width=8.5 if tall else 7.0, height=2.0)
+    alone = all(len(g.names) == 1 for g in groups)
+    for axis, group in zip(axes, groups, strict=True):
+        _panel(axis, group, trajectories, alone)
+    axes[0].set_title(_title(trajectories), loc="left", fontsize="medium")
+    _legend(figure, trajectories, alone)
     axes[-1].set_xlabel("t [s]")
     figure.align_ylabels(axes)
     return save(figure, path)
 
 
-def _groups(trajectory: "Trajectory", shown: Sequence[str]) -> dict[str, list[str]]:
-    """Panels of many signals: title -> names."""
-    found = {name: "" for name in shown}
-    if is_mechanism(trajectory.model):
-        found = {name: kind for name, kind in kinds(trajectory.model).items() if name in shown}
-    groups: dict[str, list[str]] = {}
-    for name, kind in found.items():
-        unit = trajectory.units[name]
-        title = f"{kind} [{unit}]" if unit else "[several units]"
-        groups.setdefault(kind if kind == CONSTRAINTS else title.strip(), []).append(name)
-    return groups
+def split(groups: Sequence[Group]) -> list[Group]:
+    """The groups as several simulations are compared: a panel per signal, if these are few.
+
+    Of energies the sum is enough.
+    """
+    single = [
+        Group("", group.unit, {name: name}, group.norms)
+        for group in groups
+        for name in (list(group.names)[-1:] if group.title == ENERGY else group.names)
+    ]
+    return single if len(single) <= APART else list(groups)
 
 
-def _grouped(trajectories: "Mapping[str, Trajectory]", shown: Sequence[str]) -> Figure:
-    """Many signals: a panel per kind, a colour per signal, a line style per simulation."""
-    first = next(iter(trajectories.values()))
-    groups = _groups(first, shown)
-    figure, axes = panels(len(groups), width=9.5, height=2.3)
-    for axis, (title, members) in zip(axes, groups.items(), strict=True):
-        for k, name in enumerate(members):
-            for style, trajectory in zip(
-                ("-", "--", ":", "-."), trajectories.values(), strict=False
-            ):
-                label = name if style == "-" else None
-                dots = title == CONSTRAINTS
-                axis.plot(
-                    trajectory.t if dots else trajectory.looks,
-                    trajectory[name] if dots else trajectory.at_looks(name),
-                    "." if dots else style,
-                    color=colour(k),
-                    label=label,
-                    linewidth=1.1,
-                    markersize=1.5,
-                )
-        if title == CONSTRAINTS:
-            axis.set_yscale("log", nonpositive="mask")
-        axis.set_ylabel(title)
+def _panel(axis: Axes, group: Group, trajectories: "Mapping[str, Trajectory]", alone: bool) -> None:
+    """The signals of a group: a colour each, line styles for several simulations.
+
+    Where every panel of the picture holds but one, simulations differ by colour, too.
+    """
+    several, runs = len(group.names) > 1, len(trajectories) > 1
+    values = {
+        (name, label): run[name] if group.norms else run.at_looks(name)
+        for name in group.names
+        for label, run in trajectories.items()
+    }
+    factor, unit = readable(group.unit, values.values())
+    for k, (name, called) in enumerate(group.names.items()):
+        for r, (label, run) in enumerate(trajectories.items()):
+            said = label if not several else called if r == 0 else None
+            y = factor * values[name, label]
+            if group.norms:
+                axis.plot(run.t, y, ".", color=colour(k), markersize=1.5, label=said)
+                continue
+            look = line(r if alone else k if several else BLACK, r) if runs else line(k)
+            axis.plot(run.looks, y, linewidth=1.2, label=said, **look)
+    if group.norms:
+        axis.set_yscale("log", nonpositive="mask")
+    else:
+        level(axis, [factor * v for v in values.values()])
+    (only,) = group.names if not several else ("",)
+    axis.set_ylabel(f"{only or group.title} [{unit}]".replace(" []", "").strip())
+    if several:
         axis.legend(
             loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize="x-small",
-            markerscale=4,
+            markerscale=4, ncols=1 + (len(group.names) - 1) // 8,
         )  # fmt: skip
-    styles = ", ".join(
-        f"{label} {style}"
-        for label, style in zip(trajectories, ("-", "- -", ":", "- ."), strict=False)
-    )
-    axes[0].set_title(
-        f"{first.scene}: {styles}" if len(trajectories) > 1 else first.scene, loc="left"
-    )
-    axes[-1].set_xlabel("t [s]")
-    figure.align_ylabels(axes)
-    return figure
+
+
+def level(axis: Axes, values: Sequence[Array]) -> None:
+    """Ticks that say the values as they are; a constant in the middle of an axis, not magnified."""
+    axis.ticklabel_format(axis="y", useOffset=False)
+    low = min((float(np.nanmin(v, initial=np.inf)) for v in values), default=0.0)
+    high = max((float(np.nanmax(v, initial=-np.inf)) for v in values), default=0.0)
+    size = max(abs(low), abs(high))
+    if np.isfinite(size) and high - low <= FLAT * size:
+        middle = (low + high) / 2
+        axis.set_ylim(middle - (0.2 * size or 1.0), middle + (0.2 * size or 1.0))
+
+
+def _title(trajectories: "Mapping[str, Trajectory]") -> str:
+    """The scene, and the laws where these are the same in all."""
+    first = next(iter(trajectories.values()))
+    laws = {friction_laws(run.model) for run in trajectories.values()}
+    (law,) = laws if len(laws) == 1 else ("",)
+    return f"{first.scene} with {law}" if law else first.scene
+
+
+def _legend(figure: Figure, trajectories: "Mapping[str, Trajectory]", alone: bool) -> None:
+    """What line belongs to what simulation, below the panels; nothing for one without a name."""
+    first = next(iter(trajectories.values()))
+    if list(trajectories) == [first.scene]:
+        return
+    handles: list[Artist] = []
+    for r, label in enumerate(trajectories):
+        look = line(r) if alone else line(BLACK, r)
+        handles.append(Line2D([], [], label=label, linewidth=1.4, **look))
+    figure.legend(
+        handles=handles, loc="outside lower center", frameon=False, fontsize="small",
+        ncols=min(4, len(handles)),
+    )  # fmt: skip

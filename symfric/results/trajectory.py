@@ -265,17 +265,27 @@ class Trajectory(Showing, Derivatives):
         """All signals at the last time reached."""
         return {k: float(v[0]) for k, v in self.evaluate(np.array(self.span[1:])).items()}
 
-    def plot(self, *names: str, path: str | Path | None = None, label: str = "") -> "Figure":
-        """One panel per signal over time, labelled with units; saved to `path` if given.
+    def plot(
+        self,
+        *names: str,
+        path: str | Path | None = None,
+        label: str = "",
+        panels: str = "main",
+    ) -> "Figure":
+        """Signals over time with units; saved to `path` if given.
+
+        A notebook shows the figure that a cell returns; elsewhere `.show()` opens it in a window.
 
         Args:
-            names: signals or details to show; all signals if none is given.
+            names: signals or details to show, a panel each.
             path: image file, its format taken from the ending.
             label: legend entry of this trajectory.
+            panels: without names, "main" for positions, friction and energy or power, "all" for
+                every signal, those of a kind together where they are many.
         """
         from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow to import)
 
-        return plot_trajectories({label or self.scene: self}, names, path)
+        return plot_trajectories({label or self.scene: self}, names, path, panels)
 
     def animate(
         self,

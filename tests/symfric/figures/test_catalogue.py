@@ -22,6 +22,9 @@ SHOWN_WITH = {
     "lag": {"L"},
     "drift": {"S", "P"},
     "break_away": {"S", "P"},
+    "stiction": {"D", "S"},
+    "dwell": {"T"},
+    "velocity_step": {"L"},
 }
 OTHER_INPUTS = {"quarter_car_general", "bam"}
 """Laws that need more than a pushed block offers."""
@@ -30,7 +33,7 @@ OTHER_INPUTS = {"quarter_car_general", "bam"}
 def shows(law: str, name: str) -> bool:
     if name in NEEDS:
         return law in NEEDS[name]
-    if name in ("drift", "break_away") and law in OTHER_INPUTS | {"wojewoda"}:
+    if name in ("drift", "break_away", "stiction") and law in OTHER_INPUTS | {"wojewoda"}:
         return False
     return bool(SHOWN_WITH[name] & set(phenomena(law_from_text(law))))
 
@@ -54,7 +57,7 @@ def test_every_figure_has_finite_columns_of_one_length_or_is_refused(law: str) -
 REFERENCES = {"generic_asperity": GenericAsperity(count=12), "random_bristles": RandomBristles()}
 
 
-LONG = {("generic_asperity", "break_away"), ("generic_asperity", "drift")}
+LONG = {("generic_asperity", name) for name in ("break_away", "drift", "dwell", "stiction")}
 
 
 @pytest.mark.parametrize(

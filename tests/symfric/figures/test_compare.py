@@ -4,7 +4,7 @@ import pytest
 
 import symfric
 import symfric.laws
-from symfric import Coulomb, LuGre, with_values
+from symfric import Coulomb, LuGre, Viscous, with_values
 from symfric.figures import FigureData, compare
 from symfric.laws import GenericAsperity
 
@@ -41,9 +41,17 @@ def test_stick_slip_of_two_laws_reaches_the_exact_amplitude() -> None:
     assert data["brown_mcphee"]["x"].max() == pytest.approx(0.5705, rel=0.02)
 
 
-def test_one_law_that_cannot_show_it_is_named() -> None:
-    with pytest.raises(ValueError, match="hysteresis of coulomb"):
-        compare([LuGre(), Coulomb()], "hysteresis")
+def test_a_law_that_cannot_show_it_is_left_out_and_the_note_says_why() -> None:
+    data = compare([LuGre(), Coulomb()], "hysteresis")
+    assert {curve.law for curve in data.curves} == {"lugre"}
+    assert data.note.startswith("without coulomb: hysteresis of coulomb: expected a law that shows")
+    assert "such laws are" not in data.note
+    assert data.to_dict()["note"] == data.note
+
+
+def test_where_no_law_can_show_it_the_first_is_named() -> None:
+    with pytest.raises(ValueError, match="hysteresis of viscous"):
+        compare([Viscous(), Coulomb()], "hysteresis")
 
 
 def test_unknown_scenario_is_refused_with_a_hint() -> None:
@@ -69,9 +77,12 @@ def test_a_population_is_compared_by_name_and_as_an_instance() -> None:
     assert {c.law for c in data.curves} == {"gms", "generic_asperity_2", "generic_asperity_3"}
 
 
-def test_a_population_is_refused_in_a_scene() -> None:
-    with pytest.raises(ValueError, match="scene rabinowicz, got generic_asperity, a population"):
-        compare(["gms", "generic_asperity"], "rabinowicz")
+def test_a_population_is_left_out_of_a_scene() -> None:
+    data = compare(["coulomb", "generic_asperity"], "rabinowicz")
+    assert {curve.law for curve in data.curves} == {"coulomb"}
+    assert data.note.startswith("without generic_asperity: rabinowicz with generic_asperity")
+    with pytest.raises(ValueError, match="expected a law with equations, got a population"):
+        compare(["generic_asperity"], "rabinowicz")
 
 
 def test_the_title_says_the_inputs_of_all_laws() -> None:

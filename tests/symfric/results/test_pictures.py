@@ -1,14 +1,22 @@
-"""Pictures carry names, units and legends, and are written whole."""
+"""Pictures of runs: what they show by default, with which names, units and line styles."""
 
 from pathlib import Path
+from typing import Any
 
+import casadi as ca
 import matplotlib.pyplot as plt
+import numpy as np
 import pytest
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from symfric import BrownMcPhee, LuGre, Trajectory, rabinowicz, simulate
-from symfric.results.pictures import plot_trajectories
-from symfric.scenes import FourMass
+from symfric import BrownMcPhee, LuGre, Model, Trajectory, Variable, rabinowicz, simulate
+from symfric.foundation.style import line
+from symfric.results.kinds import friction_laws, shortened
+from symfric.results.pictures import level, plot_trajectories
+from symfric.scenes import Arm, FourMass, QuarterCar
 
 
 @pytest.fixture(scope="module")
@@ -17,36 +25,147 @@ def runs() -> dict[str, Trajectory]:
     return {name: simulate(rabinowicz(law), 0.5, samples=51) for name, law in laws.items()}
 
 
-def test_trajectory_plots_a_labelled_panel_per_signal(runs: dict[str, Trajectory]) -> None:
+@pytest.fixture(scope="module")
+def four_mass() -> Trajectory:
+    return simulate(FourMass(BrownMcPhee()).model(), 0.1, samples=11)
+
+
+def labels(figure: Figure) -> list[str]:
+    return [axis.get_ylabel() for axis in figure.axes]
+
+
+def names(axis: Axes) -> list[str]:
+    return [str(one.get_label()) for one in axis.lines]
+
+
+def test_a_run_shows_positions_friction_and_power_and_names_its_law(
+    runs: dict[str, Trajectory],
+) -> None:
     figure = runs["lugre"].plot()
-    axes = figure.axes
-    assert [axis.get_ylabel() for axis in axes] == [
-        "x [m]",
-        "v [m/s]",
-        "z [m]",
-        "v_rel [m/s]",
-        "friction [N]",
-        "power [W]",
-    ]
-    assert axes[-1].get_xlabel() == "t [s]"
-    assert "rabinowicz" in (axes[0].get_title(), axes[0].get_title(loc="left"))
-    line = axes[1].lines[0]
-    assert line.get_xdata() == pytest.approx(runs["lugre"].looks)
-    assert line.get_ydata() == pytest.approx(runs["lugre"].at_looks("v"))
+    assert labels(figure) == ["x [mm]", "friction [N]", "power [mW]"]
+    assert figure.axes[-1].get_xlabel() == "t [s]"
+    assert figure.axes[0].get_title(loc="left") == "rabinowicz with LuGre"
+    (line_,) = figure.axes[0].lines
+    assert line_.get_xdata() == pytest.approx(runs["lugre"].looks)
+    assert line_.get_ydata() == pytest.approx(1e3 * runs["lugre"].at_looks("x"))
+
+
+def test_all_signals_have_a_panel_each_where_they_are_few(runs: dict[str, Trajectory]) -> None:
+    figure = runs["lugre"].plot(panels="all")
+    assert labels(figure) == ["x [mm]", "v [m/s]", "z [µm]", "v_rel [m/s]", "friction [N]",
+                              "power [mW]"]  # fmt: skip
+
+
+def test_other_choices_are_refused(runs: dict[str, Trajectory]) -> None:
+    with pytest.raises(ValueError, match=r"plot: panels: expected one of main, all, got some"):
+        runs["lugre"].plot(panels="some")
 
 
 def test_chosen_signals_in_the_chosen_order(runs: dict[str, Trajectory]) -> None:
     figure = runs["lugre"].plot("friction", "x", label="LuGre")
-    assert [axis.get_ylabel() for axis in figure.axes] == ["friction [N]", "x [m]"]
+    assert labels(figure) == ["friction [N]", "x [mm]"]
     assert figure.axes[0].lines[0].get_label() == "LuGre"
 
 
-def test_several_trajectories_share_panels_and_a_legend(runs: dict[str, Trajectory]) -> None:
+def test_runs_differ_by_colour_and_line_style_and_stand_in_a_legend_below(
+    runs: dict[str, Trajectory],
+) -> None:
     figure = plot_trajectories(runs)
-    assert [len(axis.lines) for axis in figure.axes] == [2] * 5  # z stands in one of them only
-    legend = figure.axes[0].get_legend()
-    assert legend is not None
+    assert [len(axis.lines) for axis in figure.axes] == [2, 2, 2]
+    for k, one in enumerate(figure.axes[0].lines):
+        assert to_hex(one.get_color()) == line(k)["color"]
+        assert one.is_dashed() == (k == 1)
+    (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == list(runs)
+    figure.draw_without_rendering()
+    lowest = min(axis.get_window_extent().y0 for axis in figure.axes)
+    assert legend.get_window_extent().y1 < lowest
+
+
+def test_mechanisms_share_panels_by_kind_and_constraints_are_left_to_all(
+    four_mass: Trajectory,
+) -> None:
+    figure = four_mass.plot()
+    assert labels(figure) == ["position [m]", "friction [N]", "energy [J]"]
+    assert [names(axis) for axis in figure.axes] == [
+        ["x1", "y2", "z3", "x4"],
+        ["x1", "y2", "z3", "x4"],
+        ["kinetic", "potential", "energy"],
+    ]
+    everything = four_mass.plot(panels="all")
+    assert labels(everything) == ["position [m]", "rate [m/s]", "normal force [N]", "friction [N]",
+                                  "power of friction [W]", "energy [J]",
+                                  "constraints"]  # fmt: skip
+    assert [axis.get_yscale() for axis in everything.axes] == 6 * ["linear"] + ["log"]
+
+
+def test_a_legend_of_signals_stands_beside_its_panel(four_mass: Trajectory) -> None:
+    figure = four_mass.plot()
+    figure.draw_without_rendering()
+    for axis in figure.axes:
+        legend = axis.get_legend()
+        assert legend is not None
+        assert legend.get_window_extent().x0 >= axis.get_window_extent().x1
+
+
+def test_of_compared_mechanisms_energy_is_the_sum(four_mass: Trajectory) -> None:
+    run = simulate(QuarterCar(LuGre()).model(), 0.1, samples=5)
+    assert labels(plot_trajectories({"a": run, "b": run})) == [
+        "X_b [m]", "X_w [m]", "friction [N]", "power [W]",
+    ]  # fmt: skip
+    both = plot_trajectories({"a": four_mass, "b": four_mass})  # nine signals: too many alone
+    assert labels(both) == ["position [m]", "friction [N]", "energy [J]"]
+    first, second = both.axes[0].lines[:2]
+    assert first.get_color() == second.get_color()
+    assert (first.is_dashed(), second.is_dashed()) == (False, True)
+
+
+def test_six_joints_are_three_panels() -> None:
+    run = simulate(Arm(BrownMcPhee()).model(), 0.01, samples=3)
+    figure = run.plot()
+    assert labels(figure) == ["position [rad]", "friction [N]", "energy [J]"]
+    assert names(figure.axes[1]) == [f"q{k}" for k in range(1, 7)]
+
+
+def test_a_model_of_its_own_kind_shows_all_of_it() -> None:
+    a = Variable("concentration", "mol/m^3", start=1.0)
+    run = simulate(Model("decay", x=(a,), ode=-a.symbol), 1.0, samples=5)
+    figure = run.plot()
+    assert labels(figure) == ["concentration [mol/m^3]"]
+    assert figure.axes[0].get_title(loc="left") == "decay"
+
+
+def test_a_constant_is_a_level_line_and_no_offset_is_written() -> None:
+    x, c = Variable("x", "m", start=1.0), Variable("c", "m", start=7.8e-6)
+    still = Model("still", x=(x, c), ode=ca.SX([1.0, 0.0]))
+    axis = simulate(still, 1.0, samples=5).plot("c").axes[0]
+    assert axis.get_ylabel() == "c [µm]"
+    assert axis.get_ylim() == pytest.approx((0.8 * 7.8, 1.2 * 7.8))
+    axis.figure.draw_without_rendering()
+    assert axis.yaxis.get_offset_text().get_text() == ""
+
+
+@pytest.mark.parametrize(("values", "limits"), [([0.0, 0.0], (-1.0, 1.0)),
+                                                ([5.0, 5.0 + 1e-9], (4.0, 6.0))])  # fmt: skip
+def test_what_hardly_changes_is_not_magnified(
+    values: list[float], limits: tuple[float, float]
+) -> None:
+    axis: Any = Figure().subplots()
+    axis.plot(values)
+    level(axis, [np.array(values), np.array([np.nan])])
+    assert axis.get_ylim() == pytest.approx(limits)
+
+
+def test_names_lose_the_ending_that_all_share_and_stay_short() -> None:
+    assert shortened(["phi_1_friction", "phi_2_friction"]) == ["phi_1", "phi_2"]
+    assert shortened(["kinetic", "potential"]) == ["kinetic", "potential"]
+    assert shortened(["x_friction"]) == ["x_friction"]
+    (long,) = shortened(["a" * 30 + "_" + "b" * 30])
+    assert (len(long), long[:3], long[-3:]) == (28, "aaa", "bbb")
+
+
+def test_the_laws_of_a_model_are_told_once() -> None:
+    assert friction_laws(FourMass(BrownMcPhee()).model()) == "BrownMcPhee"
 
 
 def test_picture_is_written_and_pyplot_keeps_none(
@@ -70,12 +189,3 @@ def test_format_follows_the_ending(
 def test_unknown_signal_is_refused_with_a_hint(runs: dict[str, Trajectory]) -> None:
     with pytest.raises(ValueError, match=r"got frction; did you mean friction"):
         runs["lugre"].plot("frction")
-
-
-def test_mechanisms_have_a_panel_per_kind_and_constraints_on_a_logarithmic_scale() -> None:
-    run = simulate(FourMass(BrownMcPhee()).model(), 0.1, samples=11)
-    axes = {axis.get_ylabel(): axis for axis in run.plot().axes}
-    assert list(axes) == ["position [m]", "rate [m/s]", "normal force [N]", "friction [N]",
-                          "friction [W]", "energy [J]", "constraints"]  # fmt: skip
-    assert [line.get_label() for line in axes["position [m]"].lines] == ["x1", "y2", "z3", "x4"]
-    assert [axis.get_yscale() for axis in axes.values()] == 6 * ["linear"] + ["log"]
