@@ -1,0 +1,65 @@
+"""Pendulum and box of figures 6 to 12: eleven laws with the numbers of tables 6 and 7."""
+
+from functools import cache
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from symfric import ExactCoulomb, Law, Trajectory, simulate
+from symfric.gallery.selection import _machine as machine
+from symfric.gallery.selection._laws import LAWS, small_multiples
+from symfric.gallery.signals import acceleration, largest
+from symfric.scenes import PendulumBox
+
+Array = NDArray[np.float64]
+T_END = 15.0
+EXACT = "exact dry friction"
+
+
+def box(law: Law, J: float = machine.J) -> PendulumBox:
+    """The scene of table 6; `J` [kg m^2] is the inertia of the pendulum about its mass."""
+    return PendulumBox.preset("jing_mi_table_7", law, J=J)
+
+
+@cache
+def run(name: str, t_end: float = T_END, rtol: float = 1e-7) -> Trajectory:
+    """A law, or exact dry friction, in floor and hinge; seen every ms."""
+    law: Law = ExactCoulomb() if name == EXACT else LAWS[name]
+    model = box(law).model()
+    return simulate(model, t_end, rtol=rtol, t_eval=np.linspace(0, t_end, round(1000 * t_end) + 1))
+
+
+@cache
+def signal(name: str, what: str, t_end: float) -> Array:
+    """x, x', x'' of the box or phi, phi', phi'' of the pendulum."""
+    one, joint = run(name, t_end), what.rstrip("'")
+    ending = what.removeprefix(joint)
+    if ending == "''":
+        return acceleration(one, f"{joint}_rate")
+    return one[f"{joint}_rate"] if ending else one[joint]
+
+
+@cache
+def by_hand(t_end: float) -> dict[str, Array]:
+    """The smooth Coulomb law in both joints, by equations written by hand."""
+    return machine.smooth_coulomb(run("Smooth", t_end).t)
+
+
+def distance(what: str, t_end: float) -> float:
+    """Largest difference of a signal of the smooth Coulomb law from that by hand."""
+    return largest(signal("Smooth", what, t_end) - by_hand(t_end)[what])
+
+
+def picture(
+    what: str, label: str, names: tuple[str, ...], t_end: float, limit: float = np.inf
+) -> Figure:
+    """A panel per law, exact dry friction behind."""
+    t = run(EXACT, t_end).t
+    curves = {name: (t, signal(name, what, t_end)) for name in names}
+    return small_multiples(curves, (t, signal(EXACT, what, t_end)), label, (-limit, limit))
+
+
+def last_swing(name: str, what: str, t_end: float) -> float:
+    """Half the range of a signal in the last two seconds."""
+    return float(np.ptp(signal(name, what, t_end)[-2000:])) / 2
