@@ -51,8 +51,9 @@ class QuarterCar(Scene):
     (a mechanism with the strut's force on two guides is the test's second opinion).
 
     Defaults: section 3 of the paper, and its road of 50 mm (30 and 70 mm in its other runs). It
-    does not give L_d and the times of the road. N_0 is chosen so that a law with mu_s = 0.15
-    breaks away at the paper's 193.8 N; the paper has none, and its own law needs none.
+    does not give L_d and the times of the road; by its text the first ramp is the gentlest, which
+    takes a t_first above 1.7 s. N_0 is chosen so that a law with mu_s = 0.15 breaks away at the
+    paper's 193.8 N; the paper has none, and its own law needs none.
     Source: Al-Zughaibi, quarter-car friction, equations 1-13.
     """
 
@@ -84,7 +85,12 @@ class QuarterCar(Scene):
         0.05, unit="m", role="motion", doc="rise of the second ramp, half fall of the third"
     )
     t_0: Scalar = param(0.5, unit="s", role="motion", doc="start of the first ramp", lower=0.0)
-    t_ramp: Scalar = param(1.0, unit="s", role="motion", doc="duration of a ramp", lower=1e-12)
+    t_first: Scalar = param(
+        1.0, unit="s", role="motion", doc="duration of the first ramp", lower=1e-12
+    )
+    t_ramp: Scalar = param(
+        1.0, unit="s", role="motion", doc="duration of the other ramps", lower=1e-12
+    )
     t_hold: Scalar = param(2.0, unit="s", role="motion", doc="rest after a ramp", lower=0.0)
 
     def __post_init__(self) -> None:
@@ -94,11 +100,15 @@ class QuarterCar(Scene):
         object.__setattr__(self, "law", with_values(self.law, shared))
 
     def road(self, t: Scalar) -> Scalar:
-        """Height X_r of the road [m] at time t [s]: three ramps of one duration."""
+        """Height X_r of the road [m] at time t [s]: three ramps, a rest after each."""
         heights = (self.middle, self.amplitude, -2 * self.amplitude)
-        starts = (self.t_0 + k * (self.t_ramp + self.t_hold) for k in range(3))
-        ramps = (smooth.clip((t - start) / self.t_ramp, 0.0, 1.0) for start in starts)
-        return sum(height * ramp for height, ramp in zip(heights, ramps, strict=True))
+        second = self.t_0 + self.t_first + self.t_hold
+        starts = (self.t_0, second, second + self.t_ramp + self.t_hold)
+        lengths = (self.t_first, self.t_ramp, self.t_ramp)
+        return sum(
+            height * smooth.clip((t - start) / length, 0.0, 1.0)
+            for height, start, length in zip(heights, starts, lengths, strict=True)
+        )
 
     def equations(self, p: Variables) -> Model:
         """States X_b, X_w, v_b, v_w and those of the law; results of road, suspension, guide."""

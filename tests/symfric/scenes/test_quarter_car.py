@@ -247,3 +247,11 @@ def test_friction_lessens_the_overshoot_of_the_body() -> None:
     assert free == pytest.approx(9.5e-3, abs=1e-4)
     for law in (QuarterCarGeneral(), QuarterCarSimple()):
         assert overshoot(law) < 0.5 * free
+
+
+def test_the_first_ramp_may_be_gentler_and_the_others_come_later() -> None:
+    rig = QuarterCar(QuarterCarSimple(), t_first=2.4)
+    corners = (0.5, 2.9, 4.9, 5.9, 7.9, 8.9)
+    heights = (0.0, 0.085, 0.085, 0.135, 0.135, 0.035)
+    assert np.allclose([float(rig.road(t)) for t in corners], heights, atol=1e-12)
+    assert abs(float(rig.road(1.7)) - 0.0425) < 1e-12

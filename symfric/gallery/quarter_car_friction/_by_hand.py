@@ -1,0 +1,75 @@
+"""The rig of the paper once more, without `symfric`: exactly without friction, else in small steps.
+
+The body sticks until the strut's force exceeds break-away, and stops where its velocity crosses
+zero; in between its friction is equation 12 with the signs that the text asks for.
+"""
+
+from itertools import pairwise
+from math import asin, copysign, cos, exp, pi, sin, tan
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from symfric.gallery.quarter_car_friction._rig import FIRST, HOLD, RAMP, START, T_END
+
+Array = NDArray[np.float64]
+
+M_B, M_W, K_S, B_D, K_T, B_T = 240.0, 40.0, 28900.0, 260.0, 920000.0, 3886.0
+THETA, L_D, BREAK_AWAY = pi / 4, 0.4, 193.8
+CORNERS = np.cumsum([0.0, START, FIRST, HOLD, RAMP, HOLD, RAMP, T_END])
+"""Times at which the road bends [s]."""
+
+
+def heights(millimetres: int) -> Array:
+    """Height of the road at its corners [m]."""
+    up, down = 0.085 + 1e-3 * millimetres, 0.085 - 1e-3 * millimetres
+    return np.array([0.0, 0.0, 0.085, 0.085, up, up, down, down])
+
+
+def without_friction(t: Array) -> Array:
+    """X_b, X_w, v_b, v_w [m, m/s] at `t` [s] by the exponential of a matrix, shape (4, n)."""
+    rows = [
+        [0, 0, 1, 0, 0, 0],
+        [0, 0, 0, 1, 0, 0],
+        [-K_S / M_B, K_S / M_B, -B_D / M_B, B_D / M_B, 0, 0],
+        [K_S / M_W, -(K_S + K_T) / M_W, B_D / M_W, -(B_D + B_T) / M_W, K_T / M_W, B_T / M_W],
+        [0, 0, 0, 0, 0, 1],
+        [0, 0, 0, 0, 0, 0],
+    ]  # body, wheel, their velocities, road, its slope
+    matrix, road = np.array(rows, dtype=float), heights(50)
+    y, found = np.zeros(6), np.zeros((4, t.size))
+    for k, (begin, end) in enumerate(pairwise(CORNERS)):
+        y[4:] = road[k], (road[k + 1] - road[k]) / (end - begin)
+        inside = np.flatnonzero((t >= begin) & (t <= end))
+        for i in inside:
+            found[:, i] = (expm(matrix * (t[i] - begin)) @ y)[:4]
+        y = expm(matrix * (end - begin)) @ y
+    return found
+
+
+def with_friction(
+    h: float, millimetres: int, C_e: float, e_1: float, mu: float, sigma_v: float
+) -> tuple[Array, Array, Array]:
+    """Times [s], body [m] and friction [N] in steps of `h` [s]."""
+    t = np.linspace(0.0, T_END, round(T_END / h) + 1)
+    road = np.interp(t, CORNERS, heights(millimetres))
+    slope = np.gradient(road, h).tolist()
+    X_b = X_w = v_b = v_w = 0.0
+    body, friction = np.zeros(t.size), np.zeros(t.size)
+    for i, X_r in enumerate(road.tolist()):
+        x = X_w - X_b
+        f = K_S * x + B_D * (v_w - v_b)
+        if v_b == 0.0 and abs(f) <= BREAK_AWAY:
+            held = f
+        else:
+            side = copysign(1.0, v_b or f)
+            lean = asin(x * cos(THETA) / (L_D - x * sin(THETA)))
+            held = side * (C_e * exp(-abs(v_b) / e_1) + mu * abs(f) / tan(THETA - lean))
+            held += sigma_v * v_b
+            v_b += h / M_B * (f - held)
+            v_b = v_b if side * v_b > 0 else 0.0
+        body[i], friction[i] = X_b, held
+        v_w += h / M_W * (K_T * (X_r - X_w) + B_T * (slope[i] - v_w) - f)
+        X_b, X_w = X_b + h * v_b, X_w + h * v_w
+    return t, body, friction

@@ -1,0 +1,26 @@
+"""The rig of the paper on a road of 30, 50 or 70 mm."""
+
+from collections.abc import Mapping
+
+from symfric import QuarterCarGeneral, Trajectory, simulate, with_values
+from symfric.laws import Law
+from symfric.scenes import QuarterCar
+
+START, FIRST, RAMP, HOLD, T_END = 0.3, 2.4, 1.0, 2.0, 12.0  # s
+"""Times of the road; not in the paper, whose text says that the first ramp is the gentlest."""
+STAGES = {"A": (START, 0.0), "B": (4.7, 0.085), "C": (7.7, 0.135), "D": (T_END, 0.035)}
+"""End of each rest [s], and where the paper says that the body is then [m]."""
+FRICTION = {"C_e": 180.0, "e_1": 0.01, "mu": 0.05, "sigma_v": 1500.0}
+"""Friction of the general law [N, m/s, 1, N s/m]; not in the paper."""
+
+
+def general(numbers: Mapping[str, float] = FRICTION, form: str = "smooth") -> QuarterCarGeneral:
+    """The general law in narrow windows [m/s, N], since the paper's has none."""
+    return with_values(QuarterCarGeneral(v_eps=2e-4, F_eps=0.1, form=form), numbers)
+
+
+def ride(law: Law, millimetres: int = 50, samples: int = 6001) -> Trajectory:
+    """A run of the rig with `law` in its guide."""
+    name = f"al_zughaibi_{millimetres}_mm"
+    car = QuarterCar.preset(name, law, t_0=START, t_first=FIRST, t_ramp=RAMP, t_hold=HOLD)
+    return simulate(car.model(), T_END, rtol=1e-8, samples=samples)
