@@ -172,6 +172,15 @@ def unit_does_what_python_does(printed: str, folder: Path) -> None:
     assert (folder / "drive.fmu").is_file()
 
 
+def opti_lands_within_a_micrometre(printed: str, folder: Path) -> None:
+    iterations, cost, miss = re.findall(
+        r"(\d+) iter.* J = ([\d.]+) .*\n.*: ([-+][\d.]+) um,", printed
+    )[0]
+    assert int(iterations) <= 15
+    assert abs(float(cost) - 1.114) < 1e-3
+    assert abs(float(miss)) < 1.0
+
+
 LONG = (
     "arm_to_a_place",
     "co_design",
@@ -209,6 +218,7 @@ SAYS = dict.fromkeys(LONG, motion_is_verified) | {
     "drive_unit": unit_does_what_python_does,
     "robot_feed_forward": each_term_makes_the_arm_truer,
     "rabinowicz": period_is_between_those_of_two_laws,
+    "opti_lugre": opti_lands_within_a_micrometre,
     "optimal_move": moves_are_solved_and_saved,
 }
 

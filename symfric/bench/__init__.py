@@ -12,6 +12,8 @@ from symfric.bench.identification import bench_identification as bench_identific
 from symfric.bench.integrator import Benchmark as Benchmark
 from symfric.bench.integrator import Row as Row
 from symfric.bench.integrator import bench_integrator as bench_integrator
+from symfric.bench.interop import InteropBenchmark as InteropBenchmark
+from symfric.bench.interop import bench_interop as bench_interop
 from symfric.bench.ivp import IvpBenchmark as IvpBenchmark
 from symfric.bench.ivp import bench_ivp as bench_ivp
 from symfric.bench.jitter import jitter as jitter

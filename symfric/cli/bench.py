@@ -18,11 +18,12 @@ SUBJECTS = (
     "jitter",
     "regularisation",
     "ocp",
+    "interop",
     "identification",
     "codegen",
     "embedded",
 )
-TABLES = ("calls", "ensemble", "embedded")
+TABLES = ("calls", "ensemble", "embedded", "interop")
 """Subjects without a picture."""
 
 
@@ -59,7 +60,8 @@ def bench(
     problems with published solutions (Test Set for IVP Solvers). jitter: total variation of
     accelerations against law, step and transition velocity. regularisation: error of smooth laws
     against dry friction, over their width or stiffness. ocp: optimal control from many starts,
-    whether it lands, large programs, controllers; beside CasADi's Opti and rockit. identification:
+    whether it lands, large programs, controllers; beside CasADi's Opti and rockit. interop: laws in
+    Opti, rockit, do-mpc and CasADi's integrators, as their users write them. identification:
     fits from many starts and noises, their intervals, measured machines, damaged files. codegen:
     generated C beside its goals and CasADi's own. embedded: its instructions and bytes on Cortex-M
     cores, under QEMU.

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
         CodegenBenchmark,
         EmbeddedBenchmark,
         IdentificationBenchmark,
+        InteropBenchmark,
         IvpBenchmark,
         LaneBenchmark,
         MultibodyBenchmark,
@@ -345,3 +346,33 @@ def _skipped(reasons: dict[str, str]) -> None:
 def _short(value: float) -> float:
     """Three digits."""
     return float(f"{value:.3g}")
+
+
+def interop(result: "InteropBenchmark") -> None:
+    """Moves by tool, route and law; CasADi's integrators; what is absent."""
+    output.show_table(
+        ["tool", "route", "law", "J", "miss", "it.", "s", ""],
+        [
+            [m.tool, m.route[:7], m.law, f"{m.cost:.3f}", _short(m.miss),
+             m.iterations, f"{m.time_s:.1f}", _word(m.answer)]
+            for m in result.moves
+        ],
+        "0.1 m in 1 s against friction: cost, miss by `simulate` with the law itself",
+    )  # fmt: skip
+    output.show_table(
+        ["integrator", "law", "error [m]", "time ratio", ""],
+        [[r.integrator, r.law, _short(r.error), _short(r.ratio), r.answer] for r in result.runs],
+        "20 s of stick-slip in CasADi's integrators; time over that of symfric without compiler",
+    )
+    for tool in result.absent:
+        output.show(f"{tool} is not installed: no rows")
+
+
+def _word(answer: str) -> str:
+    """The words of Ipopt, shorter; nothing where it is content."""
+    known = {
+        "Solve_Succeeded": "",
+        "Maximum_CpuTime_Exceeded": "out of time",
+        "Search_Direction_Becomes_Too_Small": "gave up",
+    }
+    return known.get(answer, answer.replace("_", " ").lower())

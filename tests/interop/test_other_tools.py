@@ -1,0 +1,102 @@
+"""Laws inside the tools of others: Opti, CasADi's integrators, rockit, do-mpc, acados."""
+
+import re
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from symfric.bench.interop import LAWS, ROUTES, Move, integrators, move
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "interop"
+MISS = {"flow": 2e-3, "collocation": 1e-3}
+"""Of laws that equal steps do not quite resolve [m, m/s]."""
+
+
+def needs(tool: str) -> None:
+    if tool not in ("opti", "acados") and find_spec(tool) is None:
+        pytest.skip(f"needs {tool} (extra interop)")
+
+
+@pytest.fixture(scope="module")
+def opti() -> dict[tuple[str, str], Move]:
+    laws = ("brown_mcphee", "lugre", "elasto_plastic")
+    return {(law, route): move("opti", route, law) for law in laws for route in MISS}
+
+
+def test_opti_takes_static_laws_and_bristles(opti: dict[tuple[str, str], Move]) -> None:
+    for (law, route), found in opti.items():
+        assert found.answer == "Solve_Succeeded", (law, route)
+        assert found.iterations <= 30
+        assert found.miss < MISS[route], (law, route)
+
+
+def test_through_flow_lugre_is_hit_a_hundred_times_better_than_by_collocation(
+    opti: dict[tuple[str, str], Move],
+) -> None:
+    assert opti["lugre", "flow"].iterations <= 15
+    assert opti["lugre", "flow"].miss < 5e-6 < 1e-5 < opti["lugre", "collocation"].miss
+
+
+@pytest.mark.filterwarnings("ignore::FutureWarning")  # how do-mpc hands NumPy to CasADi
+@pytest.mark.parametrize("tool", ["rockit", "do_mpc"])
+@pytest.mark.parametrize("route", MISS)
+def test_other_tools_find_what_opti_finds(
+    tool: str, route: str, opti: dict[tuple[str, str], Move]
+) -> None:
+    needs(tool)
+    found = move(tool, route, "lugre")
+    assert found.answer == "Solve_Succeeded"
+    assert found.cost == pytest.approx(opti["lugre", route].cost, rel=1e-5)
+    assert found.miss == pytest.approx(opti["lugre", route].miss, rel=0.2)
+
+
+def test_every_tool_has_both_routes() -> None:
+    assert {route for _, route in ROUTES} == {*MISS}
+    assert "gms" in LAWS
+
+
+@pytest.mark.parametrize("law", ["brown_mcphee", "lugre"])
+def test_casadis_integrators_take_the_model_and_agree(law: str) -> None:
+    runs = {run.integrator: run for run in integrators(law)}
+    assert runs["symfric"].error < 1e-5
+    assert max(runs["cvodes"].error, runs["idas"].error) < 1e-4
+    assert not runs["rk"].error < 1e-2  # explicit steps do not resolve friction, and do not say so
+
+
+def printed(name: str, folder: Path) -> str:
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / f"{name}.py")],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_acados_gets_functions_that_compile_to_the_law(tmp_path: Path) -> None:
+    said = printed("acados_drive", tmp_path)
+    pairs = re.findall(r"(-\d+\.\d+) [^,]*, by \w+ (-\d+\.\d+)", said)
+    assert len(pairs) == 2
+    assert all(a == b for a, b in pairs)
+
+
+def test_rockit_example(tmp_path: Path) -> None:
+    needs("rockit")
+    misses = re.findall(r"simulated ([-+][\d.]+) um", printed("rockit_lugre", tmp_path))
+    assert abs(float(misses[0])) < 1.0 and abs(float(misses[1])) < 100.0
+
+
+def test_do_mpc_example(tmp_path: Path) -> None:
+    needs("do_mpc")
+    (miss,) = re.findall(r": ([-+][\d.]+) mm from", printed("do_mpc_drive", tmp_path))
+    assert abs(float(miss)) < 0.05
+
+
+def test_examples_are_short() -> None:
+    for path in EXAMPLES.glob("*.py"):
+        assert len(path.read_text("utf-8").splitlines()) <= 100
