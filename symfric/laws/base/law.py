@@ -4,11 +4,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, empty, equals
 from symfric.foundation.parameters import Parametric, parameters
+from symfric.laws.base.given import with_states
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -114,14 +115,21 @@ class Law(Parametric, ABC):
     body writes the minus (m dv/dt = F_e - force).
 
     `v` is the sliding velocity [m/s], `N` >= 0 the normal force [N], `z` the column of internal
-    states, shape (n, 1) for CasADi types and (n, ...) for arrays, n = len(states). Any of them may
-    be a float, a NumPy array, SX, MX or DM. A law that needs another input, such as the applied
-    tangential force, names it in `inputs` and takes it as a keyword-only argument with default 0.
+    states, shape (n, 1) for CasADi types and (n, ...) for arrays, n = len(states); of one state it
+    may be a number. Any of them may be a float, a NumPy array, SX, MX or DM. A law that needs
+    another input, such as the applied tangential force, names it in `inputs` and takes it as a
+    keyword-only argument with default 0.
 
     A law with modes (stick, slip) keeps them in states that only jump, at its `switches`.
     """
 
     facts: ClassVar[Facts]
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        super().__init_subclass__(**keywords)
+        for name in ("force", "rate"):
+            if name in vars(cls):
+                setattr(cls, name, with_states(vars(cls)[name]))
 
     @property
     @abstractmethod

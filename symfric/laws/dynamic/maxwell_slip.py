@@ -144,7 +144,7 @@ class MaxwellSlip(Law):
         return column(*ends, *modes), column(*means, *modes)
 
     def update(self, F: Scalar, dx: Scalar, N: Scalar) -> Scalar:
-        """The spring forces after the slip `dx` [m] in one direction, exactly."""
+        """The spring forces after the slip `dx` [m] in one direction, exactly; their sum is F."""
         held = [
             smooth.clip(F[i] + e.k * dx, -e.mu * N, e.mu * N) for i, e in enumerate(self.elements)
         ]

@@ -27,7 +27,7 @@ def forces(points: list[float]) -> list[float]:
     F, found = np.zeros(4), [0.0]
     for a, b in pairwise(points):
         F = EXACT.update(F, b - a, N)
-        found.append(float(EXACT.force(0.0, N, F)))
+        found.append(float(np.sum(F)))
     return found
 
 
