@@ -19,6 +19,7 @@ from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable, check_names
 from symfric.foundation.shown import Showing, Shown
 from symfric.foundation.symbols import stacked, symbols_of
+from symfric.model.accelerations import accelerations
 from symfric.model.contact import Contact, closed, opened, reopened, with_forces
 from symfric.model.holonomic import Holonomic
 from symfric.model.parts import Event, Monitor, Output
@@ -199,7 +200,7 @@ class Model(Showing, Starting):
 
     @cached_property
     def further(self) -> dict[str, Output]:
-        """The `details`, written out.
+        """The `details`, written out, and accelerations, `<q>_acc`, that have no such name.
 
         Raises:
             ValueError: one has a name that the model has already.
@@ -210,7 +211,9 @@ class Model(Showing, Starting):
             raise ValueError(
                 f"model '{self.name}': details: expected new names, got {', '.join(repeated)}"
             )
-        return found
+        taken = {*found, *self.signals, *(v.name for v in self.p)}
+        own = accelerations(self).items()
+        return found | {name: output for name, output in own if name not in taken}
 
     def expression(self, name: str) -> ca.SX:
         """The signal or detail `name` in the symbols of the model.

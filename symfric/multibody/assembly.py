@@ -32,6 +32,7 @@ from symfric.multibody.mass import solve_mass
 from symfric.multibody.results import Put
 from symfric.multibody.slips import Slip, depends_on_load, events, keeps_deflection, slips
 from symfric.multibody.topology import Topology
+from symfric.multibody.units import constraint_units, multiplier_units
 
 Details = Callable[[ca.SX, Put], Mapping[str, Output]]
 Drawn = Callable[[Mapping[str, float]], Sketch]
@@ -81,11 +82,11 @@ def assemble(
     """
     groups = rests(f"mechanism '{name}'", eq, (q, qd, guess["a"]), p)
     contacts = slips(eq, guess["N"].tolist(), groups)
-    units = {label: part.unit for part in eq.held for label in part.labels}
+    units = multiplier_units(eq)
     multipliers = tuple(
         Variable(
             label,
-            units.get(label, ""),
+            units[label],
             start=float(x),
             nominal=max(1.0, abs(float(x))),
             doc="multiplier",
@@ -167,7 +168,7 @@ def _model(
         ),
         u=machine.u,
         p=p,
-        outputs=_outputs(eq, contacts, put),
+        outputs=_outputs(eq, contacts, put, [v.unit for v in machine.multipliers]),
         monitors=tuple(m for s, _ in scales if s.force is not s.contact.F for m in _watched(s)),
         events=events([s for s in contacts if s.force is not s.contact.F], groups, machine.qd),
         t=eq.kin.t,
@@ -298,15 +299,17 @@ def _sizes(slip: Slip) -> tuple[ca.SX, ca.SX]:
     return speed, slip.contact.friction.magnitude(*ca.vertsplit(slip.force))
 
 
-def _outputs(eq: Equations, contacts: Sequence[Slip], put: Put) -> dict[str, Output]:
-    """Results of the contacts, energies, and what is left of the constraints."""
+def _outputs(
+    eq: Equations, contacts: Sequence[Slip], put: Put, multipliers: list[str]
+) -> dict[str, Output]:
+    """Results of the contacts, energies, and what is left of the constraints.
+
+    `multipliers` are their units.
+    """
     found: dict[str, Output] = {}
-    norms = (
-        ("constraint_position", eq.phi, "m"),
-        ("constraint_velocity", eq.phi_dot, "m/s"),
-        ("constraint_acceleration", eq.phi_ddot, ""),
-    )
-    expressions = put([*(s.normal for s in contacts), *(x for _, x, _ in norms)])
+    levels = ("constraint_position", "constraint_velocity", "constraint_acceleration")
+    norms = [eq.phi, eq.phi_dot, eq.phi_ddot]
+    expressions = put([*(s.normal for s in contacts), *norms])
     for slip, normal in zip(contacts, expressions, strict=False):
         contact, name = slip.contact, slip.contact.name
         if slip.N is slip.normal:
@@ -328,7 +331,8 @@ def _outputs(eq: Equations, contacts: Sequence[Slip], put: Put) -> dict[str, Out
     ):
         found[name] = Output(value, "J", doc, kinds.ENERGY)
     if eq.m:
-        for (label, _, unit), value in zip(norms, expressions[len(contacts) :], strict=True):
+        units = constraint_units(multipliers)
+        for label, unit, value in zip(levels, units, expressions[len(contacts) :], strict=True):
             norm = ca.sqrt(ca.sumsqr(value))
             found[label] = Output(
                 norm, unit, "norm of the constraints on this level", kinds.CONSTRAINTS

@@ -72,9 +72,9 @@ def test_details_are_shown_beside_signals(run: Trajectory) -> None:
     assert [axis.get_ylabel() for axis in axes] == ["phi_N [N]", "phi_Fx [N]"]
 
 
-def test_a_model_without_details_has_none() -> None:
+def test_a_model_without_details_has_accelerations_alone() -> None:
     run = simulate(rabinowicz(LuGre()), 0.1, samples=3)
-    assert run.details == {}
+    assert run.details == {"x_acc": "m/s^2"}
     with pytest.raises(ValueError, match="got wok_rate"):
         run["wok_rate"]
 

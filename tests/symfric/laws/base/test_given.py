@@ -35,9 +35,7 @@ def test_an_array_beside_velocities_has_a_state_for_each() -> None:
 
 def test_wrong_states_are_refused_with_the_right_ones() -> None:
     for z in ((), [], ca.SX(0, 1)):
-        with pytest.raises(
-            ValueError, match="LuGre: expected z with 1 state, z, got none; z ="
-        ):
+        with pytest.raises(ValueError, match="LuGre: expected z with 1 state, z, got none; z ="):
             LAW.force(0.1, 7.8, z)
     for z in ([1e-5, 2.0], np.zeros(2), ca.SX.sym("z", 2), np.zeros((3, 1))):
         with pytest.raises(ValueError, match="LuGre: expected z with 1 state, z, got"):

@@ -1,0 +1,79 @@
+"""Accelerations of models against differences of velocities and closed forms."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric.foundation.parameters import Variable
+from symfric.integrator import simulate
+from symfric.laws import BrownMcPhee, LuGre
+from symfric.model import Model, Output
+from symfric.scenes import ALL_SCENES, Drive, FourBar, rabinowicz
+
+
+def test_every_scene_has_the_accelerations_of_its_positions() -> None:
+    """Differences of the dense rates: of second order in h, and rounded by 1e-16 / h."""
+    for name, kind in ALL_SCENES.items():
+        scene = kind(BrownMcPhee())
+        given = {n: g.function for n, g in scene.inputs.items()}
+        model = scene.model()
+        run = simulate(model, 0.2, u=given, rtol=1e-8, samples=5)
+        found = [n for n in run.details if n.endswith("_acc")]
+        assert len(found) >= 1, name
+        assert all(run.details[n] in ("m/s^2", "rad/s^2") for n in found), name
+        h, t = 1e-6, np.linspace(0.02, 0.18, 23)
+        states = [v.name for v in model.x]
+        half = states.index(states[0]) + len(found)  # coordinates stand first, then their rates
+        rates = dict(zip(found, states[half:], strict=False))
+        after, before = run.at(t + h), run.at(t - h)
+        for n, rate in rates.items():
+            slope = (after[rate] - before[rate]) / (2 * h)
+            wanted = run.of(model.expression(n), t)
+            scale = max(1.0, float(np.abs(wanted).max()))
+            assert np.abs(slope - wanted).max() < 2e-3 * scale, (name, n)
+
+
+def test_the_acceleration_of_the_block_is_what_newton_says() -> None:
+    run = simulate(rabinowicz(LuGre()), 3.0, samples=301)
+    np.testing.assert_allclose(run["x_acc"], (-2.1 * run["x"] - run["friction"]) / 0.8, atol=1e-12)
+    assert run.unit("x_acc") == "m/s^2"
+
+
+def test_a_turning_drive_has_an_angular_acceleration() -> None:
+    run = simulate(Drive(BrownMcPhee(), turning=True).model(), 0.1, samples=3)
+    assert run.unit("x_acc") == "rad/s^2"
+
+
+def test_accelerations_cost_nothing_until_they_are_asked_for() -> None:
+    model = FourBar(BrownMcPhee()).model()
+    run = simulate(model, 0.05, samples=3)
+    assert "further" not in model.__dict__
+    assert not any(n.endswith("_acc") for n in run.units)
+    assert "theta_crank_acc" in run.details
+
+
+def test_only_rates_that_are_states_have_accelerations_and_names_are_not_taken_twice() -> None:
+    x, v, w = Variable("x", "m"), Variable("v", "m/s"), Variable("w", "V")
+    model = Model(
+        "own", x=(x, v, w), ode=ca.vertcat(v.symbol, -x.symbol, 2 * v.symbol),
+        details=lambda: {"x_acc": Output(7.0, "m")},
+    )  # fmt: skip
+    assert list(model.further) == ["x_acc"]
+    assert model.further["x_acc"].unit == "m"
+    rate = ca.SX.sym("rate")
+    implicit = Model("rc", x=(w,), xdot=rate, residual=rate + w.symbol)
+    assert implicit.further == {}
+    volts = Model("volts", x=(w, x), ode=ca.vertcat(x.symbol, w.symbol))
+    assert {n: o.unit for n, o in volts.further.items()} == {"w_acc": "m/s", "x_acc": "V/s"}
+
+
+@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+def test_accelerations_of_a_loop_do_not_depend_on_the_formulation(formulation: str) -> None:
+    machine = FourBar(BrownMcPhee()).mechanism()
+    model = machine.build(formulation=formulation)
+    run = simulate(model, 0.02, rtol=1e-9, samples=5)
+    name = "theta_crank_acc" if formulation == "joint" else "crank_rod_x_acc"
+    t, h = np.linspace(0.004, 0.016, 7), 1e-6
+    rate = name.replace("_acc", "_rate")
+    slope = (run.at(t + h)[rate] - run.at(t - h)[rate]) / (2 * h)
+    np.testing.assert_allclose(run.of(model.expression(name), t), slope, rtol=1e-4)
