@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING
 from symfric.foundation.fronts import hand_out
 
 if TYPE_CHECKING:
+    from symfric.choice import Choice as Choice
+    from symfric.choice import select as select
     from symfric.figures import FigureData as FigureData
     from symfric.figures import Recommendation as Recommendation
     from symfric.figures import compare as compare
@@ -113,6 +115,7 @@ else:
     hand_out(
         __name__,
         {
+            "symfric.choice": "Choice select",
             "symfric.figures": "FigureData Recommendation compare figure recommended",
             "symfric.foundation.parameters": "Parameter Variable parameters symbolise with_values",
             "symfric.foundation.status": "SolveError Status",

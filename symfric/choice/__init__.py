@@ -1,1 +1,23 @@
-"""Which law for a machine: candidates run on it, ranked by time at equal error."""
+"""The choice of a law: laws on the user's machine, ranked by time at equal error."""
+
+from typing import TYPE_CHECKING
+
+from symfric.foundation.fronts import hand_out
+
+if TYPE_CHECKING:
+    from symfric.choice.friction import Friction as Friction
+    from symfric.choice.needs import NEEDS as NEEDS
+    from symfric.choice.result import Choice as Choice
+    from symfric.choice.row import Row as Row
+    from symfric.choice.select import select as select
+else:
+    hand_out(
+        __name__,
+        {
+            "symfric.choice.friction": "Friction",
+            "symfric.choice.needs": "NEEDS",
+            "symfric.choice.result": "Choice",
+            "symfric.choice.row": "Row",
+            "symfric.choice.select": "select",
+        },
+    )

@@ -28,6 +28,7 @@ COMMANDS = {
     "codegen": "Write a friction law, a plant or inverse dynamics as C99, and verify it.",
     "export-fmu": "Write a scene or a model as a Functional Mock-up Unit.",
     "ocp": "Solve an optimal control problem and check it.",
+    "select": "Rank friction laws on a machine, and say which to take.",
     "demo": "Simulate, identify, optimise and generate C.",
     "gallery": "Compute the figures of the papers again.",
     "bench": "Measure symfric beside other integrators.",

@@ -2,6 +2,8 @@
 
 import runpy
 import traceback
+from collections.abc import Callable
+from functools import partial
 from inspect import signature
 from pathlib import Path
 from typing import Any
@@ -26,15 +28,7 @@ def held_by_file(
         ValueError: no such file or name, a file that fails, numbers that do not fit, something else
             than what is wanted.
     """
-    path, _, name = text.partition(".py")
-    file, name = Path(f"{path}.py"), name.removeprefix(":") or default
-    if not file.is_file():
-        raise ValueError(f"{command}: expected a Python file, got '{file}', which does not exist")
-    held = _run(command, file)
-    if name not in held:
-        there = [n for n, value in held.items() if isinstance(value, kind)]
-        hint = f"; it holds {', '.join(there)}" if there else "; name one after a colon"
-        raise ValueError(f"{command}: expected '{name}' in '{file}', got none{hint}")
+    name, held = _named(command, text, default, lambda value: isinstance(value, kind))
     found = held[name]
     if callable(found):
         found = made(text, found, values)
@@ -44,6 +38,41 @@ def held_by_file(
         what = f"a {wanted}, or a function that returns one"
         raise checks.refused(f"{command} '{text}'", what, found)
     return found
+
+
+def function_of_file(command: str, text: str, default: str, values: dict[str, float]) -> Any:
+    """What FILE.py[:NAME] holds and can be called, with the numbers of --set as its keywords.
+
+    Raises:
+        ValueError: no such file or name, a file that fails, numbers that do not fit.
+    """
+    name, held = _named(command, text, default, callable)
+    found = held[name]
+    if not callable(found):
+        raise checks.refused(f"{command} '{text}'", "a function law -> Model, or a scene", found)
+    first, *others = signature(found).parameters or [""]
+    check_names(f"--set of {text}, a function of {first}", values, others)
+    return partial(found, **values) if values else found
+
+
+def _named(
+    command: str, text: str, default: str, fits: Callable[[Any], bool]
+) -> tuple[str, dict[str, Any]]:
+    """The name that FILE.py[:NAME] means, and all that the file holds.
+
+    Raises:
+        ValueError: no such file, a file that fails, no such name; it says which ones fit.
+    """
+    path, _, name = text.partition(".py")
+    file, name = Path(f"{path}.py"), name.removeprefix(":") or default
+    if not file.is_file():
+        raise ValueError(f"{command}: expected a Python file, got '{file}', which does not exist")
+    held = _run(command, file)
+    if name not in held:
+        there = [n for n, value in held.items() if fits(value)]
+        hint = f"; it holds {', '.join(there)}" if there else "; name one after a colon"
+        raise ValueError(f"{command}: expected '{name}' in '{file}', got none{hint}")
+    return name, held
 
 
 def _run(command: str, file: Path) -> dict[str, Any]:

@@ -38,7 +38,7 @@ from symfric.laws import Law
 from symfric.laws.base.law import check_law
 from symfric.laws.base.sticking import Sticking
 from symfric.model import Model
-from symfric.model.kinds import POSITION
+from symfric.model.kinds import FRICTION_STATE, POSITION
 from symfric.results.trajectory import Trajectory
 from symfric.scenes import Scene
 
@@ -160,6 +160,7 @@ class Bed:
         free: whether the widths are parameters of one model and not numbers in each.
         u: inputs of the model.
         backend: engine of the runs, see `simulate`.
+        times: at which motions are compared [s]; None for equally spaced ones.
     """
 
     name: str
@@ -169,6 +170,7 @@ class Bed:
     free: bool = False
     u: Mapping[str, Input] | None = None
     backend: str = "auto"
+    times: Array | None = None
 
 
 @final
@@ -259,35 +261,39 @@ def sample(
         begin = process_time()
         p = values if bed.free else None
         run = simulate(
-            model, bed.t_end, rtol=rtol, samples=SAMPLES, p=p, u=bed.u, max_steps=max_steps,
-            backend=bed.backend,
+            model, bed.t_end, rtol=rtol, samples=SAMPLES, t_eval=bed.times, p=p, u=bed.u,
+            max_steps=max_steps, backend=bed.backend,
         )  # fmt: skip
         return process_time() - begin, run
 
     spent, run = min((timed() for _ in range(repeats)), key=lambda pair: pair[0])
-    motion, size = _looked_at(bed, model, run, law)
+    motion, size = looked_at(bed, model, run, law)
     steps, lost = run.statistics.steps, run.statistics.rejections
     return Sample(s, values or {}, rtol, steps, steps + lost, spent, motion, size)
 
 
-def _looked_at(bed: Bed, model: Model, run: Trajectory, law: Law) -> tuple[Array, Array]:
-    """What errors are measured on, and relative to what."""
+def looked_at(bed: Bed, model: Model, run: Trajectory, law: Law) -> tuple[Array, Array]:
+    """What errors are measured on, shape (signals, times), and relative to what."""
     if callable(bed.of):
         rows = checks.array(f"{bed.name}: of", bed.of(run), ndim=None, nan=True).reshape(-1, 1)
         size = np.abs(rows)[:, 0]
         return rows, np.where(size > 0, size, 1.0)
-    own = {state.name for state in law.states}
-    machine = [v for v in model.x if v.name not in own]
-    rates = {f"{v.unit}/s" for v in machine}
-    positions = [v.name for v in machine if v.kind == POSITION] or [
-        v.name for v in machine if v.unit not in rates
-    ]
-    names = bed.of or positions
+    names = bed.of or positions(model, law)
     rows = np.array([run[name] for name in names])
     nominal = {v.name: v.nominal for v in model.x}
     least = STILL * np.array([nominal.get(name, 1.0) for name in names])
     moved = np.ptp(rows, axis=1)
     return rows, np.where(moved > least, moved, least / STILL)
+
+
+def positions(model: Model, law: Law) -> tuple[str, ...]:
+    """The states of the machine, not of friction, that are no rates of others."""
+    inside = {state.name for contact in model.contacts for state in contact.states}
+    inside |= {state.name for state in law.states}
+    machine = [v for v in model.x if v.name not in inside and v.kind != FRICTION_STATE]
+    found = [v.name for v in machine if v.kind == POSITION]
+    rates = {f"{v.unit}/s" for v in machine}
+    return tuple(found or [v.name for v in machine if v.unit not in rates])
 
 
 def distance(one: Sample, reference: Sample) -> float:

@@ -1,0 +1,197 @@
+"""The friction that all candidates describe, and each law with the numbers that describe it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import asin, e, log, pi
+from typing import final
+
+import numpy as np
+from scipy.optimize import brentq
+
+from symfric.foundation import checks
+from symfric.foundation.parameters import parameters, with_values
+from symfric.laws import (
+    Armstrong,
+    BengisuAkay,
+    Benson,
+    BlimanSorine,
+    DuanSingh,
+    ExactCoulomb,
+    Exudyn,
+    Law,
+    Leuven,
+    MakkarDixon,
+    MaxwellSlip,
+    PoppStelter,
+    RuiWang,
+    SteadyStateLuGre,
+    StickSlip,
+    VelocityBased,
+    steady_force,
+)
+
+
+@final
+@dataclass(frozen=True)
+class Friction:
+    """Dry friction, as far as every law is to have it.
+
+        F = mu_d N sign(v) sliding,  |F| <= mu_s N at rest
+        F = N [mu_d + (mu_s - mu_d) exp(-(v/v_s)^2)] sign(v)      with v_s
+
+    Attributes:
+        mu_s, mu_d: static and dynamic coefficient.
+        v_s: Stribeck velocity [m/s], over which friction falls after break-away. None: it falls at
+            once, or nobody has measured how; then the velocities of that fall are as free as other
+            widths, and only their limit is compared.
+    """
+
+    mu_s: float = 0.15
+    mu_d: float = 0.1
+    v_s: float | None = None
+
+    def __post_init__(self) -> None:
+        checks.number("friction: mu_d", self.mu_d, above=0.0)
+        checks.number("friction: mu_s", self.mu_s, lower=self.mu_d, hint="mu_s >= mu_d")
+        if self.v_s is not None:
+            checks.number("friction: v_s", self.v_s, unit="m/s", above=0.0)
+
+    @property
+    def exact(self) -> ExactCoulomb:
+        """It without regularisation."""
+        if self.v_s is None:
+            return ExactCoulomb(mu_s=self.mu_s, mu_d=self.mu_d)
+        return ExactCoulomb(mu_s=self.mu_s, mu_d=self.mu_d, v_s=self.v_s, form="stribeck")
+
+    def __str__(self) -> str:
+        """Its numbers."""
+        falls = "falling at once" if self.v_s is None else f"v_s = {self.v_s:g} m/s"
+        return f"mu_s = {self.mu_s:g}, mu_d = {self.mu_d:g}, {falls}"
+
+
+def friction_of(law: Law) -> Friction:
+    """The levels of `law` where it has mu_s and mu_d; else those of the defaults."""
+    known = parameters(law)
+    given = {n: float(known[n].value) for n in ("mu_s", "mu_d") if n in known}
+    start = Friction()
+    mu_d = given.get("mu_d", start.mu_d * given.get("mu_s", start.mu_s) / start.mu_s)
+    return Friction(given.get("mu_s", start.mu_s * mu_d / start.mu_d), mu_d)
+
+
+FALL: dict[type[Law], str] = {
+    BengisuAkay: "xi",
+    Exudyn: "v_exp",
+    Benson: "d_c",
+    DuanSingh: "c",
+    PoppStelter: "d",
+    MakkarDixon: "gamma_3",
+}
+"""What the Stribeck velocity, or its inverse, is called where it is not v_s."""
+NO_FALL = (VelocityBased, StickSlip)
+"""Laws whose v_s is the width of the transition."""
+
+
+def fall_of(law: Law) -> str | None:
+    """The parameter of `law` that is its Stribeck velocity or the inverse; None without one."""
+    if isinstance(law, NO_FALL):
+        return None
+    name = FALL.get(type(law), "v_s")
+    return name if name in parameters(law) else None
+
+
+Levels = Callable[[Friction, float], Mapping[str, float]]
+
+
+def _of_bliman(f: Friction, _: float) -> Mapping[str, float]:
+    """mu_1 - mu_2 is the level of sliding; mu_2 makes the peak."""
+    eta = BlimanSorine().eta
+
+    def peak(mu_2: float) -> float:
+        mu_1 = f.mu_d + mu_2
+        s = eta / (1 - eta) * log(mu_1 / (eta * mu_2))
+        return mu_1 * (1 - e ** (-s / eta)) - mu_2 * (1 - e**-s) - f.mu_s
+
+    if f.mu_s <= f.mu_d:
+        return {"mu_1": f.mu_d, "mu_2": 0.0}
+    mu_2 = float(brentq(peak, 1e-6 * f.mu_d, 1e6 * f.mu_d))  # pyright: ignore[reportArgumentType]
+    return {"mu_1": f.mu_d + mu_2, "mu_2": mu_2}
+
+
+def _shared(law: type[MaxwellSlip | Leuven], total: str) -> Levels:
+    """Elements that carry `total` together, in the shares that they come with."""
+    own = {n: p.value for n, p in parameters(law()).items() if n[:3] == "mu_" and n[3:].isdigit()}
+    whole = sum(own.values())
+    least = getattr(law(), "mu_s", whole)  # Leuven's carry more than mu_s, or its bristle runs away
+    return lambda f, _: {n: value * getattr(f, total) / least for n, value in own.items()}
+
+
+LEVELS: dict[type[Law], Levels] = {
+    PoppStelter: lambda f, _: {"eta": f.mu_d / f.mu_s},
+    Armstrong: lambda f, _: {"mu_inf": f.mu_s - f.mu_d, "mu_a": 0.2 * (f.mu_s - f.mu_d)},
+    BlimanSorine: _of_bliman,
+    MaxwellSlip: _shared(MaxwellSlip, "mu_d"),
+    Leuven: _shared(Leuven, "mu_s"),
+    SteadyStateLuGre: lambda f, N: {"F_S": f.mu_s * N, "F_C": f.mu_d * N, "sigma_2": 0.0},
+    RuiWang: lambda f, N: {"D": f.mu_s * N, "C": 2 - 2 / pi * asin(f.mu_d / f.mu_s)},
+    MakkarDixon: lambda f, N: {"gamma_1": (f.mu_s - f.mu_d) * N, "gamma_4": f.mu_d * N},
+}
+"""Levels of laws that call them otherwise than mu_s and mu_d; those in newton at a load N."""
+
+
+def alike(law: Law, friction: Friction, load: float | None) -> Law:
+    """`law` with the levels, and where it has one the Stribeck velocity, of `friction`.
+
+    Args:
+        load: normal force [N] where it is one number.
+
+    Raises:
+        ValueError: a law with forces for levels where the load is not one number.
+    """
+    known, make = parameters(law), LEVELS.get(type(law))
+    same = {"mu_s": friction.mu_s, "mu_d": friction.mu_d}
+    values = {name: value for name, value in same.items() if name in known}
+    in_newton = [n for n, p in known.items() if p.role == "level" and p.unit in ("N", "N m")]
+    if in_newton and load is None:
+        raise ValueError(
+            f"its levels ({', '.join(in_newton)}) are forces, and the load here is not one number"
+        )
+    if make is not None:
+        values |= make(friction, 1.0 if load is None else load)
+    fall = fall_of(law)
+    if friction.v_s is not None and fall is not None:
+        inverse = known[fall].unit in ("s/m", "s/rad")
+        values[fall] = 1 / friction.v_s if inverse else friction.v_s
+    return with_values(law, values)
+
+
+def peaked(law: Law, mu_s: float, load: float | None) -> Law:
+    """A static law with the highest force of steady sliding at mu_s N; any other as it is.
+
+    The product of a rise over one velocity and a fall over another stays below the static level
+    that it is written with, by 0.05 % to 7 %. What is measured is the peak.
+    """
+    known = parameters(law)
+    apart = {"mu_s", "F_S", "gamma_1"} & set(known)
+    if law.states or law.inputs or "S" not in law.facts.phenomena or not apart:
+        return law
+    N = 1.0 if load is None else load
+    if "mu_d" in known and known["mu_s"].value == known["mu_d"].value:
+        return law
+    widths = [p for p in known.values() if p.role in ("velocity scale", "width") and p.unit != "1"]
+    speeds = [1 / float(p.value) if "s/" in p.unit else float(p.value) for p in widths]
+    v = np.geomspace(0.02 * min(speeds), 20 * max(speeds), 4001)
+    for _ in range(4):
+        top = float(steady_force(law, v, N).max()) / N
+        law = with_values(law, _raised(law, mu_s / top, (mu_s - top) * N))
+    return law
+
+
+def _raised(law: Law, factor: float, missing: float) -> dict[str, float]:
+    """The parameters of a higher peak: by a factor, or by a force [N]; sliding stays as it is."""
+    now = {name: float(p.value) for name, p in parameters(law).items()}
+    if isinstance(law, MakkarDixon):
+        return {"gamma_1": now["gamma_1"] + missing}
+    if isinstance(law, PoppStelter):
+        return {"mu_s": now["mu_s"] * factor, "eta": now["eta"] / factor}
+    name = "F_S" if isinstance(law, SteadyStateLuGre) else "mu_s"
+    return {name: now[name] * factor}

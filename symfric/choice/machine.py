@@ -1,0 +1,261 @@
+"""The user's machine with any law in it: models, runs, and what one run costs."""
+
+import warnings
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, fields, replace
+from functools import cached_property, partial
+from math import inf
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.choice.friction import Friction, alike, friction_of
+from symfric.choice.softness import Softness, softness
+from symfric.figures.regularisation import Bed, Measure, Sample, sample
+from symfric.foundation import checks
+from symfric.foundation.numeric import is_number
+from symfric.integrator.arguments import chosen
+from symfric.integrator.equations.inputs import Input, input_data
+from symfric.integrator.running.built import built
+from symfric.laws import BrownMcPhee, Law
+from symfric.model import Model
+from symfric.scenes import Scene
+
+Array = NDArray[np.float64]
+
+
+FAILURES = (RuntimeError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError)
+"""What a law, or a function of the user that makes a machine of it, may raise."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """A machine that takes any law.
+
+    Attributes:
+        name: what it is called.
+        make: law -> scene or model.
+        places: fields of the scene that hold the candidate; None for all that hold its kind.
+        t_end: how long a motion is [s].
+        of: what is compared; None for the positions.
+        u: inputs.
+        times: at which motions are compared [s]; None for 2001 equal intervals.
+    """
+
+    name: str
+    make: Callable[[Law], object]
+    places: tuple[str, ...] | None
+    t_end: float
+    of: Measure | None = None
+    u: Mapping[str, Input] | None = None
+    times: Array | None = None
+
+    def bed(self, model: Model) -> Bed:
+        """Where runs of `model` are compared."""
+        return Bed(
+            self.name, lambda _: model, self.t_end, self.of, u=self.u, backend="vm",
+            times=self.times,
+        )  # fmt: skip
+
+    def with_law(self, law: Law) -> Model:
+        """The model with `law` as it is.
+
+        Raises:
+            ValueError: the machine refuses it, or gives neither scene nor model.
+        """
+        return _model(self, law, self.make(law))
+
+    def run(self, model: Model, law: Law, rtol: float, most: int) -> Sample:
+        """One run; `most` attempts are allowed.
+
+        Raises:
+            SolveError: it failed.
+        """
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # loose tolerances are tried on purpose
+            return sample(self.bed(model), law, rtol, max_steps=most)
+
+    def instructions(self, model: Model, rtol: float) -> tuple[int, str]:
+        """CasADi instructions of one attempt at this tolerance, and the method."""
+        formula = chosen("simulate", "auto", rtol)
+        inputs = input_data(model, self.u, 0.0, self.t_end)
+        return built(model, inputs, formula)[0].instructions, formula.name
+
+
+def machine_of(
+    where: str,
+    scene: object,
+    t_end: float | None,
+    u: Mapping[str, Input] | None,
+    of: Measure | None,
+    probe: Law,
+) -> Machine:
+    """A scene, a class of scenes, or a function law -> scene or model, as a machine.
+
+    A scene is driven as it is when nobody says how, unless `u` says so.
+
+    Raises:
+        ValueError: none of these, no end where nothing says one.
+    """
+    if of is not None and not callable(of):
+        of = checks.names(f"{where}: of", of)
+    places: tuple[str, ...] | None = ("law",)
+    make: Callable[[Law], object]
+    if isinstance(scene, Scene):
+        make, kind, name = partial(_in_scene, scene), type(scene), type(scene).__name__
+    elif isinstance(scene, type) and issubclass(scene, Scene):
+        make, kind, name = scene, scene, scene.__name__
+    elif callable(scene):
+        make, places = scene, None
+        first = _probed(where, make, probe)
+        kind, name = type(first), first.name if isinstance(first, Model) else type(first).__name__
+    else:
+        raise checks.refused(where, "a scene such as Rabinowicz, or a function law -> Model", scene)
+    given = dict(u or {})
+    if issubclass(kind, Scene):
+        t_end = kind.t_end if t_end is None else t_end
+        given = {n: own.function for n, own in kind.inputs.items()} | given
+    if t_end is None:
+        raise ValueError(f"{where}: t_end: expected the end of the motion [s], got none")
+    end = checks.number(f"{where}: t_end", t_end, unit="s", above=0.0)
+    return Machine(name, make, places, end, of, given)
+
+
+def _in_scene(scene: Scene, law: Law) -> Scene:
+    return replace(scene, law=law)
+
+
+def _probed(where: str, make: Callable[[Law], object], probe: Law) -> Scene | Model:
+    made = make(probe)
+    if not isinstance(made, Scene | Model):
+        raise checks.refused(f"{where}: scene({type(probe).__name__})", "a scene or a Model", made)
+    return made
+
+
+def _model(machine: Machine, law: Law, made: object) -> Model:
+    if isinstance(made, Scene):
+        return made.model()
+    where = f"{machine.name}({type(law).__name__})"
+    return checks.kind(where, made, Model, "a scene or a Model")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A law in a machine, with numbers that describe the wanted friction, and its softness.
+
+    Attributes:
+        machine: where it is.
+        law: with its numbers.
+        knobs: place -> what may be scaled of the law there; "" for a function law -> model.
+        scene: that holds the laws; None for a function law -> model.
+    """
+
+    machine: Machine
+    law: Law
+    knobs: Mapping[str, Softness]
+    scene: Scene | None
+
+    @property
+    def scalable(self) -> bool:
+        """Whether anything is smooth."""
+        return any(knob.powers for knob in self.knobs.values())
+
+    def law_at(self, s: float) -> Law:
+        """The law at the softness `s`; of several places the first."""
+        return next(iter(self.knobs.values())).at(s)
+
+    def model(self, s: float) -> Model:
+        """The machine at the softness `s`.
+
+        Raises:
+            ValueError: beyond a bound of the law, or the machine refuses it.
+        """
+        if self.scene is None:
+            return self.machine.with_law(self.law_at(s))
+        laws: dict[str, Any] = {place: knob.at(s) for place, knob in self.knobs.items()}
+        return replace(self.scene, **laws).model()
+
+    @cached_property
+    def first(self) -> Model:
+        """The machine with the law as it comes."""
+        return self.model(1.0)
+
+
+def candidate(
+    machine: Machine, law: Law, frictions: Mapping[str, Friction], load: float | None, own: bool
+) -> Candidate:
+    """`law` in `machine`.
+
+    Args:
+        frictions: that it is to describe, by the place in the machine; "" for any other place.
+        load: normal force [N] where it is one number.
+        own: it has its numbers already: they were fitted, nothing is to be scaled.
+
+    Raises:
+        ValueError: the machine refuses the law, or no numbers of the law describe the friction.
+    """
+    same = law if own else alike(law, frictions[""], load)
+    made = machine.make(same)
+    scene = made if isinstance(made, Scene) else None
+    held = {"": same} if scene is None else holders(machine, scene, type(same))
+    if not held:
+        raise ValueError(f"{machine.name} does not hold it")
+    knobs: dict[str, Softness] = {}
+    for place, there in held.items():
+        friction = frictions.get(place, frictions[""])
+        if own:
+            knobs[place] = Softness(there, {}, friction.mu_s, load)
+        else:
+            knobs[place] = softness(alike(there, friction, load), friction, load)
+    return Candidate(machine, same, knobs, scene)
+
+
+def holders(machine: Machine, scene: Scene, kind: type[Law]) -> dict[str, Law]:
+    """Place -> law of the scene, where the candidate is."""
+    names = machine.places or [item.name for item in fields(scene)]
+    return {n: getattr(scene, n) for n in names if isinstance(getattr(scene, n), kind)}
+
+
+def frictions_of(machine: Machine, given: Friction | None, scene: object) -> dict[str, Friction]:
+    """Place -> friction there, "" for any: as given, else that of the scene as it comes."""
+    if given is not None:
+        return {"": given}
+    if isinstance(scene, Scene):
+        return {"": friction_of(scene.law)}
+    start = Friction()
+    made: object = start
+    for probe in (start.exact, BrownMcPhee()):
+        with suppress(*FAILURES):
+            made = machine.make(probe)
+            break
+    if machine.places is not None or not isinstance(made, Scene):
+        return {"": start}
+    held = {f.name: getattr(made, f.name) for f in fields(made)}
+    found = {name: friction_of(law) for name, law in held.items() if isinstance(law, Law)}
+    return {"": found["law"]} | found
+
+
+def load_of(model: Model) -> float | None:
+    """The normal force [N] of all contacts where it is one number; else None."""
+    loads = [contact.N for contact in model.contacts]
+    if not loads or not all(is_number(N) and np.isfinite(float(N)) for N in loads):
+        return None
+    found = {float(N) for N in loads}  # pyright: ignore[reportArgumentType]
+    return found.pop() if len(found) == 1 else None
+
+
+def distance(one: Array, reference: Array, size: Array, mean: bool = False) -> float:
+    """Largest difference of two motions, shape (signals, times), relative to `size`.
+
+    Of data, which hold noise, the largest root mean square; infinite where they do not compare.
+    """
+    if one.shape != reference.shape or not one.size:
+        return inf
+    off = np.abs(one - reference)
+    worst = np.sqrt((off**2).mean(axis=1)) if mean else off.max(axis=1)
+    found = float((worst / size).max())
+    return found if np.isfinite(found) else inf

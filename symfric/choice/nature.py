@@ -1,0 +1,98 @@
+"""What a law is, without running it: smoothness, parameters and who can measure them, cost in C."""
+
+from collections.abc import Sequence
+from math import isfinite
+
+import numpy as np
+
+from symfric.codegen.blocks.from_law import law_block
+from symfric.codegen.writing.routines import routines
+from symfric.emitter.c99 import REALS
+from symfric.foundation.parameters import Parameter, parameters
+from symfric.laws import Law, steady_force
+
+EASY = ("level", "viscous", "velocity scale", "load", "geometry", "temperature")
+"""Roles of parameters that a pull test and steady sliding give."""
+NUMERICAL = ("width", "sampling")
+"""Roles of parameters that are chosen, not measured."""
+SHARP = 1e-9
+"""Widths [m/s] below this are none for an optimiser or a fixed step."""
+STEP = 1e-3
+"""Step [s] of the C; the count does not depend on it."""
+
+
+def physical(law: Law) -> tuple[list[Parameter], tuple[str, ...]]:
+    """The parameters that describe friction, and the names of those that are hard to measure.
+
+    Hard are bristles (micrometres before break-away), times (dwell, lag) and shapes, which only a
+    fit gives; what smooths a jump is chosen and is neither.
+    """
+    known = [p for p in parameters(law).values() if p.role not in NUMERICAL and not p.width]
+    return known, tuple(p.name for p in known if p.role not in EASY)
+
+
+def smoothness(law: Law) -> str:
+    """The class in the velocity, as the numbers of `law` are.
+
+    A law that is smooth only over a width says what it is without: "C∞ (C0 at v = 0 as v_eps -> 0)"
+    with v_eps = 1e-15 m/s is C0.
+    """
+    said = law.facts.smoothness
+    first = said.split()[0]
+    if first.startswith("set"):
+        return "jumps"
+    eps = parameters(law).get("v_eps")
+    sharp = eps is not None and float(eps.value) < SHARP  # pyright: ignore[reportArgumentType]
+    if sharp and "(C0" in said:
+        return "C0"
+    return first.strip(",;")
+
+
+def is_smooth(row_class: str) -> bool:
+    """Whether exact second derivatives exist: what optimal control asks for."""
+    return row_class in ("C2", "C∞")
+
+
+def steepness(law: Law, speed: float) -> float:
+    """Largest slope of the force over velocity, relative to the level at `speed` [s/m].
+
+    Of laws with states that at rest, where a bristle carries: stiffness is no slope over velocity,
+    and the number is NaN; so it is for laws that need more than v and N.
+    """
+    if law.states or law.inputs:
+        return float("nan")
+    v = np.concatenate([[0.0], np.geomspace(1e-14, speed, 6001)])
+    F = steady_force(law, v, 1.0)
+    slope = np.abs(np.diff(F) / np.diff(v)).max() / abs(float(F[-1])) if F[-1] else np.nan
+    return float(slope) if isfinite(slope) else float("nan")
+
+
+def c_operations(law: Law) -> tuple[int | None, str]:
+    """Operations of the law's step in C, float, parameters constant; or why it has none."""
+    try:
+        block = law_block(law, h=STEP if law.states else None, free=())
+        steps = [r for r in routines(block, REALS["float"]) if _is_step(r.name)]
+    except ValueError as problem:
+        return None, str(problem)
+    return sum(r.operations + sum(r.calls.values()) for r in steps), ""
+
+
+def _is_step(name: str) -> bool:
+    return not name.endswith(("_init", "_reset", "_init_sliding"))
+
+
+def shown(codes: Sequence[str]) -> str:
+    """Codes of phenomena as one word, by which laws are grouped: the hardest to have."""
+    for code, word in GROUPS.items():
+        if code in codes:
+            return word
+    return "sliding"
+
+
+GROUPS = {
+    "M": "memory",
+    "P": "presliding",
+    "St": "Stribeck",
+    "S": "stiction",
+}
+"""Code -> group of laws in pictures."""

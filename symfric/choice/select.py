@@ -1,0 +1,199 @@
+"""Choose a law: every candidate runs on the user's machine, ranked by time at equal error."""
+
+import signal
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from multiprocessing import get_all_start_methods, get_context
+from multiprocessing.connection import wait
+from multiprocessing.context import ForkProcess
+from time import perf_counter
+from typing import Any
+
+from symfric.choice.friction import Friction
+from symfric.choice.machine import FAILURES, frictions_of, load_of, machine_of
+from symfric.choice.measured import Task, measured
+from symfric.choice.needs import needed
+from symfric.choice.reference import reference_of
+from symfric.choice.result import Choice
+from symfric.choice.row import FAILED, Row, ordered
+from symfric.figures.regularisation import Measure
+from symfric.foundation import checks
+from symfric.integrator.equations.inputs import Input
+from symfric.laws import ALL_LAWS, BrownMcPhee, Law
+from symfric.laws.base.law import check_law
+from symfric.results.trajectory import Trajectory
+
+Progress = Callable[[str, float], None]
+
+
+def select(
+    scene: object,
+    laws: Mapping[str, Law] | Sequence[str] | None = None,
+    *,
+    needs: Sequence[str] = ("stiction", "stribeck"),
+    accuracy: float = 1e-4,
+    friction: Friction | None = None,
+    reference: "str | Law | Trajectory" = "exact",
+    data: Mapping[str, Sequence[float]] | None = None,
+    t_end: float | None = None,
+    u: Mapping[str, Input] | None = None,
+    of: Measure | None = None,
+    fitted: bool | None = None,
+    control: float = 0.05,
+    fixed_steps: bool = True,
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> Choice:
+    """Rank friction laws on a machine by the time of a run at equal error.
+
+        error = max |x - x_dry| / (largest - smallest x_dry)      over positions and times
+
+    Every law describes the same friction (mu_s, mu_d; the peak of a smooth law is mu_s N) and is
+    made as soft as the accuracy allows: its widths and bristles are scaled together. Then the
+    loosest tolerance is taken with which law and integrator together keep the accuracy. That run is
+    timed. A law that the machine does not take, that does not show what is needed or does not keep
+    the accuracy has its row, too, and the reason in it.
+
+    Args:
+        scene: a scene, a class of scenes (`Rabinowicz`), or a function law -> scene or `Model`,
+            such as `partial(PendulumBox.preset, "jing_mi_table_7")`.
+        laws: name -> law, or names; the whole catalogue by default.
+        needs: words of `symfric.choice.NEEDS`, such as "stiction", "presliding", "drift-free".
+        accuracy: largest error relative to the size of the motion; between 0 and 1.
+        friction: what all laws describe; by default the levels that the scene has.
+        reference: "exact" dry friction by events, where the machine takes it, else as "sharpest",
+            the limit of a smooth law; or a law, or a run.
+        data: t [s] and signals by name, to compare with instead; errors are then root mean squares,
+            and the laws those that were fitted.
+        t_end: end of the motion [s]; that of the scene.
+        u: inputs; those of the scene.
+        of: what is compared: signals by name, or a function of a trajectory, such as the period of
+            a cycle, where an error of phase would grow with time; by default the positions.
+        fitted: laws come with their numbers, nothing is set or scaled; by default with `data`.
+        control: largest error of fixed steps, of a law that is as soft as that allows.
+        fixed_steps: measure them, too.
+        workers: processes; more than one needs a system that can fork (not Windows).
+        progress: called with the name of a law that is done, and the share of all.
+
+    Raises:
+        ValueError: bad input.
+        SolveError: not even a reference runs.
+
+    An interrupt (Ctrl-C) returns what is there, with `interrupted` set.
+    Limits: a motion that has no limit as widths vanish, such as a chaotic one over a long time, has
+    no accuracy; shorten it or compare other numbers. Times are those of CasADi's virtual machine.
+    """
+    where, began = "select", perf_counter()
+    asked = needed(f"{where}: needs", needs)
+    accuracy = checks.number(f"{where}: accuracy", accuracy, above=0.0, upper=1.0)
+    control = checks.number(f"{where}: control", control, above=0.0, upper=1.0)
+    count = checks.count(f"{where}: workers", workers)
+    if friction is not None:
+        such = "a friction, such as Friction(mu_s=0.2, mu_d=0.15)"
+        checks.kind(f"{where}: friction", friction, Friction, such)
+    known = laws_of(where, laws)
+    machine = machine_of(f"{where}: scene", scene, t_end, u, of, BrownMcPhee())
+    frictions = frictions_of(machine, friction, scene)
+    load = None
+    with suppress(*FAILURES):
+        load = load_of(machine.with_law(BrownMcPhee()))
+    given = reference if data is None else data
+    compared, machine = reference_of(
+        f"{where}: reference", machine, given, frictions, load, accuracy
+    )
+    own = data is not None if fitted is None else checks.flag(f"{where}: fitted", fitted)
+    task = Task(
+        machine, compared, asked, frictions, load, accuracy, control, own,
+        checks.flag(f"{where}: fixed_steps", fixed_steps),
+    )  # fmt: skip
+    rows, interrupted = _rows(task, known, count, progress)
+    return Choice(
+        machine.name, asked, accuracy, str(frictions[""]), compared.about, compared.uncertain,
+        control, machine.t_end, tuple(ordered(rows)), perf_counter() - began, interrupted,
+    )  # fmt: skip
+
+
+def laws_of(where: str, laws: Mapping[str, Law] | Sequence[str] | None) -> dict[str, Law]:
+    """The candidates by name.
+
+    Raises:
+        ValueError: unknown names, something else than laws, none at all.
+    """
+    if laws is None:
+        return {name: kind() for name, kind in ALL_LAWS.items()}
+    if isinstance(laws, Mapping):
+        found = checks.named(f"{where}: laws", laws)
+        for name, law in found.items():
+            check_law(f"{where}: laws: {name}", law)
+    else:
+        found = {n: ALL_LAWS[n]() for n in checks.names(f"{where}: laws", laws, ALL_LAWS)}
+    if not found:
+        raise ValueError(f"{where}: laws: expected at least one, got none")
+    return found
+
+
+def _rows(
+    task: Task, laws: Mapping[str, Law], workers: int, progress: Progress | None
+) -> tuple[list[Row], bool]:
+    """The rows, and whether somebody interrupted."""
+    rows: list[Row] = []
+    results = _many(task, laws, workers) if workers > 1 else _one_by_one(task, laws)
+    try:
+        for row in results:
+            rows.append(row)
+            if progress is not None:
+                progress(row.law, len(rows) / len(laws))
+    except KeyboardInterrupt:
+        return rows, True
+    return rows, False
+
+
+def _one_by_one(task: Task, laws: Mapping[str, Law]) -> Iterator[Row]:
+    for name, law in laws.items():
+        yield measured(task, name, law)
+
+
+def _many(task: Task, laws: Mapping[str, Law], workers: int) -> Iterator[Row]:
+    """The rows as they come from several processes, each of which asks for one law at a time.
+
+    They are forked: functions of a user's file cannot be sent.
+    """
+    if "fork" not in get_all_start_methods():
+        yield from _one_by_one(task, laws)
+        return
+    fork = get_context("fork")
+    left = list(laws)
+    crew: dict[Any, tuple[ForkProcess, str]] = {}
+    try:
+        while left or crew:
+            while left and len(crew) < workers:
+                name = left.pop(0)
+                ours, theirs = fork.Pipe(duplex=False)
+                process = fork.Process(
+                    target=_work, args=(theirs, task, name, laws[name]), daemon=True
+                )
+                process.start()
+                theirs.close()
+                crew[ours] = process, name
+            for pipe in wait(list(crew)):
+                process, name = crew.pop(pipe)
+                yield _answer(pipe, process, name)
+    finally:
+        for process, _ in crew.values():
+            process.kill()
+
+
+def _answer(pipe: Any, process: ForkProcess, name: str) -> Row:
+    """The row that a process sends; that it ended, where it sends none."""
+    try:
+        row: Row = pipe.recv()
+    except EOFError:
+        process.join()
+        return Row(name, FAILED, f"its process ended with exit status {process.exitcode}")
+    process.join()
+    return row
+
+
+def _work(pipe: Any, task: Task, name: str, law: Law) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for whoever waits for the rows
+    pipe.send(measured(task, name, law))

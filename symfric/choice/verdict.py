@@ -1,0 +1,98 @@
+"""What to take, and why, in sentences."""
+
+from collections.abc import Sequence
+
+from symfric.choice.nature import is_smooth
+from symfric.choice.row import FAILED, INACCURATE, LACKING, REFUSED, Row
+
+ALIKE = 1.1
+"""Times within this ratio are the same, on any machine."""
+
+
+def verdict(
+    rows: Sequence[Row], needs: Sequence[str], accuracy: float, control: float
+) -> tuple[str, ...]:
+    """Sentences: for simulation, for optimal control, for a controller, and what fell out."""
+    ranked = [row for row in rows if row.ranked]
+    asked = " and ".join(needs) or "friction"
+    found: list[str] = []
+    if not ranked:
+        near = [row for row in rows if row.standing == INACCURATE]
+        best = min(near, key=lambda row: row.error, default=None)
+        found.append(
+            f"No law shows {asked} and keeps {accuracy:g}"
+            + (f"; {best.law} comes nearest, {best.reason}." if best else ".")
+        )
+    else:
+        found += [_fastest(ranked, asked), _smooth(ranked), _fixed(ranked, control)]
+    return tuple([*found, _others(rows)])
+
+
+def _fastest(ranked: Sequence[Row], asked: str) -> str:
+    best = ranked[0]
+    near = [row.law for row in ranked[1:] if row.time_s <= ALIKE * best.time_s]
+    text = (
+        f"Simulation: take {best.law}, the fastest of {len(ranked)} laws that show {asked} and "
+        f"keep the accuracy: {1e3 * best.time_s:.3g} ms in {best.attempts} attempts by "
+        f"{best.method}, {best.error:.1e} off"
+    )
+    if near:
+        return f"{text}; {_listed(near)} {'are' if len(near) > 1 else 'is'} as fast."
+    if len(ranked) > 1:
+        second = ranked[1]
+        return f"{text}; {second.law} takes {second.time_s / best.time_s:.2g} times as long."
+    return f"{text}."
+
+
+def _smooth(ranked: Sequence[Row]) -> str:
+    """The one with second derivatives that climbs least; bristles where there is no other."""
+    smooth = [row for row in ranked if is_smooth(row.smoothness)]
+    if not smooth:
+        return (
+            "Optimal control: none of them has second derivatives; "
+            f"{ranked[0].law} is {ranked[0].smoothness}."
+        )
+    flat = [row for row in smooth if row.steepness == row.steepness]
+    if flat:
+        take = min(flat, key=lambda row: row.steepness)
+        return (
+            f"Optimal control: take {take.law} ({take.smoothness}): of those with second "
+            f"derivatives its force is the least steep, {take.steepness:.2g} of its level per m/s."
+        )
+    take = smooth[0]
+    return f"Optimal control: take {take.law} ({take.smoothness}), with {_states(take)}."
+
+
+def _fixed(ranked: Sequence[Row], control: float) -> str:
+    able = [row for row in ranked if row.fixed_step is not None and row.c_operations is not None]
+    if not able:
+        return (
+            f"Controller: none of them follows within {control:g} in fixed steps that were tried."
+        )
+    take = min(able, key=lambda row: (row.c_operations or 0) / (row.fixed_step or 1.0))
+    return (
+        f"Controller: take {take.law}: its C takes {take.c_operations} operations, and with it the "
+        f"plant stays within {control:g} in steps of {take.fixed_step:g} s (backward Euler): the "
+        "fewest operations for a second of motion."
+    )
+
+
+def _states(row: Row) -> str:
+    return f"{row.states} state{'s' if row.states != 1 else ''}"
+
+
+def _others(rows: Sequence[Row]) -> str:
+    """How many fell out, by the reason."""
+    what = {
+        LACKING: "show something else",
+        INACCURATE: "do not keep the accuracy",
+        FAILED: "do not run to the end",
+        REFUSED: "do not fit into this machine",
+    }
+    counts = {text: sum(row.standing == name for row in rows) for name, text in what.items()}
+    said = [f"{count} {text}" for text, count in counts.items() if count]
+    return f"Of {len(rows)} laws {_listed(said)}." if said else f"All {len(rows)} laws do."
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -1,0 +1,163 @@
+"""`symfric select`: rank friction laws on a machine, and say which to take."""
+
+from collections.abc import Callable
+from os import cpu_count
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from symfric import Law, SolveError, Status, law_from_text, parameters, with_values
+from symfric.choice import NEEDS, Choice, Friction
+from symfric.choice import select as select_law
+from symfric.choice.needs import needed
+from symfric.choice.text import LEGEND, lines
+from symfric.cli import completions, output
+from symfric.cli.machines import LawOfOption, PresetOption, kind_of
+from symfric.cli.options import JsonOption, PlotOption, SetOption, check_outputs, numbers
+from symfric.cli.user_file import function_of_file
+from symfric.foundation.parameters import check_names
+from symfric.laws import ALL_LAWS
+from symfric.scenes import Scene
+
+
+def select(
+    scene: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENE",
+            help="A scene, FILE.urdf, or FILE.py[:NAME], a function law -> Model.",
+            autocompletion=completions.scenes,
+        ),
+    ],
+    need: Annotated[
+        str,
+        typer.Option("--need", metavar="WORD,...", help=f"Of {', '.join(NEEDS)}."),
+    ] = "stiction,stribeck",
+    accuracy: Annotated[
+        float, typer.Option("--accuracy", help="Largest error relative to the motion.")
+    ] = 1e-4,
+    law: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--law",
+            metavar="NAME",
+            help="Candidate; may be repeated. All laws by default.",
+            autocompletion=completions.laws,
+        ),
+    ] = None,
+    settings: SetOption = None,
+    preset: PresetOption = None,
+    law_of: LawOfOption = None,
+    t_end: Annotated[float | None, typer.Option("--t-end", help="End of the motion [s].")] = None,
+    control: Annotated[
+        float, typer.Option("--control", help="Largest error of fixed steps.")
+    ] = 0.05,
+    fixed_steps: Annotated[
+        bool, typer.Option("--fixed-steps/--no-fixed-steps", help="Measure them, too.")
+    ] = True,
+    workers: Annotated[
+        int | None, typer.Option("--workers", help="Processes; default all cores.")
+    ] = None,
+    plot: PlotOption = None,
+    html: Annotated[
+        Path | None, typer.Option("--html", metavar="FILE.html", help="Write one page.")
+    ] = None,
+    csv: Annotated[
+        Path | None, typer.Option("--csv", metavar="FILE.csv", help="Write the table.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Rank friction laws on a machine, and say which to take.
+
+    Every law describes the same friction (--set mu_s=0.2 mu_d=0.15, and v_s where the fall is
+    known), is made as soft as --accuracy allows, and is timed there. --set takes parameters of the
+    scene, too, and --set lugre.sigma_1=2 one of one law. Ctrl-C keeps what is there.
+
+    Example: symfric select rabinowicz --need stiction,stribeck --accuracy 1e-4 --html choice.html
+
+    Example: symfric select my_machine.py:press --t-end 2 --need presliding
+    """
+    check_outputs(html, csv, json, picture=plot)
+    words = needed("--need", [word for word in need.split(",") if word])
+    machine, friction, candidates = _asked(scene, settings, preset, law_of, law)
+    with output.progress(f"select {scene}") as tell:
+        found = select_law(
+            machine,
+            candidates,
+            needs=words,
+            accuracy=accuracy,
+            friction=friction,
+            t_end=t_end,
+            control=control,
+            fixed_steps=fixed_steps,
+            workers=cpu_count() or 1 if workers is None else workers,
+            progress=lambda _, share: tell(share),
+        )
+    if plot:
+        found.plot(plot)
+    if html:
+        found.to_html(html)
+    if csv:
+        found.to_csv(csv)
+    output.emit_json(found.to_dict(), json)
+    if json != "-":
+        show_choice(found)
+    output.say_written(plot, html, csv, json)
+    if found.interrupted:
+        raise SolveError("select: interrupted", Status.INTERRUPTED, found)
+    if found.best is None:
+        raise SolveError(f"select: {found.verdict[0]}", Status.SOLVER_FAILED, found)
+
+
+OF_FRICTION = ("mu_s", "mu_d", "v_s")
+
+
+def _asked(
+    scene: str,
+    settings: list[str] | None,
+    preset: str | None,
+    law_of: list[str] | None,
+    names: list[str] | None,
+) -> tuple[Any, Friction | None, dict[str, Law]]:
+    """The machine, the friction, the candidates with the numbers of --set.
+
+    Raises:
+        ValueError: unknown names; numbers that nothing here has.
+    """
+    given = numbers("--set", settings)
+    friction = {n: given.pop(n) for n in OF_FRICTION if n in given}
+    texts = names or list(ALL_LAWS)
+    laws = {text: law_from_text(text) for text in texts}
+    for key in [key for key in given if "." in key]:
+        of, _, own = key.rpartition(".")
+        check_names(f"--set {key}", [of], laws)
+        laws[of] = with_values(laws[of], {own: given.pop(key)})
+    if ".py" in scene:
+        machine: Any = function_of_file("select", scene, "machine", given)
+    else:
+        machine = _with(kind_of(scene, preset=preset, law_of=law_of), scene, given)
+    levels = Friction(**friction) if friction else None
+    return machine, levels, laws
+
+
+def _with(kind: Callable[[Law], Scene], scene: str, values: dict[str, float]) -> Any:
+    """The scene with the numbers of --set that are its own."""
+    if not values:
+        return kind
+    known = parameters(kind(law_from_text("coulomb")))
+    own = set(parameters(law_from_text("coulomb")))
+    check_names(f"--set of {scene}", values, [n for n in known if n not in own] + [*OF_FRICTION])
+
+    def machine(law: Law) -> Scene:
+        return with_values(kind(law), values)
+
+    machine.__name__ = scene
+    return machine
+
+
+def show_choice(found: Choice) -> None:
+    """Print table, reasons and verdict."""
+    for line in lines(found):
+        typer.echo(line)
+    typer.echo(f"\n{LEGEND}")

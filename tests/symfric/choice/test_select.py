@@ -1,0 +1,211 @@
+"""The choice of a law on a machine: what is ranked, what is not and why, and how it looks."""
+
+import csv
+import json
+from math import log2
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric import Model, Variable, simulate
+from symfric.choice import Choice, Friction, select
+from symfric.choice.friction import peaked
+from symfric.choice.text import lines
+from symfric.laws import ALL_LAWS, BrownMcPhee, ExactCoulomb, Law, LuGre, steady_force
+from symfric.scenes import Drive, Rabinowicz
+from symfric.scenes.base import contact
+
+SHORT = 8.0
+"""Seconds in which the block breaks away once and sticks again."""
+SOME = ("brown_mcphee", "lugre", "coulomb", "exact_coulomb", "wojewoda", "makkar_dixon")
+
+
+@pytest.fixture(scope="module")
+def choice() -> Choice:
+    return select(Rabinowicz, SOME, accuracy=1e-2, t_end=SHORT, fixed_steps=False)
+
+
+def test_every_candidate_has_a_row_that_says_where_it_stands(choice: Choice) -> None:
+    assert {row.law for row in choice} == set(SOME)
+    assert {row.law for row in choice.ranked} == {
+        "brown_mcphee", "lugre", "exact_coulomb", "makkar_dixon",
+    }  # fmt: skip
+    assert choice["coulomb"].reason == "shows no stiction, no stribeck"
+    assert choice["wojewoda"].standing == "cannot run"
+    assert "needs dv" in choice["wojewoda"].reason
+    assert all(row.reason for row in choice if not row.ranked)
+
+
+def test_what_is_ranked_keeps_the_accuracy_when_run_again(choice: Choice) -> None:
+    t = np.linspace(0, SHORT, 2001)
+    exact = simulate(Rabinowicz(ExactCoulomb()).model(), SHORT, rtol=1e-9)["x"]
+    row = choice["brown_mcphee"]
+    v_t = (row.values or {})["v_t"]
+    own = peaked(BrownMcPhee(v_t=v_t), 0.15, None)
+    top = steady_force(own, np.linspace(0.1, 10, 20001) * v_t, 1.0).max()
+    assert top == pytest.approx(0.15, rel=1e-6)
+    with pytest.warns(UserWarning, match="rtol"):
+        run = simulate(Rabinowicz(own).model(), SHORT, rtol=row.rtol, t_eval=t)
+    assert np.abs(run["x"] - exact).max() / np.ptp(exact) == pytest.approx(row.error, rel=1e-3)
+    assert row.error < 1e-2
+    assert row.attempts == run.statistics.steps + run.statistics.rejections
+
+
+def test_it_is_as_soft_as_the_accuracy_allows() -> None:
+    wide, narrow = (
+        select(Rabinowicz, ["brown_mcphee"], accuracy=a, t_end=SHORT, fixed_steps=False)
+        for a in (1e-2, 1e-3)
+    )
+    widths = [(c["brown_mcphee"].values or {})["v_t"] for c in (wide, narrow)]
+    assert 2.0 < log2(widths[0] / widths[1]) < 6.5  # error ~ v_t^(2/3): 31 times
+    assert 0.5e-2 < wide["brown_mcphee"].error < 1e-2
+
+
+def test_levels_and_their_peak_are_those_that_were_asked_for() -> None:
+    found = select(
+        Rabinowicz, ["tustin"], friction=Friction(0.3, 0.2), accuracy=1e-2, t_end=14.0,
+        fixed_steps=False,
+    )  # fmt: skip
+    assert found.best is not None
+    assert "mu_s = 0.3, mu_d = 0.2" in found.friction
+
+
+def test_a_scene_as_it_stands_gives_the_levels() -> None:
+    found = select(
+        Rabinowicz(LuGre(mu_s=0.2, mu_d=0.12)), ["stribeck"], accuracy=0.05, t_end=10.0,
+        fixed_steps=False,
+    )  # fmt: skip
+    assert found.friction == "mu_s = 0.2, mu_d = 0.12, falling at once"
+    assert found.best is not None
+
+
+def test_a_fall_that_is_known_is_kept() -> None:
+    found = select(
+        Rabinowicz, ["stribeck", "tustin", "brown_mcphee"], friction=Friction(v_s=0.05),
+        accuracy=1e-2, t_end=SHORT, fixed_steps=False,
+    )  # fmt: skip
+    assert [row.law for row in found.ranked] == ["stribeck"]
+    assert "v_s" not in (found["stribeck"].values or {})
+    assert found["tustin"].reason.endswith("it tends to another motion")
+
+
+def press(law: Law) -> Model:
+    """A mass that a spring pulls back, on a guide; written by a user."""
+    x, v = Variable("x", "m", nominal=0.1), Variable("v", "m/s", start=0.5, nominal=0.1)
+    pull = -30 * x.symbol
+    guide = contact("guide", law, v.symbol, 20.0, rest={"v": 0.0}, F_e=pull)
+    return Model(
+        "press", x=(x, v), ode=ca.vertcat(v.symbol, (pull - guide.force) / 2), contacts=(guide,)
+    )
+
+
+def test_a_function_of_a_user_is_a_machine() -> None:
+    found = select(press, ["stribeck", "karnopp"], needs=["stiction"], accuracy=1e-2, t_end=2.0)
+    assert found.machine == "press"
+    assert {row.law for row in found.ranked} == {"stribeck", "karnopp"}
+    assert found["stribeck"].fixed_step is not None
+
+
+def test_a_function_that_fails_for_a_law_is_a_row() -> None:
+    def only_static(law: Law) -> Model:
+        if law.states:
+            raise TypeError("no states, please")
+        return press(law)
+
+    found = select(only_static, ["lugre", "stribeck"], accuracy=0.05, t_end=1.0, fixed_steps=False)
+    assert (found["lugre"].standing, found["lugre"].reason) == ("cannot run", "no states, please")
+    assert found.best is not None
+    assert "the sharpest law" in found.reference  # exact dry friction has a state
+
+
+def test_data_judge_fitted_laws() -> None:
+    t = np.linspace(0, 3.0, 301)
+    truth = LuGre(mu_s=0.2, mu_d=0.15)
+    run = simulate(
+        Drive(truth).model(), 3.0, t_eval=t, u={"force": lambda t: 2 * ca.sin(ca.pi * t)}
+    )
+    laws = {"right": truth, "wrong": LuGre()}
+    found = select(Drive, laws, data={"t": t, "x": run["x"]}, accuracy=1e-3, fixed_steps=False)
+    assert [row.law for row in found.ranked] == ["right"]
+    assert found["wrong"].error > 0.05
+    assert found["right"].values == {}  # nothing was scaled
+
+
+def test_steps_that_hold_are_shorter_for_an_explicit_method() -> None:
+    found = select(Rabinowicz, ["stribeck"], accuracy=0.03, t_end=SHORT)
+    row = found["stribeck"]
+    assert row.fixed_step is not None
+    assert row.explicit_step is not None
+    assert row.explicit_step <= row.fixed_step
+    assert row.c_operations == 12
+
+
+def test_bad_input_is_refused_in_a_sentence() -> None:
+    cases: tuple[tuple[dict[str, Any], str], ...] = (
+        ({"needs": ["stictoin"]}, "needs: expected some of sliding, stiction, .* got stictoin"),
+        ({"needs": "stiction"}, "expected a sequence of names"),
+        ({"accuracy": 0.0}, "accuracy: expected a number > 0"),
+        ({"laws": ["lugrr"]}, "did you mean lugre"),
+        ({"laws": {"mine": "lugre"}}, "expected a law such as LuGre"),
+        ({"laws": {}}, "expected at least one"),
+        ({"scene": 3}, "expected a scene such as Rabinowicz"),
+        ({"scene": press}, "t_end: expected the end of the motion"),
+        ({"scene": lambda law: 3, "t_end": 1.0}, "expected a scene or a Model, got 3"),
+        ({"friction": (0.2, 0.1)}, "friction: expected"),
+        ({"reference": "exakt"}, "expected one of exact, sharpest"),
+    )
+    for given, said in cases:
+        arguments: dict[str, Any] = {"scene": Rabinowicz, "laws": ["stribeck"]} | given
+        with pytest.raises(ValueError, match=said):
+            select(**arguments)
+
+
+def test_it_shows_and_saves_itself(choice: Choice, tmp_path: Path) -> None:
+    shown = repr(choice).splitlines()
+    assert len(shown) <= 30
+    every = list(lines(choice))
+    assert max(map(len, [*shown, *every])) <= 80
+    assert any(line.startswith("Simulation: take") for line in shown)
+    choice.to_csv(tmp_path / "c.csv")
+    with (tmp_path / "c.csv").open(encoding="utf-8") as file:
+        assert [row["law"] for row in csv.DictReader(file)] == [row.law for row in choice]
+    choice.to_json(tmp_path / "c.json")
+    kept = json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))
+    assert kept["best"] == choice.ranked[0].law
+    choice.to_html(tmp_path / "c.html")
+    page = (tmp_path / "c.html").read_text(encoding="utf-8")
+    assert "http" not in page.replace("data:image", "")
+    assert all(row.law in page for row in choice)
+
+
+def test_an_interrupt_keeps_what_is_there() -> None:
+    def stop(name: str, _: float) -> None:
+        if name == "stribeck":
+            raise KeyboardInterrupt
+
+    found = select(
+        Rabinowicz, ["stribeck", "lugre"], accuracy=0.05, t_end=3.0, fixed_steps=False,
+        progress=stop,
+    )  # fmt: skip
+    assert found.interrupted
+    assert [row.law for row in found] == ["stribeck"]
+    assert "Interrupted" in list(lines(found))[-1]
+
+
+def test_processes_give_the_same_rows() -> None:
+    alone, two = (
+        select(press, ["stribeck", "lugre"], accuracy=0.05, t_end=1.0, workers=n) for n in (1, 2)
+    )
+    assert {(r.law, r.error, r.attempts) for r in alone} == {
+        (r.law, r.error, r.attempts) for r in two
+    }
+
+
+@pytest.mark.slow
+def test_no_law_of_the_catalogue_breaks_it() -> None:
+    found = select(Rabinowicz, accuracy=1e-2, t_end=SHORT, workers=2)
+    assert {row.law for row in found} == set(ALL_LAWS)
+    assert len(found.ranked) > 15
