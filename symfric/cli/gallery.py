@@ -1,7 +1,9 @@
 """`symfric gallery`: the figures of the papers, computed again."""
 
+from itertools import groupby
 from pathlib import Path
 from re import split
+from textwrap import shorten
 from typing import Annotated
 
 import typer
@@ -11,6 +13,9 @@ from symfric.cli.options import check_folder
 from symfric.gallery import chosen, short
 from symfric.gallery.plate import about
 from symfric.gallery.rendering import Gallery, render
+
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as of all commands."""
 
 
 def gallery(
@@ -36,7 +41,7 @@ def gallery(
     Beside each: what is compared, how far we are, and what was refuted by what evidence. Writes a
     picture and a JSON file of its numbers for every figure, and index.html with all of them.
     Ctrl-C keeps what is done. A figure that fails is told, the others go on, and the exit status
-    is 1.
+    is 1; it is 130 after Ctrl-C.
 
     Example: symfric gallery --list
 
@@ -52,8 +57,11 @@ def gallery(
     with output.progress(f"{len(chosen(asked))} figures") as tell:
         done = render(out, asked, quick=quick, workers=workers, progress=tell)
     show_gallery(done)
-    output.say_written(out / "index.html")
-    if not done.passed:
+    took = f"{len(done.records)} of {len(done.asked)} figures in {done.seconds:.0f} s"
+    output.note(f"{took}, {'at reduced size, ' if quick else ''}wrote {out / 'index.html'}")
+    if done.left:
+        raise typer.Exit(INTERRUPTED)
+    if done.failures:
         raise typer.Exit(1)
     return None
 
@@ -70,20 +78,27 @@ def show_list(names: tuple[str, ...]) -> None:
 
 def show_gallery(done: Gallery) -> None:
     """Print what is compared, how far we are, and what failed."""
-    output.show_table(
-        ["figure", "what is compared", "how far", "s"],
-        [
-            (short(name), first_sentence(r["compared"]), r["how_far"], f"{r['seconds']:.1f}")
-            for name, r in done.records.items()
-        ],
-    )
+    for folder, names in groupby(done.records, lambda name: name.partition("/")[0]):
+        records = {name: done.records[name] for name in names}
+        paper = next(iter(records.values()))["paper"]
+        output.show(f"{folder}: {paper}")
+        rows = [
+            (
+                short(name).partition("/")[2],
+                brief(r["compared"]),
+                r["how_far"],
+                f"{r['seconds']:.1f}",
+            )
+            for name, r in records.items()
+        ]
+        output.show_table(["figure", "what is compared", "how far", "s"], rows)
+        output.show()
     for name, why in done.failures.items():
         output.note(f"symfric: {name} failed, {why}")
-    left = len(done.asked) - len(done.records) - len(done.failures)
-    if left:
-        output.note(f"symfric: interrupted, {left} of {len(done.asked)} figures were not computed")
+    if done.left:
+        output.note(f"symfric: {done.left} of {len(done.asked)} figures were not computed")
 
 
-def first_sentence(text: str) -> str:
-    """Up to the first full stop, colon or semicolon."""
-    return split(r"(?<!\.)[.;:](?: |$)", text)[0]
+def brief(text: str, width: int = 84) -> str:
+    """The first sentence or clause, cut to two lines of the table."""
+    return shorten(split(r"(?<!\.)[.;:](?: |$)", text)[0], width, placeholder=" ...")

@@ -3,11 +3,12 @@
 import ast
 import json
 import os
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from threading import Event, Thread
 from time import perf_counter, time
 from typing import Any, final
 
@@ -35,17 +36,19 @@ class Gallery:
         asked: names of the plates that were to be computed.
         records: name -> plate as plain data, of what was computed now.
         failures: name -> why it was not; neither is what an interrupt left undone.
+        seconds: wall time.
     """
 
     folder: Path
     asked: tuple[str, ...]
     records: dict[str, Record]
     failures: dict[str, str]
+    seconds: float
 
     @property
-    def passed(self) -> bool:
-        """Whether every plate that was asked for is there."""
-        return len(self.records) == len(self.asked)
+    def left(self) -> int:
+        """How many plates an interrupt left undone."""
+        return len(self.asked) - len(self.records) - len(self.failures)
 
 
 def render(
@@ -80,22 +83,45 @@ def render(
     tasks = ((i, (group, str(folder), quick)) for i, group in enumerate(groups))
     size = min(workers or os.cpu_count() or 1, len(groups))
     crew = Crew(_rendered, tasks, size, LIMIT)
-    failures, done = dict[str, str](), 0
+    failures = dict[str, str]()
+
+    def tell() -> None:
+        if progress is not None:
+            there = sum(place(folder, name, ".json").exists() for name in asked)
+            progress((there + len(failures)) / len(asked))
+
     try:
-        for number, outcome in crew.outcomes():
-            failures |= _failures(groups[number], folder, outcome)
-            done += len(groups[number])
-            if progress is not None:
-                progress(done / len(asked))
+        with _repeated(tell):
+            for number, outcome in crew.outcomes():
+                failures |= _failures(groups[number], folder, outcome)
     except KeyboardInterrupt:
         pass
     finally:
         crew.dismiss()
+    tell()
     there = read(folder)
     write_text(folder / "index.html", index_page([*there.values()]))
     records = {name: there[name] for name in asked if name in there}
     fresh = {n: r for n, r in records.items() if place(folder, n, ".json").stat().st_mtime >= began}
-    return Gallery(folder, asked, fresh, failures)
+    return Gallery(folder, asked, fresh, failures, time() - began)
+
+
+@contextmanager
+def _repeated(tell: Callable[[], None], every: float = 0.5) -> Generator[None]:
+    """Call `tell` every so many seconds while the block runs: a process draws many plates."""
+    end = Event()
+
+    def watch() -> None:
+        while not end.wait(every):
+            tell()
+
+    watcher = Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        end.set()
+        watcher.join()
 
 
 def place(folder: Path, name: str, ending: str) -> Path:

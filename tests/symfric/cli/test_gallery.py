@@ -6,7 +6,7 @@ import pytest
 
 from symfric.cli import gallery as command
 from symfric.cli.app import main
-from symfric.cli.gallery import first_sentence
+from symfric.cli.gallery import brief
 from symfric.gallery.rendering import Gallery
 
 NAME = "self_tuning/fig_07_shape_factor"
@@ -31,17 +31,29 @@ def test_a_wrong_name_is_refused_before_anything_is_computed(
 def test_what_failed_is_told_and_the_status_is_1(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    record = {"compared": "This with that. More.", "how_far": "2e-9 m", "seconds": 1.5}
-    done = Gallery(tmp_path, ("a", NAME, "b"), {NAME: record}, {"a": "ValueError: none"})
+    record = {
+        "paper": "A and B, Title",
+        "compared": "This with that. More.",
+        "how_far": "2e-9 m",
+        "seconds": 1.5,
+    }
+    done = Gallery(tmp_path, ("a", NAME), {NAME: record}, {"a": "ValueError: none"}, 2.0)
     monkeypatch.setattr(command, "render", lambda *_, **__: done)  # pyright: ignore[reportUnknownArgumentType, reportUnknownLambdaType]
     assert main(["gallery", "--out", str(tmp_path)]) == 1
     told = capsys.readouterr()
     assert "a failed, ValueError: none" in told.err
-    assert "interrupted, 1 of 3 figures" in told.err
+    part = Gallery(tmp_path, ("a", NAME, "b"), {NAME: record}, {"a": "ValueError: none"}, 2.0)
+    monkeypatch.setattr(command, "render", lambda *_, **__: part)  # pyright: ignore[reportUnknownArgumentType, reportUnknownLambdaType]
+    assert main(["gallery", "--out", str(tmp_path)]) == 130
+    assert "1 of 3 figures were not computed" in capsys.readouterr().err
     assert "This with that" in told.out
     assert "More" not in told.out
+    assert "self_tuning: A and B, Title" in told.out
+    assert max(map(len, told.out.splitlines())) <= 80
 
 
-def test_a_sentence_ends_where_it_says() -> None:
-    assert first_sentence("One. Two.") == "One"
-    assert first_sentence("0.5 mm ... 2 only.") == "0.5 mm ... 2 only"
+def test_a_text_is_cut_to_what_the_table_holds() -> None:
+    assert brief("word " * 30).endswith("word ...")
+    assert len(brief("word " * 30)) <= 84
+    assert brief("One. Two.") == "One"
+    assert brief("0.5 mm ... 2 only.") == "0.5 mm ... 2 only"
