@@ -111,6 +111,7 @@ if TYPE_CHECKING:
     from symfric.results.report import report as report
     from symfric.scenes import drive as drive
     from symfric.scenes import rabinowicz as rabinowicz
+    from symfric.scenes.base import contact as contact
 else:
     hand_out(
         __name__,
@@ -140,6 +141,7 @@ else:
             "symfric.model": "Contact Event Model Monitor Output",
             "symfric.results.report": "report",
             "symfric.scenes": "drive rabinowicz",
+            "symfric.scenes.base": "contact",
         },
     )
 
