@@ -106,7 +106,7 @@ def run(
     ] = "main",
     movie: Annotated[
         Path | None,
-        typer.Option("--animate", metavar="FILE.gif", help="Film a mechanism: .gif, .html, .mp4."),
+        typer.Option("--animate", metavar="FILE.gif", help="Film the machine: .gif, .html, .mp4."),
     ] = None,
     json: JsonOption = None,
 ) -> None:
@@ -135,9 +135,9 @@ def run(
         )
     check_outputs(out, json, movie, picture=plot)
     checks.choice("--panels", panels, ("main", "all"))
-    check_movie(movie, scene)
     machines = scenes_with(scene, law, numbers("--set", settings), preset, law_of)
     models = {name: machine.model() for name, machine in machines.items()}
+    check_movie(movie, scene, models[law[0]])
     machine = next(iter(machines.values()))
     signals, described = inputs_of(machine, models[law[0]], inputs)
     until = shown_until(machine, signals) if t_end is None else t_end
@@ -171,16 +171,19 @@ def run(
             raise SolveError(trajectory.message, trajectory.status, trajectory)
 
 
-def check_movie(path: Path | None, scene: str) -> None:
+def check_movie(path: Path | None, scene: str, model: Model) -> None:
     """Refuse a film that cannot be made, before any work is spent on it.
 
     Raises:
-        ValueError: a scene without bodies, or a kind of file that is not written.
+        ValueError: a scene that is not drawn, or a kind of file that is not written.
     """
     if path is None:
         return
-    if scene not in MECHANISMS and not scene.endswith(".urdf"):
-        raise ValueError(f"--animate: expected one of {', '.join(MECHANISMS)}, got {scene}")
+    if model.sketch is None:
+        raise ValueError(
+            f"--animate: expected a scene with places, such as {', '.join(MECHANISMS)}, got "
+            f"{scene}; --plot shows its signals"
+        )
     from symfric.results.animation import check_format  # noqa: PLC0415  (matplotlib is slow)
 
     check_format(path)

@@ -85,8 +85,10 @@ class Sketch:
             by column, and its position [m].
         parts: bodies.
         marks: what stands between the places.
+        symbols: size of the symbols of joints, relative to that in a mechanism.
     """
 
     places: ca.SX
     parts: tuple[Part, ...]
     marks: tuple[Mark, ...]
+    symbols: float = 1.0

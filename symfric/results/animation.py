@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from symfric.foundation import checks
 from symfric.foundation.files import write_text, written
 from symfric.foundation.panels import blank, grid
-from symfric.foundation.style import colour
+from symfric.foundation.style import EDGE, colour
 from symfric.model.sketch import Sketch
 from symfric.results.strokes import AZIMUTH, ELEVATION, Poses, Stroke, View, look, strokes
 
@@ -32,9 +32,11 @@ BRIEF, LONG, SHOWN = 2.0, 12.0, 6.0
 """Motions between BRIEF and LONG [s] are shown as fast as they are, others in SHOWN."""
 PATH = 1001
 """Points of the path of a centre of mass."""
-STILL, STICKS, SLIDES = "white", "#d62728", "#2ca02c"
-"""Fill of joints: without friction, sticking, sliding."""
-GROUND, EDGE = "#8c6d46", "#222222"
+STICKS, SLIDES = colour(1), "white"
+"""Fill of joints with friction: filled they stick, hollow they slide, which print shows, too."""
+GROUND = "#8c6d46"
+FLATTEST = 0.4
+"""Least ratio of the sides of a picture in a plane."""
 
 
 def animate(
@@ -164,8 +166,8 @@ def picture(
     model = trajectory.model
     if model.sketch is None:
         raise ValueError(
-            f"animation of '{trajectory.scene}': expected a mechanism, got a model without "
-            "bodies; plot() shows its signals"
+            f"animation of '{trajectory.scene}': expected a machine with places, got a model "
+            "without a sketch; plot() shows its signals"
         )
     sketch = model.sketch()
     columns = trajectory.of(sketch.places, times).reshape(-1, 12, times.size)
@@ -229,7 +231,7 @@ def _flat(view: View) -> tuple[Figure, Canvas]:
     low, high = axes @ view.low, axes @ view.high
     low, high = np.minimum(low, high), np.maximum(low, high)
     size = high - low
-    more = np.maximum(0.6 * size.max() - size, 0) / 2
+    more = np.maximum(FLATTEST * size.max() - size, 0) / 2
     low, high = low - more, high + more
     width, height = high - low
     scale = 6.4 / max(width, height)
@@ -304,13 +306,14 @@ def _style(stroke: Stroke) -> dict[str, Any]:
         "rod": {"color": EDGE, "linewidth": 1.8},
         "damper": {"color": EDGE, "linewidth": 1.2, "linestyle": "--"},
         "spring": {"color": "#7f7f7f", "linewidth": 1.0},
-        "joint": {"color": EDGE, "marker": stroke.marker, "markersize": 7.0, "linestyle": "",
-                  "markerfacecolor": STILL},
+        "joint": {"color": EDGE, "marker": stroke.marker, "linestyle": "", "markeredgewidth": 1.6,
+                  "markersize": 4.0 if stroke.sticks is None else 9.0,
+                  "markerfacecolor": EDGE if stroke.sticks is None else SLIDES},
     }  # fmt: skip
     return styles[stroke.role]
 
 
 def _fill(line: Line2D, stroke: Stroke, k: int) -> None:
-    """Colour a joint by what its contacts do."""
+    """Fill a joint by what its contacts do."""
     if stroke.sticks is not None:
         line.set_markerfacecolor(STICKS if stroke.sticks[k] else SLIDES)

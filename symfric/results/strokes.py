@@ -94,7 +94,7 @@ def look(sketch: Sketch, poses: Poses) -> View:
     every = np.concatenate([a.transpose(1, 0, 2).reshape(3, -1) for a in (poses.at, poses.paths)],
                            axis=1)  # fmt: skip
     low, high = every.min(axis=1), every.max(axis=1)
-    size = SYMBOL * max(float(np.max(high - low)), 1e-9)
+    size = SYMBOL * sketch.symbols * max(float(np.max(high - low)), 1e-9)
     normal = _normal(sketch, poses)
     if normal is None:
         e, a = np.radians([ELEVATION, AZIMUTH])
@@ -105,21 +105,37 @@ def look(sketch: Sketch, poses: Poses) -> View:
 
 
 def _normal(sketch: Sketch, poses: Poses) -> Array | None:
-    """The normal of the plane in which all moves, towards the eye; None if there is none."""
+    """The normal of the plane in which all moves, towards the eye; None if there is none.
+
+    What moves along a line, or not at all, is seen along its hinges; without hinges, in the plane
+    that holds all its places, or from aside where these lie on a line, too.
+    """
     moved = (poses.at - poses.at[:, :, :1]).transpose(1, 0, 2).reshape(3, -1)
-    directions, extent, _ = np.linalg.svd(moved, full_matrices=False)
     hinges = [poses.axes[mark.b, 2] for mark in sketch.marks if mark.symbol.hinge]
+    directions, extent, _ = np.linalg.svd(moved, full_matrices=False)
     if extent[1] > FLAT * extent[0]:
         normal = directions[:, 2]
     elif hinges:
         normal = hinges[0][:, 0]
     else:
-        return None
+        moved = poses.at.transpose(1, 0, 2).reshape(3, -1)
+        moved = moved - moved[:, :1]
+        directions, extent, _ = np.linalg.svd(moved, full_matrices=False)
+        aside = _aside(directions[:, 0] if extent[0] > 0 else np.array([1.0, 0.0, 0.0]))
+        normal = directions[:, 2] if extent[1] > FLAT * extent[0] else aside
+    extent = np.maximum(extent, 1e-300)
     across = [np.linalg.norm(np.cross(axis.T, normal), axis=1).max() for axis in hinges]
     if np.abs(normal @ moved).max() > FLAT * extent[0] or max(across, default=0.0) > FLAT:
         return None
     view = View(normal, normal, normal, True, 0.0)
     return normal if view.right[np.argmax(np.abs(view.right))] > 0 else -normal
+
+
+def _aside(line: Array) -> Array:
+    """The direction from which a line is seen best: across it and level; y for one along x or z."""
+    level = np.array([0.0, -1.0, 0.0]) if abs(line[1]) < UPRIGHT else np.array([1.0, 0.0, 0.0])
+    across = level - (level @ line) * line
+    return np.asarray(across / np.linalg.norm(across))
 
 
 def strokes(

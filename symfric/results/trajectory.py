@@ -295,10 +295,11 @@ class Trajectory(Showing, Derivatives):
         speed: float | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> None:
-        """Write a moving picture of a mechanism: GIF, HTML with the pictures inside, or MP4.
+        """Write a moving picture of a machine: GIF, HTML with the pictures inside, or MP4.
 
-        Planar mechanisms are seen along the normal of their plane. Joints are filled red while
-        all their contacts move slower than the velocity scale of their law, green while one slides.
+        Planar machines are seen along the normal of their plane. Joints with friction are filled
+        while all their contacts move slower than the velocity scale of their law, hollow while one
+        slides.
 
         Args:
             path: file ending in .gif, .html or .mp4 (needs the program ffmpeg).

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar, final
 
 import casadi as ca
@@ -11,7 +12,9 @@ from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable, param, with_values
 from symfric.laws import Law
 from symfric.model import Model, Output, Variables
+from symfric.model.sketch import Sketch
 from symfric.scenes.base import GivenInput, Scene, contact, in_turning
+from symfric.scenes.drawn import Block, drawn
 
 
 def sine(t: ca.SX) -> ca.SX:
@@ -63,8 +66,15 @@ class Drive(Scene):
                 "friction": Output(slip.force, "N", "friction force opposing v"),
                 "power": Output(slip.force * v.symbol, "W", "power taken by friction"),
             },
+            sketch=partial(self._sketch, x.symbol),
         )
         return in_turning(model) if self.turning else model
+
+    def _sketch(self, x: ca.SX) -> Sketch:
+        """The mass on its guide, or a hand that turns."""
+        if self.turning:
+            return drawn({}, hands={"axis": (x, 1.0)})
+        return drawn({"mass": Block(x, 0.0, "x", "v", self.law)})
 
 
 def drive(law: Law, *, free: Iterable[str] = (), **parameters: Scalar) -> Model:

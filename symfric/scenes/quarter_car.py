@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from math import pi
 from typing import ClassVar, final
 
@@ -12,7 +13,9 @@ from symfric.foundation.parameters import Variable, param, parameters, with_valu
 from symfric.laws.base import smooth
 from symfric.laws.static.quarter_car import QuarterCarGeneral, tilt
 from symfric.model import Model, Monitor, Output, Variables
+from symfric.model.sketch import Sketch
 from symfric.scenes.base import Scene, contact
+from symfric.scenes.drawn import Block, drawn
 from symfric.scenes.presets import Numbers, Preset
 
 ANY = 1e100
@@ -148,6 +151,19 @@ class QuarterCar(Scene):
                 "friction": Output(slip.force, "N", "friction force opposing v_b"),
                 "power": Output(slip.force * v_b.symbol, "W", "power taken by friction"),
             },
+            sketch=partial(self._sketch, X_b.symbol, X_w.symbol, X_r),
+        )
+
+    def _sketch(self, X_b: ca.SX, X_w: ca.SX, X_r: ca.SX) -> Sketch:
+        """Body on its guide, strut, wheel, and the road below the tyre."""
+        wheel, body = 0.5 * self.L_d, 1.5 * self.L_d
+        return drawn(
+            {
+                "wheel": Block(0.0, X_w + wheel),
+                "body": Block(0.0, X_b + body, "z", "v_b", self.law),
+            },
+            {"road": (0.0, X_r)},
+            [("spring", "road", "wheel"), ("spring", "wheel", "body")],
         )
 
     def normal_force(self, f_sd: Scalar, x_rel: Scalar) -> Scalar:

@@ -2,16 +2,19 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar, final
 
 import casadi as ca
 
-from symfric.foundation.numeric import Scalar
+from symfric.foundation.numeric import Scalar, equals
 from symfric.foundation.parameters import Variable, param, with_values
 from symfric.laws import BrownMcPhee, Law, LuGre
 from symfric.model import Model, Output, Variables
+from symfric.model.sketch import Sketch
 from symfric.scenes import jing_mi
 from symfric.scenes.base import Scene, contact
+from symfric.scenes.drawn import Block, around, drawn
 from symfric.scenes.presets import Numbers, Preset
 
 
@@ -70,6 +73,7 @@ class Rabinowicz(Scene):
         N, v_rel = self.m * self.g, v.symbol - self.v_belt
         pull = -self.k * x.symbol
         slip = contact("belt", self.law, v_rel, N, rest={"v": self.v_belt}, F_e=pull)
+        t = ca.SX.sym("t")
         return Model(
             name="rabinowicz",
             x=(x, v),
@@ -81,6 +85,19 @@ class Rabinowicz(Scene):
                 "friction": Output(slip.force, "N", "friction force opposing v_rel"),
                 "power": Output(slip.force * v_rel, "W", "power taken by the contact"),
             },
+            t=t,
+            sketch=partial(self._sketch, x.symbol, t),
+        )
+
+    def _sketch(self, x: ca.SX, t: ca.SX) -> Sketch:
+        """The block on the belt, whose marks move with it, and its spring."""
+        way = 0.15 * self.m * self.g / self.k if not equals(self.k, 0.0) else 1.0
+        marks = [(around(self.v_belt * t + i * way / 3, -way, 2 * way), 0.0) for i in range(9)]
+        return drawn(
+            {"block": Block(x, 0.0, "x", "v_rel", self.law)},
+            {"wall": (-way, 0.0)},
+            [("spring", "wall", "block")],
+            ticks=marks,
         )
 
 

@@ -108,7 +108,8 @@ def lines() -> Iterator[list[str]]:
         plot=PICTURES,
         json=TABLES[:-1],
         input=["force=1", "force", "=", "v_belt=1"],
-        animate=["x.gif", "x", "x.png"],
+        animate=["x", "x.png"],
+        panels=["", "some", "Main"],
     )
     yield from options(
         DRIVE,
@@ -134,7 +135,7 @@ def lines() -> Iterator[list[str]]:
             "force=.:x",
             "force=header.csv:force",
         ],
-        animate=["x.gif"],
+        animate=["x.mov"],
         set=["m=0", "m=-1", "N=nan", "mu_d=5,5", "mu_d=2"],
     )
     yield [*DRIVE.split(), "--input", "force=1", "--input", "force=2"]

@@ -241,7 +241,6 @@ def test_a_film_is_written_and_named(tmp_path: Path, capsys: pytest.CaptureFixtu
 @pytest.mark.parametrize(
     ("line", "why"),
     [
-        ("drive --law lugre --animate x.gif", "--animate: expected one of pendulum,"),
         ("pendulum --law lugre --animate x.avi", "ending in .gif, .html, .mp4, got '.avi'"),
         ("pendulum --law coulomb --law viscous --animate x.gif", "expected one --law, got 2"),
     ],

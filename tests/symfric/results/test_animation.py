@@ -7,9 +7,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.animation import FFMpegWriter
+from matplotlib.colors import to_hex
 from PIL import Image
 
-from symfric import BrownMcPhee, LuGre, Trajectory, rabinowicz, simulate
+from symfric import BrownMcPhee, Model, Trajectory, Variable, rabinowicz, simulate
+from symfric.multibody import Mechanism, Prismatic
 from symfric.results.animation import SLIDES, STICKS, check_format, frame_times, picture
 from symfric.scenes import MECHANISMS, Pendulum
 
@@ -90,11 +92,52 @@ def test_rates_must_be_above_zero(runs: dict[str, Trajectory], bad: dict[str, fl
         runs["pendulum"].animate("x.gif", **bad)
 
 
-def test_a_model_without_bodies_is_refused(tmp_path: Path) -> None:
-    run = simulate(rabinowicz(LuGre()), 0.1)
-    with pytest.raises(ValueError, match="'rabinowicz': expected a mechanism"):
+def test_a_model_without_a_sketch_is_refused(tmp_path: Path) -> None:
+    x = Variable("x", "m", start=1.0)
+    run = simulate(Model("decay", x=(x,), ode=-x.symbol), 0.1)
+    with pytest.raises(ValueError, match="'decay': expected a machine with places"):
         run.animate(tmp_path / "x.gif")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_block_on_a_belt_is_seen_from_aside_with_its_spring_and_its_stick() -> None:
+    """Carried by the belt it sticks, until the spring pulls it back."""
+    run = simulate(rabinowicz(BrownMcPhee()), 8.0)
+    figure, show = picture(run, np.array([0.0, 3.0, 7.0]))
+    (axis,) = figure.axes
+    assert (axis.get_xlabel(), axis.get_ylabel(), axis.get_aspect()) == ("x [m]", "z [m]", 1.0)
+    joint = next(line for line in axis.lines if line.get_marker() == "s")
+    fills = []
+    for k, t in enumerate((0.0, 3.0, 7.0)):
+        show(k)
+        fills.append(to_hex(joint.get_markerfacecolor()))
+        assert joint.get_xdata()[0] == pytest.approx(run.at(t)["x"][0])
+    assert fills == [to_hex(fill) for fill in (SLIDES, STICKS, SLIDES)]
+
+
+def test_marks_of_the_belt_move_with_it() -> None:
+    run = simulate(rabinowicz(BrownMcPhee()), 2.0)
+    figure, show = picture(run, np.array([0.0, 1.0]))
+    ticks = [line for line in figure.axes[0].lines if line.get_marker() == "|"]
+    at = []
+    for k in range(2):
+        show(k)
+        at.append([line.get_xdata()[0] for line in ticks])
+    moved = np.subtract(at[1], at[0])
+    length = 3 * 0.15 * 0.8 * 9.81 / 2.1
+    assert np.mod(moved, length) == pytest.approx(np.full(9, 0.1))
+
+
+@pytest.mark.parametrize("along", ["x", "y", "z"])
+def test_a_slider_alone_is_drawn_in_a_plane(along: str) -> None:
+    machine = Mechanism("slider", gravity=(0.0, 0.0, 0.0))
+    machine.body("block", mass=1.0, inertia=(1.0, 1.0, 1.0))
+    for place in ("ground.rail", "block.rail"):
+        machine.frame(place, z=tuple(float(along == other) for other in "xyz"))
+    machine.joint(Prismatic("s", "ground.rail", "block.rail", rate=1.0))
+    figure, _ = picture(simulate(machine.build(), 0.1), np.array([0.0, 0.1]))
+    assert figure.axes[0].name == "rectilinear"
+    assert along in figure.axes[0].get_xlabel() + figure.axes[0].get_ylabel()
 
 
 @pytest.mark.parametrize(("end", "speed", "frames"), [(4.0, 1.0, 81), (0.25, 0.25 / 6, 121),
