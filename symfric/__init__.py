@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from symfric.integrator import Trajectory as Trajectory
     from symfric.integrator import flow as flow
     from symfric.integrator import load_run as load_run
+    from symfric.integrator import rate_of as rate_of
     from symfric.integrator import simulate as simulate
     from symfric.integrator import simulate_many as simulate_many
     from symfric.integrator import stepper as stepper
@@ -121,7 +122,7 @@ else:
             "symfric.foundation.parameters": "Parameter Variable parameters symbolise with_values",
             "symfric.foundation.status": "SolveError Status",
             "symfric.integrator": """
-                Ensemble Hold Linear Plant Statistics Trajectory flow load_run
+                Ensemble Hold Linear Plant Statistics Trajectory flow load_run rate_of
                 simulate simulate_many stepper
             """,
             "symfric.laws": """

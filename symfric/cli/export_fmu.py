@@ -7,11 +7,12 @@ import typer
 
 from symfric.cli import completions, output
 from symfric.cli.machines import LawOfOption, PresetOption, scenes_with
-from symfric.cli.options import JsonOption, SetOption, check_outputs, numbers
+from symfric.cli.options import JsonOption, SetOption, assignments, check_outputs
 from symfric.cli.user_file import held_by_file
 from symfric.fmu import Exported
 from symfric.fmu import export_fmu as exported
 from symfric.fmu.export import KINDS
+from symfric.foundation import checks
 from symfric.model import Model
 from symfric.scenes import Scene
 
@@ -82,7 +83,7 @@ def export_fmu(
     """
     check_outputs(out, json)
     make = from_file if ".py" in what else scene_of
-    model = make(what, law, numbers("--set", settings), preset, law_of)
+    model = make(what, law, assignments("--set", settings), preset, law_of)
     unit = exported(
         model,
         Path(f"{named(model, what)}.fmu") if out is None else out,
@@ -109,7 +110,7 @@ def named(model: Model | Scene, what: str) -> str:
 def scene_of(
     what: str,
     law: str | None,
-    values: dict[str, float],
+    settings: dict[str, str],
     preset: str | None,
     law_of: list[str] | None,
 ) -> Scene:
@@ -120,13 +121,13 @@ def scene_of(
     """
     if law is None:
         raise ValueError(f"export-fmu {what}: expected --law NAME, got none; such as --law lugre")
-    return scenes_with(what, [law], values, preset, law_of)[law]
+    return scenes_with(what, [law], settings, preset, law_of)[law]
 
 
 def from_file(
     what: str,
     law: str | None,
-    values: dict[str, float],
+    settings: dict[str, str],
     preset: str | None,
     law_of: list[str] | None,
 ) -> Model | Scene:
@@ -140,6 +141,7 @@ def from_file(
         if value:
             raise ValueError(f"{option}: expected none with '{what}', which has its laws")
     kind = Model | Scene
+    values = {n: checks.parsed(f"--set {n}", text) for n, text in settings.items()}
     return held_by_file("export-fmu", what, DEFAULT_NAME, values, "Model", kind)
 
 

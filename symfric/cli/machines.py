@@ -1,6 +1,7 @@
 """A scene as commands name it: its laws, a paper's preset, its parameters."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Annotated
 
@@ -9,7 +10,8 @@ import typer
 from symfric import Law, law_from_text, parameters, with_values
 from symfric.cli import completions
 from symfric.cli.options import assignments
-from symfric.foundation.parameters import check_names
+from symfric.foundation import checks
+from symfric.foundation.parameters import check_names, options
 from symfric.multibody.urdf.read import relative
 from symfric.scenes import ALL_SCENES, Robot, Scene
 
@@ -66,13 +68,18 @@ def kind_of(
 def scenes_with(
     scene: str,
     laws: Sequence[str],
-    values: dict[str, float],
+    settings: Mapping[str, str | float],
     preset: str | None = None,
     law_of: Sequence[str] | None = None,
 ) -> dict[str, Scene]:
     """The scene with each of the laws by name, parameters set wherever they occur.
 
-    Values of --set come after those of a preset.
+    Args:
+        scene: its name, or FILE.urdf.
+        laws: texts of --law.
+        settings: of --set: numbers of scene and laws, forms of laws, what the scene is made of;
+            they come after those of a preset.
+        preset, law_of: of these options.
 
     Raises:
         ValueError: unknown law, a law given twice, a parameter that none of the scenes has; those
@@ -81,10 +88,50 @@ def scenes_with(
     if len(set(laws)) != len(laws):
         raise ValueError(f"--law: expected every law once, got {', '.join(laws)}")
     kind = kind_of(scene, preset=preset, law_of=law_of)
-    machines = {text: kind(law_from_text(text)) for text in laws}
+    made = {text: law_from_text(text) for text in laws}
+    machines = {text: formed(kind(law), settings) for text, law in made.items()}
     known = {text: parameters(machine) for text, machine in machines.items()}
-    check_names(f"--set of {scene}", values, {n: None for names in known.values() for n in names})
+    forms = {text: _forms(machine) for text, machine in machines.items()}
+    every = {n: None for group in (known, forms) for names in group.values() for n in names}
+    check_names(f"--set of {scene}", settings, every)
+    values = {
+        name: _number(name, text)
+        for name, text in settings.items()
+        if any(name in names for names in known.values())
+    }
     return {
         text: with_values(machine, {n: v for n, v in values.items() if n in known[text]})
         for text, machine in machines.items()
     }
+
+
+def formed(machine: Scene, settings: Mapping[str, str | float]) -> Scene:
+    """The scene with the forms and the structure among texts of --set.
+
+    Raises:
+        ValueError: a text that is none of the choices, no count, neither true nor false.
+    """
+    law = {n: str(text) for n, text in settings.items() if n in options(machine.law)}
+    if law:
+        machine = replace(machine, law=replace(machine.law, **law))
+    own = {n: settings[n] for n in (*options(machine), *machine.structures()) if n in settings}
+    chosen = {name: _chosen(name, text, getattr(machine, name)) for name, text in own.items()}
+    return replace(machine, **chosen) if chosen else machine
+
+
+def _forms(machine: Scene) -> list[str]:
+    return [*options(machine.law), *options(machine), *machine.structures()]
+
+
+def _number(name: str, given: str | float) -> float:
+    return checks.parsed(f"--set {name}", given) if isinstance(given, str) else given
+
+
+def _chosen(name: str, text: str | float, like: str | bool | int) -> str | bool | int:
+    """What a text means for a field that holds a value of the kind of `like`."""
+    if isinstance(like, str):
+        return str(text)
+    if isinstance(like, bool):
+        return checks.choice(f"--set {name}", text, ("true", "false")) == "true"
+    number = _number(name, text)
+    return int(number) if number.is_integer() else checks.count(f"--set {name}", number)

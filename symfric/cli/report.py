@@ -9,8 +9,9 @@ import typer
 
 from symfric import SolveError, Trajectory, parameters, simulate
 from symfric.cli import completions, output
-from symfric.cli.options import SetOption, check_outputs, numbers
-from symfric.cli.run import inputs_of, scenes_with, shown_until
+from symfric.cli.inputs import driven
+from symfric.cli.machines import LawOfOption, PresetOption, scenes_with
+from symfric.cli.options import SetOption, assignments, check_outputs
 from symfric.results.report import report as write_report
 from symfric.scenes import ALL_SCENES
 
@@ -37,6 +38,8 @@ def report(
         "report.html"
     ),
     settings: SetOption = None,
+    preset: PresetOption = None,
+    law_of: LawOfOption = None,
     inputs: Annotated[
         list[str] | None,
         typer.Option("--input", metavar="NAME=VALUE", help="Input, as of `run`."),
@@ -58,17 +61,21 @@ def report(
     Example: symfric report rabinowicz --law lugre --law brown_mcphee --out report.html
     """
     check_outputs(out)
-    machines = scenes_with(scene, law, numbers("--set", settings))
+    machines = scenes_with(scene, law, assignments("--set", settings), preset, law_of)
     models = {name: machine.model() for name, machine in machines.items()}
     machine = next(iter(machines.values()))
-    signals, _ = inputs_of(machine, models[law[0]], inputs)
-    until = shown_until(machine, signals) if t_end is None else t_end
-    start = numbers("--x0", x0)
-    how: Any = {"x0": start, "u": signals, "rtol": rtol, "samples": 2001, "throw": False}
+    given = driven(machine, models[law[0]], inputs, x0, t_end)
+    how: Any = {
+        "x0": given.start,
+        "u": given.signals,
+        "rtol": rtol,
+        "samples": 2001,
+        "throw": False,
+    }
     found: dict[str, Trajectory] = {}
     for name, model in models.items():
         with output.progress(f"{scene} with {name}") as tell:
-            found[name] = simulate(model, until, **how, measure_error=True, progress=tell)
+            found[name] = simulate(model, given.until, **how, measure_error=True, progress=tell)
     write_report(
         found,
         out,

@@ -9,7 +9,7 @@ import typer
 
 from symfric import Law, SolveError, Trajectory, parameters, simulate
 from symfric.cli import completions, output
-from symfric.cli.inputs import input_from_text
+from symfric.cli.inputs import driven
 from symfric.cli.machines import LawOfOption, PresetOption, kind_of, scenes_with
 from symfric.cli.options import (
     JsonOption,
@@ -17,13 +17,10 @@ from symfric.cli.options import (
     SetOption,
     assignments,
     check_outputs,
-    numbers,
     seconds,
 )
 from symfric.foundation import checks
-from symfric.foundation.parameters import check_names
-from symfric.integrator import Input, simulate_by_peer
-from symfric.integrator.equations.inputs import Sampled
+from symfric.integrator import simulate_by_peer
 from symfric.model import Model
 from symfric.results.kinds import is_mechanism, kinds, norms
 from symfric.scenes import ALL_SCENES, MECHANISMS, Scene
@@ -56,8 +53,8 @@ def run(
             "--input",
             metavar="NAME=VALUE",
             help="Input: a number, or FILE.csv:COLUMN over its column t, both in SI "
-            "or with their units in the header, as t [ms]. "
-            "The drive's default is force = 2 sin(pi t) N.",
+            "or with their units in the header, as t [ms]; others stay as `symfric scenes SCENE` "
+            "shows.",
         ),
     ] = None,
     x0: Annotated[
@@ -135,15 +132,15 @@ def run(
         )
     check_outputs(out, json, movie, picture=plot)
     checks.choice("--panels", panels, ("main", "all"))
-    machines = scenes_with(scene, law, numbers("--set", settings), preset, law_of)
+    machines = scenes_with(scene, law, assignments("--set", settings), preset, law_of)
     models = {name: machine.model() for name, machine in machines.items()}
     check_movie(movie, scene, models[law[0]])
     machine = next(iter(machines.values()))
-    signals, described = inputs_of(machine, models[law[0]], inputs)
-    until = shown_until(machine, signals) if t_end is None else t_end
-    start = numbers("--x0", x0)
+    given = driven(machine, models[law[0]], inputs, x0, t_end)
+    until = given.until
     found: dict[str, Trajectory] = {}
-    common: Any = {"x0": start, "u": signals, "rtol": rtol, "samples": samples, "throw": False}
+    common: Any = {"x0": given.start, "u": given.signals, "rtol": rtol, "samples": samples}
+    common |= {"throw": False}
     for name, model in models.items():
         with output.progress(f"{scene} with {name}") as tell:
             if peer is None:
@@ -161,7 +158,7 @@ def run(
         with output.progress(f"{movie}") as tell:
             next(iter(found.values())).animate(movie, progress=tell)
     for name, trajectory in found.items():
-        output.emit_json(to_dict(name, machines[name], trajectory) | {"inputs": described}, json)
+        output.emit_json(to_dict(name, machines[name], trajectory) | {"inputs": given.told}, json)
         if json != "-":
             show_trajectory(name, trajectory)
             show_warnings(name, machines[name])
@@ -187,24 +184,6 @@ def check_movie(path: Path | None, scene: str, model: Model) -> None:
     from symfric.results.animation import check_format  # noqa: PLC0415  (matplotlib is slow)
 
     check_format(path)
-
-
-def inputs_of(
-    scene: Scene, model: Model, texts: list[str] | None
-) -> tuple[dict[str, Input], dict[str, str]]:
-    """Inputs by name, and the texts that describe them; without any those of the scene."""
-    given, units = assignments("--input", texts), {v.name: v.unit for v in model.u}
-    check_names(f"--input of {model.name}", given, units)
-    if not given:
-        own = scene.inputs.items()
-        return {name: of.function for name, of in own}, {name: of.text for name, of in own}
-    return {n: input_from_text(n, text, units[n]) for n, text in given.items()}, given
-
-
-def shown_until(scene: Scene, signals: dict[str, Input]) -> float:
-    """The last sample of the inputs, else what shows the scene."""
-    ends = [float(np.max(s.t)) for s in signals.values() if isinstance(s, Sampled)]
-    return max(ends, default=scene.t_end)
 
 
 def to_dict(law: str, scene: Scene, trajectory: Trajectory) -> dict[str, Any]:

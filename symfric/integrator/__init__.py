@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from symfric.integrator.equations.inputs import Hold as Hold
     from symfric.integrator.equations.inputs import Input as Input
     from symfric.integrator.equations.inputs import Linear as Linear
+    from symfric.integrator.equations.rates import rate_of as rate_of
     from symfric.integrator.flow import flow as flow
     from symfric.integrator.plant import Plant as Plant
     from symfric.integrator.simulate import simulate as simulate
@@ -25,6 +26,7 @@ else:
             "symfric.integrator.by_peer": "simulate_by_peer",
             "symfric.integrator.ensemble": "Ensemble simulate_many",
             "symfric.integrator.equations.inputs": "Hold Input Linear",
+            "symfric.integrator.equations.rates": "rate_of",
             "symfric.integrator.flow": "flow",
             "symfric.integrator.simulate": "simulate",
             "symfric.integrator.plant": "Plant",

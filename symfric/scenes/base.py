@@ -49,6 +49,9 @@ class Scene(Parametric, ABC):
     inputs: ClassVar[Mapping[str, GivenInput]] = {}
     """Inputs by name, where none are given."""
 
+    integrals: ClassVar[Mapping[str, str]] = {}
+    """State -> the input that is its rate; the command line takes the state's samples for it."""
+
     presets: ClassVar[Mapping[str, Preset]] = {}
     """Numbers of papers by name, see `preset`."""
 
@@ -58,6 +61,11 @@ class Scene(Parametric, ABC):
     def places(cls) -> dict[str, str]:
         """Where laws other than `law` may rub: the keyword, and what it is, see `other_law`."""
         return {item.name: item.metadata["place"] for item in fields(cls) if _is_place(item)}
+
+    @classmethod
+    def structures(cls) -> dict[str, str]:
+        """Fields that decide what equations there are: the keyword, and what it is."""
+        return {i.name: i.metadata["structure"] for i in fields(cls) if "structure" in i.metadata}
 
     @classmethod
     def preset(cls, name: str, law: Law, **others: Any) -> Self:
@@ -142,6 +150,15 @@ def other_law(doc: str) -> Any:
     return field(default=None, metadata={"place": doc})
 
 
+def structure(default: bool | int, doc: str) -> Any:
+    """Declare a field of a scene that decides what equations there are: a count, yes or no.
+
+    It is chosen when the scene is made and leaves no switch in the equations; forms with names are
+    declared by `option`.
+    """
+    return field(default=default, metadata={"structure": doc})
+
+
 def _is_place(item: Any) -> bool:
     return "place" in item.metadata
 
@@ -153,13 +170,16 @@ def _is_scalar(value: Scalar) -> bool:
 
 
 def contact(
-    name: str, law: Law, v: Scalar, N: Scalar, rest: Mapping[str, Scalar], **inputs: Scalar
-) -> Contact:
+    name: str, law: Law, v: Scalar, N: Scalar, rest: Mapping[str, Scalar], *,
+    least: Scalar | None = None, bare: bool = True, **inputs: Scalar,
+) -> Contact:  # fmt: skip
     """`law` between bodies that slide at `v` under `N`, the only contact of a machine.
 
     Args:
         name: what is rubbed against.
         rest: state of the model -> its value at which `v` is exactly zero.
+        least: smallest value of an `N` that changes, which the law must bear.
+        bare: states are called as in the law; False where a machine has several contacts.
         inputs: what the machine offers to laws besides v and N.
 
     Raises:
@@ -172,12 +192,15 @@ def contact(
             f"{''.join(f', {offered}' for offered in inputs)} here, got one that needs "
             f"{', '.join(missing)}"
         )
-    if is_number(N) and N == 0 and divides_by_load(law):
+    bottom = N if least is None else least
+    if is_number(bottom) and bottom == 0 and divides_by_load(law):
         raise ValueError(
             f"{type(law).__name__}: expected a normal force above 0 N, by which the law divides, "
             "got 0; lugre_normalised does not, and load_dependent(...) rounds it off"
         )
-    return Contact(name, ca.SX(v), N, law, given=inputs, rest=rest, bare=True)
+    if least is not None and is_number(least):  # laws that need a load refuse a number only
+        law.rate(ca.SX(1.0), least, ca.SX([s.nominal for s in law.states]))
+    return Contact(name, ca.SX(v), N, law, given=inputs, rest=rest, bare=bare)
 
 
 def divides_by_load(law: Law) -> bool:

@@ -13,7 +13,7 @@ from symfric.foundation.parameters import Variable, param, with_values
 from symfric.laws import Law
 from symfric.model import Model, Output, Variables
 from symfric.model.sketch import Sketch
-from symfric.scenes.base import GivenInput, Scene, contact, in_turning
+from symfric.scenes.base import GivenInput, Scene, contact, in_turning, structure
 from symfric.scenes.drawn import Block, drawn
 
 
@@ -42,7 +42,7 @@ class Drive(Scene):
     N: Scalar = param(0.8 * 9.81, unit="N", role="load", doc="normal force", lower=0.0)
     offset: Scalar = param(0.0, unit="N", role="offset", doc="constant force opposing the input")
 
-    turning: bool = False
+    turning: bool = structure(default=False, doc="whether the axis turns")
 
     def __post_init__(self) -> None:
         checks.flag("Drive: turning", self.turning)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from re import fullmatch
 from typing import TypeVar, final
 
 from symfric.foundation.parameters import parameters, with_values
@@ -28,7 +29,8 @@ class Numbers:
     def given(self, law: L) -> L:
         """`law` with these numbers, also inside a sum or a wrapper; its other ones and forms stay.
 
-        A law that the source does not use gets the common ones that it has.
+        A law that the source does not use gets the common ones that it has. Elements that carry a
+        level together (mu_1, mu_2, ...) carry the new one in the shares that they had.
         """
         held: dict[str, Law | tuple[Law, ...]] = {}
         for item in fields(law):
@@ -41,7 +43,14 @@ class Numbers:
             return replace(law, **held)
         known = parameters(law)
         own = {name: value for name, value in self.common.items() if name in known}
-        return with_values(law, own | dict(self.laws.get(type(law), {})))
+        own |= self.laws.get(type(law), {})
+        elements = [name for name in known if fullmatch(r"mu_\d+", name)]
+        level = "mu_s" if "mu_s" in known else "mu_d"
+        if elements and level in self.common:
+            shares = {name: float(known[name].value) for name in elements}
+            whole = float(known[level].value) if level in known else sum(shares.values())
+            own |= {name: x * self.common[level] / whole for name, x in shares.items()}
+        return with_values(law, own)
 
 
 @final
@@ -52,7 +61,7 @@ class Preset:
     Attributes:
         doc: what it is, and what the source leaves open.
         source: authors, title, table.
-        values: parameters of the machine.
+        values: parameters of the machine, and what its structure is.
         friction: place that rubs -> its numbers; "law" is where the scene's law is.
     """
 

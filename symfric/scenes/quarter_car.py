@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from math import pi
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import casadi as ca
 
@@ -125,7 +125,7 @@ class QuarterCar(Scene):
         x_tyre, v_tyre = X_r - X_w.symbol, ca.jtimes(X_r, t, ca.SX(1)) - v_w.symbol
         f_sd = self.k_s * x_rel + self.b_d * v_rel
         N = self.normal_force(f_sd, x_rel)
-        given = {"x_rel": x_rel, "v_rel": v_rel, "F_e": f_sd}
+        given: dict[str, Any] = {"x_rel": x_rel, "v_rel": v_rel, "F_e": f_sd}
         slip = contact("guide", self.law, v_b.symbol, N, rest={"v_b": 0.0}, **given)
         # beyond the strut's reach N is not a number: a run must stop there under any law
         load = ca.SX.sym("N")

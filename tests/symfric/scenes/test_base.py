@@ -23,13 +23,25 @@ from symfric.scenes import ALL_SCENES, MECHANISMS, Drive, Robot, Scene, friction
 from symfric.scenes.quarter_car import ANY
 
 SINGLE = {name: kind for name, kind in ALL_SCENES.items() if name not in MECHANISMS}
-"""Scenes with one contact; those with several are tested in test_mechanism.py."""
+"""Scenes that write their own equations; mechanisms are tested in test_mechanism.py."""
 
 each_scene = pytest.mark.parametrize("kind", SINGLE.values(), ids=SINGLE.keys())
 
 
-COORDINATES = {"rabinowicz": 1, "drive": 1, "quarter_car": 2}
-OFFERED = {"rabinowicz": {"F_e"}, "drive": {"F_e"}, "quarter_car": {"F_e", "x_rel", "v_rel"}}
+STATES = {
+    "rabinowicz": 2,
+    "drive": 2,
+    "quarter_car": 4,
+    "coupled_blocks": 4,
+    "drill_string": 9,
+    "clutch": 3,
+    "nip": 3,
+    "prescribed": 1,
+}
+OFFERED = {name: {"F_e"} for name in STATES} | {
+    "quarter_car": {"F_e", "x_rel", "v_rel"},
+    "prescribed": {i.name for law in CASES.values() for i in law.inputs} - {"F_e"},
+}
 
 
 @pytest.mark.parametrize("scene", SINGLE)
@@ -38,11 +50,12 @@ def test_every_law_gives_a_model_of_its_size_that_starts_or_is_refused(scene: st
     for law in CASES.values():
         if not {i.name for i in law.inputs} <= OFFERED[scene]:
             refused += 1
-            with pytest.raises(ValueError, match=r"law that needs no more than v, N, .*F_e"):
+            said = r"law (that needs no more than v, N, .*F_e|of motion and load, got .* the force)"
+            with pytest.raises(ValueError, match=said):
                 SINGLE[scene](law).model()
             continue
         model = SINGLE[scene](law).model()
-        assert len(model.x) == 2 * COORDINATES[scene] + len(law.states)
+        assert len(model.x) == STATES[scene] + len(model.contacts) * len(law.states)
         assert model.initial_state().shape == (len(model.x),)
         assert model.p == ()
     assert 0 < refused < len(CASES) / 4
@@ -60,7 +73,8 @@ def test_every_parameter_can_be_free(kind: type[Scene]) -> None:
 @each_scene
 def test_constant_parameters_cost_less_than_free_ones(kind: type[Scene]) -> None:
     scene = kind(Stribeck())
-    fixed, free = (scene.model(f).function("ode").n_instructions() for f in ([], parameters(scene)))
+    models = scene.model(), scene.model(parameters(scene))
+    fixed, free = (model.function("signals").n_instructions() for model in models)
     assert fixed < free
 
 
@@ -103,8 +117,9 @@ def test_friction_states_start_in_steady_sliding_at_the_given_velocity() -> None
 def test_error_control_watches_the_sliding_velocity_on_the_scale_of_the_law(
     kind: type[Scene], law: Coulomb | Viscous, scale: list[float]
 ) -> None:
-    monitors = kind(law).model().monitors  # a quarter car watches the reach of its strut, too
-    assert [m.nominal for m in monitors if m.nominal != ANY] == scale
+    model = kind(law).model()  # a quarter car watches the reach of its strut, too
+    found = [m.nominal for m in model.monitors if m.nominal != ANY]
+    assert found == scale * len(model.contacts)
 
 
 def test_scale_of_a_free_parameter_follows_it() -> None:

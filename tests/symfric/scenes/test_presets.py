@@ -20,6 +20,7 @@ from symfric import (
     simulate,
 )
 from symfric.cli import main
+from symfric.laws import RateAndState, Wojewoda
 from symfric.scenes import ALL_SCENES, PendulumBox, QuarterCar, Rabinowicz
 
 ELEVEN = (
@@ -100,9 +101,12 @@ def test_every_law_takes_every_preset() -> None:
             assert preset.source
             assert set(preset.friction) <= {"law", *kind.places()}, name
             for law in CASES.values():
-                scene = kind.preset(name, law)
-                known = {n: p.value for n, p in parameters(scene).items()}
-                assert all(known[n] == x for n, x in preset.values.items()), name
+                try:
+                    scene = kind.preset(name, law)
+                except ValueError as error:  # levels that a law is not made for; it says so
+                    assert isinstance(law, Wojewoda | RateAndState), error
+                    continue
+                assert all(getattr(scene, n) == x for n, x in preset.values.items()), name
 
 
 def test_the_period_of_stick_slip_is_that_of_dry_friction() -> None:
