@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from html import escape
+from re import sub
 from typing import Any
 
 STYLE = """
@@ -48,16 +49,21 @@ def figure_block(record: Mapping[str, Any]) -> str:
     said = {
         "compared": record["compared"],
         "how far": f"{record['how_far']}: {record['measure']}",
-        "refuted": record["evidence"],
+        "evidence": record["evidence"],
     }
     title = f"{record['figure']}. {record['title']}"
-    text = "".join(f"<p>{escape(p)}</p>" for p in record["text"].split("\n\n") if p)
-    entries = "".join(f"<dt>{name}</dt><dd>{escape(value)}</dd>" for name, value in said.items())
+    text = "".join(f"<p>{written(p)}</p>" for p in record["text"].split("\n\n") if p)
+    entries = "".join(f"<dt>{name}</dt><dd>{written(value)}</dd>" for name, value in said.items())
     return (
         f'<h3 id="{anchor(record)}">{escape(title)}</h3>{text}'
         f'<img src="{escape(record["picture"])}" alt="{escape(title)}" loading="lazy">'
         f"<dl>{entries}</dl>{_numbers(record)}"
     )
+
+
+def written(text: str) -> str:
+    """Text of a docstring as HTML, names between backquotes as code."""
+    return sub(r"`([^`]+)`", r"<code>\1</code>", escape(text))
 
 
 def anchor(record: Mapping[str, Any]) -> str:

@@ -33,7 +33,7 @@ def plate(quick: bool = False) -> Plate:
         axis.set_ylabel("acceleration of\nmass 1 [m/s²]")
         axis.set_ylim(-8.0, 8.0)
         axis.set_title(law, fontsize="medium", loc="left")
-        axis.legend(loc="upper right", fontsize="small", ncols=2)
+        axis.legend(loc="lower center", fontsize="small", ncols=2)
         smooth.append(variation(a))
         numbers[f"total variation with error control, {law} [m/s^2]"] = smooth[-1]
         numbers[f"total variation in steps of 1 ms, {law} [m/s^2]"] = variation(by_steps)

@@ -22,7 +22,7 @@ def test_a_plate_is_drawn_and_says_how_far_we_are(name: str) -> None:
     assert np.isfinite(values).all()
     assert plate.numbers
     assert plate.how_far
-    plt.close(plate.picture)
+    assert not plt.get_fignums(), "figures are made outside pyplot"
     assert plate.to_dict()["figure"] == plate.figure
 
 
