@@ -1,0 +1,52 @@
+"""Steady LuGre friction for several viscous coefficients.
+
+The values of the figure are not given; these lie between those of the two studies.
+
+Compared: the speed of least force, found by the roots of the derivative, with the curves' minima.
+
+Distance: largest difference, over v_s.
+
+Evidence: nothing is refuted. Without viscous friction there is no minimum; the larger sigma_2, the
+slower and the higher it is. Above a value that follows from the steepest slope of the Stribeck part
+the force rises throughout: six times that of the pilot study.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import root_scalar
+
+from symfric.foundation.panels import WIDE, panels
+from symfric.foundation.style import line
+from symfric.gallery.laminator_nips._studies import PRINTED, curve
+from symfric.gallery.plate import Plate, plate_of
+
+SIGMA_2 = (0.0, 60.0, 120.0, 230.0, 400.0)  # N s/m
+
+
+def plate(quick: bool = False) -> Plate:
+    """Vary sigma_2 of the pilot study."""
+    pilot = PRINTED["pilot"]
+    v_s, fall = float(pilot.v_s), float(pilot.F_S) - float(pilot.F_C)
+    v = np.linspace(1e-6, 500 / 60e3, 400 if quick else 40_000)
+
+    def slope(speed: float, viscous: float = 0.0) -> float:
+        """Slope of the curve [N s/m]."""
+        falling = 2 * fall * speed / v_s**2 * float(np.exp(-((speed / v_s) ** 2)))
+        return viscous - falling
+
+    figure, (axis,) = panels(1, WIDE, 2.8)
+    numbers = {"sigma_2 beyond which nothing falls [N s/m]": -slope(v_s / np.sqrt(2))}
+    far = 0.0
+    for k, sigma_2 in enumerate(SIGMA_2):
+        force = curve(replace(pilot, sigma_2=sigma_2), v)
+        axis.plot(v, force, **line(k), label=f"{sigma_2:g} N s/m")
+        if sigma_2 > 0:
+            root = root_scalar(slope, args=(sigma_2,), bracket=[v_s / np.sqrt(2), v[-1]])
+            least = float(root.root)
+            numbers[f"speed of least force, sigma_2 = {sigma_2:g} N s/m [m/s]"] = least
+            far = max(far, abs(float(v[np.argmin(force)]) - least) / v_s)
+    axis.set_xlabel("velocity [m/s]")
+    axis.set_ylabel("friction force [N]")
+    figure.legend(title="viscous friction", loc="outside right center")
+    return plate_of(__name__, figure, far, "1", numbers)

@@ -1,0 +1,44 @@
+"""The pilot study: mean forces, the identified curve, and its errors.
+
+Compared: the curve that is identified from points with noise, all at once and by the six steps of
+the thesis, with the printed one that made them.
+
+Distance: rms difference of the curve found at once from the printed one, over the mean force.
+
+Evidence: the curve comes back, with an error of the size of the thesis's. Refuted is that its five
+digits mean anything: with other noise of that size the parameters scatter by the shares given
+beside, 6 to 100 % at once, and the six steps, which read two levels off single points, leave
+two to three times the error. F_s and v_s rest on speeds that the thesis itself calls unstable:
+without them F_s is anything from half to a hundred thousand times its value. And 50 speeds of nine
+tests are 450 tests, not 150.
+"""
+
+import numpy as np
+
+from symfric.foundation.panels import panels
+from symfric.gallery.laminator_nips import _studies as studies
+from symfric.gallery.plate import Plate, plate_of
+
+
+def plate(quick: bool = False) -> Plate:
+    """Identify the pilot study again, with one noise and with many."""
+    printed = studies.PRINTED["pilot"]
+    v, force = studies.measured("pilot")
+    once, half = studies.at_once(v, force)
+    laws = {"printed": printed, "all at once": once}
+    steps = studies.in_steps(v, force)
+    if steps is not None:
+        laws["six steps"] = steps
+
+    figure, (above, *below) = panels(3, height=1.7)
+    studies.draw_curves(above, v, force, laws)
+    studies.draw_errors(below, v, force, once)
+
+    numbers = {
+        f"error of the curve, {way}, 8 % in the thesis [%]": 100 * studies.error(law, v, force)
+        for way, law in laws.items()
+    } | studies.told(laws, half)
+    if not quick:
+        numbers |= studies.scatter("pilot", 20) | studies.without_unstable("pilot", 20)
+    far = np.sqrt(np.mean((studies.curve(once, v) - studies.curve(printed, v)) ** 2))
+    return plate_of(__name__, figure, float(far / force.mean()), "1", numbers)
