@@ -24,6 +24,8 @@ OUT = Path("out")
 
 def acados_model(model: Model) -> Any:
     """The fields of an AcadosModel from an explicit model without events."""
+    if model.ode is None or model.z or model.events:
+        raise ValueError(f"acados_model: expected an explicit model without events: {model.name}")
     if find_spec("acados_template"):
         from acados_template import AcadosModel  # noqa: PLC0415  # pyright: ignore
 
@@ -34,7 +36,7 @@ def acados_model(model: Model) -> Any:
     made.x, made.u, made.p = (model.vector(letter) for letter in "xup")
     made.xdot = ca.SX.sym("xdot", made.x.numel())
     made.f_expl_expr = model.ode
-    made.f_impl_expr = made.xdot - made.f_expl_expr
+    made.f_impl_expr = made.xdot - model.ode
     return made
 
 

@@ -28,7 +28,7 @@ def main() -> None:
             ocp.method(rockit.MultipleShooting(N=N))
             ocp.add_objective(ocp.sum(u**2) * T / N)
         else:
-            f = ca.Function("f", [model.vector("x"), model.vector("u")], [ca.SX(model.ode)])
+            f = ca.Function("f", [model.vector("x"), model.vector("u")], [model.ode])  # pyright: ignore
             ocp.set_der(x, f(x, u))
             ocp.method(rockit.DirectCollocation(N=N, degree=3))
             ocp.add_objective(ocp.integral(u**2))

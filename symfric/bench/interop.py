@@ -164,7 +164,9 @@ def _steady(model: Model) -> list[float]:
 
 def right_hand_side(model: Model) -> ca.Function:
     """(x, u) -> dx/dt: all that other tools want of an explicit model."""
-    return ca.Function("f", [model.vector("x"), model.vector("u")], [ca.SX(model.ode)])
+    if model.ode is None:
+        raise ValueError(f"bench interop: expected an explicit model, got '{model.name}'")
+    return ca.Function("f", [model.vector("x"), model.vector("u")], [model.ode])
 
 
 def step(model: Model) -> ca.Function:
@@ -301,13 +303,14 @@ def integrators(law: str) -> Iterator[Run]:
     ours = simulate(model, 20.0, samples=401, backend="vm")
     spent = process_time() - begin
     yield Run("symfric", law, float(np.abs(ours["x"] - exact["x"]).max()), 1.0)
-    dae = {"x": model.vector("x"), "ode": ca.SX(model.ode)}
+    x = model.vector("x")
+    dae = {"x": x, "ode": ca.SX(right_hand_side(model)(x, []))}
     for name, options in INTEGRATORS.items():
         made = ca.integrator("I", name, dae, 0.0, times, options)
         begin = process_time()
         try:
             with contextlib.redirect_stderr(io.StringIO()):
-                found = made(x0=[start[v.name] for v in model.x])["xf"].toarray()
+                found: Any = made(x0=[start[v.name] for v in model.x])["xf"].toarray()
         except RuntimeError as error:
             why = str(error).splitlines()[-1].partition(": ")[2]
             yield Run(name, law, np.nan, np.nan, why)
