@@ -9,7 +9,7 @@ VENV := .venv
 ONE_THREAD := OPENBLAS_NUM_THREADS=1
 BIN := $(VENV)/bin
 
-.PHONY: demo test docs newest extras check stress mutants embedded clean
+.PHONY: demo test docs docs-check newest extras check stress mutants embedded clean
 
 demo: $(VENV)/.runtime
 	$(BIN)/symfric demo --out out
@@ -17,10 +17,16 @@ demo: $(VENV)/.runtime
 test: $(VENV)/.test
 	$(ONE_THREAD) $(BIN)/python -m pytest -n auto --dist loadfile
 
-# Pages in out/docs/index.html. SYMFRIC_DOCS=quick takes the gallery of the papers at reduced size.
+# Pages in out/docs/index.html. SYMFRIC_DOCS=quick takes the gallery of the papers at reduced size,
+# SYMFRIC_DOCS=keep takes every picture as it is, for those who write text.
 docs: $(VENV)/.docs
 	$(ONE_THREAD) $(BIN)/python -m sphinx -W --keep-going -n -q -d out/doctrees docs out/docs
+	$(BIN)/python -m docs.machine.links out/docs
 	@echo "docs: out/docs/index.html"
+
+# Every page in a browser, narrow and wide; says so where Chromium is not installed.
+docs-check: docs
+	$(BIN)/python -m docs.machine.browser out/docs
 
 newest:
 	@newest="$$(sh .ci/newest-python "$(PYTHON)")"; \
@@ -61,7 +67,7 @@ check: $(VENV)/.dev
 
 clean:
 	rm -rf $(VENV) .venv-newest .venv-extras out dist build .pytest_cache .ruff_cache .hypothesis
-	rm -rf docs/made docs/laws docs/scenes docs/gallery docs/examples docs/reference
+	rm -rf docs/made docs/laws docs/scenes docs/gallery docs/examples docs/reference docs/benchmarks/*.rst
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The stages build on each other, so that `make -j` never runs two installers at once.

@@ -35,6 +35,8 @@ python_maximum_signature_line_length = 80
 add_module_names = False
 toc_object_entries = False
 
+smartquotes = False  # options of commands begin with two hyphens
+
 html_theme = "furo"
 html_title = f"symfric {release}"
 html_static_path = ["static"]

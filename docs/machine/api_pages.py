@@ -9,8 +9,9 @@ from typing import Any
 
 from docs.machine import rst
 from docs.machine.docstrings import first_line
+from docs.machine.docstrings import text as sentence
 from docs.machine.law_pages import MADE_OF_LAWS
-from docs.machine.names import FRONTS, Public, catalogue
+from docs.machine.names import FRONTS, Public, catalogue, linked, source_of
 from symfric import ALL_LAWS, POPULATIONS
 from symfric.scenes import ALL_SCENES
 
@@ -32,7 +33,7 @@ def page(front: str, names: list[Public]) -> str:
     elsewhere = own_pages()
     laws = [p for p in names if elsewhere.get(id(p.object), "").startswith("/laws/")]
     others = sorted((p for p in names if p not in laws), key=lambda p: p.name.lower())
-    rows = [[_link(p, elsewhere), rst.plain(summary(p))] for p in others]
+    rows = [[_link(p, elsewhere), sentence(summary(p), linked)] for p in others]
     text += rst.table(["name", "what it is"], rows)
     if laws:
         text += rst.title("Laws", "-") + "Each has a page of its own, with its equation.\n\n"
@@ -67,7 +68,7 @@ def entry(public: Public) -> str:
         return rst.directive(kind, public.full, members="")
     if callable(item) and hasattr(item, "__name__"):
         return rst.directive("autofunction", public.full)
-    return rst.directive("py:data", public.full, rst.plain(summary(public)) + "\n")
+    return rst.directive("py:data", public.full, sentence(summary(public), linked) + "\n")
 
 
 def summary(public: Public) -> str:
@@ -75,7 +76,8 @@ def summary(public: Public) -> str:
     item: Any = public.object
     if inspect.isclass(item) or (callable(item) and hasattr(item, "__name__")):
         return first_line(item.__doc__).rstrip(".")
-    return first_line(data_docs(public.module).get(public.name, "")).rstrip(".")
+    said = data_docs(source_of(public.front, public.name))
+    return first_line(said.get(public.name, "")).rstrip(".")
 
 
 @cache

@@ -7,6 +7,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 from docs.machine.pages import DOCS
 from docs.machine.stamp import code_hash, digest, is_fresh, stamped
@@ -49,19 +50,18 @@ def law(name: str, folder: Path) -> None:
 
     chosen = any_from_text(name)
     plot_laws({name: chosen}, path=folder / f"{name}.png")
-    small(name, chosen, folder / f"{name}_small.png")
+    small(chosen, folder / f"{name}_small.png")
 
 
-def small(name: str, law: object, path: Path) -> None:
+def small(law: Any, path: Path) -> None:
     """Force in steady sliding around rest, without numbers."""
     import numpy as np  # noqa: PLC0415
     from matplotlib.figure import Figure  # noqa: PLC0415
 
-    from symfric.figures.pictures import _velocity_scales  # noqa: PLC0415
+    from symfric.figures.pictures import window  # noqa: PLC0415
     from symfric.laws import steady_force  # noqa: PLC0415
 
-    del name
-    edge = 5 * max(_velocity_scales(law), default=0.1)
+    edge = window(law, 1.0)
     v = np.linspace(-edge, edge, 1001)
     figure = Figure(figsize=(2.2, 1.4), layout="constrained")
     axis = figure.add_subplot()

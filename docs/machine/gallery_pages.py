@@ -5,13 +5,16 @@
 
 import json
 import os
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from docs.machine import rst
+from docs.machine.docstrings import text as sentence
 from docs.machine.drawing import MADE
+from docs.machine.names import linked
 from docs.machine.pages import ROOT
-from docs.machine.stamp import code_hash, code_of, digest
+from docs.machine.stamp import code_hash, code_of, digest, kept
 from symfric.gallery import scripts
 from symfric.gallery.rendering import read, render
 
@@ -40,13 +43,14 @@ def make(say: Callable[[str], None]) -> list[str]:
     FOLDER.mkdir(parents=True, exist_ok=True)
     before: dict[str, str] = json.loads(KEYS.read_text()) if KEYS.exists() else {}
     now, there = keys(), read(FOLDER)
-    changed = [name for name, key in now.items() if before.get(name) != key or name not in there]
+    stale = {name for name, key in now.items() if before.get(name) != key and not kept()}
+    changed = [name for name in now if name in stale or name not in there]
     if not changed:
         return []
     say(f"computing {len(changed)} figures of the papers{' at reduced size' * quick()}")
     done = render(FOLDER, changed, quick=quick())
-    kept = {n: k for n, k in now.items() if n not in changed or n in done.records}
-    KEYS.write_text(json.dumps(kept, indent=1))
+    good = {n: k for n, k in now.items() if n not in changed or n in done.records}
+    KEYS.write_text(json.dumps(good, indent=1))
     return [f"gallery '{name}': {why}" for name, why in done.failures.items()]
 
 
@@ -71,26 +75,38 @@ def index(papers: Mapping[str, list[Mapping[str, Any]]]) -> str:
     if quick():
         text += rst.directive("note", "", "These figures are computed at reduced size.\n")
     for paper, records in papers.items():
-        text += rst.title(paper, "-")
+        text += rst.title(re.split(r", (?:doi|J\.|[A-Z]\w+ [\d(])", paper)[0], "-")
+        text += f"*{rst.plain(paper)}*\n\n" + cards(records)
         rows = [
             [
                 f":doc:`{r['figure']} <{r['name']}>`",
-                rst.plain(r["title"]),
-                rst.plain(r["how_far"]),
-                rst.plain(r["measure"]),
+                sentence(r["title"], linked),
+                f"{rst.plain(r['how_far'])}: {sentence(r['measure'], linked)}",
             ]
             for r in records
         ]
-        text += rst.table(["figure", "what it shows", "how far", "measured as"], rows)
+        text += rst.table(["figure", "what it shows", "how far we are"], rows)
         text += rst.pages((r["name"] for r in records), hidden="")
     return text
+
+
+def cards(records: Iterable[Mapping[str, Any]]) -> str:
+    """The pictures of a paper, each leading to its page."""
+    body = "".join(
+        rst.directive(
+            "figure", f"/made/gallery/{r['picture']}", rst.plain(r["figure"]) + "\n",
+            target=f"{r['name']}.html", alt=rst.plain(r["title"]),
+        )
+        for r in records
+    )  # fmt: skip
+    return rst.directive("container", "cards", body)
 
 
 def page(record: Mapping[str, Any]) -> str:
     """One figure."""
     text = rst.title(f"{record['figure']}. {record['title']}")
     text += f"*{rst.plain(record['paper'])}*\n\n"
-    text += "".join(f"{rst.plain(p)}\n\n" for p in record["text"].split("\n\n") if p)
+    text += "".join(f"{sentence(p, linked)}\n\n" for p in record["text"].split("\n\n") if p)
     if record["quick"]:
         text += rst.directive("note", "", "Computed at reduced size.\n")
     text += rst.directive(
@@ -102,11 +118,11 @@ def page(record: Mapping[str, Any]) -> str:
         "Refuted, and by what evidence": record["evidence"],
     }
     for name, words in said.items():
-        text += f"**{name}.** {rst.plain(words)}\n\n"
+        text += f"**{name}.** {sentence(words, linked)}\n\n"
     rows = [[rst.plain(name), f"{value:.6g}"] for name, value in record["numbers"].items()]
     if rows:
         text += rst.title("Numbers", "-") + rst.table((), rows)
     module = scripts()[record["name"]]
     source = ROOT.joinpath(*module.split(".")).with_suffix(".py")
-    text += rst.title(f"The script, {source.relative_to(ROOT)}", "-")
+    text += rst.title("Script", "-") + f"``{source.relative_to(ROOT)}``\n\n"
     return text + rst.literal(source.read_text("utf-8"), "python")

@@ -5,11 +5,13 @@ from pathlib import Path
 
 from docs.machine import (
     api_pages,
+    bench_pages,
     command_pages,
     drawing,
     example_pages,
     gallery_pages,
     law_pages,
+    limit_pages,
     rst,
     scene_pages,
 )
@@ -24,6 +26,7 @@ def make_all(say: Callable[[str], None]) -> list[str]:
     failed += drawing.draw_all("scenes", scene_pages.ALL_SCENES, scene_pages.draw, say)
     write("examples", example_pages.pages())
     write("reference", reference())
+    write("benchmarks", {"index": bench_pages.page()})
     failed += gallery_pages.make(say)
     write("gallery", gallery_pages.pages())
     return failed
@@ -36,7 +39,7 @@ def reference() -> dict[str, str]:
     text += "Every public name, from its docstring.\n\n"
     text += rst.table(["module", "what it is for"], api_pages.index_rows())
     text += rst.pages(found, hidden="")
-    return found | {"python": text, "commands": command_pages.page()}
+    return found | {"python": text, "commands": command_pages.page(), "limits": limit_pages.page()}
 
 
 def write(room: str, pages: dict[str, str]) -> None:

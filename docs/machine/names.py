@@ -50,6 +50,14 @@ class Public:
         return getattr(import_module(self.front), self.name)
 
 
+def source_of(front: str, name: str) -> str:
+    """The module in which a name that a front hands out is defined."""
+    for public in handed_out(front):
+        if public.name == name and public.module != front:
+            return source_of(public.module, name)
+    return front
+
+
 def handed_out(front: str) -> list[Public]:
     """The names that a front hands out, or that a module of functions defines."""
     path = ROOT.joinpath(*front.split("."))

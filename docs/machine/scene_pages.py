@@ -6,7 +6,7 @@ from typing import Any
 
 from docs.machine import rst
 from docs.machine.docstrings import first_line, to_rst
-from docs.machine.law_pages import number, shown_symbol, signature, without_title
+from docs.machine.law_pages import number, shown_symbol, signature
 from docs.machine.names import linked
 from symfric import BrownMcPhee, law_name, parameters
 from symfric.scenes import ALL_SCENES, Scene
@@ -45,10 +45,10 @@ def page(name: str, kind: type[Scene]) -> str:
     scene = kind(LAW())
     model = scene.model()
     doc = getdoc(kind) or ""
-    text = rst.title(first_line(doc).split(":")[0].rstrip("."))
+    text = rst.title(name.replace("_", " ").capitalize())
     text += f"``{name}`` on the command line, "
     text += f"``from symfric.scenes import {kind.__name__}`` in Python.\n\n"
-    text += to_rst(without_title(doc), linked, symbols=True)
+    text += to_rst(doc, linked, symbols=True)
     if model.sketch is not None:
         about = f"{name} at an instant of this run"
         text += rst.directive("figure", f"/made/scenes/{name}_sketch.png", alt=about, width="24rem")

@@ -1,15 +1,34 @@
 """Formulas as MathML, which browsers draw themselves: no script, no fonts, no network."""
 
+import re
+from html import escape
 from typing import Any
 
 from docutils import nodes
+from docutils.utils.math import MathError
 from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx.util import logging
 from sphinx.util.math import get_node_equation_number
+
+log = logging.getLogger(__name__)
+SIZED = re.compile(r"\\[bB]igg?[lrm]?(?![A-Za-z])")
+"""Sizes of brackets, which a browser chooses itself."""
+ACCENTED = re.compile(r"(\\(?:d?dot|hat|bar|tilde|vec)\s*(?:\{[^{}]*\}|[A-Za-z]))_")
+
+
+def mathml(node: nodes.Element, as_block: bool) -> str:
+    """A formula as MathML; a subscript stands beside its letter, also below a dot."""
+    formula = SIZED.sub("", ACCENTED.sub(r"\1{}_", node.astext())).replace(r"\dots", r"\ldots")
+    try:
+        return str(tex2mathml(formula, as_block=as_block))
+    except MathError as error:
+        log.warning("formula %r: %s", node.astext(), error, location=node)
+        return f"<code>{escape(node.astext())}</code>"
 
 
 def visit_inline(writer: Any, node: nodes.math) -> None:
     """A formula within a line."""
-    writer.body.append(tex2mathml(node.astext(), as_block=False))
+    writer.body.append(mathml(node, as_block=False))
     raise nodes.SkipNode
 
 
@@ -19,7 +38,7 @@ def visit_block(writer: Any, node: nodes.math_block) -> None:
     if node["number"]:
         number = get_node_equation_number(writer, node)
         writer.body.append(f'<span class="eqno">({number})</span>')
-    writer.body.append(tex2mathml(node.astext(), as_block=True))
+    writer.body.append(mathml(node, as_block=True))
     writer.body.append("</div>\n")
     raise nodes.SkipNode
 

@@ -54,6 +54,15 @@ def find_type(app: Any, env: Any, node: Any, content: Any) -> Any:
     return content
 
 
+def forget(app: Any, error: Exception | None) -> None:
+    """Take away pages of an earlier build that are none any more."""
+    kept = {*app.env.found_docs, "genindex", "search", "py-modindex"}
+    for path in Path(app.outdir).rglob("*.html"):
+        name = path.relative_to(app.outdir).with_suffix("").as_posix()
+        if error is None and name not in kept and not name.startswith("_"):
+            path.unlink()
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Connect the above."""
     MADE.mkdir(exist_ok=True)
@@ -61,4 +70,5 @@ def setup(app: Any) -> dict[str, bool]:
     app.connect("source-read", show_made)
     app.connect("autodoc-process-docstring", as_rst)
     app.connect("missing-reference", find_type)
+    app.connect("build-finished", forget)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

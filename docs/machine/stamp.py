@@ -2,6 +2,7 @@
 
 import ast
 import hashlib
+import os
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
@@ -51,9 +52,14 @@ def digest(texts: Iterable[str]) -> str:
 
 
 def is_fresh(folder: Path, key: str) -> bool:
-    """Whether `folder` was made with `key`."""
+    """Whether `folder` was made with `key`, or was made at all where what is there is kept."""
     stamp = folder / ".key"
-    return stamp.is_file() and stamp.read_text() == key
+    return stamp.is_file() and (kept() or stamp.read_text() == key)
+
+
+def kept() -> bool:
+    """Whether SYMFRIC_DOCS=keep: pictures stay as they are, for those who write text."""
+    return os.environ.get("SYMFRIC_DOCS", "") == "keep"
 
 
 def stamped(folder: Path, key: str) -> None:
