@@ -73,8 +73,16 @@ def _able(
             refused[name] = error
     if not made:
         raise next(iter(refused.values()))
-    why = [f"without {name}: {str(error).split('; ')[0]}" for name, error in refused.items()]
-    return made, "; ".join(why)
+    reasons: dict[str, list[str]] = {}
+    for name, error in refused.items():
+        reasons.setdefault(_reason(str(error)), []).append(name)
+    return made, "; ".join(f"without {', '.join(who)}: {why}" for why, who in reasons.items())
+
+
+def _reason(text: str) -> str:
+    """What was expected, without who was asked and what there is instead."""
+    start = text.find("expected ")
+    return text[max(start, 0) :].split("; ")[0].split(", got ")[0]
 
 
 def _title(laws: Sequence[AnyLaw], shown: Sequence[FigureData]) -> str:

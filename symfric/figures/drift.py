@@ -5,7 +5,7 @@ from math import isfinite
 import casadi as ca
 import numpy as np
 
-from symfric.figures.data import Curve, FigureData
+from symfric.figures.data import Array, Curve, FigureData
 from symfric.figures.motion import pushed
 from symfric.figures.requirements import require
 from symfric.figures.scales import NORMAL_FORCE, Scales, scales
@@ -54,9 +54,11 @@ def drift(
 
     F_S is the static level and F_b the kinetic one, or sigma_0 z_ba for `ElastoPlastic`, which
     claims no drift below that only. The block has 0.8 kg, or 1 kg per 1.5 N of F_S where that is
-    more. Columns t [s], F_e, F [N] and x [m], the way since the vibration began, which lasts until
-    `t_end`, or longer by as much as the block needs longer to rest. A law without drift stays where
-    the first strokes put it; LuGre goes on with every period, and a law without states creeps.
+    more. Columns t [s], F_e, F [N], x [m], the way since the vibration began, which lasts until
+    `t_end`, or longer by as much as the block needs longer to rest, and x_mean [m], the mean of x
+    over two periods, which is drawn: it stays for a block that only shakes. A law without drift
+    stays where the first strokes put it; LuGre goes on with every period, and a law without states
+    creeps.
 
     Raises:
         ValueError: a law with neither static friction nor pre-sliding.
@@ -80,10 +82,25 @@ def drift(
     rest = float(run.at(vibrate_from)["x"][0])
     columns = {"t": t, "F_e": found["force"], "x": found["x"] - rest, "F": found["friction"]}
     keep = t >= vibrate_from - 0.2
+    once = over_period(t, columns["x"], 1 / frequency)
+    columns["x_mean"] = over_period(
+        t, once, 1 / frequency
+    )  # twice, or elastic ringing shines through
     return FigureData(
         "drift",
-        f"drift under {frequency:g} Hz below break-away, N = {N:g} N",
-        {"t": "s", "F_e": "N", "x": "m", "F": "N"},
-        (("t", "F_e"), ("t", "x")),
+        f"drift under {frequency:g} Hz below break-away, mean over two periods, N = {N:g} N",
+        {"t": "s", "F_e": "N", "x": "m", "F": "N", "x_mean": "m"},
+        (("t", "x_mean"),),
         (Curve(law_name(law), "", {name: c[keep] for name, c in columns.items()}),),
     )
+
+
+def over_period(t: Array, x: Array, period: float) -> Array:
+    """Mean of `x` over the `period` [s] around each of the equally spaced times `t`, shape (n,).
+
+    At the ends it is that of the first and last full period.
+    """
+    way = np.concatenate([[0.0], np.cumsum((x[1:] + x[:-1]) / 2 * np.diff(t))])
+    middle = np.clip(t, t[0] + period / 2, t[-1] - period / 2)
+    before, after = (np.interp(middle + side * period / 2, t, way) for side in (-1, 1))
+    return np.asarray((after - before) / period)

@@ -221,19 +221,35 @@ def plot_figure(data: "FigureData", path: str | Path | None = None) -> Figure:
     abscissae = {x for x, _ in data.panels}
     height = {1: 4.0, 2: 2.6}.get(len(data.panels), 1.7)
     figure, axes = panels(len(data.panels), 7.0, height, shared=len(abscissae) == 1)
+    drawn, omitted = clear(data.curves)
     for axis, panel in zip(axes, data.panels, strict=True):
-        _curves(axis, data, panel, data.curves, laws if len(laws) > 1 else ())
+        _curves(axis, data, panel, drawn, laws if len(laws) > 1 else ())
         if axis is not axes[-1] and len(abscissae) == 1:
             axis.set_xlabel("")
     title = data.title if len(laws) > 1 else f"{laws[0]}: {data.title}"
     figure.suptitle("\n".join(textwrap.wrap(title, 88)), fontsize="medium")
-    if data.note:
-        axes[0].set_title("\n".join(textwrap.wrap(data.note, 100)), loc="left", fontsize="small")
-    if len(data.curves) > 1:
+    if note := "; ".join(text for text in (data.note, omitted) if text):
+        axes[0].set_title("\n".join(textwrap.wrap(note, 100)), loc="left", fontsize="small")
+    if len(drawn) > 1:
         entries = axes[0].get_legend_handles_labels()
         figure.legend(*entries, loc="outside lower center", ncols=3, fontsize="small")
     figure.align_ylabels(axes)
     return save(figure, path)
+
+
+def clear(curves: Sequence[Curve]) -> tuple[list[Curve], str]:
+    """Those of `curves` that can be told apart in one picture, and a word about the others.
+
+    Where laws are compared these are no references, and of three laws and more the first and the
+    last case.
+    """
+    laws = {c.law for c in curves}
+    shown = [c for c in curves if not (c.reference and len(laws) > 1)]
+    cases = list(dict.fromkeys(c.case for c in shown))
+    if len(laws) > 2 and len(cases) > 2:
+        shown = [c for c in shown if c.case in (cases[0], cases[-1])]
+    left = list(dict.fromkeys(c.case for c in curves if c not in shown))
+    return shown, f"not drawn: {', '.join(left)}" if left else ""
 
 
 def _curves(
@@ -267,5 +283,9 @@ def _curves(
     for on, scale in ((x, axis.set_xscale), (y, axis.set_yscale)):
         if on in data.log:
             scale("log")
+    if y not in data.log:
+        axis.ticklabel_format(axis="y", useOffset=False)
+        if data.dots and axis.dataLim.y0 >= 0:
+            axis.set_ylim(0.0, 1.1 * axis.dataLim.y1)
     axis.set_xlabel(f"{x} [{unit_x}]")
     axis.set_ylabel(f"{y} [{unit_y}]")

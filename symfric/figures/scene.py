@@ -6,12 +6,13 @@ from symfric.figures.data import Curve, FigureData
 from symfric.integrator import Input, simulate
 from symfric.laws import AnyLaw, Population, law_name
 from symfric.laws.base.law import check_law
+from symfric.model.kinds import ENERGY
 from symfric.results.kinds import main
 from symfric.results.trajectory import Trajectory
 from symfric.scenes import ALL_SCENES
 
 PANELS = 2
-"""Signals of a kind that are drawn at most; all of them are columns."""
+"""Signals of a kind that are drawn at most, of energies the sum; all of them are columns."""
 
 
 def in_scene(law: AnyLaw, scene: str) -> Trajectory:
@@ -41,7 +42,11 @@ def scene_figure(scene: str, runs: Mapping[str, Trajectory]) -> FigureData:
     first = next(iter(runs.values()))
     shared = {n: u for n, u in first.units.items() if all(n in run.units for run in runs.values())}
     groups = main(first.model, shared)
-    drawn = [name for group in groups for name in list(group.names)[-PANELS:]]
+    drawn = [
+        name
+        for group in groups
+        for name in (list(group.names)[-1:] if group.title == ENERGY else [*group.names][:PANELS])
+    ]
     return FigureData(
         scene,
         scene,

@@ -14,7 +14,7 @@ CURVATURES = (-1.0, 0.0, 0.25, 0.5, 0.75, 0.95)
 
 SWEPT = {
     "B": ("stiffness factor", "sets how steeply the force rises at rest, not how high the peak is"),
-    "C": ("shape factor", "sets what follows the rise: up to 1 none falls, above 1 a peak falls"),
+    "C": ("shape factor", "up to 1 gives a plateau, above 1 a peak from which the force falls"),
     "E": ("curvature factor", "moves the peak to another velocity and leaves height and slope"),
 }
 """Factor -> what it is called, and what a figure says that it does."""

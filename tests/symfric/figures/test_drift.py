@@ -5,6 +5,7 @@ import pytest
 
 from symfric import LuGre, law_from_text
 from symfric.figures import compare, drift
+from symfric.figures.drift import over_period
 from symfric.laws import ElastoPlastic
 
 
@@ -39,3 +40,20 @@ def test_the_block_is_pushed_below_break_away_at_first_and_in_the_end() -> None:
     F_e = drift(LuGre())["lugre"]["F_e"]
     assert F_e.max() == pytest.approx(0.8 * 0.7848, rel=1e-3)
     assert F_e.min() == pytest.approx(0.2 * 0.7848, rel=1e-3)
+
+
+def test_the_mean_over_two_periods_drifts_with_lugre_and_stays_with_gms() -> None:
+    data = compare(["lugre", "gms"], "drift")
+    assert data.panels == (("t", "x_mean"),)
+    for law, rise in (("lugre", 1.6e-4), ("gms", 0.0)):
+        t, mean = data[law]["t"], data[law]["x_mean"]
+        late = mean[np.abs(t - 7.0).argmin()] - mean[np.abs(t - 3.0).argmin()]
+        assert late == pytest.approx(rise, rel=0.1, abs=2e-7)
+
+
+def test_a_mean_over_a_period_forgets_its_sine_and_keeps_a_line() -> None:
+    t = np.linspace(0.0, 1.0, 401)
+    found = over_period(t, 2 * t + np.sin(2 * np.pi * 10 * t), 0.1)
+    inner = (t > 0.06) & (t < 0.94)
+    assert found[inner] == pytest.approx(2 * t[inner], abs=1e-3)
+    assert found[0] == pytest.approx(0.1, abs=1e-3)

@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 
 from symfric import BrownMcPhee, Karnopp, LuGre, law_from_text, with_values
 from symfric.figures import compare, figure
+from symfric.figures.data import Curve, FigureData
 from symfric.figures.nature import behaviours
-from symfric.figures.pictures import decades, plot_catalogue, plot_figure, plot_laws, window
+from symfric.figures.pictures import clear, decades, plot_catalogue, plot_figure, plot_laws, window
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import steady_force
 
@@ -137,20 +138,40 @@ def test_a_figure_says_its_note_and_reads_in_its_units() -> None:
     drawn = plot_figure(compare(["lugre", "coulomb"], "hysteresis"))
     (axis,) = drawn.axes
     assert (axis.get_xlabel(), axis.get_ylabel()) == ("x [µm]", "F [N]")
-    assert axis.get_title(loc="left").startswith("without coulomb: hysteresis of coulomb")
+    assert axis.get_title(loc="left").startswith("without coulomb: expected")
     assert plt.get_fignums() == []
 
 
 def test_a_sweep_says_what_is_swept_and_what_for() -> None:
     data = figure(law_from_text("self_tuning"), "sweep_c")
     assert data.title.startswith("profiles for values of the shape factor C")
-    assert data.note.startswith("C sets what follows the rise")
+    assert data.note.startswith("C up to 1 gives a plateau")
 
 
 def test_one_colour_a_law_one_line_style_a_case() -> None:
     drawn = plot_figure(compare(["lugre", "gms"], "lag"))
     lines = drawn.axes[0].lines
-    assert len({line.get_color() for line in lines[:4]}) == 1
+    assert [line.get_label() for line in lines[:3]] == [
+        "lugre, 2 Hz",
+        "lugre, 5 Hz",
+        "lugre, 10 Hz",
+    ]
+    assert len({line.get_color() for line in lines[:3]}) == 1
     assert len({line.get_color() for line in lines}) == 2
-    dashes = [str(line.get_linestyle()) + str(line._dash_pattern) for line in lines[:4]]  # type: ignore[attr-defined]
-    assert len(set(dashes)) == 4
+    assert len({str(line._dash_pattern) for line in lines[:3]}) == 3  # type: ignore[attr-defined]
+    assert drawn.axes[0].get_title(loc="left") == "not drawn: steady"
+
+
+def test_of_many_laws_the_first_and_last_case_are_drawn_and_all_are_in_the_data() -> None:
+    data = compare(["lugre", "gms", "dahl"], "hysteresis")
+    drawn, said = clear(data.curves)
+    assert (len(data.curves), len(drawn), said) == (9, 6, "not drawn: 5x")
+
+
+def test_measured_levels_stand_above_zero() -> None:
+    data = FigureData("levels", "", {"rate": "N/s", "F": "N"}, (("rate", "F"),),
+                      (Curve("a", "", {"rate": np.array([1.0, 10.0]),
+                                       "F": np.array([1.0, 1.00001])}),),
+                      log=("rate",), dots=True)  # fmt: skip
+    axis = plot_figure(data).axes[0]
+    assert axis.get_ylim() == pytest.approx((0.0, 1.1), rel=1e-3)

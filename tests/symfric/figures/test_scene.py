@@ -7,7 +7,7 @@ from symfric.scenes import Pendulum
 
 def test_a_mechanism_is_drawn_by_position_friction_and_energy() -> None:
     data = scene_figure("pendulum", {"LuGre": in_scene(LuGre(), "pendulum")})
-    assert data.panels == (("t", "phi"), ("t", "phi_friction"), ("t", "potential"), ("t", "energy"))
+    assert data.panels == (("t", "phi"), ("t", "phi_friction"), ("t", "energy"))
     assert data["LuGre"]["t"][-1] == Pendulum.t_end
 
 
