@@ -22,6 +22,7 @@ USAGE_ERROR = cast("type[typer.BadParameter]", typer.BadParameter.__mro__[2])
 
 COMMANDS = {
     "laws": "List the friction laws, or show one in full.",
+    "scenes": "List the scenes, or show one in full.",
     "run": "Simulate SCENE with a friction law.",
     "report": "Simulate SCENE and write one page: signals, friction, error, laws.",
     "identify": "Fit friction laws to measured data, and say what they are worth.",

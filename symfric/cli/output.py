@@ -58,7 +58,7 @@ def show_doc(text: str) -> None:
     paragraph: list[str] = []
     for line in [*text.splitlines(), ""]:
         kept = not line or line.startswith(" ")
-        if paragraph and (kept or line.startswith(("Limits:", "Source:"))):
+        if paragraph and (kept or line.startswith(("Defaults:", "Limits:", "Source:"))):
             show(" ".join(paragraph))
             paragraph = []
         if kept:

@@ -19,8 +19,9 @@ from symfric.scenes.presets import Numbers, Preset
 class CoupledBlocks(Scene):
     """Two blocks on a belt, each held to the ground by a spring, with a spring between them.
 
-        m_1 v_1' = -k_1 x_1 + k_c (x_2 - x_1) - F(v_1 - v_belt, m_1 g),   x_1' = v_1
-        m_2 v_2' = -k_2 x_2 - k_c (x_2 - x_1) - F_2(v_2 - v_belt, m_2 g),   x_2' = v_2
+        m_1 v_1' = -k_1 x_1 + k_c (x_2 - x_1) - F(v_1 - v_belt, m_1 g)
+        m_2 v_2' = -k_2 x_2 - k_c (x_2 - x_1) - F_2(v_2 - v_belt, m_2 g)
+        x_1' = v_1,   x_2' = v_2
 
     x_1 and x_2 are the elongations of the springs, signs as in `Rabinowicz`. A block that breaks
     away pushes the other one: the smallest model of earthquakes, which slides in turns, together,

@@ -28,11 +28,11 @@ FALL = {"v_s": 0.155575 / 0.9}
 @final
 @dataclass(frozen=True, eq=False)
 class DrillString(Scene):
-    """A string of `lumps` inertias under a top drive whose speed is given, friction at the bit.
+    """A string of inertias under a top drive whose speed is given, friction at the bit.
 
         twist_i' = w_(i-1) - w_i,   w_0 = w_top
-        J_i w_i' = t_i - t_(i+1) - c_b w_i [bit],   t_i = n k twist_i + n c (w_(i-1) - w_i)
-        bit:  t_(n+1) = R F(R w_n, N)
+        t_i = n k twist_i + n c (w_(i-1) - w_i)
+        J_i w_i' = t_i - t_(i+1),   at the bit t_(n+1) = R F(R w_n, N) + c_b w_n
 
     w_top is the input [rad/s], k and c the stiffness and the damping of the whole string, n =
     lumps; the lumps of the string have J_string/n, the bit has J_bit and half a lump more. N is the
