@@ -24,3 +24,8 @@ def rms(difference: Array) -> float:
 def largest(difference: Array) -> float:
     """Largest magnitude."""
     return float(np.abs(difference).max())
+
+
+def spread(x: Array) -> float:
+    """The S x 100 [m] of Jing and Mi: 100 times the standard deviation of positions."""
+    return 100 * float(np.std(x, ddof=1))

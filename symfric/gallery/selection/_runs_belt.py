@@ -34,11 +34,6 @@ def acceleration(one: Trajectory) -> Array:
     return -(K * one["x"] + one["friction"]) / M
 
 
-def spread(x: Array) -> float:
-    """The paper's S x 100 [m]: 100 times the standard deviation of the positions."""
-    return 100 * float(np.std(x, ddof=1))
-
-
 def leaving(one: Trajectory) -> Array:
     """Instants [s] at which the block falls behind the belt by a tenth of its velocity."""
     v = one["v_rel"]

@@ -15,8 +15,8 @@ and Dahl do not stick is confirmed.
 
 from symfric.gallery.plate import Plate, plate_of
 from symfric.gallery.selection._laws import PRINTED, SLIDING, chosen, small_multiples
-from symfric.gallery.selection._runs_belt import T_END, exact, run, spread
-from symfric.gallery.signals import largest, rms
+from symfric.gallery.selection._runs_belt import T_END, exact, run
+from symfric.gallery.signals import largest, rms, spread
 
 
 def plate(quick: bool = False) -> Plate:

@@ -22,9 +22,8 @@ from symfric.foundation.style import EDGE, QUIET, colour, line
 from symfric.gallery.plate import Plate, plate_of
 from symfric.gallery.selection import _machine as machine
 from symfric.gallery.selection._laws import PRINTED
-from symfric.gallery.selection._runs_belt import spread
 from symfric.gallery.selection._runs_box import T_END, box, run
-from symfric.gallery.signals import acceleration
+from symfric.gallery.signals import acceleration, spread
 
 TOP, HALF = 0.4, 0.2
 """Height of the hinge and half the width of the box [m]."""

@@ -20,9 +20,8 @@ import numpy as np
 from symfric import Karnopp, simulate
 from symfric.gallery.plate import Plate, plate_of
 from symfric.gallery.selection._laws import LAWS, PRINTED, chosen
-from symfric.gallery.selection._runs_belt import spread
 from symfric.gallery.selection._runs_box import EXACT, T_END, box, distance, picture, run
-from symfric.gallery.signals import largest
+from symfric.gallery.signals import largest, spread
 
 
 def plate(quick: bool = False) -> Plate:
