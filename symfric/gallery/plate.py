@@ -14,6 +14,7 @@ from typing import Any, final
 from matplotlib.figure import Figure
 
 from symfric.foundation.parameters import check_names
+from symfric.foundation.shown import Showing, Shown, Table
 
 SECTIONS = ("Compared", "Distance", "Evidence")
 """What the docstring of every script says under these words."""
@@ -21,8 +22,8 @@ SCRIPT = re.compile(r"fig_(\d+)(?:_(\d+))?_\w+")
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class Plate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Plate(Showing):
     """One figure of a paper, computed again.
 
     Everything but the last four is said once, in the docstrings of the script and of its folder.
@@ -57,6 +58,22 @@ class Plate:
     def how_far(self) -> str:
         """The distance with its unit."""
         return f"{self.distance:.2g} {self.unit}" if self.unit != "1" else f"{self.distance:.2g}"
+
+    def shown(self) -> Shown:
+        """Figure, what is compared, how far we are, and the numbers."""
+        rows = tuple((name, f"{value:.6g}") for name, value in self.numbers.items())
+        lines = (
+            self.paper,
+            f"compared: {self.compared}",
+            f"how far: {self.how_far}; {self.measure}",
+            f"evidence: {self.evidence}",
+        )
+        table = Table(("number", "value"), rows, numbers=(1,), rest="... {n} more")
+        return Shown(f"{self.figure}: {self.title}", lines, table)
+
+    def thumbnail(self) -> Figure:
+        """The picture itself."""
+        return self.picture
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but the picture as plain data."""

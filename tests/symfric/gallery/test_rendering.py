@@ -7,8 +7,9 @@ import pytest
 
 from symfric.gallery import rendering
 from symfric.gallery.pages import index_page
-from symfric.gallery.plate import chosen, figure_of, plate_of, sections, short
+from symfric.gallery.plate import chosen, figure_of, plate_of, plates, sections, short
 from symfric.gallery.rendering import draw, read, render, together
+from symfric.stress.crew import Died, Hung
 
 NAME = "self_tuning/fig_07_shape_factor"
 
@@ -68,6 +69,24 @@ def test_a_plate_is_written_whole(tmp_path: Path) -> None:
     assert f'src="{NAME}.png"' in page
     assert record["how_far"] in page
     assert "reduced size" in page
+
+
+def test_a_plate_shows_itself_in_one_screen() -> None:
+    plate = plates()[NAME](quick=True)
+    told = repr(plate).splitlines()
+    assert told[0] == "Figure 7: Influence of the shape factor C on the friction force"
+    assert "how far: 0 of 4 statements" in repr(plate)
+    assert len(told) <= 25
+    assert max(map(len, told)) <= 100
+    assert "<img" in plate._repr_html_()  # pyright: ignore[reportPrivateUsage]
+
+
+def test_plates_that_died_are_told_apart_from_those_that_were_done(tmp_path: Path) -> None:
+    draw(NAME, tmp_path, quick=True)
+    found = rendering._failures((NAME, "other"), tmp_path, Died("SIGKILL", "out of memory"))  # pyright: ignore[reportPrivateUsage]
+    assert found == {"other": "its process died, SIGKILL: out of memory"}
+    hung = rendering._failures(("other",), tmp_path, Hung(600.0))  # pyright: ignore[reportPrivateUsage]
+    assert hung == {"other": "no end within its time"}
 
 
 def test_figures_of_the_same_runs_share_a_process() -> None:
