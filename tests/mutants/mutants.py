@@ -15,6 +15,7 @@ from mutants.fits import FITS
 from mutants.generated import GENERATED
 from mutants.loops import LOOPS
 from mutants.mutant import Mutant
+from mutants.pictured import PICTURED
 from mutants.plants import PLANTS
 from mutants.robots import ROBOTS
 from mutants.solvers import RESULTS, SOLVERS
@@ -350,5 +351,5 @@ LEFT_OUT = (
 MUTANTS = (
     *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
     *BESIDE, *CACHES, *COMPENSATED, *DEVICES, *DRY, *EMITTED, *ENSEMBLES, *EXPORTED,
-    *GENERATED, *LEFT_OUT, *LOOPS, *DERIVATIVES, *PLANTS, *RESULTS, *ROBOTS, *SOLVERS,
+    *GENERATED, *LEFT_OUT, *LOOPS, *DERIVATIVES, *PICTURED, *PLANTS, *RESULTS, *ROBOTS, *SOLVERS,
 )  # fmt: skip
