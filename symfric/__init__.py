@@ -1,4 +1,32 @@
-"""Friction laws as CasADi expressions, from simulation to optimal control and embedded C."""
+"""Friction laws as CasADi expressions, from simulation to optimal control and embedded C.
+
+    from symfric import LuGre, rabinowicz, simulate
+
+    run = simulate(rabinowicz(LuGre()), 20.0)
+    print(run)  # every signal with its unit and extremes
+    run.plot()
+    run.save("run.npz")
+
+What there is; `help` of each tells more:
+
+    laws        LuGre, BrownMcPhee, GMS, ... (ALL_LAWS by name, POPULATIONS of random contacts);
+                Law, StaticLaw, Element and Slider to write and compose them; law_from_text and
+                any_from_text, law_name; PlanarSlip and SpatialSlip in a plane and in space
+    machines    rabinowicz, drive; more in symfric.scenes (ALL_SCENES by name)
+    equations   Model of Variable, Output, Event and Monitor; contact puts a law into it (Contact)
+    mechanisms  Mechanism of bodies and joints that rub, read_urdf; more in symfric.multibody
+    running     simulate, simulate_many, stepper, flow; inputs as numbers, functions of time or
+                samples, Hold and Linear (rate_of: their rate); SolveError, Status where runs fail
+    results     Trajectory (run["x"], run.at(times), run.at(run.step_times), run.extremes, plot,
+                animate, save, to_csv, to_dataframe), load_run, Statistics, Ensemble, Plant, report
+    choice      select ranks laws on a machine at equal error (Choice)
+    behaviour   figure and compare of laws (FigureData); recommended finds a smoothing for a wanted
+                error (Recommendation)
+    parameters  Parameter, parameters, with_values, symbolise
+
+Optimal control is the package `ocp`, identification `identification`; C is written by
+`symfric.codegen`, units of FMI by `symfric.fmu`. The command line is `symfric`.
+"""
 
 from typing import TYPE_CHECKING
 
@@ -67,6 +95,7 @@ if TYPE_CHECKING:
     from symfric.laws import LeineSwitch as LeineSwitch
     from symfric.laws import Leuven as Leuven
     from symfric.laws import LoadDependent as LoadDependent
+    from symfric.laws import LoadNormalised as LoadNormalised
     from symfric.laws import Lorentzian as Lorentzian
     from symfric.laws import LuGre as LuGre
     from symfric.laws import LuGreNormalised as LuGreNormalised
@@ -109,10 +138,12 @@ if TYPE_CHECKING:
     from symfric.model import Model as Model
     from symfric.model import Monitor as Monitor
     from symfric.model import Output as Output
+    from symfric.multibody import Mechanism as Mechanism
+    from symfric.multibody import read_urdf as read_urdf
     from symfric.results.report import report as report
+    from symfric.scenes import contact as contact
     from symfric.scenes import drive as drive
     from symfric.scenes import rabinowicz as rabinowicz
-    from symfric.scenes.base import contact as contact
 else:
     hand_out(
         __name__,
@@ -131,7 +162,7 @@ else:
                 BoucWen Bristle2D BrittleSelfTuning BrownMcPhee Capstan Coulomb Dahl
                 DuanSingh ElastoPlastic Element ExactCoulomb Exudyn GenericAsperity
                 Gonthier HaessigFriedland Hollars Karnopp Lagged Law LeineSwitch
-                Leuven LoadDependent Lorentzian LuGre LuGreNormalised LuGrePassive
+                Leuven LoadDependent LoadNormalised Lorentzian LuGre LuGreNormalised LuGrePassive
                 MakkarDixon MaxwellSlip ModifiedThrelfall PlanarSlip PoppStelter
                 Population PowerLawViscous QuarterCarGeneral QuarterCarSimple
                 RandomBristles RateAndState RuiWang SelfTuning SimscapeBreakaway
@@ -140,9 +171,9 @@ else:
                 VelocityBased Viscous Wojewoda any_from_text law_from_text law_name
             """,
             "symfric.model": "Contact Event Model Monitor Output",
+            "symfric.multibody": "Mechanism read_urdf",
             "symfric.results.report": "report",
-            "symfric.scenes": "drive rabinowicz",
-            "symfric.scenes.base": "contact",
+            "symfric.scenes": "contact drive rabinowicz",
         },
     )
 

@@ -211,10 +211,13 @@ def largest_norms(trajectory: Trajectory) -> dict[str, float]:
 
 
 def show_warnings(law: str, scene: Scene) -> None:
-    """Print what the numbers of the scene's laws give away."""
+    """Print what the numbers of the scene's laws give away; `laws` tells it of their defaults."""
     held = (getattr(scene, item.name) for item in fields(scene))
     for value in held:
-        for warning in value.warnings() if isinstance(value, Law) else ():
+        chosen = isinstance(value, Law) and any(
+            p.value != p.default for p in parameters(value).values()
+        )
+        for warning in value.warnings() if chosen else ():
             output.show(f"Warning: {law}: {warning}.\n")
 
 

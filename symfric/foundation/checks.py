@@ -23,6 +23,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.shown import Showing
+
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
@@ -51,6 +53,8 @@ def shown(value: object) -> str:
         value = value.item()
     if callable(value) and hasattr(value, "__name__"):
         return f"the function {value.__name__}"
+    if isinstance(value, Showing):
+        return _cut(value.shown().title)
     text = " ".join(repr(value).split()) if hasattr(value, "_repr_html_") else repr(value)
     if text.startswith("<") or "\n" in text:
         return f"an object of type {type(value).__name__}"
@@ -168,7 +172,11 @@ def expression(where: str, value: object) -> Any:
         return value
     found = as_number(value)
     if found is None or not isfinite(found):
-        raise refused(where, "an SX expression or a finite number", value)
+        symbol = isinstance(getattr(value, "symbol", None), ca.SX)
+        hint = "write .symbol behind a variable" if symbol else ""
+        if isinstance(value, list | tuple):
+            hint = "write casadi.vertcat(...) for a column"
+        raise refused(where, "an SX expression or a finite number", value, hint)
     return value
 
 

@@ -23,7 +23,9 @@ class Front(ModuleType):
         else:
             found = None if name.startswith("_") else self._room(name)
             if found is None:
-                raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
+                raise AttributeError(
+                    f"module {self.__name__!r} has no attribute {name!r}", name=name, obj=self
+                )
         self.__dict__[name] = found
         return found
 

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from math import inf
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -19,6 +19,7 @@ from symfric.foundation import checks
 from symfric.foundation.checks import check_names as check_names
 from symfric.foundation.numeric import Scalar, is_casadi, is_number, is_symbolic
 from symfric.foundation.shown import Shown, Table, figure_of
+from symfric.foundation.variable import Variable as Variable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -102,54 +103,6 @@ class Parameter:
     width: int = 0
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Variable:
-    """A named scalar of a model: its symbol, unit and the numbers that belong to it.
-
-    Attributes:
-        symbol: SX symbol, shape (1, 1).
-        start: initial or default value; an expression in other symbols where it depends on them.
-        nominal: typical magnitude; absolute tolerances and scalings are relative to it.
-        lower, upper: bounds for optimisation and identification.
-        kind: what it is among the signals of a model, see `symfric.model.kinds`.
-    """
-
-    name: str
-    unit: str
-    start: Scalar = 0.0
-    nominal: float = 1.0
-    lower: float = -inf
-    upper: float = inf
-    doc: str = ""
-    symbol: ca.SX = field(default_factory=lambda: ca.SX(0, 0))
-    kind: str = ""
-
-    def __post_init__(self) -> None:
-        where = f"variable '{checks.text('variable: name', self.name)}'"
-        if not isinstance(self.unit, str):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise checks.refused(f"{where}: unit", "a text such as 'N', or ''", self.unit)
-        symbol = checks.kind(f"{where}: symbol", self.symbol, ca.SX, "an SX symbol")
-        if symbol.is_empty():
-            object.__setattr__(self, "symbol", ca.SX.sym(self.name))
-        elif not (symbol.is_scalar() and symbol.is_symbolic()):
-            raise checks.refused(f"{where}: symbol", "one SX symbol", symbol)
-        if ca.SX(checks.expression(f"{where}: start", self.start)).numel() != 1:
-            raise checks.refused(f"{where}: start", "a number or one expression", self.start)
-        checks.number(f"{where}: nominal", self.nominal, above=0.0)
-        low, high = (checks.as_number(bound) for bound in (self.lower, self.upper))
-        if low is None or high is None or not low <= high or low == inf or high == -inf:
-            shown = f"{checks.shown(self.lower)} and {checks.shown(self.upper)}"
-            raise ValueError(f"{where}: expected numbers lower <= upper, got {shown}")
-
-    def __repr__(self) -> str:
-        said = f": {self.doc}" if self.doc else ""
-        return f"<variable '{self.name}' [{self.unit}], start {figure_of(self.start)}{said}>"
-
-    def within(self, where: str, value: object) -> float:
-        """`value` as a finite number inside the bounds."""
-        return checks.number(where, value, unit=self.unit, lower=self.lower, upper=self.upper)
-
-
 @dataclass(frozen=True, eq=False)
 class Parametric:
     """A frozen dataclass with `param` fields; checks its numbers when it is made.
@@ -165,6 +118,12 @@ class Parametric:
 
     suffixes: ClassVar[tuple[str, ...]] = ()
     """Fixed name endings of the children; without them a child is renamed only on a clash."""
+
+    def __new__(cls, *_: Any, **given: Any) -> Self:
+        """A name that is no field is refused with the nearest one."""
+        if not given.keys() <= cls.__dataclass_fields__.keys():
+            check_names(cls.__name__, given, [item.name for item in fields(cls)])
+        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         problems = list(_problems(self))

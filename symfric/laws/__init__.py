@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from symfric.laws.composed.compose import Sum as Sum
     from symfric.laws.composed.isotropic import PlanarSlip as PlanarSlip
     from symfric.laws.composed.isotropic import SpatialSlip as SpatialSlip
+    from symfric.laws.composed.normalised import LoadNormalised as LoadNormalised
     from symfric.laws.composed.populations import AnyLaw as AnyLaw
     from symfric.laws.composed.populations import GenericAsperity as GenericAsperity
     from symfric.laws.composed.populations import Population as Population
@@ -96,6 +97,7 @@ else:
             "symfric.laws.catalogue": "ALL_LAWS",
             "symfric.laws.composed.compose": "Asymmetric LoadDependent Sum",
             "symfric.laws.composed.isotropic": "PlanarSlip SpatialSlip",
+            "symfric.laws.composed.normalised": "LoadNormalised",
             "symfric.laws.composed.populations": "AnyLaw GenericAsperity Population RandomBristles",
             "symfric.laws.composed.wrap": "Lagged TemperatureDependent",
             "symfric.laws.dynamic.armstrong": "Armstrong",

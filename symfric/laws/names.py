@@ -7,6 +7,7 @@ from symfric.foundation.parameters import check_names
 from symfric.laws.base.law import Law, check_law
 from symfric.laws.catalogue import ALL_LAWS
 from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum
+from symfric.laws.composed.normalised import LoadNormalised
 from symfric.laws.composed.populations import AnyLaw, GenericAsperity, Population, RandomBristles
 from symfric.laws.composed.wrap import Lagged, TemperatureDependent
 
@@ -31,8 +32,9 @@ ALIASES = {
 }
 """Other names of the same law, as papers and programs use them."""
 
-WRAPPERS: dict[str, type[LoadDependent | Lagged | TemperatureDependent]] = {
+WRAPPERS: dict[str, type[LoadDependent | LoadNormalised | Lagged | TemperatureDependent]] = {
     "load_dependent": LoadDependent,
+    "load_normalised": LoadNormalised,
     "lagged": Lagged,
     "temperature_dependent": TemperatureDependent,
 }
@@ -51,7 +53,7 @@ def law_name(law: AnyLaw) -> str:
         return "+".join(law_name(term) for term in law.laws)
     if isinstance(law, Asymmetric):
         return f"asymmetric({law_name(law.positive)})"
-    if isinstance(law, LoadDependent | Lagged | TemperatureDependent):
+    if isinstance(law, LoadDependent | LoadNormalised | Lagged | TemperatureDependent):
         name = next(name for name, kind in WRAPPERS.items() if kind is type(law))
         return f"{name}({law_name(law.law)})"
     known = (name for name, kind in (ALL_LAWS | POPULATIONS).items() if kind is type(law))
@@ -69,8 +71,8 @@ def law_from_text(text: str) -> Law:
     """The law with default parameters that `text` names.
 
     `brown_mcphee`, another name of a law as `adams`, sums `coulomb+viscous`, wrappers
-    `asymmetric(coulomb+viscous)`, `load_dependent(lugre)`, `lagged(stribeck)` and
-    `temperature_dependent(lugre)`.
+    `asymmetric(coulomb+viscous)`, `load_dependent(lugre)`, `load_normalised(lugre)`,
+    `lagged(stribeck)` and `temperature_dependent(lugre)`.
 
     Raises:
         ValueError: unknown name (the closest one is offered), empty term, unbalanced parentheses.

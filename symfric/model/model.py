@@ -302,7 +302,9 @@ def check_model(where: str, model: object) -> None:
     if isinstance(model, Model):
         return
     hint = ""
-    if not isinstance(model, type):
+    if isinstance(model, type):
+        hint = f"make one, as in {model.__name__}(LuGre()).model()" * hasattr(model, "model")
+    else:
         ways = {
             "model": "call its model()",
             "build": "call its build()",

@@ -75,6 +75,8 @@ def naming_problems(model: "Model") -> list[str]:
         problems.append(
             f"expected every name once and none of {', '.join(sorted(RESERVED))}, "
             f"got {', '.join(repeated)}"
+            + "; contacts made with bare=False call their states <contact>_<state>"
+            * any(contact.bare for contact in model.contacts)
         )
     odd = [n for n in names if not (n.isascii() and n.isidentifier())]
     if odd:
@@ -98,6 +100,8 @@ def equation_problems(model: "Model", known: ca.SX) -> list[str]:
         problems.append(f"ode: expected {nx} rows (one a state), got {model.ode.numel()}")
     elif model.ode is not None and model.alg.numel() != nz:
         problems.append(f"alg: expected {nz} rows, got {model.alg.numel()}")
+    elif model.ode is None and nx and model.residual.is_empty():
+        problems.append(f"ode: expected a row for each of {nx} states, got none")
     elif model.residual.numel() != nx + nz:
         problems.append(f"residual: expected {nx + nz} rows, got {model.residual.numel()}")
     single = {f"output '{n}'": o.expression for n, o in model.outputs.items()}

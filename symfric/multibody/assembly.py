@@ -18,6 +18,7 @@ from typing import final
 import casadi as ca
 import numpy as np
 
+from symfric.foundation.checks import listed
 from symfric.foundation.numeric import Scalar, is_symbolic
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import at_start, stacked, symbols_of
@@ -273,7 +274,7 @@ def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[s
     Those are the unknown ones, and those that inputs or parameters give; a sum of absolute values
     of reactions that no law asks for cannot.
     """
-    values, words, advice = list[ca.SX](), list[str](), list[str]()
+    values, words, bristles = list[ca.SX](), list[str](), list[Slip]()
     for s in contacts:
         friction, joint = s.contact.friction, s.contact.joint
         law = type(friction.law).__name__
@@ -282,12 +283,25 @@ def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[s
             values.append(s.N / (s.unknown[0].nominal if s.unknown else 1.0))
             words.append(f"normal force of joint '{joint}' with {law}")
         if s.unknown and keeps_deflection(friction.law):
-            advice.append(
-                f"bristles of {law} in joint '{joint}' keep the deflection of a larger load, and "
-                "their damping then grows without bound as the load falls: lugre_normalised, "
-                "whose deflection does not depend on the load, goes on (so do dahl and sigma_1 = 0)"
-            )
-    return stacked(values), tuple(words), "; ".join(dict.fromkeys(advice))
+            bristles.append(s)
+    return stacked(values), tuple(words), _advice(bristles)
+
+
+def _advice(bristles: Sequence[Slip]) -> str:
+    """What to write instead of laws whose bristles keep the deflection of a larger load; once."""
+    if not bristles:
+        return ""
+    laws = dict.fromkeys(type(s.contact.friction.law).__name__ for s in bristles)
+    joints = dict.fromkeys(s.contact.joint for s in bristles)
+    name, load = next(iter(laws)), float(at_start(bristles[0].unknown[0].start, ()))
+    load = float(f"{max(load, 1.0):.2g}")
+    return (
+        f"bristles of {', '.join(laws)} in joint{'s' * (len(joints) > 1)} {listed(joints)} keep "
+        "the deflection of a larger load, and their damping then grows without bound as the load "
+        f"falls: write LoadNormalised({name}(...), N_0={load:g}) for {name}(...), the "
+        "same under that load, whose deflection follows none (load_normalised(...) on the command "
+        "line)"
+    )
 
 
 def _sizes(slip: Slip) -> tuple[ca.SX, ca.SX]:

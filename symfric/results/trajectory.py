@@ -111,7 +111,7 @@ class Trajectory(Showing, Derivatives):
 
     @property
     def step_times(self) -> Array:
-        """Ends of the accepted steps [s], shape (steps + 1,).
+        """Ends of the accepted steps [s], shape (steps + 1,); `at(step_times)` has the signals.
 
         A run whose steps would take much memory has not kept them, and is run again for them, as it
         is for values between the times `t`.

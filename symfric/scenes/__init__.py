@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from symfric.scenes.arm import Arm as Arm
     from symfric.scenes.base import GivenInput as GivenInput
     from symfric.scenes.base import Scene as Scene
+    from symfric.scenes.base import contact as contact
     from symfric.scenes.base import friction_states as friction_states
     from symfric.scenes.base import other_law as other_law
     from symfric.scenes.catalogue import ALL_SCENES as ALL_SCENES
@@ -37,7 +38,7 @@ else:
         __name__,
         {
             "symfric.scenes.arm": "Arm",
-            "symfric.scenes.base": "GivenInput Scene friction_states other_law",
+            "symfric.scenes.base": "GivenInput Scene contact friction_states other_law",
             "symfric.scenes.catalogue": "ALL_SCENES MECHANISMS",
             "symfric.scenes.clutch": "Clutch",
             "symfric.scenes.coupled_blocks": "CoupledBlocks",

@@ -170,27 +170,42 @@ def _is_scalar(value: Scalar) -> bool:
 
 
 def contact(
-    name: str, law: Law, v: Scalar, N: Scalar, rest: Mapping[str, Scalar], *,
-    least: Scalar | None = None, bare: bool = True, **inputs: Scalar,
+    name: str, law: Law, v: Scalar, N: Scalar, rest: Mapping[str, Scalar] | None = None,
+    *, least: Scalar | None = None, bare: bool = True, **inputs: Scalar,
 ) -> Contact:  # fmt: skip
-    """`law` between bodies that slide at `v` under `N`, the only contact of a machine.
+    """`law` between bodies that slide at `v` under `N`: puts any law into equations of your own.
+
+    Write them with `force` of the contact and give it to the `Model`, which then has the states of
+    the law behind its own, its changes of mode as events, and error control that sees the slip:
+
+        x, v, pull = Variable("x", "m"), Variable("v", "m/s"), Variable("pull", "N")
+        slip = contact("floor", LuGre(), v.symbol, 10.0, rest={"v": 0.0}, F_e=pull.symbol)
+        rate = (pull.symbol - slip.force) / 2.0
+        sled = Model("sled", x=(x, v), u=(pull,), ode=casadi.vertcat(v.symbol, rate),
+                     contacts=(slip,), outputs={"friction": Output(slip.force, "N")})
 
     Args:
         name: what is rubbed against.
-        rest: state of the model -> its value at which `v` is exactly zero.
+        law: any law of a scalar slip; another one is another word here.
+        v: sliding velocity [m/s] in the symbols of the model; `force` opposes it.
+        N: normal force [N], a number or an expression.
+        rest: state of the model -> its value at which `v` is exactly zero, for laws that rest.
         least: smallest value of an `N` that changes, which the law must bear.
-        bare: states are called as in the law; False where a machine has several contacts.
-        inputs: what the machine offers to laws besides v and N.
+        bare: states and events are called as in the law; with several contacts give False, and
+            they are called "<name>_<state>".
+        inputs: what the machine offers to laws besides v and N, such as F_e, the force that the
+            contact must carry for no acceleration.
 
     Raises:
-        ValueError: the law needs an input that the machine does not offer, or a load where N is 0.
+        ValueError: no law, one that needs an input that is not offered, or a load where N is 0.
     """
+    check_law(f"contact '{name}': law", law)
     missing = [f"{i.name} ({i.doc})" for i in law.inputs if i.name not in inputs]
     if missing:
         raise ValueError(
             f"{type(law).__name__}: expected a law that needs no more than v, N"
             f"{''.join(f', {offered}' for offered in inputs)} here, got one that needs "
-            f"{', '.join(missing)}"
+            f"{', '.join(missing)}; offer it by name, as in contact(..., F_e=pull)"
         )
     bottom = N if least is None else least
     if is_number(bottom) and bottom == 0 and divides_by_load(law):
@@ -200,7 +215,8 @@ def contact(
         )
     if least is not None and is_number(least):  # laws that need a load refuse a number only
         law.rate(ca.SX(1.0), least, ca.SX([s.nominal for s in law.states]))
-    return Contact(name, ca.SX(v), N, law, given=inputs, rest=rest, bare=bare)
+    v = checks.expression(f"contact '{name}': v", v)
+    return Contact(name, ca.SX(v), N, law, given=inputs, rest=rest or {}, bare=bare)
 
 
 def divides_by_load(law: Law) -> bool:

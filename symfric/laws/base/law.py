@@ -242,8 +242,14 @@ def chosen(law: Law, inputs: Mapping[str, Scalar]) -> dict[str, Scalar]:
 
 def check_law(where: str, law: object) -> None:
     """Refuse what is not a law: its class, or its name."""
-    if not isinstance(law, Law):
-        raise checks.refused(where, "a law such as LuGre()", law)
+    if isinstance(law, Law):
+        return
+    hint = ""
+    if isinstance(law, type) and issubclass(law, Law):
+        hint = f"write {law.__name__}() with parentheses"
+    elif isinstance(law, str):
+        hint = f"law_from_text({law!r}) makes one of its name"
+    raise checks.refused(where, "a law such as LuGre()", law, hint)
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,6 +43,7 @@ from symfric.laws import (
     Element,
     Lagged,
     LoadDependent,
+    LoadNormalised,
     PlanarSlip,
     Slider,
     Table,
@@ -320,7 +321,9 @@ def test_symbols_take_the_bounds_of_their_parameters(kind: type[Law]) -> None:
 
 def test_every_parameter_of_every_law_and_scene_says_what_it_is_for() -> None:
     """Roles are data: identification, temperature and code generation read them, not texts."""
-    wrappers = (Asymmetric, LoadDependent, Lagged, TemperatureDependent, PlanarSlip, Table)
+    wrappers = (
+        Asymmetric, LoadDependent, LoadNormalised, Lagged, TemperatureDependent, PlanarSlip, Table,
+    )  # fmt: skip
     parts = (*ALL_LAWS.values(), *POPULATIONS.values(), *wrappers, Element, Slider)
     for kind in (*parts, *ALL_SCENES.values(), Robot):
         for item in fields(kind):

@@ -2,7 +2,16 @@
 
 import pytest
 
-from symfric import ALL_LAWS, Asymmetric, Coulomb, LoadDependent, StaticLaw, law_from_text
+from symfric import (
+    ALL_LAWS,
+    Asymmetric,
+    Coulomb,
+    LoadDependent,
+    LoadNormalised,
+    LuGre,
+    StaticLaw,
+    law_from_text,
+)
 from symfric.foundation.numeric import Scalar
 from symfric.laws import POPULATIONS, RandomBristles, any_from_text, law_name
 
@@ -52,6 +61,8 @@ def test_wrappers_start_with_equal_sides() -> None:
     assert isinstance(law, Asymmetric)
     assert law.positive is law.negative
     assert isinstance(law_from_text("load_dependent(coulomb)"), LoadDependent)
+    assert isinstance(law_from_text("load_normalised(lugre)"), LoadNormalised)
+    assert law_name(LoadNormalised(LuGre())) == "load_normalised(lugre)"
 
 
 @pytest.mark.parametrize(

@@ -326,9 +326,9 @@ def test_a_negative_preload_is_an_error_where_it_outweighs_the_reaction() -> Non
 @pytest.mark.parametrize("scene", [SliderCrank(LuGre()), FourBar(LuGre())], ids=["crank", "bar"])
 def test_bristles_that_keep_the_deflection_of_another_load_are_named(scene: MechanismScene) -> None:
     """Their damping makes the reaction loop singular; what to take instead stands in the error."""
-    with pytest.raises(SolveError, match=r"bristles of LuGre in joint '[a-z_]*crank' keep") as e:
+    with pytest.raises(SolveError, match=r"bristles of LuGre in joints? [a-z_]*crank.* keep") as e:
         simulate(scene.model(), 0.5)
-    assert "lugre_normalised" in str(e.value)
+    assert "write LoadNormalised(LuGre(...), N_0=" in str(e.value)
     assert simulate(replace(scene, law=LuGreNormalised()).model(), 0.1).t[-1] == 0.1
 
 

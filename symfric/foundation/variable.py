@@ -1,0 +1,58 @@
+"""A named scalar of a model."""
+
+from dataclasses import dataclass, field
+from math import inf
+
+import casadi as ca
+
+from symfric.foundation import checks
+from symfric.foundation.numeric import Scalar
+from symfric.foundation.shown import figure_of
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Variable:
+    """A named scalar of a model: its symbol, unit and the numbers that belong to it.
+
+    Attributes:
+        symbol: SX symbol, shape (1, 1).
+        start: initial or default value; an expression in other symbols where it depends on them.
+        nominal: typical magnitude; absolute tolerances and scalings are relative to it.
+        lower, upper: bounds for optimisation and identification.
+        kind: what it is among the signals of a model, see `symfric.model.kinds`.
+    """
+
+    name: str
+    unit: str
+    start: Scalar = 0.0
+    nominal: float = 1.0
+    lower: float = -inf
+    upper: float = inf
+    doc: str = ""
+    symbol: ca.SX = field(default_factory=lambda: ca.SX(0, 0))
+    kind: str = ""
+
+    def __post_init__(self) -> None:
+        where = f"variable '{checks.text('variable: name', self.name)}'"
+        if not isinstance(self.unit, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise checks.refused(f"{where}: unit", "a text such as 'N', or ''", self.unit)
+        symbol = checks.kind(f"{where}: symbol", self.symbol, ca.SX, "an SX symbol")
+        if symbol.is_empty():
+            object.__setattr__(self, "symbol", ca.SX.sym(self.name))
+        elif not (symbol.is_scalar() and symbol.is_symbolic()):
+            raise checks.refused(f"{where}: symbol", "one SX symbol", symbol)
+        if ca.SX(checks.expression(f"{where}: start", self.start)).numel() != 1:
+            raise checks.refused(f"{where}: start", "a number or one expression", self.start)
+        checks.number(f"{where}: nominal", self.nominal, above=0.0)
+        low, high = (checks.as_number(bound) for bound in (self.lower, self.upper))
+        if low is None or high is None or not low <= high or low == inf or high == -inf:
+            shown = f"{checks.shown(self.lower)} and {checks.shown(self.upper)}"
+            raise ValueError(f"{where}: expected numbers lower <= upper, got {shown}")
+
+    def __repr__(self) -> str:
+        said = f": {self.doc}" if self.doc else ""
+        return f"<variable '{self.name}' [{self.unit}], start {figure_of(self.start)}{said}>"
+
+    def within(self, where: str, value: object) -> float:
+        """`value` as a finite number inside the bounds."""
+        return checks.number(where, value, unit=self.unit, lower=self.lower, upper=self.upper)
