@@ -67,6 +67,15 @@ def figures(incomplete: str) -> list[str]:
     return [*_of(FIGURES, incomplete), *scenes(incomplete)]
 
 
+def plates(incomplete: str) -> list[str]:
+    """Papers of the gallery, and behind the slash their figures."""
+    from symfric.gallery.plate import scripts, short  # noqa: PLC0415  (of this command only)
+
+    names = [short(name) for name in scripts()]
+    papers = dict.fromkeys(f"{name.partition('/')[0]}/" for name in names)
+    return _of(names if "/" in incomplete else papers, incomplete)
+
+
 def problems(incomplete: str) -> list[str]:
     """Ready problems of optimal control."""
     from ocp.problems.catalogue import READY  # noqa: PLC0415  (of this command only)

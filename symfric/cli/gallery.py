@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from symfric.cli import output
+from symfric.cli import completions, output
 from symfric.cli.options import check_folder
 from symfric.gallery import chosen, short
 from symfric.gallery.plate import about
@@ -21,7 +21,11 @@ INTERRUPTED = 130
 def gallery(
     names: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[NAME]...", help="A figure, or a paper; all if none is given."),
+        typer.Argument(
+            metavar="[NAME]...",
+            help="A figure, or a paper; all if none is given.",
+            autocompletion=completions.plates,
+        ),
     ] = None,
     out: Annotated[
         Path, typer.Option("--out", metavar="FOLDER", help="Where pictures and numbers go.")

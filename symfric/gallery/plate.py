@@ -9,6 +9,7 @@ from inspect import cleandoc
 from math import isfinite
 from pathlib import Path
 from sys import modules
+from textwrap import wrap
 from typing import Any, final
 
 from matplotlib.figure import Figure
@@ -62,12 +63,13 @@ class Plate(Showing):
     def shown(self) -> Shown:
         """Figure, what is compared, how far we are, and the numbers."""
         rows = tuple((name, f"{value:.6g}") for name, value in self.numbers.items())
-        lines = (
+        told = (
             self.paper,
             f"compared: {self.compared}",
             f"how far: {self.how_far}; {self.measure}",
             f"evidence: {self.evidence}",
         )
+        lines = tuple(line for text in told for line in wrap(text, 98, subsequent_indent="  "))
         table = Table(("number", "value"), rows, numbers=(1,), rest="... {n} more")
         return Shown(f"{self.figure}: {self.title}", lines, table)
 
@@ -182,7 +184,7 @@ def chosen(names: tuple[str, ...]) -> tuple[str, ...]:
     Raises:
         ValueError: a name that begins none.
     """
-    known = [*scripts()]
+    known, names = [*scripts()], tuple(name.rstrip("/") for name in names)
     found = {name: [k for k in known if k == name or begins(k, name)] for name in names}
     wrong = [name for name, hits in found.items() if not hits]
     folders = dict.fromkeys(name.partition("/")[0] for name in known)

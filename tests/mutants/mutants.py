@@ -18,6 +18,7 @@ from mutants.mutant import Mutant
 from mutants.pictured import PICTURED
 from mutants.plants import PLANTS
 from mutants.robots import ROBOTS
+from mutants.shown import SHOWN
 from mutants.solvers import RESULTS, SOLVERS
 
 STEP = "symfric/integrator/step/attempt.py"
@@ -351,5 +352,6 @@ LEFT_OUT = (
 MUTANTS = (
     *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
     *BESIDE, *CACHES, *COMPENSATED, *DEVICES, *DRY, *EMITTED, *ENSEMBLES, *EXPORTED,
-    *GENERATED, *LEFT_OUT, *LOOPS, *DERIVATIVES, *PICTURED, *PLANTS, *RESULTS, *ROBOTS, *SOLVERS,
+    *GENERATED, *LEFT_OUT, *LOOPS, *DERIVATIVES, *PICTURED, *PLANTS, *RESULTS, *ROBOTS, *SHOWN,
+    *SOLVERS,
 )  # fmt: skip

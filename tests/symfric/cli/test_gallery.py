@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from symfric.cli import completions
 from symfric.cli import gallery as command
 from symfric.cli.app import main
 from symfric.cli.gallery import brief
@@ -18,6 +19,12 @@ def test_it_lists_the_figures_by_paper(capsys: pytest.CaptureFixture[str]) -> No
     assert "self_tuning/fig_07" in told
     assert "10.1177/14644193231169325" in told
     assert max(map(len, told.splitlines())) <= 80
+
+
+def test_the_shell_completes_papers_and_their_figures() -> None:
+    assert completions.plates("self") == ["self_tuning/"]
+    assert "self_tuning/fig_07" in completions.plates("self_tuning/fig_0")
+    assert completions.plates("no") == []
 
 
 def test_a_wrong_name_is_refused_before_anything_is_computed(

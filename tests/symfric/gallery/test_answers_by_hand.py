@@ -21,6 +21,11 @@ def test_the_belt_has_the_period_and_the_extremes_of_the_closed_form() -> None:
     assert motion["x"].max() == pytest.approx(known.x_max, rel=1e-6)
     assert motion["x"][20000:].min() == pytest.approx(known.x_min, rel=1e-6)
     assert motion["friction"].min() == pytest.approx(-1.1772, rel=1e-3)
+    slips = motion["v_rel"] < -0.05
+    assert np.allclose(motion["friction"][slips], -0.7848)
+    a = np.gradient(np.gradient(motion["x"], times), times)
+    inside = np.convolve(slips, np.ones(9), "same") == 9  # away from stops and starts
+    assert np.allclose(a[inside], motion["a"][inside], atol=1e-4)
     for t in (0.5, 7.0, 33.3):
         x, _ = rabinowicz_motion(0.0, t, (0.15, 0.1, 0.8, 2.1, 0.1, 9.81))
         assert motion["x"][round(1000 * t)] == pytest.approx(x, rel=1e-10)

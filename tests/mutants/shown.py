@@ -1,0 +1,85 @@
+"""Mutants of the gallery: what it compares with, what it tells, what it keeps."""
+
+from mutants.mutant import Mutant
+
+BELT = "symfric/gallery/belt.py"
+MACHINES = "symfric/gallery/self_tuning/_machines.py"
+ORACLE = "symfric/gallery/self_tuning/_oracle.py"
+PLATE = "symfric/gallery/plate.py"
+RENDERING = "symfric/gallery/rendering.py"
+T_HAND = ("tests/symfric/gallery/test_answers_by_hand.py",)
+T_PLATES = ("tests/symfric/gallery/test_rendering.py",)
+T_COMMAND = ("tests/symfric/cli/test_gallery.py",)
+
+SHOWN = (
+    Mutant(
+        "the block slips at its static level",
+        BELT,
+        "F[here] = -self.F_C",
+        "F[here] = -self.F_S",
+        T_HAND,
+    ),
+    Mutant(
+        "the block leaves the belt early",
+        BELT,
+        "at = self.F_S / self.k if sticks",
+        "at = self.F_C / self.k if sticks",
+        T_HAND,
+    ),
+    Mutant(
+        "rod 2-3 pulls slider 2 the other way",
+        MACHINES,
+        "(l5 + l6) * y2",
+        "(l5 - l6) * y2",
+        T_HAND,
+    ),
+    Mutant(
+        "the thrust face of the bearing does not rub",
+        MACHINES,
+        "N - size(f1) - size(f2) - size(F[0])",
+        "N - size(f1) - size(f2)",
+        T_HAND,
+    ),
+    Mutant(
+        "the last stage of fixed steps is half a step",
+        ORACLE,
+        "k4 = rate(y + h * k3)",
+        "k4 = rate(y + h / 2 * k3)",
+        T_HAND,
+    ),
+    Mutant(
+        "numbers that are not finite are shown",
+        PLATE,
+        "if not isfinite(v)]",
+        "if v != v]",
+        T_PLATES,
+    ),
+    Mutant(
+        "fig_0 begins fig_07",
+        PLATE,
+        'name.startswith(start) and name[len(start)] in "/_"',
+        "name.startswith(start)",
+        T_PLATES,
+    ),
+    Mutant(
+        "a figure that fails takes the others with it",
+        RENDERING,
+        "except Exception as error:",
+        "except ValueError as error:",
+        T_PLATES,
+    ),
+    Mutant(
+        "who died has what it had done told as failed",
+        RENDERING,
+        'for name in group if not place(folder, name, ".json").exists()}',
+        "for name in group}",
+        T_PLATES,
+    ),
+    Mutant(
+        "a gallery with failures ends well",
+        "symfric/cli/gallery.py",
+        "    if done.failures:\n        raise typer.Exit(1)",
+        "    pass",
+        T_COMMAND,
+    ),
+)
