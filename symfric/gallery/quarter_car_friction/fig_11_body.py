@@ -49,7 +49,8 @@ def plate(quick: bool = False) -> Plate:
     )  # fmt: skip
     axis.plot(run.t, 1e3 * run["X_b"], **look("quarter_car_general"), label="friction")
     for stage, (end, height) in STAGES.items():
-        axis.plot(end, 1e3 * height, "k^", markersize=5)
+        label = "rests, in the paper" if stage == "A" else None
+        axis.plot(end, 1e3 * height, "k^", markersize=5, label=label)
         axis.annotate(stage, (end, 1e3 * height), (-4, 7), textcoords="offset points")
     axis.set_xlabel("time [s]")
     axis.set_ylabel("displacement of the body [mm]")
