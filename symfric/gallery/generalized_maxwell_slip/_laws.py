@@ -21,6 +21,7 @@ from symfric import (
 )  # fmt: skip
 from symfric.figures import Scales
 from symfric.laws import AnyLaw
+from symfric.scenes import Prescribed
 
 F_S, F_C, V_S, DELTA = 1.05, 0.2, 98e-6, 0.78  # N, N, m/s, 1
 SIGMA_0, SIGMA_1, Z_BA = 0.16e6, 0.08, 0.61e-6  # N/m, N s/m, m
@@ -37,9 +38,8 @@ PATH = tuple(1e-6 * x for x in (0.0, 1.5, 0.2, 1.1, 0.6, 1.1, 0.2, 1.5, 0.0))
 SIGNALS = Scales(static=F_S, kinetic=F_C, elastic=F_C, stretch=1.5e-6, velocity=1e-4)
 """What the figures of `symfric.figures` take their amplitudes from."""
 
-_STRIBECK = {"mu_s": F_S, "mu_d": F_C, "v_s": V_S, "delta": DELTA}
-_BRISTLE = _STRIBECK | {"sigma_0": SIGMA_0, "sigma_1": SIGMA_1, "sigma_2": 0.0}
 _SLIDERS = tuple(Slider(k, alpha * F_S) for k, alpha in ELEMENTS)
+_TABLE_1 = Prescribed.presets["lampaert_table_1"].friction["law"]
 
 
 def generic(count: int = 2000) -> GenericAsperity:
@@ -52,13 +52,13 @@ def generic(count: int = 2000) -> GenericAsperity:
 
 def laws(count: int = 2000) -> dict[str, AnyLaw]:
     """All laws by the names of the paper, the generic model of `count` asperities in front."""
-    elements = tuple(Element(k, alpha) for k, alpha in ELEMENTS)
+    table, elements = _TABLE_1.given, tuple(Element(k, alpha) for k, alpha in ELEMENTS)
     return {
         "generic model": generic(count),
-        "GMS": GMS(elements=elements, C=C, form="event", **_STRIBECK),
-        "Leuven": Leuven(elements=_SLIDERS, sigma_1=SIGMA_1, delta_l=DELTA_L, n=200.0, **_STRIBECK),
-        "LuGre": LuGre(**_BRISTLE),
-        "elasto-plastic": ElastoPlastic(z_ba=Z_BA, **_BRISTLE),
+        "GMS": table(GMS(elements=elements, form="event")),
+        "Leuven": table(Leuven(elements=_SLIDERS, mu_s=F_S, mu_d=F_C, sigma_1=SIGMA_1, n=200.0)),
+        "LuGre": table(LuGre()),
+        "elasto-plastic": table(ElastoPlastic()),
         "Maxwell slip": MaxwellSlip(elements=_SLIDERS, form="event"),
         "Dahl": Dahl(sigma_0=SIGMA_0, mu_d=F_C),
     }
