@@ -2,15 +2,18 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar, final
 
 import casadi as ca
 
-from symfric.foundation.numeric import Scalar
+from symfric.foundation.numeric import Scalar, equals, smallest
 from symfric.foundation.parameters import Variable, param
 from symfric.laws import Law, LeineSwitch
 from symfric.model import Model, Output, Variables
+from symfric.model.sketch import Sketch
 from symfric.scenes.base import Scene, contact, other_law
+from symfric.scenes.drawn import Block, around, drawn
 from symfric.scenes.presets import Numbers, Preset
 
 
@@ -80,6 +83,7 @@ class CoupledBlocks(Scene):
                 ((self.law, self.m_1), (self.law_of("block_2"), self.m_2))
             )
         )  # fmt: skip
+        t = ca.SX.sym("t")
         return Model(
             name="coupled_blocks",
             x=(x_1, x_2, v_1, v_2),
@@ -99,4 +103,21 @@ class CoupledBlocks(Scene):
                 "power_1": Output(one.force * sliding[0], "W", "power taken by contact 1"),
                 "power_2": Output(two.force * sliding[1], "W", "power taken by contact 2"),
             },
+            t=t,
+            sketch=partial(self._sketch, x_1.symbol, x_2.symbol, t),
+        )
+
+    def _sketch(self, x_1: ca.SX, x_2: ca.SX, t: ca.SX) -> Sketch:
+        """The blocks on the belt, whose marks move with it, and their springs."""
+        stiff = smallest(self.k_1, self.k_2)
+        way = 0.15 * self.m_1 * self.g / stiff if not equals(stiff, 0.0) else 1.0
+        marks = [(around(self.v_belt * t + i * way / 3, -way, 3 * way), 0.0) for i in range(12)]
+        return drawn(
+            {
+                "block_1": Block(x_1, 0.0, "x", "v_rel_1", self.law),
+                "block_2": Block(x_2 + 1.5 * way, 0.0, "x", "v_rel_2", self.law_of("block_2")),
+            },
+            {"wall": (-way, 0.0)},
+            [("spring", "wall", "block_1"), ("spring", "block_1", "block_2")],
+            ticks=marks,
         )

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar, final
 
 import casadi as ca
@@ -12,7 +13,9 @@ from symfric.foundation.parameters import Variable, param
 from symfric.foundation.symbols import symbols_of
 from symfric.laws import Benson, LuGre, Stribeck, Tustin
 from symfric.model import Model, Output, Variables
+from symfric.model.sketch import Sketch
 from symfric.scenes.base import GivenInput, Scene, contact, structure
+from symfric.scenes.drawn import drawn
 from symfric.scenes.presets import Numbers, Preset
 
 
@@ -135,4 +138,9 @@ class DrillString(Scene):
                 "friction": Output(rock.force, "N", "friction force opposing v_rel"),
                 "power": Output(rock.force * v, "W", "power taken by the rock"),
             },
+            sketch=partial(self._sketch, phi.symbol, symbols_of(twists)),
         )
+
+    def _sketch(self, phi: ca.SX, twists: ca.SX) -> Sketch:
+        """Hands of bit and top drive, seen from above; the angle between them is the twist."""
+        return drawn({}, hands={"bit": (phi, 0.7), "top": (phi + ca.sum1(twists), 1.0)})

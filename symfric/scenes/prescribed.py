@@ -13,6 +13,7 @@ from symfric.laws.base import smooth
 from symfric.laws.base.law import FORCE
 from symfric.model import Model, Output, Variables
 from symfric.scenes.base import GivenInput, Scene, contact
+from symfric.scenes.drawn import Block, drawn
 from symfric.scenes.presets import Numbers, Preset
 
 
@@ -125,4 +126,5 @@ class Prescribed(Scene):
                 "power": Output(slip.force * v.symbol, "W", "power taken by friction"),
                 **({"N": Output(N, "N", "normal force")} if varying else {}),
             },
+            sketch=lambda: drawn({"sample": Block(x.symbol, 0.0, "x", "v", self.law)}),
         )
