@@ -20,7 +20,7 @@ test: $(VENV)/.test
 # Pages in out/docs/index.html. SYMFRIC_DOCS=quick takes the gallery of the papers at reduced size,
 # SYMFRIC_DOCS=keep takes every picture as it is, for those who write text.
 docs: $(VENV)/.docs
-	$(ONE_THREAD) $(BIN)/python -m sphinx -W --keep-going -n -q -d out/doctrees docs out/docs
+	$(ONE_THREAD) $(BIN)/python -m sphinx -W --keep-going -n -q -j auto -d out/doctrees docs out/docs
 	$(BIN)/python -m docs.machine.links out/docs
 	@echo "docs: out/docs/index.html"
 
