@@ -23,7 +23,7 @@ from symfric.integrator.equations.inputs import Hold, Input, Sampled
 from symfric.model import Model
 
 Array = NDArray[np.float64]
-WORK = 150_000_000
+WORK = 500_000_000
 """CasADi instructions that one step size may take: what a small step is worth."""
 CHUNK = 1000
 """Steps between looks whether the motion still is one."""

@@ -12,7 +12,7 @@ from symfric.choice.fixed_step import Motion, largest
 from symfric.choice.friction import Friction
 from symfric.choice.machine import FAILURES, Candidate, Machine, candidate
 from symfric.choice.needs import lacking
-from symfric.choice.reference import Reference
+from symfric.choice.reference import OWN, Reference
 from symfric.choice.row import FAILED, INACCURATE, LACKING, RANKED, REFUSED, Row
 from symfric.choice.softness import MARGIN, Ladder, Rung, ladder
 from symfric.figures.regularisation import Sample, positions
@@ -24,6 +24,8 @@ from symfric.model import Model
 
 WORK = 400_000_000
 """CasADi instructions that a run may take, about a second."""
+AS_GOOD = 1.1
+"""Errors from data within this ratio of the smallest are the same."""
 LEAST = 20_000
 """Attempts that any run may take."""
 LOOSEST, PER_DECADE = 1e-3, 2
@@ -48,6 +50,8 @@ class Task:
         control: largest error of fixed steps.
         own: laws come with their numbers: they were fitted.
         fixed: whether fixed steps are measured.
+        work: CasADi instructions that a run may take.
+        misfits: law -> error from data, measured elsewhere; None without data.
     """
 
     machine: Machine
@@ -59,6 +63,8 @@ class Task:
     control: float
     own: bool
     fixed: bool
+    work: int = WORK
+    misfits: dict[str, float] | None = None
 
     @property
     def fine(self) -> float:
@@ -82,16 +88,37 @@ def measured(task: Task, name: str, law: Law) -> Row:
     except FAILURES as problem:
         return replace(row, reason=_short(problem))
     try:
+        task = _from_own(task, held, most)
         found = _climbed(task, held, most)
     except FAILURES as problem:
         return replace(row, standing=FAILED, reason=_short(problem))
-    return _placed(task, held, found, most, row)
+    return _by_data(task.misfits, _placed(task, held, found, most, row))
+
+
+def _from_own(task: Task, held: Candidate, most: int) -> Task:
+    """The task with the law's own motion as reference, where only the integrator is judged."""
+    if task.reference is not OWN:
+        return task
+    run = task.machine.run(held.first, held.law, 0.1 * task.fine, 10 * most)
+    return replace(task, reference=replace(OWN, motion=run.motion, size=run.size))
+
+
+def _by_data(misfits: dict[str, float] | None, row: Row) -> Row:
+    """The row with its error from data; ranked where that is about as small as the smallest."""
+    if misfits is None or not row.attempts:
+        return row
+    misfit, best = misfits[row.law], min(misfits.values())
+    row = replace(row, error=misfit, curve=())
+    if row.ranked and misfit > AS_GOOD * best:
+        why = f"{100 * misfit:.3g} % off the data, the best {100 * best:.3g} %"
+        return replace(row, standing=INACCURATE, reason=why)
+    return row
 
 
 def _most(task: Task, model: Model) -> int:
     """Attempts that a run of this model may take."""
     instructions, _ = task.machine.instructions(model, task.fine)
-    return max(LEAST, WORK // max(1, instructions))
+    return max(LEAST, task.work // max(1, instructions))
 
 
 def _climbed(task: Task, held: Candidate, most: int) -> tuple[Ladder, Points]:

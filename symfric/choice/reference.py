@@ -47,6 +47,10 @@ class Reference:
         return distance(motion, self.motion, self.size, self.mean)
 
 
+OWN = Reference("its own fine run", np.zeros((0, 0)), np.zeros(0), 0.0)
+"""Stands for the fine run of each law itself: only the integrator is judged."""
+
+
 def reference_of(
     where: str,
     machine: Machine,

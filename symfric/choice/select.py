@@ -13,7 +13,7 @@ from symfric.choice.friction import Friction
 from symfric.choice.machine import FAILURES, frictions_of, load_of, machine_of
 from symfric.choice.measured import Task, measured
 from symfric.choice.needs import needed
-from symfric.choice.reference import reference_of
+from symfric.choice.reference import OWN, reference_of
 from symfric.choice.result import Choice
 from symfric.choice.row import FAILED, Row, ordered
 from symfric.figures.regularisation import Measure
@@ -35,6 +35,7 @@ def select(
     friction: Friction | None = None,
     reference: "str | Law | Trajectory" = "exact",
     data: Mapping[str, Sequence[float]] | None = None,
+    misfits: Mapping[str, float] | None = None,
     t_end: float | None = None,
     u: Mapping[str, Input] | None = None,
     of: Measure | None = None,
@@ -65,6 +66,9 @@ def select(
             the limit of a smooth law; or a law, or a run.
         data: t [s] and signals by name, to compare with instead; errors are then root mean squares,
             and the laws those that were fitted.
+        misfits: law -> error from data that were measured elsewhere, as on a test rig, and that the
+            laws were fitted to; then `accuracy` is that of the integrator alone, and laws are
+            ranked that are within 10 % of the smallest misfit.
         t_end: end of the motion [s]; that of the scene.
         u: inputs; those of the scene.
         of: what is compared: signals by name, or a function of a trajectory, such as the period of
@@ -98,17 +102,25 @@ def select(
     with suppress(*FAILURES):
         load = load_of(machine.with_law(BrownMcPhee()))
     given = reference if data is None else data
-    compared, machine = reference_of(
-        f"{where}: reference", machine, given, frictions, load, accuracy
-    )
-    own = data is not None if fitted is None else checks.flag(f"{where}: fitted", fitted)
+    compared = OWN
+    if misfits is None:
+        compared, machine = reference_of(
+            f"{where}: reference", machine, given, frictions, load, accuracy
+        )
+    if misfits is not None:
+        checks.check_names(f"{where}: misfits: laws", known, misfits)
+        misfits = {n: checks.number(f"{where}: misfits: {n}", misfits[n], lower=0.0) for n in known}
+    of_data = data is not None or misfits is not None
+    own = of_data if fitted is None else checks.flag(f"{where}: fitted", fitted)
     task = Task(
         machine, compared, asked, frictions, load, accuracy, control, own,
-        checks.flag(f"{where}: fixed_steps", fixed_steps),
+        checks.flag(f"{where}: fixed_steps", fixed_steps), misfits=misfits,
     )  # fmt: skip
     rows, interrupted = _rows(task, known, count, progress)
     return Choice(
-        machine.name, asked, accuracy, str(frictions[""]), compared.about, compared.uncertain,
+        machine.name, asked, accuracy, "as fitted" if own else str(frictions[""]),
+        compared.about if misfits is None else "the data that they were fitted to",
+        compared.uncertain,
         control, machine.t_end, tuple(ordered(rows)), perf_counter() - began, interrupted,
     )  # fmt: skip
 

@@ -53,6 +53,8 @@ class Softness:
         Raises:
             ValueError: beyond a bound of the law.
         """
+        if not self.powers:
+            return self.law
         known = parameters(self.law)
         scaled = {n: float(known[n].value) * s**power for n, power in self.powers.items()}
         law = with_values(self.law, {n: float(f"{x:.{DIGITS}g}") for n, x in scaled.items()})

@@ -32,7 +32,7 @@ def _fastest(ranked: Sequence[Row], asked: str) -> str:
     best = ranked[0]
     near = [row.law for row in ranked[1:] if row.time_s <= ALIKE * best.time_s]
     text = (
-        f"Simulation: take {best.law}, the fastest of {len(ranked)} laws that show {asked} and "
+        f"Simulation: take {best.law}, the fastest of {len(ranked)} that show {asked} and "
         f"keep the accuracy: {1e3 * best.time_s:.3g} ms in {best.attempts} attempts by "
         f"{best.method}, {best.error:.1e} off"
     )
@@ -64,6 +64,8 @@ def _smooth(ranked: Sequence[Row]) -> str:
 
 
 def _fixed(ranked: Sequence[Row], control: float) -> str:
+    if not any(row.fixed_step or row.fixed_why for row in ranked):
+        return "Controller: fixed steps were not measured."
     able = [row for row in ranked if row.fixed_step is not None and row.c_operations is not None]
     if not able:
         return (

@@ -10,12 +10,15 @@ import typer
 from symfric import Law, SolveError, Status, law_from_text, parameters, with_values
 from symfric.choice import NEEDS, Choice, Friction
 from symfric.choice import select as select_law
-from symfric.choice.needs import needed
+from symfric.choice.needs import lacking, needed
 from symfric.choice.text import LEGEND, lines
 from symfric.cli import completions, output
+from symfric.cli.fitting import Reading, reading
+from symfric.cli.fitting import kind_of as kind_of_residuals
 from symfric.cli.machines import LawOfOption, PresetOption, kind_of
 from symfric.cli.options import JsonOption, PlotOption, SetOption, check_outputs, numbers
 from symfric.cli.user_file import function_of_file
+from symfric.figures.requirements import phenomena
 from symfric.foundation.parameters import check_names
 from symfric.laws import ALL_LAWS
 from symfric.scenes import Scene
@@ -59,6 +62,26 @@ def select(
     workers: Annotated[
         int | None, typer.Option("--workers", help="Processes; default all cores.")
     ] = None,
+    data: Annotated[
+        list[str] | None,
+        typer.Option("--data", metavar="FILE", help="Fit the candidates to it first."),
+    ] = None,
+    kind: Annotated[str, typer.Option("--kind", help="How, as of `symfric identify`.")] = "inverse",
+    columns: Annotated[
+        list[str] | None,
+        typer.Option("--column", metavar="SIGNAL=NAME", help="Column of a signal in the data."),
+    ] = None,
+    units: Annotated[
+        list[str] | None,
+        typer.Option("--unit", metavar="SIGNAL=UNIT", help="Unit of a column in the data."),
+    ] = None,
+    normal_force: Annotated[
+        float, typer.Option("--normal-force", help="Normal force [N] of the data.")
+    ] = 1.0,
+    paper: Annotated[
+        bool,
+        typer.Option("--paper", help="Jing and Mi's tables beside ours; two scenes have them."),
+    ] = False,
     plot: PlotOption = None,
     html: Annotated[
         Path | None, typer.Option("--html", metavar="FILE.html", help="Write one page.")
@@ -70,17 +93,27 @@ def select(
 ) -> None:
     """Rank friction laws on a machine, and say which to take.
 
-    Every law describes the same friction (--set mu_s=0.2 mu_d=0.15, and v_s where the fall is
-    known), is made as soft as --accuracy allows, and is timed there. --set takes parameters of the
-    scene, too, and --set lugre.sigma_1=2 one of one law. Ctrl-C keeps what is there.
+    With --data, candidates that show what is needed are fitted first, and those are ranked that fit
+    as well as the best. Without, every law describes the same friction (--set mu_s=0.2 mu_d=0.15,
+    and v_s where the fall is known) and is made as soft as --accuracy allows. --set takes
+    parameters of the scene, too, and --set lugre.sigma_1=2 one of one law. Ctrl-C keeps what is
+    there.
 
     Example: symfric select rabinowicz --need stiction,stribeck --accuracy 1e-4 --html choice.html
 
     Example: symfric select my_machine.py:press --t-end 2 --need presliding
     """
     check_outputs(html, csv, json, picture=plot)
+    if paper:
+        _paper(scene, json, any((law, settings, preset, law_of, plot, html, csv)))
+        return
     words = needed("--need", [word for word in need.split(",") if word])
     machine, friction, candidates = _asked(scene, settings, preset, law_of, law)
+    misfits = None
+    if data:
+        read = reading(columns, units, None, None, kind == "points")
+        able = {n: c for n, c in candidates.items() if not lacking(words, phenomena(c))}
+        candidates, misfits = fitted(able, read, data, kind, normal_force)
     with output.progress(f"select {scene}") as tell:
         found = select_law(
             machine,
@@ -88,6 +121,7 @@ def select(
             needs=words,
             accuracy=accuracy,
             friction=friction,
+            misfits=misfits,
             t_end=t_end,
             control=control,
             fixed_steps=fixed_steps,
@@ -154,6 +188,55 @@ def _with(kind: Callable[[Law], Scene], scene: str, values: dict[str, float]) ->
 
     machine.__name__ = scene
     return machine
+
+
+def fitted(
+    laws: dict[str, Law], read: Reading, files: list[str], kind: str, normal_force: float
+) -> tuple[dict[str, Law], dict[str, float]]:
+    """The laws with the numbers that fit the data, and their errors from these.
+
+    Laws that cannot be fitted are named on standard error.
+
+    Raises:
+        ValueError: none can be fitted.
+    """
+    from identification.select import select as rank_fits  # noqa: PLC0415  (only with data)
+
+    chosen = kind_of_residuals(kind, None, {})
+    records = read.read(files)
+    with output.progress("fit") as tell:
+        ranking = rank_fits(
+            list(laws), records, chosen, folds=0, normal_force=normal_force,
+            progress=lambda _, share: tell(share),
+        )  # fmt: skip
+    found = {r.law: r for r in ranking.rows if r.fit is not None and r.fit.law is not None}
+    for row in ranking.rows:
+        if row.law not in found:
+            output.note(f"{row.law}: {row.sentence}")
+    if not found:
+        raise ValueError("--data: expected data that a law can be fitted to, got none; see above")
+    held = {name: row.fit.law for name, row in found.items() if row.fit and row.fit.law}
+    return held, {name: row.fitted / 100 for name, row in found.items()}
+
+
+def _paper(scene: str, json: str | None, others: bool) -> None:
+    """Print the paper's tables beside ours.
+
+    Raises:
+        ValueError: a scene that is not in the paper, options that change it.
+    """
+    from symfric.choice.jing_mi import TABLES, compare_with_paper  # noqa: PLC0415  (only here)
+
+    check_names("--paper of", [scene], TABLES)
+    if others:
+        raise ValueError("--paper: expected no option but --json beside it, got others")
+    with output.progress(f"select {scene} --paper") as tell:
+        found = compare_with_paper(scene, progress=lambda _, share: tell(share))
+    output.emit_json(found.to_dict(), json)
+    if json != "-":
+        for line in found.lines():
+            typer.echo(line)
+    output.say_written(json)
 
 
 def show_choice(found: Choice) -> None:
