@@ -41,7 +41,7 @@ def plate(quick: bool = False) -> Plate:
 
     far = {
         f"difference from the equations by hand, {name} [N]": max(
-            by_hand(name, c, 2_000 if quick else 20_000) for c in runs[name].curves
+            by_hand(name, c, 1_000 if quick else 20_000) for c in runs[name].curves
         )
         for name in (("GMS", "LuGre") if quick else _by_hand.LAWS)
     }

@@ -46,7 +46,7 @@ def plate(quick: bool = False) -> Plate:
     numbers = dict(far)
     for name in ("generic model", *lagging):
         for c, same in zip(runs[name], runs["generic model"], strict=True):
-            area = 1e6 * abs(float(np.trapezoid(c["F"], c["v"])))
+            area = 1e6 * float(np.trapezoid(c["F"], c["v"]))  # positive: lower while v falls
             numbers[f"area of the loop, {name}, {c.case} [uN m/s]"] = area
             rms = float(np.sqrt(np.mean((c["F"] - same["F"]) ** 2)))
             numbers[f"rms difference from the generic model, {name}, {c.case} [N]"] = rms
