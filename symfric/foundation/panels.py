@@ -6,7 +6,6 @@ wants a window says `figure.show()`.
 """
 
 from base64 import b64encode
-from html import escape
 from io import BytesIO
 from pathlib import Path
 from typing import Any, Literal, final
@@ -123,15 +122,3 @@ def png(figure: Figure, dpi: float = 100) -> bytes:
 def data_uri(figure: Figure, dpi: float = 60) -> str:
     """`figure` as text for the `src` of an HTML image: a PNG inside, no file, no network."""
     return "data:image/png;base64," + b64encode(png(figure, dpi)).decode()
-
-
-def thumbnail(figure: Figure, what: str = "", width: int = 320) -> str:
-    """`figure` as an HTML image of `width` pixels, drawn at twice as many for sharp screens.
-
-    Args:
-        figure: what is shown.
-        what: text for those who do not see it.
-        width: on the page [pixel].
-    """
-    dpi = 2 * width / float(figure.get_size_inches()[0])
-    return f'<img src="{data_uri(figure, dpi)}" alt="{escape(what)}" width="{width}">'

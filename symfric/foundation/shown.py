@@ -4,11 +4,9 @@ Everything that comes from a user is escaped; there are no scripts, and pictures
 """
 
 from abc import ABC, abstractmethod
-from base64 import b64encode
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
-from io import BytesIO
 from typing import TYPE_CHECKING, final
 
 from symfric.foundation.numeric import Scalar, is_casadi, is_number
@@ -162,10 +160,9 @@ def _html_table(table: Table) -> str:
 
 def _image(figure: "Figure", words: str) -> str:
     """A figure as an image inside the page."""
-    buffer = BytesIO()
-    figure.savefig(buffer, format="png", dpi=DOTS_PER_INCH)
-    data = b64encode(buffer.getvalue()).decode("ascii")
+    from symfric.foundation.panels import data_uri  # noqa: PLC0415  (matplotlib is slow to import)
+
     return (
         f'<img alt="{escape(words, quote=True)}" style="max-width:100%;margin-top:6px" '
-        f'src="data:image/png;base64,{data}">'
+        f'src="{data_uri(figure, DOTS_PER_INCH)}">'
     )

@@ -93,6 +93,17 @@ class Ensemble(Showing):
         checks.check_names(f"ensemble of '{self.scene}'", [name], self.signals)
         return self.signals[name]
 
+    def plot(self, *names: str, path: str | Path | None = None) -> "Figure":
+        """Median and bands of 50 and 90 % of the members over time; histograms of ends alone.
+
+        Args:
+            names: signals to show; the first six if none is given.
+            path: image file, its format taken from the ending.
+        """
+        from symfric.results.bands import plot_many  # noqa: PLC0415  (matplotlib is slow to import)
+
+        return plot_many(self.scene, self.t, self.signals, self.units, names, path)
+
 
 def simulate_many(
     model: Model,

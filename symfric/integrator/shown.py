@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from symfric.foundation.shown import Shown, Table, among, counted
+from symfric.foundation.style import COLOURS
 
 if TYPE_CHECKING:
     from symfric.integrator.ensemble import Ensemble
@@ -54,7 +55,7 @@ def picture(runs: "Ensemble") -> Figure | None:
     name, values = next(iter(runs.signals.items()))
     figure = Figure(figsize=(5.2, 1.9), layout="constrained")
     axis = figure.subplots()
-    axis.plot(runs.t, np.asarray(values[:LINES]).T, linewidth=0.6, color="#0072b2", alpha=0.4)
+    axis.plot(runs.t, np.asarray(values[:LINES]).T, linewidth=0.6, color=COLOURS[0], alpha=0.4)
     axis.set_xlabel("t [s]", fontsize=7)
     axis.set_ylabel(f"{name} [{runs.units[name]}]", fontsize=7)
     axis.tick_params(labelsize=7)

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from symfric.foundation.style import EDGE, colour
 from symfric.multibody.sketch import sketch
 
 if TYPE_CHECKING:
@@ -20,7 +21,6 @@ SIZE = 2.6
 """Of the picture [inch]."""
 AWAY = 1e-6
 """Extent across a plane, relative to that in it, below which all lies in the plane."""
-BODIES = ("#0033b0", "#f26400", "#007a45", "#b45fab", "#900808", "#7184ff")
 
 
 def picture(machine: "Mechanism") -> Figure | None:
@@ -63,15 +63,14 @@ def _draw(axis: Axes, drawn: "Sketch", flat: Array) -> None:
     for k, part in enumerate(drawn.parts):
         if part.fixed:
             continue
-        colour = BODIES[k % len(BODIES)]
         for place in (*part.corners, *part.ends):
-            _line(axis, flat, (part.centre, place), color=colour, linewidth=2.2)
-        axis.plot(*flat[part.centre], "s", color=colour, markersize=4)
+            _line(axis, flat, (part.centre, place), color=colour(k), linewidth=2.2)
+        axis.plot(*flat[part.centre], "s", color=colour(k), markersize=4)
     for mark in drawn.marks:
         if mark.symbol.line:
             _line(axis, flat, (mark.a, mark.b), color="0.35", linewidth=1.0, linestyle="--")
-        face = "#1f1f1f" if mark.grounded else "white"
-        axis.plot(*flat[mark.b], "o", markersize=5, markerfacecolor=face, color="#1f1f1f")
+        face = EDGE if mark.grounded else "white"
+        axis.plot(*flat[mark.b], "o", markersize=5, markerfacecolor=face, color=EDGE)
 
 
 def _line(axis: Axes, flat: Array, ends: Sequence[int], **how: object) -> None:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from symfric.foundation import checks
 from symfric.foundation.files import write_text, written
 from symfric.foundation.panels import blank, grid
+from symfric.foundation.prefixes import readable
 from symfric.foundation.style import EDGE, colour
 from symfric.model.sketch import Sketch
 from symfric.results.strokes import AZIMUTH, ELEVATION, Poses, Stroke, View, look, strokes
@@ -234,14 +235,16 @@ def _flat(view: View) -> tuple[Figure, Canvas]:
     more = np.maximum(FLATTEST * size.max() - size, 0) / 2
     low, high = low - more, high + more
     width, height = high - low
+    factor, unit = readable("m", [low, high])
+    low, high = factor * low, factor * high
     scale = 6.4 / max(width, height)
     figure, ((ax,),) = grid(1, 1, scale * width + 0.9, scale * height + 0.9)
     ax.set_aspect("equal")
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    ax.set(xlabel=f"{_direction(view.right)} [m]", ylabel=f"{_direction(view.up)} [m]")
+    ax.set(xlabel=f"{_direction(view.right)} [{unit}]", ylabel=f"{_direction(view.up)} [{unit}]")
 
     def add(stroke: Stroke) -> Callable[[int], None]:
-        points = np.einsum("ac,nck->ank", axes, stroke.points)
+        points = factor * np.einsum("ac,nck->ank", axes, stroke.points)
         (line,) = ax.plot([], [], **_style(stroke))
 
         def put(k: int) -> None:

@@ -60,10 +60,8 @@ def main(model: Model, units: dict[str, str]) -> list[Group]:
     """
     kind, own = kinds(model), {v.name for c in model.contacts for v in c.states}
     rubs = {"friction" if c.bare else f"{c.name}_friction" for c in model.contacts}
-    places = [
-        v.name
-        for v in model.x
-        if v.kind == POSITION or (not v.kind and v.unit in LENGTHS and v.name not in own)
+    places = [v.name for v in model.x if v.kind == POSITION] or [
+        v.name for v in model.x if not v.kind and v.unit in LENGTHS and v.name not in own
     ]
     forces = [n for n, u in units.items() if u in FORCES and (kind.get(n) == FRICTION or n in rubs)]
     if not (places or forces):

@@ -4,11 +4,9 @@ The page is for the drawer: whoever opens it in a year sees the numbers, the law
 equations, parameters and limits, and how to run it again.
 """
 
-from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from inspect import getdoc
-from io import BytesIO
 from pathlib import Path
 from platform import platform, python_version
 from typing import Any
@@ -94,11 +92,10 @@ def _verdict(runs: Mapping[str, Trajectory]) -> str:
 
 def _picture(runs: Mapping[str, Trajectory]) -> str:
     """The picture that `plot` gives, inside the page."""
-    from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
+    from symfric.foundation.panels import data_uri  # noqa: PLC0415  (matplotlib is slow)
+    from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (likewise)
 
-    file = BytesIO()
-    plot_trajectories(runs).savefig(file, format="png", dpi=110)
-    source = f"data:image/png;base64,{b64encode(file.getvalue()).decode()}"
+    source = data_uri(plot_trajectories(runs), dpi=110)
     drawing = f'<img src="{source}" alt="signals over time" style="max-width:100%">'
     return html.figure(drawing, "Signals over time, with every accepted step.")
 

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from symfric.foundation.style import COLOURS
 from symfric.model.kinds import CONSTRAINTS, FRICTION
 from symfric.results.kinds import kinds
 
@@ -24,7 +25,7 @@ def picture(run: "Trajectory") -> Figure:
     axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     for axis, name in zip(axes, names, strict=True):
         t, values = _thinned(run.t, run[name])
-        axis.plot(t, values, linewidth=1.0, color="#0072b2")
+        axis.plot(t, values, linewidth=1.0, color=COLOURS[0])
         axis.set_ylabel(f"{name} [{run.units[name]}]", fontsize=7)
         axis.tick_params(labelsize=7)
         axis.grid(alpha=0.3)

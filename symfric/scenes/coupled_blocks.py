@@ -11,6 +11,7 @@ from symfric.foundation.numeric import Scalar, equals, smallest
 from symfric.foundation.parameters import Variable, param
 from symfric.laws import Law, LeineSwitch
 from symfric.model import Model, Output, Variables
+from symfric.model.kinds import FRICTION
 from symfric.model.sketch import Sketch
 from symfric.scenes.base import Scene, contact, other_law
 from symfric.scenes.drawn import Block, around, drawn
@@ -98,8 +99,12 @@ class CoupledBlocks(Scene):
             outputs={
                 "v_rel_1": Output(sliding[0], "m/s", "velocity of block 1 relative to the belt"),
                 "v_rel_2": Output(sliding[1], "m/s", "velocity of block 2 relative to the belt"),
-                "friction_1": Output(one.force, "N", "friction force opposing v_rel_1"),
-                "friction_2": Output(two.force, "N", "friction force opposing v_rel_2"),
+                "friction_1": Output(
+                    one.force, "N", "friction force opposing v_rel_1", kind=FRICTION
+                ),
+                "friction_2": Output(
+                    two.force, "N", "friction force opposing v_rel_2", kind=FRICTION
+                ),
                 "power_1": Output(one.force * sliding[0], "W", "power taken by contact 1"),
                 "power_2": Output(two.force * sliding[1], "W", "power taken by contact 2"),
             },
@@ -108,16 +113,20 @@ class CoupledBlocks(Scene):
         )
 
     def _sketch(self, x_1: ca.SX, x_2: ca.SX, t: ca.SX) -> Sketch:
-        """The blocks on the belt, whose marks move with it, and their springs."""
+        """The blocks on the belt, whose marks move with it; each hangs on a spring of its own."""
         stiff = smallest(self.k_1, self.k_2)
         way = 0.15 * self.m_1 * self.g / stiff if not equals(stiff, 0.0) else 1.0
-        marks = [(around(self.v_belt * t + i * way / 3, -way, 3 * way), 0.0) for i in range(12)]
+        marks = [(around(self.v_belt * t + i * way / 3, -way, 4 * way), 0.0) for i in range(15)]
         return drawn(
             {
                 "block_1": Block(x_1, 0.0, "x", "v_rel_1", self.law),
-                "block_2": Block(x_2 + 1.5 * way, 0.0, "x", "v_rel_2", self.law_of("block_2")),
+                "block_2": Block(x_2 + 2 * way, 0.0, "x", "v_rel_2", self.law_of("block_2")),
             },
-            {"wall": (-way, 0.0)},
-            [("spring", "wall", "block_1"), ("spring", "block_1", "block_2")],
+            {"wall_1": (-way, 0.5 * way), "wall_2": (way, 0.5 * way)},
+            [
+                ("spring", "wall_1", "block_1"),
+                ("spring", "wall_2", "block_2"),
+                ("spring", "block_1", "block_2"),
+            ],
             ticks=marks,
         )

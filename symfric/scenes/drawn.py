@@ -14,7 +14,7 @@ from symfric.model.sketch import Mark, Part, Sketch, Symbol
 ALONG = {"x": ca.DM([0, 1, 0, 0, 0, 1, 1, 0, 0]), "z": ca.DM([1, 0, 0, 0, 1, 0, 0, 0, 1])}
 """Direction of a rail -> axes of a place, column by column; the rail runs along the third."""
 RAIL = Symbol("s", guide=True)
-TICK = Symbol("|")
+TICK, HUB = Symbol("|"), Symbol("o")
 LINES = {line: Symbol(line=line, anchored=True) for line in ("spring", "damper")}
 
 
@@ -43,6 +43,7 @@ def drawn(
     links: Sequence[tuple[str, str, str]] = (),
     hands: Mapping[str, tuple[Scalar, float]] | None = None,
     ticks: Sequence[tuple[Scalar, Scalar]] = (),
+    hub: Block | None = None,
 ) -> Sketch:
     """A machine that is drawn without being a mechanism.
 
@@ -52,6 +53,7 @@ def drawn(
         links: (line, from, to) between blocks and fixed places; a line is "spring" or "damper".
         hands: name -> angle [rad] and length [m] of a hand that turns about the origin.
         ticks: places (x, z) [m] of marks on what moves below, as a belt.
+        hub: where the hands turn, if something rubs there.
     """
     columns: list[ca.SX] = []
     parts: list[Part] = []
@@ -73,9 +75,12 @@ def drawn(
     for line, a, b in links:
         marks.append(Mark(f"{a}_{b}", LINES[line], at[a], at[b], (), grounded=a in (fixed or {})))
     for name, (angle, length) in (hands or {}).items():
-        hub = place(0, 0)
+        centre = place(0, 0)
         tip = place(length * ca.sin(angle), length * ca.cos(angle))
-        parts.append(Part(name, hub, (tip,)))
+        parts.append(Part(name, centre, (tip,)))
+    if hub is not None:
+        k = place(hub.x, hub.z)
+        marks.append(Mark("hub", HUB, k, k, _slips(hub)))
     marks += [Mark("tick", TICK, k, k) for k in [place(x, z) for x, z in ticks]]
     return Sketch(ca.horzcat(*columns), tuple(parts), tuple(marks), symbols=2.0)
 

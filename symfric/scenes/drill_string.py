@@ -15,7 +15,7 @@ from symfric.laws import Benson, LuGre, Stribeck, Tustin
 from symfric.model import Model, Output, Variables
 from symfric.model.sketch import Sketch
 from symfric.scenes.base import GivenInput, Scene, contact, structure
-from symfric.scenes.drawn import drawn
+from symfric.scenes.drawn import Block, drawn
 from symfric.scenes.presets import Numbers, Preset
 
 
@@ -143,4 +143,5 @@ class DrillString(Scene):
 
     def _sketch(self, phi: ca.SX, twists: ca.SX) -> Sketch:
         """Hands of bit and top drive, seen from above; the angle between them is the twist."""
-        return drawn({}, hands={"bit": (phi, 0.7), "top": (phi + ca.sum1(twists), 1.0)})
+        hands = {"bit": (phi, 0.7), "top": (phi + ca.sum1(twists), 1.0)}
+        return drawn({}, hands=hands, hub=Block(0.0, 0.0, "", "v_rel", self.law))

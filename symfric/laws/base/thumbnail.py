@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from symfric.foundation.checks import as_number
 from symfric.foundation.numeric import is_symbolic
 from symfric.foundation.parameters import parameters
+from symfric.foundation.style import COLOURS
 from symfric.laws.base import smooth
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def picture(law: "Law") -> Figure | None:
         force = law.force(v, LOAD, law.steady_state(v, LOAD), **inputs)
     figure = Figure(figsize=(4.2, 1.9), layout="constrained")
     axis = figure.subplots()
-    axis.plot(1e3 * v, np.broadcast_to(force, v.shape), linewidth=1.2, color="#0072b2")
+    axis.plot(1e3 * v, np.broadcast_to(force, v.shape), linewidth=1.2, color=COLOURS[0])
     axis.set_xlabel("v [mm/s], steady", fontsize=7)
     axis.set_ylabel("F [N] under 1 N", fontsize=7)
     axis.tick_params(labelsize=7)

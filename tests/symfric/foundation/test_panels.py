@@ -13,7 +13,7 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.image import imread
 
-from symfric.foundation.panels import Picture, blank, data_uri, grid, panels, save, thumbnail
+from symfric.foundation.panels import Picture, blank, data_uri, grid, panels, save
 from symfric.foundation.style import COLOURS
 
 
@@ -56,13 +56,10 @@ def test_a_notebook_shows_a_figure_once() -> None:
     assert not any(getattr(figure, name, lambda: None)() for name in others)
 
 
-def test_thumbnail_is_an_image_of_the_wanted_width_that_needs_no_file() -> None:
-    figure = blank(4.0, 2.0)
-    text = thumbnail(figure, "force & <speed>", 160)
-    assert 'width="160"' in text and 'alt="force &amp; &lt;speed&gt;"' in text
-    inside = b64decode(text.split("base64,")[1].split('"')[0])
-    assert imread(BytesIO(inside), format="png").shape[:2] == (160, 320)
-    assert data_uri(figure).startswith("data:image/png;base64,")
+def test_a_data_uri_holds_the_picture_and_needs_no_file() -> None:
+    kind, inside = data_uri(blank(4.0, 2.0), dpi=80).split(",")
+    assert kind == "data:image/png;base64"
+    assert imread(BytesIO(b64decode(inside)), format="png").shape[:2] == (160, 320)
 
 
 def test_a_window_is_refused_where_there_is_none() -> None:

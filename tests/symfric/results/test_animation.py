@@ -13,7 +13,7 @@ from PIL import Image
 from symfric import BrownMcPhee, Model, Trajectory, Variable, rabinowicz, simulate
 from symfric.multibody import Mechanism, Prismatic
 from symfric.results.animation import SLIDES, STICKS, check_format, frame_times, picture
-from symfric.scenes import MECHANISMS, Pendulum
+from symfric.scenes import MECHANISMS, DrillString, Pendulum, Prescribed
 
 
 @pytest.fixture(scope="module")
@@ -179,3 +179,28 @@ def test_time_and_speed_stand_above_and_joints_show_whether_they_stick() -> None
         fills += [fill for fill in found if fill in (STICKS, SLIDES)]
     assert fills == [STICKS, SLIDES]
     assert axis.get_title(loc="left") == "pendulum   t = 0.500 s  (0.1 x)"
+
+
+def test_the_hands_of_a_drill_string_turn_and_its_bit_sticks_at_first() -> None:
+    run = simulate(DrillString(BrownMcPhee()).model(), 8.0, u={"w_top": 0.5})
+    figure, show = picture(run, np.array([0.0, 8.0]))
+    axis = figure.axes[0]
+    circles = (line for line in axis.lines if line.get_marker() == "o")
+    hub = next(line for line in circles if line.get_markersize() > 8)
+    assert to_hex(hub.get_markerfacecolor()) == to_hex(STICKS)
+    show(1)
+    now = run.at(8.0)
+    angle = now["phi"][0] + sum(now[f"twist_{i}"][0] for i in range(1, 5))
+    ends = [np.asarray(line.get_xdata()) for line in axis.lines]
+    tips = np.array([x[1] for x in ends if x.size == 3])  # centre, tip, gap
+    assert np.abs(tips - np.sin(angle)).min() < 1e-9  # the hand of the top drive
+
+
+def test_small_machines_are_drawn_in_small_units() -> None:
+    run = simulate(Prescribed(BrownMcPhee()).model(), 1.0, u={"v": 1e-3})
+    figure, show = picture(run, np.array([0.0, 1.0]))
+    show(1)
+    (axis,) = figure.axes
+    assert axis.get_xlabel() == "x [mm]"
+    block = next(line for line in axis.lines if line.get_marker() == "s")
+    assert block.get_xdata()[0] == pytest.approx(1.0)

@@ -16,7 +16,7 @@ from symfric import BrownMcPhee, LuGre, Model, Trajectory, Variable, rabinowicz,
 from symfric.foundation.style import line
 from symfric.results.kinds import friction_laws, shortened
 from symfric.results.pictures import level, plot_trajectories
-from symfric.scenes import Arm, FourMass, QuarterCar
+from symfric.scenes import Arm, CoupledBlocks, Drive, FourMass, QuarterCar, Scene
 
 
 @pytest.fixture(scope="module")
@@ -189,3 +189,16 @@ def test_format_follows_the_ending(
 def test_unknown_signal_is_refused_with_a_hint(runs: dict[str, Trajectory]) -> None:
     with pytest.raises(ValueError, match=r"got frction; did you mean friction"):
         runs["lugre"].plot("frction")
+
+
+@pytest.mark.parametrize(
+    ("scene", "shown"),
+    [
+        (CoupledBlocks, ["position [m]", "friction [N]", "power of friction [W]"]),
+        (Drive, ["x [m]", "friction [N]", "power [W]"]),
+    ],
+)
+def test_scenes_without_joints_show_the_same_kinds(scene: type[Scene], shown: list[str]) -> None:
+    inputs = {name: given.function for name, given in scene.inputs.items()}
+    run = simulate(scene(BrownMcPhee()).model(), 1.0, u=inputs, samples=11)
+    assert labels(run.plot()) == shown
