@@ -41,8 +41,10 @@ class Nip(Scene):
 
     Defaults: slip and its range of at most 650 mm/min from the thesis; it has no numbers of the
     machine: roller, shaft and load are made up. Its measured laws are presets of `Prescribed`.
-    Limits: the web does not slip on the chill roll and does not stretch; no edge effects of the
-    cylinder.
+    Limits: where friction falls, even slip and stick-slip are both motions of one nip, and start
+    and law decide between them: under the defaults dry friction that was at rest swings for ever,
+    the soft bristles of `LuGre` (1e5 N/m) find even slip. The web does not slip on the chill roll
+    and does not stretch; no edge effects of the cylinder.
     Source: A Friction Model for Laminator Nips, MSc thesis TFRT-5968, Lund 2015, section 2.9.
     """
 

@@ -14,6 +14,7 @@ from mutants.exported import EXPORTED
 from mutants.fits import FITS
 from mutants.generated import GENERATED
 from mutants.loops import LOOPS
+from mutants.machines import MACHINES
 from mutants.mutant import Mutant
 from mutants.pictured import PICTURED
 from mutants.plants import PLANTS
@@ -352,6 +353,6 @@ LEFT_OUT = (
 MUTANTS = (
     *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
     *BESIDE, *CACHES, *COMPENSATED, *DEVICES, *DRY, *EMITTED, *ENSEMBLES, *EXPORTED,
-    *GENERATED, *LEFT_OUT, *LOOPS, *DERIVATIVES, *PICTURED, *PLANTS, *RESULTS, *ROBOTS, *SHOWN,
-    *SOLVERS,
+    *GENERATED, *LEFT_OUT, *LOOPS, *DERIVATIVES, *MACHINES, *PICTURED, *PLANTS, *RESULTS, *ROBOTS,
+    *SHOWN, *SOLVERS,
 )  # fmt: skip
