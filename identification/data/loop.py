@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation import checks
+from symfric.foundation.brief import brief
 
 Array = NDArray[np.float64]
 
@@ -39,6 +40,8 @@ class PositionLoop:
     limit: float
     reference: Array
     disturbance: Array
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         for key in ("kp", "kv", "gain"):

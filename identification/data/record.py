@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from identification.data.loop import PositionLoop
 from symfric.foundation import checks
+from symfric.foundation.brief import brief
 
 Array = NDArray[np.float64]
 
@@ -48,6 +49,8 @@ class Record:
     loop: PositionLoop | None = None
     columns: Mapping[str, str] = field(default_factory=dict[str, str])
     left_out: Mapping[str, str] = field(default_factory=dict[str, str])
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         where = f"data '{self.name}'"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from identification.residuals.evaluation import Channel
 from identification.result.estimate import Error
 from identification.verdict.whiteness import Whiteness
+from symfric.foundation.brief import brief
 
 Array = NDArray[np.float64]
 
@@ -30,6 +31,8 @@ class Line:
 
     t: Array
     y: Array
+
+    __repr__ = brief
 
 
 @final
@@ -63,6 +66,8 @@ class Series:
     correlation: Array
     low: Array
     high: Array
+
+    __repr__ = brief
 
 
 def envelope(t: Array, y: Array, most: int = MOST) -> Line:

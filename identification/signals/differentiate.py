@@ -17,6 +17,7 @@ from identification.signals.filters import (
     lowpass,
 )
 from identification.signals.velocity import Velocity
+from symfric.foundation.brief import brief
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -46,6 +47,8 @@ class MotionSignals:
     force: Array
     filter: Filter
     slow: Mask
+
+    __repr__ = brief
 
     @cached_property
     def decimation(self) -> Decimation:

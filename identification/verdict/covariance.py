@@ -13,6 +13,7 @@ from identification.verdict.combinations import Trace, lost
 from identification.verdict.levels import Levels
 from identification.verdict.minimum import Minimum, minimum, trace
 from identification.verdict.sandwich import sandwich
+from symfric.foundation.brief import brief
 
 LEVEL = 0.95
 """Of the intervals."""
@@ -65,6 +66,8 @@ class Covariance:
     effective: dict[str, float]
     sentences: tuple[str, ...]
     notes: Mapping[str, str] = field(default_factory=dict[str, str])
+
+    __repr__ = brief
 
     @property
     def standard_errors(self) -> Array:

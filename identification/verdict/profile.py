@@ -23,6 +23,7 @@ from identification.residuals.evaluation import Array
 from identification.solving.task import Point, Task
 from identification.verdict.covariance import Covariance
 from symfric.foundation import checks
+from symfric.foundation.brief import brief
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -67,6 +68,8 @@ class Profile:
     high: float | None
     logarithmic: bool
     sentences: tuple[str, ...]
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         ends = [e for e in (self.low, self.high) if e is not None]

@@ -17,6 +17,7 @@ import numpy as np
 from identification.residuals.evaluation import Array
 from identification.verdict.colour import span
 from identification.verdict.order import Count
+from symfric.foundation.brief import brief
 
 LAGS = 25
 """Most lags that are looked at."""
@@ -40,6 +41,8 @@ class Whiteness:
     high: Array
     statistic: float
     p: float
+
+    __repr__ = brief
 
 
 def whiteness(r: Array, J: Array, position: Count, most: int = LAGS) -> Whiteness:

@@ -8,6 +8,8 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.brief import brief
+
 Array = NDArray[np.float64]
 
 GROWTH = 3.0
@@ -37,6 +39,8 @@ class MeshErrors:
     local: Array
     losses: Array
     outside: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    __repr__ = brief
 
 
 def refined(

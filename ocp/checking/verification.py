@@ -7,6 +7,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.brief import brief
 from symfric.foundation.status import Status
 from symfric.results.trajectory import Trajectory
 
@@ -96,6 +97,8 @@ class Verification:
     restarted: "Verification | None" = None
     restarts: tuple[float, ...] = ()
     growth: float = float("nan")
+
+    __repr__ = brief
 
     @property
     def misses(self) -> tuple[Miss, ...]:

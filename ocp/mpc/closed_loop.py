@@ -14,6 +14,7 @@ from ocp.mpc.gauss_newton import CycleStatus
 from ocp.mpc.optimality import Optimality
 from ocp.mpc.session import Session
 from symfric.foundation import checks
+from symfric.foundation.brief import brief
 from symfric.foundation.files import written
 from symfric.foundation.panels import panels, save
 from symfric.foundation.style import colour
@@ -72,6 +73,8 @@ class ClosedLoop:
     violation: Array
     status: NDArray[np.int64]
     tolerance: float
+
+    __repr__ = brief
 
     def __getitem__(self, name: str) -> Array:
         checks.check_names(f"loop of '{self.plant}'", [name], [*self.signals, *self.controls])

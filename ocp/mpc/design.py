@@ -12,6 +12,7 @@ from ocp.mpc.horizon import Horizon
 from ocp.mpc.interior_point import Prices
 from ocp.mpc.kernels import Kernels, kernels
 from ocp.mpc.sweeps import Sweeps
+from symfric.foundation.brief import brief
 
 Array = NDArray[np.float64]
 
@@ -70,6 +71,8 @@ class Design:
     p0: Array
     r0: Array
     penalty: float
+
+    __repr__ = brief
 
     @cached_property
     def kernels(self) -> Kernels:

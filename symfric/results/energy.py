@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.shown import Showing, Shown, Table
 from symfric.foundation.symbols import stacked
 from symfric.model.kinds import WORK
 
@@ -41,8 +42,8 @@ def _pieces(trajectory: "Trajectory", expression: ca.SX, a: Array, b: Array) -> 
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class EnergyBalance:
+@dataclass(frozen=True, eq=False, repr=False)
+class EnergyBalance(Showing):
     """Energy of a mechanism and the work that changed it, over the times of a trajectory.
 
         defect(t) = E(t) - E(0) - W(t),   W the sum of all work
@@ -66,6 +67,16 @@ class EnergyBalance:
     work: dict[str, Array]
     defect: Array
     scale: float
+
+    def shown(self) -> Shown:
+        """Energy at the start and at the end, the work in between, and what is left."""
+        rows = [("energy at the start", f"{self.energy[0]:.6g}")]
+        rows += [(f"work of {name}", f"{work[-1]:.6g}") for name, work in self.work.items()]
+        rows += [("energy at the end", f"{self.energy[-1]:.6g}")]
+        rows += [("unexplained, at most", f"{np.abs(self.defect).max():.3g}")]
+        title = f"energy from {self.t[0]:g} to {self.t[-1]:g} s"
+        after = f"unexplained over what moved: {self.relative:.2g}"
+        return Shown(title, (), Table(("", "J"), tuple(rows), numbers=(1,)), (after,))
 
     @property
     def relative(self) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
+from symfric.foundation.brief import brief
 from symfric.foundation.memory import remember
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import stacked, strays
@@ -40,6 +41,8 @@ class Sampled:
     t: ArrayLike
     values: ArrayLike
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         where = type(self).__name__
         t = checks.times(f"{where}: t", self.t)
@@ -67,7 +70,7 @@ class Sampled:
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Hold(Sampled):
     """Zero-order hold: `values[k]` from t[k] until t[k+1], as a digital controller puts it out."""
 
@@ -81,7 +84,7 @@ class Hold(Sampled):
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Linear(Sampled):
     """Linear interpolation between the samples, as for a measured signal."""
 
