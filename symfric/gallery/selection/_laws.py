@@ -23,6 +23,7 @@ from symfric import (
     Threlfall,
     VelocityBased,
 )
+from symfric.choice.jing_mi import PRINTED
 from symfric.foundation.panels import grid
 from symfric.foundation.style import colour
 from symfric.gallery.drawing import REFERENCE
@@ -52,20 +53,10 @@ SLIDING = ("Smooth", "Threlfall", "Dahl")
 BRISTLES = ("LuGre", "Elasto-plastic", "Stick-slip", "Gonthier")
 """Laws with a static level and states."""
 
-PRINTED = {
-    "Smooth": (12.7889, 5.8842),
-    "Threlfall": (11.6026, 6.4755),
-    "Bengisu": (13.8757, 6.7982),
-    "Karnopp": (13.9528, 7.0905),
-    "Velocity-based": (13.8141, 3.7149),
-    "Awrejcewicz": (12.5478, 7.1542),
-    "Dahl": (13.4439, 6.8376),
-    "LuGre": (15.0088, 6.2963),
-    "Elasto-plastic": (14.5011, 3.3126),
-    "Stick-slip": (13.3829, 1.4088),
-    "Gonthier": (14.6707, 5.3765),
-}
-"""Printed S x 100 [m] of the block on the belt (table 4) and of the box (table 8)."""
+TABLE_4 = {name: 100 * row.S4 for name, row in PRINTED.items()}
+"""Printed S x 100 [m] of the block on the belt."""
+TABLE_8 = {name: 100 * row.S8 for name, row in PRINTED.items()}
+"""Printed S x 100 [m] of the box."""
 
 
 def chosen(quick: bool) -> tuple[str, ...]:

@@ -21,7 +21,7 @@ from symfric.foundation.panels import grid
 from symfric.foundation.style import EDGE, QUIET, colour, line
 from symfric.gallery.plate import Plate, plate_of
 from symfric.gallery.selection import _machine as machine
-from symfric.gallery.selection._laws import PRINTED
+from symfric.gallery.selection._laws import TABLE_8
 from symfric.gallery.selection._runs_box import T_END, box, run
 from symfric.gallery.signals import acceleration, spread
 
@@ -61,7 +61,7 @@ def plate(quick: bool = False) -> Plate:
             "the same by hand, box [m/s^2]": by_hand[0],
             "the same by hand, pendulum [rad/s^2]": by_hand[1],
             "m L^2 [kg m^2]": machine.M * machine.L**2,
-            "S x 100 in table 8, Smooth [m]": PRINTED["Smooth"][1],
+            "S x 100 in table 8, Smooth [m]": TABLE_8["Smooth"],
             "S x 100 with 1.8 kg m^2 about the mass [m]": spread(table["x"]),
             "S x 100 with a point mass [m]": spread(point["x"]),
         },

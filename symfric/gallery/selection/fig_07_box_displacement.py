@@ -19,7 +19,7 @@ import numpy as np
 
 from symfric import Karnopp, simulate
 from symfric.gallery.plate import Plate, plate_of
-from symfric.gallery.selection._laws import LAWS, PRINTED, chosen
+from symfric.gallery.selection._laws import LAWS, TABLE_8, chosen
 from symfric.gallery.selection._runs_box import EXACT, T_END, box, distance, picture, run
 from symfric.gallery.signals import largest, spread
 
@@ -35,7 +35,7 @@ def plate(quick: bool = False) -> Plate:
     }
     off: list[float] = []
     for name in names:
-        one, printed = run(name, t_end), PRINTED[name][1]
+        one, printed = run(name, t_end), TABLE_8[name]
         S, at_steps = spread(one["x"]), spread(one.at(one.step_times)["x"])
         off.append(abs(S / printed - 1))
         numbers[f"S x 100, {name} [m]"] = S
