@@ -25,6 +25,8 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 WORK = 500_000_000
 """CasADi instructions that one step size may take: what a small step is worth."""
+FEWEST = 100
+"""Whole powers are tried that make so many steps at least."""
 CHUNK = 1000
 """Steps between looks whether the motion still is one."""
 
@@ -50,7 +52,7 @@ def largest(
         return None, str(problem).partition("; ")[0]
     step = _step(block)
     least = machine.t_end * step.n_instructions() / WORK
-    first = floor(log10(machine.t_end / 20))
+    first = floor(log10(machine.t_end / FEWEST))
     for power in range(first, floor(log10(least)) - 1, -1):
         tried = 10.0**power
         if tried < least:

@@ -18,9 +18,10 @@ from symfric.choice.softness import MARGIN, Ladder, Rung, ladder
 from symfric.figures.regularisation import Sample, positions
 from symfric.figures.requirements import phenomena
 from symfric.foundation.parameters import parameters
-from symfric.foundation.status import SolveError
+from symfric.foundation.status import SolveError, Status
 from symfric.laws import Law
 from symfric.model import Model
+from symfric.results.trajectory import Trajectory
 
 WORK = 400_000_000
 """CasADi instructions that a run may take, about a second."""
@@ -135,7 +136,7 @@ def _climbed(task: Task, held: Candidate, most: int) -> tuple[Ladder, Points]:
 
     wanted = MARGIN * task.accuracy
     softest = max(task.accuracy, task.control) if task.fixed else task.accuracy
-    found = ladder(run, wanted, softest, held.scalable, FAILURES)
+    found = ladder(run, wanted, softest, held.scalable, FAILURES, _short)
     return found, points
 
 
@@ -247,6 +248,15 @@ def _stepped(task: Task, held: Candidate, rungs: Ladder, row: Row) -> Row:
 
 
 def _short(problem: object) -> str:
-    """The first sentence of an error, without where it arose."""
-    text = " ".join(str(problem).split())
-    return text.partition("; ")[0]
+    """The first sentence of an error; of a run that failed what its status says."""
+    if isinstance(problem, SolveError) and isinstance(problem.partial, Trajectory):
+        run = problem.partial
+        said = {
+            Status.MAX_STEPS: f"more than {run.statistics.steps + run.statistics.rejections} tries",
+            Status.JAMMED: "friction jams",
+            Status.STEP_TOO_SMALL: "the step becomes too small",
+            Status.EVENT_STORM: "events pile up",
+        }
+        if problem.status in said:
+            return f"{said[problem.status]} by t = {run.t[-1]:.3g} s"
+    return " ".join(str(problem).split()).partition("; ")[0]

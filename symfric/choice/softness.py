@@ -142,7 +142,12 @@ Run = Callable[[float], Rung]
 
 
 def ladder(
-    run: Run, wanted: float, softest: float, scalable: bool, failures: tuple[type[Exception], ...]
+    run: Run,
+    wanted: float,
+    softest: float,
+    scalable: bool,
+    failures: tuple[type[Exception], ...],
+    said: Callable[[Exception], str] = str,
 ) -> Ladder:
     """Runs towards dry friction until two keep the error `wanted`, and away from it to `softest`.
 
@@ -151,6 +156,7 @@ def ladder(
         wanted, softest: errors of the driest and of the softest law that are of interest.
         scalable: there is something to scale.
         failures: what a run may raise, which ends the ladder on its side.
+        said: such a failure in words.
 
     Raises:
         one of `failures`: the law as it comes, s = 1, does not run.
@@ -161,7 +167,7 @@ def ladder(
         try:
             rungs += [] if stopped else [run(rungs[-1].s / RATIO)]
         except failures as problem:
-            stopped = str(problem)
+            stopped = said(problem)
     with suppress(*failures):  # softer than the law allows
         while scalable and rungs[0].error <= softest and rungs[0].s < RATIO**SOFTEST:
             rungs.insert(0, run(rungs[0].s * RATIO))

@@ -13,6 +13,8 @@ def verdict(
     rows: Sequence[Row], needs: Sequence[str], accuracy: float, control: float
 ) -> tuple[str, ...]:
     """Sentences: for simulation, for optimal control, for a controller, and what fell out."""
+    if not rows:
+        return ("Nothing was measured.",)
     ranked = [row for row in rows if row.ranked]
     asked = " and ".join(needs) or "friction"
     found: list[str] = []
@@ -86,14 +88,14 @@ def _states(row: Row) -> str:
 def _others(rows: Sequence[Row]) -> str:
     """How many fell out, by the reason."""
     what = {
-        LACKING: "show something else",
-        INACCURATE: "do not keep the accuracy",
-        FAILED: "do not run to the end",
-        REFUSED: "do not fit into this machine",
+        LACKING: "for what they show",
+        INACCURATE: "for their error",
+        FAILED: "whose run fails",
+        REFUSED: "that do not fit into this machine",
     }
     counts = {text: sum(row.standing == name for row in rows) for name, text in what.items()}
     said = [f"{count} {text}" for text, count in counts.items() if count]
-    return f"Of {len(rows)} laws {_listed(said)}." if said else f"All {len(rows)} laws do."
+    return f"Left out of {len(rows)}: {_listed(said)}." if said else "None is left out."
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from os import cpu_count
 from pathlib import Path
+from textwrap import fill
 from typing import Annotated, Any
 
 import typer
@@ -53,6 +54,10 @@ def select(
     preset: PresetOption = None,
     law_of: LawOfOption = None,
     t_end: Annotated[float | None, typer.Option("--t-end", help="End of the motion [s].")] = None,
+    of: Annotated[
+        str | None,
+        typer.Option("--of", metavar="SIGNAL,...", help="What is compared; default positions."),
+    ] = None,
     control: Annotated[
         float, typer.Option("--control", help="Largest error of fixed steps.")
     ] = 0.05,
@@ -123,6 +128,7 @@ def select(
             friction=friction,
             misfits=misfits,
             t_end=t_end,
+            of=None if of is None else [name.strip() for name in of.split(",")],
             control=control,
             fixed_steps=fixed_steps,
             workers=cpu_count() or 1 if workers is None else workers,
@@ -243,4 +249,4 @@ def show_choice(found: Choice) -> None:
     """Print table, reasons and verdict."""
     for line in lines(found):
         typer.echo(line)
-    typer.echo(f"\n{LEGEND}")
+    typer.echo("\n" + fill(LEGEND, 80))

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Parameter, parameters, with_values
+from symfric.foundation.status import Status
 from symfric.integrator.equations.inputs import Input
 from symfric.integrator.simulate import simulate
 from symfric.laws import Law
@@ -254,6 +255,7 @@ def sample(
 
     Raises:
         SolveError: the run failed.
+        KeyboardInterrupt: somebody stopped it.
     """
     model = bed.model(law)
 
@@ -267,6 +269,8 @@ def sample(
         return process_time() - begin, run
 
     spent, run = min((timed() for _ in range(repeats)), key=lambda pair: pair[0])
+    if run.status is Status.INTERRUPTED:
+        raise KeyboardInterrupt  # a part of a motion is no sample
     motion, size = looked_at(bed, model, run, law)
     steps, lost = run.statistics.steps, run.statistics.rejections
     return Sample(s, values or {}, rtol, steps, steps + lost, spent, motion, size)
