@@ -1,6 +1,6 @@
 """`symfric codegen`: a friction law, or a scene as a plant, as C99, verified on this machine."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -13,7 +13,7 @@ from symfric.cli import completions, output
 from symfric.cli.codegen_compensator import compensator_block
 from symfric.cli.codegen_robot import robot_block
 from symfric.cli.codegen_shown import show_sizes, show_verification
-from symfric.cli.machines import kind_of
+from symfric.cli.machines import LawOfOption, PresetOption, kind_of
 from symfric.cli.options import (
     JsonOption,
     SetOption,
@@ -54,6 +54,8 @@ def codegen(
         ),
     ] = None,
     settings: SetOption = None,
+    preset: PresetOption = None,
+    law_of: LawOfOption = None,
     scene: Annotated[
         str | None,
         typer.Option(
@@ -172,6 +174,7 @@ def codegen(
         "--step-size": step_size is not None, "--method": method is not None, "--free": bool(free),
         "--fold": fold, "--turning": turning, "--payload": payload is not None,
         "--tunable-gravity": tunable_gravity, "--compensation": bool(compensation),
+        "--preset": preset is not None, "--law-of": bool(law_of),
     }  # fmt: skip
     check_applicable(subject, [option for option, there in given.items() if there])
     own: dict[str, Any] = {"fold": fold or None, "free": free or None, "name": name, "h": step_size}
@@ -185,15 +188,16 @@ def codegen(
         )  # fmt: skip
         text, own = law or made.name, {}
     elif scene is not None:
-        machine = machine_of(scene, chosen, numbers("--set", settings))
+        kind_of_scene = kind_of(scene, "--scene", preset, law_of)
+        machine = machine_of(scene, kind_of_scene, chosen, numbers("--set", settings))
         own["method"] = "auto" if method is None else method
         made = plant_block(machine, **own)
         adjustable = partial(plant_block, machine, **{n: v for n, v in own.items() if n != "h"})
         text, own = chosen.text, {}
     elif compensator:
-        law_of = with_settings(chosen.law, chosen.text, settings)
+        compensated = with_settings(chosen.law, chosen.text, settings)
         made = compensator_block(
-            law_of, chosen.drive, compensation or (),
+            compensated, chosen.drive, compensation or (),
             name=name, h=step_size, turning=turning, fold=fold,
         )  # fmt: skip
         text, own = chosen.text, {}
@@ -224,6 +228,8 @@ APPLIES = {
     "--payload": (INVERSE,),
     "--tunable-gravity": (INVERSE,),
     "--compensation": (COMPENSATOR,),
+    "--preset": (PLANT,),
+    "--law-of": (PLANT,),
 }
 """Options that do not fit all that C is made of, and what they fit."""
 
@@ -350,14 +356,15 @@ def chosen_law(fit: Path | None, law: str | None) -> Chosen:
     return Chosen(found.name, found.law, found.drive, tuple(forces))
 
 
-def machine_of(scene: str, chosen: Chosen, values: dict[str, float]) -> Scene:
+def machine_of(
+    scene: str, kind: Callable[[Law], Scene], chosen: Chosen, values: dict[str, float]
+) -> Scene:
     """The scene with the law; of a fitted drive with its mass and offset, too.
 
     Raises:
         ValueError: coefficients that are forces in a scene that has a load of its own; unknown
             names.
     """
-    kind = kind_of(scene, "--scene")
     if kind is Drive and chosen.drive is not None:
         machine: Scene = chosen.drive
     else:  # a population is refused by its name

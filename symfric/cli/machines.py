@@ -29,7 +29,7 @@ LawOfOption = Annotated[
     typer.Option(
         "--law-of",
         metavar="PLACE=LAW",
-        help="Law of another place of the scene, as hinge=coulomb; may be repeated.",
+        help="Law of another place of the scene or joint of a robot, as hinge=coulomb.",
         autocompletion=completions.places,
     ),
 ]
@@ -52,8 +52,8 @@ def kind_of(
     others = {place: law_from_text(text) for place, text in assignments("--law-of", law_of).items()}
     if scene.endswith(".urdf"):
         check_names("--preset of a robot", [preset] if preset else [], ())
-        check_names("--law-of of a robot", others, (), "--law is the law of all of its joints")
-        return lambda law: Robot(relative(law), scene)
+        laws = tuple(relative(law) for law in others.values())
+        return lambda law: Robot(relative(law), scene, tuple(others), laws)
     check_names(where, [scene], ALL_SCENES)
     kind = ALL_SCENES[scene]
     check_names(

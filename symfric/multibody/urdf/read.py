@@ -41,6 +41,7 @@ def read_urdf(
     source: str | Path,
     *,
     law: Law | None = None,
+    laws: Mapping[str, Law] | None = None,
     level: Scalar = 0.0,
     bearings: Mapping[str, JointFriction] | None = None,
     floating: bool = False,
@@ -64,6 +65,7 @@ def read_urdf(
         source: path of the file, or its text.
         law: instead of Coulomb; its normal force is f, so with mu_d = 1 it slides at the file's
             level (`relative` scales a law so).
+        laws: joint name -> law, instead of `law`.
         level: f of the joints whose tag has none [N m, N].
         bearings: joint name -> friction, instead of what the file says of this joint.
         floating: whether the root link moves freely (joint `floating_base`); otherwise it is the
@@ -74,7 +76,7 @@ def read_urdf(
 
     Raises:
         ValueError: all mistakes of the file at once, each with its path; nothing that moves has a
-            mass; an unknown name in `bearings`.
+            mass; an unknown name in `bearings` or `laws`.
         OSError: the file cannot be read.
 
     Warns:
@@ -88,6 +90,8 @@ def read_urdf(
     """
     if law is not None:
         check_law("urdf: law", law)
+    for name, own in checks.named("urdf: laws", laws).items():
+        check_law(f"urdf: law of '{name}'", own)
     if not is_symbolic(level):
         checks.number("urdf: level", level, lower=0.0)
     checks.named("urdf: bearings", bearings)
@@ -106,14 +110,17 @@ def read_urdf(
     problems = [*names.problems, *_massless(moved, held, strict or (grounded and not moved))]
     if problems:
         raise ValueError("\n".join(f"urdf '{urdf.name}' > {text}" for text in problems))
-    check_names(f"urdf '{urdf.name}' bearings", bearings or {}, [j.name for j in moved])
+    for what, given in (("bearings", bearings), ("laws", laws)):
+        check_names(f"urdf '{urdf.name}' {what}", given or {}, [j.name for j in moved])
     m = Mechanism(_identifier(urdf.name), gravity)
     _add_bodies(m, urdf, places, weights, names)
     if not grounded:
         m.joint(Floating(FLOATING, GROUND, names.links[urdf.root]))
     left = list(urdf.left_out)
     for joint in moved:
-        friction = (bearings or {}).get(joint.name) or tag_friction(joint, law, level)
+        friction = (bearings or {}).get(joint.name) or tag_friction(
+            joint, (laws or {}).get(joint.name, law), level
+        )
         left += _hang(m, joint, names, places, friction, urdf.zero(joint))
     _couple(m, moved, names)
     if law is not None and equals(level, 0.0) and not any(joint.friction for joint in moved):

@@ -2,6 +2,7 @@
 
 import json
 from math import atan, pi, sqrt
+from pathlib import Path
 
 import pytest
 from law_cases import CASES
@@ -147,3 +148,17 @@ def test_command_line_takes_presets_and_laws_of_places(capsys: pytest.CaptureFix
         assert message in capsys.readouterr().err
     assert main(["run", "rabinowicz", "--law", "lugre", "--law-of", "hinge=dahl"]) == 2
     assert "--law is the law of what rubs there" in capsys.readouterr().err
+
+
+@pytest.mark.heavy
+def test_c_of_a_scene_takes_presets_and_places(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = "codegen --law coulomb --scene pendulum_box --preset jing_mi_table_7 --step-size 1e-3"
+    assert main([*line.split(), "--law-of", "hinge=dahl", "--out", str(tmp_path)]) == 0
+    source = "".join(path.read_text() for path in tmp_path.rglob("*.h"))
+    assert "mu_d_1" in source
+    assert "sigma_0" in source
+    capsys.readouterr()
+    assert main(["codegen", "--law", "dahl", "--preset", "x", "--out", str(tmp_path)]) == 2
+    assert "--preset: expected with --scene only" in capsys.readouterr().err

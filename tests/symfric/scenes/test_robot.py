@@ -1,5 +1,6 @@
 """Robots of URDF files as scenes: the law at the level of every joint, parameters by name."""
 
+import numpy as np
 import pytest
 from robots import MOVING, SMALL, random_robot
 
@@ -61,3 +62,32 @@ def test_friction_of_a_moment_has_a_level_and_no_radius() -> None:
     assert list(slides) == ["turning: expected a joint that turns about an axis only"]
     both = JointFriction(Coulomb(), radius=0.1, normal=1.0, turning=True).problems(("turn",))
     assert list(both) == ["radius: expected none with turning, got 0.1"]
+
+
+TWO = SMALL.replace(
+    "</robot>",
+    """<link name="hand"><inertial><origin xyz="0 0 -0.1"/><mass value="1"/>
+    <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <joint name="wrist" type="revolute"><parent link="arm"/><child link="hand"/>
+    <origin xyz="0 0 -0.5"/><axis xyz="0 1 0"/><dynamics friction="0.05"/></joint></robot>""",
+)
+
+
+def test_a_joint_may_have_a_law_of_its_own() -> None:
+    scene = Robot(Coulomb(mu_d=1.0), TWO, joints=("wrist",), laws=(relative(LuGre()),))
+    model = scene.model(["mu_d_2"])
+    assert [v.name for v in model.x] == ["hinge", "wrist", "hinge_rate", "wrist_rate", "wrist_z"]
+    run = simulate(scene.model(), 0.5, x0={"hinge": 1.0})
+    slow = np.abs(run["wrist_rate"]) > 0.05
+    assert np.abs(run["wrist_friction"][slow]) == pytest.approx(0.05 * 0.1 / 0.15, rel=1e-2)
+    names = parameters(scene)
+    assert (names["mu_d_1"].value, names["mu_s"].value) == (1.0, 1.0)
+
+
+def test_laws_of_joints_that_are_not_there_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"urdf 'small' laws: expected one of hinge, wrist, got"):
+        Robot(LuGre(), TWO, joints=("elbow",), laws=(LuGre(),)).model()
+    with pytest.raises(ValueError, match="a law for every one of the joints, got 1 joints and 0"):
+        Robot(LuGre(), TWO, joints=("wrist",))
+    with pytest.raises(ValueError, match="Robot: laws: expected a law such as"):
+        Robot(LuGre(), TWO, joints=("wrist",), laws=("lugre",))  # type: ignore[arg-type]
