@@ -1,11 +1,13 @@
 """The reference of the command line, from the commands themselves."""
 
+import re
 from inspect import cleandoc
 from typing import Any
 
 import typer
 
 from docs.machine import rst
+from docs.machine.docstrings import text as sentence
 from docs.machine.docstrings import to_rst
 from docs.machine.names import linked
 from symfric.cli.app import COMMANDS, app
@@ -33,18 +35,27 @@ def section(name: str, command: Any) -> str:
     words = [_argument(p) for p in positional]
     text += rst.literal(" ".join([f"symfric {name}", *words, "[OPTIONS]"]), "text")
     prose, examples = split(command.help or "")
-    text += to_rst(cleandoc(prose), linked, formulas=False)
+    text += to_rst(flagged(cleandoc(prose)), linked, formulas=False)
     if examples:
         text += rst.literal("\n".join(f"$ {line}" for line in examples), "console")
     if positional:
-        rows = [[rst.code(_argument(p)), rst.plain(p.help or "")] for p in positional]
+        rows = [[rst.code(_argument(p)), sentence(flagged(p.help or ""))] for p in positional]
         text += rst.table(["argument", "meaning"], rows)
     rows = [
-        [rst.code(_option(p)), rst.plain(p.help or ""), _default(p)]
+        [rst.code(_option(p)), sentence(flagged(p.help or "")), _default(p)]
         for p in named
         if not getattr(p, "hidden", False)
     ]
-    return text + rst.table(["option", "meaning", "default"], rows)
+    return text + rst.table(["option", "meaning", "default"], rows, "options")
+
+
+FLAG = re.compile(r"(?<![\w-])(--?[a-z][\w-]*(?:[= ][A-Z]{2,}\b|=[\w.=]+)?)")
+
+
+def flagged(text: str) -> str:
+    """Words in which options stand as code, so that no line ends behind their hyphens."""
+    parts = text.split("`")  # what stands between backticks is code already
+    return "`".join(FLAG.sub(r"`\1`", p) if k % 2 == 0 else p for k, p in enumerate(parts))
 
 
 def split(text: str) -> tuple[str, list[str]]:

@@ -22,7 +22,7 @@ def draw_all(
     """Let `draw(name, folder)` draw each of `names` into a folder; sentences about what failed."""
     folder, names = MADE / room, list(names)
     key = digest([code_hash(), room, *names])
-    if is_fresh(folder, key):
+    if is_fresh(folder, key) and all((folder / f"{name}.png").exists() for name in names):
         return []
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)

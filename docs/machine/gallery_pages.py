@@ -75,8 +75,9 @@ def index(papers: Mapping[str, list[Mapping[str, Any]]]) -> str:
     if quick():
         text += rst.directive("note", "", "These figures are computed at reduced size.\n")
     for paper, records in papers.items():
-        text += rst.title(re.split(r", (?:doi|J\.|[A-Z]\w+ [\d(])", paper)[0], "-")
-        text += f"*{rst.plain(paper)}*\n\n" + cards(records)
+        head = re.split(r", (?:doi|J\.|[A-Z]\w+ [\d(])", paper)[0]
+        text += rst.title(head, "-") + (f"*{rst.plain(paper)}*\n\n" if paper != head else "")
+        text += cards(records)
         rows = [
             [
                 f":doc:`{r['figure']} <{r['name']}>`",
@@ -85,7 +86,7 @@ def index(papers: Mapping[str, list[Mapping[str, Any]]]) -> str:
             ]
             for r in records
         ]
-        text += rst.table(["figure", "what it shows", "how far we are"], rows)
+        text += rst.table(["figure", "what it shows", "how far we are"], rows, "options")
         text += rst.pages((r["name"] for r in records), hidden="")
     return text
 
@@ -99,7 +100,7 @@ def cards(records: Iterable[Mapping[str, Any]]) -> str:
         )
         for r in records
     )  # fmt: skip
-    return rst.directive("container", "cards", body)
+    return rst.directive("container", "cards wide", body)
 
 
 def page(record: Mapping[str, Any]) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 
 from docs.machine import rst
 from docs.machine.docstrings import first_line, to_rst
+from docs.machine.docstrings import text as sentence
 from docs.machine.law_pages import number, shown_symbol, signature
 from docs.machine.names import linked
 from symfric import BrownMcPhee, law_name, parameters
@@ -32,10 +33,8 @@ def index() -> str:
     for name, kind in ALL_SCENES.items():
         model = kind(LAW()).model()
         presets = ", ".join(f"``{p}``" for p in kind.presets) or "-"
-        rows.append(
-            [f":doc:`{name} <{name}>`", rst.plain(first_line(kind.__doc__)), str(len(model.x))]
-        )
-        rows[-1].append(presets)
+        said = sentence(first_line(kind.__doc__), linked)
+        rows.append([f":doc:`{name} <{name}>`", said, str(len(model.x)), presets])
     text += rst.table(["scene", "what it is", "states", "presets"], rows)
     return text + rst.pages((f"{name} <{name}>" for name in ALL_SCENES), hidden="")
 
@@ -59,14 +58,15 @@ def page(name: str, kind: type[Scene]) -> str:
     text += rst.title("Parameters", "-") + parameter_table(scene)
     if kind.presets:
         rows = [
-            [f"``{n}``", rst.plain(p.doc), rst.plain(p.source)] for n, p in kind.presets.items()
+            [f"``{n}``", sentence(p.doc, linked), sentence(p.source, linked)]
+            for n, p in kind.presets.items()
         ]
         text += rst.title("Presets", "-")
         text += f"``{kind.__name__}.preset(NAME, law)``, ``symfric run {name} --preset NAME``.\n\n"
         text += rst.table(["preset", "what it is", "source"], rows)
     places = kind.places()
     if places:
-        rows = [[f"``{n}``", rst.plain(doc)] for n, doc in places.items()]
+        rows = [[f"``{n}``", sentence(doc, linked)] for n, doc in places.items()]
         text += rst.title("Places that rub", "-")
         text += "Each may have a law of its own: ``--law-of PLACE=LAW``.\n\n"
         text += rst.table(["place", "what it is"], rows)

@@ -1,5 +1,7 @@
 """Pages of the documentation: pictures that blocks make, and pages made of the code itself."""
 
+import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,7 @@ from docs.machine.making import MADE, make_page_pictures, place
 from docs.machine.names import known, linked
 from docs.machine.pages import DOCS, PICTURE
 
+LINK = re.compile(r"(\]\()([\w./-]+\.md)([#)])")
 log = logging.getLogger(__name__)
 
 
@@ -32,7 +35,13 @@ def show_made(app: Any, name: str, content: list[str]) -> None:
         beside = (page.parent / match[2]).exists()
         return match[0] if beside else f"{match[1]}{made}{match[2]}{match[3]}"
 
-    content[0] = PICTURE.sub(shown, content[0])
+    content[0] = LINK.sub(partial(to_made, page.parent), PICTURE.sub(shown, content[0]))
+
+
+def to_made(folder: Path, match: re.Match[str]) -> str:
+    """A link of Markdown to a page that is made of the code, which is reStructuredText."""
+    there = (folder / match[2]).exists() or not (folder / f"{match[2][:-3]}.rst").exists()
+    return match[0] if there else f"{match[1]}{match[2][:-3]}.rst{match[3]}"
 
 
 def as_rst(app: Any, what: str, name: str, item: Any, options: Any, lines: list[str]) -> None:

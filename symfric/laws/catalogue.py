@@ -106,4 +106,4 @@ DYNAMIC_LAWS: dict[str, type[Law]] = {
 """Every law with states that stands alone, by name."""
 
 ALL_LAWS: dict[str, type[Law]] = {**STATIC_LAWS, **DYNAMIC_LAWS}
-"""Both; the contract tests run over them."""
+"""Every law that stands alone, by name; the contract tests run over them."""
