@@ -13,12 +13,13 @@ import sys
 from pathlib import Path
 from typing import Any, final
 
-import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
 from symfric import LuGre, drive, stepper
+from symfric.foundation.panels import grid, save
+from symfric.foundation.style import COLOURS
 
 Array = NDArray[np.float64]
 DT, STEPS, CANDIDATES, EPISODES, ROUNDS = 0.02, 50, 32, 8, 15
@@ -85,15 +86,15 @@ def main(out: Path) -> None:
         best = tried[np.argmax(score.mean(axis=1))]
         learnt.append(score.mean(axis=1).max())
     after = episode(env, np.tile(best, (env.envs, 1)), 99)
-    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(10, 3), layout="constrained")
+    figure, ((left, middle, right),) = grid(1, 3, width=10, height=3)
     left.plot(learnt, "o-")
     left.set(xlabel="round", ylabel="best reward")
     for axes, title, (total, errors) in ((middle, "before", before), (right, "after", after)):
         last = 1e3 * np.median(np.abs(errors[-1]))
         Console().print(f"{title}: reward {total.mean():.2f}, median error after 1 s {last:.2f} mm")
-        axes.plot(DT * np.arange(STEPS + 1), 1e3 * errors[:, :40], color="C0", alpha=0.3)
+        axes.plot(DT * np.arange(STEPS + 1), 1e3 * errors[:, :40], color=COLOURS[0], alpha=0.3)
         axes.set(xlabel="t [s]", ylabel="error [mm]", title=title, ylim=(-100, 100))
-    figure.savefig(out / "learn_drive.png", dpi=150)
+    save(figure, out / "learn_drive.png")
 
 
 if __name__ == "__main__":

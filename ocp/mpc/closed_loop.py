@@ -17,7 +17,7 @@ from symfric.foundation import checks
 from symfric.foundation.brief import brief
 from symfric.foundation.files import written
 from symfric.foundation.panels import panels, save
-from symfric.foundation.style import colour
+from symfric.foundation.style import line
 from symfric.integrator.plant import Plant
 from symfric.integrator.stepper import stepper
 from symfric.model import Model, check_model
@@ -188,21 +188,24 @@ def plot_loops(
     shown = list(names) or shared
     figure, axes = panels(len(shown) + 1)
     for number, (label, one) in enumerate(loops.items()):
-        shade, edges = colour(number), np.append(one.t, one.t_end)
+        look, edges = line(number), np.append(one.t, one.t_end)
         for axis, name in zip(axes, shown, strict=False):
             if name in one.controls:
-                axis.stairs(one.controls[name], edges, baseline=None, color=shade, label=label)
+                axis.stairs(one.controls[name], edges, baseline=None, label=label, **look)
             else:
-                axis.plot(edges, one.signals[name], color=shade, linewidth=1.2, label=label)
+                axis.plot(edges, one.signals[name], linewidth=1.2, label=label, **look)
             axis.set_ylabel(f"{name} [{one.units[name]}]")
-        axes[-1].semilogy(one.t, 1e3 * one.cpu, ".", ms=3, color=shade)
+        axes[-1].semilogy(one.t, 1e3 * one.cpu, ".", ms=3, color=look["color"])
         for k in np.flatnonzero(one.status != CycleStatus.CONVERGED).tolist():
             for axis in axes:
-                axis.axvspan(edges[k], edges[k + 1], color=shade, alpha=0.15, linewidth=0)
+                axis.axvspan(edges[k], edges[k + 1], color=look["color"], alpha=0.15, linewidth=0)
     axes[-1].set_ylabel("cycle [ms]")
     axes[-1].set_xlabel("t [s]")
     if len(loops) > 1:
-        axes[0].legend(fontsize="small")
+        entries = axes[0].get_legend_handles_labels()
+        figure.legend(
+            *entries, loc="outside lower center", fontsize="small", ncols=4, frameon=False
+        )
     else:
         axes[0].set_title(next(iter(loops)))
     figure.align_ylabels(axes)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from ocp.result.motion import Motion
@@ -13,13 +14,12 @@ from ocp.result.solution import Solution
 from symfric.foundation import checks
 from symfric.foundation.panels import panels, save
 from symfric.foundation.parameters import check_names
-from symfric.foundation.style import colour
+from symfric.foundation.style import Line, colour, line
 from symfric.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 SHADES = {"slip+": colour(6), "stick": "0.45", "slip-": colour(1)}
 """Kind of mode -> colour of its background."""
@@ -64,7 +64,7 @@ def plot_solutions(
     figure, axes = panels(len(shown))
     for axis, name in zip(axes, shown, strict=True):
         for number, (_, solution, motion) in enumerate(drawn):
-            _signal(axis, solution, motion, name, colour(number))
+            _signal(axis, solution, motion, name, line(number))
         for phase in first.phases[1:]:
             axis.axvline(phase.begin, color="0.6", linewidth=0.6, zorder=0)
         if len(solutions) == 1:
@@ -93,7 +93,7 @@ def _explain(
     handles: list[Artist] = []
     if len(entries) > 1:
         for number, entry in enumerate(entries):
-            handles += axis.plot([], [], color=colour(number), label=entry)
+            handles += axis.plot([], [], label=entry, **line(number))
     else:
         axis.set_title(entries[0])
     if alone is not None and alone.modes:
@@ -107,23 +107,29 @@ def _explain(
             bands = ", ".join(alone.modes)
             handles.append(Patch(facecolor="none", label=f"bands from below: {bands}"))
     if handles:
-        axis.legend(handles=handles, fontsize="small", loc="best", ncols=len(handles))
+        root = axis.get_figure(root=True)
+        if isinstance(root, Figure):
+            columns = 1 if len(entries) > 1 else len(handles)
+            root.legend(
+                handles=handles, fontsize="small", loc="outside upper left", ncols=columns,
+                frameon=False,
+            )  # fmt: skip
 
 
-def _signal(axis: "Axes", solution: Solution, motion: Motion, name: str, shade: str) -> None:
+def _signal(axis: "Axes", solution: Solution, motion: Motion, name: str, look: Line) -> None:
     if name in motion.controls:
         edges = np.append(motion.t_control, motion.phases[-1].end)
-        axis.stairs(motion.controls[name], edges, baseline=None, color=shade, linewidth=1.2)
+        axis.stairs(motion.controls[name], edges, baseline=None, linewidth=1.2, **look)
         return
     at = motion.nodes
     nodes = np.arange(motion.t.size)[at][:: max(1, np.size(motion.t[at]) // CIRCLES)]
-    axis.plot(motion.t[nodes], motion[name][nodes], "o", color=shade, ms=3.5, mfc="none")
+    axis.plot(motion.t[nodes], motion[name][nodes], "o", color=look["color"], ms=3.5, mfc="none")
     runs = simulated(solution, motion)
     for run in runs:
         if name in run.units:
-            axis.plot(run.t, run[name], color=shade, linewidth=1.0)
+            axis.plot(run.t, run[name], linewidth=1.0, **look)
     if not runs:
-        axis.plot(motion.t, motion[name], color=shade, linewidth=1.0)
+        axis.plot(motion.t, motion[name], linewidth=1.0, **look)
 
 
 def simulated(solution: Solution, motion: Motion) -> list[Trajectory]:

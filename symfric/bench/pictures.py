@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
 from symfric.foundation.panels import grid, panels, save
-from symfric.foundation.style import COLOURS, colour
+from symfric.foundation.style import COLOURS, MARKERS, colour, dash
 
 if TYPE_CHECKING:
     from symfric.bench.regularisation import RegularisationRow
@@ -46,7 +46,8 @@ def plot_work_precision(
             error, time = zip(*sorted(points), strict=True)
             bold = name.startswith("symfric")
             axis.loglog(
-                error, [1e3 * t for t in time], marker="o", markersize=4 if bold else 3,
+                error, [1e3 * t for t in time], markersize=4 if bold else 3,
+                marker=MARKERS[names.index(name) % len(MARKERS)],
                 linewidth=2.0 if bold else 1.0, linestyle="-" if bold else "--", label=name,
                 color=colour(names.index(name)), markerfacecolor=_filled(names.index(name)),
             )  # fmt: skip
@@ -77,8 +78,13 @@ def plot_regularisation(
             line = [row for row in own if row.rtol == rtol]
             x = [row.value for row in line]
             label = f"rtol = {rtol:g}"
-            above.loglog(x, [r.error for r in line], "-o", color=colour(k), ms=3, label=label)
-            below.loglog(x, [1e3 * r.time_s for r in line], "-o", color=colour(k), ms=3)
+            look: dict[str, Any] = {
+                "color": colour(k), "linestyle": dash(k), "linewidth": 1.2,
+                "markersize": 3 + 1.5 * k,
+                "marker": MARKERS[k % len(MARKERS)], "markerfacecolor": "none",
+            }  # fmt: skip
+            above.loglog(x, [r.error for r in line], label=label, **look)
+            below.loglog(x, [1e3 * r.time_s for r in line], **look)
             cycle = [(r.value, r.cycle_error) for r in line if r.cycle_error == r.cycle_error]
             if cycle:
                 above.loglog(*zip(*cycle, strict=True), "--", color=colour(k), lw=1)

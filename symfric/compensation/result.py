@@ -250,7 +250,10 @@ class Comparison:
             axis.sharex(axes[0])
         axes[4].set_title("at a reversal" if self.reference.rest is None else "at rest", fontsize=9)
         axes[4].set_xlabel("t [s]")
-        axes[0].legend(fontsize="small", ncols=3)
+        entries = axes[0].get_legend_handles_labels()
+        figure.legend(
+            *entries, loc="outside lower center", fontsize="small", ncols=4, frameon=False
+        )
         axes[0].set_title(f"plant '{self.plant}'")
         figure.align_ylabels(axes)
         return save(figure, path)

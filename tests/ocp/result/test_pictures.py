@@ -91,8 +91,7 @@ def test_modes_are_shaded_a_band_for_each_contact(move: Solution) -> None:
         (0.0, 0.5, 0.5),
     ]
     assert bands[1].get_facecolor() == bands[3].get_facecolor() != bands[0].get_facecolor()
-    legend = axis.get_legend()
-    assert legend is not None
+    (legend,) = axis.get_figure(root=True).legends  # type: ignore[union-attr]
     assert [text.get_text() for text in legend.get_texts()] == [
         "slip+", "stick", "slip-", "bands from below: guide, wheel",
     ]  # fmt: skip
@@ -102,8 +101,7 @@ def test_several_solutions_and_scenarios_are_overlaid(move: Solution) -> None:
     two = solve_once(unit_move(scenarios={"dry": {}, "oiled": {}}), 5)
     failed = solve_once(unit_move(bounds={"a": (-1.0, 1.0)}), 4)
     figure = plot_solutions({"a": move, "b": two, "c": failed}, ["x"])
-    legend = figure.axes[0].get_legend()
-    assert legend is not None
+    (legend,) = figure.legends
     entries = [text.get_text() for text in legend.get_texts()]
     assert [entry.split(":")[0] for entry in entries] == ["a", "b dry", "b oiled", "c"]
     assert entries[0].startswith("a: T = 2 s, J = ")
