@@ -204,14 +204,18 @@ def _at_equal_error(task: Task, held: Candidate, s: float, most: int, row: Row) 
         chosen = rtol, run, task.reference.off(run.motion)
     rtol, run, error = chosen
     instructions, method = task.machine.instructions(model, rtol)
-    known = parameters(law)
-    knob = next(iter(held.knobs.values()))
     return replace(
         row, error=error, rtol=rtol, method=method, attempts=run.attempts,
         instructions=instructions, time_s=_timed(task, model, law, rtol, most, run),
-        values={n: float(known[n].value) for n in knob.powers},  # pyright: ignore[reportArgumentType]
+        values=_own_numbers(law),
         steepness=nature.steepness(law, 1.0),
     )  # fmt: skip
+
+
+def _own_numbers(law: Law) -> dict[str, float]:
+    """The parameters that are not those that the law comes with: what to give it."""
+    known = {n: (float(p.value), p.default) for n, p in parameters(law).items()}  # pyright: ignore[reportArgumentType]
+    return {name: value for name, (value, start) in known.items() if value != start}
 
 
 def _timed(task: Task, model: Model, law: Law, rtol: float, most: int, run: Sample) -> float:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from symfric.choice.needs import NEEDS
 from symfric.choice.pictures import plot_choice
 from symfric.choice.row import Row
-from symfric.foundation.panels import thumbnail
+from symfric.foundation.panels import data_uri
 
 if TYPE_CHECKING:
     from symfric.choice.result import Choice
@@ -41,7 +41,7 @@ COLUMNS = (
     ("parameters", "that describe friction; of these hard to measure"),
     ("class", "smoothness in the velocity"),
     ("shows", "codes of what it shows"),
-    ("softness", "the parameters that were scaled, as soft as the accuracy allows"),
+    ("numbers", "what to give the law: parameters that it does not come with"),
 )
 """Head of a column, and what it means."""
 
@@ -64,7 +64,7 @@ def body(choice: "Choice", width: int = 640) -> str:
     stopped = "<p>Interrupted: laws without a row were not measured.</p>"
     parts = [
         f'<div class="{kind}">{said}{stopped * choice.interrupted}</div>',
-        f"<p>{thumbnail(plot_choice(choice), choice.title, width)}</p>",
+        f"<p>{_image(choice, width)}</p>",
     ]
     if choice.ranked:
         parts += ["<h2>Ranked by time at equal error</h2>", _ranked(choice.ranked)]
@@ -72,6 +72,13 @@ def body(choice: "Choice", width: int = 640) -> str:
     if others:
         parts += ["<h2>Not ranked, and why</h2>", _others(others)]
     return "\n".join(parts)
+
+
+def _image(choice: "Choice", width: int) -> str:
+    """The picture, drawn at twice its `width` [pixel] for sharp screens."""
+    figure = plot_choice(choice)
+    source = data_uri(figure, 2 * width / float(figure.get_size_inches()[0]))
+    return f'<img src="{source}" alt="{escape(choice.title)}" width="{width}">'
 
 
 def _asked(choice: "Choice") -> str:

@@ -22,7 +22,8 @@ class Row:
         standing: one of `ORDER`; `reason` says why it is not ranked.
         phenomena: codes of `symfric.laws.PHENOMENA`.
         error: largest difference from the reference relative to the motion; NaN without a run.
-        values: the parameters that say what is smooth, at the softest that keeps the accuracy.
+        values: what to give the law: all parameters that it does not come with, of several places
+            that rub those of the first.
         rtol, method, attempts, instructions: of the run at equal error: relative tolerance, method,
             attempts of a step, CasADi instructions of one.
         time_s: processor time of that run [s] in CasADi's virtual machine, the shortest of several.

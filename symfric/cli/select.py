@@ -134,15 +134,15 @@ def select(
             workers=cpu_count() or 1 if workers is None else workers,
             progress=lambda _, share: tell(share),
         )
+    output.emit_json(found.to_dict(), json)
+    if json != "-":
+        show_choice(found)
+    if csv:
+        found.to_csv(csv)
     if plot:
         found.plot(plot)
     if html:
         found.to_html(html)
-    if csv:
-        found.to_csv(csv)
-    output.emit_json(found.to_dict(), json)
-    if json != "-":
-        show_choice(found)
     output.say_written(plot, html, csv, json)
     if found.interrupted:
         raise SolveError("select: interrupted", Status.INTERRUPTED, found)

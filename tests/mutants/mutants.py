@@ -4,6 +4,7 @@ Where the line of a mutant is rewritten, rewrite the mutant: `tests/test_mutants
 """
 
 from mutants.beside import BESIDE
+from mutants.chosen import CHOSEN
 from mutants.compensated import COMPENSATED
 from mutants.derivatives import DERIVATIVES
 from mutants.devices import DEVICES
@@ -352,7 +353,8 @@ LEFT_OUT = (
 
 MUTANTS = (
     *CONTROLLERS, *EVENT, *FITS, *CONSISTENT, *TRANSCRIPTION, *EMIT, *DIFFERENTIAL_ALGEBRAIC,
-    *BESIDE, *CACHES, *COMPENSATED, *DEVICES, *DRY, *EMITTED, *ENSEMBLES, *EXPORTED,
+    *BESIDE,
+    *CHOSEN, *CACHES, *COMPENSATED, *DEVICES, *DRY, *EMITTED, *ENSEMBLES, *EXPORTED,
     *GENERATED, *LEFT_OUT, *LOOPS, *DERIVATIVES, *MACHINES, *PICTURED, *PLANTS, *RESULTS, *ROBOTS,
     *SHOWN, *SOLVERS,
 )  # fmt: skip

@@ -1,0 +1,29 @@
+"""Mutants of the choice of a law."""
+
+from mutants.mutant import Mutant
+
+FOLDER = "symfric/choice"
+TESTS = ("tests/symfric/choice/test_select.py",)
+
+CHOSEN = (
+    Mutant(
+        "the peak of a smooth law is lower than the static level", f"{FOLDER}/softness.py",
+        "return peaked(law, self.mu_s, self.load)", "return law", TESTS,
+    ),
+    Mutant(
+        "a law that is far off is ranked", f"{FOLDER}/measured.py",
+        "not row.error <= task.accuracy", "not row.error <= 100 * task.accuracy", TESTS,
+    ),
+    Mutant(
+        "nobody asks what a law shows", f"{FOLDER}/needs.py",
+        "if NEEDS[word][0] not in shown]", "if NEEDS[word][0] in ()]", TESTS,
+    ),
+    Mutant(
+        "every fixed step holds", f"{FOLDER}/fixed_step.py",
+        "if not (off <= share).all():", "if (off > 1e9).all():", TESTS,
+    ),
+    Mutant(
+        "J+S takes laws that show pre-sliding, too", f"{FOLDER}/jing_mi.py",
+        'needs == "JS",', '"JS" in needs,', ("tests/symfric/choice/test_jing_mi.py",),
+    ),
+)  # fmt: skip
