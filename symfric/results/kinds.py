@@ -8,6 +8,7 @@ from symfric.model import Model
 from symfric.model.kinds import CONSTRAINTS, ENERGY, FRICTION, INPUT, POSITION
 
 LENGTHS, FORCES, POWER = ("m", "rad"), ("N", "N m"), "W"
+SPEEDS = {"m/s", "rad/s"}
 
 
 def is_mechanism(model: Model) -> bool:
@@ -52,7 +53,8 @@ class Group:
 def main(model: Model, units: dict[str, str]) -> list[Group]:
     """What a run is about: positions, friction, and energy or, without books of it, power.
 
-    Empty where the model has neither positions nor friction.
+    Speeds instead of positions where no state is a position, as in a clutch. Empty where the model
+    has neither positions nor friction.
 
     Args:
         model: whose signals they are.
@@ -66,12 +68,15 @@ def main(model: Model, units: dict[str, str]) -> list[Group]:
     forces = [n for n, u in units.items() if u in FORCES and (kind.get(n) == FRICTION or n in rubs)]
     if not (places or forces):
         return []
+    rates = {v.unit for v in model.x if v.name not in own} & SPEEDS
+    speeds = [n for n, u in units.items() if u in rates and n not in own and not kind.get(n)]
     energies = [n for n in units if kind.get(n) == ENERGY]
     powers = [] if energies else [n for n in model.outputs if units.get(n) == POWER]
     return [
         group
         for title, names in (
             ("position", places),
+            ("speed", [] if places else speeds),
             ("friction", forces),
             ("energy", energies),
             ("power of friction", powers),

@@ -7,6 +7,7 @@ import pytest
 
 from symfric import Coulomb, ExactCoulomb, Linear, LuGre, Viscous, simulate
 from symfric.integrator import Input
+from symfric.results.kinds import main
 from symfric.scenes import Clutch
 
 J_1, J_2, T_1, T_2, W = 0.2, 0.64, 100.0, 20.0, 150.0
@@ -83,3 +84,9 @@ def test_an_open_clutch_has_its_drag_alone_also_below_zero() -> None:
     with pytest.raises(ValueError, match="expected a normal force above 0 N"):
         Clutch(LuGre(), N_0=0.0).model()
     assert simulate(Clutch(Viscous(), N_0=0.0).model(), 0.01).status.ok
+
+
+def test_a_picture_shows_speeds_where_nothing_is_a_position() -> None:
+    model = Clutch(Coulomb()).model()
+    groups = main(model, {name: unit for name, unit in simulate(model, 0.01).units.items()})
+    assert (groups[0].title, set(groups[0].names)) == ("speed", {"w_rel", "w_1", "w_2"})
