@@ -35,6 +35,9 @@ from symfric.multibody.slips import Slip, depends_on_load, events, keeps_deflect
 from symfric.multibody.topology import Topology
 from symfric.multibody.units import constraint_units, multiplier_units
 
+AT_REST = 1e-9
+"""Sliding velocity [m/s] below which a law without a velocity scale rests in pictures: by modes it
+is exact but for rounding."""
 Details = Callable[[ca.SX, Put], Mapping[str, Output]]
 Drawn = Callable[[Mapping[str, float]], Sketch]
 
@@ -152,7 +155,7 @@ def _model(
         return ca.substitute(known, [eq.a], [mechanics.explicit[0]])
 
     scales = [(s, x) for s in contacts if np.isfinite(x := _scale(s, p))]
-    names = {s.contact.name: x for s, x in scales}
+    names = {s.contact.name: AT_REST for s in contacts} | {s.contact.name: x for s, x in scales}
     return Model(
         name=machine.name,
         x=(

@@ -10,7 +10,16 @@ from matplotlib.animation import FFMpegWriter
 from matplotlib.colors import to_hex
 from PIL import Image
 
-from symfric import BrownMcPhee, Model, Trajectory, Variable, rabinowicz, simulate
+from symfric import (
+    BrownMcPhee,
+    ExactCoulomb,
+    Law,
+    Model,
+    Trajectory,
+    Variable,
+    rabinowicz,
+    simulate,
+)
 from symfric.multibody import Mechanism, Prismatic
 from symfric.results.animation import SLIDES, STICKS, check_format, frame_times, picture
 from symfric.scenes import MECHANISMS, DrillString, Pendulum, Prescribed
@@ -167,9 +176,10 @@ def test_spatial_mechanisms_have_one_scale_on_three_axes(runs: dict[str, Traject
     assert spans / spans.max() == pytest.approx(box / box.max())
 
 
-def test_time_and_speed_stand_above_and_joints_show_whether_they_stick() -> None:
+@pytest.mark.parametrize("law", [BrownMcPhee(v_t=0.02), ExactCoulomb()], ids=["smooth", "exact"])
+def test_time_and_speed_stand_above_and_joints_show_whether_they_stick(law: Law) -> None:
     """From rest at 1 rad: the hinge sticks first and slides then."""
-    run = simulate(Pendulum(BrownMcPhee(v_t=0.02)).model(), 0.5)
+    run = simulate(Pendulum(law).model(), 0.5)
     figure, show = picture(run, np.array([0.0, 0.5]), speed=0.1)
     (axis,) = figure.axes
     fills: list[str] = []
