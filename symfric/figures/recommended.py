@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import floor, inf, isfinite, log, log10
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, final
 
 import numpy as np
@@ -22,7 +23,7 @@ from symfric.figures.regularisation import (
 )
 from symfric.foundation import checks
 from symfric.foundation.parameters import parameters
-from symfric.foundation.shown import Shown
+from symfric.foundation.shown import WIDTH, Showing, Shown
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.equations.inputs import Input
 from symfric.laws import Law
@@ -49,7 +50,7 @@ FINEST = 1e-11
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Recommendation:
+class Recommendation(Showing):
     """A law as smooth as a wanted error allows.
 
     Attributes:
@@ -90,11 +91,13 @@ class Recommendation:
             f"({self.wanted:g} wanted) at rtol = {self.rtol:g}, in {self.steps} steps"
         )
 
-    def __repr__(self) -> str:
-        return f"<Recommendation {self}>"
+    def shown(self) -> Shown:
+        """What was found, in a sentence."""
+        return Shown("recommended", tuple(wrap(str(self), WIDTH)))
 
-    def _repr_html_(self) -> str:
-        return Shown("recommended", (str(self),)).html(self.plot())
+    def thumbnail(self) -> "Figure":
+        """The curve."""
+        return self.plot()
 
     def plot(self, path: str | Path | None = None) -> "Figure":
         """Draw the curve; save it to `path` if given."""

@@ -17,12 +17,12 @@ SHORT = 8
 """Numbers that are written out."""
 
 
-def brief(thing: Any, /) -> str:
+def brief(self: Any) -> str:
     """Class and fields of a dataclass, a line each, within a screen."""
-    lines = [f"  {item.name}: {told(getattr(thing, item.name))}" for item in fields(thing)]
+    lines = [f"  {item.name}: {told(getattr(self, item.name))}" for item in fields(self)]
     if len(lines) > HEIGHT - 2:
         lines = [*lines[: HEIGHT - 2], f"  ... {len(lines) - HEIGHT + 2} more"]
-    return "\n".join([f"<{type(thing).__name__}", *(cut(line, WIDTH - 1) for line in lines)]) + ">"
+    return "\n".join([f"<{type(self).__name__}", *(cut(line, WIDTH - 1) for line in lines)]) + ">"
 
 
 def told(value: Any) -> str:

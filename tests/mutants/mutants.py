@@ -14,6 +14,7 @@ from mutants.ensembles import ENSEMBLES
 from mutants.exported import EXPORTED
 from mutants.fits import FITS
 from mutants.generated import GENERATED
+from mutants.held import HELD
 from mutants.loops import LOOPS
 from mutants.machines import MACHINES
 from mutants.mutant import Mutant
@@ -356,5 +357,5 @@ MUTANTS = (
     *BESIDE,
     *CHOSEN, *CACHES, *COMPENSATED, *DEVICES, *DRY, *EMITTED, *ENSEMBLES, *EXPORTED,
     *GENERATED, *LEFT_OUT, *LOOPS, *DERIVATIVES, *MACHINES, *PICTURED, *PLANTS, *RESULTS, *ROBOTS,
-    *SHOWN, *SOLVERS,
+    *HELD, *SHOWN, *SOLVERS,
 )  # fmt: skip

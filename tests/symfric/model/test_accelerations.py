@@ -19,18 +19,22 @@ def test_every_scene_has_the_accelerations_of_its_positions() -> None:
         model = scene.model()
         run = simulate(model, 0.2, u=given, rtol=1e-8, samples=5)
         found = [n for n in run.details if n.endswith("_acc")]
-        assert len(found) >= 1, name
+        moves = {v.unit for v in model.x} & {"m/s", "rad/s"}
+        assert bool(found) is bool(moves), name
         assert all(run.details[n] in ("m/s^2", "rad/s^2") for n in found), name
         h, t = 1e-6, np.linspace(0.02, 0.18, 23)
-        states = [v.name for v in model.x]
-        half = states.index(states[0]) + len(found)  # coordinates stand first, then their rates
-        rates = dict(zip(found, states[half:], strict=False))
-        after, before = run.at(t + h), run.at(t - h)
-        for n, rate in rates.items():
-            slope = (after[rate] - before[rate]) / (2 * h)
+        here, after, before = run.at(t), run.at(t + h), run.at(t - h)
+        slopes = {v.name: (after[v.name] - before[v.name]) / (2 * h) for v in model.x}
+        for n in found:  # the rate of q is the state that is the slope of q, whatever it is called
+            q = n.removesuffix("_acc")
+            speeds = [v.name for v in model.x if run.units[v.name] in ("m/s", "rad/s")]
+            if q in speeds:  # of nothing that is a state
+                rate = q
+            else:
+                rate = min(speeds, key=lambda r: float(np.abs(here[r] - slopes[q]).max()))
             wanted = run.of(model.expression(n), t)
             scale = max(1.0, float(np.abs(wanted).max()))
-            assert np.abs(slope - wanted).max() < 2e-3 * scale, (name, n)
+            assert np.abs(slopes[rate] - wanted).max() < 2e-3 * scale, (name, n, rate)
 
 
 def test_the_acceleration_of_the_block_is_what_newton_says() -> None:

@@ -1,0 +1,51 @@
+"""Mutants of what is kept and shown: packs, stored runs, states given to laws, accelerations."""
+
+from mutants.mutant import Mutant
+
+PACKED = "symfric/foundation/packed.py"
+STORED = "symfric/integrator/stored.py"
+T_PACKED = ("tests/symfric/foundation/test_packed.py",)
+T_STORED = ("tests/symfric/integrator/test_stored.py",)
+T_SHOWN = ("tests/symfric/foundation/test_shown.py",)
+T_ACCELERATIONS = ("tests/symfric/model/test_accelerations.py",)
+
+HELD = (
+    Mutant(
+        "a file may name classes of anybody", PACKED,
+        'if self._own is not None and place.split(".")[0] not in OWN:', "if False:", T_PACKED,
+    ),
+    Mutant(
+        "a file of another version is read", PACKED,
+        'if about["format"] != form:', "if False:", T_STORED,
+    ),
+    Mutant(
+        "shared objects become several", PACKED,
+        "if id(value) in self._known:", "if False:", T_PACKED,
+    ),
+    Mutant(
+        "a stored run forgets its events", STORED,
+        "happened=list(self.happened)", "happened=[]", T_STORED,
+    ),
+    Mutant(
+        "a stored model has no further results", "symfric/model/model.py",
+        'state["details"] = Given(dict(self.further))', 'state["details"] = Given({})', T_STORED,
+    ),
+    Mutant(
+        "names of a user are no text in a page", "symfric/foundation/shown.py",
+        'f"{escape(text)}</{mark}>"', 'f"{text}</{mark}>"', T_SHOWN,
+    ),
+    Mutant(
+        "a law takes more states than it has", "symfric/laws/base/given.py",
+        "if rows != len(law.states):", "if rows < len(law.states):",
+        ("tests/symfric/laws/base/test_given.py",),
+    ),
+    Mutant(
+        "an acceleration is the rate", "symfric/model/accelerations.py",
+        "Output(model.ode[r], unit", "Output(model.ode[k], unit", T_ACCELERATIONS,
+    ),
+    Mutant(
+        "deflections follow the load", "symfric/laws/composed/normalised.py",
+        "        return self.N_0\n", "        return N\n",
+        ("tests/symfric/laws/composed/test_normalised.py",),
+    ),
+)  # fmt: skip
