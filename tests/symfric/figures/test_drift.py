@@ -42,6 +42,7 @@ def test_the_block_is_pushed_below_break_away_at_first_and_in_the_end() -> None:
     assert F_e.min() == pytest.approx(0.2 * 0.7848, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_mean_over_two_periods_drifts_with_lugre_and_stays_with_gms() -> None:
     data = compare(["lugre", "gms"], "drift")
     assert data.panels == (("t", "x_mean"),)

@@ -162,6 +162,7 @@ def test_one_colour_a_law_one_line_style_a_case() -> None:
     assert drawn.axes[0].get_title(loc="left") == "not drawn: steady"
 
 
+@pytest.mark.slow
 def test_of_many_laws_the_first_and_last_case_are_drawn_and_all_are_in_the_data() -> None:
     data = compare(["lugre", "gms", "dahl"], "hysteresis")
     drawn, said = clear(data.curves)

@@ -27,6 +27,7 @@ def test_figures_are_unknown_to_pyplot_and_change_no_settings() -> None:
     assert dict(mpl.rcParams) == before
 
 
+@pytest.mark.slow
 def test_drawing_does_not_even_import_pyplot() -> None:
     code = (
         "import sys; from symfric import LuGre, rabinowicz, simulate\n"

@@ -120,6 +120,7 @@ def test_of_compared_mechanisms_energy_is_the_sum(four_mass: Trajectory) -> None
     assert (first.is_dashed(), second.is_dashed()) == (False, True)
 
 
+@pytest.mark.slow
 def test_six_joints_are_three_panels() -> None:
     run = simulate(Arm(BrownMcPhee()).model(), 0.01, samples=3)
     figure = run.plot()
