@@ -70,14 +70,16 @@ def _of_times(found: "PaperComparison") -> str:
         return ""
     count = found.t_end / STEP
     steps = [row.explicit_step for row in found.rows if row.explicit_step]
-    able = (
-        f"; explicit steps of {min(steps):g} to {max(steps):g} s follow within 5 % for "
-        f"{len(steps)} of {len(found.rows)} laws"
-    )
+    able = "; no explicit method takes this machine, whose reactions are unknowns of its equations"
+    if steps:
+        able = (
+            f"; explicit steps of {min(steps):g} to {max(steps):g} s follow within 5 % for "
+            f"{len(steps)} of {len(found.rows)} laws"
+        )
     return (
         f"T: the table of the machine says Runge-Kutta with steps of {STEP:g} s, which are "
         f"{count:.1g} steps, {1e9 * min(printed) / count:.0f} ns each in the fastest run; the text "
-        f"says ode15s, which chooses its steps{able if steps else ''}. Printed times span a factor "
+        f"says ode15s, which chooses its steps{able}. Printed times span a factor "
         f"of {max(printed) / min(printed):.0f}, ours at equal error "
         f"{max(ours) / min(ours):.0f}. Processor and program are not named."
     )

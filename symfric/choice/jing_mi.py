@@ -56,8 +56,8 @@ SAMPLES = 20001
 """Equally spaced positions for S."""
 RTOL, ATOL = 1e-3, 1e-8
 """Of the peer: the text says ode15s with an absolute error of 1e-8, whose default is 1e-3."""
-WORK = 4_000_000_000
-"""CasADi instructions that a run may take, some ten seconds."""
+WORK = 1_000_000_000
+"""CasADi instructions that a run may take, some three seconds."""
 PATIENCE = 30.0
 """Processor time [s] that the peer may take."""
 
