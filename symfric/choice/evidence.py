@@ -78,7 +78,7 @@ def _of_times(found: "PaperComparison") -> str:
         )
     return (
         f"T: the table of the machine says Runge-Kutta with steps of {STEP:g} s, which are "
-        f"{count:.1g} steps, {1e9 * min(printed) / count:.0f} ns each in the fastest run; the text "
+        f"{count:.2g} steps, {1e9 * min(printed) / count:.0f} ns each in the fastest run; the text "
         f"says ode15s, which chooses its steps{able}. Printed times span a factor "
         f"of {max(printed) / min(printed):.0f}, ours at equal error "
         f"{max(ours) / min(ours):.0f}. Processor and program are not named."
