@@ -36,6 +36,7 @@ from identification.result.fitted import Fitted
 from identification.result.live import Kind
 from identification.solving.many_starts import Progress
 from symfric.foundation import checks
+from symfric.foundation.shown import Shown, Table
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import Law
 from symfric.laws.cost import cost
@@ -143,6 +144,26 @@ class Ranking:
                 f"{operations:>4}  {row.status}"
             )
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction]
+        """What a notebook shows: the table and its picture."""
+        header = ("law", "validation", "fit", "AICc", "BIC", "parameters", "status", "")
+        rows = tuple(
+            (
+                row.law,
+                *map(percent, (row.validation, row.fitted)),
+                *map(_number, (row.aicc, row.bic)),
+                str(row.parameters),
+                row.status or "not fitted",
+                row.sentence,
+            )
+            for row in self.rows
+        )
+        drawn = any(row.fit is not None for row in self.rows)
+        shown = Shown(
+            f"laws on {self.data}: {self.how}", table=Table(header, rows, (1, 2, 3, 4, 5))
+        )
+        return shown.html(self.plot() if drawn else None)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but the fits as plain data."""

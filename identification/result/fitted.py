@@ -17,11 +17,12 @@ from identification.result.live import Live
 from identification.result.page import Ranking, page_of
 from identification.result.series import Series
 from identification.result.stored import read, to_dict
-from identification.result.text import text_of
+from identification.result.text import sentences, text_of
 from identification.verdict.judge import Verdict
 from identification.verdict.profile import Profile, profile
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Parametric
+from symfric.foundation.shown import Shown, Table
 from symfric.foundation.status import Status
 from symfric.laws import Law
 from symfric.model import Model
@@ -102,6 +103,14 @@ class Fitted:
 
     def __repr__(self) -> str:
         return f"<Fitted {self.name}: {self.status.name}>"
+
+    def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction]
+        """What a notebook shows: verdict, what was fitted, the pictures."""
+        named = [(n, e) for n, e in self.parameters.items() if not (e.fixed or e.nuisance)]
+        rows = tuple((n, *map(_told, (e.value, e.low, e.high)), e.unit) for n, e in named)
+        table = Table(("parameter", "value", "95 % from", "to", "unit"), rows, (1, 2, 3))
+        title = f"{self.name} fitted by {self.kind}: {self.status.name}"
+        return Shown(title, tuple(sentences(self)), table).html(self.plot())
 
     @property
     def values(self) -> dict[str, float]:
@@ -198,3 +207,8 @@ class Fitted:
             ValueError: no such file, one that something else wrote, or one of a later version.
         """
         return read(Fitted, path, own)
+
+
+def _told(value: float | None) -> str:
+    """Six digits; a dash for none."""
+    return "–" if value is None else f"{value:.6g}"

@@ -19,6 +19,7 @@ from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
 from symfric.foundation.files import write_text, written
 from symfric.foundation.parameters import check_names
+from symfric.foundation.shown import Shown
 from symfric.foundation.status import Status
 from symfric.results.trajectory import Trajectory
 
@@ -111,6 +112,11 @@ class Solution:
             f"<Solution of '{self.problem.name}': {self.status.name}, J = {self.cost:.6g}, "
             f"T = {self.T:.6g} s{checked}>"
         )
+
+    def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction]
+        """What a notebook shows: what was found, and the motion."""
+        title = f"Solution of '{self.problem.name}': {self.status.name}"
+        return Shown(title, tuple(str(self).splitlines())).html(self.plot())
 
     def __str__(self) -> str:
         """What was found, in a few lines."""

@@ -171,3 +171,9 @@ def test_it_tells_itself_in_a_few_lines(move: Solution) -> None:
     assert repr(told.stored).startswith("<Stored solution of 'drive': SOLVED, J = 0.4")
     phases = str(solve_once(there_and_back(), 4)).splitlines()[1]
     assert phases.endswith("T = 2 s (out 1 s, back 1 s)")
+
+
+def test_a_notebook_shows_the_motion_in_a_picture(move: Solution) -> None:
+    page = move._repr_html_()
+    assert page.count("data:image/png;base64,") == 1
+    assert f"J = {move.cost:.6g}" in page
