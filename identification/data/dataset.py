@@ -9,7 +9,7 @@ from identification.data.check import check
 from identification.data.findings import Findings
 from identification.data.frames import ASSUMED, columns_of
 from identification.data.merge import merged
-from identification.data.raw import Wanted, record
+from identification.data.raw import Missing, Wanted, record
 from identification.data.reading import Paths, files, read_records
 from identification.data.record import Record
 from identification.data.repair import scaled, unwrapped, without_spikes
@@ -62,6 +62,7 @@ class Dataset:
         step: float | None = None,
         variable: str | None = None,
         points: bool = False,
+        missing: Missing = "refuse",
     ) -> "Dataset":
         """Records from files: CSV and other text, `.mat` up to version 7, `.npz`, `.npy`.
 
@@ -84,11 +85,13 @@ class Dataset:
             step: sample interval [s] of files without a time.
             variable: struct, matrix or deeper part of a `.mat` or `.npz` file: "run(2).log".
             points: rows are points (v, F) of a friction curve; no time is needed.
+            missing: "drop" leaves out rows in which a channel has no number (an empty cell, NaN);
+                `resampled` then makes the intervals equal and cuts at long gaps.
 
         Raises:
             ValueError: what cannot be used, with file, row and column; of several files all.
         """
-        wanted = Wanted(columns, units, step, checks.flag("read: points", points))
+        wanted = Wanted(columns, units, step, checks.flag("read: points", points), None, missing)
         found = read_records(paths, wanted, variable)
         pattern = paths if isinstance(paths, str) and len(files(paths)) > 1 else ""
         return cls(found, pattern)
@@ -103,6 +106,7 @@ class Dataset:
         columns: Mapping[str, str] | None = None,
         step: float | None = None,
         points: bool = False,
+        missing: Missing = "refuse",
         name: str = "data",
         **arrays: object,
     ) -> "Dataset":
@@ -113,7 +117,7 @@ class Dataset:
 
         Args:
             frame: what holds the columns: a mapping or a frame.
-            units, columns, step, points: as in `read`.
+            units, columns, step, points, missing: as in `read`.
             name: of the record.
             arrays: further columns by name.
 
@@ -123,7 +127,8 @@ class Dataset:
         checks.text("Dataset.of: name", name)
         raw, framed = columns_of(name, frame, arrays)
         assumed = None if framed else ASSUMED
-        wanted = Wanted(columns, units, step, checks.flag("Dataset.of: points", points), assumed)
+        pairs = checks.flag("Dataset.of: points", points)
+        wanted = Wanted(columns, units, step, pairs, assumed, missing)
         return cls((record(raw, wanted),), name)
 
     def __iter__(self) -> Iterator[Record]:

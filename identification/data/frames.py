@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.data.raw import Array, Column, Raw, label
+from identification.data.raw import Array, Column, Raw, label, only_gaps
 from symfric.foundation import checks
 
 ASSUMED = {"t": "s", "x": "m", "v": "m/s", "a": "m/s^2", "force": "N", "F": "N", "N": "N"}
@@ -80,7 +80,9 @@ def _column(where: str, key: str, values: object) -> Column:
             numbers[k] = number
     else:
         problem = f"sample 0: expected a number, got {checks.shown(found[0])}" if found.size else ""
-    return Column(name, said, numbers, problem or _problem(numbers))
+    return Column(
+        name, said, numbers, problem or _problem(numbers), not problem and only_gaps(numbers)
+    )
 
 
 def _problem(values: Array) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from identification.data.loop import PositionLoop
 from identification.data.mat_bytes import variables
-from identification.data.raw import Array, Column, Raw, label
+from identification.data.raw import Array, Column, Raw, label, only_gaps
 from identification.data.record import Record
 
 EMPS = ("t", "qm", "vir", "gtau")
@@ -133,7 +133,7 @@ def _matrix(name: str, value: Array) -> Raw:
     """The columns of a matrix; one that lies on its side is turned."""
     if value.shape[0] < value.shape[1]:
         value = value.T
-    columns = (Column("", "", c, _problem(c)) for c in value.T)
+    columns = (Column("", "", c, _problem(c), only_gaps(c)) for c in value.T)
     return Raw(name, tuple(columns))
 
 
@@ -156,7 +156,7 @@ def _raw(where: str, name: str, variables: Mapping[str, Node]) -> Raw:
             problem = f"expected {usual} numbers as in the others, got {value.size}"
             columns.append(Column(text, said, np.full(usual, np.nan), problem))
         else:
-            columns.append(Column(text, said, value, _problem(value)))
+            columns.append(Column(text, said, value, _problem(value), only_gaps(value)))
     return Raw(name, tuple(columns))
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from re import fullmatch
-from typing import TypeVar, final
+from typing import Literal, TypeVar, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from symfric.foundation import checks
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
+Missing = Literal["refuse", "drop"]
 
 ALIASES: Mapping[str, tuple[str, ...]] = {
     "t": ("t", "time", "timestamp"),
@@ -29,6 +30,8 @@ POINTS: Mapping[str, tuple[str, ...]] = {
     "N": ("N", "normal", "normal_force"),
 }
 """The same of points."""
+OF_GAPS = "missing='drop' (--missing drop) leaves out rows without a number"
+"""What to do about cells that hold nothing."""
 SKIPPED = ("", "-", "_")
 """Names in `columns` of columns that are not wanted."""
 
@@ -43,12 +46,14 @@ class Column:
         unit: what the file says, "" for nothing.
         values: its numbers, NaN where there is none, shape (n,).
         problem: what its first bad cell is, with its place; "" where all are numbers.
+        gaps: whether cells that hold nothing (or NaN) are all that is wrong.
     """
 
     label: str
     unit: str
     values: Array
     problem: str = ""
+    gaps: bool = False
 
 
 @final
@@ -80,6 +85,7 @@ class Wanted:
         step: sample interval of records without a time [s].
         points: whether the rows are points without time.
         assumed: units of canonical channels about which nobody says anything.
+        missing: what happens to rows in which a channel has no number, "refuse" or "drop".
     """
 
     columns: Mapping[str, str] | Sequence[str] | None = None
@@ -87,6 +93,15 @@ class Wanted:
     step: float | None = None
     points: bool = False
     assumed: Mapping[str, str] | None = None
+    missing: Missing = "refuse"
+
+    def __post_init__(self) -> None:
+        checks.choice("read: missing", self.missing, ("refuse", "drop"))
+
+
+def only_gaps(values: Array) -> bool:
+    """Whether some samples are NaN, and no others are bad."""
+    return bool(np.isnan(values).any()) and not bool(np.isinf(values).any())
 
 
 def label(cell: str) -> tuple[str, str]:
@@ -127,10 +142,12 @@ def record(raw: Raw, wanted: Wanted) -> Record:
     asked = wanted.columns.keys() if isinstance(wanted.columns, Mapping) else set[str]()
     needed = {*asked, *({"v", "F"} if wanted.points else KINDS)}
     given = _units(where, named, wanted)
+    rows = _rows(where, raw, {key: c for key, c in named.items() if key in needed}, wanted)
     problems: list[str] = []
     signals, units, left_out = dict[str, Array](), dict[str, str](), dict[str, str]()
     for key, column in named.items():
-        if column.problem:
+        values = column.values[rows]
+        if column.problem and not (column.gaps and np.isfinite(values).all()):
             if key in needed:
                 problems.append(f"column '{_shown(column)}', {column.problem}")
             left_out[column.label] = column.problem
@@ -140,22 +157,41 @@ def record(raw: Raw, wanted: Wanted) -> Record:
         except ValueError as error:
             problems.append(str(error))
             continue
-        signals[key] = factor * column.values
+        signals[key] = factor * values
     if problems:
         silent = any(problem.endswith("got none") for problem in problems)
         hint = "; say it in the call: units='m, N', units='rad, N m' or units={'x': 'mm'}" * silent
+        empty = any(named[key].gaps for key in named if key in needed)
+        hint += f"; {OF_GAPS}" * (empty and wanted.missing == "refuse")
         raise ValueError(f"{where}: " + "; ".join(problems) + hint)
-    t = _time(where, raw, signals, wanted)
+    t = _time(where, raw, signals, wanted, rows)
     signals.pop("t", None)
+    if not signals and left_out:
+        why = "; ".join(f"column '{name}', {bad}" for name, bad in left_out.items())
+        raise ValueError(f"{where}: expected a column of numbers beside the time, got none: {why}")
     return Record(
         raw.name,
         t,
         signals,
         {key: units[key] for key in signals},
-        first_row=raw.first_row,
+        first_row=raw.first_row if rows.all() else 0,
         columns={k: c.label for k, c in named.items() if c.label not in (k, "") and k in signals},
         left_out=left_out,
     )
+
+
+def _rows(where: str, raw: Raw, needed: Mapping[str, Column], wanted: Wanted) -> NDArray[np.bool_]:
+    """Which rows are taken: all, or those in which every needed channel has a number."""
+    taken = np.ones(max((c.values.size for c in raw.columns), default=0), dtype=np.bool_)
+    columns = [c for c in needed.values() if c.gaps]
+    if wanted.missing == "refuse" or not columns:
+        return taken
+    for column in columns:
+        taken &= np.isfinite(column.values)
+    if not taken.any():
+        names = ", ".join(f"'{_shown(c)}'" for c in columns)
+        raise ValueError(f"{where}: expected a row with numbers in {names}, got none")
+    return taken
 
 
 def _shown(column: Column) -> str:
@@ -257,7 +293,9 @@ def _scale(key: str, column: Column, given: str, wanted: Wanted) -> tuple[float,
     return meant.factor, meant.si
 
 
-def _time(where: str, raw: Raw, signals: Mapping[str, Array], wanted: Wanted) -> Array | None:
+def _time(
+    where: str, raw: Raw, signals: Mapping[str, Array], wanted: Wanted, rows: NDArray[np.bool_]
+) -> Array | None:
     if wanted.points:
         return None
     if wanted.step is not None:
@@ -267,12 +305,15 @@ def _time(where: str, raw: Raw, signals: Mapping[str, Array], wanted: Wanted) ->
                 "name it '-' in columns"
             )
         step = checks.number(f"{where}: step", wanted.step, unit="s", above=0.0)
-        return step * np.arange(raw.columns[0].values.size, dtype=np.float64)
+        return step * np.flatnonzero(rows).astype(np.float64)
     if "t" not in signals:
         have = ", ".join(_shown(c) for c in raw.columns)
+        timed = [c.label for c in raw.columns if c.unit and getattr(unit(c.unit), "si", "") == "s"]
+        name = timed[0] if len(timed) == 1 else "..."
         raise ValueError(
             f"{where}: expected a column of time 't [s]', got {have}; name it with "
-            "columns={'t': ...}, give step= [s] for equally spaced samples, or points=True"
+            f"columns={{'t': '{name}'}} (--column t={name}), give step= [s] (--step) for equally "
+            "spaced samples, or points=True"
         )
     return signals["t"]
 

@@ -198,7 +198,7 @@ class Record:
             raise ValueError(
                 f"data '{self.name}': column t, {self.place(k + 1)}: expected equal intervals of "
                 f"{self.step:.6g} s to {JITTER:.0%}, got {intervals[k]:.6g} s at t = {t[k]:.6g} s; "
-                "use data.resampled()"
+                "use data.resampled() (--resample)"
             )
         return self
 

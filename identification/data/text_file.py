@@ -17,6 +17,8 @@ from symfric.foundation.files import written
 COMMENTS = ("#", "%", "//")
 """What a line begins with that says something about the file."""
 DELIMITERS = ("\t", ";", ",", " ")
+EMPTY = ("", "-", "na", "n/a", "null")
+"""Cells that say that there is no number, beside NaN."""
 LOOKED_AT = 40
 """Lines at the end of the file that tell the delimiter."""
 
@@ -71,9 +73,9 @@ def read_text(file: Path) -> Raw:
             )
     columns: list[Column] = []
     for k in range(width):
-        values, problem = _column(body, numbers, k, comma)
+        values, problem, gaps = _column(body, numbers, k, comma)
         name, said = label(names[k]) if names else ("", "")
-        columns.append(Column(name, said or (units[k] if units else ""), values, problem))
+        columns.append(Column(name, said or (units[k] if units else ""), values, problem, gaps))
     return Raw(file.name, tuple(columns), numbers[0])
 
 
@@ -205,24 +207,33 @@ def _trimmed(row: Sequence[str]) -> int:
 
 def _column(
     body: Sequence[Sequence[str]], numbers: Sequence[int], index: int, comma: bool
-) -> tuple[Array, str]:
-    """One column as numbers, and a sentence about its first bad cell, if any."""
+) -> tuple[Array, str, bool]:
+    """One column as numbers, a sentence about its first bad cell, whether all such are empty."""
     cells = [row[index] if index < len(row) else "" for row in body]
     if comma:
         cells = [cell.replace(",", ".") if cell.count(",") == 1 else cell for cell in cells]
     values = np.full(len(cells), np.nan)
+    problem = ""
     for k, cell in enumerate(cells):
         try:
             values[k] = _number(cell)
         except ValueError:
-            return values, f"row {numbers[k]}: expected a number, got '{cell[:40]}'"
+            problem = problem or f"row {numbers[k]}: expected a number, got '{cell[:40]}'"
+            if cell.lower() not in EMPTY:
+                return values, problem, False
+    gaps = not bool(np.isinf(values).any())
+    if problem:
+        return values, problem, gaps
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
         place = f"row {numbers[int(bad[0])]}"
-        return values, f"{place}: expected a finite number, got {cells[int(bad[0])][:40]}" + (
-            f" ({bad.size} such cells)" if bad.size > 1 else ""
+        return (
+            values,
+            f"{place}: expected a finite number, got {cells[int(bad[0])][:40]}"
+            + (f" ({bad.size} such cells)" if bad.size > 1 else ""),
+            gaps,
         )
-    return values, ""
+    return values, "", False
 
 
 def to_csv(record: Record, path: Path) -> Path:

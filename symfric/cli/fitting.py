@@ -32,20 +32,24 @@ RULES = {"log": log, "linear": linear}
 @final
 @dataclass(frozen=True)
 class Reading:
-    """How files are read; see `Dataset.read`."""
+    """How files are read, see `Dataset.read`; `resample`: as equal intervals, cut at gaps."""
 
     columns: dict[str, str] | list[str] | None
     units: dict[str, str] | str | None
     step: float | None
     variable: str | None
     points: bool
+    missing: str = "refuse"
+    resample: bool = False
 
     def read(self, paths: Sequence[str]) -> Dataset:
         """The records of the files."""
-        return Dataset.read(
+        missing: Any = self.missing
+        found = Dataset.read(
             list(paths), columns=self.columns, units=self.units, step=self.step,
-            variable=self.variable, points=self.points,
+            variable=self.variable, points=self.points, missing=missing,
         )  # fmt: skip
+        return found.resampled() if self.resample else found
 
 
 def reading(
@@ -54,6 +58,8 @@ def reading(
     step: float | None,
     variable: str | None,
     points: bool,
+    missing: str = "refuse",
+    resample: bool = False,
 ) -> Reading:
     """The texts of --column and --unit: SIGNAL=NAME, repeated, or all columns in their order.
 
@@ -64,7 +70,7 @@ def reading(
     """
     named = _named_or_all("--column", columns, "x=pos", "t,x,-,force")
     timed = step is not None or (named is not None and "t" in named)
-    return Reading(named, _units(units), step, variable, points and not timed)
+    return Reading(named, _units(units), step, variable, points and not timed, missing, resample)
 
 
 def _named_or_all(

@@ -18,7 +18,14 @@ from identification.verdict.profile import Profile
 from symfric import SolveError, Status
 from symfric.cli import completions, output
 from symfric.cli.fitting import KINDS, free_in, kind_of, laws_in, reading
-from symfric.cli.options import JsonOption, PlotOption, check_outputs, numbers
+from symfric.cli.options import (
+    JsonOption,
+    MissingOption,
+    PlotOption,
+    ResampleOption,
+    check_outputs,
+    numbers,
+)
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
 
@@ -64,6 +71,8 @@ def identify(
     variable: Annotated[
         str | None, typer.Option("--variable", help="Struct or matrix in a .mat file.")
     ] = None,
+    missing: MissingOption = "refuse",
+    resample: ResampleOption = False,
     normal_force: Annotated[
         float,
         typer.Option("--normal-force", help="Normal force [N]; with 1 coefficients are forces."),
@@ -108,7 +117,7 @@ def identify(
     check_outputs(report, json, picture=plot)
     laws, wishes = laws_in(law), free_in(free)
     chosen = kind_of(kind, windows, wishes)
-    read = reading(columns, units, step, variable, kind == "points")
+    read = reading(columns, units, step, variable, kind == "points", missing, resample)
     asked: dict[str, Any] = {
         "free": wishes or None,
         "fixed": numbers("--fix", fixed) or None,

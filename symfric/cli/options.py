@@ -19,6 +19,15 @@ JsonOption = Annotated[
     str | None,
     typer.Option("--json", metavar="FILE|-", help="Write JSON; - prints it and nothing else."),
 ]
+MissingOption = Annotated[
+    str,
+    typer.Option(
+        "--missing", metavar="refuse|drop", help="Rows in which a channel has no number: drop them."
+    ),
+]
+ResampleOption = Annotated[
+    bool, typer.Option("--resample", help="Equal intervals; a long gap begins another record.")
+]
 PlotOption = Annotated[
     Path | None, typer.Option("--plot", metavar="FILE.png", help="Write a picture.")
 ]

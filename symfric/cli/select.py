@@ -16,11 +16,20 @@ from symfric.choice.text import LEGEND, lines
 from symfric.cli import completions, output
 from symfric.cli.fitting import Reading, reading
 from symfric.cli.fitting import kind_of as kind_of_residuals
-from symfric.cli.machines import LawOfOption, PresetOption, kind_of
-from symfric.cli.options import JsonOption, PlotOption, SetOption, check_outputs, numbers
+from symfric.cli.machines import LawOfOption, PresetOption, formed, kind_of
+from symfric.cli.options import (
+    JsonOption,
+    MissingOption,
+    PlotOption,
+    ResampleOption,
+    SetOption,
+    assignments,
+    check_outputs,
+)
 from symfric.cli.user_file import function_of_file
 from symfric.figures.requirements import phenomena
-from symfric.foundation.parameters import check_names
+from symfric.foundation import checks
+from symfric.foundation.parameters import check_names, options
 from symfric.laws import ALL_LAWS
 from symfric.scenes import Scene
 
@@ -80,6 +89,8 @@ def select(
         list[str] | None,
         typer.Option("--unit", metavar="SIGNAL=UNIT", help="Unit of a column in the data."),
     ] = None,
+    missing: MissingOption = "refuse",
+    resample: ResampleOption = False,
     normal_force: Annotated[
         float, typer.Option("--normal-force", help="Normal force [N] of the data.")
     ] = 1.0,
@@ -116,7 +127,7 @@ def select(
     machine, friction, candidates = _asked(scene, settings, preset, law_of, law)
     misfits = None
     if data:
-        read = reading(columns, units, None, None, kind == "points")
+        read = reading(columns, units, None, None, kind == "points", missing, resample)
         able = {n: c for n, c in candidates.items() if not lacking(words, phenomena(c))}
         candidates, misfits = fitted(able, read, data, kind, normal_force)
     with output.progress(f"select {scene}") as tell:
@@ -165,35 +176,43 @@ def _asked(
     Raises:
         ValueError: unknown names; numbers that nothing here has.
     """
-    given = numbers("--set", settings)
-    friction = {n: given.pop(n) for n in OF_FRICTION if n in given}
+    given = assignments("--set", settings)
+    friction = _numbers({n: given.pop(n) for n in OF_FRICTION if n in given})
     texts = names or list(ALL_LAWS)
     laws = {text: law_from_text(text) for text in texts}
     for key in [key for key in given if "." in key]:
         of, _, own = key.rpartition(".")
         check_names(f"--set {key}", [of], laws)
-        laws[of] = with_values(laws[of], {own: given.pop(key)})
+        laws[of] = with_values(laws[of], _numbers({own: given.pop(key)}))
     if ".py" in scene:
-        machine: Any = function_of_file("select", scene, "machine", given)
+        machine: Any = function_of_file("select", scene, "machine", _numbers(given))
     else:
         machine = _with(kind_of(scene, preset=preset, law_of=law_of), scene, given)
     levels = Friction(**friction) if friction else None
     return machine, levels, laws
 
 
-def _with(kind: Callable[[Law], Scene], scene: str, values: dict[str, float]) -> Any:
-    """The scene with the numbers of --set that are its own."""
-    if not values:
+def _with(kind: Callable[[Law], Scene], scene: str, texts: dict[str, str]) -> Any:
+    """The scene with the texts of --set that are its own: numbers, forms, what it is made of."""
+    if not texts:
         return kind
-    known = parameters(kind(law_from_text("coulomb")))
-    own = set(parameters(law_from_text("coulomb")))
-    check_names(f"--set of {scene}", values, [n for n in known if n not in own] + [*OF_FRICTION])
+    one = kind(law_from_text("coulomb"))
+    forms = (*options(one), *one.structures())
+    made = {n: text for n, text in texts.items() if n in forms}
+    own = set(parameters(one.law))
+    known = [n for n in parameters(formed(one, made)) if n not in own]
+    check_names(f"--set of {scene}", texts, [*known, *forms, *OF_FRICTION])
+    values = _numbers({n: text for n, text in texts.items() if n not in forms})
 
     def machine(law: Law) -> Scene:
-        return with_values(kind(law), values)
+        return with_values(formed(kind(law), made), values)
 
     machine.__name__ = scene
     return machine
+
+
+def _numbers(texts: dict[str, str]) -> dict[str, float]:
+    return {name: checks.parsed(f"--set {name}", text) for name, text in texts.items()}
 
 
 def fitted(

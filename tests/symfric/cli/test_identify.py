@@ -49,6 +49,20 @@ def found(
     return json.loads(out)
 
 
+def test_empty_cells_and_a_pause_are_read_on_request(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = (folder / "one.csv").read_text().splitlines()
+    rows[50] = rows[50].split(",")[0] + ",,"
+    half = len(rows) // 2
+    del rows[half : half + 30]
+    (tmp_path / "one.csv").write_text("\n".join(rows) + "\n")
+    assert main(["identify", str(tmp_path / "one.csv"), "--law", "coulomb+viscous"]) == 2
+    assert "--missing drop" in capsys.readouterr().err
+    result = found(tmp_path, capsys, "coulomb+viscous", "--missing", "drop", "--resample")
+    assert len(result["records"]) == 2
+
+
 def test_json_holds_the_true_values_inside_their_intervals(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

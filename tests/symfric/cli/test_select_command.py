@@ -42,6 +42,16 @@ def test_a_scene_with_parameters_gives_table_and_files(
     assert sheet.read_text(encoding="utf-8").startswith("law,")
 
 
+def test_what_a_scene_is_made_of_is_set_beside_its_numbers(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    asked = ["select", "drive", "--law", "stribeck", "--t-end", "1", "--set", "m=2", *FAST]
+    assert main([*asked, "--set", "turning=true"]) == 0
+    assert "Simulation: take stribeck" in capsys.readouterr().out
+    assert main([*asked, "--set", "turning=yes"]) == 2
+    assert "--set turning: expected one of true, false" in capsys.readouterr().err
+
+
 def test_a_function_in_a_file_is_a_machine(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
