@@ -202,7 +202,7 @@ def source(own: Equations) -> str:
     model, y, d = own.model, system.y, system.d
     functions: dict[str, ca.Function] = {
         "model_signals": integrator.signals,
-        "model_start": start_function(model.x, model.vector("u"), model.vector("p")),
+        "model_start": start_function(model.x, model.vector("u"), model.vector("p"), model.z),
         "model_rates": integrator.f,
     }
     if own.exchange:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from symfric.foundation import checks
 from symfric.foundation.numeric import evaluate, evaluate_all
 from symfric.foundation.parameters import Variable
-from symfric.foundation.symbols import stacked, symbols_of
+from symfric.foundation.symbols import stacked, starts_of, symbols_of
 
 
 class Starting(ABC):
@@ -20,6 +20,7 @@ class Starting(ABC):
 
     name: str
     x: tuple[Variable, ...]
+    z: tuple[Variable, ...]
     p: tuple[Variable, ...]
     u: tuple[Variable, ...]
 
@@ -41,7 +42,8 @@ class Starting(ABC):
         """Start values of x, shape (nx,), replaced by those `given` by name.
 
         A start value that is an expression (a bristle at steady state depends on the sliding
-        velocity) is evaluated with the given values of the other states and parameters.
+        velocity) is evaluated with the given values of the other states and parameters, and with
+        the start values of algebraic variables.
         """
         if not given and not (p and self._start_by_p):
             if p:
@@ -134,7 +136,7 @@ class Starting(ABC):
     @cached_property
     def _start(self) -> ca.Function:
         """Start values as a Function of (values given, which are given, u, p)."""
-        return start_function(self.x, self.vector("u"), self.vector("p"))
+        return start_function(self.x, self.vector("u"), self.vector("p"), self.z)
 
     @cached_property
     def _start_follows(self) -> bool:
@@ -150,12 +152,18 @@ class Starting(ABC):
         return ca.Function("slopes", arguments, slopes)
 
 
-def start_function(x: Sequence[Variable], u: ca.SX, p: ca.SX) -> ca.Function:
-    """Start values of the states as a Function of (values known, which are known, u, p)."""
+def start_function(
+    x: Sequence[Variable], u: ca.SX, p: ca.SX, z: Sequence[Variable] = ()
+) -> ca.Function:
+    """Start values of the states as a Function of (values known, which are known, u, p).
+
+    Where one depends on algebraic variables `z`, it takes their start values: what solves the
+    equations is known only when the states are.
+    """
     n, states = len(x), symbols_of(x)
     known, chosen = ca.SX.sym("known", n), ca.SX.sym("chosen", n)
     rows = [ca.if_else(chosen[i], known[i], v.start) for i, v in enumerate(x)]
-    values = stacked(rows)
+    values = ca.substitute(stacked(rows), symbols_of(z), starts_of(z))
     for _ in range(2):
         values = ca.substitute(values, states, values)
     arguments = [known, chosen, u, p]

@@ -97,7 +97,7 @@ class Integrator:
     def _event_function(self) -> ca.Function:
         """Event expressions as a Function (t, y, d)."""
         values = stacked(ca.SX(e.expression) for e in self.model.events)
-        return self.of_time("events", ca.densify(values))
+        return self.of_time("events", ca.densify(_solved(self.model, values)))
 
     def _reset_function(self) -> ca.Function:
         """Values of all resets, event after event, as a Function (t, y, d)."""
@@ -300,3 +300,17 @@ class Integrator:
             except CompileError:  # a broken compiler is no reason not to simulate
                 self.prospect.hopeless = True
         return self.vm()
+
+
+def _solved(model: Model, expression: ca.SX) -> ca.SX:
+    """`expression` where the algebraic variables z solve their equations, by one step of Newton's.
+
+    Within a step they do to the tolerance, and behind an event exactly: without this, an event that
+    depends on them may pass through zero a second time there. That of a mechanism is left as it is.
+    """
+    z = model.vector("z")
+    explicit = model.ode is not None and model.holonomic is None and bool(model.z)
+    if not (explicit and ca.depends_on(expression, z)):
+        return expression
+    change = ca.solve(ca.jacobian(model.alg, z), model.alg)
+    return ca.substitute(expression, z, z - change)

@@ -1,0 +1,55 @@
+"""Where states start: numbers, and expressions in what else there is."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric import LuGre, Model, RateAndState, Variable, contact, simulate
+
+LAW = RateAndState(mu_0=0.6, a=0.01, b=0.015, v_0=1e-6, D_c=1e-3)
+PLATE, STRESS, ETA = 1e-9, 50e6, 5e6
+
+
+def fault() -> Model:
+    """A patch without mass: its velocity is an algebraic variable."""
+    load = Variable("load", "Pa", start=3.2e7, nominal=1e7)
+    v = Variable("v", "m/s", start=PLATE, nominal=PLATE)
+    rock = contact("fault", LAW, v.symbol, STRESS)
+    return Model(
+        "fault",
+        x=(load,),
+        z=(v,),
+        ode=3e8 * (PLATE - v.symbol),
+        alg=load.symbol - ETA * v.symbol - rock.force,
+        contacts=(rock,),
+    )
+
+
+def test_a_law_starts_by_the_start_value_of_an_algebraic_velocity() -> None:
+    steady = LAW.steady_state(PLATE, STRESS).item()
+    assert fault().initial_state() == pytest.approx([3.2e7, steady])
+    assert fault().initial_state({"psi": 2.0}) == pytest.approx([3.2e7, 2.0])
+    many, _ = fault().initial_states({"load": np.array([3e7, 3.1e7])}, {}, 2)
+    assert many == pytest.approx(np.array([[3e7, steady], [3.1e7, steady]]))
+
+
+def test_a_fault_without_mass_comes_to_creep_where_the_rock_is_stiff() -> None:
+    end = simulate(fault(), 3e8).final  # 3e8 Pa/m is above (b - a) STRESS / D_c
+    assert end["v"] == pytest.approx(PLATE, rel=1e-3)
+    mu = 0.6 + (0.01 - 0.015) * np.log(PLATE / 1e-6)
+    assert end["load"] == pytest.approx(mu * STRESS, rel=1e-3)
+
+
+def test_a_bristle_starts_by_the_start_value_of_an_algebraic_load() -> None:
+    v, N = Variable("v", "m/s", start=1.0), Variable("N", "N", start=12.0)
+    shoe = contact("shoe", LuGre(mu_s=0.5, mu_d=0.4), v.symbol, N.symbol, least=1.0)
+    brake = Model(
+        "brake",
+        x=(v,),
+        z=(N,),
+        ode=-shoe.force,
+        alg=N.symbol - (10.0 + 0.1 * ca.tanh(v.symbol)),
+        contacts=(shoe,),
+    )
+    law = LuGre(mu_s=0.5, mu_d=0.4)
+    assert brake.initial_state()[1] == pytest.approx(law.steady_state(1.0, 12.0).item())
