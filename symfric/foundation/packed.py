@@ -13,7 +13,7 @@ from enum import Enum
 from functools import partial
 from importlib import import_module
 from io import BytesIO
-from typing import IO, Any, cast, final
+from typing import IO, Any, TypeVar, cast, final
 from zipfile import BadZipFile
 
 import casadi as ca
@@ -38,6 +38,16 @@ class Given:
     def __call__(self) -> Any:
         """It."""
         return self.value
+
+
+T = TypeVar("T")
+
+
+def shallow(thing: T) -> T:
+    """Another object with the same fields, symbols among them; a pickle would have new ones."""
+    made = object.__new__(type(thing))
+    made.__dict__.update(vars(thing))
+    return made
 
 
 def dump(file: IO[bytes], thing: object, kind: str = "", form: int = 0) -> None:

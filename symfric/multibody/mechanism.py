@@ -85,6 +85,10 @@ class Mechanism(Showing):
         """All that was added."""
         return vars(self)
 
+    def __copy__(self) -> "Mechanism":
+        """One with the same symbols."""
+        return packed.shallow(self)
+
     def __reduce__(self) -> tuple[Any, ...]:
         """A pickle holds all that was added; symbols of other objects are others there."""
         return packed.loads, (packed.dumps(self),)

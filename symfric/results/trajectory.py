@@ -335,6 +335,10 @@ class Trajectory(Showing, Derivatives):
             raise ValueError(f"trajectory of '{self.scene}': expected one of simulate, got another")
         return self.keep(self)
 
+    def __copy__(self) -> "Trajectory":
+        """One with the same symbols."""
+        return packed.shallow(self)
+
     def __reduce__(self) -> tuple[Any, ...]:
         """A pickle holds what a file does."""
         return _again, (packed.dumps(self._kept),)

@@ -1,11 +1,15 @@
 """The interface between equations and solvers."""
 
+import pickle
+from copy import copy
+
 import casadi as ca
 import numpy as np
 import pytest
 
-from symfric import Model, Output, Variable, simulate
+from symfric import BrownMcPhee, Model, Output, Variable, rabinowicz, simulate
 from symfric.model import Event, Monitor
+from symfric.scenes import Arm
 
 x, y = Variable("x", "m", start=1.0, nominal=0.1), Variable("y", "m/s")
 w, u, k = Variable("w", "N"), Variable("u", "N", start=2.0), Variable("k", "N/m", start=3.0)
@@ -196,3 +200,14 @@ def test_model_without_states_is_solved_or_refused_in_a_sentence() -> None:
     for model in (Model("empty"), Model("still", ode=ca.SX(0, 1))):
         with pytest.raises(ValueError, match=r"model '\w+': expected states x or unknowns z"):
             simulate(model, 1.0)
+
+
+def test_a_copy_has_the_same_symbols_and_a_pickle_has_others() -> None:
+    machine = Arm(BrownMcPhee()).mechanism()
+    model = rabinowicz(BrownMcPhee())
+    run = simulate(model, 0.1)
+    assert len(copy(machine).build().u) == 6  # its forces know the inputs
+    assert ca.is_equal(copy(model).x[0].symbol, model.x[0].symbol)
+    assert copy(run).model is model
+    assert copy(machine).inputs[0] is machine.inputs[0]
+    assert not ca.is_equal(pickle.loads(pickle.dumps(model)).x[0].symbol, model.x[0].symbol)
