@@ -176,10 +176,6 @@ class Model(Showing, Starting):
         state["opening"] = None if self.opening is None else Given(self.opening())
         return state
 
-    def __copy__(self) -> "Model":
-        """One with the same symbols."""
-        return packed.shallow(self)
-
     def __reduce__(self) -> tuple[Any, ...]:
         """A pickle holds all that the model says; symbols of other objects are others there."""
         return packed.loads, (packed.dumps(self),)
