@@ -1,5 +1,7 @@
 """One law in the user's machine: as soft as the accuracy allows, timed at equal error."""
 
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import inf, isfinite
 from time import process_time
@@ -13,7 +15,7 @@ from symfric.choice.friction import Friction
 from symfric.choice.machine import FAILURES, Candidate, Machine, candidate
 from symfric.choice.needs import lacking
 from symfric.choice.reference import OWN, Reference
-from symfric.choice.row import FAILED, INACCURATE, LACKING, RANKED, REFUSED, Row
+from symfric.choice.row import FAILED, INACCURATE, LACKING, RANKED, REFUSED, Row, ordered
 from symfric.choice.softness import MARGIN, Ladder, Rung, ladder
 from symfric.figures.regularisation import Sample, positions
 from symfric.figures.requirements import phenomena
@@ -73,13 +75,26 @@ class Task:
         return min(1e-7, max(1e-11, 1e-4 * self.accuracy))
 
 
+def best_form(task: Task, name: str, laws: Sequence[Law]) -> Row:
+    """The row of the first of several forms of a law that is ranked; without one of the best.
+
+    A law that does not show what is needed does not show it in another form, either.
+    """
+    rows: list[Row] = []
+    for law in laws:
+        rows.append(measured(task, name, law))
+        if rows[-1].standing in (RANKED, LACKING):
+            break
+    return ordered(rows)[0]
+
+
 def measured(task: Task, name: str, law: Law) -> Row:
     """The row of `law`; never raises for what a law or a machine may do."""
     shown = tuple(phenomena(law))
     hard = nature.physical(law)
     row = Row(
         name, REFUSED, phenomena=shown, states=len(law.states), parameters=len(hard[0]),
-        hard=hard[1],
+        hard=hard[1], form=nature.form(law),
     )  # fmt: skip
     operations, why = nature.c_operations(law)
     row = replace(row, c_operations=operations, c_why=why, smoothness=nature.smoothness(law))
@@ -215,6 +230,11 @@ def _at_equal_error(task: Task, held: Candidate, s: float, most: int, row: Row) 
 def _own_numbers(law: Law) -> dict[str, float]:
     """The parameters that are not those that the law comes with: what to give it."""
     known = {n: (float(p.value), p.default) for n, p in parameters(law).items()}  # pyright: ignore[reportArgumentType]
+    with suppress(TypeError):  # a wrapper, which comes with no law in it
+        whole = parameters(type(law)())  # of elements that a law comes with it says the numbers
+        known = {
+            n: (x, float(whole[n].value) if n in whole else inf) for n, (x, _) in known.items()
+        }  # pyright: ignore[reportArgumentType]
     return {name: value for name, (value, start) in known.items() if value != start}
 
 

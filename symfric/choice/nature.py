@@ -1,6 +1,7 @@
 """What a law is, without running it: smoothness, parameters and who can measure them, cost in C."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import isfinite
 
 import numpy as np
@@ -8,7 +9,7 @@ import numpy as np
 from symfric.codegen.blocks.from_law import law_block
 from symfric.codegen.writing.routines import routines
 from symfric.emitter.c99 import REALS
-from symfric.foundation.parameters import Parameter, parameters
+from symfric.foundation.parameters import Parameter, options, parameters
 from symfric.laws import Law, steady_force
 
 EASY = ("level", "viscous", "velocity scale", "load", "geometry", "temperature")
@@ -17,6 +18,8 @@ NUMERICAL = ("width", "sampling")
 """Roles of parameters that are chosen, not measured."""
 SHARP = 1e-9
 """Widths [m/s] below this are none for an optimiser or a fixed step."""
+EVENT = "event"
+"""Form of laws with modes, and the class of what switches by events."""
 STEP = 1e-3
 """Step [s] of the C; the count does not depend on it."""
 
@@ -35,8 +38,10 @@ def smoothness(law: Law) -> str:
     """The class in the velocity, as the numbers of `law` are.
 
     A law that is smooth only over a width says what it is without: "C∞ (C0 at v = 0 as v_eps -> 0)"
-    with v_eps = 1e-15 m/s is C0.
+    with v_eps = 1e-15 m/s is C0. One that switches by events is of the class "event".
     """
+    if form(law) == EVENT:
+        return EVENT
     said = law.facts.smoothness
     first = said.split()[0]
     if first.startswith("set"):
@@ -46,6 +51,24 @@ def smoothness(law: Law) -> str:
     if sharp and "(C0" in said:
         return "C0"
     return first.strip(",;")
+
+
+def form(law: Law) -> str:
+    """The form that `law` was given in place of the one that it comes in; "" for that."""
+    chosen = options(law).get("form")
+    return chosen.value if chosen is not None and chosen.value != chosen.default else ""
+
+
+def forms(law: Law) -> tuple[Law, ...]:
+    """`law` with its modes switched by events, where it has that form, and as it is.
+
+    The first is the one to try first: the exact one, if a controller can take it, too.
+    """
+    chosen = options(law).get("form")
+    if chosen is None or EVENT not in chosen.choices or chosen.value == EVENT:
+        return (law,)
+    exact = replace(law, **{chosen.name: EVENT})
+    return (law, exact) if c_operations(exact)[0] is None else (exact, law)
 
 
 def is_smooth(row_class: str) -> bool:

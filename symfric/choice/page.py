@@ -99,7 +99,8 @@ def _ranked(rows: Sequence[Row]) -> str:
 
 
 def _cells(row: Row) -> str:
-    values = ", ".join(f"{name} = {value:.3g}" for name, value in (row.values or {}).items())
+    form = [f"form = {row.form}"] if row.form else []
+    values = ", ".join([*form, *(f"{n} = {value:.3g}" for n, value in (row.values or {}).items())])
     numbers = (
         f"{1e3 * row.time_s:.2f}",
         f"{1e-6 * row.work:.2f}",
@@ -127,7 +128,7 @@ def _step(value: float | None) -> str:
 def _others(rows: Sequence[Row]) -> str:
     head = "".join(f"<th>{name}</th>" for name in ("law", "error", "time [ms]", "why"))
     lines = [
-        f"<tr><td>{escape(row.law)}</td>"
+        f"<tr><td>{escape(row.called)}</td>"
         f'<td class="n">{f"{row.error:.1e}" if isfinite(row.error) else "-"}</td>'
         f'<td class="n">{f"{1e3 * row.time_s:.2f}" if isfinite(row.time_s) else "-"}</td>'
         f'<td class="why">{escape(f"{row.standing}: {row.reason}")}</td></tr>'

@@ -144,7 +144,8 @@ def flat(row: Row) -> dict[str, Any]:
     found = row.to_dict()
     del found["curve"]
     values = found.pop("values") or {}
-    found["values"] = " ".join(f"{name}={value:g}" for name, value in values.items())
+    form = [f"form={row.form}"] if row.form else []
+    found["values"] = " ".join([*form, *(f"{n}={value:g}" for n, value in values.items())])
     found["phenomena"] = " ".join(row.phenomena)
     found["hard"] = " ".join(row.hard)
     return found

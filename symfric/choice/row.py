@@ -19,6 +19,8 @@ class Row:
 
     Attributes:
         law: its name.
+        form: the form that it has in place of the one that it comes in, such as "event"; "" for
+            that one.
         standing: one of `ORDER`; `reason` says why it is not ranked.
         phenomena: codes of `symfric.laws.PHENOMENA`.
         error: largest difference from the reference relative to the motion; NaN without a run.
@@ -64,11 +66,17 @@ class Row:
     c_why: str = ""
     states: int = 0
     curve: tuple[tuple[float, float], ...] = ()
+    form: str = ""
 
     @property
     def ranked(self) -> bool:
         """It shows what is needed and keeps the accuracy."""
         return self.standing == RANKED
+
+    @property
+    def called(self) -> str:
+        """The law with its form."""
+        return f"{self.law} (form = {self.form})" if self.form else self.law
 
     @property
     def work(self) -> int:

@@ -11,7 +11,8 @@ from typing import Any
 
 from symfric.choice.friction import Friction
 from symfric.choice.machine import FAILURES, frictions_of, load_of, machine_of
-from symfric.choice.measured import Task, measured
+from symfric.choice.measured import Task, best_form
+from symfric.choice.nature import forms
 from symfric.choice.needs import needed
 from symfric.choice.reference import OWN, reference_of
 from symfric.choice.result import Choice
@@ -24,11 +25,14 @@ from symfric.laws.base.law import check_law
 from symfric.results.trajectory import Trajectory
 
 Progress = Callable[[str, float], None]
+Candidates = Mapping[str, Law | Sequence[Law]] | Sequence[str]
+"""Name -> law or forms of it; or names."""
+Forms = Mapping[str, tuple[Law, ...]]
 
 
 def select(
     scene: object,
-    laws: Mapping[str, Law] | Sequence[str] | None = None,
+    laws: Candidates | None = None,
     *,
     needs: Sequence[str] = ("stiction", "stribeck"),
     accuracy: float = 1e-4,
@@ -58,7 +62,10 @@ def select(
     Args:
         scene: a scene, a class of scenes (`Rabinowicz`), or a function law -> scene or `Model`,
             such as `partial(PendulumBox.preset, "jing_mi_table_7")`.
-        laws: name -> law, or names; the whole catalogue by default.
+        laws: name -> law, or names; the whole catalogue by default. A law by its name that
+            has an exact form with events is tried in that and, where that is not ranked, as it
+            comes (in the other order where the exact form has no C); the row says which it was.
+            Several laws under a name are such forms.
         needs: words of `symfric.choice.NEEDS`, such as "stiction", "presliding", "drift-free".
         accuracy: largest error relative to the size of the motion; between 0 and 1.
         friction: what all laws describe; by default the levels that the scene has.
@@ -125,27 +132,29 @@ def select(
     )  # fmt: skip
 
 
-def laws_of(where: str, laws: Mapping[str, Law] | Sequence[str] | None) -> dict[str, Law]:
-    """The candidates by name.
+def laws_of(where: str, laws: Candidates | None) -> dict[str, tuple[Law, ...]]:
+    """The candidates by name, each in the forms that are tried.
 
     Raises:
         ValueError: unknown names, something else than laws, none at all.
     """
     if laws is None:
-        return {name: kind() for name, kind in ALL_LAWS.items()}
+        return {name: forms(kind()) for name, kind in ALL_LAWS.items()}
     if isinstance(laws, Mapping):
-        found = checks.named(f"{where}: laws", laws)
-        for name, law in found.items():
-            check_law(f"{where}: laws: {name}", law)
+        given = checks.named(f"{where}: laws", laws)
+        found = {n: tuple(x) if isinstance(x, list | tuple) else (x,) for n, x in given.items()}
+        for name, several in found.items():
+            for law in several or (several,):
+                check_law(f"{where}: laws: {name}", law)
     else:
-        found = {n: ALL_LAWS[n]() for n in checks.names(f"{where}: laws", laws, ALL_LAWS)}
+        found = {n: forms(ALL_LAWS[n]()) for n in checks.names(f"{where}: laws", laws, ALL_LAWS)}
     if not found:
         raise ValueError(f"{where}: laws: expected at least one, got none")
     return found
 
 
 def _rows(
-    task: Task, laws: Mapping[str, Law], workers: int, progress: Progress | None
+    task: Task, laws: Forms, workers: int, progress: Progress | None
 ) -> tuple[list[Row], bool]:
     """The rows, and whether somebody interrupted."""
     rows: list[Row] = []
@@ -160,12 +169,12 @@ def _rows(
     return rows, False
 
 
-def _one_by_one(task: Task, laws: Mapping[str, Law]) -> Iterator[Row]:
+def _one_by_one(task: Task, laws: Forms) -> Iterator[Row]:
     for name, law in laws.items():
-        yield measured(task, name, law)
+        yield best_form(task, name, law)
 
 
-def _many(task: Task, laws: Mapping[str, Law], workers: int) -> Iterator[Row]:
+def _many(task: Task, laws: Forms, workers: int) -> Iterator[Row]:
     """The rows as they come from several processes, each of which asks for one law at a time.
 
     They are forked: functions of a user's file cannot be sent.
@@ -206,6 +215,6 @@ def _answer(pipe: Any, process: ForkProcess, name: str) -> Row:
     return row
 
 
-def _work(pipe: Any, task: Task, name: str, law: Law) -> None:
+def _work(pipe: Any, task: Task, name: str, law: tuple[Law, ...]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for whoever waits for the rows
-    pipe.send(measured(task, name, law))
+    pipe.send(best_form(task, name, law))

@@ -1,6 +1,6 @@
 """The choice as a table of eighty columns."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from math import isfinite
 from textwrap import wrap
 from typing import TYPE_CHECKING
@@ -16,7 +16,8 @@ HEAD = (
 )
 LEGEND = (
     "time [ms] and tries (attempts of a step) at equal error; h [s]: largest fixed step; C: "
-    "operations of the law; par: parameters, of which hard to measure; class: smoothness"
+    "operations of the law; par: parameters, of which hard to measure; class: smoothness, or "
+    "event: a form whose modes switch by events"
 )
 
 
@@ -40,16 +41,24 @@ def lines(choice: "Choice", most: int | None = None) -> Iterator[str]:
             yield _line(row)
     yield ""
     if most is None:
-        for row in choice.rows:
-            if not row.ranked:
-                yield from wrap(
-                    f"{row.law}: {row.standing}, {row.reason}", WIDTH, subsequent_indent="    "
-                )
+        for reason, names in _left_out(choice.rows).items():
+            text = f"{reason}: {', '.join(names)}"
+            yield from wrap(text, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
         yield ""
     for sentence in choice.verdict:
         yield from wrap(sentence, WIDTH)
     if choice.interrupted:
         yield "Interrupted: laws without a row were not measured."
+
+
+def _left_out(rows: Iterable[Row]) -> dict[str, list[str]]:
+    """Why laws are not ranked -> those of which this is said, in the order of the rows."""
+    found: dict[str, list[str]] = {}
+    for row in rows:
+        if not row.ranked:
+            reason = row.reason.removeprefix(f"{row.law} ")
+            found.setdefault(f"{row.standing}, {reason}", []).append(row.called)
+    return found
 
 
 def _line(row: Row) -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from symfric.choice.nature import is_smooth
+from symfric.choice.nature import EVENT, is_smooth
 from symfric.choice.row import FAILED, INACCURATE, LACKING, REFUSED, Row
 
 ALIKE = 1.1
@@ -23,7 +23,7 @@ def verdict(
         best = min(near, key=lambda row: row.error, default=None)
         found.append(
             f"No law shows {asked} and keeps {accuracy:g}"
-            + (f"; {best.law} comes nearest, {best.reason}." if best else ".")
+            + (f"; {best.called} comes nearest, {best.reason}." if best else ".")
         )
     else:
         found += [_fastest(ranked, asked), _smooth(ranked), _fixed(ranked, control)]
@@ -32,9 +32,9 @@ def verdict(
 
 def _fastest(ranked: Sequence[Row], asked: str) -> str:
     best = ranked[0]
-    near = [row.law for row in ranked[1:] if row.time_s <= ALIKE * best.time_s]
+    near = [row.called for row in ranked[1:] if row.time_s <= ALIKE * best.time_s]
     text = (
-        f"Simulation: take {best.law}, the fastest of {len(ranked)} that show {asked} and "
+        f"Simulation: take {best.called}, the fastest of {len(ranked)} that show {asked} and "
         f"keep the accuracy: {1e3 * best.time_s:.3g} ms in {best.attempts} attempts by "
         f"{best.method}, {best.error:.1e} off"
     )
@@ -42,7 +42,7 @@ def _fastest(ranked: Sequence[Row], asked: str) -> str:
         return f"{text}; {_listed(near)} {'are' if len(near) > 1 else 'is'} as fast."
     if len(ranked) > 1:
         second = ranked[1]
-        return f"{text}; {second.law} takes {second.time_s / best.time_s:.2g} times as long."
+        return f"{text}; {second.called} takes {second.time_s / best.time_s:.2g} times as long."
     return f"{text}."
 
 
@@ -50,19 +50,18 @@ def _smooth(ranked: Sequence[Row]) -> str:
     """The one with second derivatives that climbs least; bristles where there is no other."""
     smooth = [row for row in ranked if is_smooth(row.smoothness)]
     if not smooth:
-        return (
-            "Optimal control: none of them has second derivatives; "
-            f"{ranked[0].law} is {ranked[0].smoothness}."
-        )
+        first = ranked[0]
+        kind = "switches by events" if first.form == EVENT else f"is {first.smoothness}"
+        return f"Optimal control: none of them has second derivatives; {first.called} {kind}."
     flat = [row for row in smooth if row.steepness == row.steepness]
     if flat:
         take = min(flat, key=lambda row: row.steepness)
         return (
-            f"Optimal control: take {take.law} ({take.smoothness}): of those with second "
+            f"Optimal control: take {take.called} ({take.smoothness}): of those with second "
             f"derivatives its force is the least steep, {take.steepness:.2g} of its level per m/s."
         )
     take = smooth[0]
-    return f"Optimal control: take {take.law} ({take.smoothness}), with {_states(take)}."
+    return f"Optimal control: take {take.called} ({take.smoothness}), with {_states(take)}."
 
 
 def _fixed(ranked: Sequence[Row], control: float) -> str:
@@ -75,9 +74,9 @@ def _fixed(ranked: Sequence[Row], control: float) -> str:
         )
     take = min(able, key=lambda row: (row.c_operations or 0) / (row.fixed_step or 1.0))
     return (
-        f"Controller: take {take.law}: its C takes {take.c_operations} operations, and with it the "
-        f"plant stays within {control:g} in steps of {take.fixed_step:g} s (backward Euler): the "
-        "fewest operations for a second of motion."
+        f"Controller: take {take.called}: its C takes {take.c_operations} operations, and with it "
+        f"the plant stays within {control:g} in steps of {take.fixed_step:g} s (backward Euler): "
+        "the fewest operations for a second of motion."
     )
 
 

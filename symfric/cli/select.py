@@ -1,6 +1,7 @@
 """`symfric select`: rank friction laws on a machine, and say which to take."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from os import cpu_count
 from pathlib import Path
 from textwrap import fill
@@ -11,6 +12,7 @@ import typer
 from symfric import Law, SolveError, Status, law_from_text, parameters, with_values
 from symfric.choice import NEEDS, Choice, Friction
 from symfric.choice import select as select_law
+from symfric.choice.nature import forms
 from symfric.choice.needs import lacking, needed
 from symfric.choice.text import LEGEND, lines
 from symfric.cli import completions, output
@@ -25,6 +27,7 @@ from symfric.cli.options import (
     SetOption,
     assignments,
     check_outputs,
+    with_settings,
 )
 from symfric.cli.user_file import function_of_file
 from symfric.figures.requirements import phenomena
@@ -111,9 +114,10 @@ def select(
 
     With --data, candidates that show what is needed are fitted first, and those are ranked that fit
     as well as the best. Without, every law describes the same friction (--set mu_s=0.2 mu_d=0.15,
-    and v_s where the fall is known) and is made as soft as --accuracy allows. --set takes
-    parameters of the scene, too, and --set lugre.sigma_1=2 one of one law. Ctrl-C keeps what is
-    there.
+    and v_s where the fall is known) and is made as soft as --accuracy allows. --set takes what the
+    scene has, too, and --set lugre.sigma_1=2 is for one law. A law that has an exact form with
+    events is tried in that first, unless --set gms.form=smooth (or form=smooth, of all) says in
+    which. Ctrl-C keeps what is there.
 
     Example: symfric select rabinowicz --need stiction,stribeck --accuracy 1e-4 --html choice.html
 
@@ -124,7 +128,7 @@ def select(
         _paper(scene, json, any((law, settings, preset, law_of, plot, html, csv)))
         return
     words = needed("--need", [word for word in need.split(",") if word])
-    machine, friction, candidates = _asked(scene, settings, preset, law_of, law)
+    machine, friction, candidates, formed_by_hand = _asked(scene, settings, preset, law_of, law)
     misfits = None
     if data:
         read = reading(columns, units, None, None, kind == "points", missing, resample)
@@ -133,7 +137,7 @@ def select(
     with output.progress(f"select {scene}") as tell:
         found = select_law(
             machine,
-            candidates,
+            {n: (c,) if n in formed_by_hand else forms(c) for n, c in candidates.items()},
             needs=words,
             accuracy=accuracy,
             friction=friction,
@@ -170,26 +174,53 @@ def _asked(
     preset: str | None,
     law_of: list[str] | None,
     names: list[str] | None,
-) -> tuple[Any, Friction | None, dict[str, Law]]:
-    """The machine, the friction, the candidates with the numbers of --set.
+) -> tuple[Any, Friction | None, dict[str, Law], set[str]]:
+    """The machine, the friction, the candidates with what --set says, and whose form it says.
 
     Raises:
-        ValueError: unknown names; numbers that nothing here has.
+        ValueError: unknown names; numbers and forms that nothing here has.
     """
     given = assignments("--set", settings)
     friction = _numbers({n: given.pop(n) for n in OF_FRICTION if n in given})
     texts = names or list(ALL_LAWS)
     laws = {text: law_from_text(text) for text in texts}
+    said = _formed(laws, given)
     for key in [key for key in given if "." in key]:
         of, _, own = key.rpartition(".")
         check_names(f"--set {key}", [of], laws)
-        laws[of] = with_values(laws[of], _numbers({own: given.pop(key)}))
+        if own in options(laws[of]):
+            said.add(of)
+        laws[of] = with_settings(laws[of], of, [f"{own}={given.pop(key)}"])
     if ".py" in scene:
         machine: Any = function_of_file("select", scene, "machine", _numbers(given))
     else:
         machine = _with(kind_of(scene, preset=preset, law_of=law_of), scene, given)
     levels = Friction(**friction) if friction else None
-    return machine, levels, laws
+    return machine, levels, laws, said
+
+
+def _formed(laws: dict[str, Law], given: dict[str, str]) -> set[str]:
+    """Take what is called as an option of laws out of `given`; give it to all that have it.
+
+    Returns:
+        The names of these laws.
+
+    Raises:
+        ValueError: a text that no law has for a form; it says which there are.
+    """
+    said: set[str] = set()
+    every = [(n, o) for n, law in laws.items() for o in options(law).values()]
+    for name in [name for name in given if any(o.name == name for _, o in every)]:
+        own = [(law, o) for law, o in every if o.name == name]
+        text = given.pop(name)
+        checks.choice(
+            f"--set {name}", text, list(dict.fromkeys(c for _, o in own for c in o.choices))
+        )
+        for law, o in own:
+            if text in o.choices:
+                laws[law] = replace(laws[law], **{name: text})
+                said.add(law)
+    return said
 
 
 def _with(kind: Callable[[Law], Scene], scene: str, texts: dict[str, str]) -> Any:

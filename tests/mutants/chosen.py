@@ -19,6 +19,10 @@ CHOSEN = (
         "if NEEDS[word][0] not in shown]", "if NEEDS[word][0] in ()]", TESTS,
     ),
     Mutant(
+        "forms with events are not tried", f"{FOLDER}/nature.py",
+        "else (exact, law)", "else (law,)", TESTS,
+    ),
+    Mutant(
         "every fixed step holds", f"{FOLDER}/fixed_step.py",
         "if not (off <= share).all():", "if (off > 1e9).all():", TESTS,
     ),

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from math import log2
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,9 @@ import pytest
 
 from symfric import Model, Variable, simulate, with_values
 from symfric.choice import Choice, Friction, select
+from symfric.choice.nature import forms
 from symfric.choice.text import lines
-from symfric.laws import ALL_LAWS, BrownMcPhee, ExactCoulomb, Law, LuGre, steady_force
+from symfric.laws import ALL_LAWS, GMS, BrownMcPhee, ExactCoulomb, Law, LuGre, steady_force
 from symfric.scenes import Drive, Rabinowicz
 from symfric.scenes.base import contact
 
@@ -121,6 +123,63 @@ def test_a_function_that_fails_for_a_law_is_a_row() -> None:
     assert (found["lugre"].standing, found["lugre"].reason) == ("cannot run", "no states, please")
     assert found.best is not None
     assert "the sharpest law" in found.reference  # exact dry friction has a state
+
+
+def test_a_law_is_judged_by_events_and_as_it_comes_where_they_do_not_fit() -> None:
+    def smooth_only(law: Law) -> Model:
+        if law.switches(ca.SX.sym("v"), 1.0, ca.SX.sym("z", len(law.states))):
+            raise ValueError("no events, please")
+        return press(law)
+
+    rows = [
+        select(
+            machine, ["maxwell_slip"], needs=["presliding"], friction=Friction(0.1, 0.1),
+            reference=BrownMcPhee(mu_s=0.1, mu_d=0.1, v_t=1e-5), accuracy=0.02, t_end=1.0,
+            fixed_steps=False,
+        )["maxwell_slip"]
+        for machine in (press, smooth_only)
+    ]  # fmt: skip
+    assert [(row.form, row.smoothness, row.standing) for row in rows] == [
+        ("event", "event", "ranked"), ("", "C0", "ranked"),
+    ]  # fmt: skip
+    assert rows[0].to_dict()["form"] == "event"
+
+
+def test_the_exact_form_comes_first_where_a_controller_can_take_it() -> None:
+    found = {name: [vars(law)["form"] for law in forms(ALL_LAWS[name]())] for name in TWO_FORMS}
+    assert found == {
+        "gms": ["event", "smooth"], "karnopp": ["smooth", "event"], "threlfall": ["smooth"],
+    }  # fmt: skip
+    assert len(forms(GMS(form="event"))) == len(forms(LuGre())) == 1
+
+
+TWO_FORMS = ("gms", "karnopp", "threlfall")
+
+
+@pytest.mark.slow
+def test_gms_keeps_an_accuracy_by_events_that_its_smooth_form_does_not() -> None:
+    asked: dict[str, Any] = {"accuracy": 1e-2, "t_end": SHORT, "fixed_steps": False}
+    both = select(Rabinowicz, {"named": GMS(), "event": GMS(form="event")}, **asked)
+    assert [row.law for row in both.ranked] == ["event"]
+    assert "(form = event)" in both.verdict[0]
+    assert "switches by events" in both.verdict[1]
+    values = both["event"].values or {}
+    own = simulate(
+        Rabinowicz(with_values(GMS(form="event"), values)).model(), SHORT, rtol=1e-6
+    )  # the values are all that is needed
+    exact = simulate(Rabinowicz(ExactCoulomb()).model(), SHORT, rtol=1e-9)["x"]
+    assert np.abs(own["x"] - exact).max() / np.ptp(exact) < 1.2e-2
+
+
+def test_laws_left_out_stand_by_the_reason(choice: Choice) -> None:
+    said = list(lines(choice))
+    rows = choice.rows
+    alike = tuple(
+        replace(row, law=n) for row in rows if row.law == "coulomb" for n in ("one", "two")
+    )
+    assert "lacks, shows no stiction, no stribeck: coulomb" in said
+    both = list(lines(replace(choice, rows=rows + alike)))
+    assert "lacks, shows no stiction, no stribeck: coulomb, one, two" in both
 
 
 def test_data_judge_fitted_laws() -> None:

@@ -68,6 +68,19 @@ def test_a_function_in_a_file_is_a_machine(
     assert "it holds" in capsys.readouterr().err
 
 
+def test_forms_are_set_for_one_law_or_all(capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["select", "rabinowicz", "--law", "karnopp", "--t-end", "5", "--need", "", *FAST]
+
+    def form(*given: str) -> str:
+        assert main([*asked, *given, "--json", "-"]) == 0
+        rows = json.loads(capsys.readouterr().out)["rows"]
+        return next(row["form"] for row in rows if row["law"] == "karnopp")
+
+    assert form() == ""
+    assert form("--set", "karnopp.form=event") == "event"
+    assert form("--law", "stribeck", "--set", "form=original") == "original"
+
+
 def test_nothing_that_keeps_the_accuracy_is_a_failure(capsys: pytest.CaptureFixture[str]) -> None:
     asked = ["select", "rabinowicz", "--law", "coulomb", "--need", "", "--t-end", "8", *FAST]
     assert main(asked) == 1
@@ -79,6 +92,9 @@ def test_what_is_meant_is_asked_before_anything_runs(capsys: pytest.CaptureFixtu
         (["--need", "stictoin"], "expected some of sliding, stiction"),
         (["--law", "lugrr"], "did you mean lugre"),
         (["--set", "lugre.sigma=1", "--law", "lugre"], "got sigma"),
+        (["--set", "gms.form=evnt"], "expected one of smooth, event, got 'evnt'"),
+        (["--set", "form=evnt"], "did you mean event"),
+        (["--set", "lugre.sigma_1=stiff"], "expected a finite number, got 'stiff'"),
         (["--set", "mus=1"], "did you mean mu_s"),
         (["--preset", "nobody"], "jing_mi_table_3"),
         (["--paper", "--law", "lugre"], "--paper: expected no option but --json"),
