@@ -5,12 +5,27 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
-PREFIXED = ("m", "m/s", "m/s^2", "N", "N m", "N/s", "rad", "rad/s", "rad/s^2", "s", "J", "W")
+PREFIXED = (
+    "m", "m/s", "m/s^2", "N", "N m", "N/s", "rad", "rad/s", "rad/s^2", "s", "J", "W", "Pa",
+)  # fmt: skip
 """Units that may have a prefix."""
 
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 LEAST, MOST = 0.08, 2e4
 """Largest magnitudes that are written without a prefix."""
+
+CLOCKS = ((365.25 * 86400.0, "years"), (86400.0, "days"), (3600.0, "h"))
+"""What a long time is told in [s]; from three of them on, for hours from six."""
+
+
+def clock(times: ArrayLike) -> tuple[float, str]:
+    """A factor and the unit in which `times` [s], times the factor, are easily read on an axis."""
+    t = np.asarray(times, dtype=float)
+    span = float(np.ptp(t[np.isfinite(t)])) if np.isfinite(t).any() else 0.0
+    for size, unit in CLOCKS:
+        if span >= (6 if unit == "h" else 3) * size:
+            return 1 / size, unit
+    return 1.0, "s"
 
 
 def readable(unit: str, values: Iterable[ArrayLike]) -> tuple[float, str]:

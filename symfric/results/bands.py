@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.panels import panels, save
-from symfric.foundation.prefixes import readable
+from symfric.foundation.prefixes import clock, readable
 from symfric.foundation.style import colour, line
 from symfric.results.pictures import level
 
@@ -50,6 +50,7 @@ def plot_many(
     ends = t.ndim > 1 or t.size < 2
     pick = slice(None) if ends else np.unique(np.linspace(0, t.size - 1, TIMES).astype(int))
     figure, axes = panels(len(shown), shared=not ends, height=2.0)
+    by_t, unit_t = clock(t)
     for axis, name in zip(axes, shown, strict=True):
         values = np.asarray(signals[name][:, pick], dtype=float)
         factor, unit = readable(units[name], [values])
@@ -58,13 +59,13 @@ def plot_many(
             axis.set_xlabel(f"{name} [{unit}] at the end")
             axis.set_ylabel("members")
         else:
-            _bands(axis, t[pick], factor * values)
+            _bands(axis, by_t * t[pick], factor * values)
             level(axis, [factor * values])
             axis.set_ylabel(f"{name} [{unit}]")
     members = next(iter(signals.values())).shape[0] if signals else 0
     axes[0].set_title(f"{scene}, {members} members", loc="left", fontsize="medium")
     if not ends:
-        axes[-1].set_xlabel("t [s]")
+        axes[-1].set_xlabel(f"t [{unit_t}]")
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=6, frameon=False,
                       fontsize="small")  # fmt: skip

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from symfric.foundation import checks
 from symfric.foundation.panels import panels as empty_panels
 from symfric.foundation.panels import save
-from symfric.foundation.prefixes import readable
+from symfric.foundation.prefixes import clock, readable
 from symfric.foundation.style import COLOURS, EDGE, colour, line
 from symfric.model.kinds import ENERGY
 from symfric.results.kinds import Group, every, friction_laws, main
@@ -36,8 +36,11 @@ def plot_trajectories(
     names: Sequence[str] = (),
     path: str | Path | None = None,
     panels: str = "main",
+    log: Sequence[str] = (),
 ) -> Figure:
     """Signals of one or several simulations over time, those of a kind in a panel.
+
+    Times of hours, days and years are told in these.
 
     Args:
         trajectories: legend entry -> trajectory.
@@ -47,11 +50,13 @@ def plot_trajectories(
             power, where the model keeps no books of its energy); "all" for every signal that all
             trajectories share, those of a kind and unit together where they are many. A model
             with neither positions nor friction shows all.
+        log: signals or details whose panel has a logarithmic axis, where they are above zero.
     """
     checks.choice("plot: panels", panels, CHOICES)
+    log = (log,) if isinstance(log, str) else tuple(log)
     first = next(iter(trajectories.values()))
     for trajectory in trajectories.values():
-        trajectory.check(names)
+        trajectory.check([*names, *log])
     units = {
         n: u for n, u in first.units.items() if all(n in t.units for t in trajectories.values())
     }
@@ -65,11 +70,14 @@ def plot_trajectories(
     tall = max((len(g.names) for g in groups), default=1) > 1
     figure, axes = empty_panels(len(groups), width=8.5 if tall else 7.0, height=2.0)
     alone = all(len(g.names) == 1 for g in groups)
+    _check_log(log, groups, trajectories)
+    span = [end for run in trajectories.values() for end in run.span]
+    by_t, unit_t = clock(span)
     for axis, group in zip(axes, groups, strict=True):
-        _panel(axis, group, trajectories, alone)
+        _panel(axis, group, trajectories, alone, by_t, not set(log).isdisjoint(group.names))
     axes[0].set_title(_title(trajectories), loc="left", fontsize="medium")
     _legend(figure, trajectories, alone)
-    axes[-1].set_xlabel("t [s]")
+    axes[-1].set_xlabel(f"t [{unit_t}]")
     figure.align_ylabels(axes)
     return save(figure, path)
 
@@ -87,7 +95,27 @@ def split(groups: Sequence[Group]) -> list[Group]:
     return single if len(single) <= APART else list(groups)
 
 
-def _panel(axis: Axes, group: Group, trajectories: "Mapping[str, Trajectory]", alone: bool) -> None:
+def _check_log(
+    log: Sequence[str], groups: Sequence[Group], trajectories: "Mapping[str, Trajectory]"
+) -> None:
+    """Refuse logarithmic axes of what is not shown, or never above zero."""
+    checks.check_names("plot: log", log, [name for group in groups for name in group.names])
+    for name in log:
+        top = max(float(run.at_looks(name).max()) for run in trajectories.values())
+        if not top > 0:
+            raise ValueError(
+                f"plot: log: expected signals above zero somewhere, got {name}, at most {top:g}"
+            )
+
+
+def _panel(
+    axis: Axes,
+    group: Group,
+    trajectories: "Mapping[str, Trajectory]",
+    alone: bool,
+    by_t: float,
+    log: bool,
+) -> None:
     """The signals of a group: a colour each, line styles for several simulations.
 
     Where every panel of the picture holds but one, simulations differ by colour, too.
@@ -98,17 +126,17 @@ def _panel(axis: Axes, group: Group, trajectories: "Mapping[str, Trajectory]", a
         for name in group.names
         for label, run in trajectories.items()
     }
-    factor, unit = readable(group.unit, values.values())
+    factor, unit = (1.0, group.unit) if log else readable(group.unit, values.values())
     for k, (name, called) in enumerate(group.names.items()):
         for r, (label, run) in enumerate(trajectories.items()):
             said = label if not several else called if r == 0 else None
             y = factor * values[name, label]
             if group.norms:
-                axis.plot(run.t, y, ".", color=colour(k), markersize=1.5, label=said)
+                axis.plot(by_t * run.t, y, ".", color=colour(k), markersize=1.5, label=said)
                 continue
             look = line(r if alone else k if several else BLACK, r) if runs else line(k)
-            axis.plot(run.looks, y, linewidth=1.2, label=said, **look)
-    if group.norms:
+            axis.plot(by_t * run.looks, y, linewidth=1.2, label=said, **look)
+    if group.norms or log:
         axis.set_yscale("log", nonpositive="mask")
     else:
         level(axis, [factor * v for v in values.values()])

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from symfric.foundation.prefixes import clock
 from symfric.foundation.style import COLOURS
 from symfric.model.kinds import CONSTRAINTS, FRICTION
 from symfric.results.kinds import kinds
@@ -20,16 +21,16 @@ PANELS, POINTS = 3, 1500
 
 def picture(run: "Trajectory") -> Figure:
     """Some signals over time, small: the first position, its rate and the first friction force."""
-    names = _main(run)
+    names, (by_t, unit_t) = _main(run), clock(run.span)
     figure = Figure(figsize=(5.2, 0.5 + 1.05 * len(names)), layout="constrained")
     axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     for axis, name in zip(axes, names, strict=True):
         t, values = _thinned(run.t, run[name])
-        axis.plot(t, values, linewidth=1.0, color=COLOURS[0])
+        axis.plot(by_t * t, values, linewidth=1.0, color=COLOURS[0])
         axis.set_ylabel(f"{name} [{run.units[name]}]", fontsize=7)
         axis.tick_params(labelsize=7)
         axis.grid(alpha=0.3)
-    axes[-1].set_xlabel("t [s]", fontsize=7)
+    axes[-1].set_xlabel(f"t [{unit_t}]", fontsize=7)
     figure.align_ylabels(list(axes))
     return figure
 

@@ -2,7 +2,7 @@
 
 import csv
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -271,6 +271,7 @@ class Trajectory(Showing, Derivatives):
         path: str | Path | None = None,
         label: str = "",
         panels: str = "main",
+        log: Sequence[str] = (),
     ) -> "Figure":
         """Signals over time with units; saved to `path` if given.
 
@@ -282,10 +283,11 @@ class Trajectory(Showing, Derivatives):
             label: legend entry of this trajectory.
             panels: without names, "main" for positions, friction and energy or power, "all" for
                 every signal, those of a kind together where they are many.
+            log: signals on logarithmic axes, as `plot("v", "x", log=["v"])`.
         """
         from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow to import)
 
-        return plot_trajectories({label or self.scene: self}, names, path, panels)
+        return plot_trajectories({label or self.scene: self}, names, path, panels, log)
 
     def animate(
         self,

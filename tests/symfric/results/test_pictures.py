@@ -203,3 +203,26 @@ def test_scenes_without_joints_show_the_same_kinds(scene: type[Scene], shown: li
     inputs = {name: given.function for name, given in scene.inputs.items()}
     run = simulate(scene(BrownMcPhee()).model(), 1.0, u=inputs, samples=11)
     assert labels(run.plot()) == shown
+
+
+def test_a_signal_over_decades_has_a_logarithmic_axis_and_years_below_it() -> None:
+    x = Variable("x", "m", start=1e-9, nominal=1e-9)
+    year = 365.25 * 86400.0
+    growing = Model("growing", x=(x,), ode=x.symbol / year)
+    run = simulate(growing, 20 * year)
+    figure = run.plot("x", log=["x"])
+    (axis,) = figure.axes
+    assert (axis.get_yscale(), axis.get_ylabel(), axis.get_xlabel()) == (
+        "log",
+        "x [m]",
+        "t [years]",
+    )
+    (curve,) = axis.lines
+    years, x_drawn = np.asarray(curve.get_xdata()), np.asarray(curve.get_ydata())
+    assert x_drawn == pytest.approx(1e-9 * np.exp(years), rel=1e-4)
+    assert run.plot("x").axes[0].get_yscale() == "linear"
+    with pytest.raises(ValueError, match="expected one of x, got y"):
+        run.plot("x", log=["y"])
+    sunk = simulate(growing, 3.0, x0={"x": -1.0})
+    with pytest.raises(ValueError, match="log: expected signals above zero somewhere, got x"):
+        sunk.plot("x", log="x")
