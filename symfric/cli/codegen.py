@@ -350,7 +350,8 @@ def chosen_law(fit: Path | None, law: str | None) -> Chosen:
             "or a law of your own; generate it in Python: symfric.codegen.generate(fit.law, out)"
         )
     if found.status is not Status.SOLVED:
-        output.note(f"{fit}: the fit ended {found.status.name}: {found.message}")
+        first = found.message.partition(". ")[0].rstrip(".")
+        output.note(f"{fit}: the fit ended {found.status.name}: {first}.")
     units = {n: p.unit for n, p in parameters(found.law).items()}
     forces = [n for n, e in found.parameters.items() if units.get(n) == "1" and e.unit != "1"]
     return Chosen(found.name, found.law, found.drive, tuple(forces))

@@ -28,6 +28,14 @@ def each_law(incomplete: str) -> list[str]:
     return [f"{start}{comma}{name}" for name in laws(last)]
 
 
+def needs(incomplete: str) -> list[str]:
+    """What a law shall show, in a list with commas."""
+    from symfric.choice import NEEDS  # noqa: PLC0415  (of one command only)
+
+    start, comma, last = incomplete.rpartition(",")
+    return [f"{start}{comma}{word}" for word in _of(NEEDS, last)]
+
+
 def all_laws(incomplete: str) -> list[str]:
     """Laws, and populations of random contacts."""
     return [*laws(incomplete), *_of(POPULATIONS, incomplete)]

@@ -48,7 +48,12 @@ def select(
     ],
     need: Annotated[
         str,
-        typer.Option("--need", metavar="WORD,...", help=f"Of {', '.join(NEEDS)}."),
+        typer.Option(
+            "--need",
+            metavar="WORD,...",
+            help=f"Of {', '.join(NEEDS)}.",
+            autocompletion=completions.needs,
+        ),
     ] = "stiction,stribeck",
     accuracy: Annotated[
         float, typer.Option("--accuracy", help="Largest error relative to the motion.")

@@ -131,7 +131,8 @@ def _check(
     plant: Model, blocks: Sequence[Any], reference: Reference, controller: Cascade,
     position: str, velocity: str,
 ) -> None:  # fmt: skip
-    checks.check_names(f"{WHERE}: plant", [position, velocity], [v.name for v in plant.x])
+    hint = "name what is measured: position='...', velocity='...'"
+    checks.check_names(f"{WHERE}: plant", [position, velocity], [v.name for v in plant.x], hint)
     if len(plant.u) != 1:
         names = ", ".join(v.name for v in plant.u) or "none"
         raise ValueError(f"{WHERE}: plant: expected one input, the force, got {names}")

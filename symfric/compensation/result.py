@@ -184,10 +184,11 @@ class Comparison:
         ]
 
     def table(self) -> str:
-        """A few lines of text: errors in micrometres, the hunting in counts."""
+        """A few lines of text: errors in a unit of their size, the hunting in counts."""
         width = max(len(name) for name in self.loops)
         x, force = self.units
-        small = f"[u{x}]"
+        scale, small = _unit_for(max(loop.peak for loop in self.loops.values()))
+        small = f"[{small}{x}]"
         head = f"{'case':<{width}} {'RMS ' + small:>10} {'peak ' + small:>11} {'smaller':>8} "
         lines = [
             f"plant '{self.plant}', {self.reference.t[-1]:.3g} s, blocks as {self.engine}",
@@ -196,8 +197,8 @@ class Comparison:
         for row in self.rows():
             hunting = row["hunting"] / self.count
             lines.append(
-                f"{row['case']:<{width}} {1e6 * row['rms_error']:>10.4g} "
-                f"{1e6 * row['peak_error']:>11.4g} {row['reduction']:>8.3g} "
+                f"{row['case']:<{width}} {scale * row['rms_error']:>10.4g} "
+                f"{scale * row['peak_error']:>11.4g} {row['reduction']:>8.3g} "
                 f"{'-' if np.isnan(hunting) else f'{hunting:.3g}':>17} "
                 f"{row['work']:>9.3g} {row['peak_added']:>11.3g}"
             )
@@ -232,20 +233,20 @@ class Comparison:
         figure, axes = panels(5, height=1.6, shared=False)
         window = self._reversal()
         near = slice(window.start, window.stop)
-        axes[0].plot(self.reference.t, 1e3 * self.reference.x, "k--", lw=0.8, label="reference")
+        large, of_x = _unit_for(_size(self.reference.x))
+        small, of_error = _unit_for(max(_size(loop.error) for loop in shown))
+        tiny, of_near = _unit_for(max(_size(loop.error[near]) for loop in shown))
+        axes[0].plot(self.reference.t, large * self.reference.x, "k--", lw=0.8, label="reference")
         for number, loop in enumerate(shown):
             t, n, look = loop.t, loop.force.size, line(number)
-            axes[0].plot(t, 1e3 * loop.x[:n], label=loop.name, **look, lw=1.0)
-            axes[1].plot(t, 1e6 * loop.error, **look, lw=1.0)
+            axes[0].plot(t, large * loop.x[:n], label=loop.name, **look, lw=1.0)
+            axes[1].plot(t, small * loop.error, **look, lw=1.0)
             axes[2].step(t, loop.force, where="post", **look, lw=1.0)
             axes[3].step(t, loop.added, where="post", **look, lw=1.0)
-            axes[4].plot(t[near], 1e6 * loop.error[near], **look, lw=1.0)
-        for axis, label in zip(
-            axes,
-            (f"x [m{x}]", f"error [u{x}]", f"force [{force}]", f"added [{force}]", f"error [u{x}]"),
-            strict=True,
-        ):
-            axis.set_ylabel(label)
+            axes[4].plot(t[near], tiny * loop.error[near], **look, lw=1.0)
+        labels = ("x", of_x + x), ("error", of_error + x), ("force", force), ("added", force)
+        for axis, (what, unit) in zip(axes, (*labels, ("error", of_near + x)), strict=True):
+            axis.set_ylabel(f"{what} [{unit}]")
         for axis in axes[1:4]:
             axis.sharex(axes[0])
         axes[4].set_title("at a reversal" if self.reference.rest is None else "at rest", fontsize=9)
@@ -267,3 +268,15 @@ class Comparison:
         turns = np.flatnonzero(np.diff(np.sign(self.reference.v[1:])) != 0)
         middle = int(turns[-1]) if turns.size else size // 2
         return range(max(0, middle - size // 30), min(size, middle + size // 15))
+
+
+def _size(values: Array) -> float:
+    return float(np.abs(values).max(initial=0.0))
+
+
+def _unit_for(size: float) -> tuple[float, str]:
+    """Factor and prefix that give a length or an angle of `size` digits before the point."""
+    for factor, prefix in ((1.0, ""), (1e3, "m")):
+        if size * factor >= 1.0:
+            return factor, prefix
+    return 1e6, "u"

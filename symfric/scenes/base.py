@@ -171,7 +171,7 @@ def _is_scalar(value: Scalar) -> bool:
 
 def contact(
     name: str, law: Law, v: Scalar, N: Scalar, rest: Mapping[str, Scalar] | None = None,
-    *, least: Scalar | None = None, bare: bool = True, **inputs: Scalar,
+    *, least: Scalar | None = None, bare: bool = True, turning: bool = False, **inputs: Scalar,
 ) -> Contact:  # fmt: skip
     """`law` between bodies that slide at `v` under `N`: puts any law into equations of your own.
 
@@ -193,6 +193,7 @@ def contact(
         least: smallest value of an `N` that changes, which the law must bear.
         bare: states and events are called as in the law; with several contacts give False, and
             they are called "<name>_<state>".
+        turning: `v` is a rate [rad/s] and `force` a moment [N m]: units of the states of the law.
         inputs: what the machine offers to laws besides v and N, such as F_e, the force that the
             contact must carry for no acceleration.
 
@@ -216,7 +217,8 @@ def contact(
     if least is not None and is_number(least):  # laws that need a load refuse a number only
         law.rate(ca.SX(1.0), least, ca.SX([s.nominal for s in law.states]))
     v = checks.expression(f"contact '{name}': v", v)
-    return Contact(name, ca.SX(v), N, law, given=inputs, rest=rest or {}, bare=bare)
+    turns = checks.flag(f"contact '{name}': turning", turning)
+    return Contact(name, ca.SX(v), N, law, given=inputs, rest=rest or {}, turning=turns, bare=bare)
 
 
 def divides_by_load(law: Law) -> bool:

@@ -77,10 +77,12 @@ class Drive(Scene):
         return drawn({"mass": Block(x, 0.0, "x", "v", self.law)})
 
 
-def drive(law: Law, *, free: Iterable[str] = (), **parameters: Scalar) -> Model:
-    """Model of a mass with force input and friction `law`.
+def drive(
+    law: Law, *, turning: bool = False, free: Iterable[str] = (), **parameters: Scalar
+) -> Model:
+    """Model of a mass with force input and friction `law`; `turning`: of an axis that turns.
 
     `parameters` are m, N, offset and those of the law, by name. Those named in
     `free` become symbols in `Model.p`.
     """
-    return with_values(Drive(law), parameters).model(free)
+    return with_values(Drive(law, turning=turning), parameters).model(free)

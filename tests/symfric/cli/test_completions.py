@@ -20,6 +20,7 @@ COMPLETED = {
     "symfric run pendulum_box --law dahl --law-of hi": ["hinge="],
     "symfric ocp swing_up_of_nothing": [],
     "symfric bench iv": ["ivp"],
+    "symfric select drive --need stiction,strib": ["stiction,stribeck"],
     "symfric gallery self": ["self_tuning/"],
 }
 

@@ -148,6 +148,7 @@ def test_a_drive_that_turns_has_its_units(tmp_path) -> None:
     found = close_loop(turning.model(), moves([1e-3], 0.1, 0.05), block, controller=SOFT)
     assert found.units == ("rad", "N m")
     assert "RMS [urad]" in found.table()
+    assert [axis.get_ylabel() for axis in found.plot().axes[:2]] == ["x [mrad]", "error [urad]"]
     assert str(found) == repr(found) == found.table()
     assert repr(found["compensated"]).startswith("<Loop 'compensated': 150 samples, RMS error ")
     assert len(repr(found["compensated"])) < 80

@@ -60,6 +60,15 @@ def test_two_contacts_have_states_of_their_own_names() -> None:
     assert [s.name for s in model.x] == ["v", "left_z", "right_z"]
 
 
+def test_a_contact_that_turns_has_its_units() -> None:
+    w = Variable("w", "rad/s")
+    hub = contact("hub", LuGre(mu_s=1.4, mu_d=0.9), w.symbol, 1.0, rest={"w": 0.0}, turning=True)
+    model = Model("hub", x=(w,), ode=-hub.force / 0.01, contacts=(hub,))
+    assert [state.unit for state in model.x] == ["rad/s", "rad"]
+    with pytest.raises(ValueError, match="contact 'hub': turning: expected"):
+        contact("hub", LuGre(), w.symbol, 1.0, turning=1)  # type: ignore[arg-type]
+
+
 def test_mistakes_are_told_with_what_to_write() -> None:
     v = Variable("v", "m/s")
     with pytest.raises(ValueError, match=r"the class LuGre; write LuGre\(\) with parentheses"):

@@ -56,5 +56,6 @@ def test_axis_that_turns_has_the_equations_of_one_that_slides_and_its_own_units(
         "x": "rad", "v": "rad/s", "z": "rad", "force": "N m", "friction": "N m", "power": "W",
     }  # fmt: skip
     assert [p.unit for p in turns.p] == ["kg m^2", "N m/rad"]
+    assert drive(LuGre(), turning=True).signals == turns.signals
     with pytest.raises(ValueError, match="Drive: turning: expected True or False, got 1"):
         Drive(LuGre(), turning=1)  # type: ignore[arg-type]
