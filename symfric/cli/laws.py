@@ -236,4 +236,5 @@ def show_law(name: str, law: AnyLaw) -> None:
             (p.name, float(p.value), p.unit, p.lower, p.upper, p.doc)
             for p in parameters(law).values()
         ],
+        digits=output.EXACT,
     )

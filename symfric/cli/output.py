@@ -17,16 +17,19 @@ from rich.text import Text
 
 from symfric.foundation.files import write_text
 
+EXACT = 12
+"""Digits of numbers that somebody may type again."""
 
-def number(value: float) -> str:
-    """Six significant digits; a dash for an absent bound."""
-    return f"{value:.6g}" if math.isfinite(value) else "-"
+
+def number(value: float, digits: int = 6) -> str:
+    """So many significant digits; a dash for an absent bound."""
+    return f"{value:.{digits}g}" if math.isfinite(value) else "-"
 
 
 def show_table(
-    columns: Sequence[str], rows: Iterable[Sequence[str | float]], title: str = ""
+    columns: Sequence[str], rows: Iterable[Sequence[str | float]], title: str = "", digits: int = 6
 ) -> None:
-    """Print a table on standard output; numbers stand at the right."""
+    """Print a table on standard output; numbers, of so many digits, stand at the right."""
     rows = [list(row) for row in rows]
     table = Table(
         title=Text(title) if title else None,
@@ -44,7 +47,7 @@ def show_table(
             overflow="fold",
         )
     for row in rows:
-        table.add_row(*(Text(c if isinstance(c, str) else number(c)) for c in row))
+        table.add_row(*(Text(c if isinstance(c, str) else number(c, digits)) for c in row))
     Console(highlight=False).print(table)
 
 

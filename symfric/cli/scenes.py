@@ -231,6 +231,7 @@ def show_scene(found: dict[str, Any]) -> None:
             (p["name"], p["value"], p["unit"], p["lower"], p["upper"], p["doc"])
             for p in found["parameters"]
         ],
+        output.EXACT,
     )
     _table(
         ["--set", "value", "choices", "meaning"],
@@ -253,8 +254,8 @@ def _number(value: float | None) -> str:
     return "of the law" if value is None else output.number(value)
 
 
-def _table(columns: list[str], rows: list[Any]) -> None:
+def _table(columns: list[str], rows: list[Any], digits: int = 6) -> None:
     """A table and an empty line; nothing where there are no rows."""
     if rows:
-        output.show_table(columns, rows)
+        output.show_table(columns, rows, digits=digits)
         output.show()

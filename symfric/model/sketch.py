@@ -36,6 +36,7 @@ class Symbol:
         axes: lines through b along axes of a or b, each ("a" or "b", number of the axis).
         hinge: whether it turns about z of b and does nothing else.
         guide: whether it slides along z of a.
+        slot: whether it slides along z of a in a slot that hangs on the origin of a.
         plate: whether it moves in the plane x, y of a.
         anchored: whether it shows where it hangs on the ground.
     """
@@ -45,13 +46,14 @@ class Symbol:
     axes: tuple[tuple[str, int], ...] = ()
     hinge: bool = False
     guide: bool = False
+    slot: bool = False
     plate: bool = False
     anchored: bool = False
 
     @property
     def turnable(self) -> bool:
-        """Whether a and b may be swapped: not where each has an axis of its own."""
-        return len({end for end, _ in self.axes}) < 2
+        """Whether a and b may be swapped: not where each has an axis of its own, or a slot."""
+        return len({end for end, _ in self.axes}) < 2 and not self.slot
 
 
 @final

@@ -36,8 +36,8 @@ from symfric.multibody.topology import Topology
 from symfric.multibody.units import constraint_units, multiplier_units
 
 AT_REST = 1e-9
-"""Sliding velocity [m/s] below which a law without a velocity scale rests in pictures: by modes it
-is exact but for rounding."""
+"""Sliding velocity [m/s] below which a law that rests by modes does so in pictures: it is exact but
+for rounding."""
 Details = Callable[[ca.SX, Put], Mapping[str, Output]]
 Drawn = Callable[[Mapping[str, float]], Sketch]
 
@@ -155,7 +155,8 @@ def _model(
         return ca.substitute(known, [eq.a], [mechanics.explicit[0]])
 
     scales = [(s, x) for s in contacts if np.isfinite(x := _scale(s, p))]
-    names = {s.contact.name: AT_REST for s in contacts} | {s.contact.name: x for s, x in scales}
+    modal = (s for s in contacts if s.contact.friction.law.inputs)
+    names = {s.contact.name: AT_REST for s in modal} | {s.contact.name: x for s, x in scales}
     return Model(
         name=machine.name,
         x=(
@@ -300,7 +301,7 @@ def _advice(bristles: Sequence[Slip]) -> str:
     load = float(f"{max(load, 1.0):.2g}")
     return (
         f"bristles of {', '.join(laws)} in joint{'s' * (len(joints) > 1)} {listed(joints)} keep "
-        "the deflection of a larger load, and their damping then grows without bound as the load "
+        "the deflection of a larger load, and the equations stiffen without bound as the load "
         f"falls: write LoadNormalised({name}(...), N_0={load:g}) for {name}(...), the "
         "same under that load, whose deflection follows none (load_normalised(...) on the command "
         "line)"
@@ -330,8 +331,9 @@ def _outputs(
     for slip, normal in zip(contacts, expressions, strict=False):
         contact, name = slip.contact, slip.contact.name
         if slip.N is slip.normal:
+            what = "level of the friction moment" if contact.friction.turning else "normal force"
             found[f"{contact.pressed}_N"] = Output(
-                normal, contact.unit("N"), "normal force", kinds.NORMAL_FORCE
+                normal, contact.unit("N"), what, kinds.NORMAL_FORCE
             )
         speed, size = _sizes(slip)
         rate = contact.unit("m/s")

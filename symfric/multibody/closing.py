@@ -148,7 +148,7 @@ class PinInSlot(Closing):
     directions: ClassVar[Mapping[str, int]] = {"slide": 0}
     plane: ClassVar[int | None] = 1
     transmits: ClassVar[tuple[str, ...]] = ("Fx", "Fz")
-    symbol: ClassVar[Symbol] = Symbol("o", axes=(("a", 2),), anchored=True)
+    symbol: ClassVar[Symbol] = Symbol("o", slot=True)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
         """p_x = 0: between the walls of the slot."""

@@ -223,8 +223,10 @@ class Mechanism(Showing):
         if found:
             raise ValueError("\n".join(found))
 
-    def _hung(self, p: ca.SX, values: ca.DM) -> tuple[list[Body], Topology]:
+    def _hung(self, p: ca.SX, values: ca.DM, closed: bool = True) -> tuple[list[Body], Topology]:
         """The bodies in their places and the tree on which they hang.
+
+        `closed`: whether the start has to close the loops.
 
         Raises:
             ValueError: all mistakes that can be told without equations, and those of the start.
@@ -246,7 +248,7 @@ class Mechanism(Showing):
                 for b in bodies
             }
             made = self._written(replace(tree, bodies=unit), p, values)
-            weights += [*made.problems, *made.misfits]
+            weights += [*made.problems, *(made.misfits if closed else ())]
         self._refuse([*weights, *bearings, *loose])
         return bodies, tree
 
@@ -293,7 +295,7 @@ class Mechanism(Showing):
         """
         symbols = symbols_of(p)
         values = ca.DM(starts_of(p))
-        _, tree = self._hung(symbols, values)
+        _, tree = self._hung(symbols, values, closed=False)
         made = self._written(tree, symbols, values)
         self._refuse(made.problems)
         at = numeric(made.eq, symbols, values)

@@ -64,8 +64,8 @@ def _mark(
     used: dict[str, int],
     slips: tuple[tuple[str, float], ...] = (),
 ) -> Mark:
-    """A mark whose first end is on the ground, if one is."""
-    grounded = GROUND in (body_of(end) for end in ends)
+    """A mark whose first end is on the ground, if one is and it may be the first."""
+    grounded = GROUND in (body_of(end) for end in ends[: 1 if symbol.slot else 2])
     if grounded and body_of(ends[0]) != GROUND and symbol.turnable:
         ends = ends[1], ends[0]
     return Mark(name, symbol, used[ends[0]], used[ends[1]], slips, grounded)

@@ -58,10 +58,16 @@ def depends_on_load(law: Law) -> bool:
 
 
 def keeps_deflection(law: Law) -> bool:
-    """Whether bristles deflect with the load, and the force at given deflection varies with it."""
+    """Whether bristles deflect with the load.
+
+    At the deflection of a larger load their damping (`LuGre`) or their rate (`Dahl`) grows without
+    bound as the load falls. `LoadNormalised` takes laws of v and N only.
+    """
     N, z, v = ca.SX.sym("N"), ca.SX.sym("z", len(law.states)), ca.SX.sym("v")
-    slope = ca.jacobian(ca.SX(law.force(v, N, z)), N)
-    return ca.depends_on(slope, z) and ca.depends_on(ca.SX(law.steady_state(v, N)), N)
+    if law.inputs or not law.states or not ca.depends_on(ca.SX(law.steady_state(v, N)), N):
+        return False
+    moved = ca.vertcat(ca.SX(law.force(v, N, z)), ca.SX(law.rate(v, N, z)))
+    return ca.depends_on(ca.jacobian(moved, N), z)
 
 
 def slips(

@@ -178,10 +178,11 @@ def _body(sketch: Sketch, part: Part, k: int, poses: Poses, view: View) -> Itera
 
 
 def _behind(mark: Mark, poses: Poses, view: View) -> Iterator[Stroke]:
-    """Guides, rods, springs, and where something hangs on the ground."""
+    """Guides, slots, rods, springs, and where something hangs on the ground."""
     a, b, z = poses.at[mark.a], poses.at[mark.b], poses.axes[mark.a, 2]
-    if mark.symbol.guide:
+    if mark.symbol.guide or mark.symbol.slot:
         along = np.sum(z * (b - a), axis=0)
+        along = np.append(along, 0.0) if mark.symbol.slot else along
         low, high = along.min() - 3 * view.size, along.max() + 3 * view.size
         role = "ground" if mark.grounded else "guide"
         yield Stroke(role, np.stack([a + low * z, a + high * z]))

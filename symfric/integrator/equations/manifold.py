@@ -199,6 +199,10 @@ def pulls(manifold: Manifold, y: Array, d: Array, margin: float) -> str:
     values = evaluate(manifold.pressing, y, d)
     for share, what in zip(values, manifold.pressed, strict=True):
         if share < limit:
+            if abs(share) <= PULLING:
+                return (
+                    f"the {what} falls to zero; below, it would pull, and its friction would drive"
+                )
             return (
                 f"the {what} falls below zero ({share:.3g} times its typical size): it would "
                 "pull, and its friction would drive"

@@ -68,6 +68,11 @@ def test_a_scene_says_all_that_it_takes_and_gives(
     assert f"{name} is shown over {kind.t_end:g} s." in words
 
 
+def test_parameters_are_shown_to_the_last_digit(capsys: pytest.CaptureFixture[str]) -> None:
+    """Who types them again has the same machine."""
+    assert "\nJ_bit       471.9698   kg m^2" in told(capsys, "drill_string")
+
+
 def test_a_law_and_a_preset_show_the_numbers_that_run_takes(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -7,13 +7,14 @@ import pytest
 from mechanics import brown_mcphee, four_bar_with_friction
 from scipy.integrate import solve_ivp
 
-from symfric import BrownMcPhee, ExactCoulomb, LuGre, Trajectory, simulate
-from symfric.laws import Law
+from symfric import BrownMcPhee, Dahl, ExactCoulomb, LuGre, SolveError, Trajectory, simulate
+from symfric.laws import Law, LoadNormalised, MaxwellSlip
 from symfric.multibody import (
     Cylindrical,
     Distance,
     Floating,
     JointFriction,
+    JointSpringDamper,
     Mechanism,
     PinInSlot,
     PlanarPrismatic,
@@ -180,9 +181,8 @@ def test_a_guide_that_closes_is_a_guide() -> None:
     assert np.abs(other["guide_friction"]).min() > 1.0
 
 
-def test_a_scotch_yoke_is_driven_by_the_moment_of_its_slot() -> None:
-    """x = r cos(theta): N = m r w^2 |cos|, the pin slides at r w cos in the slot."""
-    r, w, mass = 0.1, 10.0, 2.0
+def yoke(law: Law, r: float, w: float, mass: float) -> Mechanism:
+    """A crank whose pin rubs in the slot of a yoke; it turns at w from 0.2 rad."""
     m = Mechanism("yoke", gravity=(0.0, 0.0, 0.0))
     m.body("crank", 1.0, (1e-3, 1e-3, 1e-3))
     m.body("yoke", mass, (1e-3, 1e-3, 1e-3))
@@ -194,7 +194,14 @@ def test_a_scotch_yoke_is_driven_by_the_moment_of_its_slot() -> None:
     m.frame("yoke.slot", z=Z, x=X)
     m.joint(Revolute("theta", "ground.bearing", "crank.bearing", 0.2, w))
     m.joint(Prismatic("x", "ground.guide", "yoke.guide", r * cos(0.2), -r * w * sin(0.2)))
-    m.joint(PinInSlot("slot", "yoke.slot", "crank.pin", friction=JointFriction(COULOMB)))
+    m.joint(PinInSlot("slot", "yoke.slot", "crank.pin", friction=JointFriction(law)))
+    return m
+
+
+def test_a_scotch_yoke_is_driven_by_the_moment_of_its_slot() -> None:
+    """x = r cos(theta): N = m r w^2 |cos|, the pin slides at r w cos in the slot."""
+    r, w, mass = 0.1, 10.0, 2.0
+    m = yoke(COULOMB, r, w, mass)
     m.constraint(PrescribedMotion("motor", "theta", lambda t: 0.2 + w * t))
     run = simulate(m.build(), 0.6, backend="vm", samples=31)
     theta = 0.2 + w * run.t
@@ -205,6 +212,25 @@ def test_a_scotch_yoke_is_driven_by_the_moment_of_its_slot() -> None:
     inertia = mass * r * r * w * w * np.cos(theta) * np.sin(theta)
     moment = inertia + 0.2 * N * np.abs(slip) / w
     assert run["motor_moment"][apart] == pytest.approx(moment[apart], abs=1e-4)
+
+
+@pytest.mark.parametrize("law", [Dahl(), MaxwellSlip()], ids=lambda law: type(law).__name__)
+def test_bristles_without_damping_that_a_falling_load_stops_are_named(law: Law) -> None:
+    """A spring lets go of the yoke. What the error says to write instead is copied, and goes on."""
+
+    def swung(law: Law) -> Trajectory:
+        m = yoke(law, 0.1, 0.0, 2.0)
+        m.force(JointSpringDamper("spring", "theta", stiffness=20.0))
+        return simulate(m.assembled().build(), 0.05, backend="vm", samples=11)
+
+    with pytest.raises(
+        SolveError, match=r"force of joint 'slot' with .* falls to zero; below"
+    ) as e:
+        swung(law)
+    name, said = type(law).__name__, str(e.value)
+    advised = said[said.index("LoadNormalised(") : said.index(f" for {name}")].replace("...", "")
+    run = swung(eval(advised, {"LoadNormalised": LoadNormalised, name: type(law)}))
+    assert np.abs(run.energy_balance().defect).max() < 1e-4
 
 
 def test_a_bead_on_a_turning_wire_is_pressed_by_coriolis_and_weight() -> None:

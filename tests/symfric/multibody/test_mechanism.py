@@ -99,6 +99,12 @@ def test_an_open_loop_is_refused_and_the_nearest_closed_one_offered() -> None:
         slider_on_a_rod(start=0.9).build()
     assert "x = 0.832" in str(e.value)
     assert "z = 0.554" in str(e.value)
+    heavy = slider_on_a_rod(start=0.9)
+    heavy.body("rotor", -1.0, (0.1, 0.1, 0.1))
+    heavy.joint(Revolute("turn", "ground", "rotor"))
+    with pytest.raises(ValueError, match="body 'rotor' > mass") as e:
+        heavy.assembled()
+    assert "start" not in str(e.value)  # it is what is asked for
     assembled = slider_on_a_rod(start=0.9).assembled().build()
     x, z, *_ = assembled.initial_state()
     assert x**2 + z**2 == pytest.approx(1.0, abs=1e-12)

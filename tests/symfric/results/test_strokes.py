@@ -6,7 +6,7 @@ import pytest
 from numpy.typing import NDArray
 
 from symfric.model.sketch import Mark, Part, Sketch, Symbol
-from symfric.multibody import Distance, Prismatic, Revolute, Spherical
+from symfric.multibody import Distance, PinInSlot, Prismatic, Revolute, Spherical
 from symfric.multibody.sketch import SPRING
 from symfric.results.strokes import Poses, Stroke, View, look, strokes
 
@@ -112,6 +112,13 @@ def test_a_guide_reaches_beyond_the_slide_on_the_axis_of_its_parent() -> None:
     assert found["ground"].points[:, :, 0] == pytest.approx(np.array([[0, 0, 1.7], [0, 0, 2.3]]))
     assert "anchor" not in found
     assert "guide" in drawn(Prismatic.symbol, A, B)
+
+
+def test_a_slot_reaches_from_its_body_to_beyond_the_pin() -> None:
+    found = drawn(PinInSlot.symbol, A, np.array([0.0, 0.0, 2.0]))
+    assert found["guide"].points[:, :, 0] == pytest.approx(np.array([[0, 0, -0.3], [0, 0, 2.3]]))
+    assert found["joint"].points[0, :, 0] == pytest.approx(np.array([0.0, 0.0, 2.0]))
+    assert not PinInSlot.symbol.turnable  # the slot stays that of its body
 
 
 def test_what_hangs_on_the_ground_shows_it() -> None:
