@@ -60,10 +60,12 @@ class SixSteps:
 
     Attributes:
         steps: as they were done, in the order of the numbers.
-        values: F_S, F_C [N], v_s [m/s], sigma_2 [N s/m], delta.
+        values: F_S, F_C [N], v_s [m/s], sigma_2 [N s/m], delta; v_s and delta are NaN where no
+            falling part was found.
         errors: relative standard errors if all points were fitted at once around these values,
             with the scatter that the curve leaves; inf where the points cannot tell.
-        rms: root mean square error over the mean force [%].
+        rms: root mean square error over the mean force [%], that of F_C + sigma_2 v without a
+            falling part.
         curve: mean force at each speed.
         doubts: what the points cannot tell, one sentence each.
     """
@@ -77,7 +79,14 @@ class SixSteps:
 
     @property
     def law(self) -> SteadyStateLuGre:
-        """The law with these values."""
+        """The law with these values.
+
+        Raises:
+            ValueError: no falling part was found, so that there is no v_s.
+        """
+        if not np.isfinite(self.values["v_s"]):
+            why = self.doubts[0]
+            raise ValueError(f"six_steps: law: expected points that tell v_s, got none; {why}")
         return SteadyStateLuGre(**self.values, v_eps=1e-3 * float(self.curve.v.min()))
 
     def __str__(self) -> str:
@@ -130,11 +139,15 @@ def six_steps(v: Array, F: Array, *, unstable: float = 0.0) -> SixSteps:
         Step(5, "F_C: step 2 less sigma_2 v_min", 1, {"F_C": F_C}),
         Step(6, "delta: exponential part again", count, {"delta": delta, "v_s": v_s}),
     )
-    found = StribeckCurve(F_S, F_C, v_s, delta, sigma_2, 0.0, 0.0)
-    error = found.force(speed) - force
-    errors = standard_errors(found, speed, _noise(error))
+    if count:
+        found = StribeckCurve(F_S, F_C, v_s, delta, sigma_2, 0.0, 0.0)
+        error = found.force(speed) - force
+        errors = standard_errors(found, speed, _noise(error))
+        doubts = (*_doubts(found, curve, low, count, unstable), *_undetermined(errors))
+    else:
+        error, errors = F_C + sigma_2 * speed - force, {name: np.inf for name in NAMES}
+        doubts = (_no_fall(curve, top, low), *_of_line(curve, low))
     rms = 100 * float(np.sqrt(np.mean(error**2)) / force.mean())
-    doubts = (*_doubts(found, curve, low, count, unstable), *_undetermined(errors))
     return SixSteps(steps, values, errors, rms, curve, doubts)
 
 
@@ -183,14 +196,14 @@ def _exponential(
 
 
 def _exponents(speed: Array, power: Array) -> tuple[float, float, float]:
-    """v_s for delta = 2; v_s and delta: straight lines through power = (v/v_s)^delta.
+    """v_s for delta = 2; v_s and delta: straight lines through power = (v/v_s)^delta; else NaN.
 
     With a free exponent it is a line through the logarithms. Each point weighs as much as an error
     of the force moves it: share = exp(-power), so d log(power) = d share / (share power).
     """
     if speed.size < 2:
         scale = float(speed[0] / np.sqrt(power[0])) if speed.size else float("nan")
-        return scale, scale, 2.0
+        return scale, scale, 2.0 if speed.size else float("nan")
     weight = np.exp(-power)
     gaussian = np.sqrt(np.sum((weight * speed**2) ** 2) / np.sum(weight**2 * speed**2 * power))
     slope = np.polyfit(np.log(speed), np.log(power), 1, w=weight * power)[0]
@@ -214,15 +227,36 @@ def _doubts(found: StribeckCurve, curve: Curve, low: int, count: int, unstable: 
             f"v_s = {v_s:.3g} m/s lies among speeds of stick-slip (up to {unstable:.3g} m/s): "
             "F_S, v_s and delta describe means of an unsteady force"
         )
-    if low == curve.v.size - 1:
-        said.append("the force falls up to the fastest point: no linear part, sigma_2 is set to 0")
-    elif curve.v.size - low < LEAST:
-        said.append(f"the linear part has {curve.v.size - low} points: sigma_2 is a guess")
+    said += _of_line(curve, low)
     if count < LEAST:
         said.append(f"the exponential part has {count} points: v_s and delta are guesses")
     if not slowest < v_s < fastest:
         said.append(f"v_s = {v_s:.3g} m/s lies outside the speeds measured")
     return said
+
+
+def _of_line(curve: Curve, low: int) -> list[str]:
+    """What the linear part, from the smallest force on, cannot tell."""
+    if low == curve.v.size - 1:
+        return ["the force falls up to the fastest point: no linear part, sigma_2 is set to 0"]
+    if curve.v.size - low < LEAST:
+        return [f"the linear part has {curve.v.size - low} points: sigma_2 is a guess"]
+    return []
+
+
+def _no_fall(curve: Curve, top: int, low: int) -> str:
+    """That no point tells how friction falls, so that there is neither v_s nor delta."""
+    F, v = curve.F, curve.v
+    if top == low:
+        return (
+            f"no falling part was found: the force is smallest, {F[low]:.3g} N, at the slowest "
+            "point; it rises, as that of coulomb+viscous does, or falls at lower speeds"
+        )
+    return (
+        f"no falling part was found: no point between the largest force, {F[top]:.3g} N at "
+        f"{v[top]:.3g} m/s, and the smallest, {F[low]:.3g} N at {v[low]:.3g} m/s, tells how it "
+        "falls; scatter may hide that, and more points at these speeds or Fit of all points tell"
+    )
 
 
 def _undetermined(errors: dict[str, float]) -> list[str]:

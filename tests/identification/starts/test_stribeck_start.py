@@ -77,6 +77,22 @@ def test_smallest_errors_of_the_main_study_are_those_of_its_points() -> None:
     )
 
 
+def test_points_without_a_falling_part_say_so_and_give_no_law() -> None:
+    v = mm_min(10)
+    scatter = 0.14 * np.exp(-v / 2e-3) * np.random.default_rng(13).standard_normal(v.size)
+    for force, why in ((PILOT.force(v) * (1 + scatter), "scatter"), (2.0 + 100 * v, "rises")):
+        found = six_steps(v, force)
+        assert [name for name, x in found.values.items() if np.isnan(x)] == ["v_s", "delta"]
+        assert "no falling part was found" in found.doubts[0]
+        assert why in found.doubts[0]
+        assert found.doubts[0] in str(found)
+        assert "nan" not in " ".join(found.doubts)
+        with pytest.raises(ValueError, match="no falling part was found"):
+            _ = found.law
+    assert found.rms < 1e-9  # F_C + sigma_2 v is all that there is
+    assert found.values["sigma_2"] == pytest.approx(100.0)
+
+
 def test_forward_forces_are_refused() -> None:
     v = mm_min(10)
     with pytest.raises(ValueError, match="forces with the sign of the velocity"):
