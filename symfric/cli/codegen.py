@@ -13,10 +13,11 @@ from symfric.cli import completions, output
 from symfric.cli.codegen_compensator import compensator_block
 from symfric.cli.codegen_robot import robot_block
 from symfric.cli.codegen_shown import show_sizes, show_verification
-from symfric.cli.machines import LawOfOption, PresetOption, kind_of
+from symfric.cli.machines import LawOfOption, PresetOption, formed, forms, kind_of
 from symfric.cli.options import (
     JsonOption,
     SetOption,
+    assignments,
     check_folder,
     check_outputs,
     numbers,
@@ -189,7 +190,7 @@ def codegen(
         text, own = law or made.name, {}
     elif scene is not None:
         kind_of_scene = kind_of(scene, "--scene", preset, law_of)
-        machine = machine_of(scene, kind_of_scene, chosen, numbers("--set", settings))
+        machine = machine_of(scene, kind_of_scene, chosen, assignments("--set", settings))
         own["method"] = "auto" if method is None else method
         made = plant_block(machine, **own)
         adjustable = partial(plant_block, machine, **{n: v for n, v in own.items() if n != "h"})
@@ -358,9 +359,9 @@ def chosen_law(fit: Path | None, law: str | None) -> Chosen:
 
 
 def machine_of(
-    scene: str, kind: Callable[[Law], Scene], chosen: Chosen, values: dict[str, float]
+    scene: str, kind: Callable[[Law], Scene], chosen: Chosen, texts: dict[str, str]
 ) -> Scene:
-    """The scene with the law; of a fitted drive with its mass and offset, too.
+    """The scene with the law and the texts of --set; of a fitted drive with mass and offset, too.
 
     Raises:
         ValueError: coefficients that are forces in a scene that has a load of its own; unknown
@@ -370,8 +371,12 @@ def machine_of(
         machine: Scene = chosen.drive
     else:  # a population is refused by its name
         machine = kind(chosen.law if isinstance(chosen.law, Law) else law_from_text(chosen.text))
-    check_names(f"--set of {scene}", values, parameters(machine))
-    if chosen.forces and machine is not chosen.drive and values.get("N") != 1.0:
+    own = machine is chosen.drive
+    machine = formed(machine, texts)
+    made = {n for n in texts if n in forms(machine)}
+    check_names(f"--set of {scene}", texts, [*parameters(machine), *forms(machine)])
+    values = {n: checks.parsed(f"--set {n}", texts[n]) for n in texts if n not in made}
+    if chosen.forces and not own and values.get("N") != 1.0:
         names = ", ".join(chosen.forces)
         hint = "--set N=1" if "N" in parameters(machine) else "fit it with --normal-force"
         raise ValueError(

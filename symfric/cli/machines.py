@@ -91,8 +91,8 @@ def scenes_with(
     made = {text: law_from_text(text) for text in laws}
     machines = {text: formed(kind(law), settings) for text, law in made.items()}
     known = {text: parameters(machine) for text, machine in machines.items()}
-    forms = {text: _forms(machine) for text, machine in machines.items()}
-    every = {n: None for group in (known, forms) for names in group.values() for n in names}
+    made_of = {text: forms(machine) for text, machine in machines.items()}
+    every = {n: None for group in (known, made_of) for names in group.values() for n in names}
     check_names(f"--set of {scene}", settings, every)
     values = {
         name: _number(name, text)
@@ -119,7 +119,8 @@ def formed(machine: Scene, settings: Mapping[str, str | float]) -> Scene:
     return replace(machine, **chosen) if chosen else machine
 
 
-def _forms(machine: Scene) -> list[str]:
+def forms(machine: Scene) -> list[str]:
+    """What --set takes of a scene besides numbers."""
     return [*options(machine.law), *options(machine), *machine.structures()]
 
 

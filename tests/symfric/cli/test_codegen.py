@@ -83,6 +83,16 @@ def test_distance_in_words(ulp: int | None, words: str) -> None:
 
 
 @compiled
+def test_what_a_plant_is_made_of_is_set_beside_its_numbers(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = f"codegen --scene drive --law stribeck --no-kit --out {tmp_path} --set m=2"
+    assert main([*line.split(), "--set", "turning=true"]) == 0
+    assert "moving mass [kg m^2]" in (tmp_path / "drive_f64.h").read_text()
+    assert main([*line.split(), "--set", "turning=yes"]) == 2
+    assert "--set turning: expected one of true, false" in capsys.readouterr().err
+
+
 def test_scene_becomes_a_plant(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     line = f"codegen --scene rabinowicz --law lugre --set k=3 --out {tmp_path} --free mu_s"
     assert main(f"{line} --step-size 1e-3 --method backward_euler --json -".split()) == 0
