@@ -12,13 +12,13 @@ unit does what `stepper` does in Python.
 import sys
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
 from symfric import LuGre, stepper
 from symfric.fmu import export_fmu, running
+from symfric.foundation.panels import panels, save
 from symfric.scenes import Drive
 
 Array = NDArray[np.float64]
@@ -65,11 +65,11 @@ def main(out: Path) -> None:
     x, attempts = in_unit(unit.path)
     difference = float(np.abs(x - in_python(scene)).max())
     say(f"1 kHz: {attempts / TIMES.size:.2f} attempts a sample, unit - Python {difference:.1e} m")
-    figure, axes = plt.subplots(figsize=(7, 3), layout="constrained")
+    figure, (axes,) = panels(1)
     axes.plot(TIMES, 1e3 * x)
     title = "Drive with LuGre friction as a unit, PD at 1 kHz"
     axes.set(xlabel="t [s]", ylabel="x [mm]", title=title)
-    figure.savefig(out / "drive_unit.png", dpi=150)
+    save(figure, out / "drive_unit.png")
 
 
 if __name__ == "__main__":

@@ -14,7 +14,6 @@ Without the data in ../shared/data/EMPS a record is simulated.
 import sys
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from rich.console import Console
 
@@ -22,6 +21,8 @@ from identification import ClosedLoop, Dataset, Fit, Fitted, Shooting, synthetic
 from identification.residuals.initial import local, noise_of
 from identification.residuals.open_loop import sampled_motion
 from symfric import Asymmetric, Coulomb, Sum, Viscous
+from symfric.foundation.panels import grid, save
+from symfric.foundation.style import line
 
 FOLDER = Path(__file__).resolve().parents[2] / "shared" / "data" / "EMPS"
 WIDTHS = {"coulomb+viscous": "v_eps", "asymmetric(coulomb+viscous)": "v_eps_pos v_eps_neg"}
@@ -82,17 +83,17 @@ def main(out: Path) -> None:
     kind = Shooting(["x"], windows=2.0, interpolation="hold", every=10, engine="sampled")
     windows = Fit(kind, loop.name, data, starts=1).solve(throw=False)
     say(*[f"  {text}" for text in windows.verdict.sentences], sep="\n")
-    figure, axes = plt.subplots(1, 2, figsize=(9, 3), sharey=True, layout="constrained")
+    figure, (axes,) = grid(1, 2, 9.0, 3.0, sharey=True)
     for ax, name, where in zip(axes, ("fitted", "other"), (data, other), strict=True):
-        for label, fit in (("closed loop", loop), ("windows of 2 s", windows)):
+        for k, (label, fit) in enumerate((("closed loop", loop), ("windows of 2 s", windows))):
             error = 1e3 * free_run(fit, where)
-            ax.plot(where[0].time, error, label=label)
+            ax.plot(where[0].time, error, label=label, **line(k))
             rms = np.sqrt(np.mean(error[20:] ** 2))
             say(f"open loop, {name} record, fitted by {label}: {rms:.2f} mm")
         ax.set(xlabel="t [s]", title=f"{name} record")
     axes[0].set_ylabel("error of the free run [mm]")
     axes[0].legend()
-    figure.savefig(out / "identify_emps.png", dpi=150)
+    save(figure, out / "identify_emps.png")
 
 
 if __name__ == "__main__":

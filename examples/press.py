@@ -14,12 +14,13 @@ import sys
 from pathlib import Path
 
 import casadi as ca
-import matplotlib.pyplot as plt
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
 from symfric import BrownMcPhee, Trajectory, simulate
+from symfric.foundation.panels import panels, save
+from symfric.foundation.style import line
 from symfric.multibody import (
     JointFriction,
     Kinematics,
@@ -81,17 +82,16 @@ def main() -> None:
     console = Console()
     console.print(table)
     console.print(f"work of the drive: {work[0]:.0f} J without friction, {work[1]:.0f} J with it")
-    figure, (upper, lower) = plt.subplots(2, 1, sharex=True, layout="constrained")
-    for run, label in ((smooth, "without friction"), (real, "with friction")):
-        upper.plot(np.degrees(run["crank"]), run["drive_moment"], label=label)
-    for name in BEARINGS:
-        lower.plot(np.degrees(real["crank"]), real[f"{name}_power"], label=name)
+    figure, (upper, lower) = panels(2)
+    for k, (run, label) in enumerate(((smooth, "without friction"), (real, "with friction"))):
+        upper.plot(np.degrees(run["crank"]), run["drive_moment"], label=label, **line(k))
+    for k, name in enumerate(BEARINGS):
+        lower.plot(np.degrees(real["crank"]), real[f"{name}_power"], label=name, **line(k))
     upper.set_ylabel("torque of the drive [N m]")
     lower.set(ylabel="lost to friction [W]", xlabel="crank [deg]")
     for axes in (upper, lower):
         axes.legend()
-        axes.grid(visible=True, alpha=0.3)
-    figure.savefig(out / "press.png", dpi=150)
+    save(figure, out / "press.png")
     real.animate(out / "press.gif", fps=10, speed=0.5)
 
 

@@ -15,13 +15,14 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
 from symfric import BrownMcPhee, stepper
 from symfric.codegen import generate, inverse_dynamics_block, verify
+from symfric.foundation.panels import panels, save
+from symfric.foundation.style import line
 from symfric.scenes import Arm
 
 Array = NDArray[np.float64]
@@ -85,13 +86,13 @@ def main(out: Path) -> None:
         back = STIFF * error + DAMP * (qd[k] - x[:, JOINTS : 2 * JOINTS])
         x = plant.step(ahead[k] + SHARE * back)
     t, off = H * np.arange(len(q)), 1e3 * np.linalg.norm(np.array(errors), axis=2)
-    figure, axes = plt.subplots(figsize=(7, 3.5), layout="constrained")
+    figure, (axes,) = panels(1, height=2.8)
     for i, name in enumerate(CASES):
         Console().print(f"{name}: {np.sqrt(np.mean(off[:, i] ** 2)):.3f} mrad rms")
-        axes.semilogy(t, off[:, i], label=name)
+        axes.semilogy(t, off[:, i], label=name, **line(i))
     axes.set(xlabel="t [s]", ylabel="error of all joints [mrad]", ylim=(1e-3, None))
     axes.legend()
-    figure.savefig(out / "robot_feed_forward.png", dpi=150)
+    save(figure, out / "robot_feed_forward.png")
 
 
 if __name__ == "__main__":
