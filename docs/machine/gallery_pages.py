@@ -20,6 +20,8 @@ from symfric.gallery.rendering import read, render
 
 FOLDER = MADE / "gallery"
 KEYS = FOLDER / "keys.json"
+ASIDE = ROOT / "symfric" / "gallery" / "pages.py"
+"""The page that `symfric gallery` writes, of which ours are not made."""
 
 
 def quick() -> bool:
@@ -28,13 +30,15 @@ def quick() -> bool:
 
 
 def keys() -> dict[str, str]:
-    """Plate -> what it depends on: the library, its paper's scripts, its size."""
+    """Plate -> what it depends on: the library, what the gallery shares, its paper, its size."""
     found: dict[str, str] = {}
+    shared = [code_of(p) for p in sorted((ROOT / "symfric" / "gallery").glob("*.py")) if p != ASIDE]
     for name, module in scripts().items():
         folder = ROOT.joinpath(*module.split(".")).parent
         own = [code_of(p) for p in sorted(folder.glob("_*.py"))]
-        script = (folder / f"{module.rpartition('.')[2]}.py").read_text("utf-8")
-        found[name] = digest([code_hash(), *own, script, str(quick())])
+        stem = module.rpartition(".")[2]
+        said = [(folder / f"{file}.py").read_text("utf-8") for file in (stem, "__init__")]
+        found[name] = digest([code_hash(), *shared, *own, *said, str(quick())])
     return found
 
 

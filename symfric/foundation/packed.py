@@ -232,9 +232,15 @@ class _Reader:
                 f"expected classes of symfric, got {name} of {place}; hand it over, as in "
                 f"load_run(path, own=[{name}])"
             )
-        found: Any = import_module(place)
-        for part in name.split("."):
-            found = getattr(found, part)
+        try:
+            found: Any = import_module(place)
+            for part in name.split("."):
+                found = getattr(found, part)
+        except (ImportError, AttributeError) as error:
+            raise UnreadableError(
+                f"expected classes that this version of symfric has, got {name} of {place}; it was "
+                "written by another one"
+            ) from error
         if not (isinstance(found, type) and issubclass(found, wanted)):
             raise _foreign
         if not (is_dataclass(found) or hasattr(found, "to_pack") or issubclass(found, Enum)):

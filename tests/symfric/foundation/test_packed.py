@@ -86,13 +86,45 @@ def test_files_hold_classes_of_symfric_and_those_handed_over() -> None:
     assert load(Pair(1, 2), own=[Pair]).b == 2
 
 
+def naming(path: str, **arrays: Any) -> BytesIO:
+    """A pack of an object of this class, without fields."""
+    text = f'{{"kind": "kind", "format": 1, "content": {{"is": "{path}", "has": {{}}}}}}'
+    words = {"about": text, "expressions": ca.StringSerializer().encode()}
+    buffer = BytesIO()
+    plain = {n: np.frombuffer(w.encode(), np.uint8) for n, w in words.items()}
+    np.savez(buffer, **plain, **arrays)  # pyright: ignore[reportArgumentType]
+    buffer.seek(0)
+    return buffer
+
+
 def test_a_file_cannot_name_what_is_no_data() -> None:
     for path in ("symfric.foundation.files:write_text", "symfric.foundation.checks:Path",
                  "symfric.cli.app:typer.Typer"):  # fmt: skip
-        text = f'{{"kind": "kind", "format": 1, "content": {{"is": "{path}", "has": {{}}}}}}'
-        words = {"about": text, "expressions": ca.StringSerializer().encode()}
-        buffer = BytesIO()
-        np.savez(buffer, **{n: np.frombuffer(w.encode(), np.uint8) for n, w in words.items()})  # pyright: ignore
-        buffer.seek(0)
         with pytest.raises(ValueError, match="expected a file that symfric wrote"):
-            packed.load(buffer, "kind", 1)
+            packed.load(naming(path), "kind", 1)
+
+
+def test_classes_of_other_packages_and_of_other_versions_are_named() -> None:
+    with pytest.raises(ValueError, match="expected classes of symfric, got Law of symfriction"):
+        packed.load(naming("symfriction:Law"), "kind", 1)
+    for path in ("symfric.laws.gone:Law", "symfric.laws:Gone"):
+        with pytest.raises(ValueError, match=r"this version of symfric has, got \w+ of symfric\."):
+            packed.load(naming(path), "kind", 1)
+
+
+@dataclass
+class Armed:
+    """What a pickle would run."""
+
+    def __reduce__(self) -> Any:
+        return FIRED.append, (1,)
+
+
+FIRED: list[int] = []
+
+
+def test_nothing_in_a_file_is_run() -> None:
+    buffer = naming("symfric.laws:LuGre", a0=np.array([Armed()], dtype=object))
+    with pytest.raises(ValueError, match="expected a file that symfric wrote"):
+        packed.load(buffer, "kind", 1)
+    assert FIRED == []
