@@ -14,10 +14,11 @@ def written(folder: Path, body: str, name: str = "a.html") -> list[str]:
 
 def test_links_within_and_out_of_the_pages_hold(tmp_path: Path) -> None:
     (tmp_path / "b.html").write_text("<p id='here'>x</p>", "utf-8")
+    (tmp_path / "a picture.png").write_bytes(b"")
     good = (
         '<h1 id="top">x</h1><a href="#top">1</a><a href="b.html#here">2</a><a href="b.html">3</a>'
         '<a href="https://docs.python.org/3/">4</a><a href="mailto:a@b.c">5</a>'
-        '<img src="data:image/png,">'
+        '<img src="data:image/png,"><img src="a%20picture.png">'
     )
     assert written(tmp_path, good) == []
     assert main(tmp_path) == 0
@@ -28,6 +29,7 @@ def test_links_within_and_out_of_the_pages_hold(tmp_path: Path) -> None:
     [
         ('<a href="c.html">', "no such file"),
         ('<a href="#nowhere">', "no such place"),
+        ('<a href="b.html#nowhere">', "no such place"),
         ('<a href="https://nonsense">', "no well-formed address"),
         ('<a href="ftp://a.b/">', "no well-formed address"),
         ('<img src="gone.png">', "no such file"),
@@ -36,6 +38,7 @@ def test_links_within_and_out_of_the_pages_hold(tmp_path: Path) -> None:
     ],
 )
 def test_links_that_lead_nowhere_are_found(tmp_path: Path, link: str, trouble: str) -> None:
+    (tmp_path / "b.html").write_text("<p id='here'>x</p>", "utf-8")
     (found,) = written(tmp_path, link)
     assert found.startswith("a.html: ") and trouble in found
     assert main(tmp_path) == 1

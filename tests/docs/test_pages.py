@@ -56,6 +56,8 @@ def test_printed_text_agrees_up_to_what_is_left_out() -> None:
     assert not agrees("a\nb\n", "a\n")
     assert agrees("a\nb\n", "a\n...")
     assert not agrees("anything", "")
+    assert not agrees("a 1x5\n", "a 1.5\n")
+    assert agrees("x [m] (a|b)\n", "x [m] (a|b)\n")
 
 
 def test_code_without_output_must_print_nothing(

@@ -15,6 +15,7 @@ from mutants.exported import EXPORTED
 from mutants.fits import FITS
 from mutants.generated import GENERATED
 from mutants.held import HELD
+from mutants.judged import JUDGED
 from mutants.loops import LOOPS
 from mutants.machines import MACHINES
 from mutants.mutant import Mutant
@@ -23,6 +24,7 @@ from mutants.plants import PLANTS
 from mutants.robots import ROBOTS
 from mutants.shown import SHOWN
 from mutants.solvers import RESULTS, SOLVERS
+from mutants.told import TOLD
 
 STEP = "symfric/integrator/step/attempt.py"
 WATCH = "symfric/integrator/step/watch.py"
@@ -357,5 +359,5 @@ MUTANTS = (
     *BESIDE,
     *CHOSEN, *CACHES, *COMPENSATED, *DEVICES, *DRY, *EMITTED, *ENSEMBLES, *EXPORTED,
     *GENERATED, *LEFT_OUT, *LOOPS, *DERIVATIVES, *MACHINES, *PICTURED, *PLANTS, *RESULTS, *ROBOTS,
-    *HELD, *SHOWN, *SOLVERS,
+    *HELD, *JUDGED, *SHOWN, *SOLVERS, *TOLD,
 )  # fmt: skip

@@ -23,17 +23,18 @@ sys.path[0] = str(HERE.parent)  # where its folder is the package
 from mutants.mutant import Mutant  # noqa: E402  (a script finds its neighbours)
 from mutants.mutants import MUTANTS  # noqa: E402
 
-PACKAGES = ("symfric", "ocp", "identification", "tests", "examples")
+PACKAGES = ("symfric", "ocp", "identification", "tests", "examples", "docs")
 LIMIT = 120.0
 """Seconds after which tests count as hanging, which kills a mutant, too."""
 
 
 def copied(folder: Path) -> Path:
     """A copy of the tree in `folder`."""
-    ignore = shutil.ignore_patterns("__pycache__", ".*", "*.png", "*.gif")
+    ignore = shutil.ignore_patterns("__pycache__", ".*", "*.png", "*.gif", "made", "_build")
     for name in PACKAGES:
         shutil.copytree(ROOT / name, folder / name, ignore=ignore)
-    shutil.copy(ROOT / "pyproject.toml", folder)
+    for name in ("pyproject.toml", "README.md"):  # a page is a test, too
+        shutil.copy(ROOT / name, folder)
     return folder
 
 

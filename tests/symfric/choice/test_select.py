@@ -2,6 +2,7 @@
 
 import csv
 import json
+import warnings
 from dataclasses import replace
 from math import log2
 from pathlib import Path
@@ -111,6 +112,26 @@ def test_a_function_of_a_user_is_a_machine() -> None:
     assert found.machine == "press"
     assert {row.law for row in found.ranked} == {"stribeck", "karnopp"}
     assert found["stribeck"].fixed_step is not None
+
+
+def test_the_tolerance_is_the_loosest_that_keeps_the_accuracy() -> None:
+    """Half decades from 1e-3 on; the first that keeps it where the next tighter one does, too."""
+    accuracy, t = 1e-5, np.linspace(0, 2.0, 2001)
+    found = select(
+        press, ["stribeck"], needs=["stiction"], accuracy=accuracy, t_end=2.0, fixed_steps=False
+    )["stribeck"]
+    law = with_values(ALL_LAWS["stribeck"](), found.values or {})
+    exact = simulate(press(ExactCoulomb()), 2.0, rtol=1e-10, t_eval=t)["x"]
+    keeps = list[bool]()
+    tried = [10 ** (-3 - k / 2) for k in range(8)]
+    for rtol in tried:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about loose tolerances
+            run = simulate(press(law), 2.0, rtol=rtol, t_eval=t, backend="vm")
+        keeps.append(bool(np.abs(run["x"] - exact).max() / np.ptp(exact) <= accuracy))
+    first = next(k for k in range(7) if keeps[k] and keeps[k + 1])
+    assert first > 0
+    assert found.rtol == pytest.approx(tried[first])
 
 
 def test_a_function_that_fails_for_a_law_is_a_row() -> None:

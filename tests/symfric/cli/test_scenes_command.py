@@ -84,6 +84,8 @@ def test_a_law_and_a_preset_show_the_numbers_that_run_takes(
     assert [v["name"] for v in result["states"]][-2:] == ["x_z", "phi_z"]
     assert result["states"][-1]["start"] is None
     assert "of the law" in told(capsys, "pendulum_box --law lugre")
+    without = {p["name"] for p in found(capsys, "pendulum_box")["parameters"]}
+    assert without == {"m_box", "m", "L", "J", "R", "phi_0", "g"}
 
 
 def test_a_robot_shows_its_joints_and_inputs(

@@ -20,6 +20,19 @@ def test_rate_and_state_jumps_by_a_and_falls_by_b() -> None:
     assert 0.3 * float(law.D_c) < fallen < 3 * float(law.D_c)
 
 
+def test_the_way_is_the_same_at_each_velocity_and_ends_where_it_began() -> None:
+    """Half as much before; behind the second jump the contact is as old as at first."""
+    law = RateAndState()
+    curve = velocity_step(law, 2.0, factor=10.0).curves[0]
+    F, x, v = curve["F"], curve["x"], curve["v"]
+    fast = np.flatnonzero(v > 2 * v[0])
+    way = 20 * float(law.D_c)
+    jumps = x[fast[0]], x[fast[-1]], x[-1]
+    assert jumps == pytest.approx((0.5 * way, 1.5 * way, 2.5 * way), rel=1e-2)  # to a sample
+    assert v[-1] == pytest.approx(v[0])
+    assert F[-1] == pytest.approx(F[0], rel=1e-6)
+
+
 def test_a_law_without_lag_is_refused() -> None:
     with pytest.raises(ValueError, match="velocity_step of coulomb: expected a law that shows"):
         velocity_step(Coulomb())

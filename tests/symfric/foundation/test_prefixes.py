@@ -11,6 +11,8 @@ from symfric.foundation.prefixes import clock, readable
     [
         ("m/s", 0.0024, "mm/s"),
         ("m", 3e-6, "µm"),
+        ("m", 9e-5, "mm"),  # 0.09, not 90 of the next
+        ("m", 7e-5, "µm"),
         ("m", 2e-9, "nm"),
         ("m", 1e-14, "nm"),
         ("N", 0.15, "N"),
@@ -26,7 +28,7 @@ from symfric.foundation.prefixes import clock, readable
 def test_the_largest_magnitude_chooses_the_prefix(unit: str, top: float, expected: str) -> None:
     factor, found = readable(unit, [[0.0, -top], [0.1 * top, np.nan, np.inf]])
     assert found == expected
-    size = {"mm/s": 1e-3, "µm": 1e-6, "nm": 1e-9, "kN": 1e3, "MJ": 1e6, "MPa": 1e6}.get(
+    size = {"mm/s": 1e-3, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9, "kN": 1e3, "MJ": 1e6, "MPa": 1e6}.get(
         expected, 1.0
     )
     assert factor == pytest.approx(1 / size)

@@ -64,3 +64,4 @@ def test_four_curves_differ_in_grey_and_28_in_colour_or_line_style() -> None:
         assert line(k)["color"] != line(k + 1)["color"]
         assert line(k) == line(k + 28)
     assert line(0)["linestyle"] == DASHES[0] == "-"
+    assert line(3, 0) == {"color": COLOURS[3], "linestyle": "-"}

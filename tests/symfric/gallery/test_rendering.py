@@ -1,6 +1,7 @@
 """Plates on disk: all that work, and why the others do not."""
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -93,6 +94,9 @@ def test_figures_of_the_same_runs_share_a_process() -> None:
     groups = together(chosen(()))
     assert sorted(name for group in groups for name in group) == sorted(chosen(()))
     assert all(len({name.split("/")[0] for name in group}) == 1 for group in groups)
+    belt = {name for name in chosen(("selection",)) if "_belt_" in name}
+    assert len(belt) == 4
+    assert belt in [{*group} for group in groups]
 
 
 def test_one_that_fails_is_told_beside_the_others(
@@ -107,6 +111,50 @@ def test_one_that_fails_is_told_beside_the_others(
         NAME: f"ArithmeticError: no {NAME}",
         "other": "ArithmeticError: no other",
     }
+
+
+def test_what_was_there_before_is_not_what_was_done_now(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One of three is drawn, one fails, and then somebody interrupts."""
+    names = [n for n in chosen(()) if n.startswith("laminator_nips/")][:3]
+    first, second, third = names
+    folder = tmp_path / "laminator_nips"
+    folder.mkdir()
+    record = {"paper": "P", "figure": "F", "title": "T", "text": "", "compared": "c", "measure": "",
+              "evidence": "", "how_far": "0", "numbers": {}, "quick": True, "seconds": 0.1,
+              "unit": "1", "distance": 0.0, "symfric": "0"}  # fmt: skip
+
+    def put(name: str, title: str) -> None:
+        kept = record | {"name": name, "title": title, "picture": f"{name}.png"}
+        (tmp_path / f"{name}.json").write_text(json.dumps(kept), "utf-8")
+
+    for name in names:
+        put(name, "before")
+        (tmp_path / f"{name}.png").write_bytes(b"before")
+
+    class OneByOne:
+        """Answers without processes."""
+
+        def __init__(self, *_: object) -> None:
+            pass
+
+        def outcomes(self) -> Iterator[tuple[int, dict[str, str]]]:
+            put(first, "now")
+            yield 0, {}
+            yield 1, {second: "ValueError: no"}
+            raise KeyboardInterrupt
+
+        def dismiss(self) -> None:
+            pass
+
+    monkeypatch.setattr(rendering, "Crew", OneByOne)
+    monkeypatch.setattr(rendering, "together", lambda names: [(n,) for n in names])  # pyright: ignore
+    done = render(tmp_path, names, quick=True)
+    assert {name: kept["title"] for name, kept in done.records.items()} == {first: "now"}
+    assert (done.failures, done.left) == ({second: "ValueError: no"}, 1)
+    assert not (tmp_path / f"{third}.json").exists()
+    assert not [*tmp_path.rglob("*.png")]
 
 
 @pytest.mark.heavy

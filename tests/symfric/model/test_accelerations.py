@@ -6,7 +6,7 @@ import pytest
 
 from symfric.foundation.parameters import Variable
 from symfric.integrator import simulate
-from symfric.laws import BrownMcPhee, LuGre
+from symfric.laws import Armstrong, BrownMcPhee, LuGre
 from symfric.model import Model, Output
 from symfric.scenes import ALL_SCENES, Drive, FourBar, rabinowicz
 
@@ -41,6 +41,12 @@ def test_the_acceleration_of_the_block_is_what_newton_says() -> None:
     run = simulate(rabinowicz(LuGre()), 3.0, samples=301)
     np.testing.assert_allclose(run["x_acc"], (-2.1 * run["x"] - run["friction"]) / 0.8, atol=1e-12)
     assert run.unit("x_acc") == "m/s^2"
+
+
+def test_a_velocity_that_a_law_keeps_has_no_acceleration() -> None:
+    model = rabinowicz(Armstrong())
+    assert [v.unit for v in model.x if v.name == "w"] == ["m/s"]
+    assert [*model.further] == ["x_acc"]
 
 
 def test_a_turning_drive_has_an_angular_acceleration() -> None:

@@ -38,6 +38,12 @@ class Page(HTMLParser):
             self.cells.append(data)
 
 
+def _places(cells: list[str], name: str) -> list[int]:
+    found = [k for k, cell in enumerate(cells) if cell == name]
+    assert len(found) >= 2
+    return found
+
+
 def test_a_page_holds_the_numbers_of_the_runs_and_needs_nothing(tmp_path: Path) -> None:
     scenes = {"LuGre": Rabinowicz(LuGre()), "<b>": Rabinowicz(BrownMcPhee(mu_s=0.17))}
     runs = {n: simulate(s.model(), 8.0, measure_error=True) for n, s in scenes.items()}
@@ -51,6 +57,9 @@ def test_a_page_holds_the_numbers_of_the_runs_and_needs_nothing(tmp_path: Path) 
         assert f"{run.extremes['x'][1]:.6g}" in page.cells
         assert f"{run.final['friction']:.6g}" in page.cells
         assert f"{run.statistics.error:.1e}" in page.cells
+    for run, at in zip(runs.values(), _places(page.cells, "x"), strict=False):
+        ends = (run.final["x"], *run.extremes["x"])
+        assert page.cells[at + 1 : at + 5] == [*(f"{value:.6g}" for value in ends), "m"]
     assert "0.17" in page.cells
     assert text.count("Source:") == len(runs)
 
@@ -75,3 +84,17 @@ def test_the_command_writes_one_page_of_several_laws(tmp_path: Path) -> None:
     assert {"dahl", "coulomb", "0.5", "sigma_0"} <= set(cells)
     assert main([*words.split()[:-3], "--set", "mm=1", "--out", str(tmp_path / "n.html")]) == 2
     assert not (tmp_path / "n.html").exists()
+
+
+def test_the_page_of_a_run_that_jams_is_written_and_is_no_success(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "jams.html"
+    line = "report four_bar --law lugre --law-of pin=brown_mcphee --t-end 0.3 --out"
+    words = [*line.split(), str(out)]
+    monkeypatch.setattr("sys.argv", ["symfric", *words])
+    assert main(words) == 1
+    text = out.read_text("utf-8")
+    assert "Not finished" in text
+    assert f"symfric {line} {out}" in text
+    assert f"wrote {out}" in capsys.readouterr().err

@@ -55,6 +55,8 @@ def test_showing_a_long_run_looks_at_its_times_only() -> None:
 
     long = replace(short, count=lambda: counts, evaluate=evaluate)
     assert "see extremes" in repr(long)
+    row = next(line.split() for line in repr(long).splitlines() if line.startswith("  x "))
+    assert row[-2:] == [f"{short['x'].min():.6g}", f"{short['x'].max():.6g}"]
     assert looked == [51]
 
 

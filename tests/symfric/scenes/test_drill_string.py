@@ -78,6 +78,8 @@ def test_rock_of_the_paper_sticks_at_low_speed_only(w_top: float, sticks: bool) 
     assert bool(late.min() < 1e-2) is sticks
     if not sticks:
         assert late == pytest.approx(w_top, rel=5e-3)
+        rock = 97347.0 * R * (0.5 + 0.3 * np.exp(-0.9 * w_top))  # as the paper writes it
+        assert run["torque_top"][-1] == pytest.approx(rock + C_B * w_top, rel=5e-3)
 
 
 def test_a_string_without_inertia_has_one_lump() -> None:

@@ -92,6 +92,20 @@ def test_laws_of_the_laminator_give_the_printed_forces() -> None:
             assert run["friction"][-1] == pytest.approx(force, abs=2e-3), (study, law)
 
 
+@pytest.mark.parametrize(
+    ("study", "printed"),
+    [("pilot", (4.4861, 2.5498, 0.0012, 230.0, 2.0)), ("main", (4.2672, 2.6063, 0.0049, 5.0, 3.2))],
+)
+def test_numbers_of_the_laminator(study: str, printed: tuple[float, ...]) -> None:
+    """As forces in the thesis's own law, as coefficients in others."""
+    own = parameters(Prescribed.preset(f"laminator_{study}", SteadyStateLuGre()))
+    assert [own[n].value for n in ("F_S", "F_C", "v_s", "sigma_2", "delta")] == [*printed]
+    other = parameters(Prescribed.preset(f"laminator_{study}", LuGre()))
+    assert [other[n].value for n in ("mu_s", "mu_d", "v_s", "sigma_2", "delta", "N")] == [
+        *printed, 1.0,
+    ]  # fmt: skip
+
+
 def test_levels_of_lampaert() -> None:
     found = parameters(Prescribed.preset("lampaert_table_1", ALL_LAWS["gms"]()))
     assert [found[n].value for n in ("mu_s", "mu_d", "v_s", "delta", "C")] == [
