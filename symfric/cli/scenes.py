@@ -128,6 +128,7 @@ def to_dict(name: str, machine: Scene, model: Model, law: str | None) -> dict[st
         "name": name,
         "title": title(machine),
         "doc": getdoc(type(machine)) or "",
+        "python": type(machine).__name__ if name in ALL_SCENES else None,
         "law": law,
         "t_end": machine.t_end,
         "states": [_variable(v) for v in whole.x],
@@ -211,7 +212,10 @@ def show_list(rows: list[dict[str, Any]]) -> None:
 def show_scene(found: dict[str, Any]) -> None:
     """Docstring and tables of one scene."""
     output.show_doc(found["doc"])
-    output.show(f"{found['name']} is shown over {found['t_end']:g} s.\n")
+    output.show(f"{found['name']} is shown over {found['t_end']:g} s.")
+    if found["python"]:
+        output.show(f"In Python: from symfric.scenes import {found['python']}")
+    output.show()
     _table(
         ["state", "start", "unit", "meaning"],
         [(v["name"], _number(v["start"]), v["unit"], v["doc"]) for v in found["states"]],

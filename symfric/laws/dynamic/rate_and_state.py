@@ -54,7 +54,11 @@ class RateAndState(Law):
         1e-5, unit="m", role="length", doc="slip that renews the contacts", lower=1e-15
     )
     v_eps: Scalar = param(
-        1e-12, unit="m/s", role="width", doc="velocity that counts as rest", lower=1e-15
+        1e-12,
+        unit="m/s",
+        role="width",
+        doc="counts as rest; D_c/v_eps is the age of the oldest contact",
+        lower=1e-15,
     )
     evolution: str = option("ageing", choices=("ageing", "slip"), doc="Dieterich's or Ruina's law")
 

@@ -139,3 +139,8 @@ def test_forms_and_structure_are_set_as_numbers_are(capsys: pytest.CaptureFixtur
     ):
         assert main(["scenes", *line.split()]) == 2
         assert message in capsys.readouterr().err
+
+
+def test_a_scene_says_what_it_is_called_in_python(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "In Python: from symfric.scenes import Prescribed\n" in told(capsys, "prescribed")
+    assert found(capsys, "quarter_car")["python"] == ALL_SCENES["quarter_car"].__name__
