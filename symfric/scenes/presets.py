@@ -29,8 +29,13 @@ class Numbers:
     def given(self, law: L) -> L:
         """`law` with these numbers, also inside a sum or a wrapper; its other ones and forms stay.
 
-        A law that the source does not use gets the common ones that it has. Elements that carry a
-        level together (mu_1, mu_2, ...) carry the new one in the shares that they had.
+        A law that the source does not use gets the common ones that it has. Elements that a law
+        comes with and that carry a level together (mu_1, mu_2, ...) carry the new one in the shares
+        that they had; elements that somebody gave it stay as they are.
+
+        Raises:
+            ValueError: numbers that contradict each other, such as given elements that do not carry
+                the level.
         """
         held: dict[str, Law | tuple[Law, ...]] = {}
         for item in fields(law):
@@ -47,9 +52,11 @@ class Numbers:
         elements = [name for name in known if fullmatch(r"mu_\d+", name)]
         level = "mu_s" if "mu_s" in known else "mu_d"
         if elements and level in self.common:
-            shares = {name: float(known[name].value) for name in elements}
-            whole = float(known[level].value) if level in known else sum(shares.values())
-            own |= {name: x * self.common[level] / whole for name, x in shares.items()}
+            start = parameters(type(law)())
+            shares = {name: float(start[name].value) for name in start if name in elements}
+            if shares == {name: known[name].value for name in elements}:
+                whole = float(start[level].value) if level in start else sum(shares.values())
+                own |= {name: x * self.common[level] / whole for name, x in shares.items()}
         return with_values(law, own)
 
 

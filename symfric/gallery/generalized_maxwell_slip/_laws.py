@@ -40,7 +40,7 @@ SIGNALS = Scales(static=F_S, kinetic=F_C, elastic=F_C, stretch=1.5e-6, velocity=
 
 _SLIDERS = tuple(Slider(k, alpha * F_S) for k, alpha in ELEMENTS)
 _TABLE_1 = Prescribed.presets["lampaert_table_1"].friction["law"]
-"""Numbers by law; it scales the elements of Leuven with mu_s, so these are given at F_S already."""
+"""Numbers by law; given elements stay as they are, at F_S already."""
 
 
 def generic(count: int = 2000) -> GenericAsperity:

@@ -21,8 +21,10 @@ from symfric import (
     simulate,
 )
 from symfric.cli import main
-from symfric.laws import RateAndState, Wojewoda
+from symfric.laws import Leuven, MaxwellSlip, RateAndState, Wojewoda
+from symfric.laws.dynamic.maxwell_slip import Slider
 from symfric.scenes import ALL_SCENES, PendulumBox, QuarterCar, Rabinowicz
+from symfric.scenes.presets import Numbers
 
 ELEVEN = (
     "coulomb", "threlfall", "bengisu_akay", "karnopp", "velocity_based", "awrejcewicz",
@@ -77,6 +79,24 @@ def test_a_law_that_the_paper_does_not_use_gets_its_levels() -> None:
     assert {n: found[n].value for n in ("mu_s", "mu_d", "v_t", "m", "k")} == {
         "mu_s": 0.15, "mu_d": 0.1, "v_t": 7e-3, "m": 1.0, "k": 2.0,
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", [Leuven, MaxwellSlip])
+def test_elements_that_a_law_comes_with_carry_the_level_and_others_stay(kind: type) -> None:
+    """Those of Leuven carry mu_s with a margin of theirs, those of Maxwell-slip mu_d."""
+    numbers = Numbers({"mu_s": 0.6, "mu_d": 0.4})
+    started, given = ([e.mu for e in law.elements] for law in (kind(), numbers.given(kind())))
+    ratio = 0.6 / 0.15 if kind is Leuven else 0.4 / sum(started)
+    assert given == pytest.approx([ratio * mu for mu in started])
+    mine = (Slider(3e4, 0.5), Slider(1e4, 0.2))
+    for law in (
+        kind(elements=mine),
+        kind(elements=mine, **({"mu_s": 0.2} if kind is Leuven else {})),
+    ):
+        assert [e.mu for e in numbers.given(law).elements] == [0.5, 0.2]
+    if kind is Leuven:
+        with pytest.raises(ValueError, match=r"elements that carry mu_s = 0\.6 together"):
+            numbers.given(kind(elements=(Slider(3e4, 0.5),)))
 
 
 def test_what_is_given_beside_a_preset_comes_after_it() -> None:
