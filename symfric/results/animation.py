@@ -36,6 +36,8 @@ PATH = 1001
 STICKS, SLIDES = colour(1), "white"
 """Fill of joints with friction: filled they stick, hollow they slide, which print shows, too."""
 GROUND = "#8c6d46"
+PASSES = 3
+"""Drawings until a layout with axes of one scale settles: the first does not know their height."""
 FLATTEST = 0.4
 """Least ratio of the sides of a picture in a plane."""
 
@@ -191,7 +193,8 @@ def picture(
         title.set_text(f"{trajectory.scene}   t = {times[k]:.3f} s{factor}")
 
     show(0)
-    figure.draw_without_rendering()
+    for _ in range(PASSES):
+        figure.draw_without_rendering()
     figure.set_layout_engine("none")  # every picture has the layout of the first one
     return figure, show
 

@@ -22,7 +22,7 @@ from symfric import (
 )
 from symfric.multibody import Mechanism, Prismatic
 from symfric.results.animation import SLIDES, STICKS, check_format, frame_times, picture
-from symfric.scenes import MECHANISMS, DrillString, Pendulum, Prescribed
+from symfric.scenes import ALL_SCENES, MECHANISMS, DrillString, Pendulum, Prescribed
 
 
 @pytest.fixture(scope="module")
@@ -189,6 +189,19 @@ def test_time_and_speed_stand_above_and_joints_show_whether_they_stick(law: Law)
         fills += [fill for fill in found if fill in (STICKS, SLIDES)]
     assert fills == [STICKS, SLIDES]
     assert axis.get_title(loc="left") == "pendulum   t = 0.500 s  (0.1 x)"
+
+
+@pytest.mark.parametrize("name", ["coupled_blocks", "pendulum_box"])
+def test_the_title_stands_in_the_picture(name: str) -> None:
+    """Flat and tall ones, with the words for stick and slip below."""
+    run = simulate(ALL_SCENES[name](BrownMcPhee()).model(), 0.02)
+    figure, show = picture(run, np.linspace(0, 0.02, 3))
+    for k in (0, 2):
+        show(k)
+        figure.draw_without_rendering()
+        seen = figure.get_tightbbox()
+        assert figure.bbox_inches.x0 <= seen.x0 < seen.x1 <= figure.bbox_inches.x1
+        assert figure.bbox_inches.y0 <= seen.y0 < seen.y1 <= figure.bbox_inches.y1
 
 
 def test_the_hands_of_a_drill_string_turn_and_its_bit_sticks_at_first() -> None:
