@@ -9,14 +9,15 @@ from symfric.figures.dwell import dwell
 from symfric.figures.hysteresis import hysteresis
 from symfric.figures.lag import lag
 from symfric.figures.profile import profile
+from symfric.figures.requirements import check_any
 from symfric.figures.scales import NORMAL_FORCE, Scales
 from symfric.figures.steady_state import steady_state
 from symfric.figures.stiction import stiction
 from symfric.figures.sweeps import sweep_b, sweep_c, sweep_e
 from symfric.figures.transition import transition
 from symfric.figures.velocity_step import velocity_step
-from symfric.foundation.parameters import check_names
-from symfric.laws import AnyLaw
+from symfric.foundation import checks
+from symfric.laws import AnyLaw, Law, Population
 
 
 class MakeFigure(Protocol):
@@ -51,8 +52,15 @@ def figure(law: AnyLaw, name: str, N: float = NORMAL_FORCE) -> FigureData:
     The functions of the same names take more options.
 
     Raises:
-        ValueError: unknown name (the closest one is offered), or a law that cannot show it.
+        ValueError: unknown name (the closest one is offered), a law that cannot show it, something
+            else than a law and a name.
         SolveError: a simulation behind it failed.
     """
-    check_names("figure", [name], FIGURES)
+    if isinstance(law, str) and isinstance(name, Law | Population):
+        raise ValueError(
+            f"figure: expected a law and then the name of a figure, got {law!r} and then a law; "
+            f"write figure(law, {law!r})"
+        )
+    check_any("figure", law)
+    checks.check_names("figure", [checks.text("figure: name", name)], FIGURES)
     return FIGURES[name](law, N)
