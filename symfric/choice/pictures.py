@@ -24,6 +24,10 @@ SMALL = 7
 OFFSETS = ((5, 3), (5, -9), (-5, 3), (-5, -9), (0, 8), (0, -13), (9, 9), (9, -15), (-9, 9))
 """Places of a label beside its point [points], the best first."""
 BEHIND = {"fc": "w", "alpha": 0.75, "lw": 0.0, "pad": 0.6}
+APART = 1e-2
+"""Ranked laws of less than this share of the error allowed stand apart, and are named there."""
+LEAST = 3
+"""Ticks of an axis of times."""
 MOST = 30
 """Ranked laws that are drawn by name."""
 
@@ -74,9 +78,13 @@ def _plane(figure: Figure, axis: Axes, choice: "Choice") -> None:
     axis.axhline(choice.accuracy, color="k", lw=0.8, ls=(0, (5, 2)), zorder=0)
     axis.set(xscale="log", yscale="log", xlabel="processor time [ms]", ylabel="error / motion")
     axis.tick_params(labelsize=SMALL + 1)
+    if rows:
+        curves = [t for row in rows if row.ranked for _, t in row.curve or ()]
+        _times(axis, [1e3 * t for t in (*(row.time_s for row in rows), *curves)])
     least = min((row.error for row in rows if row.error > 1e-9), default=1e-6)
     axis.set_ylim(bottom=max(1e-9, 0.1 * min(least, choice.accuracy)))
-    named = [*choice.ranked[:1], *(row for row in rows if not row.ranked)]
+    apart = (row for row in choice.ranked[1:] if row.error < APART * choice.accuracy)
+    named = [*choice.ranked[:1], *apart, *(row for row in rows if not row.ranked)]
     _label(figure, axis, named, rows)
 
 
@@ -117,8 +125,17 @@ def _by_name(axis: Axes, ranked: Sequence[Row]) -> None:
     axis.set(xscale="log", xlabel="processor time at equal error [ms]")
     axis.set_ylim(len(ranked) - 0.4, -0.6)
     times = [1e3 * row.time_s for row in ranked]
-    axis.set_xlim(0.8 * min(times), 1.25 * max(times))
-    nice = [digit * 10.0**power for power in range(-3, 6) for digit in (1, 2, 5)]
-    ticks = [t for t in nice if 0.8 * min(times) <= t <= 1.25 * max(times)]
+    _times(axis, times)
+
+
+def _times(axis: Axes, times: Sequence[float]) -> None:
+    """A logarithmic axis of times [ms] with round numbers on it, three at least where it can."""
+    low, high = 0.8 * min(times), 1.25 * max(times)
+    ticks: list[float] = []
+    for digits in ((1,), (1, 2, 5), (1, 1.5, 2, 3, 4, 5, 7)):
+        if len(ticks) < LEAST:
+            nice = [digit * 10.0**power for power in range(-3, 6) for digit in digits]
+            ticks = [t for t in nice if low <= t <= high]
+    axis.set_xlim(low, high)
     axis.set_xticks(ticks, [f"{t:g}" for t in ticks], fontsize=SMALL + 1)
     axis.minorticks_off()

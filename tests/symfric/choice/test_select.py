@@ -245,6 +245,24 @@ def test_bad_input_is_refused_in_a_sentence() -> None:
             select(**arguments)
 
 
+@pytest.mark.parametrize(("shortest", "longest"), [(1.5, 3.0), (2.0, 40.0), (1.0, 2000.0)])
+def test_the_picture_has_round_times_and_names_the_exact_law(
+    choice: Choice, shortest: float, longest: float
+) -> None:
+    """Milliseconds as they are written; the exact law stands far below the others."""
+    rows = choice.ranked
+    times = np.geomspace(1e-3 * shortest, 1e-3 * longest, len(rows)).tolist()
+    timed = [replace(r, time_s=s, curve=()) for r, s in zip(rows, times, strict=True)]
+    left, right = replace(choice, rows=tuple(timed)).plot().axes
+    for axis in (left, right):
+        ticks = [label.get_text() for label in axis.get_xticklabels()]
+        low, high = axis.get_xlim()
+        assert len(ticks) >= 3
+        assert low < shortest <= longest < high
+        assert all(low <= float(text) <= high for text in ticks)
+    assert "exact_coulomb" in [text.get_text() for text in left.texts]
+
+
 def test_it_shows_and_saves_itself(choice: Choice, tmp_path: Path) -> None:
     shown = repr(choice).splitlines()
     assert len(shown) <= 30
