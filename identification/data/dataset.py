@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, final
 
+import numpy as np
+
 from identification.data.check import check
 from identification.data.findings import Findings
 from identification.data.frames import ASSUMED, columns_of
@@ -180,8 +182,18 @@ class Dataset:
         return check(self.name, self.records, roles)
 
     def between(self, begin: float, end: float) -> "Dataset":
-        """The samples of each record with begin <= t <= end [s]."""
-        return self.each(lambda one: one.between(begin, end))
+        """The samples of each record with begin <= t <= end [s]; records without any are left out.
+
+        Raises:
+            ValueError: no record has two samples there.
+        """
+        begin, end = (checks.number("Dataset.between", at, unit="s") for at in (begin, end))
+        held = [
+            r for r in self.records if np.count_nonzero((r.time >= begin) & (r.time <= end)) > 1
+        ]
+        return Dataset(tuple(held or self.records), self.name).each(
+            lambda one: one.between(begin, end)
+        )
 
     def thinned(self, every: int) -> "Dataset":
         """Every `every`-th sample of each record; noise is not filtered before."""

@@ -237,5 +237,6 @@ def _too_short(motion: Motion, signal: str, left: int) -> ValueError:
     return ValueError(
         f"data '{motion.name}': expected at least {FEWEST} equations of {signal} after the filter "
         f"({f.cutoff:g} Hz, decimation {f.decimation}, v_min {limit}), got {left}; raise the "
-        "cut-off, lower the decimation or v_min in InverseDynamics(filter=Filter(...))"
+        "cut-off, lower the decimation or v_min in InverseDynamics(filter=Filter(...)), or leave "
+        "a short piece out by data.between(begin, end)"
     )

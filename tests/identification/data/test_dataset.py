@@ -22,6 +22,14 @@ def test_records_of_several_are_kept_apart() -> None:
     assert [record.size for record in both.thinned(10)] == [20, 6]
 
 
+def test_records_without_samples_between_are_left_out() -> None:
+    later = Dataset.of(t=T + 10.0, x=np.sin(T), force=np.cos(T), name="later")
+    (only,) = (DATA + later).between(10.5, 11.0)
+    assert (only.name, only.size) == ("later", 51)
+    with pytest.raises(ValueError, match=r"at least two samples, got 5 \.\.\. 6 s"):
+        (DATA + later).between(5.0, 6.0)
+
+
 def test_slides_and_shafts_do_not_mix() -> None:
     turns = Dataset.of(t=T, x=T, force=T, units="rad, N m")
     assert turns.rotary and not DATA.rotary
