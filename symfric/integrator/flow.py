@@ -39,7 +39,7 @@ def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Functi
     if model.events:
         raise ValueError(
             f"flow: expected a model without events, got {len(model.events)} in '{model.name}'; "
-            "use a smooth or bristle law"
+            "leave out events of your own, and use a smooth or bristle law"
         )
     u = model.vector("u")
     whole = system(model, InputData(u, u, np.zeros(2), np.zeros((len(model.u), 1)), ("flow",)))

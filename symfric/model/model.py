@@ -288,7 +288,10 @@ class Model(Showing, Starting):
         values = checks.named(f"model '{self.name}' {what}", given)
         fixed = ", ".join(f'"{name}"' for name in values if name not in known)
         free = f"free it when the model is made, as in rabinowicz(law, free=[{fixed}])"
-        checks.check_names(f"model '{self.name}' {what}", values, known, free * (what == "p"))
+        hint = free if what == "p" else ""
+        if what == "x0" and not {v.name for v in self.z}.isdisjoint(values):
+            hint = "algebraic variables follow from their equations"
+        checks.check_names(f"model '{self.name}' {what}", values, known, hint)
         return values
 
 

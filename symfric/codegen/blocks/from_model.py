@@ -113,7 +113,7 @@ def plant_block(
     if model.events:
         raise ValueError(
             f"{where}: expected a model without events, got {len(model.events)}; "
-            "use a smooth or bristle law"
+            "leave out events of your own, and use a smooth or bristle law"
         )
     size = step_variable(where, h)
     whole = suited_to_start(_held(model), METHODS[method], model)

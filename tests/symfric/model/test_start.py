@@ -29,6 +29,8 @@ def test_a_law_starts_by_the_start_value_of_an_algebraic_velocity() -> None:
     steady = LAW.steady_state(PLATE, STRESS).item()
     assert fault().initial_state() == pytest.approx([3.2e7, steady])
     assert fault().initial_state({"psi": 2.0}) == pytest.approx([3.2e7, 2.0])
+    with pytest.raises(ValueError, match="got v; algebraic variables follow from their equations"):
+        fault().initial_state({"v": 1e-6})
     many, _ = fault().initial_states({"load": np.array([3e7, 3.1e7])}, {}, 2)
     assert many == pytest.approx(np.array([[3e7, steady], [3.1e7, steady]]))
 
