@@ -177,7 +177,7 @@ def test_the_exact_form_comes_first_where_a_controller_can_take_it() -> None:
 TWO_FORMS = ("gms", "karnopp", "threlfall")
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_gms_keeps_an_accuracy_by_events_that_its_smooth_form_does_not() -> None:
     asked: dict[str, Any] = {"accuracy": 1e-2, "t_end": SHORT, "fixed_steps": False}
     both = select(Rabinowicz, {"named": GMS(), "event": GMS(form="event")}, **asked)
