@@ -63,7 +63,8 @@ class JointFriction:
         law: any friction law of v, N and F_e; in a spherical joint an isotropic one of v and N,
             `SpatialSlip`.
         radius: of the bearing or ball [m], for friction about an axis or a point.
-        length: distance a of the two bearing stations [m]; None: moments do not load the bearing.
+        length: distance a of the two bearing stations [m], the first at the origin of the frame,
+            the second along its +z; None: moments do not load the bearing.
         width: width b of a guide that takes the moment about z [m]; None: it does not load it.
         preload: normal force in addition to the reactions [N].
         normal: constant normal force [N] instead of reactions; then no unknown is added.
