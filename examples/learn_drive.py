@@ -68,8 +68,7 @@ def episode(env: StickSlipDrive, k: Array, seed: int) -> tuple[Array, Array]:
     total, errors = np.zeros(env.envs), [seen[:, 0]]
     while len(errors) <= STEPS:
         seen, reward, *_ = env.step(policy(k, seen))
-        total += reward
-        errors.append(seen[:, 0])
+        total, errors = total + reward, [*errors, seen[:, 0]]
     return total, np.array(errors)
 
 

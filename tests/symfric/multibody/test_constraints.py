@@ -343,7 +343,7 @@ def test_named_functions_take_time_where_it_matters() -> None:
 
 def test_multipliers_of_drives_have_units() -> None:
     units = driven_crank().build().signals
-    assert (units["drive_moment"], units["rod_lambda"]) == ("N m", "")
+    assert (units["drive_moment"], units["rod_lambda"]) == ("N m", "N/m")
 
 
 def test_derivatives_by_a_parameter_of_the_motion_are_exact() -> None:
