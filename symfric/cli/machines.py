@@ -15,6 +15,23 @@ from symfric.foundation.parameters import check_names, options
 from symfric.multibody.urdf.read import relative
 from symfric.scenes import ALL_SCENES, Robot, Scene
 
+SceneArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENE",
+        help=f"One of {', '.join(ALL_SCENES)}, or a robot's FILE.urdf.",
+        autocompletion=completions.scenes,
+    ),
+]
+LawsOption = Annotated[
+    list[str],
+    typer.Option(
+        "--law",
+        metavar="NAME",
+        help="Friction law; repeat it to compare several.",
+        autocompletion=completions.laws,
+    ),
+]
 PresetOption = Annotated[
     str | None,
     typer.Option(

@@ -8,32 +8,16 @@ from typing import Annotated, Any
 import typer
 
 from symfric import SolveError, Trajectory, parameters, simulate
-from symfric.cli import completions, output
+from symfric.cli import output
 from symfric.cli.inputs import driven
-from symfric.cli.machines import LawOfOption, PresetOption, scenes_with
+from symfric.cli.machines import LawOfOption, LawsOption, PresetOption, SceneArgument, scenes_with
 from symfric.cli.options import SetOption, assignments, check_outputs
 from symfric.results.report import report as write_report
-from symfric.scenes import ALL_SCENES
 
 
 def report(
-    scene: Annotated[
-        str,
-        typer.Argument(
-            metavar="SCENE",
-            help=f"One of {', '.join(ALL_SCENES)}, or a robot's FILE.urdf.",
-            autocompletion=completions.scenes,
-        ),
-    ],
-    law: Annotated[
-        list[str],
-        typer.Option(
-            "--law",
-            metavar="NAME",
-            help="Friction law; repeat it to compare several.",
-            autocompletion=completions.laws,
-        ),
-    ],
+    scene: SceneArgument,
+    law: LawsOption,
     out: Annotated[Path, typer.Option("--out", metavar="FILE.html", help="The page.")] = Path(
         "report.html"
     ),

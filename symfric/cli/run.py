@@ -8,9 +8,16 @@ import numpy as np
 import typer
 
 from symfric import Law, SolveError, Trajectory, parameters, simulate
-from symfric.cli import completions, output
+from symfric.cli import output
 from symfric.cli.inputs import driven
-from symfric.cli.machines import LawOfOption, PresetOption, kind_of, scenes_with
+from symfric.cli.machines import (
+    LawOfOption,
+    LawsOption,
+    PresetOption,
+    SceneArgument,
+    kind_of,
+    scenes_with,
+)
 from symfric.cli.options import (
     JsonOption,
     PlotOption,
@@ -23,27 +30,12 @@ from symfric.foundation import checks
 from symfric.integrator import simulate_by_peer
 from symfric.model import Model
 from symfric.results.kinds import is_mechanism, kinds, norms
-from symfric.scenes import ALL_SCENES, MECHANISMS, Scene
+from symfric.scenes import MECHANISMS, Scene
 
 
 def run(
-    scene: Annotated[
-        str,
-        typer.Argument(
-            metavar="SCENE",
-            help=f"One of {', '.join(ALL_SCENES)}, or a robot's FILE.urdf.",
-            autocompletion=completions.scenes,
-        ),
-    ],
-    law: Annotated[
-        list[str],
-        typer.Option(
-            "--law",
-            metavar="NAME",
-            help="Friction law; repeat it to compare several.",
-            autocompletion=completions.laws,
-        ),
-    ],
+    scene: SceneArgument,
+    law: LawsOption,
     settings: SetOption = None,
     preset: PresetOption = None,
     law_of: LawOfOption = None,
