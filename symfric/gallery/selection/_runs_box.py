@@ -1,5 +1,6 @@
 """Pendulum and box of figures 6 to 12: eleven laws with the numbers of tables 6 and 7."""
 
+from collections.abc import Iterable
 from functools import cache
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from symfric import ExactCoulomb, Law, Trajectory, simulate
 from symfric.gallery.selection import _machine as machine
 from symfric.gallery.selection._laws import LAWS, small_multiples
-from symfric.gallery.signals import acceleration, largest
+from symfric.gallery.signals import acceleration, largest, rms
 from symfric.scenes import PendulumBox
 
 Array = NDArray[np.float64]
@@ -63,3 +64,15 @@ def picture(
 def last_swing(name: str, what: str, t_end: float) -> float:
     """Half the range of a signal in the last two seconds."""
     return float(np.ptp(signal(name, what, t_end)[-2000:])) / 2
+
+
+def departures(what: str, unit: str, names: Iterable[str], t_end: float) -> dict[str, float]:
+    """How far the laws are from dry friction, over the run and over its last two seconds."""
+    exact = signal(EXACT, what, t_end)
+    numbers = {f"swing in the last 2 s, {EXACT} [{unit}]": last_swing(EXACT, what, t_end)}
+    for name in names:
+        off = signal(name, what, t_end) - exact
+        numbers[f"largest distance from dry friction, {name} [{unit}]"] = largest(off)
+        numbers[f"rms distance in the last 2 s, {name} [{unit}]"] = rms(off[-2000:])
+        numbers[f"swing in the last 2 s, {name} [{unit}]"] = last_swing(name, what, t_end)
+    return numbers

@@ -13,19 +13,12 @@ holds it, which takes energy from the pendulum. Bengisu and Gonthier are nearest
 
 from symfric.gallery.plate import Plate, plate_of
 from symfric.gallery.selection._laws import chosen
-from symfric.gallery.selection._runs_box import EXACT, T_END, distance, last_swing, picture, signal
-from symfric.gallery.signals import largest, rms
+from symfric.gallery.selection._runs_box import T_END, departures, distance, picture
 
 
 def plate(quick: bool = False) -> Plate:
     """15 s from 30 degrees, tables 6 and 7."""
     names, t_end = chosen(quick), 2.5 if quick else T_END
     figure = picture("phi'", "angular velocity of the pendulum [rad/s]", names, t_end)
-    exact = signal(EXACT, "phi'", t_end)
-    numbers = {f"swing in the last 2 s, {EXACT} [rad/s]": last_swing(EXACT, "phi'", t_end)}
-    for name in names:
-        one = signal(name, "phi'", t_end)
-        numbers[f"largest distance from dry friction, {name} [rad/s]"] = largest(one - exact)
-        numbers[f"rms distance in the last 2 s, {name} [rad/s]"] = rms((one - exact)[-2000:])
-        numbers[f"swing in the last 2 s, {name} [rad/s]"] = last_swing(name, "phi'", t_end)
+    numbers = departures("phi'", "rad/s", names, t_end)
     return plate_of(__name__, figure, distance("phi'", t_end), "rad/s", numbers)
