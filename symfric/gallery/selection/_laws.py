@@ -9,20 +9,7 @@ from matplotlib.figure import Figure
 from numpy import float64
 from numpy.typing import NDArray
 
-from symfric import (
-    Awrejcewicz,
-    BengisuAkay,
-    Coulomb,
-    Dahl,
-    ElastoPlastic,
-    Gonthier,
-    Karnopp,
-    Law,
-    LuGre,
-    StickSlip,
-    Threlfall,
-    VelocityBased,
-)
+from symfric import Karnopp, Law
 from symfric.choice.jing_mi import PRINTED
 from symfric.foundation.panels import grid
 from symfric.foundation.style import colour
@@ -31,19 +18,8 @@ from symfric.gallery.signals import rms
 
 Array = NDArray[float64]
 
-LAWS: dict[str, Law] = {
-    "Smooth": Coulomb(),
-    "Threlfall": Threlfall(),
-    "Bengisu": BengisuAkay(),
-    "Karnopp": Karnopp(form="event"),
-    "Velocity-based": VelocityBased(),
-    "Awrejcewicz": Awrejcewicz(),
-    "Dahl": Dahl(),
-    "LuGre": LuGre(),
-    "Elasto-plastic": ElastoPlastic(),
-    "Stick-slip": StickSlip(),
-    "Gonthier": Gonthier(),
-}
+LAWS: dict[str, Law] = {name: row.law() for name, row in PRINTED.items()}
+LAWS["Karnopp"] = Karnopp(form="event")
 """With the numbers of the library; a preset gives each those of the paper."""
 BEHIND: dict[str, Any] = {**REFERENCE, "linewidth": 2.4}
 QUICK = ("Smooth", "Karnopp", "LuGre")
