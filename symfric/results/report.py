@@ -38,7 +38,7 @@ COLOURS = ("predicted", "residual", "second", "measured")
 
 
 def report(
-    runs: Mapping[str, Trajectory],
+    runs: Trajectory | Mapping[str, Trajectory],
     path: str | Path | None = None,
     *,
     settings: Mapping[str, Mapping[str, Parameter]] | None = None,
@@ -47,7 +47,7 @@ def report(
     """One page of one or several simulations of a machine.
 
     Args:
-        runs: name, such as that of the law -> trajectory.
+        runs: a trajectory, or name, such as that of the law -> trajectory.
         path: HTML file to write.
         settings: name -> all parameters of the machine, which a model holds as constants.
         command: how to do it again.
@@ -58,7 +58,11 @@ def report(
     Raises:
         ValueError: no run, or something else than runs.
     """
-    named = checks.named("report: runs", runs)
+    if not isinstance(runs, Trajectory | Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise checks.refused("report: runs", "a run of simulate, or {name: run}", runs)
+    named = checks.named(
+        "report: runs", {runs.scene: runs} if isinstance(runs, Trajectory) else runs
+    )
     if not named:
         raise ValueError("report: expected at least one run, got none")
     for name, run in named.items():

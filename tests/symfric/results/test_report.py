@@ -70,7 +70,12 @@ def test_a_run_that_failed_is_not_called_done() -> None:
     assert "Not finished" in text and "verdict good" not in text
 
 
-@pytest.mark.parametrize("bad", [{}, {"x": 1.0}])
+def test_one_run_needs_no_name() -> None:
+    run = simulate(Rabinowicz(BrownMcPhee()).model(), 1.0)
+    assert f"{run.final['x']:.6g}" in Page(report(run)).cells
+
+
+@pytest.mark.parametrize("bad", [{}, {"x": 1.0}, 3])
 def test_what_is_no_run_is_refused(bad: dict[str, object]) -> None:
     with pytest.raises(ValueError, match="report"):
         report(bad)  # pyright: ignore[reportArgumentType]
