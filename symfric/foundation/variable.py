@@ -6,6 +6,7 @@ from math import inf
 import casadi as ca
 
 from symfric.foundation import checks
+from symfric.foundation import identity as identity  # what holds symbols pickles
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.shown import figure_of
 

@@ -177,7 +177,7 @@ class Model(Showing, Starting):
         return state
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds all that the model says; symbols of other objects are others there."""
+        """A pickle holds all that the model says, in symbols that stay themselves."""
         return packed.loads, (packed.dumps(self),)
 
     def vector(self, letter: str) -> ca.SX:

@@ -90,7 +90,7 @@ class Mechanism(Showing):
         return packed.shallow(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds all that was added; symbols of other objects are others there."""
+        """A pickle holds all that was added, in symbols that stay themselves."""
         return packed.loads, (packed.dumps(self),)
 
     def body(

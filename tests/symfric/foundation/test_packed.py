@@ -1,6 +1,7 @@
 """Packs: frozen data with expressions as plain arrays."""
 
 from dataclasses import dataclass
+from functools import partial
 from io import BytesIO
 from math import inf, nan
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from symfric.foundation import packed
+from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import Status
 from symfric.laws import GMS, LuGre, Table
@@ -64,12 +66,36 @@ def test_laws_and_variables() -> None:
 
 
 def test_what_no_pack_holds_is_refused_with_its_place() -> None:
-    with pytest.raises(ValueError, match=r"pack\.a\[1\]: expected numbers, texts.*the function"):
+    where = (
+        r"pack\.a\[1\]: expected a function that can be imported.*the function <lambda>; move it"
+    )
+    with pytest.raises(ValueError, match=where):
         packed.dumps(Pair((1, lambda: 0), 2))
     with pytest.raises(ValueError, match=r"pack\.b: expected numbers.*the class LuGre"):
         packed.dumps(Pair(1, LuGre))
     with pytest.raises(ValueError, match="expected an array of numbers"):
         packed.dumps(np.array([object()]))
+
+
+def double(x: float) -> float:
+    return 2 * x
+
+
+def test_functions_that_can_be_imported_are_kept_by_their_names() -> None:
+    back = again(Pair(double, partial(double, x=3.0)))
+    assert back.a is double
+    assert back.b() == 6.0
+    f = ca.Function("f", [x := ca.SX.sym("x")], [2 * x])
+    assert float(again(Pair(f, 0)).a(2.0)) == 4.0
+
+
+def test_functions_in_files_are_handed_over() -> None:
+    with pytest.raises(ValueError, match=r"got double of .*own=\[double\]"):
+        load(Pair(double, 2), own=[Pair])
+    assert load(Pair(double, 2), own=[Pair, double]).a is double
+    for known in (write_text, packed.dumps):  # not even those of symfric: who reads might call them
+        with pytest.raises(ValueError, match="expected functions of symfric"):
+            load((known,))
 
 
 def load(thing: object, **how: Any) -> Any:
