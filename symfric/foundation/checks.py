@@ -302,11 +302,12 @@ def times(where: str, value: object, first: float = -inf, last: float = inf) -> 
 
 
 def path(where: str, value: object) -> Path:
-    """`value` as the path of a file or folder."""
+    """`value` as the path of a file or folder; "~" is the user's own."""
     name = fspath(value) if isinstance(value, str | PathLike) else None
     if not isinstance(name, str) or not name or "\0" in name:
         raise refused(where, "a path, such as 'run.csv'", value)
-    return Path(name)
+    found = Path(name)
+    return found.expanduser() if found.parts[:1] == ("~",) else found
 
 
 def function(where: str, value: object, what: str) -> Any:

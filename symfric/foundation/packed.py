@@ -84,13 +84,17 @@ def dumps(thing: object) -> bytes:
     return buffer.getvalue()
 
 
-def load(file: IO[bytes], kind: str = "", form: int = 0, own: Iterable[type] = ()) -> Any:
+def load(
+    file: IO[bytes], kind: str = "", form: int = 0,
+    own: Iterable[type | Callable[..., Any]] = (), reader: str = "load_run",
+) -> Any:  # fmt: skip
     """What `dump` wrote.
 
     Args:
         file: open for reading.
         kind, form: as they were given to `dump`; older formats are read, too.
         own: classes and functions in it that are not symfric's.
+        reader: to whom users hand them over.
 
     Raises:
         ValueError: no pack of this kind, a damaged one, one of a newer format, or a class or
@@ -111,7 +115,7 @@ def load(file: IO[bytes], kind: str = "", form: int = 0, own: Iterable[type] = (
                 "newer version of symfric, which reads it"
             )
         known = {_path(one): one for one in own}
-        return _Reader(arrays, about.get("symbols"), known).read(about["content"])
+        return _Reader(arrays, about.get("symbols"), known, reader).read(about["content"])
     except (BadZipFile, KeyError, IndexError, EOFError, OSError, TypeError) as error:
         raise _foreign from error
     except (ValueError, RuntimeError) as error:
@@ -249,8 +253,9 @@ class _Reader:
         arrays: Mapping[str, NDArray[Any]],
         symbols: list[list[str]] | None,
         own: Mapping[str, Any] | None,
+        reader: str = "",
     ) -> None:
-        self._arrays, self._own = arrays, own
+        self._arrays, self._own, self._reader = arrays, own, reader
         stream: Any = ca.StringDeserializer(arrays[EXPRESSIONS].tobytes().decode())
         expressions = None if symbols is None else _expressions(stream, symbols)
         self._known: list[object] = []
@@ -296,7 +301,7 @@ class _Reader:
     def _function(self, path: str) -> Any:
         """The function of this name; out of a file only one that was handed over."""
         if self._own is not None and path not in self._own:
-            raise _unknown("functions", path)
+            raise self._unknown("functions", path)
         return self._named(path, "functions")
 
     def _partial(self, function: Any, args: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
@@ -308,7 +313,7 @@ class _Reader:
         if self._own is not None and path in self._own:
             return self._own[path]
         if self._own is not None and place.split(".")[0] not in OWN:
-            raise _unknown(what, path)
+            raise self._unknown(what, path)
         try:
             return _found(path)
         except (ImportError, AttributeError) as error:
@@ -317,13 +322,12 @@ class _Reader:
                 "written by another one"
             ) from error
 
-
-def _unknown(what: str, path: str) -> UnreadableError:
-    place, _, name = path.partition(":")
-    return UnreadableError(
-        f"expected {what} of symfric, got {name} of {place}; hand it over, as in "
-        f"load_run(path, own=[{name}])"
-    )
+    def _unknown(self, what: str, path: str) -> UnreadableError:
+        place, _, name = path.partition(":")
+        return UnreadableError(
+            f"expected {what} of symfric, got {name} of {place}; hand it over, as in "
+            f"{self._reader}(path, own=[{name}])"
+        )
 
 
 def _expressions(stream: Any, names: list[list[str]]) -> list[Any]:

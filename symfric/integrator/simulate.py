@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import partial
 from time import perf_counter
 
 import numpy as np
@@ -18,10 +18,8 @@ from symfric.integrator.arguments import (
     check_times,
     stopping,
 )
-from symfric.integrator.derivatives.adjoint import gradient
-from symfric.integrator.derivatives.path import Path
-from symfric.integrator.derivatives.seeds import Seeds, seeds
-from symfric.integrator.derivatives.sensitivity import Slopes, forward, of_signals
+from symfric.integrator.derivatives.seeds import seeds
+from symfric.integrator.differentiated import Differentiated
 from symfric.integrator.equations.initial import first_guess
 from symfric.integrator.equations.inputs import Input, InputData, input_data
 from symfric.integrator.methods.tableaux import ADAPTIVE
@@ -32,6 +30,7 @@ from symfric.integrator.running.record import Run
 from symfric.integrator.running.run import Tolerances, integrate
 from symfric.integrator.running.sizes import own_scale
 from symfric.integrator.settings import settings
+from symfric.integrator.stored import Basis, Stored
 from symfric.model import Model
 from symfric.results.statistics import Statistics
 from symfric.results.trajectory import Trajectory
@@ -158,18 +157,15 @@ def simulate(
     if throw and not trajectory.status.ok and trajectory.status is not Status.INTERRUPTED:
         raise SolveError(trajectory.message, trajectory.status, trajectory)
     if which is not None and run.steps:
-        path = Path(
-            run.integrator or integrator,
-            run.dense,
-            inputs,
-            values,
-            backend,
-            y0,
-            run.jumps,
-            allowed.event,
-            (trajectory.t, run.outputs.reached),
-        )
-        trajectory = _differentiated(trajectory, path, which)
+        basis = Basis(which, y0, tuple(run.jumps), allowed.event)
+        known = trajectory.t, run.outputs.reached
+        own = run.integrator or integrator
+        make = partial(basis.path, own, run.dense, inputs, values, backend, known)
+        found = Differentiated(make, which, tuple(trajectory.units), trajectory.t)
+        trajectory = replace(
+            trajectory, differentiate=found.at, pull_back=found.pull_back, delays=found.delays,
+            keep=partial(Stored.of, integrator, inputs, run, values, backend, basis=basis),
+        )  # fmt: skip
     if measure_error and trajectory.status.ok:
         finer = simulate(
             model, t_end, t_start=t_start, x0=x0, u=u, p=p, rtol=max(allowed.rtol / 100, 1e-13),
@@ -218,32 +214,6 @@ def _solve(
         )
 
     return run, count
-
-
-def _differentiated(trajectory: Trajectory, path: Path, which: Seeds) -> Trajectory:
-    """The trajectory with the derivatives of its signals, computed when asked for."""
-    names = list(trajectory.units)
-
-    @cache
-    def solution() -> Slopes:
-        return forward(path, which)
-
-    def differentiate(at: Array) -> dict[str, dict[str, Array]]:
-        values = of_signals(path, which, solution().dense, at)
-        return {
-            seed: dict(zip(names, rows, strict=True))
-            for seed, rows in zip(which.names, values, strict=True)
-        }
-
-    def pull_back(weights: Mapping[str, Array]) -> dict[str, float]:
-        used = {names.index(name): w for name, w in weights.items() if w.any()}
-        return gradient(path, which, trajectory.t, used)
-
-    def delays() -> dict[str, Array]:
-        times = np.repeat(solution().times, [len(jump.which) for jump in path.jumps], axis=0)
-        return dict(zip(which.names, times.T, strict=True))
-
-    return replace(trajectory, differentiate=differentiate, pull_back=pull_back, delays=delays)
 
 
 def _difference(model: Model, one: Trajectory, other: Trajectory) -> float:

@@ -1,28 +1,32 @@
 """Runs as data: in files that last, and in pickles."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
-from pathlib import Path
+from functools import cache, cached_property
+from os import PathLike
 from typing import Any, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation import checks, packed
 from symfric.foundation.status import Status
 from symfric.integrator.compiled.columns import Columns
+from symfric.integrator.derivatives.path import Path
+from symfric.integrator.derivatives.seeds import Seeds
+from symfric.integrator.differentiated import Differentiated
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.built import built
 from symfric.integrator.running.dense import Dense
+from symfric.integrator.running.events import Jumps
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.outputs import Outputs
 from symfric.integrator.running.record import Run
 from symfric.model import Model
 from symfric.results.statistics import Statistics
-from symfric.results.trajectory import FORMAT, KIND, Trajectory
+from symfric.results.stored import Format
+from symfric.results.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 Slopes = dict[str, dict[str, Array]]
@@ -68,6 +72,32 @@ class Later:
 
 @final
 @dataclass(frozen=True, eq=False)
+class Basis:
+    """What derivatives along stored steps need besides them.
+
+    Attributes:
+        which: by what a run is differentiated.
+        guess: unknowns from which consistent ones at the start were found.
+        jumps: events that were carried out.
+        tolerance: how sharply they were located [s].
+    """
+
+    which: Seeds
+    guess: Array
+    jumps: tuple[Jumps, ...]
+    tolerance: float
+
+    def path(
+        self, integrator: Integrator, steps: Dense, inputs: InputData, p: Array, backend: str,
+        known: tuple[Array, Array],
+    ) -> Path:  # fmt: skip
+        """The run; `known` are times of the result [s] and unknowns there."""
+        made = self.guess, self.jumps, self.tolerance, known
+        return Path(integrator, steps, inputs, p, backend, *made)
+
+
+@final
+@dataclass(frozen=True, eq=False)
 class Stored:
     """A run as data.
 
@@ -82,6 +112,7 @@ class Stored:
         status, message, statistics: how it ended, and what it took.
         slopes, delays: derivatives at `times` and of the events, where they were asked for.
         unable: why there are none although they were.
+        basis: what others need; None in files of the first format.
     """
 
     model: Model
@@ -101,14 +132,15 @@ class Stored:
     slopes: Slopes | None = None
     delays: dict[str, Array] | None = None
     unable: str = ""
+    basis: Basis | None = None
 
     @classmethod
     def of(
-        cls, integrator: "Integrator | Later", inputs: InputData, run: Run, p: Array, backend: str,
-        trajectory: Trajectory,
+        cls, integrator: Integrator, inputs: InputData, run: Run, p: Array, backend: str,
+        trajectory: Trajectory, basis: Basis | None = None,
     ) -> "Stored":  # fmt: skip
         """A run and its trajectory, with steps that are found again where there were too many."""
-        method = (integrator.now if isinstance(integrator, Later) else integrator).tableau
+        method = integrator.tableau
         stored = cls(
             integrator.model,
             inputs,
@@ -124,6 +156,7 @@ class Stored:
             trajectory.status,
             trajectory.message,
             trajectory.statistics,
+            basis=basis,
         )
         return stored if trajectory.differentiate is None else stored._with_slopes(trajectory)
 
@@ -164,12 +197,19 @@ class Stored:
                 return {v.name: by_name[v.name] for v in self.model.x}
             return made.states(at)
 
-        return replace(made, evaluate=evaluate, states=states, **self._derivatives(made.t))
+        again: dict[str, Any] = {"evaluate": evaluate, "states": states, "keep": self._kept_by}
+        return replace(made, **again, **self._derivatives(later, made.t))
 
-    def _derivatives(self, t: Array) -> dict[str, Any]:
-        """What gives the derivatives that were stored."""
+    def _derivatives(self, later: Later, t: Array) -> dict[str, Any]:
+        """What gives derivatives: those at `t` are stored, others are found along the steps."""
         if self.slopes is None and not self.unable:
             return {}
+
+        names = tuple(self.model.signals)
+
+        @cache
+        def between(basis: Basis) -> Differentiated:
+            return Differentiated(lambda: self._path(basis, later.now), basis.which, names, t)
 
         def known() -> Slopes:
             if self.slopes is None:
@@ -177,12 +217,14 @@ class Stored:
             return self.slopes
 
         def differentiate(at: Array) -> Slopes:
-            if at is not t:
+            if at is t or self.slopes is None:
+                return known()
+            if self.basis is None:
                 raise ValueError(
                     f"trajectory of '{self.model.name}': expected derivatives at `t`, which are "
-                    "those that a file holds, got other times; simulate again for more"
+                    "all that a file of the first format holds, got other times; simulate again"
                 )
-            return known()
+            return between(self.basis).at(at)
 
         def pull_back(weights: Mapping[str, Array]) -> dict[str, float]:
             return {
@@ -196,8 +238,30 @@ class Stored:
 
         return {"differentiate": differentiate, "pull_back": pull_back, "delays": delays}
 
+    def _path(self, basis: Basis, integrator: Integrator) -> Path:
+        """The run as its derivatives see it, with pivots that are sound at its start and end."""
+        if integrator.has_pivots:
+            d = [np.concatenate([self.p, self.inputs.values[:, k]]) for k in (0, -1)]
+            ends = [(basis.guess, d[0]), (self.steps.y1[-1], d[1])]
+            integrator = integrator.suited(ends, float(self.steps.t1[-1] - self.steps.t0[0]))
+        known = self.times, self.reached
+        return basis.path(integrator, self.steps, self.inputs, self.p, self.backend, known)
 
-def load_run(path: str | Path, own: Iterable[type] = ()) -> Trajectory:
+    def _kept_by(self, trajectory: Trajectory) -> "Stored":
+        del trajectory
+        return self
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write it to a file."""
+        RUN.save(path, self)
+
+
+RUN = Format("symfric run", 2, "load_run", "a saved run", Stored)
+
+
+def load_run(
+    path: str | PathLike[str], own: Iterable[type | Callable[..., Any]] = ()
+) -> Trajectory:
     """The run that `run.save(path)` wrote, to the bit.
 
     Nothing in the file is run: classes of symfric get their fields.
@@ -210,14 +274,4 @@ def load_run(path: str | Path, own: Iterable[type] = ()) -> Trajectory:
         ValueError: no such file, one that something else wrote, a damaged one, one of another
             format, or classes that are not known.
     """
-    place = checks.path("load_run", path)
-    try:
-        with place.open("rb") as file:
-            stored = packed.load(file, KIND, FORMAT, own)
-    except OSError as error:
-        reason = "a folder" if isinstance(error, IsADirectoryError) else "an unreadable file"
-        reason = "no such file" if isinstance(error, FileNotFoundError) else reason
-        raise ValueError(f"load_run '{path}': expected a saved run, got {reason}") from None
-    except ValueError as error:
-        raise ValueError(f"load_run '{path}': {error}") from None
-    return checks.kind(f"load_run '{path}'", stored, Stored, "a saved run").trajectory()
+    return RUN.load(path, own).trajectory()

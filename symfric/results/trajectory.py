@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-KIND, FORMAT = "symfric run", 1
-"""What files of runs call themselves; the number is raised when older programs would misread it."""
 
 
 class Kept(Protocol):
@@ -40,6 +38,10 @@ class Kept(Protocol):
 
     def trajectory(self) -> "Trajectory":
         """The run again."""
+        ...
+
+    def save(self, path: str | Path) -> None:
+        """Write it to a file."""
         ...
 
 
@@ -322,14 +324,13 @@ class Trajectory(Showing, Derivatives):
 
         It holds the model, the signals at `t` and all accepted steps, those of a long run found by
         another one. A loaded run does all that this one does: times in between, extremes, further
-        results, pictures, films, energy, another simulation of its `model`. Of derivatives there
-        are those at `t`. Functions are no data: inputs by functions are kept as expressions.
+        results, pictures, films, energy, derivatives that were asked for, another simulation of its
+        `model`. Functions are no data: inputs by functions are kept as expressions.
 
         Raises:
             ValueError: the file cannot be written, or a model holds what no file does.
         """
-        with written(path) as temporary, temporary.open("wb") as file:
-            packed.dump(file, self._kept, KIND, FORMAT)
+        self._kept.save(path)
 
     @property
     def _kept(self) -> "Kept":

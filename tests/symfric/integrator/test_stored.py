@@ -3,7 +3,7 @@
 import pickle
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import casadi as ca
@@ -15,9 +15,10 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator import Hold, load_run, simulate, simulate_by_peer, simulate_many
 from symfric.integrator.running import run as running
+from symfric.integrator.stored import RUN
 from symfric.laws import BrownMcPhee, ExactCoulomb, LuGre
 from symfric.model import Event, Model, Output
-from symfric.results.trajectory import FORMAT, Trajectory
+from symfric.results.trajectory import Trajectory
 from symfric.scenes import FourBar, drive, rabinowicz
 
 Array = NDArray[np.float64]
@@ -133,9 +134,28 @@ def test_derivatives_at_the_times_of_the_result_are_stored(tmp_path: Path) -> No
     found = loaded.gradient({"x": 1.0, "v": np.linspace(0.0, 1.0, 21)})
     wanted = run.gradient({"x": 1.0, "v": np.linspace(0.0, 1.0, 21)})
     assert found == pytest.approx(wanted, rel=1e-9)
-    assert loaded.differentiate is not None
-    with pytest.raises(ValueError, match=r"expected derivatives at `t`.*simulate again"):
-        loaded.differentiate(np.array([0.5]))
+
+
+def test_derivatives_between_the_times_of_the_result_are_found_again(tmp_path: Path) -> None:
+    between = np.linspace(0.0, 6.0, 97)
+    models = {
+        "smooth": (rabinowicz(LuGre(), free=["mu_s"]), ["mu_s", "x0.v"]),
+        "events": (rabinowicz(ExactCoulomb(), free=["mu_s"]), ["mu_s", "x0.v"]),
+        "loop": (FourBar(BrownMcPhee()).model(free=["mu_d"]), ["mu_d"]),
+    }
+    for name, (model, wanted) in models.items():
+        end = 0.3 if name == "loop" else 6.0
+        run = simulate(model, end, sensitivities=wanted, samples=7)
+        for loaded in (through_file(run, tmp_path), pickle.loads(pickle.dumps(run))):
+            assert run.differentiate is not None
+            assert loaded.differentiate is not None
+            one, other = (r.differentiate(between * end / 6) for r in (run, loaded))  # pyright: ignore
+            for seed, slopes in one.items():
+                for signal, values in slopes.items():
+                    found = other[seed][signal]
+                    np.testing.assert_array_equal(found, values, f"{name} {signal}")
+            twice = through_file(loaded, tmp_path)
+            assert twice.differentiate is not None
 
 
 def test_an_interrupted_write_leaves_the_old_file(
@@ -183,9 +203,12 @@ def test_foreign_and_damaged_files_are_refused(tmp_path: Path) -> None:
 
 def test_a_file_of_another_version_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = simulate(rabinowicz(BrownMcPhee()), 1.0, samples=11)
-    monkeypatch.setattr("symfric.results.trajectory.FORMAT", FORMAT + 1)
+    monkeypatch.setattr("symfric.integrator.stored.RUN", replace(RUN, number=RUN.number + 1))
     run.save(tmp_path / "run.npz")
-    newer = f"expected format {FORMAT} or older, got {FORMAT + 1}; it was written by a newer version"
+    monkeypatch.undo()
+    newer = (
+        f"expected format {RUN.number} or older, got {RUN.number + 1}; it was written by a newer"
+    )
     with pytest.raises(ValueError, match=newer):
         load_run(tmp_path / "run.npz")
 

@@ -1,0 +1,67 @@
+"""Objects in files: one file each, whole or not at all, and back to the bit.
+
+What a file is, which format, and what it cannot be is said here once for runs, ensembles, fits and
+optimal motions; how objects become arrays is `symfric.foundation.packed`.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any, Generic, TypeVar, final
+
+from symfric.foundation import checks, packed
+from symfric.foundation.files import written
+
+T = TypeVar("T")
+
+
+@final
+@dataclass(frozen=True)
+class Format(Generic[T]):
+    """A kind of file.
+
+    Attributes:
+        kind: what such files call themselves.
+        number: raised whenever older programs would misread it; older ones are read.
+        reader: what reads it, as errors call it: "load_run".
+        what: it holds: "a saved run".
+        content: class of what it holds.
+    """
+
+    kind: str
+    number: int
+    reader: str
+    what: str
+    content: type[T]
+
+    def save(self, path: str | PathLike[str], thing: T) -> None:
+        """Write `thing` to a file.
+
+        Raises:
+            ValueError: the file cannot be written, or something in it is what no file holds.
+        """
+        with written(checks.path("output", path)) as temporary, temporary.open("wb") as file:
+            packed.dump(file, thing, self.kind, self.number)
+
+    def load(self, path: str | PathLike[str], own: Iterable[type | Callable[..., Any]] = ()) -> T:
+        """What `save` wrote. Nothing in the file is run: classes get their fields.
+
+        Args:
+            path: the file.
+            own: your classes and functions in it.
+
+        Raises:
+            ValueError: no such file, one that something else wrote, a damaged one, one of a newer
+                version, or classes that are not known.
+        """
+        place, where = checks.path(self.reader, path), f"{self.reader} '{path}'"
+        try:
+            with place.open("rb") as file:
+                found = packed.load(file, self.kind, self.number, own, self.reader)
+        except OSError as error:
+            reason = "a folder" if isinstance(error, IsADirectoryError) else "an unreadable file"
+            reason = "no such file" if isinstance(error, FileNotFoundError) else reason
+            raise ValueError(f"{where}: expected {self.what}, got {reason}") from None
+        except ValueError as error:
+            raise ValueError(f"{where}: {error}") from None
+        return checks.kind(where, found, self.content, self.what)
