@@ -16,7 +16,24 @@ HELD = (
     ),
     Mutant(
         "a file of another version is read", PACKED,
-        'if about["format"] != form:', "if False:", T_STORED,
+        'if not 1 <= about["format"] <= form:', "if False:", T_STORED,
+    ),
+    Mutant(
+        "a symbol that is read is a new one", "symfric/foundation/identity.py",
+        "    if pairs:", "    if False:", ("tests/symfric/foundation/test_identity.py",),
+    ),
+    Mutant(
+        "a symbol has another name each time", "symfric/foundation/identity.py",
+        "found or _known(symbol, uuid4().hex)", "_known(symbol, uuid4().hex)",
+        ("tests/symfric/foundation/test_identity.py",),
+    ),
+    Mutant(
+        "functions of symfric in a file are called", PACKED,
+        "if self._own is not None and path not in self._own:", "if False:", T_PACKED,
+    ),
+    Mutant(
+        "derivatives of a stored run forget its events", STORED,
+        "self.guess, self.jumps, self.tolerance", "self.guess, (), self.tolerance", T_STORED,
     ),
     Mutant(
         "shared objects become several", PACKED,
