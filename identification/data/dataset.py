@@ -87,8 +87,9 @@ class Dataset:
             step: sample interval [s] of files without a time.
             variable: struct, matrix or deeper part of a `.mat` or `.npz` file: "run(2).log".
             points: rows are points (v, F) of a friction curve; no time is needed.
-            missing: "drop" leaves out rows in which a channel has no number (an empty cell, NaN);
-                `resampled` then makes the intervals equal and cuts at long gaps.
+            missing: "drop" leaves out rows in which a channel has no number (an empty cell, NaN)
+                and rows that repeat the one before, time and all; `resampled` then makes the
+                intervals equal and cuts at long gaps.
 
         Raises:
             ValueError: what cannot be used, with file, row and column; of several files all.

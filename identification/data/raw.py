@@ -85,7 +85,8 @@ class Wanted:
         step: sample interval of records without a time [s].
         points: whether the rows are points without time.
         assumed: units of canonical channels about which nobody says anything.
-        missing: what happens to rows in which a channel has no number, "refuse" or "drop".
+        missing: what happens to rows in which a channel has no number, and to those that repeat the
+            row before, "refuse" or "drop".
     """
 
     columns: Mapping[str, str] | Sequence[str] | None = None
@@ -181,11 +182,14 @@ def record(raw: Raw, wanted: Wanted) -> Record:
 
 
 def _rows(where: str, raw: Raw, needed: Mapping[str, Column], wanted: Wanted) -> NDArray[np.bool_]:
-    """Which rows are taken: all, or those in which every needed channel has a number."""
+    """Which rows are taken: all, or new ones with a number in every needed channel."""
     taken = np.ones(max((c.values.size for c in raw.columns), default=0), dtype=np.bool_)
-    columns = [c for c in needed.values() if c.gaps]
-    if wanted.missing == "refuse" or not columns:
+    if wanted.missing == "refuse":
         return taken
+    if "t" in needed and taken.size:
+        alike = [c.values[1:] == c.values[:-1] for c in needed.values()]
+        taken[1:] &= ~np.logical_and.reduce(alike)
+    columns = [c for c in needed.values() if c.gaps]
     for column in columns:
         taken &= np.isfinite(column.values)
     if not taken.any():

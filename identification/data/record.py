@@ -108,7 +108,7 @@ class Record:
         back = np.flatnonzero(np.diff(self.t) <= 0)
         if back.size:
             k = int(back[0])
-            later = ""
+            later = self._repeats(back)
             if back.size <= self.size // 20 and self.t[k + 1] <= self.t[0] + self.step:
                 later = "; the time starts again: one file for each record"
             problems.append(
@@ -117,6 +117,15 @@ class Record:
                 f"({back.size} such rows){later}"
             )
         return problems
+
+    def _repeats(self, back: NDArray[np.intp]) -> str:
+        """What to do where the times of samples `back + 1` are those of the samples before."""
+        if self.t is None or np.any(np.diff(self.t)[back] < 0):
+            return ""
+        alike = [values[back + 1] == values[back] for values in self.signals.values()]
+        if alike and np.all(alike):
+            return "; missing='drop' (--missing drop) leaves out rows that repeat the one before"
+        return "; several values at one time: is its clock too coarse? Then give step= (--step)"
 
     def place(self, sample: int) -> str:
         """Where a sample stands, for messages: its row in the file, else its number."""

@@ -22,7 +22,9 @@ JsonOption = Annotated[
 MissingOption = Annotated[
     str,
     typer.Option(
-        "--missing", metavar="refuse|drop", help="Rows in which a channel has no number: drop them."
+        "--missing",
+        metavar="refuse|drop",
+        help="Rows in which a channel has no number, or that repeat the one before: drop them.",
     ),
 ]
 ResampleOption = Annotated[

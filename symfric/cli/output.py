@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import textwrap
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
@@ -132,3 +133,11 @@ def plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value
+
+
+def printable(text: str) -> str:
+    """`text` from the command line as UTF-8 can hold it.
+
+    Where the locale is C, Python keeps bytes that it cannot read as lone surrogates.
+    """
+    return os.fsencode(text).decode("utf-8", errors="replace")

@@ -64,7 +64,7 @@ def report(
         found,
         out,
         settings={name: parameters(machine) for name, machine in machines.items()},
-        command=shlex.join(["symfric", *sys.argv[1:]]),
+        command=output.printable(shlex.join(["symfric", *sys.argv[1:]])),
     )
     output.say_written(out)
     for trajectory in found.values():

@@ -100,6 +100,14 @@ def _command(text: str) -> tuple[str, ...] | None:
     return None if path is None else (str(Path(path)), *words[1:])
 
 
+def missing_compiler() -> str:
+    """Why `find_compiler` found none, and what to do."""
+    asked = os.environ.get("CC", "").strip()
+    if asked:
+        return f"no C compiler found: $CC is {asked!r}, which is not there; correct it or unset CC"
+    return "no C compiler found; install gcc or clang, or set CC"
+
+
 def needed_compiler() -> Compiler:
     """The compiler of this machine.
 

@@ -23,7 +23,7 @@ from symfric.codegen.writing.layout import prefix
 from symfric.codegen.writing.routines import routines
 from symfric.emitter.c99 import REALS, Real
 from symfric.foundation.checks import kind
-from symfric.foundation.compiler import CompileError, Compiler, find_compiler
+from symfric.foundation.compiler import CompileError, Compiler, find_compiler, missing_compiler
 from symfric.foundation.files import write_text
 
 Array = NDArray[np.float64]
@@ -147,7 +147,6 @@ class Verification:
 
 
 VERIFIED = "verified"
-NO_COMPILER = "not verified: no C compiler found; install gcc or clang, or set CC"
 
 
 def verify(
@@ -191,7 +190,7 @@ def verify(
     kind("verify", generated, Generated, "what generate(...) returned")
     block, found = generated.block, find_compiler(compiler)
     if found is None:
-        return Verification(block.name, NO_COMPILER, None, ())
+        return Verification(block.name, f"not verified: {missing_compiler()}", None, ())
     given, of = _given(generated), cache(partial(terms, block))
     checks: list[Check] = []
     try:

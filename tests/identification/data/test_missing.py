@@ -75,3 +75,29 @@ def test_no_row_with_numbers_is_an_error() -> None:
 def test_unknown_words_are_refused() -> None:
     with pytest.raises(ValueError, match="missing: expected one of refuse, drop"):
         Dataset.of(t=[0.0], x=[1.0], missing="skip")  # pyright: ignore[reportArgumentType]
+
+
+TWICE = "t [s],x [m],force [N]\n0,0,1\n1,1,2\n1,1,2\n2,1,2\n3,4,5\n"
+
+
+def test_rows_written_twice_are_left_out_and_standstill_stays(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text(TWICE)
+    (found,) = Dataset.read(path, missing="drop")
+    np.testing.assert_array_equal(found.time, [0.0, 1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(found["x"], [0.0, 1.0, 1.0, 4.0])  # at rest is not twice
+
+
+@pytest.mark.parametrize(
+    ("rows", "way_out"),
+    [
+        (TWICE, r"row 4: .*missing='drop' \(--missing drop\) leaves out rows that repeat"),
+        (TWICE.replace("1,1,2\n1,1,2", "1,1,2\n1,2,2"), r"row 4: .*clock too coarse\? .*step="),
+        (TWICE.replace("1,1,2\n1,1,2", "1,1,2\n0.5,1,2"), r"got 0.5 s after 1 s \(1 such rows\)$"),
+    ],
+)
+def test_times_that_stand_still_say_what_to_do(tmp_path: Path, rows: str, way_out: str) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text(rows)
+    with pytest.raises(ValueError, match=way_out):
+        Dataset.read(path)

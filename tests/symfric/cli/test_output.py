@@ -60,3 +60,9 @@ def test_progress_is_silent_where_there_is_no_terminal(capsys: pytest.CaptureFix
     with output.progress("work") as tell:
         tell(0.5)
     assert capsys.readouterr().err == ""
+
+
+def test_a_command_line_of_another_locale_can_be_written_down() -> None:
+    kept = "bericht ä.html".encode().decode("ascii", errors="surrogateescape")
+    assert output.printable(kept).encode() == "bericht ä.html".encode()
+    assert output.printable("bericht ä.html") == "bericht ä.html"

@@ -210,6 +210,12 @@ def test_without_a_compiler_it_says_so(monkeypatch, tmp_path):
     )
 
 
+def test_a_compiler_named_by_the_environment_and_not_there_is_named(monkeypatch, tmp_path):
+    made = generate(LuGre(), tmp_path)
+    monkeypatch.setenv("CC", "/no/such")
+    assert "$CC is '/no/such', which is not there" in verify(made).status
+
+
 def test_c_that_does_not_compile_is_no_proof(compiler, tmp_path):
     found = tampered(generate(LuGre(), tmp_path), "double", "const double", "konst double")
     assert not found.ok
