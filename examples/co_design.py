@@ -34,14 +34,14 @@ def feeder() -> Model:
     x, v = Variable("x", "m", nominal=0.05), Variable("v", "m/s", nominal=0.5)
     force = Variable("force", "N", nominal=10.0)
     k = Variable("k", "N/m", start=100.0, nominal=300.0, lower=0.0)
-    rail = Contact("rail", slip=v.symbol, N=20.0, law=LAW)
-    pushed = force.symbol - k.symbol * x.symbol - rail.force
+    rail = Contact("rail", slip=v, N=20.0, law=LAW)
+    pushed = force - k * x - rail.force
     return Model(
         "feeder",
         x=(x, v),
         u=(force,),
         p=(k,),
-        ode=ca.vertcat(v.symbol, pushed / M),
+        ode=ca.vertcat(v, pushed / M),
         contacts=(rail,),
     )
 

@@ -44,12 +44,12 @@ def arm(servo: bool) -> Model:
     m.frame("ground.tip", at=(0.0, 0.0, 0.5), z=UP)
     before = "ground"
     for (name, axis), beyond in zip(JOINTS.items(), (SIDE, SIDE, None), strict=True):
-        mass = 4.0 if beyond else 3.0 + p["payload"].symbol
+        mass = 4.0 if beyond else 3.0 + p["payload"]
         m.body(name, mass, (0.01, 0.06, 0.06), com=(0.2 if beyond else 0.3, 0.0, 0.0))
         m.frame(f"{name}.root", z=axis)
         if beyond:
             m.frame(f"{name}.tip", at=(0.4 if name != "base" else 0.0, 0.0, 0.0), z=beyond)
-        mu, viscous = p[f"mu_{name}"].symbol, p[f"viscous_{name}"].symbol
+        mu, viscous = p[f"mu_{name}"], p[f"viscous_{name}"]
         law = Sum((Coulomb(mu_d=mu, v_eps=2e-4), Viscous(sigma_2=viscous)))
         friction = JointFriction(law, radius=0.03, length=0.08)
         m.joint(Revolute(f"q_{name}", f"{before}.tip", f"{name}.root", 0.0, 0.0, friction))

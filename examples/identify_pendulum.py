@@ -28,16 +28,15 @@ T = np.linspace(0.0, 12.0, 1201)
 def pendulum() -> Model:
     """Angle from hanging; dry friction changes its sign within 1 mrad/s."""
     phi = Variable("phi", "rad", nominal=0.1)
-    rate = Variable("rate", "rad/s", nominal=0.5)
+    v = Variable("rate", "rad/s", nominal=0.5)
     w = Variable("w", "rad/s", start=5.0, lower=0.0, doc="natural frequency")
     c = Variable("c", "rad/s^2", start=0.1, lower=0.0, doc="dry friction over inertia")
     d = Variable("d", "1/s", start=0.1, lower=0.0, doc="viscous friction over inertia")
     e = Variable("e", "1/rad", start=0.1, lower=0.0, doc="friction of the air over inertia")
-    v = rate.symbol
     size = ca.sqrt(v**2 + 1e-6)
-    brake = c.symbol * v / size + d.symbol * v + e.symbol * size * v
-    swing = -(w.symbol**2) * ca.sin(phi.symbol) - brake
-    return Model("pendulum", x=(phi, rate), p=(w, c, d, e), ode=ca.vertcat(v, swing))
+    brake = c * v / size + d * v + e * size * v
+    swing = -(w**2) * ca.sin(phi) - brake
+    return Model("pendulum", x=(phi, v), p=(w, c, d, e), ode=ca.vertcat(v, swing))
 
 
 def recorded(model: Model) -> Dataset:

@@ -34,16 +34,16 @@ def rig() -> Model:
     body, wheel, plate = (Variable(n, "m", nominal=0.1) for n in ("body", "wheel", "plate"))
     v_body, v_wheel = (Variable(n, "m/s", nominal=0.1) for n in ("v_body", "v_wheel"))
     speed = Variable("speed", "m/s", nominal=0.1, doc="speed of the plate")
-    strut = K_S * (wheel.symbol - body.symbol) + D_S * (v_wheel.symbol - v_body.symbol)
-    tyre = K_T * (plate.symbol - wheel.symbol) + D_T * (speed.symbol - v_wheel.symbol)
+    strut = K_S * (wheel - body) + D_S * (v_wheel - v_body)
+    tyre = K_T * (plate - wheel) + D_T * (speed - v_wheel)
     side = 1093.0 + ca.sqrt(strut**2 + 1.0) - 1.0  # preload and side force of the strut [N]
-    guide = Contact("guide", slip=v_body.symbol, N=side, law=LAW)
+    guide = Contact("guide", slip=v_body, N=side, law=LAW)
     a_body = (strut - guide.force) / BODY
     return Model(
         "quarter car on a rig",
         x=(body, wheel, plate, v_body, v_wheel),
         u=(speed,),
-        ode=ca.vertcat(v_body.symbol, v_wheel.symbol, speed.symbol, a_body, (tyre - strut) / WHEEL),
+        ode=ca.vertcat(v_body, v_wheel, speed, a_body, (tyre - strut) / WHEEL),
         contacts=(guide,),
         outputs={
             "a_body": Output(a_body, "m/s^2", "acceleration of the body"),

@@ -30,17 +30,17 @@ def motor_and_load() -> Model:
     motor, load = (Variable(name, "m", nominal=0.1) for name in ("motor", "load"))
     v_motor, v_load = (Variable(name, "m/s", nominal=0.1) for name in ("v_motor", "v_load"))
     force = Variable("force", "N", nominal=10.0)
-    wound = motor.symbol - load.symbol
-    spring = 200.0 * wound + 2.0 * (v_motor.symbol - v_load.symbol)
-    guide = Contact("guide", slip=v_load.symbol, N=1.0, law=LAW)
+    wound = motor - load
+    spring = 200.0 * wound + 2.0 * (v_motor - v_load)
+    guide = Contact("guide", slip=v_load, N=1.0, law=LAW)
     return Model(
         "load behind a spring",
         x=(motor, load, v_motor, v_load),
         u=(force,),
         ode=ca.vertcat(
-            v_motor.symbol,
-            v_load.symbol,
-            (force.symbol - spring) / 0.5,
+            v_motor,
+            v_load,
+            (force - spring) / 0.5,
             (spring - guide.force) / 1.0,
         ),
         contacts=(guide,),

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.shown import Showing
+from symfric.foundation.symbolic import plain
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -163,7 +164,8 @@ def count(
 
 
 def expression(where: str, value: object) -> Any:
-    """`value` as it is: an SX matrix, a DM matrix, a finite number or an array of them."""
+    """`value`, SX, DM, a finite number or an array of them, as it is; of a variable its symbol."""
+    value = plain(value)
     if isinstance(value, ca.SX | ca.DM):
         return value
     if isinstance(value, ca.MX):
@@ -172,10 +174,7 @@ def expression(where: str, value: object) -> Any:
         return value
     found = as_number(value)
     if found is None or not isfinite(found):
-        symbol = isinstance(getattr(value, "symbol", None), ca.SX)
-        hint = "write .symbol behind a variable" if symbol else ""
-        if isinstance(value, list | tuple):
-            hint = "write casadi.vertcat(...) for a column"
+        hint = "write casadi.vertcat(...) for a column" * isinstance(value, list | tuple)
         raise refused(where, "an SX expression or a finite number", value, hint)
     return value
 

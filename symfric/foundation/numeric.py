@@ -14,21 +14,24 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.symbolic import Symbolic
 from symfric.foundation.vector import Rows, Vector
 
 Scalar = Any
 """A real number: float, NumPy array (element-wise), SX, MX or DM; a `Vector` where laws take it."""
 
-_CASADI = (ca.SX, ca.MX, ca.DM)
+_CASADI = (ca.SX, ca.MX, ca.DM, Symbolic)
 
 
 def is_symbolic(value: Scalar) -> bool:
     """Whether `value` holds a CasADi symbol, so that numerical checks do not apply."""
-    return isinstance(value, ca.MX) or (isinstance(value, ca.SX) and not value.is_constant())
+    if isinstance(value, ca.SX):
+        return not value.is_constant()
+    return isinstance(value, ca.MX | Symbolic)
 
 
 def is_casadi(*values: Scalar) -> bool:
-    """Whether any of `values` is a CasADi matrix."""
+    """Whether any of `values` is a CasADi matrix, or stands for one."""
     return any(isinstance(value, _CASADI) for value in values)
 
 

@@ -15,11 +15,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation import checks
+from symfric.foundation import checks, units
 from symfric.foundation.checks import check_names as check_names
 from symfric.foundation.numeric import Scalar, is_casadi, is_number, is_symbolic
 from symfric.foundation.shown import Shown, Table, figure_of
 from symfric.foundation.variable import Variable as Variable
+from symfric.foundation.variable import take_si
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -68,6 +69,7 @@ def param(
     """
     if role and role not in ROLES:
         raise ValueError(f"param: role: expected one of {', '.join(ROLES)}, got {role!r}")
+    unit = units.checked("param", unit, stacklevel=3)
     meta = {"unit": unit, "doc": doc, "role": role, "lower": lower, "upper": upper, "width": width}
     return field(default=default, metadata=meta)
 
@@ -126,6 +128,11 @@ class Parametric:
         return super().__new__(cls)
 
     def __post_init__(self) -> None:
+        take_si(
+            type(self).__name__,
+            self,
+            *(item.name for item in fields(self) if "unit" in item.metadata),
+        )
         problems = list(_problems(self))
         if problems:
             raise ValueError(f"{type(self).__name__}: " + "; ".join(problems))

@@ -5,17 +5,27 @@ from math import inf
 
 import casadi as ca
 
-from symfric.foundation import checks
+from symfric.foundation import checks, units
 from symfric.foundation import identity as identity  # what holds symbols pickles
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.shown import figure_of
+from symfric.foundation.symbolic import Symbolic, take_symbols
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Variable:
+class Variable(Symbolic):
     """A named scalar of a model: its symbol, unit and the numbers that belong to it.
 
+    Equations are written with it as with its symbol, see `Symbolic`:
+
+        s, v = Variable("s", "m"), Variable("v", "m/s", start=0.1)
+        Model("spring", x=(s, v), ode=ca.vertcat(v, -50 * s))
+
+    A column is `ca.vertcat(*variables)`.
+
     Attributes:
+        unit: as text, SI where a law or a mechanism takes the variable; a text that is no unit is
+            warned of, with what may be meant.
         symbol: SX symbol, shape (1, 1).
         start: initial or default value; an expression in other symbols where it depends on them.
         nominal: typical magnitude; absolute tolerances and scalings are relative to it.
@@ -37,6 +47,8 @@ class Variable:
         where = f"variable '{checks.text('variable: name', self.name)}'"
         if not isinstance(self.unit, str):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise checks.refused(f"{where}: unit", "a text such as 'N', or ''", self.unit)
+        take_symbols(self, "start")
+        object.__setattr__(self, "unit", units.checked(where, self.unit))
         symbol = checks.kind(f"{where}: symbol", self.symbol, ca.SX, "an SX symbol")
         if symbol.is_empty():
             object.__setattr__(self, "symbol", ca.SX.sym(self.name))
@@ -57,3 +69,28 @@ class Variable:
     def within(self, where: str, value: object) -> float:
         """`value` as a finite number inside the bounds."""
         return checks.number(where, value, unit=self.unit, lower=self.lower, upper=self.upper)
+
+
+def take_si(where: str, given: object, *names: str) -> None:
+    """Put symbols into fields of a frozen dataclass that hold variables, which are in SI units.
+
+    Laws and mechanisms compute in SI: 50 mm/s would be taken for 50 m/s.
+
+    Raises:
+        ValueError: a variable in another unit.
+    """
+    for name in names:
+        value = getattr(given, name)
+        if isinstance(value, Variable):
+            check_si(f"{where}: {name}", value)
+    take_symbols(given, *names)
+
+
+def check_si(where: str, value: object) -> None:
+    """Refuse a variable whose unit is known and not of the SI, such as mm/s; all else passes."""
+    size = units.in_si(value.unit) if isinstance(value, Variable) else None
+    if isinstance(value, Variable) and size not in (None, 1.0):
+        raise ValueError(
+            f"{where}: expected SI units, got variable '{value.name}' [{value.unit}]; "
+            f"write {size:.6g} * {value.name}"
+        )

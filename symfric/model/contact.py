@@ -20,8 +20,10 @@ import casadi as ca
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Parametric, Variable
+from symfric.foundation.symbolic import take_symbols
 from symfric.foundation.symbols import at_start, stacked, starts_of, symbols_of
 from symfric.foundation.units import turned
+from symfric.foundation.variable import take_si
 from symfric.model.parts import Event, Monitor, Output
 
 if TYPE_CHECKING:
@@ -61,8 +63,8 @@ class Contact:
 
     Attributes:
         name: of its states and events, "<name>_<state>".
-        slip: sliding velocity [m/s] in the symbols of the model, shape (1, 1).
-        N: normal force [N], an expression or an algebraic unknown of the model; NaN where a
+        slip: sliding velocity [m/s], a variable or an expression of the model, shape (1, 1).
+        N: normal force [N], an expression or an algebraic variable of the model; NaN where a
             mechanism's law does not depend on it.
         law: any friction law of a scalar slip.
         given: further inputs of the law by name, such as the applied force F_e.
@@ -77,7 +79,7 @@ class Contact:
     """
 
     name: str
-    slip: ca.SX
+    slip: Scalar
     N: Scalar
     law: FrictionLaw
     given: Mapping[str, Scalar] = field(default_factory=dict[str, Scalar])
@@ -92,6 +94,8 @@ class Contact:
         where = f"contact '{checks.text('contact: name', self.name)}'"
         if not (isinstance(self.law, Parametric) and hasattr(self.law, "sliding")):
             raise checks.refused(f"{where}: law", "a law of a scalar slip, as LuGre()", self.law)
+        take_si(where, self, "slip", "N")
+        take_symbols(self, "given", "rest")
         for part in ("slip", "N"):
             value = ca.SX(checks.expression(f"{where}: {part}", getattr(self, part)))
             if value.numel() != 1:

@@ -4,9 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
 
-from symfric.foundation import checks
+from symfric.foundation import checks, units
 from symfric.foundation.numeric import Scalar, is_casadi
 from symfric.foundation.shown import figure_of
+from symfric.foundation.symbolic import take_symbols
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -22,9 +23,11 @@ class Output:
     kind: str = ""
 
     def __post_init__(self) -> None:
+        take_symbols(self, "expression")
         checks.expression("Output", self.expression)
         if not isinstance(self.unit, str):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise checks.refused("Output: unit", "a text such as 'N'", self.unit)
+        object.__setattr__(self, "unit", units.checked("Output", self.unit))
 
     def __repr__(self) -> str:
         return f"<output [{self.unit}]{': ' * bool(self.doc)}{self.doc}>"
@@ -47,6 +50,7 @@ class Monitor:
     nominal: Scalar
 
     def __post_init__(self) -> None:
+        take_symbols(self, "expression", "nominal")
         checks.expression("Monitor", self.expression)
         if is_casadi(self.nominal):
             checks.expression("Monitor: nominal", self.nominal)
@@ -86,6 +90,7 @@ class Event:
 
     def __post_init__(self) -> None:
         where = f"event '{checks.text('Event: name', self.name)}'"
+        take_symbols(self, "expression", "reset")
         checks.expression(where, self.expression)
         checks.count(f"{where}: direction", self.direction, least=-1, most=1)
         checks.flag(f"{where}: terminal", self.terminal)

@@ -29,6 +29,7 @@ import casadi as ca
 from symfric.foundation.checks import as_number
 from symfric.foundation.numeric import Scalar, is_symbolic
 from symfric.foundation.units import turned
+from symfric.foundation.variable import take_si
 from symfric.laws import Law
 from symfric.laws.base.law import FORCE, check_law
 from symfric.laws.composed.isotropic import SpatialSlip, anisotropy
@@ -85,6 +86,7 @@ class JointFriction:
 
     def __post_init__(self) -> None:
         check_law("friction", self.law)
+        take_si("friction", self, "radius", "length", "width", "preload", "normal", "eps")
 
     def problems(self, rubs: Sequence[str]) -> Iterator[str]:
         """What is wrong for a joint in which friction acts in the directions `rubs`."""

@@ -14,6 +14,7 @@ from symfric.foundation.checks import kind, many, number, shown
 from symfric.foundation.numeric import Scalar, equals
 from symfric.foundation.parameters import Variable, check_names
 from symfric.foundation.shown import Showing, Shown
+from symfric.foundation.symbolic import plain, with_symbols
 from symfric.foundation.symbols import starts_of, symbols_of
 from symfric.model import Model, Variables
 from symfric.multibody import checks
@@ -66,6 +67,7 @@ class Mechanism(Showing):
         self.inputs: list[Variable] = []
         self.frames: list[tuple[str, Frame]] = []
         self._wrong: list[str] = []
+        gravity = plain(gravity)
         if not is_vector(gravity):
             self._wrong.append(f"gravity: expected three numbers [m/s^2], got {gravity!r}")
         elif not all(equals(gravity[i], 0.0) for i in range(3)):
@@ -103,7 +105,8 @@ class Mechanism(Showing):
     ) -> None:
         """Add a rigid body; see `Body`."""
         if isinstance(name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
-            self.bodies.append(Body(name, mass, inertia, com, ideal=ideal))
+            numbers = plain((mass, inertia, com))
+            self.bodies.append(Body(name, *numbers, ideal=ideal))
         else:
             self._wrong.append(f"body > name: expected a text, got {shown(name)}")
 
@@ -119,7 +122,7 @@ class Mechanism(Showing):
             self._wrong.append(f"frame: expected 'body.frame' of a known body, got {shown(place)}")
             return
         try:
-            self.frames.append((place, Frame(at, z, x)))
+            self.frames.append((place, Frame(plain(at), plain(z), plain(x))))
         except ValueError as error:
             self.frames.append((place, Frame()))
             self._wrong.append(
@@ -146,7 +149,7 @@ class Mechanism(Showing):
         elif odd := list(checks.texts(part)):
             self._wrong += [f"{what.lower()} {shown(getattr(part, 'name', ''))} > {t}" for t in odd]
         else:
-            group.append(part)
+            group.append(with_symbols(part))
 
     def input(self, name: str, unit: str, start: float = 0.0, nominal: float = 1.0) -> ca.SX:
         """Add an input and return its symbol, for actuators and user forces."""

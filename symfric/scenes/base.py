@@ -16,6 +16,7 @@ from symfric.foundation.parameters import Parametric, Variable, parameters, symb
 from symfric.foundation.shown import WIDTH
 from symfric.foundation.symbols import symbols_of
 from symfric.foundation.units import turned
+from symfric.foundation.variable import check_si
 from symfric.laws import Law
 from symfric.laws.base.law import check_law
 from symfric.model import Contact, Model, Variables
@@ -179,16 +180,16 @@ def contact(
     the law behind its own, its changes of mode as events, and error control that sees the slip:
 
         x, v, pull = Variable("x", "m"), Variable("v", "m/s"), Variable("pull", "N")
-        slip = contact("floor", LuGre(), v.symbol, 10.0, rest={"v": 0.0}, F_e=pull.symbol)
-        rate = (pull.symbol - slip.force) / 2.0
-        sled = Model("sled", x=(x, v), u=(pull,), ode=casadi.vertcat(v.symbol, rate),
+        slip = contact("floor", LuGre(), v, 10.0, rest={"v": 0.0}, F_e=pull)
+        rate = (pull - slip.force) / 2.0
+        sled = Model("sled", x=(x, v), u=(pull,), ode=casadi.vertcat(v, rate),
                      contacts=(slip,), outputs={"friction": Output(slip.force, "N")})
 
     Args:
         name: what is rubbed against.
         law: any law of a scalar slip; another one is another word here.
-        v: sliding velocity [m/s] in the symbols of the model; `force` opposes it.
-        N: normal force [N], a number or an expression.
+        v: sliding velocity [m/s], a variable or an expression; `force` opposes it.
+        N: normal force [N], a number, a variable or an expression.
         rest: state of the model -> its value at which `v` is exactly zero, for laws that rest.
         least: smallest value of an `N` that changes, which the law must bear.
         bare: states and events are called as in the law; with several contacts give False, and
@@ -198,9 +199,12 @@ def contact(
             contact must carry for no acceleration.
 
     Raises:
-        ValueError: no law, one that needs an input that is not offered, or a load where N is 0.
+        ValueError: no law, one that needs an input that is not offered, a load where N is 0, or a
+            variable in other units than those of the SI.
     """
-    check_law(f"contact '{name}': law", law)
+    where = f"contact '{name}'"
+    check_law(f"{where}: law", law)
+    check_si(f"{where}: v", v)
     missing = [f"{i.name} ({i.doc})" for i in law.inputs if i.name not in inputs]
     if missing:
         raise ValueError(
@@ -216,8 +220,8 @@ def contact(
         )
     if least is not None and is_number(least):  # laws that need a load refuse a number only
         law.rate(ca.SX(1.0), least, ca.SX([s.nominal for s in law.states]))
-    v = checks.expression(f"contact '{name}': v", v)
-    turns = checks.flag(f"contact '{name}': turning", turning)
+    v = checks.expression(f"{where}: v", v)
+    turns = checks.flag(f"{where}: turning", turning)
     return Contact(name, ca.SX(v), N, law, given=inputs, rest=rest or {}, turning=turns, bare=bare)
 
 

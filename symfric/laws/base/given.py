@@ -8,6 +8,7 @@ import numpy as np
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, is_casadi, is_number
+from symfric.foundation.symbolic import plain
 from symfric.foundation.vector import Rows
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(method)
     def checked(law: "Law", v: Scalar, N: Scalar, z: Scalar = (), *more: Any, **inputs: Any) -> Any:
+        v, N, z = plain(v), plain(N), plain(z)
         return method(law, v, N, states_of(law, v, z), *more, **inputs)
 
     return checked

@@ -66,7 +66,8 @@ def test_models_show_what_they_consist_of_without_expressions() -> None:
 
 
 def test_names_of_a_user_model_are_escaped() -> None:
-    x = Variable("x", EVIL, doc=EVIL)
+    with pytest.warns(UserWarning, match="expected a unit"):
+        x = Variable("x", EVIL, doc=EVIL)
     model = Model(EVIL, x=(x,), ode=-x.symbol, outputs={"y": Output(2 * x.symbol, "m", EVIL)})
     assert shown(model).words.count(EVIL) == 4
 

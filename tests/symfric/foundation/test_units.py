@@ -1,7 +1,13 @@
-"""Units of contacts that turn."""
+"""Units as text, and those of contacts that turn."""
 
-from symfric import ALL_LAWS, parameters
-from symfric.foundation.units import turned
+from dataclasses import replace
+from math import pi
+
+import pytest
+
+from symfric import ALL_LAWS, Output, Variable, parameters
+from symfric.foundation.units import in_si, nearest, turned, written
+from symfric.scenes import ALL_SCENES
 
 
 def test_every_unit_of_sliding_has_one_of_turning() -> None:
@@ -17,3 +23,72 @@ def test_every_unit_of_sliding_has_one_of_turning() -> None:
     for unit in units - {"1", "s", "K", "degC", "rad", "1/s"}:
         assert "rad" in turned(unit) or "N m" in turned(unit), unit
         assert turned(turned(unit)) == turned(unit)
+
+
+SI = (
+    "m", "m/s", "m/s^2", "N", "N m", "N s/m", "N s^2/m", "N s^2/m^2", "kg", "kg m^2", "1", "",
+    "1/s", "1/(N m)", "rad/(s K)", "N (s/m)^d", "m s^-2", "Pa/m", "mol", "degC", "K", "V", "Ohm",
+    "V s/rad", "W/(m K)", "N/Hz^0.5", "m^(1/2)", "J", "counts", "LSB", "1/rad",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("text", SI)
+def test_units_of_the_si_are_one_and_written_as_they_are(text: str) -> None:
+    assert in_si(text) == 1.0
+    assert written(text) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "same"),
+    [
+        ("N*s/m", "N s/m"), ("kg·m²", "kg m^2"), ("Nm", "N m"), ("Nms/rad", "N m s/rad"),
+        ("m/s2", "m/s^2"), ("kg.m2", "kg m^2"), ("N.m/rad", "N m/rad"), ("m·s⁻¹", "m s^-1"),
+        ("m**2", "m^2"), ("µm", "um"), ("°C", "degC"), ("°/s", "deg/s"), ("V/√Hz", "V/Hz^0.5"),
+        (" N  m / s ", "N m/s"), ("-", "1"), ("kgm^2", "kg m^2"), ("As", "A s"),
+    ],
+)  # fmt: skip
+def test_other_ways_to_write_a_unit_are_taken(text: str, same: str) -> None:
+    assert written(text) == same
+    assert in_si(text) == in_si(same) is not None
+
+
+@pytest.mark.parametrize(
+    ("text", "size"),
+    [
+        ("mm/s", 1e-3), ("um", 1e-6), ("%", 0.01), ("rpm", pi / 30), ("deg/s^2", pi / 180),
+        ("km/h", 1 / 3.6), ("N/mm^2", 1e6), ("m/s/ms", 1e3), ("1/min", 1 / 60), ("mol/L", 1e3),
+        ("mN m", 1e-3), ("10 N", 10.0), ("1e-3 m", 1e-3), ("ms", 1e-3), ("min", 60.0),
+    ],
+)  # fmt: skip
+def test_sizes_are_those_of_the_prefixes(text: str, size: float) -> None:
+    assert in_si(text) == pytest.approx(size, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [
+        ("m/sec", "m/s"), ("newton", "N"), ("Newton meters", "N m"), ("rad/sec", "rad/s"),
+        ("meters per second", "m/s"), ("Kg", "kg"), ("N-m", "N m"), ("[m/s]", "m/s"), ("hz", "Hz"),
+        ("degrees", "deg"), ("furlong", ""), ("m//s", ""), ("(m", ""), ("N/", ""), ("m,s", ""),
+    ],
+)  # fmt: skip
+def test_what_is_no_unit_is_told_with_what_is_meant(text: str, meant: str) -> None:
+    assert in_si(text) is None
+    assert nearest(text) == meant
+
+
+def test_a_misspelt_unit_is_warned_of_once_in_the_line_that_has_it() -> None:
+    with pytest.warns(UserWarning, match=r"variable 'v': .*got 'm/seconds'; write 'm/s'") as told:
+        v = Variable("v", "m/seconds")
+    assert told[0].filename == __file__
+    replace(v, start=1.0)  # a second warning would be an error here
+    with pytest.warns(UserWarning, match="Output: .*got 'smoots'; write '1' for what counts"):
+        Output(v, "smoots")
+
+
+def test_all_units_of_the_package_are_si() -> None:
+    units = {p.unit for kind in ALL_LAWS.values() for p in parameters(kind()).values()}
+    units |= {s.unit for kind in ALL_LAWS.values() for s in (*kind().states, *kind().inputs)}
+    for scene in ALL_SCENES.values():
+        units |= {p.unit for p in parameters(scene(ALL_LAWS["brown_mcphee"]())).values()}
+    assert {unit for unit in units if in_si(unit) != 1.0 or written(unit) != unit} == set()

@@ -75,8 +75,13 @@ def test_mistakes_are_told_with_what_to_write() -> None:
         contact("a", LuGre, v.symbol, 1.0)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match=r"got 'lugre'; law_from_text\('lugre'\) makes one"):
         contact("a", "lugre", v.symbol, 1.0)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match=r"contact 'a': v: .*write .symbol behind a variable"):
-        contact("a", LuGre(), v, 1.0)
+    with pytest.raises(ValueError, match=r"contact 'a': v: expected an SX .* got 'v'"):
+        contact("a", LuGre(), "v", 1.0)
+    slow = Variable("w", "mm/s")
+    with pytest.raises(
+        ValueError, match=r"contact 'a': v: .* got variable 'w' \[mm/s\]; write 0.0"
+    ):
+        contact("a", LuGre(), slow, 1.0)
     with pytest.raises(ValueError, match=r"needs F_e .*as in contact\(\.\.\., F_e=pull\)"):
         contact("a", Karnopp(), v.symbol, 1.0)
 

@@ -1,0 +1,152 @@
+"""Objects that stand for a symbol: CasADi takes them as it is, and arithmetic writes with it."""
+
+import operator
+from collections.abc import Callable, Mapping
+from dataclasses import fields, replace
+from typing import Any, TypeVar, final
+
+import casadi as ca
+import numpy as np
+
+EXPRESSIONS = (ca.SX, ca.MX, ca.DM, int, float, np.generic, np.ndarray)
+"""With what a comparison for equality is an expression."""
+
+
+T = TypeVar("T")
+
+
+def plain(value: Any) -> Any:
+    """The symbol of what stands for one, also in a list, tuple or mapping; all else as it is."""
+    if isinstance(value, Symbolic):
+        return value.symbol
+    if isinstance(value, Equality):
+        return ca.SX(value)
+    if type(value) in (list, tuple):
+        return type(value)(map(plain, value))
+    if isinstance(value, Mapping) and any(isinstance(v, Symbolic) for v in value.values()):
+        return {name: plain(v) for name, v in value.items()}
+    return value
+
+
+def take_symbols(given: object, *names: str) -> None:
+    """Put symbols into those fields of a frozen dataclass that hold what stands for one."""
+    for name in names:
+        object.__setattr__(given, name, plain(getattr(given, name)))
+
+
+def with_symbols(given: T) -> T:
+    """A frozen dataclass as it is, or a copy with symbols in fields with what stands for one."""
+    known = {item.name: getattr(given, item.name) for item in fields(given)}  # pyright: ignore
+    changed = {name: plain(value) for name, value in known.items() if _stands(value)}
+    return replace(given, **changed) if changed else given  # pyright: ignore
+
+
+def _stands(value: Any) -> bool:
+    if isinstance(value, list | tuple):
+        return any(map(_stands, value))
+    return isinstance(value, Symbolic)
+
+
+def _written(operate: Callable[..., Any], *operands: Any) -> Any:
+    """The expression that an operator makes of these operands."""
+    if any(isinstance(value, ca.MX) for value in operands):
+        name = next(value.symbol for value in operands if isinstance(value, Symbolic))
+        raise ValueError(
+            f"variable '{name}': expected SX or numbers beside it, got MX; models are written with "
+            "casadi.SX, and Opti takes them through model.function(...), flow or stepper"
+        )
+    return operate(*map(plain, operands))
+
+
+def _operator(operate: Callable[..., Any]) -> Callable[["Symbolic", Any], Any]:
+    def forward(self: "Symbolic", other: Any) -> Any:
+        return _written(operate, self, other)
+
+    return forward
+
+
+def _reflected(operate: Callable[..., Any]) -> Callable[["Symbolic", Any], Any]:
+    def reflected(self: "Symbolic", other: Any) -> Any:
+        return _written(operate, other, self)
+
+    return reflected
+
+
+class Symbolic:
+    """Something with an SX symbol; in equations it is that symbol.
+
+        ca.sin(v),  ca.vertcat(s, v),  50 * s - v**2,  np.array([1.0, 2.0]) * v,  v > 0,  v == 0
+
+    are SX. Between two of these objects `==` says whether they are the same one, and is an
+    expression only where CasADi takes it, as in `ca.if_else(v == s, ...)`: so they are found in
+    tuples and may be keys.
+
+    Raises:
+        ValueError: an operator with MX on its other side.
+    """
+
+    symbol: ca.SX
+
+    def __SX__(self) -> ca.SX:
+        return self.symbol
+
+    __add__, __radd__ = _operator(operator.add), _reflected(operator.add)
+    __sub__, __rsub__ = _operator(operator.sub), _reflected(operator.sub)
+    __mul__, __rmul__ = _operator(operator.mul), _reflected(operator.mul)
+    __truediv__, __rtruediv__ = _operator(operator.truediv), _reflected(operator.truediv)
+    __floordiv__, __rfloordiv__ = _operator(operator.floordiv), _reflected(operator.floordiv)
+    __mod__, __rmod__ = _operator(operator.mod), _reflected(operator.mod)
+    __pow__, __rpow__ = _operator(operator.pow), _reflected(operator.pow)
+    __matmul__, __rmatmul__ = _operator(operator.matmul), _reflected(operator.matmul)
+    __lt__, __le__ = _operator(operator.lt), _operator(operator.le)
+    __gt__, __ge__ = _operator(operator.gt), _operator(operator.ge)
+
+    def __neg__(self) -> ca.SX:
+        return -self.symbol
+
+    def __pos__(self) -> ca.SX:
+        return self.symbol
+
+    def __abs__(self) -> ca.SX:
+        return ca.fabs(self.symbol)
+
+    def __eq__(self, other: object) -> Any:
+        return _compared(operator.eq, self, other)
+
+    def __ne__(self, other: object) -> Any:
+        return _compared(operator.ne, self, other)
+
+    __hash__ = object.__hash__
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *given: Any, **named: Any) -> Any:
+        return getattr(ufunc, method)(*map(plain, given), **named)
+
+    def __array_function__(
+        self, function: Callable[..., Any], _: Any, given: Any, named: Mapping[str, Any]
+    ) -> Any:
+        return function(*map(plain, given), **named)
+
+
+@final
+class Equality:
+    """`a == b` or `a != b` of two objects: a truth value, and an expression where CasADi asks."""
+
+    __slots__ = ("a", "b", "compare")
+
+    def __init__(self, compare: Callable[..., Any], a: Symbolic, b: Symbolic) -> None:
+        self.compare, self.a, self.b = compare, a, b
+
+    def __bool__(self) -> bool:
+        return self.compare(id(self.a), id(self.b))
+
+    def __SX__(self) -> ca.SX:
+        return ca.SX(self.compare(self.a.symbol, self.b.symbol))
+
+    def __repr__(self) -> str:
+        return repr(bool(self))
+
+
+def _compared(compare: Callable[..., Any], this: Symbolic, other: object) -> Any:
+    if isinstance(other, Symbolic):
+        return Equality(compare, this, other)
+    return _written(compare, this, other) if isinstance(other, EXPRESSIONS) else NotImplemented

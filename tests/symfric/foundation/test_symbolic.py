@@ -1,0 +1,134 @@
+"""Variables in equations: as their symbols, but found in tuples and keys of mappings."""
+
+import copy
+import operator
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric import BrownMcPhee, LuGre, Model, Variable, contact, simulate
+from symfric.foundation.symbolic import plain
+from symfric.multibody import JointFriction, Mechanism, Revolute
+
+A, B = Variable("a", "m"), Variable("b", "m/s")
+BINARY = (
+    operator.add, operator.sub, operator.mul, operator.truediv, operator.pow, operator.mod,
+    operator.floordiv, operator.lt, operator.le, operator.gt, operator.ge,
+)  # fmt: skip
+OTHERS = {"a number": 3.0, "NumPy's": np.float64(3.0), "DM": ca.DM(3.0), "SX": ca.SX.sym("c")}
+
+
+def same(left: object, right: object) -> bool:
+    assert isinstance(left, ca.SX)
+    assert isinstance(right, ca.SX)
+    return left.shape == right.shape and ca.is_equal(ca.densify(left), ca.densify(right), 40)
+
+
+@pytest.mark.parametrize("operate", BINARY, ids=lambda o: o.__name__)
+@pytest.mark.parametrize("other", OTHERS.values(), ids=OTHERS)
+def test_operators_are_those_of_the_symbol_on_either_side(operate, other):
+    assert same(operate(A, other), operate(A.symbol, other))
+    assert same(operate(A, B), operate(A.symbol, B.symbol))
+    if operate not in BINARY[-4:]:  # Python turns a < b around itself
+        assert same(operate(other, A), operate(other, A.symbol))
+    else:
+        assert same(ca.SX(operate(other, A)), ca.SX(operate(other, A.symbol)))
+
+
+def test_columns_matrices_and_functions_of_casadi_take_variables():
+    column, numbers = ca.vertcat(A, B), np.array([[1.0, 2.0], [3.0, 4.0]])
+    assert same(column, ca.vertcat(A.symbol, B.symbol))
+    assert same(numbers @ column, ca.DM(numbers) @ ca.vertcat(A.symbol, B.symbol))
+    assert same(np.array([1.0, 2.0]) * A, ca.vertcat(A.symbol, 2 * A.symbol))
+    assert same(ca.DM([1.0, 2.0]) * A, ca.vertcat(A.symbol, 2 * A.symbol))
+    assert same(np.array([1.0, 2.0]) @ np.array([A, B]), A.symbol + 2 * B.symbol)
+    assert same(-A, -A.symbol)
+    assert same(+A, A.symbol)
+    assert same(abs(A), ca.fabs(A.symbol))
+    assert same(ca.sin(A) * ca.atan2(A, B), ca.sin(A.symbol) * ca.atan2(A.symbol, B.symbol))
+    assert same(ca.jacobian(A * B, ca.vertcat(A, B)), ca.horzcat(B.symbol, A.symbol))
+    assert float(ca.Function("f", [A, B], [A - 2 * B])(5.0, 2.0)) == 1.0
+    assert float(ca.substitute(A - 1, A, 3)) == 2.0
+    assert not ca.depends_on(ca.sin(A), B)
+
+
+def test_a_variable_is_found_in_tuples_and_is_a_key():
+    assert A in (B, A)
+    assert A not in (B,)
+    assert [B, A].index(A) == 1
+    assert {A: 1, B: 2}[B] == 2
+    assert len({A, B, A}) == 2
+    assert (A, B) == (A, B)
+    assert (A, B) != (B, A)
+    assert A != B
+    assert not A == B  # noqa: SIM201
+    assert A is not None
+    assert A != "a"
+    assert None not in (A, B)
+
+
+def test_equality_is_an_expression_where_casadi_or_a_number_asks():
+    equal = ca.Function("f", [A, B], [ca.if_else(A == B, 1, 2), ca.if_else(A != B, 1, 2)])
+    assert [float(x) for x in equal(3, 3)] == [1.0, 2.0]
+    assert [float(x) for x in equal(3, 4)] == [2.0, 1.0]
+    assert same(A == 0, A.symbol == 0)
+    assert same(B.symbol != A, A.symbol != B.symbol)
+    assert repr(A == A) == "True"
+
+
+def test_what_does_not_fit_is_told():
+    for mixed in (lambda: ca.MX.sym("m") * A, lambda: A - ca.MX.sym("m")):
+        with pytest.raises(ValueError, match=r"variable 'a': expected SX or numbers .* got MX"):
+            mixed()
+    for odd in (lambda: A + "1", lambda: None * A, lambda: A < "1"):  # type: ignore[operator]
+        with pytest.raises(TypeError):
+            odd()
+
+
+def test_a_copy_is_another_variable_of_the_same_symbol():
+    assert copy.copy(A) != A
+    assert same(copy.copy(A) - 1, A.symbol - 1)
+
+
+def test_plain_goes_into_lists_tuples_and_mappings():
+    assert plain((A, [B, 1.0]))[0] is A.symbol
+    assert plain({"x": A, "y": 2})["x"] is A.symbol
+    given = {"y": 2}
+    assert plain(given) is given
+
+
+def test_models_are_the_same_with_variables_and_with_their_symbols():
+    def sled(written):
+        s, v = Variable("s", "m", nominal=0.1), Variable("v", "m/s", nominal=0.1)
+        S, V = (s, v) if written else (s.symbol, v.symbol)
+        slip = contact("ground", LuGre(), V, 10 + S, rest={"v": 0.0}, F_e=50 * S)
+        rates = ca.vertcat(0.02 - V, (50 * S - slip.force) / 2)
+        return Model("sled", x=(s, v), ode=rates, contacts=(slip,))
+
+    plainly, shortly = (simulate(sled(written), 1.0) for written in (False, True))
+    assert shortly.final == plainly.final
+
+
+def test_laws_and_bearings_take_variables_as_parameters():
+    mu, R, m = Variable("mu", "1", start=0.3), Variable("R", "m", start=0.1), Variable("m", "kg")
+    law = BrownMcPhee(mu_s=mu, mu_d=0.1)
+    assert same(law.mu_s, mu.symbol)
+    assert same(law.force(A, 5.0), law.force(A.symbol, 5.0))
+    assert same(LuGre().rate(A, B, mu), LuGre().rate(A.symbol, B.symbol, mu.symbol))
+    machine = Mechanism("wheel", gravity=(0.0, 0.0, -9.81))
+    machine.body("disc", mass=m, inertia=(0.1, 0.1, m * R**2))
+    machine.frame("disc.hub", at=(R, 0.0, 0.0))
+    bearing = JointFriction(law, radius=R, preload=5.0)
+    machine.joint(Revolute("hub", "ground", "disc.hub", rate=3.0, friction=bearing))
+    model = machine.build(p=(mu, R, Variable("m", "kg", start=2.0, symbol=m.symbol)))
+    slow, fast = (simulate(model, 0.1, p={"mu": x}).final["hub_rate"] for x in (0.4, 0.1))
+    assert slow < fast < 3.0
+
+
+def test_variables_in_other_units_are_refused_where_si_is_meant():
+    v = Variable("v", "mm/s", start=1.0)
+    with pytest.raises(ValueError, match=r"BrownMcPhee: v_t: expected SI .* write 0.001 \* v"):
+        BrownMcPhee(v_t=v)
+    with pytest.raises(ValueError, match=r"friction: radius: expected SI .*'d' \[mm\]"):
+        JointFriction(LuGre(), radius=Variable("d", "mm"))
