@@ -1,7 +1,6 @@
 """The reference of the command line, from the commands themselves."""
 
 import re
-from inspect import cleandoc
 from typing import Any
 
 import typer
@@ -10,7 +9,8 @@ from docs.machine import rst
 from docs.machine.docstrings import text as sentence
 from docs.machine.docstrings import to_rst
 from docs.machine.names import linked
-from symfric.cli.app import COMMANDS, app
+from symfric.cli.app import app
+from symfric.cli.commands import COMMANDS, argument_shown, arguments, is_option, prose_and_examples
 
 
 def page() -> str:
@@ -30,16 +30,15 @@ def page() -> str:
 def section(name: str, command: Any) -> str:
     """One command."""
     text = rst.title(f"symfric {name}", "-")
-    positional = [p for p in command.params if not p.opts[0].startswith("-")]
-    named = [p for p in command.params if p.opts[0].startswith("-")]
-    words = [_argument(p) for p in positional]
+    positional, named = arguments(command), [p for p in command.params if is_option(p)]
+    words = [argument_shown(p) for p in positional]
     text += rst.literal(" ".join([f"symfric {name}", *words, "[OPTIONS]"]), "text")
-    prose, examples = split(command.help or "")
-    text += to_rst(flagged(cleandoc(prose)), linked, formulas=False)
+    prose, examples = prose_and_examples(command.help or "")
+    text += to_rst(flagged(prose), linked, formulas=False)
     if examples:
         text += rst.literal("\n".join(f"$ {line}" for line in examples), "console")
     if positional:
-        rows = [[rst.code(_argument(p)), sentence(flagged(p.help or ""))] for p in positional]
+        rows = [[rst.code(argument_shown(p)), sentence(flagged(p.help or ""))] for p in positional]
         text += rst.table(["argument", "meaning"], rows)
     rows = [
         [rst.code(_option(p)), sentence(flagged(p.help or "")), _default(p)]
@@ -56,19 +55,6 @@ def flagged(text: str) -> str:
     """Words in which options stand as code, so that no line ends behind their hyphens."""
     parts = text.split("`")  # what stands between backticks is code already
     return "`".join(FLAG.sub(r"`\1`", p) if k % 2 == 0 else p for k, p in enumerate(parts))
-
-
-def split(text: str) -> tuple[str, list[str]]:
-    """What a command says of itself, and the lines of its examples."""
-    paragraphs = text.replace("\b\n", "").split("\n\n")
-    examples = [" ".join(p.split())[9:] for p in paragraphs if p.startswith("Example: ")]
-    return "\n\n".join(p for p in paragraphs if not p.startswith("Example: ")), examples
-
-
-def _argument(parameter: Any) -> str:
-    name = (parameter.metavar or parameter.name.upper()).strip("[]")
-    shown = name + ("..." if parameter.nargs == -1 and not name.endswith("...") else "")
-    return shown if parameter.required else f"[{shown}]"
 
 
 def _option(parameter: Any) -> str:

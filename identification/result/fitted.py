@@ -40,9 +40,9 @@ Array = NDArray[np.float64]
 class Fitted:
     """The result of a fit.
 
-    `print(fit)` is a report of a page; `fit.report("out.html")` one with pictures; `fit.plot()` the
-    pictures alone. Of a fit from a file or a pickle, `live` is None and the model of a machine that
-    is no `Drive` is absent.
+    `print(fit)` is a report of a page; `fit.to_html("out.html")` one with pictures; `fit.plot()`
+    the pictures alone. Of a fit from a file or a pickle, `live` is None and the model of a
+    machine that is no `Drive` is absent.
 
     Attributes:
         name: of the law or the model.
@@ -178,7 +178,7 @@ class Fitted:
 
         return picture(self, names, path)
 
-    def report(self, path: str | Path, ranking: Ranking | None = None) -> None:
+    def to_html(self, path: str | Path, ranking: Ranking | None = None) -> None:
         """Write one HTML page with everything, self-contained: no network, no scripts.
 
         Args:

@@ -4,73 +4,19 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
-from importlib import import_module
 from io import TextIOWrapper
 from types import TracebackType
-from typing import Annotated, Any, cast
+from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 
 from symfric import SolveError, Status, __version__
+from symfric.cli import usage
+from symfric.cli.commands import SETTINGS, Commands
 from symfric.foundation.programs import ProgramError
 
 BAD_INPUT, FAILED_SOLVE, INTERRUPTED = 2, 1, 130
 
-# Of all usage errors Typer exports only BadParameter; this is what they derive from.
-USAGE_ERROR = cast("type[typer.BadParameter]", typer.BadParameter.__mro__[2])
-
-COMMANDS = {
-    "laws": "List the friction laws, or show one in full.",
-    "scenes": "List the scenes, or show one in full.",
-    "run": "Simulate SCENE with a friction law.",
-    "report": "Simulate SCENE and write one page: signals, friction, error, laws.",
-    "identify": "Fit friction laws to measured data, and say what they are worth.",
-    "codegen": "Write a friction law, a plant or inverse dynamics as C99, and verify it.",
-    "export-fmu": "Write a scene or a model as a Functional Mock-up Unit.",
-    "ocp": "Solve an optimal control problem and check it.",
-    "select": "Rank friction laws on a machine, and say which to take.",
-    "demo": "Simulate, identify, optimise and generate C.",
-    "gallery": "Compute the figures of the papers again.",
-    "bench": "Measure symfric beside other integrators.",
-    "stress": "Judge runs of random laws in random scenes.",
-}
-"""What there is, and the first line of each; a command is loaded when it is called."""
-
-
-class Commands(TyperGroup):
-    """Loads the command that is called, and none for a list of them."""
-
-    def __init__(self, **attributes: Any) -> None:
-        super().__init__(**attributes)
-        known: dict[str, Any] = dict.fromkeys(COMMANDS)
-        self.commands = known  # for what was meant
-
-    def list_commands(self, ctx: Any) -> list[str]:
-        """Their names, in the order of the help."""
-        return [*COMMANDS]
-
-    def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """The command of that name, None where there is no such one."""
-        if cmd_name not in COMMANDS:
-            return None
-        one = typer.Typer(**SETTINGS)
-        name = cmd_name.replace("-", "_")
-        one.command()(getattr(import_module(f"symfric.cli.{name}"), name))
-        return typer.main.get_command(one)
-
-    def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write the table of commands into a help text."""
-        with formatter.section("Commands"):
-            formatter.write_dl([*COMMANDS.items()])
-
-
-SETTINGS: dict[str, Any] = {
-    "add_completion": False,
-    "pretty_exceptions_enable": False,
-    "rich_markup_mode": None,  # units in brackets are not markup
-    "context_settings": {"help_option_names": ["-h", "--help"]},
-}
 COMPLETED: dict[str, Any] = {"add_completion": True}
 app = typer.Typer(
     cls=Commands,
@@ -115,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refuse(error, INTERRUPTED if interrupted else FAILED_SOLVE)
     except (KeyboardInterrupt, typer.Abort):
         return _refuse(KeyboardInterrupt("interrupted"), INTERRUPTED)
-    except (ValueError, OSError, MemoryError, ProgramError, USAGE_ERROR) as error:
+    except (ValueError, OSError, MemoryError, ProgramError, usage.UsageError) as error:
         return _refuse(error, BAD_INPUT)
 
 
@@ -133,9 +79,8 @@ def sentence(error: BaseException) -> str:
         return f"'{error.filename}': {error.strerror}"
     if isinstance(error, MemoryError):
         return "expected a task that fits into memory, got a larger one; ask for fewer --samples"
-    text = error.format_message() if isinstance(error, USAGE_ERROR) else str(error)
-    text = " ".join(text.split()).removesuffix(".")
-    return text.replace(". Did you mean", "; did you mean")
+    text = usage.sentence(error) if isinstance(error, usage.UsageError) else str(error)
+    return " ".join(text.split()).removesuffix(".")
 
 
 def _prepare_process() -> None:

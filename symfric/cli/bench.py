@@ -35,7 +35,8 @@ def bench(
     subject: Annotated[
         str,
         typer.Argument(
-            help=f"What to measure: {', '.join(SUBJECTS)}.",
+            metavar="SUBJECT",
+            help=f"What to measure, default integrator: {', '.join(SUBJECTS)}.",
             autocompletion=_completed,
         ),
     ] = "integrator",

@@ -51,7 +51,7 @@ def demo(
         Path | None,
         typer.Option(
             "--data",
-            metavar="FOLDER",
+            metavar="DIR",
             help="Folder of the EMPS benchmark; without it, and without ../shared/data/EMPS, "
             "a simulated record is identified.",
         ),
@@ -90,7 +90,7 @@ def load_records(data: Path | None) -> tuple[tuple[Dataset, Dataset], tuple[str,
         laws = ("coulomb+viscous", "asymmetric(coulomb+viscous)")
         return (one, other), laws, f"the measured EMPS stage in {folder}"
     other = synthetic_drive_data(seed=1, speeds=(0.003, 0.02, 0.09))
-    origin = "a simulated record (no measured one found; --data FOLDER takes the EMPS benchmark)"
+    origin = "a simulated record (no measured one found; --data DIR takes the EMPS benchmark)"
     return (synthetic_drive_data(), other), ("stribeck",), origin
 
 
@@ -145,7 +145,7 @@ def identification(
     for fit in found:
         stem = fit.name.replace("+", "_").replace("(", "_").replace(")", "")
         page, numbers, picture = (folder / f"{stem}.{kind}" for kind in ("html", "json", "png"))
-        fit.report(page)
+        fit.to_html(page)
         fit.to_json(numbers)
         fit.plot(picture)
         files += [page, numbers, picture]

@@ -53,22 +53,32 @@ def export_fmu(
             help="Make this parameter tunable, and others not; by default all that are not zero.",
         ),
     ] = None,
-    fmi: Annotated[int, typer.Option("--fmi", help="Version of the standard: 2 or 3.")] = 3,
-    kind: Annotated[str, typer.Option("--kind", help=f"{', '.join(KINDS)}.")] = KINDS[0],
+    fmi: Annotated[int, typer.Option("--fmi", metavar="2|3", help="Version of the standard.")] = 3,
+    kind: Annotated[
+        str,
+        typer.Option("--kind", metavar="NAME", help=f"{' or '.join(KINDS)}."),
+    ] = KINDS[0],
     rtol: Annotated[
-        float, typer.Option("--rtol", help="Relative tolerance; can be tuned in the unit.")
+        float,
+        typer.Option(
+            "--rtol", metavar="NUMBER", help="Relative tolerance of a step; tunable in the unit."
+        ),
     ] = 1e-6,
-    step: Annotated[
-        float | None, typer.Option("--step", help="Fixed steps of this length [s] instead.")
+    step_size: Annotated[
+        float | None,
+        typer.Option("--step-size", metavar="SECONDS", help="Fixed steps of this length instead."),
     ] = None,
     method: Annotated[
-        str, typer.Option("--method", help="Formula of the steps, as of `run` and `codegen`.")
+        str,
+        typer.Option("--method", metavar="NAME", help="Formula, as of `run` and `codegen`."),
     ] = "auto",
     t_end: Annotated[
-        float | None, typer.Option("--t-end", help="Stop time [s] of the default experiment.")
+        float | None,
+        typer.Option("--t-end", metavar="SECONDS", help="Stop time of the default experiment."),
     ] = None,
     name: Annotated[
-        str | None, typer.Option("--name", help="Model identifier; default from the model.")
+        str | None,
+        typer.Option("--name", metavar="NAME", help="Model identifier; default from the model."),
     ] = None,
     json: JsonOption = None,
 ) -> None:
@@ -90,7 +100,7 @@ def export_fmu(
         fmi=fmi,
         kind=kind,
         rtol=rtol,
-        step=step,
+        step=step_size,
         method=method,
         free=free,
         t_end=t_end,

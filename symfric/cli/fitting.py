@@ -12,7 +12,6 @@ from identification.residuals.inverse import InverseDynamics
 from identification.residuals.points import Points
 from identification.residuals.shooting import Shooting
 from identification.unknowns.spec import above, linear, log, tied
-from symfric import law_from_text
 from symfric.cli.options import assignments
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
@@ -88,22 +87,6 @@ def _named_or_all(
 def _units(texts: Sequence[str] | None) -> dict[str, str] | str | None:
     found = _named_or_all("--unit", texts, "x=mm", '"rad, N m"')
     return ", ".join(found) if isinstance(found, list) else found
-
-
-def laws_in(text: str) -> list[str]:
-    """Laws separated by commas, each once.
-
-    Raises:
-        ValueError: none, one twice, or one that is not known.
-    """
-    laws = [part.strip() for part in text.split(",")]
-    if not all(laws):
-        raise ValueError(f"--law: expected names of laws separated by commas, got '{text}'")
-    if len(set(laws)) != len(laws):
-        raise ValueError(f"--law: expected every law once, got {text}")
-    for name in laws:
-        law_from_text(name)
-    return laws
 
 
 def kind_of(name: str, windows: str | None, free: dict[str, Any]) -> Any:

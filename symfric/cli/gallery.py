@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from symfric.cli import completions, output
-from symfric.cli.options import check_folder
+from symfric.cli.options import WorkersOption, check_folder
 from symfric.gallery import chosen, short
 from symfric.gallery.plate import about
 from symfric.gallery.rendering import Gallery, render
@@ -22,20 +22,18 @@ def gallery(
     names: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[NAME]...",
+            metavar="NAME",
             help="A figure, or a paper; all if none is given.",
             autocompletion=completions.plates,
         ),
     ] = None,
     out: Annotated[
-        Path, typer.Option("--out", metavar="FOLDER", help="Where pictures and numbers go.")
+        Path, typer.Option("--out", metavar="DIR", help="Where pictures and numbers go.")
     ] = Path("gallery"),
     quick: Annotated[
         bool, typer.Option("--quick", help="At reduced size, a second a figure.")
     ] = False,
-    workers: Annotated[
-        int | None, typer.Option("--workers", metavar="N", help="Processes; default one a core.")
-    ] = None,
+    workers: WorkersOption = None,
     listed: Annotated[
         bool, typer.Option("--list", help="List the figures and compute none.")
     ] = False,

@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Annotated, Any, final
 
 import typer
@@ -16,20 +15,23 @@ from identification.result.fitted import Fitted
 from identification.select import INTERRUPTED, Ranking, select
 from identification.verdict.profile import Profile
 from symfric import SolveError, Status
-from symfric.cli import completions, output
-from symfric.cli.fitting import KINDS, free_in, kind_of, laws_in, reading
+from symfric.cli import output
+from symfric.cli.fitting import KINDS, free_in, kind_of, reading
+from symfric.cli.machines import LawsOption
 from symfric.cli.options import (
+    HtmlOption,
     JsonOption,
     MissingOption,
     PlotOption,
     ResampleOption,
     check_outputs,
+    law_names,
     numbers,
 )
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
 
-MOST_JOBS = 256
+MOST_WORKERS = 256
 
 
 def identify(
@@ -37,21 +39,18 @@ def identify(
         list[str],
         typer.Argument(metavar="DATA", help="CSV, .mat or .npy; each file a record."),
     ],
-    law: Annotated[
-        str,
-        typer.Option(
-            "--law",
-            metavar="NAME[,NAME]",
-            help="Friction law; several are ranked.",
-            autocompletion=completions.each_law,
-        ),
-    ],
+    law: LawsOption,
     validate: Annotated[
         list[str] | None,
         typer.Option("--validate", metavar="DATA", help="Record for errors only; may be repeated."),
     ] = None,
     kind: Annotated[
-        str, typer.Option("--kind", help="; ".join(f"{n}: {t}" for n, t in KINDS.items()) + ".")
+        str,
+        typer.Option(
+            "--kind",
+            metavar="NAME",
+            help="; ".join(f"{n}: {t}" for n, t in KINDS.items()) + ".",
+        ),
     ] = "inverse",
     windows: Annotated[
         str | None,
@@ -66,16 +65,22 @@ def identify(
         typer.Option("--unit", metavar="SIGNAL=UNIT", help='Unit of a column; or all: "rad, N m".'),
     ] = None,
     step: Annotated[
-        float | None, typer.Option("--step", help="Sample time [s] of files without one.")
+        float | None,
+        typer.Option("--step", metavar="SECONDS", help="Sample time of files without one."),
     ] = None,
     variable: Annotated[
-        str | None, typer.Option("--variable", help="Struct or matrix in a .mat file.")
+        str | None,
+        typer.Option("--variable", metavar="NAME", help="Struct or matrix in a .mat file."),
     ] = None,
     missing: MissingOption = "refuse",
     resample: ResampleOption = False,
     normal_force: Annotated[
         float,
-        typer.Option("--normal-force", help="Normal force [N]; with 1 coefficients are forces."),
+        typer.Option(
+            "--normal-force",
+            metavar="NUMBER",
+            help="Normal force [N]; with 1 coefficients are forces.",
+        ),
     ] = 1.0,
     fixed: Annotated[
         list[str] | None, typer.Option("--fix", metavar="NAME=VALUE", help="Hold a parameter.")
@@ -93,17 +98,20 @@ def identify(
         typer.Option("--noise", metavar="SIGNAL=VALUE", help="Noise level; default estimated."),
     ] = None,
     loss: Annotated[
-        str, typer.Option("--loss", help="squares; against outliers huber, soft_l1, cauchy.")
+        str,
+        typer.Option(
+            "--loss", metavar="NAME", help="squares; against outliers huber, soft_l1, cauchy."
+        ),
     ] = "squares",
-    starts: Annotated[int, typer.Option("--starts", help="Most starts.")] = 6,
-    jobs: Annotated[int, typer.Option("--jobs", help="Processes for the starts.")] = 1,
+    starts: Annotated[int, typer.Option("--starts", metavar="N", help="Most starts.")] = 6,
+    workers: Annotated[
+        int, typer.Option("--workers", metavar="N", help="Processes for the starts.")
+    ] = 1,
     profiles: Annotated[
         list[str] | None,
         typer.Option("--profile", metavar="NAME", help="Interval by profile likelihood."),
     ] = None,
-    report: Annotated[
-        Path | None, typer.Option("--report", metavar="FILE.html", help="Write one page of it all.")
-    ] = None,
+    html: HtmlOption = None,
     plot: PlotOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -112,10 +120,10 @@ def identify(
     Prints the verdict of the residuals, parameters with 95 % intervals and what the data do not
     tell. The exit status is 1 where data or residuals say that the result is no physics.
 
-    Example: symfric identify run*.csv --law stribeck,lugre --validate v.csv --report out.html
+    Example: symfric identify run*.csv --law stribeck,lugre --validate v.csv --html out.html
     """
-    check_outputs(report, json, picture=plot)
-    laws, wishes = laws_in(law), free_in(free)
+    check_outputs(html, json, picture=plot)
+    laws, wishes = law_names(law), free_in(free)
     chosen = kind_of(kind, windows, wishes)
     read = reading(columns, units, step, variable, kind == "points", missing, resample)
     asked: dict[str, Any] = {
@@ -126,13 +134,13 @@ def identify(
         "loss": loss,
         "starts": starts,
     }
-    workers = checks.count("--jobs", jobs, most=MOST_JOBS)
+    checks.count("--workers", workers, most=MOST_WORKERS)
     records = read.read(data)
     other = read.read(validate) if validate else None
     if profiles:
         one = Fit(chosen, laws[0], records, **asked).prepared()
         check_names("--profile", profiles, one.task.unknowns.fitted)
-    with output.progress(f"identify {law}") as tell, _executor(workers) as executor:
+    with output.progress(f"identify {' and '.join(laws)}") as tell, _executor(workers) as executor:
         how: dict[str, Any] = {"executor": executor, "progress": _told(tell)}
         if len(laws) > 1:
             ranking = select(laws, records, chosen, other, **how, **asked)
@@ -141,14 +149,14 @@ def identify(
             ranking = None
             fit = Fit(chosen, laws[0], records, **asked).solve(**how, throw=False)
     found = judged(fit, other, profiles or (), ranking)
-    if report:
-        found.fit.report(report, found.ranking)
+    if html:
+        found.fit.to_html(html, found.ranking)
     if plot:
         found.fit.plot(plot)
     output.emit_json(found.to_dict(), json)
     if json != "-":
         show(found)
-    output.say_written(report, plot, json)
+    output.say_written(html, plot, json)
     refuse(found)
 
 
@@ -216,8 +224,7 @@ def refuse(found: Found) -> None:
     """Raise where the result is no physics, or where something could not be done.
 
     Raises:
-        SolveError: the fit did not end well.
-        ValueError: it did, but other data or profiles were of no use.
+        SolveError: the fit did not end well, or it did, but other data or profiles were of no use.
     """
     fit = found.fit
     if not fit.status.ok:
@@ -228,7 +235,7 @@ def refuse(found: Found) -> None:
     if any(INTERRUPTED in row.sentence for row in ranked):
         raise SolveError(f"identify: {INTERRUPTED}; the laws before are ranked", Status.INTERRUPTED)
     if found.failed:
-        raise ValueError("; ".join(found.failed))
+        raise SolveError("; ".join(found.failed), fit.status, fit)
 
 
 def _told(tell: Callable[[float], None]) -> Callable[[str, float], None]:
@@ -239,5 +246,5 @@ def _told(tell: Callable[[float], None]) -> Callable[[str, float], None]:
     return advance
 
 
-def _executor(jobs: int) -> AbstractContextManager[Executor | None]:
-    return nullcontext() if jobs == 1 else ProcessPoolExecutor(jobs)
+def _executor(workers: int) -> AbstractContextManager[Executor | None]:
+    return nullcontext() if workers == 1 else ProcessPoolExecutor(workers)

@@ -26,7 +26,7 @@ def laws(
     name: Annotated[
         str | None,
         typer.Argument(
-            metavar="[NAME]",
+            metavar="NAME",
             help="One law, such as lugre.",
             autocompletion=completions.all_laws,
         ),
@@ -53,7 +53,11 @@ def laws(
     ] = None,
     normal_force: Annotated[
         float | None,
-        typer.Option("--normal-force", help="Normal force [N]; default 1, and 7.848 for --figure."),
+        typer.Option(
+            "--normal-force",
+            metavar="NUMBER",
+            help="Normal force [N]; default 1, and 7.848 for --figure.",
+        ),
     ] = None,
     json: JsonOption = None,
 ) -> None:

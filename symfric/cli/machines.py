@@ -27,9 +27,9 @@ LawsOption = Annotated[
     list[str],
     typer.Option(
         "--law",
-        metavar="NAME",
-        help="Friction law; repeat it to compare several.",
-        autocompletion=completions.laws,
+        metavar="NAME[,NAME]",
+        help="Friction law; several, with commas or repeated, are compared.",
+        autocompletion=completions.each_law,
     ),
 ]
 PresetOption = Annotated[
@@ -99,11 +99,8 @@ def scenes_with(
         preset, law_of: of these options.
 
     Raises:
-        ValueError: unknown law, a law given twice, a parameter that none of the scenes has; those
-            of `kind_of`.
+        ValueError: unknown law, a parameter that none of the scenes has; those of `kind_of`.
     """
-    if len(set(laws)) != len(laws):
-        raise ValueError(f"--law: expected every law once, got {', '.join(laws)}")
     kind = kind_of(scene, preset=preset, law_of=law_of)
     made = {text: law_from_text(text) for text in laws}
     machines = {text: formed(kind(law), settings) for text, law in made.items()}

@@ -29,29 +29,41 @@ def ocp(
     problem: Annotated[
         str | None,
         typer.Argument(
-            metavar="[NAME|FILE.py[:NAME]]",
+            metavar="NAME|FILE.py[:NAME]",
             help="A ready problem, or a `Problem`, or a function that returns one, in a file.",
             autocompletion=completions.problems,
         ),
     ] = None,
     settings: SetOption = None,
     intervals: Annotated[
-        int | None, typer.Option("--intervals", help="Equal intervals to begin with.")
+        int | None, typer.Option("--intervals", metavar="N", help="Equal intervals to begin with.")
     ] = None,
     scheme: Annotated[
         str,
-        typer.Option("--scheme", help="radau3, legendre4, shooting:rodas5p:2 (method, steps)."),
+        typer.Option(
+            "--scheme",
+            metavar="NAME",
+            help="radau3, legendre4, shooting:rodas5p:2 (method, steps).",
+        ),
     ] = "radau3",
-    solver: Annotated[str, typer.Option("--solver", help=f"{', '.join(SOLVERS)}.")] = "ipopt",
+    solver: Annotated[
+        str, typer.Option("--solver", metavar="|".join(SOLVERS), help="What solves the program.")
+    ] = "ipopt",
     friction: Annotated[
         str,
-        typer.Option("--friction", help=f"How friction is met: {', '.join(get_args(Friction))}."),
+        typer.Option(
+            "--friction", metavar="NAME", help=f"How it is met: {', '.join(get_args(Friction))}."
+        ),
     ] = "auto",
     tolerance: Annotated[
-        float, typer.Option("--tolerance", help="Largest relative miss of what is asked for.")
+        float,
+        typer.Option(
+            "--tolerance", metavar="NUMBER", help="Largest relative miss of what is asked for."
+        ),
     ] = 1e-3,
     max_time: Annotated[
-        float | None, typer.Option("--max-time", help="Time [s] after which to stop.")
+        float | None,
+        typer.Option("--max-time", metavar="SECONDS", help="Time after which to stop."),
     ] = None,
     guess: Annotated[
         Path | None, typer.Option("--guess", metavar="FILE", help="Start from a saved solution.")

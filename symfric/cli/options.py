@@ -33,14 +33,18 @@ ResampleOption = Annotated[
 PlotOption = Annotated[
     Path | None, typer.Option("--plot", metavar="FILE.png", help="Write a picture.")
 ]
-LawOption = Annotated[
-    str,
-    typer.Option(
-        "--law",
-        metavar="NAME",
-        help="Friction law, such as lugre or coulomb+viscous.",
-        autocompletion=completions.laws,
-    ),
+HtmlOption = Annotated[
+    Path | None, typer.Option("--html", metavar="FILE.html", help="Write one page of it all.")
+]
+RtolOption = Annotated[
+    float, typer.Option("--rtol", metavar="NUMBER", help="Relative tolerance of a step.")
+]
+StartOption = Annotated[
+    list[str] | None,
+    typer.Option("--x0", metavar="NAME=VALUE", help="Start value of a state."),
+]
+WorkersOption = Annotated[
+    int | None, typer.Option("--workers", metavar="N", help="Processes; default one a core.")
 ]
 SetOption = Annotated[
     list[str] | None,
@@ -85,9 +89,20 @@ def seconds(option: str, text: str | None) -> list[float]:
     return [checks.parsed(option, part.strip()) for part in parts]
 
 
-def law_with(text: str, settings: Iterable[str] | None) -> Law:
-    """The law that `text` names, with the parameters and options of `--set`."""
-    return with_settings(law_from_text(text), text, settings)
+def law_names(texts: Sequence[str]) -> list[str]:
+    """Laws of --law, which is repeated or holds several with commas, each once.
+
+    Raises:
+        ValueError: none, one twice, or one that is not known.
+    """
+    laws = [part.strip() for text in texts for part in text.split(",")]
+    if not all(laws):
+        raise ValueError(f"--law: expected names of laws separated by commas, got '{texts[0]}'")
+    if len(set(laws)) != len(laws):
+        raise ValueError(f"--law: expected every law once, got {', '.join(laws)}")
+    for name in laws:
+        law_from_text(name)
+    return laws
 
 
 def any_with(text: str, settings: Iterable[str] | None) -> AnyLaw:

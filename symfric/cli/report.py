@@ -11,7 +11,14 @@ from symfric import SolveError, Trajectory, parameters, simulate
 from symfric.cli import output
 from symfric.cli.inputs import driven
 from symfric.cli.machines import LawOfOption, LawsOption, PresetOption, SceneArgument, scenes_with
-from symfric.cli.options import SetOption, assignments, check_outputs
+from symfric.cli.options import (
+    RtolOption,
+    SetOption,
+    StartOption,
+    assignments,
+    check_outputs,
+    law_names,
+)
 from symfric.results.report import report as write_report
 
 
@@ -28,14 +35,12 @@ def report(
         list[str] | None,
         typer.Option("--input", metavar="NAME=VALUE", help="Input, as of `run`."),
     ] = None,
-    x0: Annotated[
-        list[str] | None,
-        typer.Option("--x0", metavar="NAME=VALUE", help="Start value of a state."),
-    ] = None,
+    x0: StartOption = None,
     t_end: Annotated[
-        float | None, typer.Option("--t-end", help="Last time [s]; default as of `run`.")
+        float | None,
+        typer.Option("--t-end", metavar="SECONDS", help="Last time [s]; default as of `run`."),
     ] = None,
-    rtol: Annotated[float, typer.Option("--rtol", help="Relative tolerance of a step.")] = 1e-6,
+    rtol: RtolOption = 1e-6,
 ) -> None:
     """Simulate SCENE and write one page: signals, friction, error, laws.
 
@@ -45,10 +50,11 @@ def report(
     Example: symfric report rabinowicz --law lugre --law brown_mcphee --out report.html
     """
     check_outputs(out)
-    machines = scenes_with(scene, law, assignments("--set", settings), preset, law_of)
+    laws = law_names(law)
+    machines = scenes_with(scene, laws, assignments("--set", settings), preset, law_of)
     models = {name: machine.model() for name, machine in machines.items()}
     machine = next(iter(machines.values()))
-    given = driven(machine, models[law[0]], inputs, x0, t_end)
+    given = driven(machine, models[laws[0]], inputs, x0, t_end)
     how: Any = {
         "x0": given.start,
         "u": given.signals,

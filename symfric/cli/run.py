@@ -21,9 +21,12 @@ from symfric.cli.machines import (
 from symfric.cli.options import (
     JsonOption,
     PlotOption,
+    RtolOption,
     SetOption,
+    StartOption,
     assignments,
     check_outputs,
+    law_names,
     seconds,
 )
 from symfric.foundation import checks
@@ -49,48 +52,60 @@ def run(
             "shows.",
         ),
     ] = None,
-    x0: Annotated[
-        list[str] | None,
-        typer.Option("--x0", metavar="NAME=VALUE", help="Start value of a state."),
-    ] = None,
+    x0: StartOption = None,
     t_end: Annotated[
         float | None,
         typer.Option(
-            "--t-end", help="Last time [s]; default the last sample, or what shows the scene."
+            "--t-end",
+            metavar="SECONDS",
+            help="Last time [s]; default the last sample, or what shows the scene.",
         ),
     ] = None,
-    rtol: Annotated[float, typer.Option("--rtol", help="Relative tolerance of a step.")] = 1e-6,
+    rtol: RtolOption = 1e-6,
     method: Annotated[
-        str, typer.Option("--method", help="auto, rodas5p, rodas4p, rodas3, radau5, dopri5.")
+        str,
+        typer.Option(
+            "--method",
+            metavar="NAME",
+            help="Formula: auto, rodas5p, rodas4p, rodas3, radau5, dopri5.",
+        ),
     ] = "auto",
     backend: Annotated[
         str,
-        typer.Option("--backend", help="Engine: auto, vm, compiled."),
+        typer.Option(
+            "--backend", metavar="auto|vm|compiled", help="What computes: compiled C, or CasADi."
+        ),
     ] = "auto",
     peer: Annotated[
         str | None,
         typer.Option(
-            "--peer", help="One of CasADi's integrators for comparison: sundials, rosenbrock, ggl."
+            "--peer",
+            metavar="sundials|rosenbrock|ggl",
+            help="One of CasADi's integrators instead, for comparison.",
         ),
     ] = None,
     max_step: Annotated[
-        float | None, typer.Option("--max-step", help="Longest step [s]; any by default.")
+        float | None,
+        typer.Option("--max-step", metavar="SECONDS", help="Longest step; any by default."),
     ] = None,
     times: Annotated[
         str | None,
         typer.Option("--times", metavar="T1,T2,...", help="Times [s] at which a step has to end."),
     ] = None,
     samples: Annotated[
-        int, typer.Option("--samples", help="Number of equally spaced times of the result.")
+        int,
+        typer.Option("--samples", metavar="N", help="Equally spaced times of the result."),
     ] = 2001,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE.csv", help="Write the signals.")
+    csv: Annotated[
+        Path | None, typer.Option("--csv", "--out", metavar="FILE.csv", help="Write the signals.")
     ] = None,
     plot: PlotOption = None,
     panels: Annotated[
         str,
         typer.Option(
-            "--panels", help="Of --plot: main (positions, friction, energy or power) or all."
+            "--panels",
+            metavar="main|all",
+            help="Of --plot; main are positions, friction, energy or power.",
         ),
     ] = "main",
     movie: Annotated[
@@ -109,7 +124,7 @@ def run(
 
     Example: symfric run pendulum_box --law lugre --preset jing_mi_table_7 --plot box.png
 
-    Example: symfric run arm.urdf --law lugre --x0 elbow=0.3 --input tau_elbow=2 --out arm.csv
+    Example: symfric run arm.urdf --law lugre --x0 elbow=0.3 --input tau_elbow=2 --csv arm.csv
     """
     kind_of(scene, preset=preset, law_of=law_of)
     how: Any = {"max_step": max_step, "times": seconds("--times", times)}
@@ -117,18 +132,19 @@ def run(
         raise ValueError(
             "--peer: expected no --method, --backend, --max-step and --times, which are of symfric"
         )
-    if len(law) > 1 and (out or json or movie):
+    laws = law_names(law)
+    if len(laws) > 1 and (csv or json or movie):
         raise ValueError(
-            f"--out, --json and --animate: expected one --law, got {len(law)}; compare several "
+            f"--csv, --json and --animate: expected one --law, got {len(laws)}; compare several "
             "with --plot"
         )
-    check_outputs(out, json, movie, picture=plot)
+    check_outputs(csv, json, movie, picture=plot)
     checks.choice("--panels", panels, ("main", "all"))
-    machines = scenes_with(scene, law, assignments("--set", settings), preset, law_of)
+    machines = scenes_with(scene, laws, assignments("--set", settings), preset, law_of)
     models = {name: machine.model() for name, machine in machines.items()}
-    check_movie(movie, scene, models[law[0]])
+    check_movie(movie, scene, models[laws[0]])
     machine = next(iter(machines.values()))
-    given = driven(machine, models[law[0]], inputs, x0, t_end)
+    given = driven(machine, models[laws[0]], inputs, x0, t_end)
     until = given.until
     found: dict[str, Trajectory] = {}
     common: Any = {"x0": given.start, "u": given.signals, "rtol": rtol, "samples": samples}
@@ -140,8 +156,8 @@ def run(
                 found[name] = simulate(model, until, **common, **how)
             else:
                 found[name] = simulate_by_peer(model, until, peer, **common)
-    if out:
-        next(iter(found.values())).to_csv(out)
+    if csv:
+        next(iter(found.values())).to_csv(csv)
     if plot:
         from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
 
@@ -154,7 +170,7 @@ def run(
         if json != "-":
             show_trajectory(name, trajectory)
             show_warnings(name, machines[name])
-    output.say_written(out, plot, movie, json)
+    output.say_written(csv, plot, movie, json)
     for trajectory in found.values():
         if not trajectory.status.ok:
             raise SolveError(trajectory.message, trajectory.status, trajectory)
@@ -214,7 +230,7 @@ def show_warnings(law: str, scene: Scene) -> None:
 
 
 TABLE = ("position", "rate", "normal force", "friction", "energy")
-"""Kinds of signals of a mechanism that the table shows; --out and --json have all."""
+"""Kinds of signals of a mechanism that the table shows; --csv and --json have all."""
 
 
 def show_trajectory(law: str, trajectory: Trajectory) -> None:

@@ -25,7 +25,7 @@ def scenes(
     name: Annotated[
         str | None,
         typer.Argument(
-            metavar="[NAME]",
+            metavar="NAME|FILE.urdf",
             help="One scene, such as drive, or a robot's FILE.urdf.",
             autocompletion=completions.scenes,
         ),

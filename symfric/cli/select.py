@@ -20,13 +20,16 @@ from symfric.cli.fitting import Reading, reading
 from symfric.cli.fitting import kind_of as kind_of_residuals
 from symfric.cli.machines import LawOfOption, PresetOption, formed, kind_of
 from symfric.cli.options import (
+    HtmlOption,
     JsonOption,
     MissingOption,
     PlotOption,
     ResampleOption,
     SetOption,
+    WorkersOption,
     assignments,
     check_outputs,
+    law_names,
     with_settings,
 )
 from symfric.cli.user_file import function_of_file
@@ -56,39 +59,43 @@ def select(
         ),
     ] = "stiction,stribeck",
     accuracy: Annotated[
-        float, typer.Option("--accuracy", help="Largest error relative to the motion.")
+        float,
+        typer.Option("--accuracy", metavar="NUMBER", help="Largest error relative to the motion."),
     ] = 1e-4,
     law: Annotated[
         list[str] | None,
         typer.Option(
             "--law",
-            metavar="NAME",
-            help="Candidate; may be repeated. All laws by default.",
-            autocompletion=completions.laws,
+            metavar="NAME[,NAME]",
+            help="Candidates, with commas or repeated; all laws by default.",
+            autocompletion=completions.each_law,
         ),
     ] = None,
     settings: SetOption = None,
     preset: PresetOption = None,
     law_of: LawOfOption = None,
-    t_end: Annotated[float | None, typer.Option("--t-end", help="End of the motion [s].")] = None,
+    t_end: Annotated[
+        float | None, typer.Option("--t-end", metavar="SECONDS", help="Last time [s].")
+    ] = None,
     of: Annotated[
         str | None,
         typer.Option("--of", metavar="SIGNAL,...", help="What is compared; default positions."),
     ] = None,
     control: Annotated[
-        float, typer.Option("--control", help="Largest error of fixed steps.")
+        float,
+        typer.Option("--control", metavar="NUMBER", help="Largest error of fixed steps."),
     ] = 0.05,
     fixed_steps: Annotated[
         bool, typer.Option("--fixed-steps/--no-fixed-steps", help="Measure them, too.")
     ] = True,
-    workers: Annotated[
-        int | None, typer.Option("--workers", help="Processes; default all cores.")
-    ] = None,
+    workers: WorkersOption = None,
     data: Annotated[
         list[str] | None,
         typer.Option("--data", metavar="FILE", help="Fit the candidates to it first."),
     ] = None,
-    kind: Annotated[str, typer.Option("--kind", help="How, as of `symfric identify`.")] = "inverse",
+    kind: Annotated[
+        str, typer.Option("--kind", metavar="NAME", help="How, as of `symfric identify`.")
+    ] = "inverse",
     columns: Annotated[
         list[str] | None,
         typer.Option("--column", metavar="SIGNAL=NAME", help="Column of a signal in the data."),
@@ -100,16 +107,15 @@ def select(
     missing: MissingOption = "refuse",
     resample: ResampleOption = False,
     normal_force: Annotated[
-        float, typer.Option("--normal-force", help="Normal force [N] of the data.")
+        float,
+        typer.Option("--normal-force", metavar="NUMBER", help="Normal force [N] of the data."),
     ] = 1.0,
     paper: Annotated[
         bool,
         typer.Option("--paper", help="Jing and Mi's tables beside ours; two scenes have them."),
     ] = False,
     plot: PlotOption = None,
-    html: Annotated[
-        Path | None, typer.Option("--html", metavar="FILE.html", help="Write one page.")
-    ] = None,
+    html: HtmlOption = None,
     csv: Annotated[
         Path | None, typer.Option("--csv", metavar="FILE.csv", help="Write the table.")
     ] = None,
@@ -118,11 +124,11 @@ def select(
     """Rank friction laws on a machine, and say which to take.
 
     With --data, candidates that show what is needed are fitted first, and those are ranked that fit
-    as well as the best. Without, every law describes the same friction (--set mu_s=0.2 mu_d=0.15,
-    and v_s where the fall is known) and is made as soft as --accuracy allows. --set takes what the
-    scene has, too, and --set lugre.sigma_1=2 is for one law. A law that has an exact form with
-    events is tried in that first, unless --set gms.form=smooth (or form=smooth, of all) says in
-    which. Ctrl-C keeps what is there.
+    as well as the best. Without, every law describes the same friction (--set mu_s=0.2
+    --set mu_d=0.15, and v_s where the fall is known) and is made as soft as --accuracy allows.
+    --set takes what the scene has, too, and --set lugre.sigma_1=2 is for one law. A law that has an
+    exact form with events is tried in that first, unless --set gms.form=smooth (or form=smooth, of
+    all) says in which. Ctrl-C keeps what is there.
 
     Example: symfric select rabinowicz --need stiction,stribeck --accuracy 1e-4 --html choice.html
 
@@ -187,7 +193,7 @@ def _asked(
     """
     given = assignments("--set", settings)
     friction = _numbers({n: given.pop(n) for n in OF_FRICTION if n in given})
-    texts = names or list(ALL_LAWS)
+    texts = law_names(names) if names else list(ALL_LAWS)
     laws = {text: law_from_text(text) for text in texts}
     said = _formed(laws, given)
     for key in [key for key in given if "." in key]:

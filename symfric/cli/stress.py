@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from symfric.cli import output
-from symfric.cli.options import JsonOption, check_folder, check_outputs
+from symfric.cli.options import JsonOption, WorkersOption, check_folder, check_outputs
 from symfric.stress.campaign import Report, campaign, rerun
 from symfric.stress.cases import Case
 from symfric.stress.judge import CLASSES, FAILING, Verdict
@@ -15,17 +15,15 @@ from symfric.stress.judge import CLASSES, FAILING, Verdict
 def stress(
     cases: Annotated[int, typer.Option("--cases", metavar="N", help="How many cases.")] = 500,
     seed: Annotated[
-        int, typer.Option("--seed", metavar="S", help="Which cases; the same S, the same cases.")
+        int, typer.Option("--seed", metavar="N", help="Which cases; the same N, the same cases.")
     ] = 1,
     case: Annotated[
         Path | None, typer.Option("--case", metavar="FILE", help="Rerun one saved case.")
     ] = None,
-    save: Annotated[
-        Path, typer.Option("--save", metavar="FOLDER", help="Where failing cases are kept.")
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Where failing cases are kept.")
     ] = Path("stress_cases"),
-    workers: Annotated[
-        int | None, typer.Option("--workers", metavar="N", help="Processes; default one a core.")
-    ] = None,
+    workers: WorkersOption = None,
     limit: Annotated[
         float, typer.Option("--limit", metavar="SECONDS", help="When a case counts as hanging.")
     ] = 120.0,
@@ -51,10 +49,10 @@ def stress(
             show_verdict(one, verdict)
         passed, saved = verdict.kind not in FAILING, []
     else:
-        check_folder(save)
+        check_folder(out)
         with output.progress(f"{cases} cases") as tell:
             report = campaign(cases, seed, workers=workers, limit=limit, progress=tell)
-        passed, saved = report.passed, report.save(save)
+        passed, saved = report.passed, report.save(out)
         output.emit_json(report.to_dict(), json)
         if json != "-":
             show_report(report)

@@ -10,7 +10,7 @@ from docs.machine.generated import stale, write
 from docs.machine.names import catalogue, known, linked
 from docs.machine.scene_pages import pages as scene_pages
 from symfric import ALL_LAWS, POPULATIONS, LuGre, parameters
-from symfric.cli.app import COMMANDS
+from symfric.cli.commands import COMMANDS, prose_and_examples
 from symfric.scenes import ALL_SCENES
 
 
@@ -40,7 +40,7 @@ def test_every_command_stands_with_its_options() -> None:
     page = command_pages.page()
     assert all(f"\nsymfric {name}\n" in page for name in COMMANDS)
     assert "``--law NAME``" in page and "required" in page
-    assert command_pages.split("A.\n\nExample: x y\nz") == ("A.", ["x y z"])
+    assert prose_and_examples("A.\n\nExample: x y\nz") == ("A.", ["x y z"])
 
 
 def test_every_public_name_stands_once() -> None:

@@ -49,8 +49,8 @@ def test_the_file_is_plain_json_with_names_that_a_program_finds(file: Path) -> N
 
 def test_a_page_is_made_of_a_file_too(fit: Fitted, file: Path, tmp_path: Path) -> None:
     back = Fitted.from_json(file)
-    back.report(tmp_path / "back.html")
-    fit.report(tmp_path / "fit.html")
+    back.to_html(tmp_path / "back.html")
+    fit.to_html(tmp_path / "fit.html")
     sizes = [(tmp_path / name).stat().st_size for name in ("back.html", "fit.html")]
     assert abs(sizes[0] - sizes[1]) < 0.01 * sizes[1]
 

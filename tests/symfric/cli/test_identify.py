@@ -107,7 +107,7 @@ def test_the_text_fits_80_columns_and_files_are_written(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     page, picture, numbers = (tmp_path / f"r.{kind}" for kind in ("html", "png", "json"))
-    line = ["--law", "coulomb+viscous", "--report", str(page), "--plot", str(picture)]
+    line = ["--law", "coulomb+viscous", "--html", str(page), "--plot", str(picture)]
     line += ["--json", str(numbers), "--profile", "mu_d"]
     assert main(["identify", str(folder / "one.csv"), *line]) == 0
     out, err = capsys.readouterr()
@@ -135,7 +135,7 @@ def test_several_laws_are_ranked_and_the_best_one_is_told(
         "--starts",
         "1",
     ]
-    line += ["--validate", str(folder / "two.csv"), "--report", str(tmp_path / "r.html")]
+    line += ["--validate", str(folder / "two.csv"), "--html", str(tmp_path / "r.html")]
     assert main([*line, "--json", str(tmp_path / "r.json")]) == 0
     out, _ = capsys.readouterr()
     assert max(map(len, out.splitlines())) <= 80
@@ -155,7 +155,7 @@ def test_no_physics_is_an_error_and_everything_is_written_all_the_same(
     flipped.to_csv(tmp_path / "flipped.csv")
     page = tmp_path / "r.html"
     line = ["identify", str(tmp_path / "flipped.csv"), "--law", "coulomb+viscous"]
-    assert main([*line, "--report", str(page)]) == 1
+    assert main([*line, "--html", str(page)]) == 1
     out, err = capsys.readouterr()
     assert out.startswith("coulomb+viscous fitted by InverseDynamics(): IMPLAUSIBLE")
     assert err.splitlines()[-1].startswith("symfric: identify coulomb+viscous: implausible: ")
@@ -190,7 +190,7 @@ def test_where_nothing_can_be_fitted_the_data_are_the_reason(
         (["--law", "coulomb", "--kind", "points", "--free", "offset=1"], "--free offset"),
         (["--law", "coulomb", "--loss", "cube"], "loss"),
         (["--law", "coulomb", "--starts", "0"], "starts"),
-        (["--law", "coulomb", "--jobs", "0"], "--jobs"),
+        (["--law", "coulomb", "--workers", "0"], "--workers"),
         (["--law", "coulomb", "--noise", "x=1"], "force"),
         (["--law", "coulomb", "--profile", "v_eps"], "profile"),
     ],

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from symfric.cli.options import assignments, check_folder, check_outputs, law_with, numbers
+from symfric.cli.options import any_with, assignments, check_folder, check_outputs, numbers
 from symfric.foundation.parameters import parameters
 
 
@@ -27,7 +27,7 @@ def test_an_assignment_needs_name_and_value(text: str) -> None:
 
 
 def test_set_reaches_the_terms_of_a_sum() -> None:
-    law = law_with("coulomb+viscous", ["sigma_2=7"])
+    law = any_with("coulomb+viscous", ["sigma_2=7"])
     assert parameters(law)["sigma_2"].value == 7.0
 
 

@@ -15,7 +15,7 @@ def test_a_campaign_prints_a_table_and_writes_json(
 ) -> None:
     target = tmp_path / "stress.json"
     arguments = ["stress", "--cases", "2", "--seed", "3", "--json", str(target)]
-    assert main([*arguments, "--save", str(tmp_path / "cases")]) == 0
+    assert main([*arguments, "--out", str(tmp_path / "cases")]) == 0
     data = json.loads(target.read_text())
     assert list(data["classes"]) == list(CLASSES)
     assert sum(data["classes"].values()) == 2
@@ -29,7 +29,7 @@ def test_a_failing_campaign_saves_its_cases_and_says_so(
 ) -> None:
     report = Report(1, 3, {0: Verdict("silent", "far off"), 1: Verdict("right")}, 1.0)
     monkeypatch.setattr("symfric.cli.stress.campaign", lambda *_, **__: report)
-    assert main(["stress", "--save", str(tmp_path)]) == 1
+    assert main(["stress", "--out", str(tmp_path)]) == 1
     assert Case.read(tmp_path / "silent_1_0.json") == draw(1, 0)
     printed = capsys.readouterr()
     assert "Interrupted: 1 of 3 cases were not run." in printed.out
