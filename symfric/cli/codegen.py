@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from symfric.cli import completions, output
-from symfric.cli.codegen_compensator import compensator_block
+from symfric.cli.codegen_compensator import SETTINGS, compensator_block
 from symfric.cli.codegen_robot import robot_block
 from symfric.cli.codegen_shown import show_sizes, show_verification
 from symfric.cli.codegen_subject import (
@@ -151,7 +151,8 @@ def codegen(
         typer.Option(
             "--compensation",
             metavar="NAME=VALUE",
-            help="What it does, such as v_blend=0.02, scales=coulomb:0.9,stribeck:0, limit=5.",
+            help="What it does, such as v_blend=0.02, scales=coulomb:0.9,stribeck:0, limit=5. All: "
+            f"{', '.join(SETTINGS)}.",
         ),
     ] = None,
     compiler: Annotated[

@@ -1,14 +1,16 @@
 """`symfric codegen --compensator`: what the options mean."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 
 from symfric.codegen import Block
-from symfric.compensation import compensator, settings_from_text
+from symfric.compensation import Compensation, compensator, settings_from_text
 from symfric.laws import AnyLaw, Law
 from symfric.scenes import Drive
 
 FLAG = "--compensator"
+SETTINGS = tuple(item.name for item in fields(Compensation))
+"""What can be said about a compensator, for the help."""
 
 
 def compensator_block(

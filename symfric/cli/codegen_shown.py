@@ -57,9 +57,11 @@ def show_sizes(generated: Generated, measured: Sequence[Measured]) -> None:
             stack = max(found["stack"].values(), default="-")
             rows.append((real, found["compiler"], found["text"] or "-", stack, "-", "-"))
     for m in measured:
-        cells = (m.text, m.stack, m.average, m.maximum) if m.ok else (m.status, "-", "-", "-")
+        cells = (m.text, m.stack, m.average, m.maximum) if m.ok else ("-", "-", "-", "-")
         numbers = (f"{x:.0f}" if isinstance(x, float) else x for x in cells)
         rows.append((m.real, m.core, *numbers))
     if rows:
         head = ["type", "built by, for", "code [B]", "stack [B]", "instructions", "at most"]
         output.show_table(head, rows)
+    for core, status in dict.fromkeys((m.core, m.status) for m in measured if not m.ok):
+        output.show(f"{core}: {status}")

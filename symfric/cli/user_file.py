@@ -2,9 +2,9 @@
 
 import runpy
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
-from inspect import signature
+from inspect import isclass, isfunction, signature
 from pathlib import Path
 from typing import Any
 
@@ -69,10 +69,17 @@ def _named(
         raise ValueError(f"{command}: expected a Python file, got '{file}', which does not exist")
     held = _run(command, file)
     if name not in held:
-        there = [n for n, value in held.items() if fits(value)]
+        there = [n for n, value in held.items() if _meant(value, held, fits)]
         hint = f"; it holds {', '.join(there)}" if there else "; name one after a colon"
         raise ValueError(f"{command}: expected '{name}' in '{file}', got none{hint}")
     return name, held
+
+
+def _meant(value: object, held: Mapping[str, Any], fits: Callable[[Any], bool]) -> bool:
+    """Whether a name may be offered: what fits, and public functions of the file itself."""
+    if isfunction(value) or isclass(value):
+        return value.__module__ == held["__name__"] and value.__name__[0] != "_"
+    return fits(value)
 
 
 def _run(command: str, file: Path) -> dict[str, Any]:

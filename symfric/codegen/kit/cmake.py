@@ -22,31 +22,40 @@ endforeach()
 
 ONE = """\
 # The block {name}: library {name}, shared library {name}_shared, {tests}.
+# A core without an operating system gets the library alone; with CMAKE_CROSSCOMPILING_EMULATOR
+# the unit test, too.
 add_library({name} STATIC {sources})
-add_library({name}_shared SHARED {sources})
-foreach(library {name} {name}_shared)
+set(libraries {name})
+get_property(can_share GLOBAL PROPERTY TARGET_SUPPORTS_SHARED_LIBS)
+if(can_share)
+    add_library({name}_shared SHARED {sources})
+    set_target_properties({name}_shared PROPERTIES WINDOWS_EXPORT_ALL_SYMBOLS ON)
+    list(APPEND libraries {name}_shared)
+endif()
+foreach(library IN LISTS libraries)
     target_include_directories(${{library}} PUBLIC "${{CMAKE_CURRENT_LIST_DIR}}")
     set_target_properties(${{library}} PROPERTIES C_STANDARD 99 C_EXTENSIONS OFF)
     if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
         # Without fused multiply-add the results are those of CasADi to the bit, in double.
         target_compile_options(${{library}} PRIVATE -ffp-contract=off)
     endif()
-    if(UNIX)
+    if(UNIX OR (NOT WIN32 AND CMAKE_C_COMPILER_ID MATCHES "^(GNU|Clang)$"))
         target_link_libraries(${{library}} PUBLIC m)
     endif()
 endforeach()
-set_target_properties({name}_shared PROPERTIES WINDOWS_EXPORT_ALL_SYMBOLS ON)
-foreach(test {each})
-    add_executable(${{test}} "${{CMAKE_CURRENT_LIST_DIR}}/${{test}}.c")
-    set_target_properties(${{test}} PROPERTIES C_STANDARD 99 C_EXTENSIONS OFF)
-    target_link_libraries(${{test}} PRIVATE {name})
-    add_test(NAME ${{test}} COMMAND ${{test}})
-endforeach()
+if(NOT CMAKE_CROSSCOMPILING OR CMAKE_CROSSCOMPILING_EMULATOR)
+    foreach(test {each})
+        add_executable(${{test}} "${{CMAKE_CURRENT_LIST_DIR}}/${{test}}.c")
+        set_target_properties(${{test}} PROPERTIES C_STANDARD 99 C_EXTENSIONS OFF)
+        target_link_libraries(${{test}} PRIVATE {name})
+        add_test(NAME ${{test}} COMMAND ${{test}})
+    endforeach()
+endif()
 """
 
 
 def of_block(block: Block, reals: Sequence[Real]) -> str:
-    """Text of NAME_block.cmake: a static and a shared library, and the unit tests."""
+    """Text of NAME_block.cmake: a static and a shared library, unit tests, where they can be."""
     stems = [prefix(block, real) for real in reals]
     tests = [f"{stem}_test" for stem in stems]
     return ONE.format(

@@ -55,7 +55,7 @@ def test_a_file_of_python_becomes_a_unit(tmp_path, monkeypatch, capsys):
         ("drive --law lugre --method exponential", "method"),
         ("drive --law exact_coulomb --step-size 0.001", "without events"),
         ("none.py", "does not exist"),
-        ("mine.py:other", "it holds stiff"),
+        ("mine.py:other", "it holds model, stiff"),
         ("mine.py:number", "a Model"),
         ("mine.py:stiff --set m=1", "no function"),
         ("mine.py --law lugre", "--law"),
