@@ -68,7 +68,7 @@ def test_table_tells_what_was_checked(file: Path, capsys: pytest.CaptureFixture[
     [
         (["out_and_bakc"], "did you mean out_and_back"),
         (["{file}:number"], "a Problem, or a function that returns one"),
-        (["{file}:none"], "it holds short"),
+        (["{file}:none"], "it holds problem, short"),
         (["{folder}/gone.py"], "does not exist"),
         (["{file}:short", "--set", "T=2"], "which is no function"),
         (["{file}", "--set", "t=2"], "expected one of T"),
