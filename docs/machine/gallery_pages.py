@@ -124,6 +124,9 @@ def page(record: Mapping[str, Any]) -> str:
     }
     for name, words in said.items():
         text += f"**{name}.** {sentence(words, linked)}\n\n"
+    if record["checked"]:
+        text += "Checked on the numbers below whenever this figure is computed:\n\n"
+        text += "".join(f"* {sentence(claim, linked)}\n" for claim in record["checked"]) + "\n"
     rows = [[rst.plain(name), f"{value:.6g}"] for name, value in record["numbers"].items()]
     if rows:
         text += rst.title("Numbers", "-") + rst.table((), rows)

@@ -50,6 +50,7 @@ def figure_block(record: Mapping[str, Any]) -> str:
         "compared": record["compared"],
         "how far": f"{record['how_far']}: {record['measure']}",
         "evidence": record["evidence"],
+        "checked": "; ".join(record.get("checked", ())),
     }
     title = f"{record['figure']}. {record['title']}"
     text = "".join(f"<p>{written(p)}</p>" for p in record["text"].split("\n\n") if p)

@@ -27,7 +27,7 @@ SCRIPT = re.compile(r"fig_(\d+)(?:_(\d+))?_\w+")
 class Plate(Showing):
     """One figure of a paper, computed again.
 
-    Everything but the last four is said once, in the docstrings of the script and of its folder.
+    Everything but the last five is said once, in the docstrings of the script and of its folder.
 
     Attributes:
         paper: authors and title.
@@ -41,6 +41,7 @@ class Plate(Showing):
         unit: SI, "1" for a ratio.
         picture: made outside pyplot.
         numbers: name with unit, such as "period [s]" -> value; what the evidence stands on.
+        checked: sentences of the evidence that were checked on these numbers; all of them hold.
     """
 
     paper: str
@@ -54,6 +55,7 @@ class Plate(Showing):
     unit: str
     picture: Figure
     numbers: Mapping[str, float]
+    checked: tuple[str, ...] = ()
 
     @property
     def how_far(self) -> str:
@@ -68,6 +70,7 @@ class Plate(Showing):
             f"compared: {self.compared}",
             f"how far: {self.how_far}; {self.measure}",
             f"evidence: {self.evidence}",
+            *(f"checked: {'; '.join(self.checked)}" for _ in self.checked[:1]),
         )
         lines = tuple(line for text in told for line in wrap(text, 98, subsequent_indent="  "))
         table = Table(("number", "value"), rows, numbers=(1,), rest="... {n} more")
@@ -85,11 +88,17 @@ class Plate(Showing):
             "unit": self.unit,
             "how_far": self.how_far,
             "numbers": {name: float(value) for name, value in self.numbers.items()},
+            "checked": [*self.checked],
         }
 
 
 def plate_of(
-    script: str, picture: Figure, distance: float, unit: str, numbers: Mapping[str, float]
+    script: str,
+    picture: Figure,
+    distance: float,
+    unit: str,
+    numbers: Mapping[str, float],
+    claims: Mapping[str, Any],
 ) -> Plate:
     """The plate of a script, its texts taken from the docstrings.
 
@@ -99,9 +108,12 @@ def plate_of(
         distance: how far we are.
         unit: of the distance; "1" for a ratio.
         numbers: what the evidence stands on.
+        claims: sentence of the evidence -> whether the numbers bear it out. At reduced size there
+            may be fewer; a plate whose text is untrue is not drawn.
 
     Raises:
-        ValueError: a docstring without one of its sections, numbers that are not finite.
+        ValueError: a docstring without one of its sections, numbers that are not finite, a claim
+            that does not hold.
     """
     said = sections(modules[script].__doc__ or "")
     missing = [name for name in ("title", *SECTIONS) if not said.get(name)]
@@ -112,6 +124,12 @@ def plate_of(
     odd = [name for name, v in {"distance": distance, **numbers}.items() if not isfinite(v)]
     if odd:
         raise ValueError(f"gallery '{script}': expected finite numbers, got {', '.join(odd)}")
+    untrue = [f"'{sentence}'" for sentence, holds in claims.items() if not holds]
+    if untrue:
+        raise ValueError(
+            f"gallery '{script}': expected numbers that bear out its text, got others for "
+            f"{', '.join(untrue)}; correct the text, or find what has changed"
+        )
     folder, _, name = script.rpartition(".")
     return Plate(
         paper=paper_of(folder),
@@ -125,6 +143,7 @@ def plate_of(
         unit=unit,
         picture=picture,
         numbers=dict(numbers),
+        checked=tuple(claims),
     )
 
 
@@ -181,11 +200,13 @@ def short(name: str) -> str:
 def chosen(names: tuple[str, ...]) -> tuple[str, ...]:
     """Names of all plates that begin with one of `names`, in the order of the gallery; () is all.
 
+    A figure without its paper, such as fig_07 or fig_7, is that of every paper that has one.
+
     Raises:
         ValueError: a name that begins none.
     """
     known, names = [*scripts()], tuple(name.rstrip("/") for name in names)
-    found = {name: [k for k in known if k == name or begins(k, name)] for name in names}
+    found = {name: beginning(known, name) for name in names}
     wrong = [name for name, hits in found.items() if not hits]
     folders = dict.fromkeys(name.partition("/")[0] for name in known)
     check_names("gallery", wrong, [*folders, *map(short, known)])
@@ -193,9 +214,16 @@ def chosen(names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(name for name in known if name in wanted)
 
 
+def beginning(known: list[str], start: str) -> list[str]:
+    """Those that begin with `start`; fig_7 is fig_07."""
+    full = re.sub(r"fig_(\d)(?=_[^\d]|$)", r"fig_0\1", start)
+    return [name for name in known if name == start or begins(name, start) or begins(name, full)]
+
+
 def begins(name: str, start: str) -> bool:
     """Whether `start` is the first words of a plate's name; fig_1 does not begin fig_10."""
-    return name.startswith(start) and name[len(start)] in "/_"
+    stem = name.rpartition("/")[2]
+    return any(f"{one}/".startswith((f"{start}_", f"{start}/")) for one in (name, stem))
 
 
 def about(name: str) -> dict[str, str]:

@@ -57,9 +57,16 @@ SHOWN = (
     Mutant(
         "fig_0 begins fig_07",
         PLATE,
-        'name.startswith(start) and name[len(start)] in "/_"',
-        "name.startswith(start)",
+        '.startswith((f"{start}_", f"{start}/"))',
+        ".startswith(start)",
         T_PLATES,
+    ),
+    Mutant(
+        "a figure whose text is untrue is drawn",
+        PLATE,
+        "for sentence, holds in claims.items() if not holds]",
+        "for sentence, holds in claims.items() if holds is None]",
+        ("tests/symfric/gallery/test_plates.py::test_a_figure_whose_text_is_untrue_is_not_drawn",),
     ),
     Mutant(
         "a figure that fails takes the others with it",

@@ -45,3 +45,37 @@ def drift_of(stiffness: float, level: Callable[[Array], Array]) -> float:
     for _ in range(50):
         v = rate / stiffness / (1 - F * np.sign(rate) / level(v))
     return float(np.mean(v) / FREQUENCY)
+
+
+def in_periods(t: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Mean position in each period of the vibration [m]."""
+    steps = round(1 / (FREQUENCY * (t[1] - t[0])))
+    late = x[np.argmax(t >= SINCE) : -1]
+    return late[: late.size // steps * steps].reshape(-1, steps).mean(axis=1)
+
+
+def said(numbers: dict[str, float], names: list[str], quick: bool) -> dict[str, bool]:
+    """What the evidence says of the ways and the break-aways."""
+    first, last, rate = (
+        {name: numbers[f"{key}, {name}{end}"] for name in names}
+        for key, end in (
+            ("way in the first periods", " [m]"), ("way in the last periods", " [m]"),
+            ("break-away at 1 N/s over that at 10 N/s", " [1]"),
+        )
+    )  # fmt: skip
+    claims = {
+        "LuGre and Dahl drift": min(last["LuGre"], last["Dahl"]) > 1e-7,
+        "ringing LuGre drifts more than three times as fast": first["LuGre"] > 3 * last["LuGre"],
+        "break-away falls with the rate, but for Maxwell slip": all(
+            (r > 1.02) == (name != "Maxwell slip") for name, r in rate.items()
+        ),
+    }
+    if not quick:
+        stay = ("GMS", "Leuven", "Maxwell slip", "generic model")
+        claims["GMS, Leuven, Maxwell slip and the generic model stay"] = all(
+            abs(last[name]) < 2e-10 for name in stay
+        )
+        claims["the elasto-plastic law nearly stops"] = (
+            last["elasto-plastic"] < 0.03 * first["elasto-plastic"]
+        )
+    return claims

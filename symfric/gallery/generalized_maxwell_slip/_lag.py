@@ -26,3 +26,15 @@ def explained(X: np.ndarray, rate: np.ndarray) -> tuple[float, float]:
     """The best factor k in rate = k X, and which share of the rate it explains."""
     k = float(X @ rate / (X @ X))
     return k, float(1 - np.sum((rate - k * X) ** 2) / np.sum(rate**2))
+
+
+def faster(model: GenericAsperity) -> dict[str, float]:
+    """What explains the rate of the force where the velocity changes eight times as fast."""
+    _, v, force, rate, s = slid(model, 2.0, 4)
+    powers = {"C/|v|": 0.0, "|v|^(-1/2)": 0.5, "a constant h": 1.0}
+    return {
+        f"share of dF/dt explained at 2 Hz by {name} [1]": explained(
+            v**power * (1 - force / s), rate
+        )[1]
+        for name, power in powers.items()
+    }

@@ -2,10 +2,10 @@
 
 The generic model is `GenericAsperity`, a reconstruction from words. One number, the speed at which
 contacts live as long as they take to age, is fitted to the Stribeck curve of table 1; the period of
-the counterface makes the lag that table 1 has (C); its stiffness is free and chosen so that the
-paths of figures 4 and 5 reach break-away. `ELEMENTS` were found from its hysteresis by
-`identification.fit_elements`, which figure 5 repeats.
-The model of Bliman and Sorine, which is named in section 5.1 alone, has no numbers at all.
+the counterface makes a lag of the size of C in table 1 (figure 2); its stiffness is free and chosen
+so that the paths of figures 4 and 5 reach break-away. `ELEMENTS` were found from its hysteresis by
+`identification.fit_elements`, which figure 5 repeats. The model of Bliman and Sorine, which is
+named in section 5.1 alone, has no numbers at all.
 """
 
 from symfric import (

@@ -1,8 +1,8 @@
 """The generic model slides at a velocity that changes slowly: its force, and the function h.
 
 v = 250 um/s - 240 um/s cos(2 pi t / 4 s), from the third period on, averaged over periods; the
-signal, velocity range and contact of the figure are not given (its axes end at 2 mm/s and 12 N).
-h is what dF/dt = v (1 - F/s(v)) h asks for; the paper replaces it by C/|v|.
+signal, velocity range and contact of the figure are not given (its axes end at 2 mm/s and 12 N). h
+is what dF/dt = v (1 - F/s(v)) h asks for; the paper replaces it by C/|v|.
 
 Compared: the steady force of the generic model with the Stribeck curve of table 1, to which one
 number of it is fitted, and with its mean over the life of a rigid contact, in closed form.
@@ -10,19 +10,20 @@ number of it is fitted, and with its mean over the life of a rigid contact, in c
 Distance: largest difference from the Stribeck curve of table 1, over F_s.
 
 Evidence: at this pace C/|v| explains dF/dt, and a constant h, as in LuGre, does not: the paper is
-right. Not so at every pace, in this reconstruction of the generic model: as the velocity changes
-eight times faster, a constant explains more than C/|v|, and a power of about -1/2 more than both. A
-contact forgets over a path as well as over a time.
+right. Its C = 24 N/s is missed by a third, as the counterface is ours. Not so at every pace, in
+this reconstruction of the generic model: as the velocity changes eight times faster, a constant
+explains more than C/|v|, and a power of about -1/2 more than both. A contact forgets over a path as
+well as over a time.
 """
 
 import numpy as np
 
-from symfric import GenericAsperity
 from symfric.foundation.panels import WIDE, grid
 from symfric.foundation.style import line
 from symfric.gallery.generalized_maxwell_slip._by_hand import rigid, stribeck
-from symfric.gallery.generalized_maxwell_slip._lag import explained, slid
+from symfric.gallery.generalized_maxwell_slip._lag import explained, faster, slid
 from symfric.gallery.generalized_maxwell_slip._laws import F_S, generic
+from symfric.gallery.generalized_maxwell_slip._laws import C as TABLE_C
 from symfric.gallery.looks import look
 from symfric.gallery.plate import Plate, plate_of
 
@@ -69,18 +70,22 @@ def plate(quick: bool = False) -> Plate:
         "share of dF/dt explained at 0.25 Hz by C/|v| [1]": of_C,
         "share of dF/dt explained at 0.25 Hz by a constant h [1]": of_constant,
     }
+    claims = {
+        "the steady force is that of a rigid contact within 2 % of F_s": (
+            float(np.abs(steady - rigid(speeds)).max()) < 0.02 * F_S
+        )
+    }
     if not quick:
         numbers |= faster(model)
-    return plate_of(__name__, figure, far / F_S, "1", numbers)
-
-
-def faster(model: GenericAsperity) -> dict[str, float]:
-    """What explains the rate of the force where the velocity changes eight times as fast."""
-    _, v, force, rate, s = slid(model, 2.0, 4)
-    powers = {"C/|v|": 0.0, "|v|^(-1/2)": 0.5, "a constant h": 1.0}
-    return {
-        f"share of dF/dt explained at 2 Hz by {name} [1]": explained(
-            v**power * (1 - force / s), rate
-        )[1]
-        for name, power in powers.items()
-    }
+        by_C, by_root, by_constant = [*numbers.values()][-3:]
+        claims |= {
+            "at 0.25 Hz C/|v| explains dF/dt, a constant h does not": of_C
+            > 0.8
+            > 0.4
+            > of_constant,
+            "at 2 Hz a constant h explains more than C/|v|, a root more than both": (
+                by_root > by_constant > by_C
+            ),
+            "C is two thirds of that of table 1": 0.6 < C / TABLE_C < 0.72,
+        }
+    return plate_of(__name__, figure, far / F_S, "1", numbers, claims)

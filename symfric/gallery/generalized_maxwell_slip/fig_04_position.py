@@ -49,4 +49,5 @@ def plate(quick: bool = False) -> Plate:
     for case, v, s in zip(("1x", "5x", "20x"), fastest, stribeck(fastest), strict=True):
         numbers[f"fastest, {case}, over V_s [1]"] = v / V_S
         numbers[f"Stribeck curve at the fastest, {case} [N]"] = s
-    return plate_of(__name__, figure, far, "m", numbers)
+    claims = {"20 times faster it is half of V_s": 0.45 < fastest[-1] / V_S < 0.5}
+    return plate_of(__name__, figure, far, "m", numbers, claims)

@@ -67,9 +67,11 @@ def error(law: SteadyStateLuGre, v: Array, force: Array) -> float:
     return float(np.sqrt(np.mean((force - curve(law, v)) ** 2)) / force.mean())
 
 
-def draw_curves(axis: Axes, v: Array, force: Array, laws: Mapping[str, SteadyStateLuGre]) -> None:
+def draw_curves(
+    axis: Axes, v: Array, force: Array, laws: Mapping[str, SteadyStateLuGre], end: float = 0.0
+) -> None:
     """Points, and laws through them: the printed one grey, those found again in front."""
-    fine = np.linspace(v[0], v[-1], 400)
+    fine = np.linspace(v[0], end or v[-1], 400)
     axis.plot(v, force, "o", color="k", markersize=3, label="means with noise")
     for name, law in laws.items():
         mark, width = LINES[name]

@@ -1,7 +1,7 @@
 """The main study: mean forces and identified curves, and what they say beyond the data.
 
 Compared: curves identified from points with noise, 100 to 500 mm/min, with the printed one that
-made them; grey, the same with other noise of that size.
+made them; thin, the same with other noise of that size.
 
 Distance: rms difference of the first curve from the printed one, over the mean force.
 
@@ -16,9 +16,9 @@ import numpy as np
 
 from identification.starts.six_steps import standard_errors
 from identification.starts.stribeck import StribeckCurve
-from symfric.foundation.panels import panels
-from symfric.foundation.style import QUIET
+from symfric.foundation.panels import NARROW, panels
 from symfric.gallery.laminator_nips import _studies as studies
+from symfric.gallery.looks import look
 from symfric.gallery.plate import Plate, plate_of
 
 MACHINE = 650 / 60e3
@@ -32,12 +32,16 @@ def plate(quick: bool = False) -> Plate:
     seeds = range(2 if quick else 12)
     found = [studies.at_once(*studies.measured("main", seed))[0] for seed in seeds]
 
-    figure, (axis,) = panels(1, height=3.6)
+    figure, (axis,) = panels(1, NARROW, 3.2)
     far_out = np.linspace(v[0], MACHINE, 300)
     for k, law in enumerate(found[1:]):
         label = None if k else "found with other noises"
-        axis.plot(far_out, studies.curve(law, far_out), color=QUIET, linewidth=0.8, label=label)
-    studies.draw_curves(axis, v, force, {"printed": printed, "all at once": found[0]})
+        axis.plot(
+            far_out, studies.curve(law, far_out), **look("lugre"), lw=0.7, alpha=0.5, label=label
+        )
+    laws = {"printed": printed, "all at once": found[0]}
+    studies.draw_curves(axis, v, force, laws, MACHINE)
+    axis.legend(loc="lower left", fontsize="small")
     axis.axvline(v[-1], color="k", linewidth=0.8)
     axis.annotate(" 500 mm/min", (v[-1], force.max()))
     axis.set_xlabel("velocity [m/s]")
@@ -56,7 +60,14 @@ def plate(quick: bool = False) -> Plate:
         values["F_S"], values["F_C"], values["v_s"], values["delta"], values["sigma_2"], 0.0, 0.0
     )
     noise = 0.01 * float(studies.curve(printed, v).mean())
-    for name, share in standard_errors(exact, v, noise).items():
+    shares = standard_errors(exact, v, noise)
+    for name, share in shares.items():
         numbers[f"least standard error of {name}, noise of the means 1 % [%]"] = 100 * share
     far = np.sqrt(np.mean((studies.curve(found[0], v) - studies.curve(printed, v)) ** 2))
-    return plate_of(__name__, figure, float(far / force.mean()), "1", numbers)
+    claims = {
+        "the points do not know sigma_2": shares["sigma_2"] > 1,
+        "nor how low F_C is": shares["F_C"] > 0.1,
+        "at 6 mm/s the printed curve is still falling": plateau > 1.05 * least,
+        "where the machine runs the curves spread": max(beyond) - min(beyond) > 0.1,
+    }
+    return plate_of(__name__, figure, float(far / force.mean()), "1", numbers, claims)

@@ -35,4 +35,12 @@ def plate(quick: bool = False) -> Plate:
         "largest error [%]": 100 * float(left.max()),
     } | studies.told(laws, half)
     far = np.sqrt(np.mean((studies.curve(found, v) - studies.curve(printed, v)) ** 2))
-    return plate_of(__name__, figure, float(far / force.mean()), "1", numbers)
+    ratio = {n: float(getattr(found, n)) / float(getattr(printed, n)) for n in studies.NAMES}
+    claims = {
+        "the error is that of the noise, 3 %": 0.02 < studies.error(found, v, force) < 0.04,
+        "F_C is nothing, sigma_2 fifty times too large, the exponent half": (
+            ratio["F_C"] < 0.01 and 40 < ratio["sigma_2"] < 60 and 0.4 < ratio["delta"] < 0.6
+        ),
+        "the curve is the same within 2 %": far < 0.02 * force.mean(),
+    }
+    return plate_of(__name__, figure, float(far / force.mean()), "1", numbers, claims)

@@ -27,8 +27,8 @@ def heights(millimetres: int) -> Array:
     return np.array([0.0, 0.0, 0.085, 0.085, up, up, down, down])
 
 
-def without_friction(t: Array) -> Array:
-    """X_b, X_w, v_b, v_w [m, m/s] at `t` [s] by the exponential of a matrix, shape (4, n)."""
+def matrix() -> Array:
+    """Of the linear equations of body, wheel, their velocities, the road and its slope."""
     rows = [
         [0, 0, 1, 0, 0, 0],
         [0, 0, 0, 1, 0, 0],
@@ -36,15 +36,20 @@ def without_friction(t: Array) -> Array:
         [K_S / M_W, -(K_S + K_T) / M_W, B_D / M_W, -(B_D + B_T) / M_W, K_T / M_W, B_T / M_W],
         [0, 0, 0, 0, 0, 1],
         [0, 0, 0, 0, 0, 0],
-    ]  # body, wheel, their velocities, road, its slope
-    matrix, road = np.array(rows, dtype=float), heights(50)
+    ]
+    return np.array(rows, dtype=float)
+
+
+def without_friction(t: Array) -> Array:
+    """X_b, X_w, v_b, v_w [m, m/s] at `t` [s] by the exponential of a matrix, shape (4, n)."""
+    A, road = matrix(), heights(50)
     y, found = np.zeros(6), np.zeros((4, t.size))
     for k, (begin, end) in enumerate(pairwise(CORNERS)):
         y[4:] = road[k], (road[k + 1] - road[k]) / (end - begin)
         inside = np.flatnonzero((t >= begin) & (t <= end))
         for i in inside:
-            found[:, i] = (expm(matrix * (t[i] - begin)) @ y)[:4]
-        y = expm(matrix * (end - begin)) @ y
+            found[:, i] = (expm(A * (t[i] - begin)) @ y)[:4]
+        y = expm(A * (end - begin)) @ y
     return found
 
 

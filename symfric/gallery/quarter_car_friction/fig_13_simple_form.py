@@ -12,7 +12,7 @@ that the force quickly dips; it falls for e1 < 0.
 import numpy as np
 
 from symfric import QuarterCarSimple
-from symfric.foundation.panels import panels
+from symfric.foundation.panels import NARROW, panels
 from symfric.gallery.looks import look
 from symfric.gallery.plate import Plate, plate_of
 from symfric.gallery.quarter_car_friction._rig import FRICTION, ride
@@ -25,7 +25,7 @@ def plate(quick: bool = False) -> Plate:
     run = ride(law, samples=601 if quick else 6001)
     v, force = run["v_b"], run["friction"]
 
-    figure, (axis,) = panels(1, height=3.6)
+    figure, (axis,) = panels(1, NARROW, 3.0)
     axis.plot(1e3 * v, force, color=look("quarter_car_simple")["color"], marker=".", markersize=2,
               linewidth=0.6)  # fmt: skip
     axis.set_xlabel("velocity of the body [mm/s]")
@@ -40,4 +40,8 @@ def plate(quick: bool = False) -> Plate:
         "transition friction there, as printed [N]": C_e * np.exp(fastest / e_1),
     }
     far = float(np.abs(exact - force)[moves].max()) / C_e
-    return plate_of(__name__, figure, far, "1", numbers)
+    claims = {
+        "the law is a curve": far < 2e-3,
+        "with the printed sign its force is beyond all bounds": C_e * np.exp(fastest / e_1) > 1e8,
+    }
+    return plate_of(__name__, figure, far, "1", numbers, claims)

@@ -48,8 +48,9 @@ def small_multiples(
 ) -> Figure:
     """A panel per law, exact dry friction behind each; the kinds of laws by colour.
 
-    Beside its name is the root mean square distance from exact dry friction, in the same unit.
+    Beside its name is the root mean square distance from exact dry friction.
     """
+    unit = label[label.index("[") + 1 : -1]
     rows = -(-(len(curves) + 1) // 3)
     figure, axes = grid(rows, 3, height=0.9 + 1.45 * rows, sharex=True, sharey=True)
     places = [axis for row in axes for axis in row]
@@ -58,11 +59,15 @@ def small_multiples(
         axis.plot(t, y, color=colour(kind(name)), linewidth=1.1)
         axis.set_title(name, fontsize="medium", loc="left", pad=3)
         off = rms(y - reference[1])
-        axis.set_title(f"rms {off:.2g}", fontsize="x-small", loc="right", pad=3, color="0.35")
+        axis.set_title(
+            f"rms {off:.2g} {unit}", fontsize="x-small", loc="right", pad=3, color="0.35"
+        )
     if limits[0] > -inf:
         places[0].set_ylim(*limits)
     for axis in places[len(curves) :]:
         axis.axis("off")
+    for axis in places[len(curves) - 3 : len(curves)]:  # nothing stands below these
+        axis.tick_params(labelbottom=True)
     _legend(places[len(curves)])
     figure.supxlabel("time [s]", fontsize="medium")
     figure.supylabel(label, fontsize="medium")

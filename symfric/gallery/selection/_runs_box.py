@@ -66,6 +66,42 @@ def last_swing(name: str, what: str, t_end: float) -> float:
     return float(np.ptp(signal(name, what, t_end)[-2000:])) / 2
 
 
+def end_of_motion(what: str, numbers: dict[str, float], t_end: float) -> dict[str, bool]:
+    """What holds of `signal` in the last two seconds, when dry friction holds the box."""
+    names = [*LAWS] if t_end == T_END else ["Smooth", "Karnopp", "LuGre"]
+    exact = signal(EXACT, what, t_end)
+    off = {name: rms((signal(name, what, t_end) - exact)[-2000:]) for name in names}
+    most = off["LuGre"]
+    if t_end < T_END:  # the box still moves
+        return {"Karnopp errs most": off["Karnopp"] > 2 * most > 2 * off["Smooth"]}
+    stiffness = machine.M * machine.G * machine.L
+    w = float(np.sqrt(stiffness / (machine.J + machine.M * machine.L**2)))
+    swings = {one: last_swing(EXACT, one, t_end) for one in (what, "phi")}
+    numbers["frequency of the pendulum on a fixed hinge [rad/s]"] = w
+    phi = signal(EXACT, "phi", t_end)[-5000:]
+    turns = np.flatnonzero((phi[:-1] < 0) & (phi[1:] >= 0)) * 1e-3
+    numbers["frequency in the last 5 s, exact dry friction [rad/s]"] = found = float(
+        2 * np.pi * (turns.size - 1) / (turns[-1] - turns[0])
+    )
+    order = what.count("'")
+    return {
+        "LuGre and Elasto-plastic err by a quarter of the swing or more": (
+            min(most, off["Elasto-plastic"]) > 0.25 * swings[what]
+        ),
+        "Dahl errs by as much": abs(off["Dahl"] / most - 1) < 0.05,
+        "Smooth and Threlfall by two thirds to three quarters of it": all(
+            0.62 < off[name] / most < 0.77 for name in ("Smooth", "Threlfall")
+        ),
+        "Karnopp by twice as much": 1.8 < off["Karnopp"] / most < 2.1,
+        "Bengisu and Gonthier are nearest": (
+            {*sorted(off, key=lambda name: off[name])[:2]} == {"Bengisu", "Gonthier"}
+        ),
+        "dry friction leaves a pendulum on a fixed hinge": (
+            abs(found / w - 1) < 2e-3 and abs(swings[what] / (w**order * swings["phi"]) - 1) < 2e-3
+        ),
+    }
+
+
 def departures(what: str, unit: str, names: Iterable[str], t_end: float) -> dict[str, float]:
     """How far the laws are from dry friction, over the run and over its last two seconds."""
     exact = signal(EXACT, what, t_end)

@@ -1,4 +1,4 @@
-"""Friction force on the block, eleven laws.
+"""Friction force of the belt on the block, eleven laws.
 
 Compared: the greatest force of each law with the static level mu_s N = 1.177 N that table 3 gives,
 after the first stop on the belt; the force in slip with mu_d N = 0.785 N.
@@ -14,6 +14,7 @@ states are the smooth ones is refuted as well: the undamped bristles of Dahl and
 
 import numpy as np
 
+from symfric import Trajectory
 from symfric.gallery.plate import Plate, plate_of
 from symfric.gallery.selection._laws import SLIDING, chosen, small_multiples
 from symfric.gallery.selection._runs_belt import F_C, F_S, T_END, exact, run
@@ -26,12 +27,14 @@ def plate(quick: bool = False) -> Plate:
     runs = {name: run(name, t_end) for name in names}
 
     t = runs[names[0]].t
-    curves = {name: (one.t, one["friction"]) for name, one in runs.items()}
-    figure = small_multiples(curves, (t, dry["friction"]), "friction force [N]", (-1.35, 0.15))
+    curves = {name: (one.t, -one["friction"]) for name, one in runs.items()}
+    label, reference = "friction on the block [N]", (t, -dry["friction"])
+    figure = small_multiples(curves, reference, label, (-0.15, 1.35))
 
     after = t > 2.0
     numbers = {"static level [N]": F_S, "dynamic level [N]": F_C}
     off: list[float] = []
+    rings: dict[str, float] = {}
     for name, one in runs.items():
         greatest = float(np.abs(one["friction"][after]).max())
         numbers[f"greatest force, {name} [N]"] = greatest
@@ -39,6 +42,25 @@ def plate(quick: bool = False) -> Plate:
         if (after & fast).any():
             slides = float(np.abs(one["friction"][after & fast]).mean())
             numbers[f"mean force in slip beyond 50 mm/s, {name} [N]"] = slides
+        rings[name] = numbers[f"ringing in the first stick, {name} [N]"] = ringing(one)
         if name not in SLIDING:
             off.append(abs(greatest / F_S - 1))
-    return plate_of(__name__, figure, max(off), "1", numbers)
+    slips = [value / F_C for key, value in numbers.items() if key.startswith("mean force in slip")]
+    claims = {
+        "in slip all are at mu_d N to 0.1 %": np.allclose(slips, 1, atol=1e-3),
+        "Coulomb, Threlfall and Dahl show that level alone": all(
+            abs(numbers[f"greatest force, {name} [N]"] / F_C - 1) < 1e-3
+            for name in SLIDING
+            if name in runs
+        ),
+        "Dahl and Stick-slip ring, the others do not": all(
+            (ring > 1.0) == (name in ("Dahl", "Stick-slip")) for name, ring in rings.items()
+        ),
+    }
+    return plate_of(__name__, figure, max(off), "1", numbers, claims)
+
+
+def ringing(one: Trajectory) -> float:
+    """Total variation of the force between 0.3 and 3 s, beyond its fall with the spring [N]."""
+    force = one["friction"][(one.t > 0.3) & (one.t < 3.0)]
+    return float(np.abs(np.diff(force)).sum() - abs(force[-1] - force[0]))

@@ -1,7 +1,7 @@
 """The pendulum on the box, and what its table says.
 
-The machine which is simulated, at its start and after the first half swing, and the way of the
-mass between them. The hinge is 0.4 m above the ground; the width of the box is of the picture only.
+The machine which is simulated, at its start and after the first half swing, and the way of the mass
+between them. The hinge is 0.4 m above the ground; the width of the box is of the picture only.
 
 Compared: the accelerations at the start, where nothing rubs yet, with a linear system written by
 hand; the two readings of table 6 with the standard deviations that table 8 prints.
@@ -17,7 +17,7 @@ is in no equation, and the height h is in none either.
 import numpy as np
 
 from symfric import Coulomb, simulate
-from symfric.foundation.panels import grid
+from symfric.foundation.panels import NARROW, grid
 from symfric.foundation.style import EDGE, QUIET, colour, line
 from symfric.gallery.plate import Plate, plate_of
 from symfric.gallery.selection import _machine as machine
@@ -33,7 +33,7 @@ def plate(quick: bool = False) -> Plate:
     """The machine at its start, and S of both readings of its inertia."""
     t_end = 1.0 if quick else T_END
     table = run("Smooth", t_end)
-    figure, [[axis]] = grid(1, 1, width=6.0, height=3.6)
+    figure, [[axis]] = grid(1, 1, width=NARROW, height=3.4)
     swing = np.flatnonzero(np.diff(np.sign(table["phi_rate"][1:])))[0] + 1
     x, phi = table["x"][: swing + 1], table["phi"][: swing + 1]
     axis.plot(x + machine.L * np.sin(phi), TOP - machine.L * np.cos(phi), ":", color=QUIET)
@@ -50,6 +50,13 @@ def plate(quick: bool = False) -> Plate:
     by_hand = machine.at_start()
     found = [float(acceleration(table, rate)[0]) for rate in ("x_rate", "phi_rate")]
     point = simulate(box(Coulomb(), J=1e-9).model(), t_end, t_eval=table.t)
+    S, S_point = spread(table["x"]), spread(point["x"])
+    claims = {"1.8 kg m^2 is m L^2": abs(machine.M * machine.L**2 - machine.J) < 1e-12}
+    if not quick:
+        claims |= {
+            "S is 3.0 cm for a point mass": abs(S_point - 3.0) < 0.05,
+            "and 5.8 cm with 1.8 kg m^2 about the mass": abs(S - 5.8) < 0.05,
+        }
     return plate_of(
         __name__,
         figure,
@@ -62,7 +69,8 @@ def plate(quick: bool = False) -> Plate:
             "the same by hand, pendulum [rad/s^2]": by_hand[1],
             "m L^2 [kg m^2]": machine.M * machine.L**2,
             "S x 100 in table 8, Smooth [m]": TABLE_8["Smooth"],
-            "S x 100 with 1.8 kg m^2 about the mass [m]": spread(table["x"]),
-            "S x 100 with a point mass [m]": spread(point["x"]),
+            "S x 100 with 1.8 kg m^2 about the mass [m]": S,
+            "S x 100 with a point mass [m]": S_point,
         },
+        claims,
     )

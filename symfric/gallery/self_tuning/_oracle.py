@@ -52,3 +52,13 @@ def _unknown(machine: Machine) -> ca.Function:
 def _shown(machine: Machine, y: ca.DM, unknown: ca.DM) -> dict[str, Array]:
     out = ca.Function("out", [machine.y, machine.unknown], [machine.shown]).map(y.shape[1])
     return dict(zip(machine.names, np.array(out(y, unknown)), strict=True))
+
+
+def fastest(machine: Machine, y: Array) -> float:
+    """Largest magnitude of the eigenvalues of the machine's equations at the state `y` [1/s]."""
+    names = ("y", "unknown", "rates", "balance")
+    at, z, rates, balance = (getattr(machine, name) for name in names)
+    inner = ca.solve(ca.jacobian(balance, z), ca.jacobian(balance, at))
+    slope = ca.jacobian(rates, at) - ca.jacobian(rates, z) @ inner
+    found = ca.Function("slope", [at, z], [slope])(y, _unknown(machine)(y, 0.0))
+    return float(np.abs(np.linalg.eigvals(np.array(found))).max())

@@ -35,11 +35,11 @@ MACHINES = {
 
 @cache
 def run(law: str, t_end: float) -> dict[str, Array]:
-    """Time, crank [rad], slider [m], their rates and accelerations, energy [J]."""
+    """Time, crank [rad], slider [m], rates and accelerations, energy [J], constraints' norm."""
     model = SliderCrank(LAWS[law]).model()
     times = np.linspace(0.0, t_end, round(4000 * t_end) + 1)
     found = simulate(model, t_end, rtol=1e-8, t_eval=times)
-    signals = {"t": times, "energy": found["energy"]}
+    signals = {"t": times, "energy": found["energy"], "constraint": found["constraint_position"]}
     for name in ("crank", "slider"):
         signals[name], signals[f"{name}'"] = found[name], found[f"{name}_rate"]
         signals[f"{name}''"] = acceleration(found, f"{name}_rate")
@@ -62,17 +62,18 @@ def apart(signal: str, t_end: float) -> Array:
     return run("self-tuning", t_end)[signal] - run("Brown-McPhee", t_end)[signal]
 
 
-def picture(signal: str, label: str, t_end: float) -> Figure:
-    """Both laws on the oracle, and below how far they are apart."""
+def picture(signal: str, label: str, t_end: float, prefix: str = "") -> Figure:
+    """Both laws on the oracle, and below how far they are apart, its unit with `prefix`."""
+    scale = {"": 1.0, "m": 1e3, "µ": 1e6}[prefix]
     figure, (above, below) = panels(2, height=2.0)
     t, unit = run("Brown-McPhee", t_end)["t"], label[label.index("[") :]
     reference = oracle("Brown-McPhee", t_end)[signal]
     above.plot(t, reference, label="Brown-McPhee, by hand", **REFERENCE)
     for k, law in enumerate(LAWS):
         above.plot(t, run(law, t_end)[signal], label=law, **line(k))
-    below.plot(t, apart(signal, t_end), **line(0))
+    below.plot(t, scale * apart(signal, t_end), **line(0))
     above.set_ylabel(label)
-    below.set_ylabel(f"self-tuning minus\nBrown-McPhee {unit}")
+    below.set_ylabel(f"self-tuning minus\nBrown-McPhee [{prefix}{unit[1:]}")
     below.set_xlabel("time [s]")
     figure.align_ylabels([above, below])
     legend_below(figure, above)

@@ -15,7 +15,7 @@ from symfric.foundation.panels import grid
 from symfric.foundation.style import line
 from symfric.gallery.drawing import REFERENCE, legend_below
 from symfric.gallery.self_tuning import _machines as machines
-from symfric.gallery.self_tuning._oracle import fixed_steps, solve
+from symfric.gallery.self_tuning._oracle import fastest, fixed_steps, solve
 from symfric.gallery.signals import acceleration, largest
 from symfric.scenes import FourMass
 
@@ -26,6 +26,10 @@ V_T = 0.01
 """Velocity of the peak [m/s], of Haug's example."""
 SLIDERS = ("x1", "y2", "z3", "x4")
 LAWS = ("self-tuning", "Brown-McPhee")
+CONSTRAINTS = {
+    "constraint_position": "m", "constraint_velocity": "m/s", "constraint_acceleration": "m/s^2",
+}  # fmt: skip
+"""Norms of what joints and rods violate, with their units."""
 COEFFICIENTS = {"self-tuning": machines.self_tuning, "Brown-McPhee": machines.brown_mcphee}
 
 
@@ -43,6 +47,7 @@ def run(label: str, v_t: float, t_end: float) -> Signals:
     times = np.linspace(0.0, t_end, round(1000 * t_end) + 1)
     found = simulate(model, t_end, rtol=1e-8, t_eval=times)
     signals: Signals = {"t": times, "energy": found["energy"]}
+    signals |= {name: found[name] for name in CONSTRAINTS}
     for slider in SLIDERS:
         signals[slider], signals[f"{slider}'"] = found[slider], found[f"{slider}_rate"]
         signals[f"{slider}''"] = acceleration(found, f"{slider}_rate")
@@ -60,6 +65,14 @@ def oracle(label: str, v_t: float, t_end: float) -> Signals:
 def stepped(label: str, v_t: float, t_end: float, h: float = 1e-3) -> Signals:
     """The same by fixed explicit steps of `h` [s]."""
     return fixed_steps(machines.four_mass(COEFFICIENTS[label](**MU, v_t=v_t)), h, t_end)
+
+
+def fastest_at(label: str, v_t: float, t_end: float, t: float) -> float:
+    """Largest eigenvalue of the machine by hand where the run is at time `t` [1/s]."""
+    at = {name: values[round(1000 * t)] for name, values in run(label, v_t, t_end).items()}
+    w = (at["x1"] * at["y2'"] - at["y2"] * at["x1'"]) / 25
+    y = np.array([np.arctan2(at["y2"], at["x1"]), at["x4"], w, at["x4'"]])
+    return fastest(machines.four_mass(COEFFICIENTS[label](**MU, v_t=v_t)), y)
 
 
 def variation(signal: Array) -> float:
@@ -82,18 +95,24 @@ def apart(ending: str, t_end: float) -> dict[str, float]:
 
 
 def picture(ending: str, label: str, t_end: float) -> Figure:
-    """A panel per slider, both laws on the oracle."""
-    figure, axes = grid(2, 2, height=4.6, sharex=True)
-    for axis, slider in zip((a for row in axes for a in row), SLIDERS, strict=True):
+    """A panel per slider, both laws on the oracle; below how far the laws are apart."""
+    figure, axes = grid(3, 2, height=6.4, sharex=True)
+    first, other = (run(one, V_T, t_end) for one in LAWS)
+    for axis, pair in zip(axes[2], (("x1", "x4"), ("y2", "z3")), strict=True):
+        for k, slider in enumerate(pair, start=2):
+            apart_by = first[slider + ending] - other[slider + ending]
+            axis.plot(first["t"], apart_by, **line(k), label=f"mass {slider[1]}")
+        axis.legend(fontsize="small")
+        axis.set_xlabel("time [s]")
+    axes[2][0].set_ylabel(f"self-tuning minus\nBrown-McPhee {label[label.index('[') :]}")
+    for axis, slider in zip((a for row in axes[:2] for a in row), SLIDERS, strict=True):
         t = run("Brown-McPhee", V_T, t_end)["t"]
         reference = oracle("Brown-McPhee", V_T, t_end)[slider + ending]
         axis.plot(t, reference, label="Brown-McPhee, by hand", **REFERENCE)
         for k, one in enumerate(LAWS):
             axis.plot(t, run(one, V_T, t_end)[slider + ending], label=one, **line(k))
         axis.set_title(f"mass {slider[1]}, along {slider[0]}", fontsize="medium")
-    for row in axes:
+    for row in axes[:2]:
         row[0].set_ylabel(label)
-    for axis in axes[-1]:
-        axis.set_xlabel("time [s]")
     legend_below(figure, axes[0][0])
     return figure

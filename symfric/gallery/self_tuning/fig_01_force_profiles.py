@@ -3,8 +3,8 @@
 The force on the body under a constant load. The paper's range and load are lost; here are the
 friction coefficients and the 15 mm/s of its stick-slip test.
 
-Compared: the self-tuning law with Brown-McPhee, at equal velocity of the peak and at equal slope
-at rest.
+Compared: the self-tuning law with Brown-McPhee, at equal velocity of the peak and at equal slope at
+rest.
 
 Distance: the largest difference at equal velocity of the peak, relative to the static level.
 
@@ -54,23 +54,27 @@ def plate(quick: bool = False) -> Plate:
     peak = forces["self-tuning, equal peak"]
     slower = SelfTuning(B=float(tuned.B) / 2, **MU)
     difference = {n: largest(F - forces["Brown-McPhee"]) / MU["mu_s"] for n, F in forces.items()}
-    return plate_of(
-        __name__,
-        figure,
-        difference["self-tuning, equal peak"],
-        "1",
-        {
-            "difference at equal slope / mu_s N [1]": difference["self-tuning, equal slope"],
-            "peak of the self-tuning law / mu_s N [1]": peak.max() / MU["mu_s"],
-            "peak of Brown-McPhee / mu_s N [1]": forces["Brown-McPhee"].max() / MU["mu_s"],
-            "excess of Brown-McPhee over mu_d N at 10 v_t [1]": tail(brown),
-            "excess of the self-tuning law over mu_d N at 10 v_t [1]": tail(tuned),
-            "B at equal peak [s/mm]": 1e-3 * float(tuned.B),
-            "change of F by half of B at twice the speed [1]": largest(
-                on_curve(slower, 2 * v) - peak
-            ),
-        },
-    )
+    numbers = {
+        "difference at equal slope / mu_s N [1]": difference["self-tuning, equal slope"],
+        "peak of the self-tuning law / mu_s N [1]": peak.max() / MU["mu_s"],
+        "peak of Brown-McPhee / mu_s N [1]": forces["Brown-McPhee"].max() / MU["mu_s"],
+        "excess of Brown-McPhee over mu_d N at 10 v_t [1]": tail(brown),
+        "excess of the self-tuning law over mu_d N at 10 v_t [1]": tail(tuned),
+        "B at equal peak [s/mm]": 1e-3 * float(tuned.B),
+        "change of F by half of B at twice the speed [1]": largest(on_curve(slower, 2 * v) - peak),
+    }
+    claims = {
+        "half of B at twice the speed gives the same force": largest(on_curve(slower, 2 * v) - peak)
+        < 1e-12,
+        "the peak is mu_s N, that of Brown-McPhee below": (
+            forces["Brown-McPhee"].max() < 0.9997 * MU["mu_s"] < 0.9999 * MU["mu_s"] < peak.max()
+        ),
+        "at ten times its velocity 10 % above mu_d N, Brown-McPhee 0.8 %": (
+            abs(tail(tuned) - 0.10) < 0.005 and abs(tail(brown) - 0.008) < 5e-4
+        ),
+    }
+    far = difference["self-tuning, equal peak"]
+    return plate_of(__name__, figure, far, "1", numbers, claims)
 
 
 def on_curve(law: Law, v: np.ndarray) -> np.ndarray:

@@ -3,8 +3,8 @@
 With y = B v, left with E inside the arctangent, as Pacejka has it and as our law does, right with E
 outside: sin(C atan(y) - E (y - atan(y))). B = 1 s/mm and C = 1.41; the paper's numbers are lost.
 
-Compared: curves for E = 0 ... 2 in both readings with what the text says of them: as expected
-below 0.5, sinusoidal above. As expected is: one peak and no change of sign for v > 0.
+Compared: curves for E = 0 ... 2 in both readings with what the text says of them: as expected below
+0.5, sinusoidal above. As expected is: one peak and no change of sign for v > 0.
 
 Distance: how many of the two statements do not hold for our law.
 
@@ -44,6 +44,7 @@ def plate(quick: bool = False) -> Plate:
     figure.legend(loc="outside right center", title="E [1]", frameon=False)
 
     numbers: dict[str, float] = {}
+    claims: dict[str, bool] = {}
     wrong: dict[str, int] = {}
     for title, curves in readings.items():
         changes = {E: crossings(F[v > 0]) for E, F in curves.items()}
@@ -56,7 +57,13 @@ def plate(quick: bool = False) -> Plate:
     for y in (5.0, 10.0):
         threshold = C * np.arctan(y) / (y - np.arctan(y))
         numbers[f"E outside that reverses friction at {y:g} mm/s [1]"] = threshold
-    return plate_of(__name__, figure, wrong[next(iter(readings))], "of 2 statements", numbers)
+        turned = [outside(np.array([y]), E)[0] for E in (0.98 * threshold, 1.02 * threshold)]
+        claims[f"E = {threshold:.2f} outside reverses friction at {y:g} mm/s"] = (
+            turned[0] > 0 > turned[1]
+        )
+    inside, outer = wrong.values()
+    claims["the text holds with E outside, not inside, of the arctangent"] = inside > outer == 0
+    return plate_of(__name__, figure, inside, "of 2 statements", numbers, claims)
 
 
 def outside(v: np.ndarray, E: float) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Sensitivity of the friction force to the parameters of the law.
 
-The symbol in the paper's caption is lost; here are all parameters, of both laws. A curve shows
-p dF/dp / (mu_s N): by how much the force changes where a parameter changes by its own size.
+The symbol in the paper's caption is lost; here are all parameters, of both laws. A curve shows p
+dF/dp / (mu_s N): by how much the force changes where a parameter changes by its own size.
 
 Compared: derivatives by CasADi with central differences; the self-tuning law with Brown-McPhee.
 
@@ -24,6 +24,7 @@ from symfric.gallery.signals import largest
 
 V_T = 0.015  # m/s
 MU_S, MU_D = 0.15, 0.1
+SYMBOLS = {"B": "B", "v_t": "v_t", "mu_s": "\\mu_s", "mu_d": "\\mu_d"}
 
 
 def plate(quick: bool = False) -> Plate:
@@ -42,7 +43,7 @@ def plate(quick: bool = False) -> Plate:
     for axis, (title, (law, names)) in zip(axes, laws.items(), strict=True):
         for k, name in enumerate(names):
             by_casadi, by_differences = sensitivity(law, name, v)
-            axis.plot(1e3 * v, -by_casadi, label=f"to {name}", **line(k))
+            axis.plot(1e3 * v, -by_casadi, label=f"to ${SYMBOLS[name]}$", **line(k))
             errors.append(largest(by_casadi - by_differences))
             numbers[f"largest sensitivity of {title} to {name} [1]"] = largest(by_casadi)
         axis.set_title(title, fontsize="medium")
@@ -53,7 +54,23 @@ def plate(quick: bool = False) -> Plate:
         numbers[f"dC / d(mu_d/mu_s) at mu_d/mu_s = {ratio} [1]"] = (
             -2 / np.pi / np.sqrt(1 - ratio**2)
         )
-    return plate_of(__name__, figure, max(errors), "1", numbers)
+    scaled = {law: sensitivity(laws[law][0], laws[law][1][0], v)[0] for law in laws}
+    by_speed = {law: by_its_speed(laws[law][0], v) for law in laws}
+    claims = {
+        "B dF/dB = v dF/dv": np.allclose(scaled["self-tuning"], by_speed["self-tuning"]),
+        "v_t dF/dv_t = -v dF/dv": np.allclose(scaled["Brown-McPhee"], -by_speed["Brown-McPhee"]),
+        "the largest of both are 0.47 and 0.41": (
+            np.allclose([largest(one) for one in scaled.values()], [0.47, 0.41], atol=0.01)
+        ),
+    }
+    return plate_of(__name__, figure, max(errors), "1", numbers, claims)
+
+
+def by_its_speed(law: Law, v: np.ndarray) -> np.ndarray:
+    """The velocity times dF/dv, over mu_s N, at the velocities v [m/s]."""
+    speed = ca.SX.sym("v")
+    slope = ca.Function("slope", [speed], [ca.jacobian(law.force(speed, 1.0), speed)])
+    return v * slope(v[None]).full()[0] / MU_S
 
 
 def sensitivity(law: Law, name: str, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

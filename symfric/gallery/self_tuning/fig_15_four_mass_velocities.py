@@ -27,9 +27,15 @@ def plate(quick: bool = False) -> Plate:
     """4 s from the start of Haug's example."""
     t_end = 0.4 if quick else 4.0
     numbers = {f"laws apart, {slider} [m/s]": d for slider, d in apart("'", t_end).items()}
+    change: dict[str, float] = {}
     for law in LAWS:
         wide, narrow = run(law, V_T, t_end), run(law, V_T / 10, t_end)
         changes = [largest(wide[f"{s}'"] - narrow[f"{s}'"]) for s in SLIDERS]
-        numbers[f"largest change from 10 to 1 mm/s, {law} [m/s]"] = max(changes)
+        numbers[f"largest change from 10 to 1 mm/s, {law} [m/s]"] = change[law] = max(changes)
+    claims = {"the self-tuning law changes by more": change[LAWS[0]] > change[LAWS[1]]}
+    if not quick:
+        claims["the velocities change by 0.10 and 0.06 m/s"] = (
+            0.095 < change[LAWS[0]] < 0.105 and 0.06 < change[LAWS[1]] < 0.07
+        )
     figure = picture("'", "velocity [m/s]", t_end)
-    return plate_of(__name__, figure, distance("'", t_end), "m/s", numbers)
+    return plate_of(__name__, figure, distance("'", t_end), "m/s", numbers, claims)

@@ -25,9 +25,19 @@ def plate(quick: bool = False) -> Plate:
     """4 s from the start of Haug's example."""
     t_end = 0.4 if quick else 4.0
     numbers = {f"laws apart, {slider} [m/s^2]": d for slider, d in apart("''", t_end).items()}
+    totals: dict[str, list[float]] = {law: [] for law in LAWS}
     for v_t in (0.01,) if quick else (0.02, 0.01, 0.005, 0.002, 0.001):
         for law in LAWS:
             total = variation(run(law, v_t, t_end)["x1''"])
             numbers[f"total variation of x1'', {law}, {1e3 * v_t:g} mm/s [m/s^2]"] = total
+            totals[law].append(total)
+    claims = {
+        "the total variations of both laws are the same within 3 %": all(
+            abs(one / other - 1) < 0.03 for one, other in zip(*totals.values(), strict=True)
+        ),
+        "each changes by less than 5 % with the velocity of the peak": all(
+            max(each) / min(each) < 1.05 for each in totals.values()
+        ),
+    }
     figure = picture("''", "acceleration [m/s²]", t_end)
-    return plate_of(__name__, figure, distance("''", t_end), "m/s^2", numbers)
+    return plate_of(__name__, figure, distance("''", t_end), "m/s^2", numbers, claims)

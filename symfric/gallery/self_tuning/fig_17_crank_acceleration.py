@@ -5,8 +5,9 @@ SUNDIALS; and with each other.
 
 Distance: largest difference from that by hand over 0.25 s, both laws.
 
-Evidence: nothing is refuted. That no jitter is seen here follows from figure 13: the bearing slides
-at 12 m/s, a thousand times the velocity of the peak, where both laws are flat.
+Evidence: nothing is refuted: the laws overlap within 0.2 % of the greatest acceleration, and the
+joints are not violated. That no jitter is seen here follows from figure 13: the bearing slides at 8
+m/s and more, eight hundred times the velocity of the peak, where both laws are flat.
 """
 
 from symfric.gallery.plate import Plate, plate_of
@@ -20,5 +21,15 @@ def plate(quick: bool = False) -> Plate:
     numbers = {"laws apart [rad/s^2]": largest(apart("crank''", t_end))}
     slowest = min(float(run(law, t_end)["crank'"].min()) for law in LAWS)
     numbers["slowest slip in the bearing / velocity of the peak [1]"] = 0.1 * slowest / V_T
+    numbers["largest norm of the constraints"] = max(
+        largest(run(law, t_end)["constraint"]) for law in LAWS
+    )
+    greatest = largest(run("Brown-McPhee", t_end)["crank''"])
+    numbers["greatest acceleration [rad/s^2]"] = greatest
+    claims = {
+        "the bearing slides at 800 times the velocity of the peak": 0.1 * slowest > 800 * V_T,
+        "the laws overlap within 0.2 %": largest(apart("crank''", t_end)) < 2e-3 * greatest,
+        "constraints hold": numbers["largest norm of the constraints"] < 1e-7,
+    }
     figure = picture("crank''", "crank acceleration\n[rad/s²]", t_end)
-    return plate_of(__name__, figure, distance("crank''", t_end), "rad/s^2", numbers)
+    return plate_of(__name__, figure, distance("crank''", t_end), "rad/s^2", numbers, claims)

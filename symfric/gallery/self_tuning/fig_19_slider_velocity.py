@@ -22,5 +22,7 @@ def plate(quick: bool = False) -> Plate:
     half = differences.size // 2
     numbers["laws apart in the first half [m/s]"] = largest(differences[:half])
     numbers["laws apart in the second half [m/s]"] = largest(differences[half:])
-    figure = picture("slider'", "slider velocity\n[m/s]", t_end)
-    return plate_of(__name__, figure, distance("slider'", t_end), "m/s", numbers)
+    _, early, late = numbers.values()
+    claims = {"they drift apart": late > 2 * early}
+    figure = picture("slider'", "slider velocity\n[m/s]", t_end, "m")
+    return plate_of(__name__, figure, distance("slider'", t_end), "m/s", numbers, claims)

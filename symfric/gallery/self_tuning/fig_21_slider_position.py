@@ -25,5 +25,11 @@ def plate(quick: bool = False) -> Plate:
     x = np.sqrt(0.3**2 - y**2 - z**2)
     numbers["largest violation of the closed form by the angle [m]"] = largest(one["slider"] - x)
     numbers["stroke [m]"] = float(np.ptp(one["slider"]))
-    figure = picture("slider", "slider position\n[m]", t_end)
-    return plate_of(__name__, figure, distance("slider", t_end), "m", numbers)
+    claims = {
+        "the position follows from the angle by the lengths": largest(one["slider"] - x) < 1e-12,
+        "the laws overlap within 0.1 % of the stroke": (
+            numbers["laws apart [m]"] < 1e-3 * numbers["stroke [m]"]
+        ),
+    }
+    figure = picture("slider", "slider position\n[m]", t_end, "µ")
+    return plate_of(__name__, figure, distance("slider", t_end), "m", numbers, claims)

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from html import escape
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,8 @@ def test_a_name_may_be_a_figure_or_a_paper() -> None:
     assert chosen((NAME,)) == chosen(("self_tuning/fig_07",)) == (NAME,)
     assert NAME in chosen(("self_tuning",)) == chosen(("self_tuning/",))
     assert {*chosen(("self_tuning",))} <= {*chosen(())}
+    assert {*chosen(("fig_04",))} == {name for name in chosen(()) if "/fig_04_" in name}
+    assert chosen(("fig_07_shape_factor",)) == chosen(("self_tuning/fig_7",)) == (NAME,)
     with pytest.raises(ValueError, match="did you mean self_tuning/fig_"):
         chosen(("self_tuning/fig_0",))
 
@@ -59,7 +62,7 @@ def test_a_plate_refuses_numbers_that_are_not_finite() -> None:
     import symfric.gallery.self_tuning.fig_07_shape_factor as script  # noqa: PLC0415
 
     with pytest.raises(ValueError, match="expected finite numbers, got distance, period"):
-        plate_of(script.__name__, None, float("nan"), "m", {"period [s]": float("inf")})  # type: ignore[arg-type]
+        plate_of(script.__name__, None, float("nan"), "m", {"period [s]": float("inf")}, {})  # type: ignore[arg-type]
 
 
 def test_a_plate_is_written_whole(tmp_path: Path) -> None:
@@ -69,6 +72,7 @@ def test_a_plate_is_written_whole(tmp_path: Path) -> None:
     page = index_page([record])
     assert f'src="{NAME}.png"' in page
     assert record["how_far"] in page
+    assert all(escape(claim) in page for claim in record["checked"])
     assert "reduced size" in page
 
 
