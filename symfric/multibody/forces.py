@@ -181,7 +181,8 @@ class JointSpringDamper(Force):
 
     with s the displacement [m] or angle [rad]; f acts on the child, its opposite on the parent.
     The angle counts full turns. Where the joint closes a loop, it is a state of the model with the
-    joint's name, which starts with the turns of the joint's `start`.
+    joint's name. It starts with the turns that the joints of the loop have made, if all axes of the
+    loop are parallel; else nearest to the joint's `start`, as the pose tells it modulo a turn.
     """
 
     joint: str

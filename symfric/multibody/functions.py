@@ -36,8 +36,8 @@ def functions(
     Raises:
         ValueError: as `Mechanism.build`.
 
-    Limits: q alone does not count the full turns of a joint that closes a loop; springs about its
-    axis are taken at the angle nearest to the start.
+    Limits: in space q alone does not count the full turns of a joint that closes a loop; springs
+    about its axis are taken at the angle nearest to the start there.
     """
     eq = mechanism.prepare(p, formulation).eq
     q, qd, a, lam = eq.q, eq.qd, eq.a, eq.lam

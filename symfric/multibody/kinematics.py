@@ -5,11 +5,12 @@ from typing import final
 
 import casadi as ca
 
+from symfric.foundation.symbols import stacked
 from symfric.multibody.body import GROUND
 from symfric.multibody.cuts import Cuts
 from symfric.multibody.joint import Joint
 from symfric.multibody.topology import Link, Topology, body_of, frame_at
-from symfric.multibody.turns import Turns
+from symfric.multibody.turns import Moved, Turns
 
 ZERO = ca.SX(3, 1)
 
@@ -149,7 +150,12 @@ class Kinematics:
         s = joint.displacement(direction, relative.R, relative.p)
         if self.turns is None or joint.linear(direction):
             return s, rate
-        return self.turns(joint, direction, s, rate), rate
+        return self.turns(joint, direction, s, rate, self._moved), rate
+
+    @property
+    def _moved(self) -> Moved:
+        links = self.topology.links
+        return Moved(self.q, self.qd, stacked(x for link in links for x in link.joint.starts))
 
     def rate(self, joint: Joint, direction: str) -> ca.SX:
         """Rate of the displacement or angle of a joint in one of its `directions`."""

@@ -123,6 +123,13 @@ def in_absolute_coordinates(
     )  # fmt: skip
     topology = replace(topology, links=links)
     q, qd = coordinates(topology)
+    wound = {turn.angle.name: turn.angle.start for turn in tree.eq.turns}
+    angle = ca.Function("angle", [tree.eq.q, p], [stacked(wound.values())])
+    turned = dict(zip(wound, angle(tree.q0, values).full().ravel().tolist(), strict=True))
+    joints = [
+        replace(j, start=turned[j.name]) if j.start is None and j.name in turned else j
+        for j in joints
+    ]
     return written(topology, joints, forces, constraints, q, qd, p, values)
 
 

@@ -1,5 +1,6 @@
 """Springs about the axes of joints that close loops: full turns count."""
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -11,6 +12,7 @@ from symfric.multibody import (
     UserForce,
     functions,
 )
+from symfric.multibody.turns import Moved, Turns
 
 
 def drill(loop: bool, start: float, stiffness: float = 473.0) -> Mechanism:
@@ -77,8 +79,33 @@ def test_forces_of_users_see_full_turns_too() -> None:
     np.testing.assert_allclose(run["pipe"], run["rock"] - run["top"], atol=1e-6)
 
 
-def test_functions_of_positions_take_the_angle_nearest_to_the_start() -> None:
+def test_functions_of_positions_count_the_turns_of_parallel_axes() -> None:
     bias = functions(drill(True, -10.0))["bias"]
     q = [0.0, -10.0 + 4.0 * np.pi]  # top, rock
     moment = bias(q, [0.0, 0.0], [], []).full().ravel()
-    assert moment == pytest.approx([-6000.0 + 4730.0, 4000.0 - 4730.0])
+    wound = -473.0 * q[1]
+    assert moment == pytest.approx([-6000.0 + wound, 4000.0 - wound])
+
+
+@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+def test_a_string_starts_as_wound_up_as_the_joints_of_its_loop_are(formulation: str) -> None:
+    # -20 rad of the bit left -1.15 rad in the string, without a word
+    m = drill(True, -20.0)
+    m.joints[1] = Revolute("pipe", "table", "bit")
+    m.joints[2] = Revolute("rock", "ground", "bit", start=-20.0, rate=5.0)
+    m.joints = [m.joints[0], m.joints[2], m.joints[1]]
+    model = m.build(formulation=formulation)
+    states = dict(zip((v.name for v in model.x), model.initial_state(), strict=True))
+    assert states["pipe"] == pytest.approx(-20.0, abs=1e-12)
+    if formulation == "joint":
+        moved = model.initial_state({"rock": -33.0, "top": 1.0})
+        assert moved[[v.name for v in model.x].index("pipe")] == pytest.approx(-34.0)
+
+
+def test_in_space_the_start_of_a_joint_says_which_of_the_turns_is_meant() -> None:
+    moved = Moved(*(ca.SX.sym(name, 2) for name in ("q", "qd", "start")))
+    assert moved.turned(ca.dot(ca.DM([2.0, -1.0]), moved.qd)) is not None
+    assert moved.turned(moved.q[0] * moved.qd[1]) is None
+    turns, angle = Turns(), ca.SX(0.5)
+    turns(Revolute("a", "ground", "b", start=12.0), "turn", angle, moved.q[0] * moved.qd[1], moved)
+    assert float(turns.found[0].angle.start) == pytest.approx(0.5 + 4 * np.pi)
