@@ -18,7 +18,8 @@ What there is; `help` of each tells more:
     running     simulate, simulate_many, stepper, flow; inputs as numbers, functions of time or
                 samples, Hold and Linear (rate_of: their rate); SolveError, Status where runs fail
     results     Trajectory (run["x"], run.at(times), run.at(run.step_times), run.extremes, plot,
-                animate, save, to_csv, to_dataframe), load_run, Statistics, Ensemble, Plant, report
+                animate, save, to_csv, to_dataframe), load_run, Statistics, Plant, report; Ensemble
+                (varied, extremes, plot, save, to_dataframe), load_ensemble
     choice      select ranks laws on a machine at equal error (Choice)
     behaviour   figure and compare of laws (FigureData); recommended finds a smoothing for a wanted
                 error (Recommendation)
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
     from symfric.integrator import Statistics as Statistics
     from symfric.integrator import Trajectory as Trajectory
     from symfric.integrator import flow as flow
+    from symfric.integrator import load_ensemble as load_ensemble
     from symfric.integrator import load_run as load_run
     from symfric.integrator import rate_of as rate_of
     from symfric.integrator import simulate as simulate
@@ -153,8 +155,8 @@ else:
             "symfric.foundation.parameters": "Parameter Variable parameters symbolise with_values",
             "symfric.foundation.status": "SolveError Status",
             "symfric.integrator": """
-                Ensemble Hold Linear Plant Statistics Trajectory flow load_run rate_of
-                simulate simulate_many stepper
+                Ensemble Hold Linear Plant Statistics Trajectory flow load_ensemble load_run
+                rate_of simulate simulate_many stepper
             """,
             "symfric.laws": """
                 ALL_LAWS BAM GMS POPULATIONS Ambrosio Andersson Armstrong Asymmetric

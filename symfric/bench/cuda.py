@@ -9,9 +9,9 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.integrator import Ensemble, simulate_many
 from symfric.integrator.cuda import on_device
 from symfric.integrator.cuda.device import DeviceError
-from symfric.integrator.ensemble import Ensemble, simulate_many
 from symfric.laws import BrownMcPhee, LuGre
 from symfric.model import Model
 from symfric.scenes import SliderCrank, rabinowicz

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from symfric.bench import peers
 from symfric.bench.timing import best_time
-from symfric.integrator.ensemble import Ensemble, simulate_many
+from symfric.integrator import Ensemble, simulate_many
 from symfric.integrator.simulate import simulate
 from symfric.laws import Law
 from symfric.model import Model

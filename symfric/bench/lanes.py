@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from symfric.bench.cuda import CudaRow, measure_cuda
 from symfric.bench.timing import interleaved
-from symfric.integrator.ensemble import Ensemble, simulate_many
+from symfric.integrator import Ensemble, simulate_many
 from symfric.integrator.equations.initial import first_guess, first_step, smallest_step
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.many.program import program

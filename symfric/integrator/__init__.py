@@ -6,7 +6,6 @@ from symfric.foundation.fronts import hand_out
 
 if TYPE_CHECKING:
     from symfric.integrator.by_peer import simulate_by_peer as simulate_by_peer
-    from symfric.integrator.ensemble import Ensemble as Ensemble
     from symfric.integrator.ensemble import simulate_many as simulate_many
     from symfric.integrator.equations.inputs import Hold as Hold
     from symfric.integrator.equations.inputs import Input as Input
@@ -17,6 +16,8 @@ if TYPE_CHECKING:
     from symfric.integrator.simulate import simulate as simulate
     from symfric.integrator.stepper import stepper as stepper
     from symfric.integrator.stored import load_run as load_run
+    from symfric.results.ensemble import Ensemble as Ensemble
+    from symfric.results.ensemble import load_ensemble as load_ensemble
     from symfric.results.statistics import Statistics as Statistics
     from symfric.results.trajectory import Trajectory as Trajectory
 else:
@@ -24,7 +25,7 @@ else:
         __name__,
         {
             "symfric.integrator.by_peer": "simulate_by_peer",
-            "symfric.integrator.ensemble": "Ensemble simulate_many",
+            "symfric.integrator.ensemble": "simulate_many",
             "symfric.integrator.equations.inputs": "Hold Input Linear",
             "symfric.integrator.equations.rates": "rate_of",
             "symfric.integrator.flow": "flow",
@@ -32,6 +33,7 @@ else:
             "symfric.integrator.plant": "Plant",
             "symfric.integrator.stepper": "stepper",
             "symfric.integrator.stored": "load_run",
+            "symfric.results.ensemble": "Ensemble load_ensemble",
             "symfric.results.statistics": "Statistics",
             "symfric.results.trajectory": "Trajectory",
         },

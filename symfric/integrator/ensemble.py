@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError
-from symfric.foundation.shown import Showing, Shown
 from symfric.foundation.status import Status
 from symfric.integrator.arguments import (
     BACKENDS,
@@ -36,73 +35,17 @@ from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import Tolerances
 from symfric.integrator.step.layout import State
 from symfric.model import Model
+from symfric.results.ensemble import Ensemble
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from symfric.integrator.cuda.on_device import OnDevice
 
 Array = NDArray[np.float64]
 CUDA, REALS = "cuda", ("double", "float")
+RESULTS = 2
+"""Raised whenever folders hold something else."""
 CHUNK = 500
 """Members of a task for processors."""
-
-
-@final
-@dataclass(frozen=True, eq=False, repr=False)
-class Ensemble(Showing):
-    """Results of many runs.
-
-    Attributes:
-        scene: name of the model.
-        t: times [s], shape (k,); (members, 1) where each member has its own end and nothing else
-            was asked for.
-        signals: name -> values, shape (members, k); NaN after a member ended, failed or met a
-            terminal event, and for members that were not reached. Memory-mapped where the results
-            went to a folder.
-        units: name -> unit.
-        attempts: attempts of each member, shape (members,).
-        reached: time [s] each member reached, shape (members,): that of a terminal event or of
-            its failure, else its end; NaN for members that were not started.
-        failed: number of a failed member -> sentence.
-        status: SUCCESS, or INTERRUPTED with the members that were finished.
-    """
-
-    scene: str
-    t: Array
-    signals: Mapping[str, Array]
-    units: dict[str, str]
-    attempts: NDArray[np.int64]
-    reached: Array
-    failed: dict[int, str]
-    status: Status
-
-    def shown(self) -> Shown:
-        """Members, failures, and where signals end."""
-        from symfric.integrator.shown import shown  # noqa: PLC0415  (only who looks needs it)
-
-        return shown(self)
-
-    def thumbnail(self) -> "Figure | None":
-        """The first signal of members, small."""
-        from symfric.integrator.shown import picture  # noqa: PLC0415  (only who looks needs it)
-
-        return picture(self)
-
-    def __getitem__(self, name: str) -> Array:
-        checks.check_names(f"ensemble of '{self.scene}'", [name], self.signals)
-        return self.signals[name]
-
-    def plot(self, *names: str, path: str | Path | None = None) -> "Figure":
-        """Median and bands of 50 and 90 % of the members over time; histograms of ends alone.
-
-        Args:
-            names: signals to show; the first six if none is given.
-            path: image file, its format taken from the ending.
-        """
-        from symfric.results.bands import plot_many  # noqa: PLC0415  (matplotlib is slow to import)
-
-        return plot_many(self.scene, self.t, self.signals, self.units, names, path)
 
 
 def simulate_many(
@@ -205,7 +148,8 @@ def simulate_many(
     if out is not None:
         place = checks.path("simulate_many: out", out)
         folder = place / _identity(way.job, integrator, allowed, given, picks)
-    store = Store(folder, model.signals, members, max(1, looks.size))
+    times_each, states = max(1, looks.size), [v.name for v in model.x]
+    store = Store(folder, model.signals, members, times_each, len(states))
     todo = {first: picks[first] for first in store.left(picks)}
     done, status = members - sum(_size(pick) for pick in todo.values()), Status.SUCCESS
     if way.device is not None and progress is not None:
@@ -231,7 +175,19 @@ def simulate_many(
         store.reached,
         dict(sorted(store.failed.items())),
         status,
+        given.varied,
+        given.fixed,
+        {n: unit for n, unit in _units(model).items() if n in (given.varied | given.fixed)},
+        {name: store.reach[:, :, k].T for k, name in enumerate(states)},
     )
+
+
+def _units(model: Model) -> dict[str, str]:
+    """Units of what may be given."""
+    found = {v.name: v.unit for v in model.p} | {"t_end": "s"}
+    for what, group in (("x0", model.x), ("u", model.u)):
+        found |= {f"{what}.{v.name}": v.unit for v in group}
+    return found
 
 
 def _size(pick: slice) -> int:
@@ -384,7 +340,7 @@ def _identity(
     picks: dict[int, slice],
 ) -> str:
     """Hash of everything that the results depend on, and of how they are cut in chunks."""
-    parts: list[Any] = [job.digest(), tolerances.rtol, tolerances.atol, list(picks)]
+    parts: list[Any] = [RESULTS, job.digest(), tolerances.rtol, tolerances.atol, list(picks)]
     parts.append(tolerances.max_step)
     for event in integrator.model.events:
         parts += [event.name, event.direction, event.terminal, tolerances.event, list(event.reset)]

@@ -21,7 +21,7 @@ def columns(run: "Trajectory", names: Sequence[str]) -> dict[str, Array]:
 
 def dataframe(run: "Trajectory", names: Sequence[str]) -> Any:
     """A `pandas.DataFrame` with the times as index; units stand in its `attrs`."""
-    pandas = _module("to_dataframe", "pandas")
+    pandas = module("to_dataframe", "pandas")
     values = columns(run, names)
     frame = pandas.DataFrame(values, index=pandas.Index(run.t, name="t"))
     frame.attrs.update(_about(run) | {"units": {"t": "s"} | {n: run.unit(n) for n in values}})
@@ -30,7 +30,7 @@ def dataframe(run: "Trajectory", names: Sequence[str]) -> Any:
 
 def dataset(run: "Trajectory", names: Sequence[str]) -> Any:
     """An `xarray.Dataset` over the coordinate t; every signal has its unit as an attribute."""
-    xarray = _module("to_xarray", "xarray")
+    xarray = module("to_xarray", "xarray")
     values = columns(run, names)
     arrays = {n: ("t", v, {"units": run.unit(n)}) for n, v in values.items()}
     return xarray.Dataset(arrays, coords={"t": ("t", run.t, {"units": "s"})}, attrs=_about(run))
@@ -40,7 +40,12 @@ def _about(run: "Trajectory") -> dict[str, str]:
     return {"scene": run.scene, "status": run.status.name, "message": run.message}
 
 
-def _module(where: str, name: str) -> Any:
+def module(where: str, name: str) -> Any:
+    """A package that may be missing.
+
+    Raises:
+        ImportError: it is, and what to do.
+    """
     try:
         return import_module(name)
     except ImportError:

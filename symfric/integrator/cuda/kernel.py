@@ -68,7 +68,7 @@ class Kernel:
         real: floating point type of all but times.
         rows: of S.
         given: rows of R.
-        states: whose largest magnitudes are kept.
+        states: whose least and greatest values are kept.
         signals: of a result.
         operations: of an attempt.
     """

@@ -35,7 +35,7 @@ typedef struct {
     real *out;             /* signals, of member m from m * n_times * SIGNALS on */
     int *reason;
     long long *made;
-    real *largest;         /* magnitudes of the states at the ends of steps, of the start given */
+    real *reach;           /* least and greatest states at the ends of steps, of the start given */
     int *interval, *next;  /* where each member is: input interval, next result */
     const int *todo;       /* members that are to go on */
     long long n_todo, budget;
@@ -43,7 +43,7 @@ typedef struct {
 } Many;
 
 typedef struct {
-    real S[S_ROWS], R[SIZE_R], after[S_ROWS], D[ROWS * N + 1], largest[NX + 1];
+    real S[S_ROWS], R[SIZE_R], after[S_ROWS], D[ROWS * N + 1], least[NX + 1], most[NX + 1];
     double t, t_after, end; /* time, that behind the attempt, end of the input interval */
     double h_min, due;      /* smallest step; time of the next result */
     long long left;         /* attempts that are allowed still */
@@ -157,7 +157,10 @@ static BESIDE void leave(const Many *all, Thread *x, int reason)
 {
     const int m = x->member;
     for (int i = 0; i < S_ROWS; ++i) all->S[i * all->members + m] = x->S[i];
-    for (int i = 0; i < NX; ++i) all->largest[i * all->members + m] = x->largest[i];
+    for (int i = 0; i < NX; ++i) {
+        all->reach[i * all->members + m] = x->least[i];
+        all->reach[(NX + i) * all->members + m] = x->most[i];
+    }
     all->t[m] = x->t;
     all->interval[m] = x->interval;
     all->next[m] = x->next;
@@ -177,7 +180,10 @@ static BESIDE void fill(const Many *all, Thread *x)
     const int m = x->member = all->todo[k];
     for (int i = 0; i < S_ROWS; ++i) x->S[i] = all->S[i * all->members + m];
     for (int i = 0; i < SIZE_R; ++i) x->R[i] = all->R[i * all->members + m];
-    for (int i = 0; i < NX; ++i) x->largest[i] = all->largest[i * all->members + m];
+    for (int i = 0; i < NX; ++i) {
+        x->least[i] = all->reach[i * all->members + m];
+        x->most[i] = all->reach[(NX + i) * all->members + m];
+    }
     x->t = all->t[m];
     x->h_min = all->h_min[m];
     x->left = all->max_attempts - all->made[m];
@@ -232,8 +238,9 @@ static DEVICE void take(const Many *all, Thread *x)
 #endif
     if (x->t_after > x->t) {
         for (int i = 0; i < NX; ++i) {
-            const real size = x->after[MEMORY + i] < 0 ? -x->after[MEMORY + i] : x->after[MEMORY + i];
-            if (size > x->largest[i]) x->largest[i] = size;
+            const real now = x->after[MEMORY + i];
+            if (now < x->least[i]) x->least[i] = now;
+            if (now > x->most[i]) x->most[i] = now;
         }
         if (x->due <= x->t_after) {
             while (has_due(all, x, x->t_after))

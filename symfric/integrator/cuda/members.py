@@ -39,7 +39,7 @@ class Many(ctypes.Structure):
         ("ends", _POINTER), ("h_min", _POINTER),
         ("times", _POINTER), ("n_times", _COUNT), ("times_step", _COUNT), ("max_attempts", _COUNT),
         ("follow", _COUNT),
-        ("out", _POINTER), ("reason", _POINTER), ("made", _POINTER), ("largest", _POINTER),
+        ("out", _POINTER), ("reason", _POINTER), ("made", _POINTER), ("reach", _POINTER),
         ("interval", _POINTER), ("next", _POINTER),
         ("todo", _POINTER), ("n_todo", _COUNT), ("budget", _COUNT), ("ticket", _POINTER),
     )  # fmt: skip
@@ -84,21 +84,21 @@ class DeviceMembers:
         count = S.shape[0]
         shape = (count, stretch.times.shape[1], self.kernel.signals)
         found, reason = np.empty(shape), np.empty(count, dtype=np.int64)
-        largest = np.abs(S[:, State.Y])
+        reach = np.stack([S[:, State.Y]] * 2, axis=1)
         first, most = 0, self._most(stretch)
         while first < count:
             pick = slice(first, min(first + most, count))
             try:
-                part = _Part.of(self, pick, (S, R, made, largest), stretch)
+                part = _Part.of(self, pick, (S, R, made, reach), stretch)
             except MemoryError:
                 if most == 1:
                     raise
                 most = (most + 1) // 2  # somebody else took some meanwhile
                 continue
             part.whole()
-            found[pick], reason[pick] = part.results(S[pick], made[pick], largest[pick])
+            found[pick], reason[pick] = part.results(S[pick], made[pick], reach[pick])
             first = pick.stop
-        return found, reason, largest
+        return found, reason, reach
 
     def _most(self, stretch: Stretch) -> int:
         """Members that the memory takes."""
@@ -113,7 +113,7 @@ class DeviceMembers:
 
 def member_bytes(kernel: Kernel, stretch: Stretch) -> int:
     """Memory of a member on a device."""
-    numbers = kernel.rows + kernel.given + kernel.states
+    numbers = kernel.rows + kernel.given + 2 * kernel.states
     numbers += stretch.times.shape[1] * kernel.signals
     numbers += stretch.data[0].size if stretch.data.shape[0] > 1 else 0
     doubles = 3 + (stretch.times.shape[1] if stretch.times.shape[0] > 1 else 0)
@@ -148,7 +148,7 @@ class _Part:
         """Put members there; raises MemoryError."""
         device, kernel = members.device, members.kernel
         real: DTypeLike = np.float32 if kernel.real.size < 8 else np.float64
-        S, R, made, largest = (column[pick] for column in columns)
+        S, R, made, reach = (column[pick] for column in columns)
         data = stretch.data[pick] if stretch.data.shape[0] > 1 else stretch.data
         times = stretch.times[pick] if stretch.times.shape[0] > 1 else stretch.times
         count = S.shape[0]
@@ -157,7 +157,7 @@ class _Part:
             "breaks": (stretch.breaks, float), "data": (data, real),
             "ends": (stretch.ends[pick], float), "h_min": (stretch.h_min[pick], float),
             "times": (times, float), "made": (made, np.int64),
-            "largest": (largest[:, : kernel.states].T, real),
+            "reach": (reach[:, :, : kernel.states].transpose(1, 2, 0), real),
         }  # fmt: skip
         held: dict[str, Held] = {
             name: device.put(np.ascontiguousarray(array, dtype=kind))
@@ -200,11 +200,11 @@ class _Part:
             if all_.tell is not None:
                 all_.tell(self.count - todo.size)
 
-    def results(self, S: Array, made: Counts, largest: Array) -> tuple[Array, Counts]:
-        """Signals and reasons; S, made and largest are written over."""
+    def results(self, S: Array, made: Counts, reach: Array) -> tuple[Array, Counts]:
+        """Signals and reasons; S, made and reach are written over."""
         S[:] = self.held["S"].get().T
         S[:, State.T] = self.held["t"].get()
         made[:] = self.held["made"].get()
-        kept = self.held["largest"].get().T
-        largest[:, : kept.shape[1]] = kept
+        kept = self.held["reach"].get().transpose(2, 0, 1)
+        reach[:, :, : kept.shape[2]] = kept
         return self.held["out"].get(), self.held["reason"].get().astype(np.int64)

@@ -56,12 +56,20 @@ class Solved:
         attempts: shape (members,).
         reached: time [s] that each member reached.
         failed: number in the chunk -> sentence.
+        reach: least and greatest states over the start and all accepted steps, shape
+            (members, 2, nx); NaN of a member that did not start.
     """
 
     signals: Array
     attempts: NDArray[np.int64]
     reached: Array
     failed: dict[int, str]
+    reach: Array
+
+    @property
+    def size(self) -> Array:
+        """Largest magnitudes of the states, shape (members, nx); 0 without a start."""
+        return np.nan_to_num(np.abs(self.reach).max(axis=1))
 
 
 @final
@@ -123,7 +131,8 @@ def solve_chunk(job: Job, chunk: Chunk, runner: Members | None = None) -> Solved
     What runs them is `runner`, else the program of the job.
     """
     runner = runner or job.program.load()
-    found, size = _solved(job, chunk, runner)
+    found = _solved(job, chunk, runner)
+    size = found.size
     scale, last = np.tile(job.program.nominal, (size.shape[0], 1)), np.arange(size.shape[0])
     for _ in range(ROUNDS):
         own = np.minimum(scale[last], own_scale(size, job.program.nominal))
@@ -135,16 +144,16 @@ def solve_chunk(job: Job, chunk: Chunk, runner: Members | None = None) -> Solved
         scale[last] = own[small]
         those, atol = chunk[last], Given.atol(job.program.nx)
         those.R[:, atol] *= scale[last] / job.program.nominal
-        again, size = _solved(job, those, runner)
+        again = _solved(job, those, runner)
         better = np.array([m not in again.failed for m in range(last.size)])
-        last, size = last[better], size[better]
+        last, size = last[better], again.size[better]
         found.signals[last], found.attempts[last] = again.signals[better], again.attempts[better]
-        found.reached[last] = again.reached[better]
+        found.reached[last], found.reach[last] = again.reached[better], again.reach[better]
     return found
 
 
-def _solved(job: Job, chunk: Chunk, runner: Members) -> tuple[Solved, Array]:
-    """The members of a chunk, and the largest magnitudes of their states (members, nx).
+def _solved(job: Job, chunk: Chunk, runner: Members) -> Solved:
+    """The members of a chunk.
 
     They run through all their input intervals; where algebraic unknowns have to be searched for at
     the beginning of one, they stop, and go on from there. Those of a mechanism that is put together
@@ -152,7 +161,7 @@ def _solved(job: Job, chunk: Chunk, runner: Members) -> tuple[Solved, Array]:
     """
     S, count = chunk.S.copy(), chunk.S.shape[0]
     signals = np.full((count, max(1, job.times.size), job.program.n_signals), np.nan)
-    attempts, size = np.zeros(count, dtype=np.int64), np.zeros((count, job.program.nx))
+    attempts, reach = np.zeros(count, dtype=np.int64), np.full((count, 2, job.program.nx), np.nan)
     failed: dict[int, str] = {}
     waiting, together = {BEFORE: np.arange(count)}, job.program.assembly()
     while waiting:
@@ -168,8 +177,9 @@ def _solved(job: Job, chunk: Chunk, runner: Members) -> tuple[Solved, Array]:
             here = _consistent(job, chunk, S, here, first, failed)
         stretch, inside = job.stretch(chunk[here], first, follow)
         part, made = S[here], attempts[here]
-        found, reason, largest = runner.run(part, chunk.R[here], made, stretch)
-        size[here] = np.maximum(size[here], largest[:, : job.program.nx])
+        found, reason, unknowns = runner.run(part, chunk.R[here], made, stretch)
+        for k, widest in enumerate((np.fmin, np.fmax)):
+            reach[here, k] = widest(reach[here, k], unknowns[:, k, : job.program.nx])
         S[here], attempts[here], t = part, made, part[:, State.T]
         signals[np.ix_(here, inside)] = found
         for k in np.flatnonzero(np.isin(reason, list(WHY))).tolist():
@@ -179,7 +189,7 @@ def _solved(job: Job, chunk: Chunk, runner: Members) -> tuple[Solved, Array]:
         interval = np.searchsorted(job.breaks, t[stuck])
         for k in np.unique(interval).tolist():
             waiting[k] = np.concatenate([waiting.get(k, here[:0]), here[stuck][interval == k]])
-    return Solved(signals, attempts, S[:, State.T].copy(), failed), size
+    return Solved(signals, attempts, S[:, State.T].copy(), failed, reach)
 
 
 def _consistent(

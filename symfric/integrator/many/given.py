@@ -33,6 +33,9 @@ class Members:
         own: input -> signals of the members, shape (count, n).
         sampled: ends of the intervals between samples [s].
         ends: end of each member [s], shape (count,).
+        varied: what members were given arrays of, by name: a parameter, "x0.v", "u.force", "t_end";
+            shape (count,). Samples of an input are not among them.
+        fixed: numbers that all were given, likewise.
     """
 
     model: Model
@@ -43,6 +46,8 @@ class Members:
     own: dict[str, Sampled]
     sampled: Array
     ends: Array
+    varied: Values
+    fixed: dict[str, float]
 
     def starts(self, system: System, pick: slice) -> tuple[Array, Array]:
         """Start values of the unknowns (members, n), algebraic ones guessed, and parameters."""
@@ -102,6 +107,7 @@ def members_of(
         lengths[f"u.{name}"] = np.shape(signal.values if isinstance(value, Sampled) else value)
     lengths |= {"t_end": ends.shape} if ends.ndim else {}
     count = _count(lengths)
+    numbers = _numbers(given, u or {}) | ({"t_end": ends.astype(float)} if ends.ndim else {})
     for v in model.p:
         for end in (np.min, np.max) if f"p.{v.name}" in given else ():
             v.within(f"{WHERE}: p.{v.name}", float(end(given[f"p.{v.name}"])))
@@ -118,7 +124,21 @@ def members_of(
         own,
         _between(times, t_start, last),
         np.broadcast_to(ends, (count,)).astype(float),
+        {name: np.array(values) for name, values in numbers.items() if values.ndim},
+        {name: float(value) for name, value in numbers.items() if not value.ndim},
     )
+
+
+def _numbers(given: Mapping[str, Array], u: Mapping[str, Any]) -> Values:
+    """All numbers that were given: parameters by name, then "x0.v" and "u.force"."""
+    plain = {n: np.asarray(v, float) for n, v in u.items() if not callable(v) and _is_plain(v)}
+    found = {n.removeprefix("p."): v for n, v in given.items() if n.startswith("p.")}
+    found |= {name: value for name, value in given.items() if name.startswith("x0.")}
+    return found | {f"u.{name}": value for name, value in plain.items()}
+
+
+def _is_plain(value: Any) -> bool:
+    return not isinstance(value, Sampled) and np.ndim(value) < 2
 
 
 def _count(lengths: Mapping[str, tuple[int, ...]]) -> int:

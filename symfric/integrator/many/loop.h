@@ -25,7 +25,7 @@ typedef struct {
   long long follow;      /* whether algebraic unknowns follow the data at the start, too */
   double *out;           /* signals, NaN from where a member stopped */
   long long *reason, *made;
-  double *largest;       /* magnitudes of the unknowns at the ends of steps, of the start given */
+  double *reach;         /* least and greatest unknowns at the ends of steps, of the start given */
 } Many;
 
 /* What all lanes share: the next member, how many lanes run one, and results that wait: they are
@@ -40,7 +40,7 @@ typedef struct {
 /* A group of lanes: each runs a member, or none (-1) and whatever another lane does. */
 typedef struct {
   Common *common;
-  V S[S_ROWS], R[SIZE_R], after[S_ROWS], D[ROWS * N + 1], largest[N];
+  V S[S_ROWS], R[SIZE_R], after[S_ROWS], D[ROWS * N + 1], least[N], most[N];
   V h_min, due;          /* smallest step; time of the next result */
   I left;                /* attempts that are allowed still */
   long long member[LANES], interval[LANES], next[LANES];
@@ -134,7 +134,10 @@ static void finish(const Many *all, Lanes *x, int l, int reason)
   const long long m = x->member[l];
   double *out = all->out + m * all->n_times * SIGNALS;
   for (int i = 0; i < S_ROWS; ++i) all->S[m * S_ROWS + i] = x->S[i][l];
-  for (int i = 0; i < N; ++i) all->largest[m * N + i] = x->largest[i][l];
+  for (int i = 0; i < N; ++i) {
+    all->reach[2 * m * N + i] = x->least[i][l];
+    all->reach[(2 * m + 1) * N + i] = x->most[i][l];
+  }
   for (long long k = x->next[l] * SIGNALS; k < all->n_times * SIGNALS; ++k) out[k] = NAN;
   all->reason[m] = reason;
   all->made[m] = all->max_attempts - x->left[l];
@@ -150,7 +153,10 @@ static void fill(const Many *all, Lanes *x, int l)
     const long long m = x->member[l] = x->common->waiting++;
     for (int i = 0; i < S_ROWS; ++i) x->S[i][l] = all->S[m * S_ROWS + i];
     for (int i = 0; i < SIZE_R; ++i) x->R[i][l] = all->R[m * SIZE_R + i];
-    for (int i = 0; i < N; ++i) x->largest[i][l] = all->largest[m * N + i];
+    for (int i = 0; i < N; ++i) {
+      x->least[i][l] = all->reach[2 * m * N + i];
+      x->most[i][l] = all->reach[(2 * m + 1) * N + i];
+    }
     x->h_min[l] = all->h_min[m];
     x->left[l] = all->max_attempts - all->made[m];
     x->interval[l] = x->next[l] = 0;
@@ -204,8 +210,11 @@ static void take(const Many *all, Lanes *x)
 {
   x->left -= 1;
   const I moved = (I)(x->after[T] > x->S[T]);
-  for (int i = 0; i < N; ++i)
-    x->largest[i] = pick(moved, v_fmax(x->largest[i], v_fabs(x->after[MEMORY + i])), x->largest[i]);
+  for (int i = 0; i < N; ++i) {
+    const V y = x->after[MEMORY + i];
+    x->least[i] = pick(moved, v_fmin(x->least[i], y), x->least[i]);
+    x->most[i] = pick(moved, v_fmax(x->most[i], y), x->most[i]);
+  }
   for (unsigned due = which(moved & (I)(x->due <= x->after[T])), l = 0; due; due >>= 1, ++l)
     if (due & 1) {
       const double t0 = x->S[T][l], t1 = x->after[T][l];

@@ -70,7 +70,7 @@ class Members(Protocol):
 
         Returns:
             Signals (members, times, signals), NaN from where a member stopped; why (members,);
-            largest magnitudes of the unknowns at the ends of steps (members, n).
+            least and greatest unknowns at the start and the ends of steps (members, 2, n).
         """
         ...
 
@@ -98,12 +98,13 @@ class VmMembers:
         """Advance members over a stretch."""
         shape = (S.shape[0], stretch.times.shape[1], self.signals.function.numel_out(0))
         found = np.full(shape, np.nan)
-        reason, largest = np.zeros(S.shape[0], dtype=np.int64), np.abs(S[:, State.Y])
+        reason = np.zeros(S.shape[0], dtype=np.int64)
+        reach = np.stack([S[:, State.Y]] * 2, axis=1)
         for m in range(S.shape[0]):
             one = _Member(self, stretch, m, S[m], R[m].copy(), int(made[m]))
-            reason[m] = one.whole(found[m], largest[m])
+            reason[m] = one.whole(found[m], reach[m])
             made[m] = one.made
-        return found, reason, largest
+        return found, reason, reach
 
 
 @final
@@ -118,8 +119,8 @@ class _Member:
         self.data = stretch.data[m if stretch.data.shape[0] > 1 else 0]
         self.times = stretch.times[m if stretch.times.shape[0] > 1 else 0]
 
-    def whole(self, found: Array, largest: Array) -> Stop:
-        """Advance over all intervals; fills the signals and the largest magnitudes."""
+    def whole(self, found: Array, reach: Array) -> Stop:
+        """Advance over all intervals; fills the signals, least and greatest unknowns."""
         n_data, breaks, signals = self.data.shape[0], self.stretch.breaks, self.members.signals
         S, R, stop = self.S, self.R, Stop.END
         for k in range(breaks.size - 1):
@@ -131,7 +132,8 @@ class _Member:
             from_t, y0 = S[State.T], S[State.Y].copy()
             records, stop = self.attempts()
             ends = from_records(records, y0.size).y1
-            largest[:] = np.maximum(largest, np.abs(ends).max(axis=0, initial=0.0))
+            reach[0] = np.minimum(reach[0], ends.min(axis=0, initial=np.inf))
+            reach[1] = np.maximum(reach[1], ends.max(axis=0, initial=-np.inf))
             inside = (self.times >= breaks[k]) & (self.times <= S[State.T])
             if not last:
                 inside &= self.times < breaks[k + 1]
@@ -183,7 +185,7 @@ class _Many(ctypes.Structure):
         ("ends", _POINTER), ("h_min", _POINTER),
         ("times", _POINTER), ("n_times", _COUNT), ("times_step", _COUNT), ("max_attempts", _COUNT),
         ("follow", _COUNT),
-        ("out", _POINTER), ("reason", _POINTER), ("made", _POINTER), ("largest", _POINTER),
+        ("out", _POINTER), ("reason", _POINTER), ("made", _POINTER), ("reach", _POINTER),
     )  # fmt: skip
 
 
@@ -216,13 +218,13 @@ class CompiledMembers:
         members, times, data = S.shape[0], stretch.times, stretch.data
         found = np.empty((members, times.shape[1], self.signals))
         starts, reason = np.ascontiguousarray(S), np.zeros(members, dtype=np.int64)
-        largest = np.ascontiguousarray(np.abs(S[:, State.Y]))
+        reach = np.stack([S[:, State.Y]] * 2, axis=1)
         given = {
             "R": R, "breaks": stretch.breaks, "data": data, "ends": stretch.ends,
             "h_min": stretch.h_min, "times": times,
         }  # fmt: skip
         arrays: dict[str, NDArray[Any]] = {k: np.ascontiguousarray(a) for k, a in given.items()}
-        arrays |= {"S": starts, "out": found, "reason": reason, "made": made, "largest": largest}
+        arrays |= {"S": starts, "out": found, "reason": reason, "made": made, "reach": reach}
         every = _Many(
             **{name: array.ctypes.data for name, array in arrays.items()},
             members=members, intervals=data.shape[2], n_data=data.shape[1],
@@ -233,7 +235,7 @@ class CompiledMembers:
         if not self.library.symfric_many(ctypes.byref(every)):
             raise MemoryError
         S[:] = starts
-        return found, reason, largest
+        return found, reason, reach
 
 
 def many_source(

@@ -36,7 +36,7 @@ def solve_one_by_one(
     count, names = y0.shape[0], integrator.signals.numel_out(0)
     signals = np.full((count, max(1, times.size), names), np.nan)
     attempts, reached = np.zeros(count, dtype=np.int64), np.zeros(count)
-    failed = dict[int, str]()
+    failed, reach = dict[int, str](), np.full((count, 2, len(integrator.model.x)), np.nan)
     for m in range(count):
         own = input_of(inputs, data[m if data.shape[0] > 1 else 0], ends[m])
         looks = times[times <= ends[m]] if times.size else ends[m : m + 1]
@@ -50,8 +50,9 @@ def solve_one_by_one(
         if not run.status.ok:
             failed[m] = run.message
         attempts[m], reached[m] = run.attempts, run.reached
+        reach[m] = run.reach[:, : reach.shape[2]]
         y = run.outputs.reached
         at = looks[: y.shape[1]]
         d = np.hstack([np.tile(p[m], (at.size, 1)), own.values[:, own.interval(at)].T])
         (signals[m, : at.size],) = integrator.signal_columns([at, y.T, d])
-    return Solved(signals, attempts, reached, failed)
+    return Solved(signals, attempts, reached, failed, reach)

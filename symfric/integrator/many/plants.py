@@ -76,9 +76,9 @@ long long symfric_plants(const symfric_members *m, int begin)
   if (begin)
     for (b = 0; b < members * HELD; ++b)
       if (!(m->u[b] - m->u[b] == 0)) return REFUSED;
-  double *room = calloc(members, (3 + N) * sizeof(double));
+  double *room = calloc(members, (3 + 2 * N) * sizeof(double));
   if (!room) return -2;
-  double *ends = room, *h_min = room + members, *largest = room + 3 * members;
+  double *ends = room, *h_min = room + members, *reach = room + 3 * members;
   long long *reason = (long long *)(room + 2 * members);
   for (b = 0; b < members; ++b) {
     const double *now = m->S + b * S_ROWS + T;
@@ -88,7 +88,7 @@ long long symfric_plants(const symfric_members *m, int begin)
   }
   const Many all = {
     .S = m->S, .R = m->R, .members = members, .intervals = 1, .ends = ends, .h_min = h_min,
-    .max_attempts = m->attempts, .reason = reason, .made = m->made, .largest = largest,
+    .max_attempts = m->attempts, .reason = reason, .made = m->made, .reach = reach,
   };
   const int ran = symfric_many(&all);
   for (b = 0; b < members; ++b) {

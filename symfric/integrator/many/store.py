@@ -37,6 +37,7 @@ class Store:
     Attributes:
         signals: name -> values (members, times).
         attempts, reached: attempts of each member, and the time [s] it reached.
+        reach: least and greatest value of each state over the steps, shape (members, 2, nx).
         failed: number of a member -> sentence.
         damaged: first members of chunks whose results are no longer what they were.
 
@@ -44,7 +45,9 @@ class Store:
         ValueError: the folder cannot be written, or has no room for all results.
     """
 
-    def __init__(self, folder: Path | None, names: Iterable[str], members: int, times: int) -> None:
+    def __init__(
+        self, folder: Path | None, names: Iterable[str], members: int, times: int, states: int
+    ) -> None:
         self._folder, shape = folder, (members, times)
         self._files: list[_ArrayFile] = []
         if folder is None:
@@ -57,6 +60,7 @@ class Store:
             self.signals = {name: file.array for name, file in files.items()}
         self.attempts = np.zeros(members, dtype=np.int64)
         self.reached = np.full(members, np.nan)
+        self.reach = np.full((members, 2, states), np.nan)
         self.failed: dict[int, str] = {}
         self.damaged: list[int] = []
 
@@ -87,10 +91,10 @@ class Store:
             return False
         try:
             with mark.open("rb") as file, np.load(file) as saved:
-                attempts, reached = saved["attempts"], saved["reached"]
+                attempts, reached, reach = (saved[n] for n in ("attempts", "reached", "reach"))
                 failed = dict(zip(saved["failed"].tolist(), saved["why"].tolist(), strict=True))
                 if str(saved["checksum"]) == self._checksum(first, attempts.size):
-                    self._note(first, attempts, reached, failed)
+                    self._note(first, attempts, reached, reach, failed)
                     return True
         except (OSError, ValueError, KeyError, EOFError, BadZipFile):
             pass  # the mark itself is damaged
@@ -104,7 +108,7 @@ class Store:
             ValueError: they cannot be written; what is complete stays.
         """
         size, mark = result.attempts.size, self._mark(first)
-        self._note(first, result.attempts, result.reached, result.failed)
+        self._note(first, result.attempts, result.reached, result.reach, result.failed)
         if mark is None:
             for i, values in enumerate(self.signals.values()):
                 values[first : first + size] = result.signals[:, :, i]
@@ -117,6 +121,7 @@ class Store:
                     marker,
                     attempts=result.attempts,
                     reached=result.reached,
+                    reach=result.reach,
                     failed=np.array(list(result.failed), dtype=np.int64),
                     why=np.array(list(result.failed.values()), dtype=np.str_),
                     checksum=np.array(self._checksum(first, size)),
@@ -136,10 +141,12 @@ class Store:
         return total.hexdigest()
 
     def _note(
-        self, first: int, attempts: NDArray[np.int64], reached: Array, failed: dict[int, str]
-    ) -> None:
+        self, first: int, attempts: NDArray[np.int64], reached: Array, reach: Array,
+        failed: dict[int, str],
+    ) -> None:  # fmt: skip
         self.attempts[first : first + attempts.size] = attempts
         self.reached[first : first + attempts.size] = reached
+        self.reach[first : first + attempts.size] = reach
         self.failed |= {first + m: why for m, why in failed.items()}
 
 

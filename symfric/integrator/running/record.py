@@ -23,11 +23,11 @@ and who asks for what lies between lets it run again, to the bit."""
 @final
 @dataclass(frozen=True, eq=False)
 class Extent:
-    """Shortest and longest accepted step [s], largest magnitudes of the unknowns (n,)."""
+    """Shortest and longest accepted step [s], least and greatest unknowns (2, n)."""
 
     shortest: float
     longest: float
-    largest: Array
+    reach: Array
 
 
 @final
@@ -144,20 +144,27 @@ class Run:
         if self._before is not None:
             shortest.append(self._before.shortest)
             longest.append(self._before.longest)
-        return Extent(min(shortest), max(longest), self.largest)
+        return Extent(min(shortest), max(longest), self.reach)
+
+    @property
+    def reach(self) -> Array:
+        """Least and greatest unknowns at the start and at the ends of steps, shape (2, n)."""
+        found = self._pieces()
+        first = found[0].y0[:1] if self._before is None else self._before.reach
+        ends = [first, *(p.y1 for p in found)]
+        least, most = ([f(y, axis=0) for y in ends] for f in (np.min, np.max))
+        return np.array([np.min(least, axis=0), np.max(most, axis=0)])
 
     @property
     def largest(self) -> Array:
         """Largest magnitudes of the unknowns at the start and at the ends of steps, shape (n,)."""
-        found = self._pieces()
-        first = np.abs(found[0].y0[0]) if self._before is None else self._before.largest
-        return np.max([first, *(np.abs(p.y1).max(axis=0) for p in found)], axis=0)
+        return np.abs(self.reach).max(axis=0)
 
     def reaches(self, unknown: int, size: float) -> bool:
         """Whether an unknown is that large at the start or at the end of a step."""
         found = self._pieces()
-        first = np.abs(found[0].y0[0]) if self._before is None else self._before.largest
-        return bool(first[unknown] >= size) or any(
+        first = found[0].y0[0] if self._before is None else self._before.reach
+        return bool(np.abs(first[..., unknown]).max() >= size) or any(
             np.abs(p.y1[:, unknown]).max() >= size for p in found
         )
 

@@ -74,9 +74,10 @@ def test_attempts_made_before_count(make: Make) -> None:
     members = make(Integrator(model, inputs, RODAS5P))
     S, R, made = columns(inputs, model, [[1.0, 0.0], [1.0, 0.0]])
     made[1] = 64
-    found, reason, largest = members.run(S, R, made, stretch(inputs, [0.0, 100.0], 2, max_steps=96))
-    assert largest[:, 0].tolist() == [1.0, 1.0]  # it swings about zero from there
-    assert (largest[:, 1] > 1).all()
+    found, reason, reach = members.run(S, R, made, stretch(inputs, [0.0, 100.0], 2, max_steps=96))
+    assert reach[:, 1, 0].tolist() == [1.0, 1.0]  # it swings about zero from there
+    assert (reach[:, 0, 0] < 0).all()
+    assert (np.abs(reach[:, :, 1]).max(axis=1) > 1).all()
     assert reason.tolist() == [Stop.ATTEMPTS] * 2
     assert made.tolist() == [96, 96]
     assert S[1, 0] < S[0, 0] < 100.0

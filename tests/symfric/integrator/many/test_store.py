@@ -33,12 +33,13 @@ def solved(first: int, size: int = 2) -> Solved:
     members = np.arange(first, first + size, dtype=float)
     signals = np.stack([members, 100 + members], axis=1)[:, None, :].repeat(3, axis=1)
     attempts = members.astype(np.int64) + 1
-    return Solved(signals, attempts, members / 10, {1: f"member {first + 1} failed at 2³ °C"})
+    return Solved(signals, attempts, members / 10, {1: f"member {first + 1} failed at 2³ °C"},
+                  np.stack([-members, members], axis=1)[:, :, None])  # fmt: skip
 
 
 @pytest.mark.parametrize("folder", [False, True])
 def test_chunks_go_where_their_members_are(folder: bool, tmp_path: Path) -> None:
-    store = Store(tmp_path if folder else None, ["a", "b"], 5, 3)
+    store = Store(tmp_path if folder else None, ["a", "b"], 5, 3, 1)
     store.put(2, solved(2))
     np.testing.assert_array_equal(store.signals["a"][2:4], [[2.0] * 3, [3.0] * 3])
     np.testing.assert_array_equal(store.signals["b"][3], [103.0] * 3)
@@ -50,12 +51,13 @@ def test_chunks_go_where_their_members_are(folder: bool, tmp_path: Path) -> None
 
 
 def test_folder_tells_a_later_store_what_is_complete(tmp_path: Path) -> None:
-    Store(tmp_path, ["a", "b"], 4, 3).put(2, solved(2))
-    later = Store(tmp_path, ["a", "b"], 4, 3)
+    Store(tmp_path, ["a", "b"], 4, 3, 1).put(2, solved(2))
+    later = Store(tmp_path, ["a", "b"], 4, 3, 1)
     assert (later.has(0), later.has(2)) == (False, True)
     np.testing.assert_array_equal(later.signals["b"][2], [102.0] * 3)
     assert later.attempts.tolist() == [0, 0, 3, 4]
     assert later.reached[2:].tolist() == [0.2, 0.3]
+    assert later.reach[2:, :, 0].tolist() == [[-2.0, 2.0], [-3.0, 3.0]]
     assert later.failed == {3: "member 3 failed at 2³ °C"}
 
 
@@ -65,11 +67,11 @@ def test_two_calls_at_once_share_a_folder(tmp_path: Path, monkeypatch: pytest.Mo
 
     def meanwhile(file: Any, content: dict[str, Any]) -> None:
         monkeypatch.undo()
-        others.append(Store(tmp_path, ["a", "b"], 4, 3))
+        others.append(Store(tmp_path, ["a", "b"], 4, 3, 1))
         header(file, content)
 
     monkeypatch.setattr(np.lib.format, "write_array_header_1_0", meanwhile)
-    store = Store(tmp_path, ["a", "b"], 4, 3)
+    store = Store(tmp_path, ["a", "b"], 4, 3, 1)
     store.put(0, solved(0))
     assert others[0].has(0)
     np.testing.assert_array_equal(store.signals["a"], others[0].signals["a"])
@@ -77,21 +79,23 @@ def test_two_calls_at_once_share_a_folder(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_memory_remembers_nothing() -> None:
-    store = Store(None, ["a", "b"], 4, 3)
+    store = Store(None, ["a", "b"], 4, 3, 1)
     store.put(2, solved(2))
     assert not store.has(2)
 
 
 def test_signals_of_a_folder_are_mapped_not_loaded(tmp_path: Path) -> None:
-    store = Store(tmp_path, ["a"], 4, 3)
+    store = Store(tmp_path, ["a"], 4, 3, 1)
     assert isinstance(store.signals["a"], np.memmap)
     assert np.load(tmp_path / "a.npy").shape == (4, 3)
 
 
 def test_chunk_without_failures_is_complete_too(tmp_path: Path) -> None:
-    none = Solved(np.zeros((2, 3, 1)), np.ones(2, dtype=np.int64), np.ones(2), {})
-    Store(tmp_path, ["a"], 2, 3).put(0, none)
-    later = Store(tmp_path, ["a"], 2, 3)
+    none = Solved(
+        np.zeros((2, 3, 1)), np.ones(2, dtype=np.int64), np.ones(2), {}, np.zeros((2, 2, 1))
+    )
+    Store(tmp_path, ["a"], 2, 3, 1).put(0, none)
+    later = Store(tmp_path, ["a"], 2, 3, 1)
     assert later.has(0)
     assert later.failed == {}
 
@@ -226,7 +230,7 @@ def test_memory_stays_bounded_for_a_hundred_thousand_members(tmp_path: Path) -> 
 
 def finished(folder: Path) -> Path:
     """A store of three chunks, complete."""
-    store = Store(folder, ["a", "b"], 6, 3)
+    store = Store(folder, ["a", "b"], 6, 3, 1)
     for first in (0, 2, 4):
         store.put(first, solved(first))
     return folder
@@ -234,14 +238,14 @@ def finished(folder: Path) -> Path:
 
 def left(folder: Path) -> list[bool]:
     """Which chunks a later store takes over; the others are put again and must be right then."""
-    store = Store(folder, ["a", "b"], 6, 3)
+    store = Store(folder, ["a", "b"], 6, 3, 1)
     kept = [store.has(first) for first in (0, 2, 4)]
     assert store.damaged == [2 * k for k, whole in enumerate(kept) if not whole]
     for first in np.flatnonzero(~np.array(kept)) * 2:
         store.put(int(first), solved(int(first)))
     np.testing.assert_array_equal(store.signals["a"][:, 0], np.arange(6.0))
     np.testing.assert_array_equal(np.load(folder / "b.npy")[:, 2], 100 + np.arange(6.0))
-    assert all(Store(folder, ["a", "b"], 6, 3).has(first) for first in (0, 2, 4))
+    assert all(Store(folder, ["a", "b"], 6, 3, 1).has(first) for first in (0, 2, 4))
     return kept
 
 
@@ -295,7 +299,7 @@ def test_damage_is_told_and_the_results_are_right(tmp_path: Path) -> None:
 
 
 def test_results_on_disk_cannot_be_changed_by_accident(tmp_path: Path) -> None:
-    store = Store(finished(tmp_path), ["a", "b"], 6, 3)
+    store = Store(finished(tmp_path), ["a", "b"], 6, 3, 1)
     with pytest.raises(ValueError, match="read-only"):
         store.signals["a"] *= 2
 
@@ -308,8 +312,8 @@ def test_a_full_disk_is_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (2**20, before[1]))
         with pytest.raises(ValueError, match=r"out: expected 8 MB of room for '.*a.npy', got File"):
-            Store(tmp_path / "large", ["a"], 10_000, 100)
-        small = Store(tmp_path / "small", ["a", "b"], 6, 3)
+            Store(tmp_path / "large", ["a"], 10_000, 100, 1)
+        small = Store(tmp_path / "small", ["a", "b"], 6, 3, 1)
         small.put(0, solved(0))
         resource.setrlimit(resource.RLIMIT_FSIZE, (10, before[1]))
         with pytest.raises(
@@ -320,11 +324,11 @@ def test_a_full_disk_is_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
         signal.signal(signal.SIGXFSZ, handler)
     assert list((tmp_path / "large").iterdir()) == []
-    later = Store(tmp_path / "small", ["a", "b"], 6, 3)
+    later = Store(tmp_path / "small", ["a", "b"], 6, 3, 1)
     assert (later.has(0), later.has(2)) == (True, False)
 
 
 def test_room_is_taken_when_the_files_are_made(tmp_path: Path) -> None:
-    Store(tmp_path, ["a"], 3000, 100)
+    Store(tmp_path, ["a"], 3000, 100, 1)
     assert (tmp_path / "a.npy").stat().st_blocks * 512 >= 3000 * 100 * 8
     assert np.isnan(np.load(tmp_path / "a.npy")).all()

@@ -179,10 +179,10 @@ def run(
     R = Given.of(0.0, 1e-6, np.inf, 1e-7 * model.nominal("x"), d)
     attempts, h_min = np.zeros(starts.shape[0], dtype=np.int64), np.full(starts.shape[0], 1e-23)
     times = np.array([[0.0, 0.1, 0.35, 1.0, 3.0]])
-    found, reason, largest = members.run(
+    found, reason, reach = members.run(
         S, R, attempts, Stretch(inputs.breaks, inputs.values[None], ends, h_min, times, 3000)
     )
-    return found, reason, largest, S, attempts
+    return found, reason, reach, S, attempts
 
 
 def mixed(lanes: int = 0, pick: slice = slice(None)) -> list[tuple]:

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from symfric.foundation.shown import Shown, Table, among, counted
+from symfric.foundation.shown import Shown, Table, among, counted, valued
 from symfric.foundation.style import COLOURS
 
 if TYPE_CHECKING:
-    from symfric.integrator.ensemble import Ensemble
+    from symfric.results.ensemble import Ensemble
 
 MOST = 5_000_000
 """Numbers that are read without being asked for."""
@@ -22,14 +22,21 @@ def shown(runs: "Ensemble") -> Shown:
     members, times = runs.attempts.size, runs.t.shape[-1]
     first, last = np.min(runs.t), np.max(runs.t)
     span = f"{counted(times, 'time')} from {first:g} to {last:g} s" if times > 1 else f"{last:g} s"
-    lines = [f"{runs.status.name}: {counted(runs.attempts.sum(), 'attempt')} in all"]
+    done = int(np.isfinite(runs.reached).sum())
+    left = f", {members - done} members not started" if done < members else ""
+    lines = [f"{runs.status.name}: {counted(runs.attempts.sum(), 'attempt')} in all{left}"]
+    if runs.varied:
+        lines.append("varied: " + ", ".join(_range(runs, name) for name in runs.varied))
+    if runs.fixed:
+        known = ((n, v, runs.unit(n)) for n, v in runs.fixed.items())
+        lines.append(f"fixed: {valued(known)}")
     for number, why in list(runs.failed.items())[:3]:
         lines.append(f"member {number} failed: {why}")
     if len(runs.failed) > 3:
         lines.append(f"failed: {len(runs.failed)}, members {among(map(str, runs.failed))}")
     rows, read = list[tuple[str, ...]](), members * times <= MOST
-    for name, unit in runs.units.items():
-        rows.append((name, unit, *(_ends(runs, name) if read else ("", "", ""))))
+    for name in runs.signals:
+        rows.append((name, runs.units[name], *(_ends(runs, name) if read else ("", "", ""))))
     header = ("signal", "unit", "least", "median", "greatest")
     return Shown(
         f"ensemble of '{runs.scene}': {counted(members, 'member')} at {span}",
@@ -37,6 +44,12 @@ def shown(runs: "Ensemble") -> Shown:
         Table(header, tuple(rows), numbers=(2, 3, 4)),
         ("over the members, at the last time",) if read else (),
     )
+
+
+def _range(runs: "Ensemble", name: str) -> str:
+    values, unit = runs.varied[name], runs.unit(name)
+    said = "" if unit in ("", "1") else f" {unit}"
+    return f"{name} from {values.min():.6g} to {values.max():.6g}{said}"
 
 
 def _ends(runs: "Ensemble", name: str) -> tuple[str, str, str]:

@@ -1,0 +1,168 @@
+"""Ensembles keep what was varied and how far members went, save themselves and become tables."""
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from symfric import BrownMcPhee, Ensemble, ExactCoulomb, Hold, LuGre, Status
+
+from symfric import drive, load_ensemble, load_run, rabinowicz, simulate, simulate_many  # isort: skip
+
+MU = np.linspace(0.12, 0.4, 7)
+END = 24.0
+T = np.linspace(0.0, END, 9)
+
+
+def study(**how: Any) -> Ensemble:
+    model = rabinowicz(LuGre(), free=["mu_s"])
+    return simulate_many(model, END, p={"mu_s": MU}, x0={"v": 0.01}, t_eval=T, **how)
+
+
+def test_what_was_varied_is_kept_with_its_unit() -> None:
+    made = study(backend="vm")
+    np.testing.assert_array_equal(made.varied["mu_s"], MU)
+    assert made.varied["mu_s"] is not MU
+    assert made.fixed == {"x0.v": 0.01}
+    assert (made.unit("mu_s"), made.unit("x0.v"), made.unit("x")) == ("1", "m/s", "m")
+    assert "varied: mu_s from 0.12 to 0.4" in repr(made)
+    assert "fixed: x0.v = 0.01 m/s" in repr(made)
+    model = drive(BrownMcPhee())
+    pushes = Hold([0.0, 0.5], [[1.0, 2.0], [3.0, 4.0]])
+    other = simulate_many(model, [0.5, 1.0], u={"force": [2.0, 3.0]}, backend="vm")
+    assert {n: v.tolist() for n, v in other.varied.items()} == {
+        "u.force": [2.0, 3.0],
+        "t_end": [0.5, 1.0],
+    }
+    assert simulate_many(model, 1.0, u={"force": pushes}, backend="vm").varied == {}
+
+
+@pytest.mark.parametrize("backend", ["vm", "compiled"])
+def test_extremes_of_states_are_those_of_all_steps(backend: str) -> None:
+    """Samples three seconds apart miss each slip back, which lasts a fifth of one."""
+    made, model = study(backend=backend), rabinowicz(LuGre(), free=["mu_s"])
+    missed = 0
+    for m, mu in enumerate(MU.tolist()):
+        run = simulate(model, END, p={"mu_s": mu}, x0={"v": 0.01})
+        for name in ("x", "v"):
+            low, high = (ends[m] for ends in made.extremes[name])
+            least, greatest = run.extremes[name]
+            width = greatest - least
+            assert low == pytest.approx(least, abs=0.02 * width)
+            assert high == pytest.approx(greatest, abs=0.02 * width)
+            missed += made[name][m].min() > least + 0.2 * width
+    assert missed > 3  # without the steps it would have been wrong
+
+
+def test_extremes_of_members_with_events_and_of_those_that_failed() -> None:
+    model = rabinowicz(ExactCoulomb(), free=["mu_s"])
+    made = simulate_many(model, 8.0, p={"mu_s": MU[:3]}, backend="vm")
+    for m, mu in enumerate(MU[:3].tolist()):
+        least, greatest = simulate(model, 8.0, p={"mu_s": mu}).extremes["v"]
+        assert made.extremes["v"][0][m] == pytest.approx(least, abs=0.02 * (greatest - least))
+    short = study(backend="vm", max_steps=40)
+    assert short.failed
+    assert not short.finished.any()
+    assert np.isfinite(short.extremes["v"][1]).all()  # as far as they got
+
+
+def test_an_ensemble_comes_back_from_its_file_to_the_bit(tmp_path: Path) -> None:
+    for made in (study(backend="vm", max_steps=60), study(backend="vm", out=tmp_path / "folder")):
+        made.save(tmp_path / "study.npz")
+        again = load_ensemble(tmp_path / "study.npz")
+        assert repr(again) == repr(made)
+        assert again.failed == made.failed
+        for name in made.signals:
+            np.testing.assert_array_equal(again[name], made[name])
+            np.testing.assert_array_equal(again.extremes[name], made.extremes[name])
+        np.testing.assert_array_equal(again.reached, made.reached)
+        np.testing.assert_array_equal(again["mu_s"], MU)
+    with pytest.raises(ValueError, match=r"load_run '.*study.npz': expected a file that symfric"):
+        load_run(tmp_path / "study.npz")
+
+
+def test_an_interrupted_ensemble_keeps_and_saves_what_it_has(tmp_path: Path) -> None:
+    def stop(done: float) -> None:
+        if done > 0.4:
+            raise KeyboardInterrupt
+
+    made = study(backend="vm", chunk=2, executor="serial", progress=stop)
+    assert made.status is Status.INTERRUPTED
+    assert made.finished.tolist() == [True] * 4 + [False] * 3
+    assert "3 members not started" in repr(made)
+    made.save(tmp_path / "study.npz")
+    again = load_ensemble(tmp_path / "study.npz")
+    assert again.status is Status.INTERRUPTED
+    assert np.isnan(again.extremes["v"][0][4:]).all()
+    np.testing.assert_array_equal(again["x"][:4], made["x"][:4])
+    assert made.plot("v", over="mu_s").axes[0].get_title(loc="left").count("3 without a value")
+
+
+def test_a_resumed_folder_has_the_extremes_of_all(tmp_path: Path) -> None:
+    study(backend="vm", out=tmp_path)
+    again = study(backend="vm", out=tmp_path)
+    np.testing.assert_array_equal(again.reach["v"], study(backend="vm").reach["v"])
+
+
+def test_pictures_over_what_was_varied() -> None:
+    made = study(backend="vm")
+    figure = made.plot("x", "v", over="mu_s")
+    line = figure.axes[0].lines[0]
+    np.testing.assert_array_equal(line.get_xdata(), MU)
+    np.testing.assert_array_equal(line.get_ydata(), made["x"][:, -1])
+    assert figure.axes[1].get_xlabel() == "mu_s"
+    top = made.plot("v", over="mu_s", at="greatest").axes[0].lines[0]
+    np.testing.assert_array_equal(top.get_ydata(), made.extremes["v"][1])
+    middle = made.plot("x", over="mu_s", at=12.4).axes[0]
+    np.testing.assert_array_equal(middle.lines[0].get_ydata(), made["x"][:, 4])
+    assert "at t = 12 s" in middle.get_title(loc="left")
+    with pytest.raises(ValueError, match=r"plot: over.*did you mean mu_s"):
+        made.plot("x", over="mu")
+    with pytest.raises(ValueError, match="at: expected one of end, least, greatest, got most"):
+        made.plot("x", over="mu_s", at="most")
+
+
+def test_a_second_parameter_of_few_values_gives_a_line_each() -> None:
+    model = rabinowicz(BrownMcPhee(), free=["mu_s", "k"])
+    grid = {"mu_s": np.tile(MU, 2), "k": np.repeat([1.0, 500.0], 7)}
+    made = simulate_many(model, 0.2, p=grid, backend="vm")
+    lines = made.plot("x", over="mu_s").axes[0].lines
+    assert [line.get_label() for line in lines] == ["k = 1 N/m", "k = 500 N/m"]
+    axis = made.plot("x", over="k").axes[0]  # seven of mu_s: points alone
+    assert len(axis.lines) == 1
+    assert axis.get_xscale() == "log"
+
+
+def test_csv_has_a_row_for_each_member_and_time(tmp_path: Path) -> None:
+    made = study(backend="vm")
+    made.to_csv(tmp_path / "study.csv", "x")
+    with (tmp_path / "study.csv").open() as file:
+        header, *rows = csv.reader(file)
+    assert header == ["member", "t [s]", "mu_s [1]", "x [m]"]
+    found = np.array(rows, float)
+    assert found.shape == (7 * 9, 4)
+    np.testing.assert_array_equal(found[:, 3].reshape(7, 9), made["x"])
+    np.testing.assert_array_equal(found[::9, 2], MU)
+
+
+def test_tables_of_pandas() -> None:
+    pytest.importorskip("pandas", reason="pandas is not installed")
+    made = study(backend="vm")
+    frame = made.to_dataframe("x", "v")
+    assert list(frame.columns) == ["mu_s", "x", "v"]
+    assert frame.index.names == ["member", "t"]
+    np.testing.assert_array_equal(frame.loc[3, "x"], made["x"][3])
+    assert frame.attrs["units"]["mu_s"] == "1"
+    ends = simulate_many(rabinowicz(LuGre(), free=["mu_s"]), 1.0, p={"mu_s": MU}, backend="vm")
+    assert ends.to_dataframe("x").shape == (7, 2)
+
+
+def test_sets_of_xarray_have_parameters_as_coordinates() -> None:
+    pytest.importorskip("xarray", reason="xarray is not installed")
+    made = study(backend="vm")
+    data = made.to_xarray("x")
+    np.testing.assert_array_equal(data["x"].swap_dims(member="mu_s").sel(mu_s=MU[2]), made["x"][2])
+    assert data["x"].attrs["units"] == "m"
+    assert data["mu_s"].attrs["units"] == "1"
