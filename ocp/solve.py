@@ -25,6 +25,7 @@ from ocp.solvers.sqp import Sqp
 from ocp.solving.clock import Clock
 from ocp.solving.one_solve import Solver
 from ocp.solving.starts import Start
+from ocp.text.doubts import doubts
 from ocp.text.problem import Problem
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
@@ -134,6 +135,9 @@ def solve(
         progress, Clock(max_time),
     )  # fmt: skip
     solution = job.solved()
+    odd = "" if solution.ok else doubts(problem)
+    if odd:
+        solution = replace(solution, message=f"{solution.message} {odd}")
     if throw and not solution.ok:
         raise SolveError(solution.message, solution.status, solution) from solution.cause
     return solution

@@ -15,6 +15,7 @@ from ocp.result.motion import Motion, Stretch
 from ocp.result.stored import Stored, stored_spans, structure_of
 from ocp.solvers.outcome import Iterate, SolverStatistics
 from ocp.text.problem import Problem
+from ocp.text.ranges import Free
 from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
 from symfric.foundation.files import write_text, written
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+
+AT_BOUND = 1e-5
+"""Relative distance from a bound within which a duration is said to be at it."""
 
 
 class Verdict(Protocol):
@@ -123,6 +127,10 @@ class Solution:
         phases = ", ".join(f"{phase.name} {phase.T:.4g} s" for phase in self.phases)
         several = f" ({phases})" if len(self.phases) > 1 else ""
         lines = [self.message, f"J = {self.cost:.6g}, T = {self.T:.6g} s{several}"]
+        for phase, span in zip(self.phases, self.problem.chain, strict=True):
+            least = span.T.lower if isinstance(span.T, Free) else 0.0
+            if phase.T - least <= AT_BOUND * least:
+                lines.append(f"{phase.name}: T is at its lower bound, {least:g} s")
         if self.chosen:
             lines.append("chosen: " + ", ".join(f"{n} = {v:.6g}" for n, v in self.chosen.items()))
         for contact, modes in self.modes.items():
