@@ -58,7 +58,7 @@ def sources(sizes: str, model: str, fmi: int, fixed: bool, exchange: bool) -> di
     """
     steps = "exchange.c" if exchange else "fixed.c" if fixed else "adaptive.c"
     shared = ["consistent.c", steps, "unit.c", "rates.c" if exchange else "communication.c"]
-    shared.append("derivatives.c")
+    shared += ["derivatives.c", "states.c"]
     kinds = ("exchange", "cosimulation") if exchange else ("cosimulation", "exchange")
     own = [f"fmi{fmi}.c", f"fmi{fmi}_{kinds[0]}.c"]
     own += ["fmi3_absent.c", f"fmi3_no_{kinds[1]}.c"] if fmi == 3 else []

@@ -73,13 +73,13 @@ EXPORTED = (
         "*terminate = found == OVER;", "*terminate = fmi3False;", T_GATES,
     ),
     Mutant(
-        "fmu: the state of another model is put back", f"{SOURCES}/fmi2.c",
-        "|| state_kind(state) != MODEL_KIND", "", T_GATES,
+        "fmu: the state of another model is put back", f"{SOURCES}/states.c",
+        "    if (!of_this_model(state)) return 0;\n", "", T_GATES,
     ),
     Mutant(
-        "fmu: a state is put back without its last step", f"{SOURCES}/fmi2.c",
-        "memcpy(&unit_of(c)->m, state, sizeof(Memory));",
-        "memcpy(&unit_of(c)->m, state, offsetof(Memory, base));", T_STEPS,
+        "fmu: a state is put back without its last step", f"{SOURCES}/states.c",
+        "memcpy(&unit->m, state, sizeof(Memory));",
+        "memcpy(&unit->m, state, offsetof(Memory, base));", T_STEPS,
     ),
     Mutant(
         "fmu: Newton's method is never damped", CONSISTENT,

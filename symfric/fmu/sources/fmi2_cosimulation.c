@@ -4,20 +4,12 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
                                        size_t n, const fmi2Integer orders[],
                                        const fmi2Real values[])
 {
-    UNUSED(c);
-    UNUSED(references);
-    UNUSED(orders);
-    UNUSED(values);
     return n ? fmi2Error : fmi2OK;
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference references[],
                                         size_t n, const fmi2Integer orders[], fmi2Real values[])
 {
-    UNUSED(c);
-    UNUSED(references);
-    UNUSED(orders);
-    UNUSED(values);
     return n ? fmi2Error : fmi2OK;
 }
 
@@ -27,7 +19,6 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean no_return)
 {
     Instance *unit = unit_of(c);
-    UNUSED(no_return);
     if (!allowed(unit, "fmi2DoStep", RUNNING, ENDED)) return fmi2Error;
     switch (advance(unit, time, size)) {
     case DONE:
@@ -43,15 +34,11 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean
 
 fmi2Status fmi2CancelStep(fmi2Component c)
 {
-    UNUSED(c);
     return fmi2Error;
 }
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
 {
-    UNUSED(c);
-    UNUSED(kind);
-    UNUSED(value);
     return fmi2Discard;
 }
 
@@ -64,9 +51,6 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Rea
 
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
 {
-    UNUSED(c);
-    UNUSED(kind);
-    UNUSED(value);
     return fmi2Discard;
 }
 
@@ -79,8 +63,5 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2
 
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value)
 {
-    UNUSED(c);
-    UNUSED(kind);
-    UNUSED(value);
     return fmi2Discard;
 }

@@ -29,7 +29,6 @@ fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c)
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_return,
                                        fmi2Boolean *event_mode, fmi2Boolean *terminate)
 {
-    UNUSED(no_return);
     if (!allowed(unit_of(c), "fmi2CompletedIntegratorStep", RUNNING, RUNNING)) return fmi2Error;
     *event_mode = completed(unit_of(c));
     *terminate = fmi2False;

@@ -5,19 +5,11 @@
     fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference references[], size_t n,     \
                              fmi3##type values[], size_t n_values)                                \
     {                                                                                             \
-        UNUSED(c);                                                                                \
-        UNUSED(references);                                                                       \
-        UNUSED(values);                                                                           \
-        UNUSED(n_values);                                                                         \
         return n ? fmi3Error : fmi3OK;                                                            \
     }                                                                                             \
     fmi3Status fmi3Set##type(fmi3Instance c, const fmi3ValueReference references[], size_t n,     \
                              const fmi3##type values[], size_t n_values)                          \
     {                                                                                             \
-        UNUSED(c);                                                                                \
-        UNUSED(references);                                                                       \
-        UNUSED(values);                                                                           \
-        UNUSED(n_values);                                                                         \
         return n ? fmi3Error : fmi3OK;                                                            \
     }
 
@@ -36,49 +28,30 @@ NONE_OF(String)
 fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference references[], size_t n, size_t
     sizes[], fmi3Binary values[], size_t n_values)
 {
-    UNUSED(c);
-    UNUSED(references);
-    UNUSED(sizes);
-    UNUSED(values);
-    UNUSED(n_values);
     return n ? fmi3Error : fmi3OK;
 }
 
 fmi3Status fmi3GetClock(fmi3Instance c, const fmi3ValueReference references[], size_t n,
     fmi3Clock values[])
 {
-    UNUSED(c);
-    UNUSED(references);
-    UNUSED(values);
     return n ? fmi3Error : fmi3OK;
 }
 
 fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference references[], size_t n, const
     size_t sizes[], const fmi3Binary values[], size_t n_values)
 {
-    UNUSED(c);
-    UNUSED(references);
-    UNUSED(sizes);
-    UNUSED(values);
-    UNUSED(n_values);
     return n ? fmi3Error : fmi3OK;
 }
 
 fmi3Status fmi3SetClock(fmi3Instance c, const fmi3ValueReference references[], size_t n, const
     fmi3Clock values[])
 {
-    UNUSED(c);
-    UNUSED(references);
-    UNUSED(values);
     return n ? fmi3Error : fmi3OK;
 }
 
 fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReference reference,
     size_t *n)
 {
-    UNUSED(c);
-    UNUSED(reference);
-    UNUSED(n);
     return fmi3Error;
 }
 
@@ -86,12 +59,6 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference depend
     elements[], fmi3ValueReference independents[], size_t of_independents[], fmi3DependencyKind
     kinds[], size_t n)
 {
-    UNUSED(c);
-    UNUSED(dependent);
-    UNUSED(elements);
-    UNUSED(independents);
-    UNUSED(of_independents);
-    UNUSED(kinds);
     return n ? fmi3Error : fmi3OK;
 }
 
@@ -99,113 +66,69 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unk
     n_unknowns, const fmi3ValueReference knowns[], size_t n_knowns, const fmi3Float64 seeds[],
     size_t n_seeds, fmi3Float64 values[], size_t n_values)
 {
-    UNUSED(c);
-    UNUSED(unknowns);
-    UNUSED(n_unknowns);
-    UNUSED(knowns);
-    UNUSED(n_knowns);
-    UNUSED(seeds);
-    UNUSED(n_seeds);
-    UNUSED(values);
-    UNUSED(n_values);
     return fmi3Error;
 }
 
 fmi3Status fmi3EnterConfigurationMode(fmi3Instance c)
 {
-    UNUSED(c);
     return fmi3Error;
 }
 
 fmi3Status fmi3ExitConfigurationMode(fmi3Instance c)
 {
-    UNUSED(c);
     return fmi3Error;
 }
 
 fmi3Status fmi3GetIntervalDecimal(fmi3Instance c, const fmi3ValueReference references[], size_t
     n, fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
 {
-    UNUSED(c);
-    UNUSED(references);
-    UNUSED(intervals);
-    UNUSED(qualifiers);
     return n ? fmi3Error : fmi3OK;
 }
 
 fmi3Status fmi3GetIntervalFraction(fmi3Instance c, const fmi3ValueReference references[], size_t
     n, fmi3UInt64 counters[], fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[])
 {
-    UNUSED(c);
-    UNUSED(references);
-    UNUSED(counters);
-    UNUSED(resolutions);
-    UNUSED(qualifiers);
     return n ? fmi3Error : fmi3OK;
 }
 
 fmi3Status fmi3GetShiftDecimal(fmi3Instance c, const fmi3ValueReference references[], size_t n,
     fmi3Float64 shifts[])
 {
-    UNUSED(c);
-    UNUSED(references);
-    UNUSED(shifts);
     return n ? fmi3Error : fmi3OK;
 }
 
 fmi3Status fmi3GetShiftFraction(fmi3Instance c, const fmi3ValueReference references[], size_t n,
     fmi3UInt64 counters[], fmi3UInt64 resolutions[])
 {
-    UNUSED(c);
-    UNUSED(references);
-    UNUSED(counters);
-    UNUSED(resolutions);
     return n ? fmi3Error : fmi3OK;
 }
 
 fmi3Status fmi3SetIntervalDecimal(fmi3Instance c, const fmi3ValueReference references[], size_t
     n, const fmi3Float64 intervals[])
 {
-    UNUSED(c);
-    UNUSED(references);
-    UNUSED(intervals);
     return n ? fmi3Error : fmi3OK;
 }
 
 fmi3Status fmi3SetIntervalFraction(fmi3Instance c, const fmi3ValueReference references[], size_t
     n, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
 {
-    UNUSED(c);
-    UNUSED(references);
-    UNUSED(counters);
-    UNUSED(resolutions);
     return n ? fmi3Error : fmi3OK;
 }
 
 fmi3Status fmi3SetShiftDecimal(fmi3Instance c, const fmi3ValueReference references[], size_t n,
     const fmi3Float64 shifts[])
 {
-    UNUSED(c);
-    UNUSED(references);
-    UNUSED(shifts);
     return n ? fmi3Error : fmi3OK;
 }
 
 fmi3Status fmi3SetShiftFraction(fmi3Instance c, const fmi3ValueReference references[], size_t n,
     const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
 {
-    UNUSED(c);
-    UNUSED(references);
-    UNUSED(counters);
-    UNUSED(resolutions);
     return n ? fmi3Error : fmi3OK;
 }
 
 fmi3Status fmi3ActivateModelPartition(fmi3Instance c, fmi3ValueReference clock, fmi3Float64
     time)
 {
-    UNUSED(c);
-    UNUSED(clock);
-    UNUSED(time);
     return fmi3Error;
 }

@@ -6,13 +6,6 @@ fmi3Instance fmi3InstantiateCoSimulation(
     size_t n_required, fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
     fmi3IntermediateUpdateCallback update)
 {
-    UNUSED(resources);
-    UNUSED(visible);
-    UNUSED(event_mode);
-    UNUSED(early_return);
-    UNUSED(required);
-    UNUSED(n_required);
-    UNUSED(update);
     return made(name, token, on, environment, log);
 }
 
@@ -24,7 +17,6 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Bo
 {
     Instance *unit = unit_of(c);
     Outcome found;
-    UNUSED(no_return);
     if (!allowed(unit, "fmi3DoStep", RUNNING, ENDED)) return fmi3Error;
     found = advance(unit, time, size);
     *event = fmi3False;
@@ -47,10 +39,5 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference ref
                                     const fmi3Int32 orders[], fmi3Float64 values[],
                                     size_t n_values)
 {
-    UNUSED(c);
-    UNUSED(references);
-    UNUSED(orders);
-    UNUSED(values);
-    UNUSED(n_values);
     return n ? fmi3Error : fmi3OK;
 }

@@ -5,8 +5,6 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
                                           fmi3InstanceEnvironment environment,
                                           fmi3LogMessageCallback log)
 {
-    UNUSED(resources);
-    UNUSED(visible);
     return made(name, token, on, environment, log);
 }
 
@@ -46,7 +44,6 @@ fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c)
 fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_return,
                                        fmi3Boolean *event_mode, fmi3Boolean *terminate)
 {
-    UNUSED(no_return);
     if (!allowed(unit_of(c), "fmi3CompletedIntegratorStep", RUNNING, RUNNING)) return fmi3Error;
     *event_mode = completed(unit_of(c)) != 0;
     *terminate = fmi3False;

@@ -5,25 +5,16 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
                                           fmi3InstanceEnvironment environment,
                                           fmi3LogMessageCallback log)
 {
-    UNUSED(name);
-    UNUSED(token);
-    UNUSED(resources);
-    UNUSED(visible);
-    UNUSED(on);
-    UNUSED(environment);
-    UNUSED(log);
     return NULL;
 }
 
 fmi3Status fmi3EnterEventMode(fmi3Instance c)
 {
-    UNUSED(c);
     return fmi3Error;
 }
 
 fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c)
 {
-    UNUSED(c);
     return fmi3Error;
 }
 
@@ -31,91 +22,62 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *again, fmi3Bool
     fmi3Boolean *nominals_changed, fmi3Boolean *values_changed, fmi3Boolean *has_next, fmi3Float64
     *next)
 {
-    UNUSED(c);
-    UNUSED(again);
-    UNUSED(terminate);
-    UNUSED(nominals_changed);
-    UNUSED(values_changed);
-    UNUSED(has_next);
-    UNUSED(next);
     return fmi3Error;
 }
 
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c)
 {
-    UNUSED(c);
     return fmi3Error;
 }
 
 fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_return, fmi3Boolean
     *event_mode, fmi3Boolean *terminate)
 {
-    UNUSED(c);
-    UNUSED(no_return);
-    UNUSED(event_mode);
-    UNUSED(terminate);
     return fmi3Error;
 }
 
 fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time)
 {
-    UNUSED(c);
-    UNUSED(time);
     return fmi3Error;
 }
 
 fmi3Status fmi3SetContinuousStates(fmi3Instance c, const fmi3Float64 x[], size_t n)
 {
-    UNUSED(c);
-    UNUSED(x);
     return n ? fmi3Error : fmi3OK;
 }
 
 fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance c, fmi3Float64 derivatives[], size_t
     n)
 {
-    UNUSED(c);
-    UNUSED(derivatives);
     return n ? fmi3Error : fmi3OK;
 }
 
 fmi3Status fmi3GetEventIndicators(fmi3Instance c, fmi3Float64 indicators[], size_t n)
 {
-    UNUSED(c);
-    UNUSED(indicators);
     return n ? fmi3Error : fmi3OK;
 }
 
 fmi3Status fmi3GetContinuousStates(fmi3Instance c, fmi3Float64 x[], size_t n)
 {
-    UNUSED(c);
-    UNUSED(x);
     return n ? fmi3Error : fmi3OK;
 }
 
 fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance c, fmi3Float64 nominals[], size_t n)
 {
-    UNUSED(c);
-    UNUSED(nominals);
     return n ? fmi3Error : fmi3OK;
 }
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n)
 {
-    UNUSED(c);
-    UNUSED(n);
     return fmi3Error;
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n)
 {
-    UNUSED(c);
-    UNUSED(n);
     return fmi3Error;
 }
 
 fmi3Status fmi3EnterStepMode(fmi3Instance c)
 {
-    UNUSED(c);
     return fmi3Error;
 }

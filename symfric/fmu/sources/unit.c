@@ -263,10 +263,3 @@ static void explain(Instance *unit, int why)
                  "event there", MODEL_NAME, t, h, model_unknown_names[fastest]);
     }
 }
-
-static unsigned long long state_kind(const void *state)
-{
-    unsigned long long kind;
-    memcpy(&kind, state, sizeof kind);
-    return kind;
-}
