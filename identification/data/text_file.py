@@ -12,7 +12,7 @@ import numpy as np
 from identification.data.raw import Array, Column, Raw, label
 from identification.data.record import Record
 from identification.data.units import unit
-from symfric.foundation.files import written
+from symfric.foundation.files import write_table
 
 COMMENTS = ("#", "%", "//")
 """What a line begins with that says something about the file."""
@@ -239,9 +239,7 @@ def _column(
 def to_csv(record: Record, path: Path) -> Path:
     """Write a record with units in its header, and give the path back."""
     signals = {**({} if record.t is None else {"t": record.t}), **record.signals}
-    with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        units = {key: record.unit(key) for key in signals}
-        writer.writerow(f"{key} [{units[key]}]" if units[key] else key for key in signals)
-        writer.writerows(np.column_stack(list(signals.values())).tolist())
+    units = {key: record.unit(key) for key in signals}
+    header = [f"{key} [{units[key]}]" if units[key] else key for key in signals]
+    write_table(path, header, np.column_stack(list(signals.values())).tolist())
     return path

@@ -1,6 +1,5 @@
 """A controller on a plant with equations of its own, and what became of it."""
 
-import csv
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from ocp.mpc.optimality import Optimality
 from ocp.mpc.session import Session
 from symfric.foundation import checks
 from symfric.foundation.brief import brief
-from symfric.foundation.files import written
+from symfric.foundation.files import write_table
 from symfric.foundation.panels import panels, save
 from symfric.foundation.style import line
 from symfric.integrator.plant import Plant
@@ -154,10 +153,7 @@ class ClosedLoop:
         columns |= {f"{name} (reference)": values for name, values in self.references.items()}
         columns |= {"residual": self.residual, "iterations": self.iterations.astype(float)}
         columns |= {"status": self.status.astype(float), "time [s]": self.seconds}
-        with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(columns)
-            writer.writerows(np.column_stack(list(columns.values())).tolist())
+        write_table(path, columns, np.column_stack(list(columns.values())).tolist())
 
     def plot(self, *names: str, path: str | Path | None = None) -> "Figure":
         """Signals, controls and cycle times over time, a panel each; shaded: not converged.

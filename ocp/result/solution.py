@@ -1,6 +1,5 @@
 """The result of an optimal control problem: named signals that plot, write and save themselves."""
 
-import csv
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -18,7 +17,7 @@ from ocp.text.problem import Problem
 from ocp.text.ranges import Free
 from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
-from symfric.foundation.files import write_text, written
+from symfric.foundation.files import write_table, write_text
 from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Shown
 from symfric.foundation.status import Status
@@ -266,12 +265,12 @@ class Solution:
         """
         several = len(self.motions) > 1
         header = ["t [s]", *(f"{name} [{self.units[name]}]" for name in self.signals)]
-        with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow([*(["scenario"] * several), *header])
-            for motion in self.motions:
-                rows = np.column_stack([motion.t, *motion.signals.values()]).tolist()
-                writer.writerows([*([motion.name] * several), *row] for row in rows)
+        rows = (
+            [*([motion.name] * several), *row]
+            for motion in self.motions
+            for row in np.column_stack([motion.t, *motion.signals.values()]).tolist()
+        )
+        write_table(path, [*(["scenario"] * several), *header], rows)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain data; a number that is not finite is None."""

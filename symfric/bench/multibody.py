@@ -1,6 +1,5 @@
 """Mechanisms: run time at equal error beside others, cost of the step, what is counted and met."""
 
-import csv
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from functools import partial
@@ -20,7 +19,7 @@ from symfric.bench.counts import CompileRow, CountRow, compile_rows, counts
 from symfric.bench.facts import DRIFT_S, DriftRow, Fact, NormRow, drifts, facts, norms
 from symfric.bench.timing import best_time, unwarned
 from symfric.foundation.compiler import find_compiler
-from symfric.foundation.files import written
+from symfric.foundation.files import write_table
 from symfric.integrator.simulate import simulate
 from symfric.laws import BrownMcPhee
 from symfric.scenes import MechanismScene, PendulumBox, SliderCrank
@@ -174,11 +173,8 @@ class MultibodyBenchmark:
 
     def write_csv(self, path: str | Path) -> None:
         """Write the runs, a line each."""
-        with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-            table = csv.writer(file)
-            names = [f.name for f in fields(RunRow)]
-            table.writerow(names)
-            table.writerows([getattr(row, name) for name in names] for row in self.runs)
+        names = [field.name for field in fields(RunRow)]
+        write_table(path, names, ([getattr(row, name) for name in names] for row in self.runs))
 
     def plot(self, path: str | Path | None = None) -> "Figure":
         """Work-precision diagram: time against error, a panel per case."""

@@ -15,7 +15,6 @@ smooth laws choose by how they creep, each in its way (1e-4 to 1e-3 apart). Ther
 measured against its own limit, and a law with mu_s = mu_d against set-valued friction.
 """
 
-import csv
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from math import log, nan
@@ -34,7 +33,7 @@ from symfric.figures.regularisation import (
     sample,
 )
 from symfric.foundation.compiler import find_compiler
-from symfric.foundation.files import written
+from symfric.foundation.files import write_table
 from symfric.foundation.parameters import parameters
 from symfric.laws import (
     BrownMcPhee,
@@ -179,11 +178,8 @@ class RegularisationBenchmark:
 
     def write_csv(self, path: str | Path) -> None:
         """Write the rows, a line each."""
-        with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-            table = csv.writer(file)
-            names = [f.name for f in fields(RegularisationRow)]
-            table.writerow(names)
-            table.writerows([getattr(row, name) for name in names] for row in self.rows)
+        names = [field.name for field in fields(RegularisationRow)]
+        write_table(path, names, ([getattr(row, name) for name in names] for row in self.rows))
 
     def plot(self, path: str | Path | None = None) -> "Figure":
         """Error against width above, CPU time below, a column per case, a line per tolerance."""

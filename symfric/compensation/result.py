@@ -1,6 +1,5 @@
 """What became of a position loop with friction, without compensation and with it."""
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from symfric.compensation.reference import Reference
 from symfric.foundation import checks
-from symfric.foundation.files import written
+from symfric.foundation.files import write_table
 from symfric.foundation.panels import panels, save
 from symfric.foundation.style import line
 
@@ -215,10 +214,8 @@ class Comparison:
                 f"added ({name}) [{force}]": loop.added,
             }
         size = min(column.size for column in columns.values())
-        with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(columns)
-            writer.writerows(np.column_stack([c[:size] for c in columns.values()]).tolist())
+        rows = np.column_stack([column[:size] for column in columns.values()]).tolist()
+        write_table(path, columns, rows)
 
     def plot(self, *names: str, path: str | Path | None = None) -> "Figure":
         """Position, error, force and what is added over time, and beside it the first reversal.

@@ -1,6 +1,5 @@
 """The result of a simulation: named signals over time that plot and write themselves."""
 
-import csv
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks, packed
-from symfric.foundation.files import write_text, written
+from symfric.foundation.files import write_table, write_text
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Showing, Shown
@@ -355,10 +354,7 @@ class Trajectory(Showing, Derivatives):
         """
         columns = tables.columns(self, names)
         header = ["t [s]", *(f"{name} [{self.unit(name)}]" for name in columns)]
-        with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(header)
-            writer.writerows(np.column_stack([self.t, *columns.values()]).tolist())
+        write_table(path, header, np.column_stack([self.t, *columns.values()]).tolist())
 
     def to_dataframe(self, *names: str) -> Any:
         """Signals or details, all signals if none is given, as a pandas table over t.
