@@ -9,6 +9,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+import pytest
 
 from symfric import SolveError
 from symfric.foundation.checks import shown
@@ -129,6 +130,17 @@ def told(made: Iterator[Door]) -> list[tuple[str, str]]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return [(text, verdict(call)) for door in made for text, call in door.cases()]
+
+
+def every_door_refuses(groups: Mapping[str, Callable[[], Iterator[Door]]]) -> Callable[..., None]:
+    """The test that no door of any group accepts what is bad, in an empty folder."""
+
+    @pytest.mark.parametrize("group", groups)
+    def test(group: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.chdir(tmp_path)
+        refuses_all(groups[group](), tmp_path)
+
+    return test
 
 
 def refuses_all(doors: Iterator[Door], folder: Path) -> None:

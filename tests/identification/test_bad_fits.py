@@ -1,11 +1,9 @@
 """Bad Python input at data, kinds of residuals and fits."""
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from bad_values import (
     INF,
     NAN,
@@ -13,10 +11,10 @@ from bad_values import (
     Thing,
     choice,
     count,
+    every_door_refuses,
     flag,
     function,
     number,
-    refuses_all,
     thing,
     values,
 )
@@ -203,16 +201,10 @@ def doors_of_identification() -> Iterator[Door]:
     yield Door("six_steps", six_steps, points, {"v": bad, "F": bad, "unstable": number(-1.0)})
 
 
-DOORS = {
-    "fits": doors_of_fits,
-    "kinds": doors_of_kinds,
-    "data": doors_of_identification,
-}
-
-
-@pytest.mark.parametrize("group", DOORS)
-def test_every_door_refuses_bad_input_in_a_sentence(
-    group: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    refuses_all(DOORS[group](), tmp_path)
+test_every_door_refuses_bad_input_in_a_sentence = every_door_refuses(
+    {
+        "fits": doors_of_fits,
+        "kinds": doors_of_kinds,
+        "data": doors_of_identification,
+    }
+)

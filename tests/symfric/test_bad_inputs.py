@@ -1,12 +1,10 @@
 """Bad Python input: every public door refuses in one sentence, whatever it is given."""
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
 import numpy as np
-import pytest
 from bad_values import (
     INF,
     NAN,
@@ -14,13 +12,13 @@ from bad_values import (
     Thing,
     choice,
     count,
+    every_door_refuses,
     flag,
     function,
     names,
     number,
     parameter,
     path,
-    refuses_all,
     thing,
     times,
     values,
@@ -338,16 +336,10 @@ def doors_of_models() -> Iterator[Door]:
     )
 
 
-DOORS = {
-    "simulation": doors_of_simulation,
-    "trajectory": doors_of_a_trajectory,
-    "models": doors_of_models,
-}
-
-
-@pytest.mark.parametrize("group", DOORS)
-def test_every_door_refuses_bad_input_in_a_sentence(
-    group: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    refuses_all(DOORS[group](), tmp_path)
+test_every_door_refuses_bad_input_in_a_sentence = every_door_refuses(
+    {
+        "simulation": doors_of_simulation,
+        "trajectory": doors_of_a_trajectory,
+        "models": doors_of_models,
+    }
+)

@@ -2,10 +2,8 @@
 
 from collections.abc import Iterator
 from dataclasses import fields
-from pathlib import Path
 from typing import Any
 
-import pytest
 from bad_values import (
     INF,
     NAN,
@@ -13,11 +11,11 @@ from bad_values import (
     Thing,
     choice,
     count,
+    every_door_refuses,
     names,
     number,
     parameter,
     path,
-    refuses_all,
     thing,
     values,
 )
@@ -180,16 +178,10 @@ def doors_of_figures() -> Iterator[Door]:
     yield Door("FigureData.plot", data.plot, {}, {"path": [*path(), "a.xyz", "."]})
 
 
-DOORS = {
-    "laws": doors_of_laws,
-    "scenes": doors_of_scenes,
-    "figures": doors_of_figures,
-}
-
-
-@pytest.mark.parametrize("group", DOORS)
-def test_every_door_refuses_bad_input_in_a_sentence(
-    group: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    refuses_all(DOORS[group](), tmp_path)
+test_every_door_refuses_bad_input_in_a_sentence = every_door_refuses(
+    {
+        "laws": doors_of_laws,
+        "scenes": doors_of_scenes,
+        "figures": doors_of_figures,
+    }
+)

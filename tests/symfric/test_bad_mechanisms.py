@@ -2,21 +2,19 @@
 
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
-import pytest
 from bad_values import (
     INF,
     NAN,
     Door,
     Thing,
     choice,
+    every_door_refuses,
     flag,
     number,
     parameter,
-    refuses_all,
     thing,
 )
 
@@ -268,14 +266,8 @@ def doors_of_mechanisms() -> Iterator[Door]:
     )
 
 
-DOORS = {
-    "mechanisms": doors_of_mechanisms,
-}
-
-
-@pytest.mark.parametrize("group", DOORS)
-def test_every_door_refuses_bad_input_in_a_sentence(
-    group: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    refuses_all(DOORS[group](), tmp_path)
+test_every_door_refuses_bad_input_in_a_sentence = every_door_refuses(
+    {
+        "mechanisms": doors_of_mechanisms,
+    }
+)

@@ -1,22 +1,20 @@
 """Bad Python input at optimal control and C."""
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
-import pytest
 from bad_values import (
     INF,
     NAN,
     Door,
     Thing,
     choice,
+    every_door_refuses,
     flag,
     function,
     number,
     path,
-    refuses_all,
     thing,
     values,
 )
@@ -233,15 +231,9 @@ def doors_of_code() -> Iterator[Door]:
     yield Door("verify", verify, {}, {"generated": thing()})
 
 
-DOORS = {
-    "control": doors_of_control,
-    "code": doors_of_code,
-}
-
-
-@pytest.mark.parametrize("group", DOORS)
-def test_every_door_refuses_bad_input_in_a_sentence(
-    group: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    refuses_all(DOORS[group](), tmp_path)
+test_every_door_refuses_bad_input_in_a_sentence = every_door_refuses(
+    {
+        "control": doors_of_control,
+        "code": doors_of_code,
+    }
+)
