@@ -115,11 +115,6 @@ class Report:
     iterations: int
     program: int
 
-    @property
-    def converged(self) -> bool:
-        """Whether the plan is optimal within the tolerance."""
-        return self.status is CycleStatus.CONVERGED
-
 
 def _later(rows: Array) -> Array:
     return np.vstack([rows[1:], rows[-1:]])

@@ -49,10 +49,9 @@ def _places(
     return np.round(np.column_stack([width * across, height * (1.0 - up)]), 1)
 
 
-@final
 @dataclass(frozen=True, eq=False)
-class Path(Mark):
-    """A line through points."""
+class Named(Mark):
+    """Points that have an entry in the legend."""
 
     x: Array
     y: Array
@@ -62,6 +61,12 @@ class Path(Mark):
     def name(self) -> str:
         """Entry in the legend."""
         return self.entry
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Path(Named):
+    """A line through points."""
 
     def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
         """A polyline for each run of finite points."""
@@ -83,17 +88,8 @@ def _points(at: Array) -> str:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Dots(Mark):
+class Dots(Named):
     """Points, each a short stroke with round ends: small in the file."""
-
-    x: Array
-    y: Array
-    entry: str = ""
-
-    @property
-    def name(self) -> str:
-        """Entry in the legend."""
-        return self.entry
 
     def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
         """One path of all points."""
