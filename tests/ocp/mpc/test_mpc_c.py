@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from backends import needs_compiler
 from receding import controller, linear_model
 
 from ocp.mpc.controller import controller_of
@@ -12,7 +13,7 @@ from ocp.text.phase import Phase
 from ocp.text.problem import Problem
 from symfric.foundation.compiler import find_compiler
 
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
+pytestmark = needs_compiler
 
 
 def check(made: object, folder: Path) -> None:

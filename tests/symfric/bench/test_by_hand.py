@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
+from backends import needs_compiler
 
 from symfric import BrownMcPhee, LuGre, simulate
 from symfric.bench.by_hand import ByHand, collocation
-from symfric.foundation.compiler import find_compiler
 from symfric.scenes import Rabinowicz
 
 TIMES = np.linspace(0.0, 20.0, 41)[1:]
-needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 
 
 @needs_compiler

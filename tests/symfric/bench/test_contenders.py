@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
+from backends import needs_compiler
 
 from symfric import Model, simulate
 from symfric.bench.contenders import MAKERS, compile_time, compiled
 from symfric.bench.multibody import CASES
-from symfric.foundation.compiler import find_compiler
 
 WHAT = CASES["slider_crank"]
-needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 
 
 @pytest.fixture(scope="module")

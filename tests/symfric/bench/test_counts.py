@@ -1,9 +1,9 @@
 """What a mechanism does not need is not there: counts of variants in both formulations."""
 
 import pytest
+from backends import needs_compiler
 
 from symfric.bench.counts import CountRow, compile_rows, counts
-from symfric.foundation.compiler import find_compiler
 
 FOUR = (
     "frictionless",
@@ -82,7 +82,7 @@ def test_joint_coordinates_cost_a_fraction_of_absolute_ones(rows: Rows, variant:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
+@needs_compiler
 def test_compilation_is_measured() -> None:
     rows = compile_rows(("joint",))
     assert [row.mechanism for row in rows] == ["slider_crank", "four_mass"]

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from backends import needs_compiler
 
 from symfric.bench import MultibodyBenchmark
 from symfric.bench.multibody import LOOP, OURS, RunRow
 from symfric.cli import main
-from symfric.foundation.compiler import find_compiler
 
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
+pytestmark = needs_compiler
 
 
 @pytest.fixture(scope="module")

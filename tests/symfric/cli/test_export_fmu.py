@@ -4,11 +4,10 @@ import json
 from zipfile import ZipFile
 
 import pytest
+from backends import needs_compiler
 
 from symfric.cli import main
-from symfric.foundation.compiler import find_compiler
 
-compiles = pytest.mark.skipif(find_compiler() is None, reason="a unit is compiled")
 FILE = """
 from symfric import LuGre, drive
 def model(m=0.5):
@@ -18,7 +17,7 @@ number = 3
 """
 
 
-@compiles
+@needs_compiler
 def test_a_scene_becomes_a_unit(tmp_path, capsys):
     target = tmp_path / "drive.fmu"
     line = ["export-fmu", "drive", "--law", "brown_mcphee", "--set", "m=2", "--free", "m"]
@@ -32,7 +31,7 @@ def test_a_scene_becomes_a_unit(tmp_path, capsys):
     assert {"modelDescription.xml", "sources/all.c"} <= set(ZipFile(target).namelist())
 
 
-@compiles
+@needs_compiler
 def test_a_file_of_python_becomes_a_unit(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.py").write_text(FILE)

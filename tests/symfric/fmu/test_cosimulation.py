@@ -4,16 +4,16 @@ import ctypes as c
 
 import numpy as np
 import pytest
+from backends import needs_compiler
 from units import DISCARD, ERROR, OK, Archive, Second, over
 from wires import wire
 
 from symfric import Hold, LuGre, simulate
 from symfric.fmu import export_fmu
-from symfric.foundation.compiler import find_compiler
 from symfric.model import Model
 from symfric.scenes import Drive
 
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="units are run as machine code")
+pytestmark = needs_compiler
 RTOL, SPAN = 1e-9, 2.0
 TIMES = np.arange(17) / 8
 """Whose sums and differences are exact."""

@@ -2,17 +2,17 @@
 
 import numpy as np
 import pytest
+from backends import needs_compiler
 from scipy.integrate import solve_ivp
 from units import ERROR, OK, Archive, Rates
 from wires import wire
 
 from symfric import BrownMcPhee, ExactCoulomb, simulate
 from symfric.fmu import export_fmu
-from symfric.foundation.compiler import find_compiler
 from symfric.model import Model
 from symfric.scenes import Drive, Pendulum, SliderCrank
 
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="units are run as machine code")
+pytestmark = needs_compiler
 KIND = "model-exchange"
 
 

@@ -5,17 +5,17 @@ import ctypes as c
 import casadi as ca
 import numpy as np
 import pytest
+from backends import needs_compiler
 from device_cases import WEDGES, wedge
 from scipy.optimize import brentq
 from units import DISCARD, ERROR, OK, Archive, Second, Third
 from wires import wire
 
 from symfric.fmu import export_fmu
-from symfric.foundation.compiler import find_compiler
 from symfric.foundation.parameters import Variable
 from symfric.model import Event, Model
 
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="units are run as machine code")
+pytestmark = needs_compiler
 
 
 def gate() -> Model:

@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
+from backends import needs_compiler
 
 from symfric import BrownMcPhee
 from symfric.bench import codegen_fmu
 from symfric.fmu import export_fmu
 from symfric.fmu.running import running
-from symfric.foundation.compiler import find_compiler
 from symfric.scenes import ALL_SCENES, Drive
 
 
-@pytest.mark.skipif(find_compiler() is None, reason="units are run as machine code")
+@needs_compiler
 def test_a_unit_runs_and_its_refusals_are_errors(tmp_path):
     unit = export_fmu(Drive(BrownMcPhee()), tmp_path / "unit.fmu")
     with running(unit.path, x=0.25, force=1.5) as one:
@@ -34,7 +34,7 @@ def test_sources_alone_cannot_be_run(tmp_path, monkeypatch):
 
 
 @pytest.mark.heavy
-@pytest.mark.skipif(find_compiler() is None, reason="units are run as machine code")
+@needs_compiler
 def test_the_table_has_a_row_for_what_simulate_finishes_and_goals_are_met(monkeypatch):
     monkeypatch.setattr(codegen_fmu, "QUICK", ("drive",))
     monkeypatch.setattr(ALL_SCENES["drive"], "t_end", 0.5)

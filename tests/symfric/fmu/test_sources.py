@@ -6,13 +6,14 @@ from zipfile import ZipFile
 
 import casadi as ca
 import pytest
+from backends import needs_compiler
 
 from symfric import ExactCoulomb, LuGre
 from symfric.codegen.running.compiler import WARNINGS
 from symfric.fmu import export_fmu
 from symfric.fmu.export import KINDS
 from symfric.fmu.variables import direct
-from symfric.foundation.compiler import CompileError, Compiler, find_compiler
+from symfric.foundation.compiler import CompileError, Compiler
 from symfric.foundation.parameters import Variable
 from symfric.model import Model, Output
 from symfric.scenes import Drive, Pendulum, Rabinowicz, SliderCrank
@@ -114,7 +115,7 @@ def test_a_tolerance_is_set_where_there_is_one(step, variability, tmp_path, monk
     assert ("without effect" in tolerance.doc) is (step is not None)
 
 
-@pytest.mark.skipif(find_compiler() is None, reason="compiles")
+@needs_compiler
 def test_a_broken_compiler_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("symfric.fmu.package.find_compiler", lambda: Compiler(("false",)))
     with pytest.raises(CompileError, match="false"):

@@ -4,6 +4,7 @@ import ctypes as c
 
 import numpy as np
 import pytest
+from backends import needs_compiler
 from units import DISCARD, ERROR, OK, Archive, Third, over
 
 from symfric import BrownMcPhee, LuGre, simulate
@@ -11,10 +12,9 @@ from symfric.codegen import plant_block
 from symfric.codegen.running.runner import run_vm
 from symfric.emitter.c99 import DOUBLE
 from symfric.fmu import export_fmu
-from symfric.foundation.compiler import find_compiler
 from symfric.scenes import Drive, Pendulum, SliderCrank
 
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="units are run as machine code")
+pytestmark = needs_compiler
 RTOL = 1e-9
 
 

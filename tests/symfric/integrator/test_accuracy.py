@@ -6,12 +6,12 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 import pytest
+from backends import needs_compiler
 from numpy.typing import NDArray
 from oracles import rabinowicz_brown_mcphee, rabinowicz_lugre
 from stored import stored
 
 from symfric import BrownMcPhee, Law, LuGre, Model, Variable, drive, rabinowicz, simulate
-from symfric.foundation.compiler import find_compiler
 from symfric.integrator import simulate_by_peer
 from symfric.integrator.peers.casadi_integrators import PEERS
 
@@ -22,7 +22,6 @@ LAWS: dict[str, Law] = {"brown_mcphee": BrownMcPhee(), "lugre": LuGre()}
 MODELS = {name: rabinowicz(law) for name, law in LAWS.items()}
 
 each_law = pytest.mark.parametrize("name", LAWS)
-needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 
 
 @cache

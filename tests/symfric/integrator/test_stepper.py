@@ -7,6 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from backends import BACKENDS, each_backend
 from numpy.typing import NDArray
 
 from symfric import (
@@ -22,7 +23,6 @@ from symfric import (
     simulate,
     stepper,
 )
-from symfric.foundation.compiler import find_compiler
 from symfric.integrator.running import plants
 from symfric.integrator.running.plants import SAMPLES
 from symfric.scenes import SliderCrank
@@ -30,8 +30,6 @@ from symfric.scenes import SliderCrank
 Array = NDArray[np.float64]
 LAW = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
 x, z, u = Variable("x", "m"), Variable("z", "1"), Variable("u", "N")
-BACKENDS = ["vm"] + ["compiled"] * (find_compiler() is not None)
-each_backend = pytest.mark.parametrize("backend", BACKENDS)
 
 
 def followed() -> Model:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from backends import needs_compiler
 
 import symfric.integrator.compiled.background as module
 from symfric import Trajectory, rabinowicz, simulate
@@ -20,7 +21,6 @@ from symfric.laws import BrownMcPhee
 from symfric.model import Model
 
 SOURCE = "double twice(double x) { return 2 * x; }\n"
-needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 pytestmark = [needs_compiler, pytest.mark.skipif(os.name != "posix", reason="needs a shell")]
 
 Slow = Callable[[float], None]

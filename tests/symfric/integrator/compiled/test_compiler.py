@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from backends import needs_compiler
 
 from symfric import LuGre, Status, rabinowicz, simulate
 from symfric.cli import main
@@ -21,7 +22,6 @@ from symfric.integrator.running.integrator import Integrator
 
 SOURCE = "int answer(void) { return 42; }\n"
 
-needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 needs_shell = pytest.mark.skipif(sys.platform == "win32", reason="shell scripts as compilers")
 
 

@@ -3,12 +3,12 @@
 import casadi as ca
 import numpy as np
 import pytest
+from backends import needs_compiler
 
-from symfric.foundation.compiler import find_compiler
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.derivatives.lanes import FEW, MANY, lanes_source
 
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
+pytestmark = needs_compiler
 
 
 def pushed(linked: bool) -> ca.Function:

@@ -6,12 +6,12 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 import pytest
+from backends import needs_compiler
 from closed_forms import assemble
 from numpy.typing import NDArray
 
 import symfric.integrator.equations.following as module
 from symfric import BrownMcPhee, Model, Variable, Viscous
-from symfric.foundation.compiler import find_compiler
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.following import Following, following
 from symfric.integrator.equations.initial import consistent, first_guess
@@ -19,7 +19,6 @@ from symfric.integrator.equations.system import System
 from symfric.scenes import Pendulum, PendulumBox, SliderCrank
 
 Array = NDArray[np.float64]
-needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 LAW = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
 x, z = Variable("x", "m", start=1.0), Variable("z", "1")
 

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
+from backends import needs_compiler
 from numpy.typing import NDArray
 
 from symfric import LuGre, Model, Plant, SolveError, Variable, drive, stepper
-from symfric.foundation.compiler import find_compiler
 from symfric.integrator.many import plants
 
 Array = NDArray[np.float64]
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
+pytestmark = needs_compiler
 x, z, u = Variable("x", "m"), Variable("z", "1"), Variable("u", "N")
 MEMBERS = 11
 """No multiple of the number of lanes."""

@@ -5,9 +5,9 @@ from math import asin, atan2, pi, sqrt
 import casadi as ca
 import numpy as np
 import pytest
+from backends import each_backend
 
 from symfric import Event, Model, Variable, simulate
-from symfric.foundation.compiler import find_compiler
 
 LEVELS = (-0.4, -0.35, -0.29, -0.22, -0.15, 0.05, 0.12, 0.21, 0.28, 0.35)
 SPAN = 20.0
@@ -29,15 +29,7 @@ def watched() -> Model:
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8])
-@pytest.mark.parametrize(
-    "backend",
-    [
-        "vm",
-        pytest.param(
-            "compiled", marks=pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
-        ),
-    ],
-)
+@each_backend
 def test_each_passage_is_one_event(backend: str, rtol: float) -> None:
     """Behind an event z solves its equation exactly, and once was below the level again there."""
     model = watched()

@@ -9,6 +9,7 @@ from typing import Any
 
 import casadi as ca
 import pytest
+from backends import needs_compiler
 from hybrid import ball
 
 import symfric.integrator.running.integrator as module
@@ -29,14 +30,12 @@ from symfric import (
     simulate,
     simulate_many,
 )
-from symfric.foundation.compiler import find_compiler
 from symfric.integrator.running import run
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import _March
 from symfric.laws import ALL_LAWS
 from symfric.scenes import PendulumBox, SliderCrank
 
-needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 LAW = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
 FORCE = {"force": lambda t: 12 * ca.sin(3 * t)}
 SAMPLED = {"force": Linear([0.0, 0.4, 0.9], [0.0, 15.0, -15.0])}

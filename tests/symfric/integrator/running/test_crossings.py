@@ -5,10 +5,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from backends import each_backend, needs_compiler
 from hybrid import ball
 
 from symfric import Event, Linear, MaxwellSlip, Model, Status, Variable, drive, simulate
-from symfric.foundation.compiler import find_compiler
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import ADAPTIVE
 from symfric.integrator.running.engine import CompiledEngine
@@ -17,10 +17,6 @@ from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.loop import loop_source
 from symfric.integrator.running.run import Tolerances, integrate
 
-needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
-each_backend = pytest.mark.parametrize(
-    "backend", ["vm", pytest.param("compiled", marks=needs_compiler)]
-)
 x, y = Variable("x", "m"), Variable("y", "m", start=2.0)
 X, Y = x.symbol, y.symbol
 

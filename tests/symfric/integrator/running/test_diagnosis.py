@@ -3,6 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
+from backends import each_backend
 
 from symfric import (
     BrownMcPhee,
@@ -14,21 +15,10 @@ from symfric import (
     rabinowicz,
     simulate,
 )
-from symfric.foundation.compiler import find_compiler
 
 t = ca.SX.sym("t")
 x, y = Variable("x", "m"), Variable("y", "m", start=1.0)
 X, Y = x.symbol, y.symbol
-
-each_backend = pytest.mark.parametrize(
-    "backend",
-    [
-        "vm",
-        pytest.param(
-            "compiled", marks=pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
-        ),
-    ],
-)
 
 
 def failure(model: Model, t_end: float = 2.0, **options: object) -> tuple[Status, str, Trajectory]:

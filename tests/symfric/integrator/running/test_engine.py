@@ -5,11 +5,11 @@ from concurrent.futures import ThreadPoolExecutor
 import casadi as ca
 import numpy as np
 import pytest
+from backends import needs_compiler
 from closed_forms import assemble, smooth_dae, smooth_ode, timed_ode
 from numpy.typing import NDArray
 
 from symfric import BrownMcPhee, LuGre, Model, Variable, rabinowicz
-from symfric.foundation.compiler import find_compiler
 from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
 from symfric.integrator.running.engine import CompiledEngine, Engine, Stop, VmEngine
 from symfric.integrator.running.loop import c_source, width
@@ -20,7 +20,6 @@ Array = NDArray[np.float64]
 ROWS = RODAS5P.H.shape[0]
 
 KINDS = ("vm", "compiled")
-needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 each_engine = pytest.mark.parametrize(
     "kind", ["vm", pytest.param("compiled", marks=needs_compiler)]
 )

@@ -3,6 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
+from backends import each_backend
 
 from symfric import (
     ExactCoulomb,
@@ -15,14 +16,11 @@ from symfric import (
     simulate,
     stepper,
 )
-from symfric.foundation.compiler import find_compiler
 from symfric.integrator.running.engine import VmEngine
 from symfric.model import Event
 
 x, v = Variable("x", "m", start=1.0), Variable("v", "m/s")
 z, u = Variable("z", "1"), Variable("u", "N")
-BACKENDS = ["vm"] + ["compiled"] * (find_compiler() is not None)
-each_backend = pytest.mark.parametrize("backend", BACKENDS)
 
 
 def ball(restitution: float = 0.5, terminal: bool = False) -> Model:

@@ -6,11 +6,11 @@ from math import asin, pi, sqrt
 import casadi as ca
 import numpy as np
 import pytest
+from backends import each_backend
 from hybrid import ball, coulomb_on_a_belt
 from oracles import rabinowicz_coulomb
 
 from symfric import Event, Hold, Linear, Model, Output, SolveError, Status, Variable, simulate
-from symfric.foundation.compiler import find_compiler
 from symfric.integrator.equations.inputs import Input
 
 G = 9.81
@@ -20,16 +20,6 @@ FALL = sqrt(2 / G)
 t = ca.SX.sym("t")
 x, y = Variable("x", "m"), Variable("y", "m", start=2.0)
 X, Y = x.symbol, y.symbol
-
-each_backend = pytest.mark.parametrize(
-    "backend",
-    [
-        "vm",
-        pytest.param(
-            "compiled", marks=pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
-        ),
-    ],
-)
 
 
 def clock(*events: Event, rate: float = 1.0) -> Model:

@@ -7,6 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from backends import needs_compiler
 from numpy.typing import NDArray
 
 import symfric.integrator.running.run as module
@@ -22,12 +23,10 @@ from symfric import (
     rabinowicz,
     simulate,
 )
-from symfric.foundation.compiler import find_compiler
 from symfric.integrator.running.record import Run
 from symfric.scenes import PendulumBox
 
 Array = NDArray[np.float64]
-needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 each_engine = pytest.mark.parametrize(
     "backend", ["vm", pytest.param("compiled", marks=needs_compiler)]
 )

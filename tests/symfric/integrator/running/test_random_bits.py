@@ -6,6 +6,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from backends import needs_compiler
 from numpy.typing import NDArray
 
 import symfric.integrator.running.loop as loop
@@ -23,7 +24,6 @@ from symfric import (
     drive,
     simulate,
 )
-from symfric.foundation.compiler import find_compiler
 
 Array = NDArray[np.float64]
 CASES = 150
@@ -77,7 +77,7 @@ def drawn(rng: np.random.Generator) -> tuple[float, dict[str, Any]]:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
+@needs_compiler
 def test_random_runs_have_the_same_bits_by_both_engines(monkeypatch: pytest.MonkeyPatch) -> None:
     """However many attempts, rows and bytes they may take before somebody looks."""
     rng = np.random.default_rng(10)

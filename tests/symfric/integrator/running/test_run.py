@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from backends import each_backend
 
 import symfric.integrator.running.run as module
 from symfric import (
@@ -18,21 +19,10 @@ from symfric import (
     rabinowicz,
     simulate,
 )
-from symfric.foundation.compiler import find_compiler
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.running.integrator import Integrator
 
 x = Variable("x", "m", start=1.0)
-
-each_backend = pytest.mark.parametrize(
-    "backend",
-    [
-        "vm",
-        pytest.param(
-            "compiled", marks=pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
-        ),
-    ],
-)
 
 
 @each_backend

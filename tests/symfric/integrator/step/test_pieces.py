@@ -4,9 +4,8 @@ import ctypes
 
 import casadi as ca
 import numpy as np
-import pytest
+from backends import needs_compiler
 
-from symfric.foundation.compiler import find_compiler
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.step.pieces import all_macros, routine
 
@@ -28,7 +27,7 @@ def blocks() -> ca.Function:
     return ca.Function("whole", [x, d], [ends, ca.dot(first, second)])
 
 
-@pytest.mark.skipif(find_compiler() is None, reason="compiles")
+@needs_compiler
 def test_calls_have_the_bits_of_the_virtual_machine():
     whole = blocks()
     text = routine(whole, "whole")
