@@ -253,8 +253,11 @@ def show_trajectory(law: str, trajectory: Trajectory) -> None:
     )
     if mechanism:
         show_books(trajectory)
+    ended = trajectory.message
+    if not trajectory.status.ok:
+        ended = f"{trajectory.status.name}: the last line says why."
     output.show(
-        f"{trajectory.message}\n{s.method} ({s.backend}): {s.steps} steps, "
+        f"{ended}\n{s.method} ({s.backend}): {s.steps} steps, "
         f"{s.rejections} rejected, built in {s.build_time + s.compile_time:.2f} s, "
         f"run in {s.run_time:.2f} s\n"
     )

@@ -23,6 +23,7 @@ from symfric.foundation.numeric import Scalar, is_symbolic
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import at_start, stacked, symbols_of
 from symfric.laws.composed.isotropic import SpatialSlip
+from symfric.laws.names import law_name
 from symfric.model import Contact, Model, Monitor, Output, Variables, kinds
 from symfric.model.holonomic import Holonomic, Inner
 from symfric.model.sketch import Sketch
@@ -292,19 +293,23 @@ def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[s
 
 
 def _advice(bristles: Sequence[Slip]) -> str:
-    """What to write instead of laws whose bristles keep the deflection of a larger load; once."""
+    """What to write instead of laws whose bristles keep the deflection of a larger load; once.
+
+    The load under which nothing changes is the least of those at the start: in all joints bristles
+    are then no softer than they were.
+    """
     if not bristles:
         return ""
-    laws = dict.fromkeys(type(s.contact.friction.law).__name__ for s in bristles)
+    laws = {type(s.contact.friction.law).__name__: s.contact.friction.law for s in bristles}
     joints = dict.fromkeys(s.contact.joint for s in bristles)
-    name, load = next(iter(laws)), float(at_start(bristles[0].unknown[0].start, ()))
-    load = float(f"{max(load, 1.0):.2g}")
+    name, law = next(iter(laws.items()))
+    least = min(float(at_start(s.unknown[0].start, ())) for s in bristles)
+    load = f"{float(f'{max(least, 1.0):.2g}'):g}"
     return (
         f"bristles of {', '.join(laws)} in joint{'s' * (len(joints) > 1)} {listed(joints)} keep "
-        "the deflection of a larger load, and the equations stiffen without bound as the load "
-        f"falls: write LoadNormalised({name}(...), N_0={load:g}) for {name}(...), the "
-        "same under that load, whose deflection follows none (load_normalised(...) on the command "
-        "line)"
+        "the deflection of a larger load and stiffen without bound as it falls: write "
+        f"LoadNormalised({name}(...), N_0={load}) for {name}(...), the same at {load} N "
+        f"(--law 'load_normalised({law_name(law)})' --set N_0={load})"
     )
 
 

@@ -37,14 +37,15 @@ def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> t
         (Status.SINGULAR, _singular(integrator, y, d, h)),
     ):
         if cause:
-            helps = status is Status.JAMMED or "algebraic equations" in cause
-            return status, f"{where}: {cause}{_advice(integrator) if helps else ''}"
+            if status is Status.JAMMED and _advice(integrator):
+                cause = f"{cause}; {_advice(integrator)}"
+            return status, f"{where}: {cause}"
     fastest = system.names[int(np.argmax(np.abs(f[: system.nx]) / system.nominal))]
+    guess = "a discontinuity is near, give the law a smooth form or the model an event there"
     return (
         Status.STEP_TOO_SMALL,
-        f"{where}: the step fell to {h:.1e} s, fastest equation {fastest}; a discontinuity is "
-        f"near, give the law a smooth form or the model an event there{_coarse(t)}"
-        + _advice(integrator),
+        f"{where}: the step fell to {h:.1e} s, fastest equation {fastest}; "
+        f"{_advice(integrator) or guess}{_coarse(t)}",
     )
 
 
@@ -58,7 +59,7 @@ def _coarse(t: float) -> str:
 def _advice(integrator: Integrator) -> str:
     """What a mechanism says about friction without a solution."""
     mechanics = integrator.model.holonomic
-    return f"; {mechanics.advice}" if mechanics is not None and mechanics.advice else ""
+    return "" if mechanics is None else mechanics.advice
 
 
 def _dead_centre(system: System, y: Array, d: Array) -> str:
@@ -141,9 +142,10 @@ def _singular(integrator: Integrator, y: Array, d: Array, h: float) -> str:
     try:
         consistent(system, "", y, d)
     except ValueError:
+        guess = "the configuration is singular or jams there"
         return (
             f"the algebraic equations for {names} have no solution near their last one; "
-            "the configuration is singular or jams there"
+            f"{_advice(integrator) or guess}"
         )
     return ""
 
