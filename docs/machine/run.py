@@ -1,12 +1,13 @@
 """Run the blocks of a page in a folder: `python -m docs.machine.run PAGE FOLDER`."""
 
+import ast
 import os
 import shlex
 import subprocess
 import sys
 import traceback
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -15,16 +16,30 @@ from docs.machine.pages import ROOT, Block, blocks, commands
 from symfric.cli.app import main as symfric
 
 
-def run(page: Iterable[Block], name: str) -> Iterator[tuple[str, str, str]]:
+def run(
+    page: Iterable[Block],
+    name: str,
+    changed: ast.NodeTransformer | None = None,
+    known: Mapping[str, object] | None = None,
+) -> Iterator[tuple[str, str, str]]:
     """Run the blocks of a page; each piece of code with what it printed and what the page says.
 
     Code that the page gives no output for has "" there, and prints nothing if it is Python.
+
+    Args:
+        page: its blocks.
+        name: of the page, in tracebacks.
+        changed: what is done to its Python before it runs; as it is by default.
+        known: names that its Python finds there.
     """
-    names: dict[str, object] = {"__name__": "__main__"}
+    names: dict[str, object] = {"__name__": "__main__", **(known or {})}
     for block in page:
         if block.language == "python":
             printed = StringIO()
-            code = compile("\n" * block.line + block.body, name, "exec")
+            tree = ast.parse("\n" * block.line + block.body, name)
+            if changed is not None:
+                tree = ast.fix_missing_locations(changed.visit(tree))
+            code = compile(tree, name, "exec")
             with redirect_stdout(printed):
                 exec(code, names)
             yield block.body, printed.getvalue(), block.prints or ""

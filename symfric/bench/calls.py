@@ -24,7 +24,7 @@ from symfric.integrator.equations.inputs import Hold, input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.peers.casadi_integrators import peer
 from symfric.integrator.running.run import Tolerances
-from symfric.integrator.simulate import FOR_DERIVATIVES, simulate
+from symfric.integrator.simulate import simulate
 from symfric.integrator.stepper import stepper
 from symfric.laws import GMS, BrownMcPhee, Law, LuGre, MaxwellSlip
 from symfric.laws.dynamic.gms import Element
@@ -219,7 +219,7 @@ def _gradient(quick: bool) -> Iterator[CallRow]:
     def run(rtol: float = RTOL, sensitivities: tuple[str, ...] = FREE) -> Trajectory:
         return simulate(
             model, 20.0, rtol=rtol, t_eval=times, sensitivities=sensitivities, backend=_backend(),
-            method=FOR_DERIVATIVES,
+            method="radau5",
         )  # fmt: skip
 
     def slopes(rtol: float = RTOL) -> Array:

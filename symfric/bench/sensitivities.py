@@ -17,7 +17,7 @@ from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.peers.casadi_integrators import peer
 from symfric.integrator.running.run import Tolerances
-from symfric.integrator.simulate import FOR_DERIVATIVES, simulate
+from symfric.integrator.simulate import simulate
 from symfric.laws import Law
 from symfric.model import Model
 from symfric.results.trajectory import Trajectory
@@ -106,7 +106,7 @@ def _time(call: Call) -> tuple[float, Array]:
 def _ours(model: Model, backend: str, names: tuple[str, ...], rtol: float = RTOL) -> Trajectory:
     return simulate(
         model, T_END, x0={"v": V}, rtol=rtol, t_eval=[T_END], backend=backend, sensitivities=names,
-        method=FOR_DERIVATIVES,
+        method="radau5",
     )  # fmt: skip
 
 

@@ -91,6 +91,7 @@ def simulate_by_peer(
             build_time=built_at - begin if fresh else 0.0,
             compile_time=0.0,
             run_time=run_time,
+            sensitivity_errors={},
             **counts,
         )
 

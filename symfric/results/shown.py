@@ -1,5 +1,6 @@
 """How runs show themselves: how they ended, and a table of their signals."""
 
+from math import isfinite
 from typing import TYPE_CHECKING
 
 from symfric.foundation.shown import Shown, Table, among, counted
@@ -26,6 +27,7 @@ def shown(run: "Trajectory") -> Shown:
         *([f"friction: {rubbing}"] if rubbing else []),
         f"{run.status.name}: {run.message}",
         f"{took}{happened}, {counted(run.t.size, 'time')} in t",
+        *_measured(run),
     ]
     after = [] if known else [f"least and greatest at {run.t.size} times; see extremes"]
     if "further" in run.model.__dict__ and run.details:
@@ -40,6 +42,16 @@ def shown(run: "Trajectory") -> Shown:
         ),
         tuple(after),
     )
+
+
+def _measured(run: "Trajectory") -> list[str]:
+    """What was measured of its errors."""
+    counts = run.statistics
+    if not isfinite(counts.error):
+        return []
+    slopes = among(f"{name} {x:.0e}" for name, x in counts.sensitivity_errors.items())
+    derivatives = f", of derivatives by {slopes}" if slopes else ""
+    return [f"measured error: {counts.error:.0e}{derivatives}"]
 
 
 def _rows(run: "Trajectory", known: bool) -> list[tuple[str, ...]]:

@@ -1,6 +1,7 @@
 """What a simulation cost."""
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 
@@ -19,6 +20,8 @@ class Statistics:
         build_time, compile_time, run_time: wall time [s] for making the integrator (0 where it is
             reused), compiling it, and running it.
         error: measured error relative to each state's magnitude, the largest; NaN if not asked for.
+        sensitivity_errors: measured error of derivatives by each name that was asked for, relative
+            to the largest value of each state's derivative, the largest; NaN where there is none.
     """
 
     backend: str
@@ -34,7 +37,8 @@ class Statistics:
     compile_time: float
     run_time: float
     error: float = float("nan")
+    sensitivity_errors: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def to_dict(self) -> dict[str, Any]:
-        """The fields by name; an error that was not measured is left out."""
-        return {k: v for k, v in asdict(self).items() if v == v}
+        """The fields by name; errors that were not measured are left out."""
+        return {k: v for k, v in asdict(self).items() if v == v and v != {}}

@@ -77,6 +77,10 @@ CONTROLLERS = (
         "REACH = 4.0", "REACH = 400.0", T_WATCH,
     ),
     Mutant(
+        "steps that are differentiated leap over the steep part of friction", WATCH,
+        "REACH / self.finer", "REACH", ("tests/symfric/integrator/test_measured.py",),
+    ),
+    Mutant(
         "a step that turns back within is not seen to travel", WATCH,
         "bow = ca.fabs(half - (before + after) / 2)", "bow = 0 * half", T_WATCH,
     ),
@@ -275,7 +279,7 @@ CACHES = (
     ),
     Mutant(
         "one integrator for all methods", BUILT,
-        "key = (method.name, inputs.key)", "key = (inputs.key,)", T_BUILT,
+        "key = (method.name, method.finer, inputs.key)", "key = (inputs.key,)", T_BUILT,
     ),
     Mutant(
         "the processor is left out of the hash", COMPILED,

@@ -51,6 +51,8 @@ class Method(ABC):
         dense: order of the dense output for ODEs; 0 where there is none.
         dense_dae: order of the dense output for index-1 DAEs.
         H: dense output from the stages, shape (r, s).
+        finer: how many times shorter than usual the ways are that a sliding velocity may go near
+            rest in one step (`step.watch`).
         source: where the coefficients are from.
     """
 
@@ -60,6 +62,7 @@ class Method(ABC):
     dense: int = 0
     dense_dae: int = 0
     H: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    finer: float = 1.0
     source: str
 
     @property

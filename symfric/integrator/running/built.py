@@ -19,7 +19,7 @@ def built(model: Model, inputs: InputData, method: Method) -> tuple[Integrator, 
     keep both alive for ever.
     """
     known: dict[Hashable, Integrator] = model.memory.setdefault("integrators", {})
-    key = (method.name, inputs.key)
+    key = (method.name, method.finer, inputs.key)
     found = known.get(key)
     if found is not None:
         return found, False

@@ -6,11 +6,13 @@ across that scale without a look: friction that acts near rest only, a peak with
 behind it, leaves no trace in a step that leaps over it. No stage falls on the peak, no error is
 estimated, and a block that should have been caught goes on. Whatever the estimate says,
 
-    travel <= REACH (w + nearest)
+    travel <= REACH (w + nearest) / finer
 
 holds for every step, `nearest` being its least |s|, or 0 where s changes sign: steps shrink
 geometrically on the way to rest and cross it in steps of a few w. The parabola through both ends
-and the middle of the dense output serves for s. A model without monitors has none of this.
+and the middle of the dense output serves for s. A method whose steps are differentiated is
+`finer`: the derivative of friction, a peak of width w, has to be seen by several stages, while the
+state only asks for its integral. A model without monitors has none of this.
 """
 
 from collections.abc import Callable
@@ -40,6 +42,7 @@ class Watch:
         nominal: their typical magnitudes.
         change: (y, direction, d) -> what a change of y does to them, to first order.
         slips: how many of them, the first ones, are sliding velocities.
+        finer: how many times shorter their ways near rest are than usual.
     """
 
     before: Any
@@ -48,6 +51,7 @@ class Watch:
     nominal: Any
     change: ca.Function
     slips: int
+    finer: float = 1.0
 
     def error(self, y: Any, error: Any, d: Any, rtol: Any) -> Any:
         """Mean square sum of what an error of y makes of them, in units of rtol.
@@ -67,11 +71,11 @@ class Watch:
         )
         bow = ca.fabs(half - (before + after) / 2)
         nearest = ca.fmax(0, ca.fmax(ca.fmin(before, after), -ca.fmax(before, after)) - bow)
-        return ca.mmax((ca.fabs(after - before) + bow) / (REACH * (scale + nearest)))
+        return ca.mmax((ca.fabs(after - before) + bow) / (REACH / self.finer * (scale + nearest)))
 
 
-def watching(system: System) -> Callable[[Any, Trial, Any], Watch] | None:
-    """(y, trial, d) -> what is watched over it; None where nothing is."""
+def watching(system: System, finer: float = 1.0) -> Callable[[Any, Trial, Any], Watch] | None:
+    """(y, trial, d) -> what is watched over it, so many times `finer`; None where nothing is."""
     if not system.monitors.numel():
         return None
     direction = ca.SX.sym("direction", system.n)
@@ -83,6 +87,7 @@ def watching(system: System) -> Callable[[Any, Trial, Any], Watch] | None:
     def watch(y: Any, trial: Trial, d: Any) -> Watch:
         bend = sum((0.5**k * row for k, row in enumerate(trial.dense)), start=type(y)(0))
         half = value((y + trial.end) / 2 + bend / 4, d) if system.slips else type(y)(0)
-        return Watch(value(y, d), half, value(trial.end, d), nominal(d), change, system.slips)
+        ends = value(y, d), half, value(trial.end, d)
+        return Watch(*ends, nominal(d), change, system.slips, finer)
 
     return watch
