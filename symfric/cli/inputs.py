@@ -111,7 +111,10 @@ def read_column(path: Path, column: str, unit: str) -> Linear:
     names = (column, column.partition("[")[0].strip())
     table = read_table(
         path,
-        {"t": Column(("t", "time"), "s", assumed=True), column: Column(names, unit, assumed=True)},
+        {
+            "t": Column(("t", "time", "Time"), "s", assumed=True),
+            column: Column(names, unit, assumed=True),
+        },
     )
     try:
         return Linear(table.columns["t"], table.columns[column])

@@ -19,15 +19,21 @@ Rows = list[tuple[int, list[str]]]
 """Row number in the file, cells."""
 
 FACTORS: dict[str, dict[str, float]] = {
-    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6},
+    "s": {
+        "s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0,
+        "a": 365.25 * 86400.0, "yr": 365.25 * 86400.0,
+    },
     "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6},
     "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
     "m/s": {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "µm/s": 1e-6},
     "N m": {"N m": 1.0, "Nm": 1.0, "mN m": 1e-3, "mNm": 1e-3, "kN m": 1e3, "kNm": 1e3},
-    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180},
-    "rad/s": {"rad/s": 1.0, "deg/s": pi / 180},
-}
-"""Units a column may have and their factors, by SI unit; of other units only the unit itself."""
+    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180, "°": pi / 180, "rev": 2 * pi},
+    "rad/s": {"rad/s": 1.0, "deg/s": pi / 180, "rpm": pi / 30},
+}  # fmt: skip
+"""Units a column may have and their factors, by SI unit; of other units only the unit itself.
+
+A rate may have any length or angle over any time, such as mm/a.
+"""
 
 
 @final
@@ -65,14 +71,14 @@ class Table:
 def read_table(file: Path, wanted: Mapping[str, Column]) -> Table:
     """The columns `wanted` of a CSV file.
 
-    Comma, semicolon or tab separates the cells; numbers have a decimal point. Other columns are
-    left out.
+    Comma, semicolon or tab separates the cells; numbers may have a decimal comma where commas do
+    not separate. Other columns are left out.
 
     Raises:
         ValueError: all problems of the header, or of the cells, at once, each with its place.
         OSError: the file cannot be read.
     """
-    rows = _rows(file)
+    rows, delimiter = _rows(file)
     header = [cell.strip() for cell in rows[0][1]]
     found = _places(file.name, header, wanted)
     columns: dict[str, Array] = {}
@@ -81,10 +87,10 @@ def read_table(file: Path, wanted: Mapping[str, Column]) -> Table:
     if long:
         problems.append(
             f"row {long[0][0]}: expected {len(header)} cells as in the header, got "
-            f"{len(long[0][1])}; write numbers with a decimal point"
+            f"{len(long[0][1])}" + "; write numbers with a decimal point" * (delimiter == ",")
         )
     for key, (index, factor) in found.items():
-        cells, bad = _numbers(rows[1:], index)
+        cells, bad = _numbers(rows[1:], index, "." if delimiter == "," else ",")
         columns[key] = factor * cells
         if bad:
             problems.append(f"column '{header[index]}', {bad}")
@@ -97,8 +103,8 @@ def _refuse(name: str, problems: Sequence[str]) -> None:
         raise ValueError(f"read '{name}': " + "; ".join(problems))
 
 
-def _rows(file: Path) -> Rows:
-    """Non-empty rows with their number in the file, the header first."""
+def _rows(file: Path) -> tuple[Rows, str]:
+    """Non-empty rows with their number in the file, the header first, and what separates cells."""
     if not file.exists():
         raise ValueError(f"read '{file}': expected a file, got nothing there; check the path")
     if not file.is_file():
@@ -122,7 +128,7 @@ def _rows(file: Path) -> Rows:
             f"read '{file.name}': expected a header such as 't [s], x [m], force [N]', "
             "got an empty file"
         )
-    return rows
+    return rows, delimiter
 
 
 def _places(
@@ -139,14 +145,15 @@ def _places(
             twice = ", ".join(f"'{header[i]}'" for i in hits)
             problems.append(f"expected one column for {key}, got {twice}")
         elif hits:
-            factors = FACTORS.get(column.unit, {column.unit: 1.0})
             given = labels[hits[0]][1] or (column.unit if column.assumed else "")
-            if given in factors:
-                found[key] = hits[0], factors[given]
+            factor = _factor(column.unit, given)
+            if factor is not None:
+                found[key] = hits[0], factor
             else:
+                taken = ", ".join(_known(column.unit))
                 problems.append(
-                    f"column '{header[hits[0]]}': expected a unit of {', '.join(factors)} "
-                    f"in brackets, got {given or 'none'}"
+                    f"column '{header[hits[0]]}': expected a unit of {taken} in brackets, "
+                    f"got {given or 'none'}"
                 )
         elif column.needed:
             example = next(iter(names))
@@ -158,19 +165,32 @@ def _places(
     return found
 
 
+def _known(si: str) -> Mapping[str, float]:
+    return FACTORS.get(si, {si: 1.0})
+
+
+def _factor(si: str, given: str) -> float | None:
+    """What numbers in the unit `given` are multiplied by to be in `si`; None for another unit."""
+    if given in _known(si):
+        return _known(si)[given]
+    above, _, below = map(str.strip, given.partition("/"))
+    of, over = FACTORS.get(si.removesuffix("/s"), {}), FACTORS["s"]
+    return of[above] / over[below] if si.endswith("/s") and above in of and below in over else None
+
+
 def _label(cell: str) -> tuple[str, str]:
     """Name and unit of a header cell such as `x [mm]`."""
     match = fullmatch(r"(.*?)\s*\[(.*)\]", cell)
     return (match[1], match[2].strip().replace("μ", "µ")) if match else (cell, "")
 
 
-def _numbers(rows: Rows, index: int) -> tuple[Array, str]:
+def _numbers(rows: Rows, index: int, decimal: str) -> tuple[Array, str]:
     """One column as numbers, and a sentence about its first bad cell, if any."""
     values = np.full(len(rows), np.nan)
     for k, (number, row) in enumerate(rows):
         cell = row[index].strip() if index < len(row) else ""
         try:
-            values[k] = float(cell)
+            values[k] = float(cell.replace(decimal, "."))
         except ValueError:
             return values, f"row {number}: expected a number, got '{cell[:40]}'"
     return values, ""

@@ -25,17 +25,41 @@ def test_units_become_si_and_other_columns_are_left_out(tmp_path: Path) -> None:
         assert factors[unit] == 1.0
 
 
+def test_recorders_of_years_and_of_decimal_commas(tmp_path: Path) -> None:
+    text = "t [a];F [kN]\n0;1,5\n0,5;2.5\n"
+    assert table(tmp_path, text) == {"t": [0.0, 15778800.0], "F": [1500.0, 2500.0]}
+
+
+@pytest.mark.parametrize(
+    ("unit", "text", "factor"),
+    [
+        ("m/s", "mm/a", 1e-3 / 31557600),
+        ("m/s", "m/min", 1 / 60),
+        ("rad/s", "°/s", np.pi / 180),
+        ("rad/s", "rev/min", np.pi / 30),
+        ("rad/s", "rpm", np.pi / 30),
+    ],
+)
+def test_a_rate_is_a_length_over_a_time(
+    tmp_path: Path, unit: str, text: str, factor: float
+) -> None:
+    (tmp_path / "a.csv").write_text(f"v [{text}]\n2\n", encoding="utf-8")
+    found = read_table(tmp_path / "a.csv", {"v": Column(("v",), unit)})
+    assert found.columns["v"][0] == pytest.approx(2 * factor, rel=1e-15)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("", "read 'a.csv': expected a header such as 't [s], x [m], force [N]', got an empty"),
-        ("F,t\n1,2\n", "column 't': expected a unit of s, ms, us, µs in brackets, got none"),
+        ("F,t\n1,2\n", "column 't': expected a unit of s, ms, us, µs, min, h, d, a, yr in"),
         ("F [m],t [s]\n", "column 'F [m]': expected a unit of N, mN, kN in brackets, got m"),
         ("F,force,t [s]\n", "expected one column for F, got 'F', 'force'"),
         ("x,t [s]\n", "expected a column 'F [N]', got x, t [s]; check the header"),
         ("F,t [s]\n1,2\n1,2,5,3\n", "row 3: expected 2 cells as in the header, got 4; write numb"),
         ("F,t [s]\n1\n", "column 't [s]', row 2: expected a number, got ''"),
-        ("F;t [s]\n1,5;2\n", "column 'F', row 2: expected a number, got '1,5'"),
+        ("F;t [s]\n1,5,0;2\n", "column 'F', row 2: expected a number, got '1,5,0'"),
+        ("F [N/s];t [m]\n1;2\n", "column 't [m]': expected a unit of s, ms"),
         (f"F,t [s]\n{'1' * 200_000},2\n", "expected rows of short cells, got field larger than"),
     ],
 )
