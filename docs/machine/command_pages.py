@@ -29,7 +29,7 @@ def page() -> str:
 
 def section(name: str, command: Any) -> str:
     """One command."""
-    text = rst.title(f"symfric {name}", "-")
+    text = f".. _symfric-{name}:\n\n" + rst.title(f"symfric {name}", "-")
     positional, named = arguments(command), [p for p in command.params if is_option(p)]
     words = [argument_shown(p) for p in positional]
     text += rst.literal(" ".join([f"symfric {name}", *words, "[OPTIONS]"]), "text")

@@ -52,9 +52,19 @@ def make(say: Callable[[str], None]) -> list[str]:
     if not changed:
         return []
     say(f"computing {len(changed)} figures of the papers{' at reduced size' * quick()}")
-    done = render(FOLDER, changed, quick=quick())
+    told = {0}
+
+    def tell(fraction: float) -> None:
+        tenths = int(10 * fraction)
+        if tenths not in told:
+            told.add(tenths)
+            say(f"{10 * tenths} % of the figures")
+
+    done = render(FOLDER, changed, quick=quick(), progress=tell)
     good = {n: k for n, k in now.items() if n not in changed or n in done.records}
     KEYS.write_text(json.dumps(good, indent=1))
+    if done.left:
+        raise KeyboardInterrupt  # which `render` takes, keeping what is done
     return [f"gallery '{name}': {why}" for name, why in done.failures.items()]
 
 
@@ -124,7 +134,7 @@ def page(record: Mapping[str, Any]) -> str:
     }
     for name, words in said.items():
         text += f"**{name}.** {sentence(words, linked)}\n\n"
-    if record["checked"]:
+    if record.get("checked"):
         text += "Checked on the numbers below whenever this figure is computed:\n\n"
         text += "".join(f"* {sentence(claim, linked)}\n" for claim in record["checked"]) + "\n"
     rows = [[rst.plain(name), f"{value:.6g}"] for name, value in record["numbers"].items()]

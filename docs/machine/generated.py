@@ -10,8 +10,10 @@ from docs.machine import (
     drawing,
     example_pages,
     gallery_pages,
+    interop_page,
     law_pages,
     limit_pages,
+    literature_pages,
     rst,
     scene_pages,
 )
@@ -27,6 +29,7 @@ def make_all(say: Callable[[str], None]) -> list[str]:
     write("examples", example_pages.pages())
     write("reference", reference())
     write("benchmarks", {"index": bench_pages.page()})
+    interop_page.write()
     failed += gallery_pages.make(say)
     write("gallery", gallery_pages.pages())
     return failed
@@ -39,7 +42,12 @@ def reference() -> dict[str, str]:
     text += "Every public name, from its docstring.\n\n"
     text += rst.table(["module", "what it is for"], api_pages.index_rows())
     text += rst.pages(found, hidden="")
-    return found | {"python": text, "commands": command_pages.page(), "limits": limit_pages.page()}
+    return found | {
+        "python": text,
+        "commands": command_pages.page(),
+        "limits": limit_pages.page(),
+        "literature": literature_pages.page(),
+    }
 
 
 def write(room: str, pages: dict[str, str]) -> None:

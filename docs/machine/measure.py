@@ -1,23 +1,28 @@
 """Measure a subject and store it for the page of benchmarks: `python -m docs.machine.measure ivp`.
 
 What `symfric bench SUBJECT` prints is kept as tables in `docs/benchmarks/SUBJECT.json`, with
-machine, versions, date and commit; the page is made of these files alone. Measure on a machine that
-does nothing else; `--quick` takes fewer points, and the page says so.
+machine, load, versions, date and commit; the pages are made of these files alone. Measure on a
+machine that does nothing else; what else ran is told by the load, the mean number of processes that
+wanted a processor, before and after. `--quick` takes fewer points, and the page says so.
 """
 
 import json
+import os
 import platform
 import subprocess
 import sys
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from datetime import date
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 from docs.machine.pages import DOCS, ROOT
 from symfric import bench
 from symfric.cli import bench_tables, output
+from symfric.cli.bench import SUBJECTS
 from symfric.foundation.files import write_text
 
 STORED = DOCS / "benchmarks"
@@ -35,45 +40,80 @@ def machine() -> str:
     return ", ".join(parts)
 
 
+def others() -> list[str]:
+    """Versions of what subjects compare with, where it is installed."""
+    found: list[str] = []
+    for name in ("numpy", "scipy", "rockit-meco", "do-mpc", "exudyn"):
+        with suppress(PackageNotFoundError):
+            found.append(f"{name} {version(name)}")
+    return found
+
+
+def commit() -> str:
+    """The commit that is measured; says so where the code was changed since."""
+    ask = ["git", "rev-parse", "--short", "HEAD"]
+    head = subprocess.run(ask, cwd=ROOT, capture_output=True, text=True, check=True)
+    ask = ["git", "status", "--porcelain", "symfric", "ocp", "identification"]
+    changed = subprocess.run(ask, cwd=ROOT, capture_output=True, text=True, check=True)
+    return head.stdout.strip() + " with changes" * bool(changed.stdout.strip())
+
+
+def result_of(subject: str, quick: bool) -> Any:
+    """What `symfric bench SUBJECT` measures."""
+    if subject == "jitter":
+        from symfric.bench.jitter import SCALES, jitter  # noqa: PLC0415
+
+        return jitter(SCALES[1::2] if quick else SCALES)
+    return getattr(bench, f"bench_{subject}")(quick=quick)
+
+
 def measured(subject: str, quick: bool) -> dict[str, Any]:
     """The tables that `symfric bench SUBJECT` prints, with what they were measured on."""
     tables: list[dict[str, Any]] = []
 
-    def keep(columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str = "") -> None:
-        shown = [[c if isinstance(c, str) else output.number(c) for c in row] for row in rows]
+    def keep(
+        columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str = "", digits: int = 6
+    ) -> None:
+        shown = [[c if isinstance(c, str) else output.number(c, digits) for c in r] for r in rows]
         if shown:
             tables.append({"title": title, "columns": list(columns), "rows": shown})
 
-    result = getattr(bench, f"bench_{subject}")(quick=quick)
+    loads, began = [os.getloadavg()[0]], perf_counter()
+    result = result_of(subject, quick)
+    loads.append(os.getloadavg()[0])
+    spent = perf_counter() - began
     printed, output.show_table = output.show_table, keep
     try:
         getattr(bench_tables, subject)(result)
     finally:
         output.show_table = printed
-    ask = ["git", "rev-parse", "--short", "HEAD"]
-    commit = subprocess.run(ask, cwd=ROOT, capture_output=True, text=True, check=True)
     return {
         "title": subject.capitalize(),
         "about": "",
         "command": f"symfric bench {subject}{' --quick' * quick}",
         "date": date.today().isoformat(),
-        "commit": commit.stdout.strip(),
-        "machine": machine(),
+        "commit": commit(),
+        "machine": ", ".join([machine(), *others()]),
+        "load": " to ".join(f"{load:.1f}" for load in loads),
+        "seconds": round(spent),
         "tables": tables,
     }
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Measure what is named and store it; title and words that are there stay."""
+    """Measure what is named and store it; title, words and what was condensed by hand stay."""
     quick, subjects = "--quick" in arguments, [a for a in arguments if a != "--quick"]
+    unknown = [subject for subject in subjects if subject not in SUBJECTS]
+    if unknown or not subjects:
+        print(f"measure: expected some of {', '.join(SUBJECTS)}, got {' '.join(unknown) or 'none'}")
+        return 2
     for subject in subjects:
         path = STORED / f"{subject}.json"
         found = measured(subject, quick)
-        if path.exists():
-            before = json.loads(path.read_text("utf-8"))
-            found |= {"title": before["title"], "about": before["about"]}
+        before = json.loads(path.read_text("utf-8")) if path.exists() else {}
+        found |= {key: before[key] for key in ("title", "about", "short") if key in before}
         write_text(path, json.dumps(found, indent=1, ensure_ascii=False) + "\n")
-        print(f"wrote {path}")
+        print(f"wrote {path} after {found['seconds']} s")
     return 0
 
 

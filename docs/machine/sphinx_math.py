@@ -16,11 +16,17 @@ SIZED = re.compile(r"\\[bB]igg?[lrm]?(?![A-Za-z])")
 ACCENTED = re.compile(r"(\\(?:d?dot|hat|bar|tilde|vec)\s*(?:\{[^{}]*\}|[A-Za-z]))_")
 
 
+BAR = '<mo stretchy="false">|</mo>'
+"""The bar of an absolute value, which browsers take for a sign between two things, with blanks."""
+BARS = re.compile(r"\\[lr]vert(?![A-Za-z])\s?")
+
+
 def mathml(node: nodes.Element, as_block: bool) -> str:
     """A formula as MathML; a subscript stands beside its letter, also below a dot."""
     formula = SIZED.sub("", ACCENTED.sub(r"\1{}_", node.astext())).replace(r"\dots", r"\ldots")
     try:
-        return str(tex2mathml(formula, as_block=as_block))
+        found = str(tex2mathml(BARS.sub("|", formula), as_block=as_block))
+        return found.replace(BAR, BAR.replace(">", ' lspace="0" rspace="0">', 1))
     except MathError as error:
         log.warning("formula %r: %s", node.astext(), error, location=node)
         return f"<code>{escape(node.astext())}</code>"

@@ -1,6 +1,7 @@
 """Pages of the documentation: pictures that blocks make, and pages made of the code itself."""
 
 import re
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from sphinx.util import logging
 from docs.machine.docstrings import to_rst
 from docs.machine.generated import make_all
 from docs.machine.making import MADE, make_page_pictures, place
+from docs.machine.mentioned import link
 from docs.machine.names import known, linked
 from docs.machine.pages import DOCS, PICTURE
 
@@ -20,8 +22,13 @@ log = logging.getLogger(__name__)
 def make(app: Any) -> None:
     """Before any page is read: make what they show."""
     del app
-    for sentence in [*make_page_pictures(log.info), *make_all(log.info)]:
+    for sentence in [*make_page_pictures(say), *make_all(say)]:
         log.warning(sentence)
+
+
+def say(sentence: str) -> None:
+    """A line on the error stream at once: Sphinx is told to be quiet, the long work is not."""
+    print(f"docs: {sentence}", file=sys.stderr, flush=True)
 
 
 def show_made(app: Any, name: str, content: list[str]) -> None:
@@ -77,6 +84,7 @@ def setup(app: Any) -> dict[str, bool]:
     MADE.mkdir(exist_ok=True)
     app.connect("builder-inited", make)
     app.connect("source-read", show_made)
+    app.connect("doctree-read", link)
     app.connect("autodoc-process-docstring", as_rst)
     app.connect("missing-reference", find_type)
     app.connect("build-finished", forget)

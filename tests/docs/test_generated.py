@@ -4,9 +4,18 @@ from pathlib import Path
 
 import pytest
 
-from docs.machine import bench_pages, command_pages, example_pages, law_pages, limit_pages
+from docs.machine import (
+    bench_pages,
+    command_pages,
+    example_pages,
+    interop_page,
+    law_pages,
+    limit_pages,
+    literature_pages,
+)
 from docs.machine.api_pages import pages as api_pages
 from docs.machine.generated import stale, write
+from docs.machine.mentioned import place
 from docs.machine.names import catalogue, known, linked
 from docs.machine.scene_pages import pages as scene_pages
 from symfric import ALL_LAWS, POPULATIONS, LuGre, parameters
@@ -68,13 +77,53 @@ def test_every_example_has_its_docstring_and_code() -> None:
 
 def test_stored_measurements_say_by_what_where_and_when() -> None:
     stored = bench_pages.stored()
-    assert {"integrator", "ivp", "ensemble", "multibody", "ocp"} <= {*stored}
+    assert {"integrator", "ivp", "ensemble", "multibody", "ocp", "interop"} <= {*stored}
     for name, found in stored.items():
-        assert {*found} == {*bench_pages.KEYS}, name
-        assert all(found[key] for key in bench_pages.KEYS if key != "about"), name
-        for table in found["tables"]:
+        measured = {"tables"} <= {*found}
+        keys = {*bench_pages.KEYS} if measured else {"title", "about"}
+        assert {*found} - {"short"} == keys and (measured or "short" in found), name
+        short = found.get("short", dict.fromkeys(bench_pages.SHORT, "-") | {"tables": []})
+        assert {*short} == {*bench_pages.SHORT} and all(short[k] or k == "tables" for k in short)
+        for table in [*found.get("tables", ()), *short["tables"]]:
             assert all(len(row) == len(table["columns"]) for row in table["rows"]), name
     assert "symfric bench ivp" in bench_pages.page()
+
+
+def test_tools_stand_side_by_side_as_they_were_measured() -> None:
+    shown = interop_page.tables()
+    measured = {one["columns"][0]: one for one in bench_pages.stored()["interop"]["tables"]}
+    moves = interop_page.rows(measured["tool"])
+    for line in moves:
+        if not line[""]:
+            said = f"{float(line['miss']):.1e}, {line['it.']}, {line['s']} s"
+            assert said in shown["interop_moves"], line
+    assert shown["interop_moves"].count("out of time") == sum(m[""] == "out of time" for m in moves)
+    assert "``cvodes``" in shown["interop_integrators"]
+    assert "symfric bench interop" in shown["interop_by"]
+
+
+def test_names_in_pages_lead_to_where_they_are_documented() -> None:
+    assert place("simulate") == ("py", "obj", "symfric.simulate")
+    assert place("ocp.solve()") == ("py", "obj", "ocp.solve")
+    assert place("LuGre") == place("lugre") == ("std", "doc", "/laws/lugre")
+    assert place("symfric bench ivp --quick") == ("std", "ref", "symfric-bench")
+    assert place("rabinowicz") == ("std", "doc", "/scenes/rabinowicz")
+    assert place("symfric.codegen") == ("std", "doc", "/reference/symfric.codegen")
+    assert place("mu_s") is place("symfric -h") is place("simulate(x)") is None
+
+
+def test_publications_are_gathered_from_where_they_are_used() -> None:
+    said = "T.\n\nSource: A, J. X 1(2), 1999, p. 3; B,\nThesis 2001 (part); with words.\n\nMore: C."
+    assert [*literature_pages.sources(said)] == [
+        "A, J. X 1(2), 1999, p. 3",
+        "B, Thesis 2001 (part); with words",
+    ]
+    methods = dict(literature_pages.methods())
+    assert any(where == "symfric.integrator.step.tangent" for where in methods.values())
+    named = [name for names in literature_pages.laws().values() for name in names]
+    assert sorted(named) == sorted(ALL_LAWS | POPULATIONS)
+    page = literature_pages.page()
+    assert "Jing and Mi, Investigation of Selection Mechanism" in page and "@software" in page
 
 
 def test_limits_of_laws_are_gathered() -> None:
