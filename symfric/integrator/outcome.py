@@ -81,5 +81,7 @@ def trajectory_of(
         express,
         model,
         tuple(run.happened),
-        keep=partial(Stored.of, integrator, inputs, run, p, backend),
+        keep=None
+        if isinstance(integrator, Later)  # it is stored already
+        else partial(Stored.of, integrator, inputs, run, p, backend),
     )
