@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from identification.residuals.shooting import Shooting as Shooting
     from identification.result.estimate import Estimate as Estimate
     from identification.result.fitted import Fitted as Fitted
+    from identification.result.fitted import load_fit as load_fit
     from identification.select import select as select
     from identification.signals.differentiate import MotionSignals as MotionSignals
     from identification.signals.differentiate import differentiate as differentiate
@@ -66,7 +67,7 @@ else:
             "identification.residuals.points": "Points",
             "identification.residuals.shooting": "Shooting",
             "identification.result.estimate": "Estimate",
-            "identification.result.fitted": "Fitted",
+            "identification.result.fitted": "Fitted load_fit",
             "identification.select": "select",
             "identification.signals.differentiate": "MotionSignals differentiate",
             "identification.signals.filters": "Filter central_difference lowpass",

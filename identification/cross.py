@@ -124,11 +124,9 @@ def left_of(fit: Fitted, data: Dataset) -> list[Left]:
     """What a fit leaves of other data.
 
     Raises:
-        ValueError: data that cannot be compared, or a fit from a file.
+        ValueError: data that cannot be compared, or a fit from JSON.
     """
-    if fit.live is None:
-        raise checks.refused("validate", "a fit of this process", "one from a file")
-    residuals, r = fit.live.left_on(data)
+    residuals, r = fit.alive("validate").left_on(data)
     return list(_parts(residuals, [record.name for record in data], r))
 
 

@@ -13,6 +13,7 @@ from time import perf_counter
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.findings import Findings
@@ -24,7 +25,7 @@ from identification.residuals.shooting import Shooting
 from identification.result.build import fitted, levels_of
 from identification.result.calls import written
 from identification.result.fitted import Fitted
-from identification.result.live import Kind
+from identification.result.live import Asked, Kind, Live
 from identification.solving.descent import Start, descend, remaining
 from identification.solving.loss import THRESHOLD
 from identification.solving.many_starts import Progress, best_of, many_starts
@@ -38,6 +39,7 @@ from identification.verdict.judge import Verdict, judge
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 
+Array = NDArray[np.float64]
 MOST_STARTS = 10_000
 QUICK = 40
 """Evaluations of a fit that only helps to choose a setting."""
@@ -161,6 +163,23 @@ class Fit:
         made = replace(made, easier=easier)
         return Prepared(kind, found, findings, made, made.unknowns.of(values), seen)
 
+    def live(self, noise: dict[str, float], w: Array) -> Live:
+        """The problem that was solved, with its end at the coordinates `w`.
+
+        Raises:
+            ValueError: there are no residuals, as they were when it was solved.
+        """
+        asked = self.prepared()
+        made = asked.task.with_noise(noise)
+        point = made.at(w)
+        if isinstance(point, str):
+            raise ValueError(f"Fit: {asked.subject.name}: no residuals: {point}")
+        levels = levels_of(asked.subject, asked.strongest(point, self.data), self.data.rotary)
+        found = dict(zip(made.residuals.names, point.values.tolist(), strict=True))
+        certain = covariance(made, point, levels)
+        model = asked.subject.close(found).model
+        return Live(asked.kind, asked.subject, self.data, made, point, certain, model)
+
     def _quickly(self, kind: Kind, data: Dataset) -> dict[str, float] | None:
         """Values of a fit to other data, from one start and without a verdict."""
         asked = replace(self, kind=kind, data=data).prepared()
@@ -188,10 +207,11 @@ class Fit:
         verdict = judge(made, point, asked.findings)
         status, message = _status(end, verdict, remaining(made, point) / max(point.cost, 1e-300))
         levels = levels_of(asked.subject, asked.strongest(point, self.data), self.data.rotary)
+        question = Asked(replace(self, kind=asked.kind), dict(made.noise), point.w)
         result = fitted(
             asked.kind, asked.subject, self.data, made, point, starts, verdict,
             covariance(made, point, levels), tuple(asked.findings), status=status, message=message,
-            seconds=seconds, call=f"{written(self)}.solve()",
+            seconds=seconds, call=f"{written(self)}.solve()", asked=question,
         )  # fmt: skip
         if throw and not status.ok:
             raise SolveError(f"Fit: {asked.subject.name}: {result.message}", status, result)

@@ -13,7 +13,7 @@ from identification.result.calls import written
 from identification.result.curve import Curve, of_drive, of_points
 from identification.result.estimate import Errors, Estimate
 from identification.result.fitted import Fitted, Tried
-from identification.result.live import Kind, Live, errors_of, labels
+from identification.result.live import Asked, Kind, Live, errors_of, labels
 from identification.result.series import Series, points_each, series
 from identification.solving.descent import Start
 from identification.solving.task import Point, Task
@@ -50,6 +50,7 @@ def fitted(
     seconds: float = 0.0,
     call: str = "",
     validation: Errors | None = None,
+    asked: Asked | None = None,
 ) -> Fitted:
     """The result.
 
@@ -65,6 +66,7 @@ def fitted(
         seconds: of all starts.
         call: how it was asked for, as Python.
         validation: what is left of other data.
+        asked: what puts the problem again, from a file.
     """
     names = task.residuals.names
     records = tuple(r.name for r in data)
@@ -99,6 +101,7 @@ def fitted(
         evaluations=sum(s.evaluations for s in starts),
         made=_made(call, written(kind)),
         live=Live(kind, subject, data, task, point, covariance, closed.model),
+        asked=asked,
     )
 
 

@@ -1,7 +1,7 @@
 """What a fit found: parameters with intervals, a verdict, errors, the law and the model."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
@@ -13,19 +13,22 @@ from identification.data.dataset import Dataset
 from identification.data.findings import Finding
 from identification.result.curve import Curve
 from identification.result.estimate import Errors, Estimate, Tried
-from identification.result.live import Live
+from identification.result.live import Asked, Live
 from identification.result.page import Ranking, page_of
 from identification.result.series import Series
 from identification.result.stored import read, to_dict
 from identification.result.text import sentences, text_of
 from identification.verdict.judge import Verdict
 from identification.verdict.profile import Profile, profile
+from symfric.foundation import packed
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Parametric
 from symfric.foundation.shown import Shown, Table
 from symfric.foundation.status import Status
 from symfric.laws import Law
 from symfric.model import Model
+from symfric.results import tables
+from symfric.results.stored import Format
 from symfric.scenes import Drive
 from symfric.scenes.base import Scene
 
@@ -41,8 +44,9 @@ class Fitted:
     """The result of a fit.
 
     `print(fit)` is a report of a page; `fit.to_html("out.html")` one with pictures; `fit.plot()`
-    the pictures alone. Of a fit from a file or a pickle, `live` is None and the model of a
-    machine that is no `Drive` is absent.
+    the pictures alone. `fit.save("fit.npz")` keeps all of it, data included, and `load_fit` reads
+    it; a pickle does the same. A fit from JSON has neither data nor the model of a machine that is
+    no `Drive`.
 
     Attributes:
         name: of the law or the model.
@@ -66,7 +70,8 @@ class Fitted:
         machine: the drive or scene with them; None of a law alone or a model.
         seconds, evaluations: of all starts together.
         made: versions and how it was called.
-        live: what only a fit of this process has; None from a file or a pickle.
+        live: its problem and its minimum; of a stored fit they are put again from `asked`.
+        asked: the question and where it ended; None from JSON.
     """
 
     name: str
@@ -93,13 +98,39 @@ class Fitted:
     evaluations: int
     made: dict[str, str] = field(default_factory=dict[str, str])
     live: Live | None = None
+    asked: Asked | None = None
 
     def __str__(self) -> str:
         return text_of(self)
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Without `live`, whose symbols no pickle takes."""
-        return {**self.__dict__, "live": None}
+    def to_pack(self) -> dict[str, Any]:
+        """The fields; without the question where that holds functions that no file takes."""
+        state = packed.state_of(self) | {"live": None}
+        try:
+            packed.dumps(self.asked)
+        except ValueError:
+            state["asked"] = None
+        return state
+
+    def __copy__(self) -> "Fitted":
+        """One with the same fields."""
+        return packed.shallow(self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A pickle holds what a file does."""
+        return packed.loads, (packed.dumps(self),)
+
+    def save(self, path: str | Path) -> None:
+        """Write all of it to one file, its data, too, which `identification.load_fit` reads.
+
+        Numbers come back to the bit. A loaded fit does all that this one does: `validate`,
+        `profile` and `model` put the problem again. They cannot where it was asked with functions
+        that no file takes, such as a lambda in `tied`.
+
+        Raises:
+            ValueError: the file cannot be written.
+        """
+        FIT.save(path, self)
 
     def __repr__(self) -> str:
         return f"<Fitted {self.name}: {self.status.name}>"
@@ -127,24 +158,19 @@ class Fitted:
         """The model with the fitted numbers; yours keeps its parameters, which start at them.
 
         Raises:
-            ValueError: of a fit from a file, unless it is one of a drive.
+            ValueError: of a fit from JSON, unless it is one of a drive.
         """
         if isinstance(self.machine, Scene):
             return self.machine.model()
-        if self.live is not None:
-            return self.live.model
-        raise ValueError(
-            f"fit of {self.name}: expected one of this process, or of a drive, got one from a "
-            "file, which holds no equations; close your model with fit.values"
-        )
+        return self.alive("model").model
 
     def validate(self, data: Dataset) -> Errors:
         """What the fitted parameters leave of other data; start values are estimated there.
 
         Raises:
-            ValueError: data without the signals of the fit, or a fit from a file.
+            ValueError: data without the signals of the fit, or a fit from JSON.
         """
-        return self._alive("validate").errors_on(data)
+        return self.alive("validate").errors_on(data)
 
     def profile(self, name: str, points: int = 5) -> Profile:
         """How badly the model fits with one parameter held elsewhere, see `verdict.profile`.
@@ -154,18 +180,26 @@ class Fitted:
             points: about how many to each side.
 
         Raises:
-            ValueError: a parameter that was not fitted, or a fit from a file.
+            ValueError: a parameter that was not fitted, or a fit from JSON.
         """
-        live = self._alive("profile")
+        live = self.alive("profile")
         return profile(live.task, live.point, live.covariance, name, points)
 
-    def _alive(self, what: str) -> Live:
-        if self.live is None:
+    def alive(self, what: str) -> Live:
+        """The problem and its minimum, for `what`.
+
+        Raises:
+            ValueError: a fit from JSON, or one that was asked with functions, from a file.
+        """
+        if self.live is not None:
+            return self.live
+        if self.asked is None:
             raise ValueError(
-                f"fit of {self.name}: {what}: expected a fit of this process, got one from a file "
-                "or a pickle, which holds no data; fit again"
+                f"fit of {self.name}: {what}: expected a fit of this process or of fit.save(path), "
+                "got one from JSON, or one that was asked with functions, which no file takes; fit "
+                "again, or use fit.values"
             )
-        return self.live
+        return self.asked.live
 
     def plot(self, path: str | Path | None = None, names: Sequence[str] = ()) -> "Figure":
         """Friction over velocity; data and fit, what is left and its correlation.
@@ -187,6 +221,19 @@ class Fitted:
         """
         write_text(path, page_of(self, ranking))
 
+    def to_dataframe(self) -> Any:
+        """The parameters as a pandas table: value, unit, standard error, interval, note.
+
+        Raises:
+            ImportError: no pandas.
+        """
+        pandas = tables.module("to_dataframe", "pandas")
+        rows = {name: vars(estimate) for name, estimate in self.parameters.items()}
+        frame = pandas.DataFrame.from_dict(rows, orient="index")
+        frame.index.name = "parameter"
+        frame.attrs.update(name=self.name, status=self.status.name)
+        return frame
+
     def to_dict(self) -> dict[str, Any]:
         """Everything but `live` as plain data, ready for JSON."""
         return to_dict(self)
@@ -207,6 +254,23 @@ class Fitted:
             ValueError: no such file, one that something else wrote, or one of a later version.
         """
         return read(Fitted, path, own)
+
+
+FIT = Format("symfric fit", 1, "load_fit", "a saved fit", Fitted)
+
+
+def load_fit(path: str | Path, own: Iterable[type | Callable[..., Any]] = ()) -> Fitted:
+    """The fit that `fit.save(path)` wrote, to the bit.
+
+    Args:
+        path: the file.
+        own: your classes and functions in it, such as a law of yours.
+
+    Raises:
+        ValueError: no such file, one that something else wrote, a damaged one, one of a newer
+            version, or classes that are not known.
+    """
+    return FIT.load(path, own)
 
 
 def _told(value: float | None) -> str:

@@ -1,7 +1,8 @@
-"""What only a fit of this process has: its problem, its minimum, its model."""
+"""What a fit is besides its numbers: its problem, its minimum, its model."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import nan
 from typing import Any, Protocol, final
 
@@ -44,6 +45,35 @@ class Constant:
         """The number."""
         del values
         return self.value
+
+
+class Question(Protocol):
+    """What was asked of data, `identification.fit.Fit`."""
+
+    def live(self, noise: dict[str, float], w: Array) -> "Live":
+        """The problem with its end at the coordinates `w`."""
+        ...
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """A fit as a question and where it ended: the problem is put again when it is needed.
+
+    Attributes:
+        question: with its data.
+        noise: signal -> standard deviation at the end.
+        w: coordinates of the minimum.
+    """
+
+    question: Question
+    noise: dict[str, float]
+    w: Array
+
+    @cached_property
+    def live(self) -> "Live":
+        """The problem and its end."""
+        return self.question.live(self.noise, self.w)
 
 
 @final

@@ -19,12 +19,12 @@ FILE = "symfric fit"
 FORMAT = 1
 """Raised whenever older programs could not read the file or would misread it."""
 
-APART = ("law", "machine", "live")
+APART = ("law", "machine", "live", "asked")
 """Fields that are no plain data."""
 
 
 def to_dict(fit: "Fitted") -> dict[str, Any]:
-    """Everything but `live`; the law as its text and as data that make it again, and the drive."""
+    """All but the problem; the law as its text and as data that make it again, and the drive."""
     data = {f.name: plain(getattr(fit, f.name)) for f in fields(fit) if f.name not in APART}
     return {
         "file": FILE,

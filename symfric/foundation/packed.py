@@ -108,7 +108,7 @@ def load(
             arrays = {name: archive[name] for name in archive.files}
         about = json.loads(arrays.pop(ABOUT).tobytes())
         if about["kind"] != kind:
-            raise _foreign
+            raise UnreadableError(f"expected a file of the kind '{kind}', got a '{about['kind']}'")
         if not 1 <= about["format"] <= form:
             raise UnreadableError(
                 f"expected format {form} or older, got {about['format']}; it was written by a "

@@ -36,6 +36,17 @@ HELD = (
         "self.guess, self.jumps, self.tolerance", "self.guess, (), self.tolerance", T_STORED,
     ),
     Mutant(
+        "extremes of members are those at the times of the result", "symfric/results/ensemble.py",
+        "        if name in self.reach:\n            least", "        if False:\n            least",
+        ("tests/symfric/results/test_studies.py",),
+    ),
+    Mutant(
+        "a stored fit forgets its noise", "identification/fit.py",
+        "made = asked.task.with_noise(noise)\n        point = made.at(w)",
+        "made = asked.task\n        point = made.at(w)",
+        ("tests/identification/result/test_saved.py",),
+    ),
+    Mutant(
         "shared objects become several", PACKED,
         "if id(value) in self._known:", "if False:", T_PACKED,
     ),

@@ -59,7 +59,7 @@ def test_what_needs_data_says_so(file: Path) -> None:
     back = Fitted.from_json(file)
     with pytest.raises(ValueError, match="validate: expected a fit of this process"):
         back.validate(None)  # pyright: ignore[reportArgumentType]
-    with pytest.raises(ValueError, match="holds no equations"):
+    with pytest.raises(ValueError, match="model: expected a fit of this process"):
         _ = back.model
 
 

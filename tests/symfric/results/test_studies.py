@@ -79,7 +79,7 @@ def test_an_ensemble_comes_back_from_its_file_to_the_bit(tmp_path: Path) -> None
             np.testing.assert_array_equal(again.extremes[name], made.extremes[name])
         np.testing.assert_array_equal(again.reached, made.reached)
         np.testing.assert_array_equal(again["mu_s"], MU)
-    with pytest.raises(ValueError, match=r"load_run '.*study.npz': expected a file that symfric"):
+    with pytest.raises(ValueError, match="kind 'symfric run', got a 'symfric ensemble'"):
         load_run(tmp_path / "study.npz")
 
 

@@ -1,0 +1,76 @@
+"""A fit in a file of its own: exact, with the problem that it solved."""
+
+import copy
+import json
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from identification import Fit, InverseDynamics, load_fit, synthetic_drive_data, tied
+from identification.data.dataset import Dataset
+from identification.result.fitted import Fitted
+from symfric import load_run
+from symfric.foundation.status import Status
+
+
+@pytest.fixture(scope="module")
+def data() -> Dataset:
+    return synthetic_drive_data()
+
+
+@pytest.fixture(scope="module")
+def fit(data: Dataset) -> Fitted:
+    return Fit(InverseDynamics(), "stribeck", data, starts=1).solve(throw=False)
+
+
+def through_file(fit: Fitted, folder: Path) -> Fitted:
+    fit.save(folder / "fit.npz")
+    return load_fit(folder / "fit.npz")
+
+
+def test_all_of_a_fit_comes_back_to_the_bit(fit: Fitted, data: Dataset, tmp_path: Path) -> None:
+    copies = through_file(fit, tmp_path), pickle.loads(pickle.dumps(fit)), copy.deepcopy(fit)
+    for back in (*copies, through_file(copies[0], tmp_path)):
+        assert str(back) == str(fit)
+        assert json.dumps(back.to_dict()) == json.dumps(fit.to_dict())
+        assert back.parameters == fit.parameters
+        np.testing.assert_array_equal(back.correlation, fit.correlation)
+        for one, other in zip(back.series, fit.series, strict=True):
+            np.testing.assert_array_equal(one.residual.y, other.residual.y)  # JSON has six digits
+        assert back.live is None
+        assert back.model.signals == fit.model.signals
+    assert copies[0].validate(data) == fit.validate(data)
+    ours, theirs = (f.profile("mu_d", points=2) for f in (fit, copies[0]))
+    np.testing.assert_array_equal(ours.rise, theirs.rise)
+    np.testing.assert_array_equal(ours.values, theirs.values)
+
+
+def test_what_was_asked_with_functions_keeps_its_numbers(data: Dataset, tmp_path: Path) -> None:
+    rule = tied(lambda p: 1.4 * p["mu_d"])
+    made = Fit(InverseDynamics(), "stribeck", data, free={"mu_s": rule}, starts=1)
+    back = through_file(made.solve(throw=False), tmp_path)
+    assert back.values["mu_s"] == pytest.approx(1.4 * back.values["mu_d"], rel=1e-12)
+    with pytest.raises(ValueError, match=r"validate: expected a fit of this process.*functions"):
+        back.validate(data)
+
+
+def test_files_of_others_are_told_apart(fit: Fitted, tmp_path: Path) -> None:
+    fit.save(tmp_path / "fit.npz")
+    with pytest.raises(
+        ValueError,
+        match=r"fit.npz': expected a file of the kind 'symfric run', got a 'symfric fit'",
+    ):
+        load_run(tmp_path / "fit.npz")
+    with pytest.raises(ValueError, match=r"load_fit '.*none': expected a saved fit, got no such"):
+        load_fit(tmp_path / "none")
+
+
+def test_a_table_of_parameters(fit: Fitted) -> None:
+    pytest.importorskip("pandas", reason="pandas is not installed")
+    frame = fit.to_dataframe()
+    assert list(frame.index) == list(fit.parameters)
+    assert frame.loc["mu_s", "value"] == fit.values["mu_s"]
+    assert frame.loc["m", "unit"] == "kg"
+    assert frame.attrs["status"] == fit.status.name in Status.__members__
