@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.shown import Showing
-from symfric.foundation.symbolic import plain
+from symfric.foundation.symbolic import Symbolic, plain
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -49,7 +49,8 @@ def shown(value: object) -> str:
         return f"an array of shape {value.shape}{kind}"
     if isinstance(value, ca.SX | ca.MX):
         size = "" if value.numel() == 1 else f" of shape {value.shape}"
-        return f"the expression {_cut(str(value))}{size}"
+        kind = "MX expression" if isinstance(value, ca.MX) else "expression"
+        return f"the {kind} {_cut(str(value))}{size}"
     if isinstance(value, np.generic | np.ndarray):
         value = value.item()
     if callable(value) and hasattr(value, "__name__"):
@@ -57,9 +58,9 @@ def shown(value: object) -> str:
     if isinstance(value, Showing):
         return _cut(value.shown().title)
     text = " ".join(repr(value).split()) if hasattr(value, "_repr_html_") else repr(value)
-    if text.startswith("<") or "\n" in text:
+    if " at 0x" in text or "\n" in text:
         return f"an object of type {type(value).__name__}"
-    return _cut(text)
+    return _cut(text.removeprefix("<").removesuffix(">") if text.startswith("<") else text)
 
 
 def listed(names: Iterable[str], most: int = 6) -> str:
@@ -216,12 +217,18 @@ def kind(where: str, value: object, wanted: type[T], such_as: str) -> T:
 
 
 def named(where: str, value: object, known: Collection[str] | None = None) -> dict[str, Any]:
-    """`value`, a mapping from names to anything or None, as a dict; unknown names are refused."""
+    """`value`, a mapping from names to anything or None, as a dict; unknown names are refused.
+
+    A variable is taken for its name.
+    """
     if value is None:
         return {}
     if not isinstance(value, Mapping):
         raise refused(where, "values by name, such as {'v': 0.1}", value)
-    given: dict[Any, Any] = dict(value)  # pyright: ignore[reportUnknownArgumentType]
+    given: dict[Any, Any] = {
+        getattr(name, "name", name) if isinstance(name, Symbolic) else name: x
+        for name, x in value.items()
+    }
     odd = [name for name in given if not isinstance(name, str)]
     if odd:
         raise refused(where, "texts as names", odd[0])
@@ -233,7 +240,9 @@ def named(where: str, value: object, known: Collection[str] | None = None) -> di
 def many(where: str, value: object, what: str) -> tuple[Any, ...]:
     """`value`, a sequence of `what`, as a tuple; a single text is not taken for its letters."""
     if isinstance(value, str | bytes | ca.SX | ca.MX) or not isinstance(value, Iterable):
-        raise refused(where, f"a sequence of {what}", value)
+        name = getattr(value, "name", "")
+        hint = f"write ({name},)" if isinstance(name, str) and name.isidentifier() else ""
+        raise refused(where, f"a sequence of {what}", value, hint)
     return tuple(value)  # pyright: ignore[reportUnknownArgumentType, reportUnknownVariableType]
 
 

@@ -96,6 +96,7 @@ class Contact:
             raise checks.refused(f"{where}: law", "a law of a scalar slip, as LuGre()", self.law)
         take_si(where, self, "slip", "N")
         take_symbols(self, "given", "rest")
+        object.__setattr__(self, "rest", checks.named(f"{where}: rest", self.rest))
         for part in ("slip", "N"):
             value = ca.SX(checks.expression(f"{where}: {part}", getattr(self, part)))
             if value.numel() != 1:

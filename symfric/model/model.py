@@ -287,8 +287,12 @@ class Model(Showing, Starting):
         known = [v.name for v in getattr(self, what[0])]
         values = checks.named(f"model '{self.name}' {what}", given)
         fixed = ", ".join(f'"{name}"' for name in values if name not in known)
-        free = f"free it when the model is made, as in rabinowicz(law, free=[{fixed}])"
-        hint = free if what == "p" else ""
+        ways = {
+            "p": f"free it when the model is made, rabinowicz(law, free=[{fixed}]), or with "
+            f"symbolise(law, {fixed}) and Model(p=...)",
+            "u": "the model has no inputs" * (not known),
+        }
+        hint = ways.get(what, "")
         if what == "x0" and not {v.name for v in self.z}.isdisjoint(values):
             hint = "algebraic variables follow from their equations"
         checks.check_names(f"model '{self.name}' {what}", values, known, hint)

@@ -98,7 +98,8 @@ class Event:
             raise checks.refused(f"{where}: at_start", "a direction 1 or -1", 0)
         if self.rtol != inf:
             checks.number(f"{where}: rtol", self.rtol, above=0.0)
-        for name, value in checks.named(f"{where}: reset", self.reset).items():
+        object.__setattr__(self, "reset", checks.named(f"{where}: reset", self.reset))
+        for name, value in self.reset.items():
             checks.expression(f"{where}: reset of {name}", value)
 
     def __repr__(self) -> str:

@@ -1,13 +1,15 @@
 """What may be wrong with a model: kinds of its parts, names, rows, undeclared symbols."""
 
+import unicodedata
 from collections.abc import Iterator
+from re import ASCII, sub
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
-from symfric.foundation.symbols import strays
+from symfric.foundation.symbols import starts_of, strays
 from symfric.model.contact import Contact
 from symfric.model.parts import Event, Monitor, Output
 
@@ -39,6 +41,9 @@ def _wrong_kinds(model: "Model") -> Iterator[str]:
         if name != "ode" or model.ode is not None:
             yield _said(checks.expression, name, getattr(model, name))
     yield _said(_results, "outputs", model.outputs)
+    yield _said(_once, "contacts", model.contacts)
+    for name in ("ode", "alg", "residual"):
+        yield _said(_column, name, getattr(model, name))
     if not (isinstance(model.t, ca.SX) and model.t.is_scalar() and model.t.is_symbolic()):  # pyright: ignore[reportUnnecessaryIsInstance]
         yield f"t: expected one SX symbol, got {checks.shown(model.t)}"
     for name in ("details", "sketch", "opening"):
@@ -65,22 +70,39 @@ def _results(where: str, outputs: object) -> None:
         checks.kind(f"{where}: {name}", output, Output, "Output(expression, unit)")
 
 
+def _once(where: str, contacts: Any) -> None:
+    given = contacts if isinstance(contacts, tuple | list) else ()
+    names = [c.name for c in given if isinstance(c, Contact)]
+    if repeated := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+        raise ValueError(f"{where}: expected every name once, got {', '.join(repeated)}")
+
+
+def _column(where: str, value: Any) -> None:
+    shape = getattr(value, "shape", ())
+    if len(shape) == 2 and shape[0] == 1 < shape[1]:
+        raise ValueError(f"{where}: expected a column, got a row; write casadi.vertcat(...)")
+
+
 def naming_problems(model: "Model") -> list[str]:
     """Names that are repeated, reserved or no identifiers, or stand for nothing."""
     problems: list[str] = []
     names = [v.name for group in (model.x, model.z, model.u, model.p) for v in group]
     names += list(model.outputs)
-    repeated = sorted({n for n in names if names.count(n) > 1} | (RESERVED & set(names)))
-    if repeated:
+    if repeated := sorted({n for n in names if names.count(n) > 1}):
         problems.append(
-            f"expected every name once and none of {', '.join(sorted(RESERVED))}, "
-            f"got {', '.join(repeated)}"
+            f"expected every name once, got {', '.join(repeated)}"
             + "; contacts made with bare=False call their states <contact>_<state>"
             * any(contact.bare for contact in model.contacts)
         )
+    if taken := sorted(RESERVED & set(names)):
+        known = ", ".join(sorted(RESERVED))
+        problems.append(f"expected none of the names {known}, got {', '.join(taken)}")
     odd = [n for n in names if not (n.isascii() and n.isidentifier())]
     if odd:
-        problems.append(f"expected names that are C identifiers, got {', '.join(odd)}")
+        offers = ", ".join(dict.fromkeys(map(_identifier, odd)))
+        problems.append(
+            f"expected names that are C identifiers, got {', '.join(odd)}; write {offers}"
+        )
     states = [v.name for v in model.x]
     for event in model.events:
         missing = [n for n in event.reset if n not in states]
@@ -96,14 +118,16 @@ def equation_problems(model: "Model", known: ca.SX) -> list[str]:
     """Row counts that do not fit, and symbols that are not among the `known`."""
     nx, nz = len(model.x), len(model.z)
     problems: list[str] = []
-    if model.ode is not None and model.ode.numel() != nx:
-        problems.append(f"ode: expected {nx} rows (one a state), got {model.ode.numel()}")
+    if model.ode is None and nx and model.residual.is_empty():
+        problems.append(f"ode: expected {_many(nx, 'row')} (one a state), got none")
+    elif model.ode is not None and model.ode.numel() != nx:
+        got = _size(model.ode)
+        problems.append(f"ode: expected {_many(nx, 'row')} (one a state), got {got}")
     elif model.ode is not None and model.alg.numel() != nz:
-        problems.append(f"alg: expected {nz} rows, got {model.alg.numel()}")
-    elif model.ode is None and nx and model.residual.is_empty():
-        problems.append(f"ode: expected a row for each of {nx} states, got none")
+        problems.append(f"alg: expected {_many(nz, 'row')}, got {_size(model.alg)}")
     elif model.residual.numel() != nx + nz:
-        problems.append(f"residual: expected {nx + nz} rows, got {model.residual.numel()}")
+        got = _size(model.residual)
+        problems.append(f"residual: expected {_many(nx + nz, 'row')}, got {got}")
     single = {f"output '{n}'": o.expression for n, o in model.outputs.items()}
     single |= {f"monitor {i + 1}": m.expression for i, m in enumerate(model.monitors)}
     single |= {f"monitor {i + 1}: nominal": m.nominal for i, m in enumerate(model.monitors)}
@@ -117,6 +141,57 @@ def equation_problems(model: "Model", known: ca.SX) -> list[str]:
     stray = strays(ca.veccat(equations, *map(ca.SX, single.values())), known)
     if stray:
         problems.append(
-            f"expected only declared symbols, got {', '.join(stray)}; declare them as x, z, u or p"
+            f"expected only declared symbols, got {', '.join(stray)}; {_declare(stray, known)}"
         )
-    return problems
+        return problems
+    return problems + list(_start_problems(model, known))
+
+
+def _identifier(name: str) -> str:
+    """A C identifier like a name: my_x for "my x", phi for its Greek letter."""
+    letters = (unicodedata.name(c, "").partition(" LETTER ")[2].lower() for c in name)
+    plain = (
+        f"{'_' * (i > 0)}{letter.split()[0]}" if letter and not c.isascii() else c
+        for i, (c, letter) in enumerate(zip(name, letters, strict=True))
+    )
+    text = sub(r"\W+", "_", "".join(plain), flags=ASCII).strip("_") or "x"
+    return f"x_{text}" if text[0].isdigit() else text
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}{'s' * (count != 1)}"
+
+
+def _size(column: ca.SX) -> str:
+    rows, columns = column.shape
+    return str(rows) if columns == 1 else f"a matrix {rows} x {columns}"
+
+
+def _declare(stray: list[str], known: ca.SX) -> str:
+    """What to do about the first of the symbols that nobody declared."""
+    name = stray[0]
+    if name == "t":
+        return "give the symbol of time as t=t"
+    if name in map(str, ca.symvar(known)):
+        return f"it is another symbol than that of the variable {name}: write the variable itself"
+    if name.endswith("_F"):
+        return f"the contact of the friction force {name} is missing in contacts=(...)"
+    return "declare them as x, z, u or p"
+
+
+def _start_problems(model: "Model", known: ca.SX) -> Iterator[str]:
+    """Start values that need each other, or what nobody declared."""
+    starts = ca.SX(starts_of(model.x))
+    if starts.is_constant():
+        return
+    if stray := strays(starts, known):
+        yield f"start: expected declared symbols in start values, got {', '.join(stray)}"
+    states = model.vector("x")
+    for _ in model.x:
+        if not ca.depends_on(starts, states):
+            return
+        starts = ca.substitute(starts, states, starts)
+    if ca.depends_on(starts, states):
+        loop = [v.name for v, s in zip(model.x, ca.vertsplit(starts), strict=True)
+                if ca.depends_on(s, states)]  # fmt: skip
+        yield f"start: expected start values that need no other in a circle, got {', '.join(loop)}"

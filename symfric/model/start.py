@@ -164,7 +164,9 @@ def start_function(
     known, chosen = ca.SX.sym("known", n), ca.SX.sym("chosen", n)
     rows = [ca.if_else(chosen[i], known[i], v.start) for i, v in enumerate(x)]
     values = ca.substitute(stacked(rows), symbols_of(z), starts_of(z))
-    for _ in range(2):
+    for _ in x:
+        if not ca.depends_on(values, states):
+            break
         values = ca.substitute(values, states, values)
     arguments = [known, chosen, u, p]
     return ca.Function("start", arguments, [values], ["known", "chosen", "u", "p"], ["x"])

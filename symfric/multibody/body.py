@@ -8,12 +8,14 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.checks import shown
 from symfric.foundation.numeric import Scalar
 from symfric.multibody.spatial import Frame, Vector, is_scalar, is_vector, vector
 
 Array = NDArray[np.float64]
 GROUND = "ground"
 """The name of the body that does not move."""
+MOMENTS = "write (Jxx, Jyy, Jzz) or (Jxx, Jyy, Jzz, Jxy, Jxz, Jyz)"
 TRIANGLE = 1e-9
 """Relative rounding of principal moments that is no mistake."""
 
@@ -79,14 +81,15 @@ class Body:
         """What is no number or not as many as it should."""
         given: Any = self.inertia
         if not is_scalar(self.mass):
-            yield f"mass: expected a number [kg], got {self.mass!r}"
+            yield f"mass: expected a number [kg], got {shown(self.mass)}"
         count = len(given) if hasattr(given, "__len__") else 0
         if count not in (3, 6):
-            yield f"inertia: expected 3 or 6 numbers, got {count or given!r}"
+            got = count or shown(given)
+            yield f"inertia: expected 3 or 6 numbers [kg m^2], got {got}; {MOMENTS}"
         elif not all(map(is_scalar, given)):
-            yield f"inertia: expected 3 or 6 numbers [kg m^2], got {given!r}"
+            yield f"inertia: expected 3 or 6 numbers [kg m^2], got {shown(given)}; {MOMENTS}"
         if not is_vector(self.com):
-            yield f"com: expected three numbers [m], got {self.com!r}"
+            yield f"com: expected three numbers [m], got {shown(self.com)}"
 
 
 def unphysical(J: Array, point: bool = False) -> Iterator[str]:

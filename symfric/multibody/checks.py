@@ -82,7 +82,9 @@ def _moving(where: str, pairs: Iterable[tuple[str, str]], joints: Sequence[Joint
     known = {joint.name: joint.directions for joint in joints}
     for name, direction in pairs:
         if name not in known:
-            yield f"{where}: expected a joint, got {name}"
+            near = get_close_matches(name, list(known), n=1, cutoff=0.4)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            yield f"{where}: expected a joint, got {name}{hint}"
         elif direction not in known[name]:
             expected = " or ".join(known[name]) or "a joint that moves along an axis"
             yield f"{where} > direction: expected {expected}, got {direction}"
@@ -92,8 +94,9 @@ def _place(where: str, place: str, bodies: Mapping[str, Body]) -> Iterator[str]:
     body, _, frame = place.partition(".")
     if body not in bodies:
         near = get_close_matches(body, list(bodies), n=1, cutoff=0.4)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        yield f"{where}: expected a body, got {body}{hint}"
+        near = [f"{b.name}.{f}" for b in bodies.values() for f in b.frames if f == body] or near
+        hint = f"; did you mean {' or '.join(near)}?" if near else ""
+        yield f"{where}: expected a body or 'body.frame', got {place}{hint}"
     elif frame not in bodies[body].frames:
         near = [name for name in bodies[body].frames if name]
         yield f"{where}: expected one of the frames {', '.join(near) or '(none)'}, got {place}"
@@ -131,7 +134,7 @@ def bearings(joints: Sequence[Joint], p: ca.SX, u: ca.SX) -> Iterator[str]:
 
 def _rubbing(where: str, joint: Joint, friction: object, known: ca.SX) -> Iterator[str]:
     if not isinstance(friction, JointFriction):
-        yield f"{where}: expected JointFriction(law, radius=...), got {friction!r}"
+        yield f"{where}: expected JointFriction(law, radius=...), got {shown(friction)}"
         return
     yield from (f"{where}: {text}" for text in friction.problems(joint.rubs))
     law, v, N = friction.law, ca.SX.sym("v"), ca.SX.sym("N")
@@ -148,7 +151,8 @@ def undeclared(where: str, values: Iterable[object], known: ca.SX, expected: str
     flat = [x for value in values for x in (value if isinstance(value, tuple | list) else [value])]
     stray = strays(ca.veccat(*(x for x in flat if isinstance(x, ca.SX))), known)
     if stray:
-        yield f"{where}: expected only declared {expected}, got {', '.join(stray)}; see build(p)"
+        hint = f"hand the variable over, build(p=({stray[0]},))"
+        yield f"{where}: expected only declared {expected}, got {', '.join(stray)}; {hint}"
 
 
 def _finite(x: object) -> bool:

@@ -26,6 +26,7 @@ from symfric.multibody.joint import Joint
 from symfric.multibody.prepare import (
     Prepared,
     in_absolute_coordinates,
+    infinite,
     numeric,
     undeclared,
     with_cuts,
@@ -208,6 +209,7 @@ class Mechanism(Showing):
         u = symbols_of(self.inputs)
         loose = undeclared(made.eq, self.joints, self.forces, symbols, u)
         self._refuse([*made.problems, *made.misfits, *_left_open(made), *loose])
+        self._refuse(infinite(made, self.joints, self.forces, symbols, values))
         self._refuse(without_inertia(made, symbols, values))
         if formulation == "absolute":
             self._refuse(_inseparable(bodies, symbols, values))

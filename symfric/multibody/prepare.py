@@ -147,6 +147,25 @@ def undeclared(
         yield from checks.undeclared(f"force '{force.name}'", parts, known, expected)
 
 
+def infinite(
+    made: Prepared, joints: Sequence[Joint], forces: Sequence[Force], p: ca.SX, values: ca.DM
+) -> Iterator[str]:
+    """Forces that are not finite at the start, inputs zero, as along a line without a length."""
+    eq, by_name = made.eq, {joint.name: joint for joint in joints}
+    given = ca.vertcat(eq.q, eq.qd, p)
+    numbers = np.concatenate([made.q0, made.qd0, values.full().ravel()])
+    for force in forces:
+        loads = list(force.loads(eq.kin, by_name))
+        parts = ca.veccat(*(x.value if isinstance(x, Axial) else x.force for x in loads))
+        others = ca.vertcat(*(s for s in ca.symvar(parts) if strays(s, given)))
+        found = ca.Function("load", [given, others], [parts])(numbers, 0)
+        if not found.is_regular():
+            yield (
+                f"force '{force.name}': expected a finite force at the start, got "
+                f"{checks.shown(float(ca.norm_1(found)))}; do its places coincide there?"
+            )
+
+
 def without_inertia(made: Prepared, p: ca.SX, values: ca.DM) -> Iterator[str]:
     """Coordinates that no mass resists, at the start or anywhere near it, as ideal bodies make."""
     eq = made.eq

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import Scalar, is_number
+from symfric.foundation.numeric import Scalar, is_number, is_symbolic
 from symfric.foundation.parameters import Parametric, Variable, parameters, symbolise
 from symfric.foundation.shown import WIDTH
 from symfric.foundation.symbols import symbols_of
@@ -136,7 +136,14 @@ class Scene(Parametric, ABC):
 
         All others are constants of the equations, so terms they switch off vanish.
         """
-        scene, p = symbolise(self, *checks.names(f"{type(self).__name__}: free", free))
+        name = type(self).__name__
+        scene, p = symbolise(self, *checks.names(f"{name}: free", free))
+        known = parameters(scene).items()
+        if held := [n for n, q in known if is_symbolic(q.value) and n not in {v.name for v in p}]:
+            raise ValueError(
+                f"{name}: expected numbers, got a symbol for {', '.join(held)}; "
+                f"{name.lower()}(law, free={held}) makes parameters of the model"
+            )
         return scene.equations(p)
 
 
@@ -202,9 +209,13 @@ def contact(
         ValueError: no law, one that needs an input that is not offered, a load where N is 0, or a
             variable in other units than those of the SI.
     """
-    where = f"contact '{name}'"
+    where = f"contact '{checks.text('contact: name', name, 'a text, and then a law')}'"
     check_law(f"{where}: law", law)
     check_si(f"{where}: v", v)
+    if checks.as_number(v) is not None:
+        raise checks.refused(f"{where}: v", "what depends on variables", v, "v comes before N")
+    if (load := checks.as_number(N)) is not None and load < 0:
+        raise checks.refused(f"{where}: N", "a normal force >= 0 N", N)
     missing = [f"{i.name} ({i.doc})" for i in law.inputs if i.name not in inputs]
     if missing:
         raise ValueError(

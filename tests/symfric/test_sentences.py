@@ -26,8 +26,28 @@ STUMBLES: dict[str, tuple[Any, str]] = {
     "a class": (lambda: sf.rabinowicz(sf.LuGre), "got the class LuGre"),  # type: ignore[arg-type]
     "a parameter that is fixed": (
         lambda: sf.simulate(BELT, 1.0, p={"mu_s": 0.2}),
-        r"^model 'rabinowicz' p: expected no names, got mu_s; free it when the model is made, as "
-        r'in rabinowicz\(law, free=\["mu_s"\]\)$',
+        r"^model 'rabinowicz' p: expected no names, got mu_s; free it when the model is made, "
+        r'rabinowicz\(law, free=\["mu_s"\]\), or with symbolise\(law, "mu_s"\) and Model\(p=...\)$',
+    ),
+    "a symbol in a scene": (
+        lambda: sf.rabinowicz(sf.LuGre(mu_s=sf.Variable("mu", "1"))),
+        r"^Rabinowicz: expected numbers, got a symbol for mu_s; rabinowicz\(law, free=\['mu_s'\]\)",
+    ),
+    "an input of a model without any": (
+        lambda: sf.simulate(BELT, 1.0, u={"F": 1.0}),
+        "got F; the model has no inputs$",
+    ),
+    "velocity and load changed places": (
+        lambda: sf.contact("floor", sf.LuGre(), 10.0, sf.Variable("v", "m/s")),
+        "^contact 'floor': v: .* got 10.0; v comes before N$",
+    ),
+    "a load that pulls": (
+        lambda: sf.contact("floor", sf.LuGre(), sf.Variable("v", "m/s"), -10.0),
+        "^contact 'floor': N: expected a normal force >= 0 N, got -10.0$",
+    ),
+    "a law for a name": (
+        lambda: sf.contact(sf.LuGre(), "floor", 1.0, 1.0),  # type: ignore[arg-type]
+        "^contact: name: expected a text, and then a law, got LuGre",
     ),
     "math in an input": (
         lambda: sf.simulate(DRIVEN, 1.0, u={"force": lambda t: math.sin(t)}),  # type: ignore

@@ -2,6 +2,7 @@
 
 import pickle
 from copy import copy
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -83,12 +84,12 @@ def test_implicit_model_has_a_residual_and_no_ode() -> None:
 
 stray = ca.SX.sym("stray")
 BAD = {
-    "wrong ode rows": ({"x": (x,), "ode": ca.SX(2, 1)}, r"ode: expected 1 rows .* got 2"),
+    "wrong ode rows": ({"x": (x,), "ode": ca.SX(2, 1)}, r"ode: expected 1 row .* got 2"),
     "wrong alg rows": (
         {"x": (x,), "ode": ca.SX(1, 1), "alg": ca.SX(1, 1)},
         r"alg: expected 0 rows, got 1",
     ),
-    "wrong residual rows": ({"x": (x,), "residual": ca.SX(2, 1)}, r"residual: expected 1 rows"),
+    "wrong residual rows": ({"x": (x,), "residual": ca.SX(2, 1)}, r"residual: expected 1 row"),
     "undeclared symbol": (
         {"x": (x,), "ode": x.symbol * stray},
         r"expected only declared symbols, got stray; declare",
@@ -97,12 +98,28 @@ BAD = {
         {"x": (x,), "ode": x.symbol, "outputs": {"o": Output(stray, "1")}},
         r"got stray",
     ),
-    "repeated name": ({"x": (x,), "u": (Variable("x", "1"),), "ode": x.symbol}, r"once .* got x"),
+    "repeated name": ({"x": (x,), "u": (Variable("x", "1"),), "ode": x.symbol}, r"once, got x"),
     "output named like a state": (
         {"x": (x,), "ode": x.symbol, "outputs": {"x": Output(x.symbol, "m")}},
         r"got x",
     ),
     "state named t": ({"x": (Variable("t", "s"),), "ode": ca.SX(1, 1)}, r"none of .* got t"),
+    "a circle of start values": (
+        {
+            "x": (Variable("a", "1", symbol=stray, start=x.symbol), replace(x, start=2 * stray)),
+            "ode": ca.SX(2, 1),
+        },
+        r"start: expected start values that need no other in a circle, got a, x",
+    ),
+    "row for a column": ({"x": (x, Variable("y", "1")), "ode": ca.SX(1, 2)}, r"ode: .* got a row"),
+    "symbol of the same name": (
+        {"x": (x,), "ode": ca.SX.sym("x")},
+        r"another symbol than that of the variable x",
+    ),
+    "time nobody gave": ({"x": (x,), "ode": ca.SX.sym("t")}, r"give the symbol of time as t=t"),
+    "contact forgotten": ({"x": (x,), "ode": ca.SX.sym("g_F")}, r"missing in contacts="),
+    "Greek letter": ({"x": (Variable("φ_1", "rad"),), "ode": ca.SX(1, 1)}, r"got φ_1; write phi_1"),
+    "one variable, no tuple": ({"x": x, "ode": ca.SX(1, 1)}, r"got variable 'x' .*; write \(x,\)"),
     "output named ode": (
         {"x": (x,), "ode": x.symbol, "outputs": {"ode": Output(x.symbol, "m")}},
         r"got ode",

@@ -50,7 +50,7 @@ MISTAKES: dict[str, tuple[Callable[[Mechanism], object], str]] = {
     ),
     "two numbers of inertia": (
         lambda m: m.body("bob", 1.0, (1.0, 1.0)),
-        "> body 'bob' > inertia: expected 3 or 6 numbers, got 2",
+        "> body 'bob' > inertia: expected 3 or 6 numbers [kg m^2], got 2; write (Jxx, Jyy, Jzz)",
     ),
     "no identifier": (
         lambda m: m.body("the bob", 1.0, (1.0, 1.0, 1.0)),
@@ -62,7 +62,7 @@ MISTAKES: dict[str, tuple[Callable[[Mechanism], object], str]] = {
     ),
     "unknown body": (
         lambda m: m.joint(Fixed("weld", "rodd", "ground")),
-        "> joint 'weld': expected a body, got rodd; did you mean rod?",
+        "> joint 'weld': expected a body or 'body.frame', got rodd; did you mean rod?",
     ),
     "unknown frame": (
         lambda m: m.joint(Fixed("weld", "rod.tip", "ground")),
@@ -78,7 +78,7 @@ MISTAKES: dict[str, tuple[Callable[[Mechanism], object], str]] = {
     ),
     "force at nothing": (
         lambda m: m.force(SpringDamper("spring", "ground", "bob")),
-        "> force 'spring': expected a body, got bob",
+        "> force 'spring': expected a body or 'body.frame', got bob",
     ),
     "force along nothing": (
         lambda m: m.force(JointSpringDamper("motor", "hing")),
@@ -128,7 +128,15 @@ MISTAKES: dict[str, tuple[Callable[[Mechanism], object], str]] = {
     ),
     "a mass nobody declared": (
         lambda m: m.body("bob", ca.SX.sym("load"), (1.0, 1.0, 1.0)),
-        "> body 'bob': expected only declared parameters, got load; see build(p)",
+        "> body 'bob': expected only declared parameters, got load; hand the variable over, build",
+    ),
+    "a spring between one place and itself": (
+        lambda m: m.force(SpringDamper("spring", "ground", "ground", 1.0, free_length=0.1)),
+        "> force 'spring': expected a finite force at the start, got nan; do its places coincide",
+    ),
+    "a joint without its body": (
+        lambda m: m.joint(Fixed("weld", "", "ground")),
+        "> joint 'weld': expected a body or 'body.frame', got ",
     ),
     "a torque nobody declared": (
         lambda m: m.force(JointSpringDamper("motor", "hinge", actuator=ca.SX.sym("torque"))),

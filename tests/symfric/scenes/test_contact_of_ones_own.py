@@ -101,7 +101,7 @@ def test_the_front_door_names_all_that_it_hands_out() -> None:
 def test_misspelt_parameters_are_told_with_the_nearest() -> None:
     with pytest.raises(ValueError, match=r"LuGre: expected one of mu_s, .*got mu; did you mean"):
         LuGre(mu=0.2)  # type: ignore[call-arg]
-    with pytest.raises(ValueError, match="ode: expected a row for each of 1 states, got none"):
+    with pytest.raises(ValueError, match=r"expected 1 row \(one a state\), got none"):
         Model("a", x=(Variable("x", "m"),))
     with pytest.raises(ValueError, match=r"write casadi.vertcat"):
         Model("a", x=(Variable("x", "m"),), ode=[1.0])  # type: ignore[arg-type]
