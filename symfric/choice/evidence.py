@@ -123,5 +123,7 @@ OPEN = (
     "Not printed: who takes which velocity of tables 3 and 7 (the presets say how they are read "
     "here), Gonthier's v_d, the radius of the hinge in which table 7's N/m and m/s act, relative "
     "tolerances, initial conditions beyond positions. z_max = z_ba in table 7 leaves the "
-    "elasto-plastic law of that form 0/0; here z_ss follows from sigma_0."
+    "elasto-plastic law of that form 0/0; here z_ss follows from sigma_0. The text contradicts its "
+    "tables: for pre-sliding by S it chooses Elasto-plastic in both machines, table 5 has Dahl "
+    "first; and it compares three machines, of which one, with its tables, is missing."
 )

@@ -3,6 +3,7 @@
 import numpy as np
 
 from symfric.figures.data import Curve, FigureData
+from symfric.figures.requirements import finite
 from symfric.figures.scales import NORMAL_FORCE, Scales, scales
 from symfric.laws import AnyLaw, law_name, steady_force, steady_inputs
 
@@ -26,5 +27,5 @@ def profile(law: AnyLaw, N: float = NORMAL_FORCE, given: Scales | None = None) -
         f"force in steady sliding, N = {N:g} N{steady_inputs(law)}",
         {"v": "m/s", "F": "N"},
         (("v", "F"),),
-        (Curve(law_name(law), "", {"v": v, "F": steady_force(law, v, N)}),),
+        (Curve(law_name(law), "", {"v": v, "F": finite("profile", law, steady_force(law, v, N))}),),
     )

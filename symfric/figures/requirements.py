@@ -2,8 +2,15 @@
 
 from dataclasses import fields
 
+import numpy as np
+from numpy.typing import NDArray
+
 from symfric.laws import ALL_LAWS, PHENOMENA, POPULATIONS, AnyLaw, Law, Population, law_name
 from symfric.laws.base.law import check_law
+
+Array = NDArray[np.float64]
+GIVEN = ("v", "N", "F_e", "dv")
+"""What a block that is slid or pushed offers a law."""
 
 
 def parts(law: AnyLaw) -> list[type[AnyLaw]]:
@@ -29,14 +36,35 @@ def check_any(where: str, law: object) -> None:
         check_law(where, law)
 
 
-def require(where: str, law: AnyLaw, *codes: str) -> None:
-    """Refuse a law that shows none of `codes`.
+def finite(where: str, law: AnyLaw, F: Array) -> Array:
+    """`F` [N] of a law, if any of it is a number.
 
     Raises:
-        ValueError: says what is missing, and names laws that have it.
+        ValueError: none is, as where parameters leave the range of a root or an arcsine.
+    """
+    if F.size and not np.isfinite(F).any():
+        raise ValueError(
+            f"{where} of {law_name(law)}: expected parameters under which the force is a number, "
+            "got some under which it is none anywhere; the limits of the law say which"
+        )
+    return F
+
+
+def require(where: str, law: AnyLaw, *codes: str) -> None:
+    """Refuse a law that shows none of `codes`, or needs more than motion and force of a block.
+
+    Raises:
+        ValueError: says what is missing, and names laws that have it; what else the law needs.
     """
     check_any(where, law)
     shown = phenomena(law)
+    needed = [i.name for i in law.inputs if i.name not in GIVEN] if isinstance(law, Law) else []
+    if needed:
+        raise ValueError(
+            f"{where} of {law_name(law)}: expected a law that needs no more than velocity, load, "
+            f"acceleration and applied force, got one that needs {', '.join(needed)}; a figure of "
+            "a scene that has them shows it, see `symfric scenes`"
+        )
     if set(codes) & set(shown):
         return
     missing = " or ".join(PHENOMENA[code] for code in codes)

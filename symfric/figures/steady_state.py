@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from symfric.figures.data import Curve, FigureData
+from symfric.figures.requirements import finite
 from symfric.figures.scales import NORMAL_FORCE, Scales, scales
 from symfric.foundation.parameters import parameters, with_values
 from symfric.laws import AnyLaw, Law, law_name, steady_force, steady_inputs
@@ -24,7 +25,8 @@ def steady_state(
     """
     magnitudes = given or scales(law, N)
     v = np.geomspace(1e-3, 10.0, 601) * magnitudes.velocity
-    curves = [Curve(law_name(law), "", {"v": v, "F": steady_force(law, v, N)})]
+    F = finite("steady_state", law, steady_force(law, v, N))
+    curves = [Curve(law_name(law), "", {"v": v, "F": F})]
     if isinstance(law, Law) and "sigma_2" in parameters(law):
         unit = parameters(law)["sigma_2"].unit
         load = N if unit == "s/m" else 1.0

@@ -8,7 +8,7 @@ import casadi as ca
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable, option, param
-from symfric.laws import GMS, ElastoPlastic, Leuven, LuGre, SteadyStateLuGre, Stribeck
+from symfric.laws import GMS, Dahl, ElastoPlastic, Leuven, LuGre, SteadyStateLuGre, Stribeck
 from symfric.laws.base import smooth
 from symfric.laws.base.law import FORCE
 from symfric.model import Model, Output, Variables
@@ -27,14 +27,16 @@ _BRISTLE = _CURVE | {"sigma_0": 0.16e6, "sigma_1": 0.08}
 _LEVELS = {"mu_s": 1.05, "mu_d": 0.2, "sigma_2": 0.0}
 
 
-def _sled(study: str, F_S: float, F_C: float, v_s: float, sigma_2: float, delta: float) -> Preset:
-    """Carton pulled over rubber: forces of one study, as coefficients under 1 N."""
+def _sled(
+    study: str, slowest: int, F_S: float, F_C: float, v_s: float, sigma_2: float, delta: float
+) -> Preset:
+    """Carton pulled over rubber from `slowest` [mm/min] on: forces as coefficients under 1 N."""
     curve = {"v_s": v_s, "delta": delta}
     levels = {"mu_s": F_S, "mu_d": F_C, "sigma_2": sigma_2}
     measured = {"F_S": F_S, "F_C": F_C, "sigma_2": sigma_2, **curve}
     return Preset(
         f"sled of the {study} study, forces as coefficients under 1 N (its weight is not given); "
-        "measured from 100 to 500 mm/min, smooth above 140",
+        f"measured from {slowest} to 500 mm/min, smooth above 140; the machine runs up to 650",
         f"A Friction Model for Laminator Nips, MSc thesis TFRT-5968, Lund 2015, {study} study",
         {"N": 1.0},
         {"law": Numbers(levels, {SteadyStateLuGre: measured, Stribeck: curve, LuGre: curve})},
@@ -77,15 +79,16 @@ class Prescribed(Scene):
                     {
                         LuGre: _BRISTLE,
                         ElastoPlastic: _BRISTLE | {"z_ba": 0.61e-6},
-                        Leuven: _CURVE | {"delta_l": 7.0},
+                        Leuven: _CURVE | {"delta_l": 7.0, "sigma_1": 0.08},
+                        Dahl: {"sigma_0": 0.16e6},
                         GMS: _CURVE | {"C": 24.0},
                         Stribeck: _CURVE,
                     },
                 )
             },
         ),
-        "laminator_pilot": _sled("pilot", 4.4861, 2.5498, 0.0012, 230.0, 2.0),
-        "laminator_main": _sled("main", 4.2672, 2.6063, 0.0049, 5.0, 3.2),
+        "laminator_pilot": _sled("pilot", 10, 4.4861, 2.5498, 0.0012, 230.0, 2.0),
+        "laminator_main": _sled("main", 100, 4.2672, 2.6063, 0.0049, 5.0, 3.2),
     }
 
     N: Scalar = param(1.0, unit="N", role="load", doc="normal force", lower=0.0)

@@ -27,10 +27,13 @@ LINKAGE = ("k_s", "b_d", "theta", "L_d")
 def _road(millimetres: int) -> Preset:
     """The rig of section 3 on the road with this amplitude."""
     return Preset(
-        f"rig of section 3, road of {millimetres} mm; C_e, e_1, mu, sigma_v and L_d are not given",
+        f"rig of section 3, road of {millimetres} mm, whose first ramp begins at 0.3 s and makes "
+        "X_w - X_b = 6.9 mm at 0.5 s, as the text says; the other times, C_e, e_1, mu, sigma_v and "
+        "L_d are not given; 193.8 N are taken, not the 199 N of 6.9 mm of the spring; equation 12 "
+        "with a falling exponent and all of its friction against the velocity, as its text asks",
         "Al-Zughaibi, quarter-car friction, sections 3 and 8.1",
         {"M_b": 240.0, "M_w": 40.0, "k_s": 28900.0, "b_d": 260.0, "k_t": 920000.0, "b_t": 3886.0}
-        | {"theta": pi / 4, "amplitude": millimetres / 1000},
+        | {"theta": pi / 4, "amplitude": millimetres / 1000, "t_0": 0.3, "t_first": 2.4},
         {"law": Numbers({}, {QuarterCarGeneral: {"F_brk": 193.8}})},
     )
 
@@ -55,8 +58,8 @@ class QuarterCar(Scene):
 
     Defaults: section 3 of the paper, and its road of 50 mm (30 and 70 mm in its other runs). It
     does not give L_d and the times of the road; by its text the first ramp is the gentlest, which
-    takes a t_first above 1.7 s. N_0 is chosen so that a law with mu_s = 0.15 breaks away at the
-    paper's 193.8 N; the paper has none, and its own law needs none.
+    takes a t_first above 1.7 s (its presets have 2.4 s). N_0 is chosen so that a law with mu_s =
+    0.15 breaks away at the paper's 193.8 N; the paper has none, and its own law needs none.
     Source: Al-Zughaibi, quarter-car friction, equations 1-13.
     """
 

@@ -7,7 +7,8 @@ from symfric.laws import Law
 from symfric.scenes import QuarterCar
 
 START, FIRST, RAMP, HOLD, T_END = 0.3, 2.4, 1.0, 2.0, 12.0  # s
-"""Times of the road; not in the paper, whose text says that the first ramp is the gentlest."""
+"""Times of the road; START and FIRST follow from the text and are those of the preset (figure 11),
+the others are ours."""
 STAGES = {"A": (START, 0.0), "B": (4.7, 0.085), "C": (7.7, 0.135), "D": (T_END, 0.035)}
 """End of each rest [s], and where the paper says that the body is then [m]."""
 FRICTION = {"C_e": 180.0, "e_1": 0.01, "mu": 0.05, "sigma_v": 1500.0}
@@ -22,5 +23,5 @@ def general(numbers: Mapping[str, float] = FRICTION, form: str = "smooth") -> Qu
 def ride(law: Law, millimetres: int = 50, samples: int = 6001) -> Trajectory:
     """A run of the rig with `law` in its guide."""
     name = f"al_zughaibi_{millimetres}_mm"
-    car = QuarterCar.preset(name, law, t_0=START, t_first=FIRST, t_ramp=RAMP, t_hold=HOLD)
+    car = QuarterCar.preset(name, law, t_ramp=RAMP, t_hold=HOLD)
     return simulate(car.model(), T_END, rtol=1e-8, samples=samples)

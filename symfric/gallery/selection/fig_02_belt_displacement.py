@@ -1,5 +1,7 @@
 """Displacement of the block on the belt, eleven laws.
 
+`symfric select rabinowicz --paper` puts tables 4 and 5 beside ours, law by law and rank by rank.
+
 Compared: S, the standard deviation of the positions, with the paper's table 4; the positions with
 exact dry friction in closed form.
 

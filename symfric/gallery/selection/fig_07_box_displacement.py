@@ -1,5 +1,7 @@
 """Displacement of the box, eleven laws.
 
+`symfric select pendulum_box --paper` puts tables 8 and 9 beside ours, law by law and rank by rank.
+
 Compared: S, the standard deviation of the positions, with the paper's table 8; the positions with
 exact dry friction.
 
@@ -10,7 +12,8 @@ cm for ten laws whose boxes lie within 11 mm of exact dry friction. At the steps
 same motions give 2.8 ... 7.6 cm, which is the spread of table 8, 1.4 ... 7.2 cm, with Stick-slip
 below all others as there: it is where a solver takes its steps. Karnopp alone is centimetres off:
 its band of 1 mm/s at the hinge's 10 mm, a radius of ours, stops the pendulum below 0.1 rad/s at
-every turn; with a hundredth of that band it is where the others are.
+every turn; with a hundredth of that band it is where the others are, and so it is in its smooth
+form, which stops nothing.
 """
 
 from dataclasses import replace
@@ -47,8 +50,15 @@ def plate(quick: bool = False) -> Plate:
     finer = replace(box(LAWS["Karnopp"]), hinge=hinge)
     narrow = simulate(finer.model(), t_end, rtol=1e-7, t_eval=run(EXACT, t_end).t)["x"]
     numbers["the same, Karnopp with a hundredth of its band [m]"] = largest(narrow - exact)
+    smooth = replace(box(Karnopp()), hinge=replace(hinge, D_v=1e-3, form="smooth"))
+    soft = simulate(smooth.model(), t_end, rtol=1e-7, t_eval=run(EXACT, t_end).t)["x"]
+    numbers["the same, Karnopp in its smooth form [m]"] = largest(soft - exact)
     wide = apart.pop("Karnopp")
-    claims = {"a hundredth of its band brings Karnopp near": 5 * largest(narrow - exact) < wide}
+    claims = {
+        "a hundredth of its band, or its smooth form, brings Karnopp near": (
+            5 * max(largest(narrow - exact), largest(soft - exact)) < wide
+        )
+    }
     if not quick:
         low, high = min(by_steps, key=lambda name: by_steps[name]), max(by_steps.values())
         claims |= {

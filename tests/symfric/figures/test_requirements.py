@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from symfric import LuGre, figure, law_from_text
+from symfric import LuGre, QuarterCarGeneral, figure, law_from_text
 from symfric.figures.requirements import phenomena, require
 
 
@@ -29,3 +29,19 @@ def test_arguments_of_a_figure_that_changed_places_are_named() -> None:
     for law, name, said in cases:
         with pytest.raises(ValueError, match=said):
             figure(law, name)
+
+
+def test_a_law_that_needs_more_than_a_block_has_is_told_so() -> None:
+    with pytest.raises(
+        ValueError, match=r"drift of quarter_car_general: .* x_rel, v_rel; a figure of"
+    ):
+        figure(QuarterCarGeneral(), "drift")
+    assert figure(QuarterCarGeneral(), "profile").curves
+
+
+@pytest.mark.filterwarnings("ignore:invalid value encountered in arcsin")
+@pytest.mark.parametrize("name", ["profile", "steady_state"])
+def test_a_force_that_is_no_number_anywhere_is_refused(name: str) -> None:
+    """A strut of 4 mm does not reach where the figure slides it to."""
+    with pytest.raises(ValueError, match=f"{name} of quarter_car_general: .* is none anywhere"):
+        figure(QuarterCarGeneral(L_d=0.004, k_s=2.89e6), name, 10.0)

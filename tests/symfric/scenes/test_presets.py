@@ -23,7 +23,7 @@ from symfric import (
 from symfric.cli import main
 from symfric.laws import Leuven, MaxwellSlip, RateAndState, Wojewoda
 from symfric.laws.dynamic.maxwell_slip import Slider
-from symfric.scenes import ALL_SCENES, PendulumBox, QuarterCar, Rabinowicz
+from symfric.scenes import ALL_SCENES, PendulumBox, Prescribed, QuarterCar, Rabinowicz
 from symfric.scenes.presets import Numbers
 
 ELEVEN = (
@@ -112,6 +112,28 @@ def test_roads_of_the_rig(amplitude: int) -> None:
         [0.0, 0.085, 0.085 + amplitude / 1000, 0.085 - amplitude / 1000]
     )
     assert scene.law.static_level(0.0) == 193.8
+
+
+def test_the_first_ramp_of_the_rig_is_what_the_text_says_of_it() -> None:
+    """Nothing moves for 0.3 s, X_w - X_b = 6.9 mm at 0.5 s, and it is the gentlest of the three."""
+    rig = QuarterCar.preset("al_zughaibi_50_mm", ALL_LAWS["quarter_car_general"]())
+    run = simulate(rig.model(), 0.6, rtol=1e-8)
+    assert abs(run.at(0.3)["X_w"][0]) < 1e-12
+    assert run.at(0.5)["x_rel"][0] == pytest.approx(0.0069, abs=1e-4)
+    slopes = [float(rig.road(t + 0.01) - rig.road(t)) for t in (1.0, 5.0, 8.0)]
+    assert slopes[0] < slopes[1] < -slopes[2]
+
+
+def test_numbers_of_table_1_reach_every_law_that_has_them() -> None:
+    found = {
+        name: parameters(Prescribed.preset("lampaert_table_1", ALL_LAWS[name]()).law)
+        for name in ("lugre", "elasto_plastic", "leuven", "gms", "dahl")
+    }
+    printed = {"v_s": 98e-6, "delta": 0.78, "sigma_0": 0.16e6, "sigma_1": 0.08, "z_ba": 0.61e-6,
+               "C": 24.0, "delta_l": 7.0, "mu_s": 1.05, "mu_d": 0.2, "sigma_2": 0.0}  # fmt: skip
+    for name, own in found.items():
+        wrong = {n: own[n].value for n in printed if n in own and own[n].value != printed[n]}
+        assert not wrong, name
 
 
 def test_every_law_takes_every_preset() -> None:
