@@ -19,7 +19,7 @@ What there is; `help` of each tells more:
                 samples, Hold and Linear (rate_of: their rate); SolveError, Status where runs fail
     results     Trajectory (run["x"], run.at(times), run.at(run.step_times), run.extremes, plot,
                 animate, save, to_csv, to_dataframe), load_run, Statistics, Plant, report; Ensemble
-                (varied, extremes, plot, save, to_dataframe), load_ensemble
+                (varied, extremes, plot, save, to_dataframe), load_ensemble; for_print
     choice      select ranks laws on a machine at equal error (Choice)
     behaviour   figure and compare of laws (FigureData); recommended finds a smoothing for a wanted
                 error (Recommendation)
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from symfric.foundation.parameters import parameters as parameters
     from symfric.foundation.parameters import symbolise as symbolise
     from symfric.foundation.parameters import with_values as with_values
+    from symfric.foundation.printing import for_print as for_print
     from symfric.foundation.status import SolveError as SolveError
     from symfric.foundation.status import Status as Status
     from symfric.integrator import Ensemble as Ensemble
@@ -153,6 +154,7 @@ else:
             "symfric.choice": "Choice select",
             "symfric.figures": "FigureData Recommendation compare figure recommended",
             "symfric.foundation.parameters": "Parameter Variable parameters symbolise with_values",
+            "symfric.foundation.printing": "for_print",
             "symfric.foundation.status": "SolveError Status",
             "symfric.integrator": """
                 Ensemble Hold Linear Plant Statistics Trajectory flow load_ensemble load_run

@@ -70,7 +70,7 @@ def _curve(axis: Axes, curve: Curve, name: str) -> None:
     axis.set_ylim(low, high)
     axis.set_xlabel(f"v [{curve.v_unit}]")
     axis.set_ylabel(f"friction [{curve.F_unit}]")
-    axis.legend(loc="upper left", fontsize="small", markerscale=2)
+    _legend(axis)
 
 
 def limits(curve: Curve) -> tuple[float, float]:

@@ -4,6 +4,7 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
+from errno import ENOSPC
 from io import TextIOWrapper
 from types import TracebackType
 from typing import Annotated, Any
@@ -75,6 +76,11 @@ def _refuse(error: BaseException, status: int) -> int:
 
 def sentence(error: BaseException) -> str:
     """The message of `error` on one line."""
+    if isinstance(error, OSError) and error.errno == ENOSPC:
+        place = f" for '{error.filename}'" if error.filename is not None else ""
+        return (
+            f"expected room on the disk, got none left{place}; free some, or set TMPDIR elsewhere"
+        )
     if isinstance(error, OSError) and error.filename is not None:
         return f"'{error.filename}': {error.strerror}"
     if isinstance(error, MemoryError):

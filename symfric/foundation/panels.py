@@ -100,7 +100,7 @@ def dressed(axis: Axes) -> Axes:
     return axis
 
 
-def save(figure: Figure, path: str | Path | None) -> Figure:
+def save(figure: Figure, path: str | Path | None, dpi: float = 150) -> Figure:
     """Write `figure` to `path`, if given; return it either way."""
     if path is not None:
         known = sorted(figure.canvas.get_supported_filetypes())
@@ -108,7 +108,7 @@ def save(figure: Figure, path: str | Path | None) -> Figure:
         ending = place.suffix.removeprefix(".").lower()
         checks.check_names(f"picture '{path}': ending", [ending], known)
         with written(place) as temporary:
-            figure.savefig(temporary, dpi=150)
+            figure.savefig(temporary, dpi=dpi)
     return figure
 
 
