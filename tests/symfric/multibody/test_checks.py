@@ -130,8 +130,8 @@ MISTAKES: dict[str, tuple[Callable[[Mechanism], object], str]] = {
         lambda m: m.body("bob", ca.SX.sym("load"), (1.0, 1.0, 1.0)),
         "> body 'bob': expected only declared parameters, got load; hand the variable over, build",
     ),
-    "a spring between one place and itself": (
-        lambda m: m.force(SpringDamper("spring", "ground", "ground", 1.0, free_length=0.1)),
+    "a spring whose places coincide": (
+        lambda m: m.force(SpringDamper("spring", "ground.hinge", "rod.hinge", 1.0, 0.1)),
         "> force 'spring': expected a finite force at the start, got nan; do its places coincide",
     ),
     "a joint without its body": (
