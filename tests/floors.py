@@ -163,6 +163,7 @@ FLOORS: dict[str, set[str]] = {
         "symfric.figures",
         "symfric.emitter",
         "symfric.codegen",
+        "symfric.embedded",
         "symfric.page",
     },
     "ocp.text": {"symfric"},

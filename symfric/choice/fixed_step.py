@@ -5,6 +5,7 @@ their value in the middle of each step. A step size holds if the positions are f
 `share` of the size of the motion of the adaptive run of the same law, at every step. The largest
 of 1, 2, 5 times a power of ten that holds, with the power below it holding, too, is what is found:
 whole powers first, from large to small, then 2 and 5 times the one that holds.
+Limits: steps across the fold of a falling law hold or do not by the eighth digit of a parameter.
 """
 
 from collections.abc import Mapping
@@ -23,7 +24,7 @@ from symfric.integrator.equations.inputs import Hold, Input, Sampled
 from symfric.model import Model
 
 Array = NDArray[np.float64]
-WORK = 500_000_000
+WORK = 100_000_000
 """CasADi instructions that one step size may take: what a small step is worth."""
 FEWEST = 100
 """Whole powers are tried that make so many steps at least."""

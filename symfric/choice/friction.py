@@ -6,6 +6,7 @@ from math import asin, e, log, pi
 from typing import final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from symfric.foundation import checks
@@ -14,6 +15,7 @@ from symfric.laws import (
     Armstrong,
     BengisuAkay,
     Benson,
+    Bittencourt,
     BlimanSorine,
     DuanSingh,
     ExactCoulomb,
@@ -23,12 +25,15 @@ from symfric.laws import (
     MakkarDixon,
     MaxwellSlip,
     PoppStelter,
+    QuarterCarSimple,
     RuiWang,
     SteadyStateLuGre,
     StickSlip,
     VelocityBased,
     steady_force,
 )
+
+Array = NDArray[np.float64]
 
 
 @final
@@ -126,6 +131,12 @@ def _shared(law: type[MaxwellSlip | Leuven], total: str) -> Levels:
 
 
 LEVELS: dict[type[Law], Levels] = {
+    Bittencourt: lambda f, _: {
+        "F_cl": f.mu_d,
+        "F_sl": f.mu_s - f.mu_d,
+        **dict.fromkeys(("F_c0", "F_s0", "F_sT", "F_v0", "F_vT"), 0.0),
+    },
+    QuarterCarSimple: lambda f, N: {"C_e": f.mu_s * N, "sigma_v": 0.0},
     PoppStelter: lambda f, _: {"eta": f.mu_d / f.mu_s},
     Armstrong: lambda f, _: {"mu_inf": f.mu_s - f.mu_d, "mu_a": 0.2 * (f.mu_s - f.mu_d)},
     BlimanSorine: _of_bliman,
@@ -171,26 +182,44 @@ def peaked(law: Law, mu_s: float, load: float | None) -> Law:
     that it is written with, by 0.05 % to 7 %. What is measured is the peak.
     """
     known = parameters(law)
-    apart = {"mu_s", "F_S", "gamma_1"} & set(known)
+    apart = {"mu_s", "F_S", "gamma_1", "F_sl"} & set(known)
     if law.states or law.inputs or "S" not in law.facts.phenomena or not apart:
         return law
     N = 1.0 if load is None else load
     if "mu_d" in known and known["mu_s"].value == known["mu_d"].value:
         return law
-    widths = [p for p in known.values() if p.role in ("velocity scale", "width") and p.unit != "1"]
-    speeds = [1 / float(p.value) if "s/" in p.unit else float(p.value) for p in widths]
-    v = np.geomspace(0.02 * min(speeds), 20 * max(speeds), 4001)
-    for _ in range(4):
-        top = float(steady_force(law, v, N).max()) / N
-        law = with_values(law, _raised(law, mu_s / top, (mu_s - top) * N))
+    widths = [p for p in known.values() if p.role in ("velocity scale", "width")]
+    speeds = [float(p.value) for p in widths if p.unit in ("m/s", "rad/s")]
+    speeds += [1 / float(p.value) for p in widths if p.unit in ("s/m", "s/rad")]
+    wide = np.geomspace(0.02 * min(speeds), 20 * max(speeds), 2001)
+    for _ in range(PASSES):
+        top = _top(law, wide, N)
+        if abs(top - mu_s) <= 1e-9 * mu_s:
+            break
+        law = with_values(law, _raised(law, mu_s / top, mu_s - top, N, wide))
     return law
 
 
-def _raised(law: Law, factor: float, missing: float) -> dict[str, float]:
-    """The parameters of a higher peak: by a factor, or by a force [N]; sliding stays as it is."""
+PASSES = 12
+"""Corrections of a peak; each leaves a few per cent of what was missing."""
+
+
+def _top(law: Law, v: Array, N: float) -> float:
+    """The highest force of steady sliding over N: on the grid `v`, then on one around its peak."""
+    F = steady_force(law, v, N)
+    k = int(np.argmax(F))
+    near = np.geomspace(v[max(k - 1, 0)], v[min(k + 1, v.size - 1)], 201)
+    return float(max(F[k], steady_force(law, near, N).max())) / N
+
+
+def _raised(law: Law, factor: float, missing: float, N: float, v: Array) -> dict[str, float]:
+    """The parameters of a higher peak: by a factor, or by a coefficient; sliding stays as it is."""
     now = {name: float(p.value) for name, p in parameters(law).items()}
-    if isinstance(law, MakkarDixon):
-        return {"gamma_1": now["gamma_1"] + missing}
+    if isinstance(law, MakkarDixon):  # gamma_1 times a share of itself makes the peak
+        share = float((np.tanh(now["gamma_2"] * v) - np.tanh(now["gamma_3"] * v)).max())
+        return {"gamma_1": now["gamma_1"] + missing * N / share}
+    if isinstance(law, Bittencourt):
+        return {"F_sl": now["F_sl"] + missing}
     if isinstance(law, PoppStelter):
         return {"mu_s": now["mu_s"] * factor, "eta": now["eta"] / factor}
     name = "F_S" if isinstance(law, SteadyStateLuGre) else "mu_s"

@@ -2,13 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isfinite
+from math import isfinite, nan
 
 import numpy as np
 
 from symfric.codegen.blocks.from_law import law_block
 from symfric.codegen.writing.routines import routines
+from symfric.embedded import measure
 from symfric.emitter.c99 import REALS
+from symfric.foundation.compiler import CompileError
 from symfric.foundation.parameters import Parameter, options, parameters
 from symfric.laws import Law, steady_force
 
@@ -20,6 +22,8 @@ SHARP = 1e-9
 """Widths [m/s] below this are none for an optimiser or a fixed step."""
 EVENT = "event"
 """Form of laws with modes, and the class of what switches by events."""
+CORE, STEPS_ON_CORE = "m4f", 200
+"""Core whose instructions are counted, over so many steps."""
 STEP = 1e-3
 """Step [s] of the C; the count does not depend on it."""
 
@@ -100,8 +104,42 @@ def c_operations(law: Law) -> tuple[int | None, str]:
     return sum(r.operations + sum(r.calls.values()) for r in steps), ""
 
 
+def on_core(law: Law) -> tuple[float, str]:
+    """Instructions of the law's step on a Cortex-M4F; NaN and why where it was not measured."""
+    try:
+        block = law_block(law, h=STEP if law.states else None, free=())
+        found = measure(block, "float", CORE, steps=STEPS_ON_CORE)
+    except (ValueError, CompileError) as problem:
+        return nan, " ".join(str(problem).split())
+    return found.average, "" if found.ok else found.status
+
+
 def _is_step(name: str) -> bool:
     return not name.endswith(("_init", "_reset", "_init_sliding"))
+
+
+def otherwise(law: Law, mu_d: float, load: float | None) -> str:
+    """Why `law` may move otherwise than dry friction, however dry it is made; "" if nobody knows.
+
+    A static law whose steady friction is another one, a bristle that nothing damps, one that ages.
+    """
+    roles = {p.role for p in parameters(law).values() if p.value != 0.0}
+    if law.states:
+        times = [p.name for p in parameters(law).values() if p.role == "time" and p.unit == "s"]
+        if times:
+            return f"friction follows by times of its own ({', '.join(times)})"
+        bristle = roles & {"stiffness", "length"} and "damping" not in roles
+        return "nothing damps its bristle, which rings" if bristle else ""
+    if law.inputs:
+        return ""
+    level = float(steady_force(law, np.array([FAST]), load or 1.0)[0]) / (load or 1.0)
+    if abs(level - mu_d) <= ANOTHER * mu_d:
+        return ""
+    return f"sliding at {FAST:g} m/s it rubs with {level:.3g} of the load, not {mu_d:g}"
+
+
+FAST, ANOTHER = 0.1, 0.05
+"""Velocity [m/s] at which friction is that of sliding, and how far it may be another."""
 
 
 def shown(codes: Sequence[str]) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from symfric.choice.needs import NEEDS
 from symfric.choice.pictures import plot_choice
 from symfric.choice.row import Row
+from symfric.choice.text import GROUPS, interrupted, number
 from symfric.foundation.panels import data_uri
 
 if TYPE_CHECKING:
@@ -26,17 +27,23 @@ th, td { padding: .2rem .7rem .2rem 0; border-bottom: 1px solid #d5dbe1; text-al
   vertical-align: top; white-space: nowrap; } thead th { color: #5b6775; }
 td.n { text-align: right; } td.why { white-space: normal; min-width: 20rem; }
 tr.best td { font-weight: 600; }
+tr.group td { padding-top: .8rem; color: #5b6775; font-style: italic; }
+td .soft { display: block; font-weight: 400; font-size: .8rem; white-space: normal;
+  min-width: 14rem; }
 """
 
 COLUMNS = (
+    ("rank", "place among all that run; laws that are alike share it"),
     ("law", "name in the catalogue"),
-    ("time [ms]", "processor time of the run at equal error, in CasADi's virtual machine"),
-    ("work", "attempts of a step times CasADi instructions of one, in millions"),
-    ("attempts", "of a step, at equal error"),
-    ("rtol", "loosest relative tolerance that keeps the accuracy"),
+    ("work", "attempts of a step times what one counts, in millions of instructions: it ranks"),
+    ("ms", "processor time of that run in CasADi's virtual machine"),
     ("error", "largest difference from the reference, relative to the motion"),
+    ("own error", "that from the finest run of the law itself: the integrator's part"),
+    ("attempts", "of a step"),
+    ("rtol", "loosest relative tolerance that keeps the accuracy"),
     ("fixed [s]", "largest step of backward Euler in which the plant follows the motion"),
     ("explicit [s]", "largest step of an explicit Runge-Kutta method of order 5 in which it does"),
+    ("M4F", "instructions of the law's step on a Cortex-M4F, in the mean over a drive's day"),
     ("C", "operations of the law's step in C, float"),
     ("parameters", "that describe friction; of these hard to measure"),
     ("class", "smoothness in the velocity"),
@@ -44,6 +51,8 @@ COLUMNS = (
     ("numbers", "what to give the law: parameters that it does not come with"),
 )
 """Head of a column, and what it means."""
+NARROW = 700
+"""Width of a screen [pixel] below which the narrow picture is shown."""
 
 
 def page(choice: "Choice") -> str:
@@ -61,24 +70,29 @@ def body(choice: "Choice", width: int = 640) -> str:
     """Verdict, picture and tables, for a page or a notebook."""
     said = "".join(f"<p>{escape(sentence)}</p>" for sentence in choice.verdict)
     kind = "verdict" if choice.ranked else "verdict none"
-    stopped = "<p>Interrupted: laws without a row were not measured.</p>"
-    parts = [
-        f'<div class="{kind}">{said}{stopped * choice.interrupted}</div>',
-        f"<p>{_image(choice, width)}</p>",
-    ]
-    if choice.ranked:
-        parts += ["<h2>Ranked by time at equal error</h2>", _ranked(choice.ranked)]
-    others = [row for row in choice.rows if not row.ranked]
+    stopped = f"<p>{escape(interrupted(choice))}</p>" if choice.interrupted else ""
+    parts = [f'<div class="{kind}">{said}{stopped}</div>', f"<p>{_image(choice, width)}</p>"]
+    if choice.placed:
+        parts += ["<h2>All laws that run here</h2>", _placed(choice)]
+    others = [row for row in choice.rows if not row.rank]
     if others:
-        parts += ["<h2>Not ranked, and why</h2>", _others(others)]
+        parts += ["<h2>Laws that do not run here, and why</h2>", _others(others)]
     return "\n".join(parts)
 
 
 def _image(choice: "Choice", width: int) -> str:
-    """The picture, drawn at twice its `width` [pixel] for sharp screens."""
-    figure = plot_choice(choice)
-    source = data_uri(figure, 2 * width / float(figure.get_size_inches()[0]))
-    return f'<img src="{source}" alt="{escape(choice.title)}" width="{width}">'
+    """The picture for wide and for narrow screens, at twice its size for sharp ones."""
+    wide, narrow = (plot_choice(choice, wide=wide) for wide in (True, False))
+    source = data_uri(wide, 2 * width / float(wide.get_size_inches()[0]))
+    small = data_uri(narrow, 2 * SMALL_WIDTH / float(narrow.get_size_inches()[0]))
+    return (
+        f'<picture><source media="(max-width: {NARROW}px)" srcset="{small}">'
+        f'<img src="{source}" alt="{escape(choice.title)}" width="{width}"></picture>'
+    )
+
+
+SMALL_WIDTH = 400
+"""Of the narrow picture [pixel]."""
 
 
 def _asked(choice: "Choice") -> str:
@@ -90,11 +104,18 @@ def _asked(choice: "Choice") -> str:
     )
 
 
-def _ranked(rows: Sequence[Row]) -> str:
+def _placed(choice: "Choice") -> str:
     head = "".join(f'<th title="{escape(why)}">{escape(name)}</th>' for name, why in COLUMNS)
-    lines = [
-        f"<tr{' class=best' if k == 0 else ''}>{_cells(row)}</tr>" for k, row in enumerate(rows)
-    ]
+    lines = list[str]()
+    for standing, text in GROUPS.items():
+        group = [row for row in choice.placed if row.standing == standing]
+        if group:
+            lines.append(
+                f'<tr class="group"><td colspan="{len(COLUMNS)}">Laws that {text}</td></tr>'
+            )
+        lines += [
+            f"<tr{' class=best' if row.rank == 1 else ''}>{_cells(row)}</tr>" for row in group
+        ]
     return _table(head, lines)
 
 
@@ -102,23 +123,27 @@ def _cells(row: Row) -> str:
     form = [f"form = {row.form}"] if row.form else []
     values = ", ".join([*form, *(f"{n} = {value:.3g}" for n, value in (row.values or {}).items())])
     numbers = (
-        f"{1e3 * row.time_s:.2f}",
-        f"{1e-6 * row.work:.2f}",
-        str(row.attempts),
-        f"{row.rtol:.0e}",
-        f"{row.error:.1e}",
-        _step(row.fixed_step),
-        _step(row.explicit_step),
-        "-" if row.c_operations is None else str(row.c_operations),
-        f"{row.parameters} / {len(row.hard)}",
+        (number(1e-6 * row.work), ""),
+        (number(1e3 * row.time_s), ""),
+        (f"{row.error:.1e}", row.reason),
+        (f"{row.own_error:.1e}" if isfinite(row.own_error) else "-", ""),
+        (str(row.attempts), f"by {row.method}"),
+        (f"{row.rtol:.0e}", ""),
+        (_step(row.fixed_step), row.fixed_why),
+        (_step(row.explicit_step), row.explicit_why),
+        (f"{row.core:.0f}" if isfinite(row.core) else "-", row.core_why),
+        ("-" if row.c_operations is None else str(row.c_operations), row.c_why),
+        (f"{row.parameters} / {len(row.hard)}", " ".join(row.hard)),
     )
-    hints = ("", "", "", "", "", row.fixed_why, row.explicit_why, row.c_why, " ".join(row.hard))
-    cells = "".join(
-        f'<td class="n" title="{escape(hint)}">{text}</td>'
-        for text, hint in zip(numbers, hints, strict=True)
-    )
-    texts = (row.smoothness, " ".join(row.phenomena), values or "exact")
-    return f"<td>{escape(row.law)}</td>{cells}" + "".join(f"<td>{escape(t)}</td>" for t in texts)
+    cells = "".join(f'<td class="n"{_title(hint)}>{escape(text)}</td>' for text, hint in numbers)
+    why = f' <span class="soft">{escape(row.reason)}</span>' if row.reason else ""
+    texts = (row.smoothness, " ".join(row.phenomena), values or "as it comes")
+    last = "".join(f"<td>{escape(t)}</td>" for t in texts)
+    return f'<td class="n">{row.rank}</td><td>{escape(row.law)}{why}</td>{cells}{last}'
+
+
+def _title(hint: str) -> str:
+    return f' title="{escape(hint)}"' if hint else ""
 
 
 def _step(value: float | None) -> str:
@@ -126,11 +151,9 @@ def _step(value: float | None) -> str:
 
 
 def _others(rows: Sequence[Row]) -> str:
-    head = "".join(f"<th>{name}</th>" for name in ("law", "error", "time [ms]", "why"))
+    head = "".join(f"<th>{name}</th>" for name in ("law", "why"))
     lines = [
         f"<tr><td>{escape(row.called)}</td>"
-        f'<td class="n">{f"{row.error:.1e}" if isfinite(row.error) else "-"}</td>'
-        f'<td class="n">{f"{1e3 * row.time_s:.2f}" if isfinite(row.time_s) else "-"}</td>'
         f'<td class="why">{escape(f"{row.standing}: {row.reason}")}</td></tr>'
         for row in rows
     ]

@@ -1,8 +1,9 @@
-"""The choice as a picture: error against time of all laws, and the ranked ones by name."""
+"""The choice as a picture: error against work of all laws, and the ranked ones by name."""
 
 from collections.abc import Sequence
-from math import isfinite
 from pathlib import Path
+from statistics import median
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
@@ -13,7 +14,7 @@ from matplotlib.transforms import Bbox
 from symfric.choice.nature import GROUPS, shown
 from symfric.choice.row import Row
 from symfric.foundation.panels import blank, dressed, save
-from symfric.foundation.style import MARKERS, QUIET, colour
+from symfric.foundation.style import MARKERS, colour
 
 if TYPE_CHECKING:
     from symfric.choice.result import Choice
@@ -26,66 +27,80 @@ OFFSETS = ((5, 3), (5, -9), (-5, 3), (-5, -9), (0, 8), (0, -13), (9, 9), (9, -15
 BEHIND = {"fc": "w", "alpha": 0.75, "lw": 0.0, "pad": 0.6}
 APART = 1e-2
 """Ranked laws of less than this share of the error allowed stand apart, and are named there."""
+COLUMN, PLANE, ROW = 3.35, 2.1, 0.135
+"""Width of a column of print, height of the plane and of a name beside it [inch]."""
 LEAST = 3
-"""Ticks of an axis of times."""
+"""Ticks of an axis of work."""
 MOST = 30
 """Ranked laws that are drawn by name."""
 
 
-def plot_choice(choice: "Choice", path: str | Path | None = None) -> Figure:
-    """Error against time, marked by what a law shows; beside it the ranked laws by their time."""
-    ranked = choice.ranked[:MOST]
-    figure = blank(7.6, max(3.6, 1.3 + 0.155 * len(ranked)))
-    if ranked:
-        left, right = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
-        _by_name(dressed(right), ranked)
+def plot_choice(choice: "Choice", path: str | Path | None = None, wide: bool = True) -> Figure:
+    """Error against work, marked by what a law shows, and the ranked laws by their work.
+
+    Args:
+        wide: the panels side by side; else above each other, in the width of a column of print.
+    """
+    named = choice.ranked[:MOST] or choice.placed[:MOST]
+    tall = ROW * len(named) + (0.75 if wide else 0.55)
+    if wide:
+        figure = blank(2 * COLUMN + 0.6, max(3.6, tall + 0.6))
+        plane, listed = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
     else:
-        left = figure.subplots()
-    _plane(figure, dressed(left), choice)
-    figure.suptitle(choice.title, fontsize=10)
+        figure = blank(COLUMN, PLANE + tall + 0.9)
+        plane, listed = figure.subplots(2, 1, height_ratios=(PLANE, tall))
+    if named:
+        _by_name(dressed(listed), named, _milliseconds(choice.placed))
+    else:
+        figure.delaxes(listed)
+    _plane(figure, dressed(plane), choice)
+    figure.suptitle("\n".join(wrap(choice.title, 90 if wide else 48)), fontsize=SMALL + 2 * wide)
     handles = [
         Line2D([], [], ls="", marker=MARKERS[k], color=colour(k), label=kind, markersize=5)
         for k, kind in enumerate(KINDS)
-        if any(shown(row.phenomena) == kind for row in choice.rows)
+        if any(shown(row.phenomena) == kind for row in choice.placed)
     ]
     hollow = Line2D(
-        [], [], ls="", marker="o", mfc="none", mec="k", label="not ranked", markersize=5
+        [], [], ls="", marker="o", mfc="none", mec="k", label="moves otherwise", markersize=5
     )
     figure.legend(
         handles=[*handles, hollow],
         loc="outside lower center",
-        ncols=6,
+        ncols=6 if wide else 3,
         fontsize=SMALL,
         frameon=False,
+        handletextpad=0.2,
+        columnspacing=1.2,
     )
     return save(figure, path)
 
 
+def _milliseconds(rows: Sequence[Row]) -> float:
+    """Processor time of a million instructions [ms], in the middle of the laws."""
+    return median(1e9 * row.time_s / row.work for row in rows) if rows else 0.0
+
+
 def _plane(figure: Figure, axis: Axes, choice: "Choice") -> None:
-    """All laws: where they are at equal error, and how they came there."""
-    rows = [row for row in choice.rows if isfinite(row.time_s) and 0.0 < row.error < 1e3]
-    for row in rows:
-        if row.ranked:
-            errors, times = zip(*row.curve, strict=True) if row.curve else ((), ())
-            axis.plot([1e3 * t for t in times], errors, color=QUIET, lw=0.5, alpha=0.6, zorder=1)
+    """All laws where they are at equal error."""
+    rows = [row for row in choice.placed if 0.0 < row.error < 1e3]
     for row in rows:
         k = KINDS.index(shown(row.phenomena))
-        face = colour(k) if row.ranked else "none"
         axis.plot(
-            1e3 * row.time_s, row.error, MARKERS[k], ms=4.5, mfc=face, mec=colour(k), mew=0.9,
-            zorder=3 if row.ranked else 2,
+            1e-6 * row.work, row.error, MARKERS[k], ms=4.5, mew=0.9, mec=colour(k),
+            mfc=colour(k) if row.ranked else "none", zorder=3 if row.ranked else 2,
         )  # fmt: skip
     axis.axhline(choice.accuracy, color="k", lw=0.8, ls=(0, (5, 2)), zorder=0)
-    axis.set(xscale="log", yscale="log", xlabel="processor time [ms]", ylabel="error / motion")
-    axis.tick_params(labelsize=SMALL + 1)
+    axis.set(xscale="log", yscale="log")
+    axis.set_xlabel("work [million instructions]", fontsize=SMALL + 1)
+    axis.set_ylabel("error / motion", fontsize=SMALL + 1)
+    axis.tick_params(labelsize=SMALL)
     if rows:
-        curves = [t for row in rows if row.ranked for _, t in row.curve or ()]
-        _times(axis, [1e3 * t for t in (*(row.time_s for row in rows), *curves)])
+        _round(axis, [1e-6 * row.work for row in rows])
     least = min((row.error for row in rows if row.error > 1e-9), default=1e-6)
     axis.set_ylim(bottom=max(1e-9, 0.1 * min(least, choice.accuracy)))
     apart = (row for row in choice.ranked[1:] if row.error < APART * choice.accuracy)
-    named = [*choice.ranked[:1], *apart, *(row for row in rows if not row.ranked)]
-    _label(figure, axis, named, rows)
+    others = sorted((row for row in rows if not row.ranked), key=lambda row: row.work)
+    _label(figure, axis, [*choice.ranked[:1], *apart, *others], rows)
 
 
 def _label(figure: Figure, axis: Axes, named: Sequence[Row], rows: Sequence[Row]) -> None:
@@ -98,7 +113,7 @@ def _label(figure: Figure, axis: Axes, named: Sequence[Row], rows: Sequence[Row]
         for dx, dy in OFFSETS:
             side = "left" if dx > 0 else "right" if dx < 0 else "center"
             text = axis.annotate(
-                row.law, (1e3 * row.time_s, row.error), (dx, dy), textcoords="offset points",
+                row.law, (1e-6 * row.work, row.error), (dx, dy), textcoords="offset points",
                 fontsize=SMALL - 1, bbox=BEHIND, ha=side,
             )  # fmt: skip
             box = text.get_window_extent()
@@ -112,30 +127,34 @@ def _label(figure: Figure, axis: Axes, named: Sequence[Row], rows: Sequence[Row]
 
 def _around(axis: Axes, row: Row, size: float) -> Bbox:
     """The square that the marker of a row covers [pixel]."""
-    x, y = axis.transData.transform((1e3 * row.time_s, row.error))
+    x, y = axis.transData.transform((1e-6 * row.work, row.error))
     return Bbox.from_extents(x - size / 2, y - size / 2, x + size / 2, y + size / 2)
 
 
-def _by_name(axis: Axes, ranked: Sequence[Row]) -> None:
-    """The time of each ranked law, the fastest on top."""
-    for place, row in enumerate(ranked):
+def _by_name(axis: Axes, named: Sequence[Row], milliseconds: float) -> None:
+    """The work of each of them, the least on top."""
+    for place, row in enumerate(named):
         k = KINDS.index(shown(row.phenomena))
-        axis.plot(1e3 * row.time_s, place, MARKERS[k], color=colour(k), ms=4.5)
-    axis.set_yticks(range(len(ranked)), [row.law for row in ranked], fontsize=SMALL)
-    axis.set(xscale="log", xlabel="processor time at equal error [ms]")
-    axis.set_ylim(len(ranked) - 0.4, -0.6)
-    times = [1e3 * row.time_s for row in ranked]
-    _times(axis, times)
+        face = colour(k) if row.ranked else "none"
+        axis.plot(1e-6 * row.work, place, MARKERS[k], mec=colour(k), mfc=face, ms=4.5)
+    axis.set_yticks(range(len(named)), [f"{row.law}  {row.rank}" for row in named], fontsize=SMALL)
+    axis.set(xscale="log")
+    axis.set_xlabel(
+        f"work [million instructions], {milliseconds:.2g} ms each here",
+        fontsize=SMALL + 1,
+    )
+    axis.set_ylim(len(named) - 0.4, -0.6)
+    _round(axis, [1e-6 * row.work for row in named])
 
 
-def _times(axis: Axes, times: Sequence[float]) -> None:
-    """A logarithmic axis of times [ms] with round numbers on it, three at least where it can."""
-    low, high = 0.8 * min(times), 1.25 * max(times)
+def _round(axis: Axes, values: Sequence[float]) -> None:
+    """A logarithmic axis with round numbers on it, three at least where it can."""
+    low, high = 0.8 * min(values), 1.25 * max(values)
     ticks: list[float] = []
     for digits in ((1,), (1, 2, 5), (1, 1.5, 2, 3, 4, 5, 7)):
         if len(ticks) < LEAST:
-            nice = [digit * 10.0**power for power in range(-3, 6) for digit in digits]
+            nice = [digit * 10.0**power for power in range(-6, 9) for digit in digits]
             ticks = [t for t in nice if low <= t <= high]
     axis.set_xlim(low, high)
-    axis.set_xticks(ticks, [f"{t:g}" for t in ticks], fontsize=SMALL + 1)
+    axis.set_xticks(ticks, [f"{t:g}" for t in ticks], fontsize=SMALL)
     axis.minorticks_off()

@@ -35,7 +35,7 @@ class Choice:
         t_end: length of the motion [s].
         rows: one for each candidate.
         wall_s: how long it took [s].
-        interrupted: somebody stopped it; laws that were not measured have no row.
+        unmeasured: laws without a row, since somebody interrupted it.
     """
 
     machine: str
@@ -48,7 +48,7 @@ class Choice:
     t_end: float
     rows: tuple[Row, ...]
     wall_s: float
-    interrupted: bool = False
+    unmeasured: tuple[str, ...] = ()
 
     def __getitem__(self, law: str) -> Row:
         """The row of a law."""
@@ -60,13 +60,23 @@ class Choice:
         return iter(self.rows)
 
     @property
+    def interrupted(self) -> bool:
+        """Whether somebody stopped it before all laws were measured."""
+        return bool(self.unmeasured)
+
+    @property
+    def placed(self) -> tuple[Row, ...]:
+        """The rows of all laws that run here, by their rank."""
+        return tuple(row for row in self.rows if row.rank)
+
+    @property
     def ranked(self) -> tuple[Row, ...]:
-        """The rows of laws that show what is needed and keep the accuracy, fastest first."""
+        """The rows of laws that show what is needed and keep the accuracy, least work first."""
         return tuple(row for row in self.rows if row.ranked)
 
     @property
     def best(self) -> Row | None:
-        """The fastest of them; None where there is none."""
+        """The first of them; None where there is none."""
         return next(iter(self.ranked), None)
 
     @property
@@ -95,11 +105,14 @@ class Choice:
 
         return body(self)
 
-    def plot(self, path: str | Path | None = None) -> "Figure":
-        """Draw error against time, marked by what a law shows; save it to `path` if given."""
+    def plot(self, path: str | Path | None = None, *, wide: bool = False) -> "Figure":
+        """Draw error against work, marked by what a law shows; save it to `path` if given.
+
+        It is as wide as a column of print, 85 mm; `wide` puts the panels side by side.
+        """
         from symfric.choice.pictures import plot_choice  # noqa: PLC0415  (matplotlib is slow to import)
 
-        return plot_choice(self, path)
+        return plot_choice(self, path, wide)
 
     def to_html(self, path: str | Path) -> None:
         """Write one page that needs nothing from elsewhere: verdict, picture, table."""
@@ -129,7 +142,7 @@ class Choice:
             "t_end": self.t_end,
             "best": None if best is None else best.law,
             "verdict": list(self.verdict),
-            "interrupted": self.interrupted,
+            "unmeasured": list(self.unmeasured),
             "wall_s": self.wall_s,
             "rows": [row.to_dict() for row in self.rows],
         }

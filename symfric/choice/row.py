@@ -1,15 +1,18 @@
 """What was measured of one law, and where it stands."""
 
-from dataclasses import asdict, dataclass
-from math import isfinite
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
+from math import inf, isfinite
 from typing import Any, final
 
 RANKED, INACCURATE, LACKING, REFUSED, FAILED = (
     "ranked", "inaccurate", "lacks", "cannot run", "failed",
 )  # fmt: skip
-"""Standings: ranked by time; does not keep the accuracy; does not show what is needed; the machine
-does not take it; its run fails."""
+"""Standings: does all that is asked; moves otherwise, by more than the accuracy; does not show what
+is needed; the machine does not take it; its run fails."""
 ORDER = (RANKED, INACCURATE, LACKING, FAILED, REFUSED)
+ALIKE = 1.1
+"""Work within this ratio is the same: attempts differ by so much with a digit of a tolerance."""
 
 
 @final
@@ -21,13 +24,17 @@ class Row:
         law: its name.
         form: the form that it has in place of the one that it comes in, such as "event"; "" for
             that one.
-        standing: one of `ORDER`; `reason` says why it is not ranked.
+        standing: one of `ORDER`; `reason` says why it is not the first of these.
+        rank: place among all that run, 1 for the best; the same for ties; 0 for one that does not.
         phenomena: codes of `symfric.laws.PHENOMENA`.
         error: largest difference from the reference relative to the motion; NaN without a run.
+        own_error: that from the finest run of the law itself: the integrator's part.
+        softness: factor of widths and bristles of the law that was timed.
         values: what to give the law: all parameters that it does not come with, of several places
             that rub those of the first.
         rtol, method, attempts, instructions: of the run at equal error: relative tolerance, method,
-            attempts of a step, CasADi instructions of one.
+            attempts of a step, CasADi instructions that one counts (`budget.counted`). Equal are
+            errors from the reference where the law is ranked, and its own where it is not.
         time_s: processor time of that run [s] in CasADi's virtual machine, the shortest of several.
         fixed_step: largest step [s] at which the plant in fixed steps of backward Euler stays
             within `control` of the motion; `fixed_why` says what is known where there is none.
@@ -39,8 +46,11 @@ class Row:
             than a pull and steady sliding.
         c_operations: of the law's step in C, all parameters constants, single precision;
             `c_why` where there is none.
+        core: instructions of that step on a Cortex-M4F, in the mean over a day of a drive; NaN, and
+            `core_why`, where it was not measured.
+        spent: its runs used up all that they may cost.
         states: how many internal ones.
-        curve: (error, processor time [s]) of the runs on the way, softest first.
+        curve: (error, work) of the runs on the way, softest first.
     """
 
     law: str
@@ -67,6 +77,12 @@ class Row:
     states: int = 0
     curve: tuple[tuple[float, float], ...] = ()
     form: str = ""
+    rank: int = 0
+    own_error: float = float("nan")
+    softness: float = float("nan")
+    core: float = float("nan")
+    core_why: str = ""
+    spent: bool = False
 
     @property
     def ranked(self) -> bool:
@@ -91,11 +107,34 @@ class Row:
         }
 
 
-def ordered(rows: list[Row]) -> list[Row]:
-    """The best first: those that are ranked by time, others by what they miss."""
+def ordered(rows: Iterable[Row]) -> list[Row]:
+    """The best first, with their ranks: by work what does all that is asked, others by their error.
 
-    def key(row: Row) -> tuple[int, float, str]:
-        value = row.time_s if row.ranked else row.error
-        return ORDER.index(row.standing), value if isfinite(value) else 1e300, row.law
+    Nothing that a clock says decides: the same rows come in the same order on every run.
+    """
+    found = list[Row]()
+    head, rank = None, 0
+    for row in sorted(rows, key=_place):
+        if not row.attempts:
+            found.append(replace(row, rank=0))
+            continue
+        if head is None or not _tied(head, row):
+            head, rank = row, len(found) + 1
+        found.append(replace(row, rank=rank))
+    return found
 
-    return sorted(rows, key=key)
+
+def best_of(rows: Sequence[Row]) -> Row:
+    """The first of them, were they ordered."""
+    return min(rows, key=_place)
+
+
+def _place(row: Row) -> tuple[int, float, float, str]:
+    """What rows are ordered by: errors to a digit, work to the last."""
+    error = float(f"{row.error:.0e}") if isfinite(row.error) else inf
+    return ORDER.index(row.standing), 0.0 if row.ranked else error, row.work or inf, row.law
+
+
+def _tied(head: Row, row: Row) -> bool:
+    """Whether `row` is as good as the first of its rank."""
+    return _place(head)[:2] == _place(row)[:2] and row.work <= ALIKE * head.work

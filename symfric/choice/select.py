@@ -1,4 +1,4 @@
-"""Choose a law: every candidate runs on the user's machine, ranked by time at equal error."""
+"""Choose a law: every candidate runs on the user's machine, ranked by work at equal error."""
 
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -49,15 +49,20 @@ def select(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> Choice:
-    """Rank friction laws on a machine by the time of a run at equal error.
+    """Rank friction laws on a machine by the work of a run at equal error.
 
         error = max |x - x_dry| / (largest - smallest x_dry)      over positions and times
 
     Every law describes the same friction (mu_s, mu_d; the peak of a smooth law is mu_s N) and is
     made as soft as the accuracy allows: its widths and bristles are scaled together. Then the
     loosest tolerance is taken with which law and integrator together keep the accuracy. That run is
-    timed. A law that the machine does not take, that does not show what is needed or does not keep
-    the accuracy has its row, too, and the reason in it.
+    counted, attempts times instructions, and timed; the count ranks, so that every run of `select`
+    gives the same order, and laws within 10 % share a rank.
+
+    A law that moves otherwise, whatever its widths, or does not show what is needed, stands behind
+    those by its error, and is counted where its own error, that of the integrator, is the accuracy.
+    A law that the machine does not take has its row, too, and the reason in it. What a law may cost
+    is counted as well (`symfric.choice.budget`): it does not depend on how busy the computer is.
 
     Args:
         scene: a scene, a class of scenes (`Rabinowicz`), or a function law -> scene or `Model`,
@@ -82,7 +87,8 @@ def select(
             a cycle, where an error of phase would grow with time; by default the positions.
         fitted: laws come with their numbers, nothing is set or scaled; by default with `data`.
         control: largest error of fixed steps, of a law that is as soft as that allows.
-        fixed_steps: measure them, too.
+        fixed_steps: measure what a controller needs, too: the largest fixed steps, and instructions
+            on a Cortex-M4F where a cross compiler and QEMU are.
         workers: processes; more than one needs a system that can fork (not Windows).
         progress: called with the name of a law that is done, and the share of all.
 
@@ -90,7 +96,7 @@ def select(
         ValueError: bad input.
         SolveError: not even a reference runs.
 
-    An interrupt (Ctrl-C) returns what is there, with `interrupted` set.
+    An interrupt (Ctrl-C) returns what is there; `unmeasured` names the others.
     Limits: a motion that has no limit as widths vanish, such as a chaotic one over a long time, has
     no accuracy; shorten it or compare other numbers. Times are those of CasADi's virtual machine.
     """
@@ -123,12 +129,13 @@ def select(
         machine, compared, asked, frictions, load, accuracy, control, own,
         checks.flag(f"{where}: fixed_steps", fixed_steps), misfits=misfits,
     )  # fmt: skip
-    rows, interrupted = _rows(task, known, count, progress)
+    rows = _rows(task, known, count, progress)
     return Choice(
         machine.name, asked, accuracy, "as fitted" if own else str(frictions[""]),
         compared.about if misfits is None else "the data that they were fitted to",
         compared.uncertain,
-        control, machine.t_end, tuple(ordered(rows)), perf_counter() - began, interrupted,
+        control, machine.t_end, tuple(ordered(rows)), perf_counter() - began,
+        tuple(sorted(set(known) - {row.law for row in rows})),
     )  # fmt: skip
 
 
@@ -153,20 +160,16 @@ def laws_of(where: str, laws: Candidates | None) -> dict[str, tuple[Law, ...]]:
     return found
 
 
-def _rows(
-    task: Task, laws: Forms, workers: int, progress: Progress | None
-) -> tuple[list[Row], bool]:
-    """The rows, and whether somebody interrupted."""
+def _rows(task: Task, laws: Forms, workers: int, progress: Progress | None) -> list[Row]:
+    """The rows; those that are there when somebody interrupts."""
     rows: list[Row] = []
     results = _many(task, laws, workers) if workers > 1 else _one_by_one(task, laws)
-    try:
+    with suppress(KeyboardInterrupt):
         for row in results:
             rows.append(row)
             if progress is not None:
                 progress(row.law, len(rows) / len(laws))
-    except KeyboardInterrupt:
-        return rows, True
-    return rows, False
+    return rows
 
 
 def _one_by_one(task: Task, laws: Forms) -> Iterator[Row]:
@@ -217,4 +220,5 @@ def _answer(pipe: Any, process: ForkProcess, name: str) -> Row:
 
 def _work(pipe: Any, task: Task, name: str, law: tuple[Law, ...]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for whoever waits for the rows
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     pipe.send(best_form(task, name, law))

@@ -57,8 +57,14 @@ class Softness:
             return self.law
         known = parameters(self.law)
         scaled = {n: float(known[n].value) * s**power for n, power in self.powers.items()}
+        scaled = {n: _within(known[n], x) for n, x in scaled.items()}
         law = with_values(self.law, {n: float(f"{x:.{DIGITS}g}") for n, x in scaled.items()})
         return peaked(law, self.mu_s, self.load)
+
+
+def _within(p: Parameter, value: float) -> float:
+    """A width that is at its bound stays there: it only rounds off."""
+    return min(max(value, p.lower), p.upper) if p.role == "width" else value
 
 
 def softness(law: Law, friction: Friction, load: float | None) -> Softness:
@@ -87,8 +93,11 @@ def _power(law: Law, p: Parameter) -> float:
     return -1.0 if p.unit == "N/s" else of_bristles.get(p.role, 0.0)
 
 
-RATIO = 4.0
-"""From one softness of the ladder to the next."""
+RATIO, SHORTER = 4.0, 2.0
+"""From one softness of the ladder to the next; towards dry friction after a run that failed."""
+LEAP = 4
+"""Rungs that are left out once where errors stay the same."""
+ANOTHER = "it tends to another motion"
 DRIEST, SOFTEST = 16, 5
 """Rungs on either side of the law as it comes."""
 MARGIN = 0.7
@@ -100,11 +109,12 @@ ROUNDING = 5e-3
 @final
 @dataclass(frozen=True)
 class Rung:
-    """A run of the ladder: factor of the widths, error, attempts of the integrator."""
+    """A run of the ladder: factor of the widths, error, attempts and tolerance."""
 
     s: float
     error: float
     attempts: int
+    rtol: float = 0.0
 
 
 @final
@@ -162,12 +172,19 @@ def ladder(
         one of `failures`: the law as it comes, s = 1, does not run.
     """
     rungs, stopped = [run(1.0)], ""
+    ratio, leapt = RATIO, False
     while scalable and not stopped and not _kept(rungs, wanted):
-        stopped = _hopeless(rungs)
+        step = ratio
+        if _settled(rungs):  # a law whose widths are far from the machine's speeds looks so, too
+            step, stopped = ratio**LEAP, ANOTHER if leapt else ""
+            leapt = True
+        elif len(rungs) > DRIEST:
+            stopped = "its error falls too slowly"
         try:
-            rungs += [] if stopped else [run(rungs[-1].s / RATIO)]
+            rungs += [] if stopped else [run(rungs[-1].s / step)]
         except failures as problem:
-            stopped = said(problem)
+            stopped = said(problem) if ratio < RATIO else ""
+            ratio = SHORTER
     with suppress(*failures):  # softer than the law allows
         while scalable and rungs[0].error <= softest and rungs[0].s < RATIO**SOFTEST:
             rungs.insert(0, run(rungs[0].s * RATIO))
@@ -179,10 +196,7 @@ def _kept(rungs: list[Rung], wanted: float) -> bool:
     return len(rungs) > 1 and max(rung.error for rung in rungs[-2:]) <= wanted
 
 
-def _hopeless(rungs: list[Rung]) -> str:
-    """Why it makes no sense to go on: the last four errors are the same, or grow."""
-    if len(rungs) > DRIEST:
-        return "its error falls too slowly"
+def _settled(rungs: list[Rung]) -> bool:
+    """Whether the last four errors are the same, or grow."""
     last = [rung.error for rung in rungs[-4:]]
-    settled = len(last) == 4 and min(last[1:]) >= (1 - ROUNDING) * last[0]
-    return "it tends to another motion" if settled else ""
+    return len(last) == 4 and min(last[1:]) >= (1 - ROUNDING) * last[0]

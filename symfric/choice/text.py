@@ -5,20 +5,29 @@ from math import isfinite
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from symfric.choice.row import INACCURATE, RANKED, Row
+from symfric.choice.row import INACCURATE, LACKING, RANKED, Row
 
 if TYPE_CHECKING:
     from symfric.choice.result import Choice
 
 WIDTH = 80
 HEAD = (
-    f"{'law':<20}{'time':>8}{'tries':>7}{'error':>9}{'h':>7}{'C':>6}{'par':>6} {'class':<5} shows"
+    f"{'':>4}{'law':<19}{'work':>6}{'ms':>6}{'error':>7}{'own':>6}{'h':>6}{'M4F':>5}"
+    f"{'par':>6} {'class':<5} shows"
 )
 LEGEND = (
-    "time [ms] and tries (attempts of a step) at equal error; h [s]: largest fixed step; C: "
-    "operations of the law; par: parameters, of which hard to measure; class: smoothness, or "
-    "event: a form whose modes switch by events"
+    "The first column is the rank; laws with = are alike. work: millions of instructions at equal "
+    "error, which ranks; ms: processor time of the same run. error: from the reference; own: the "
+    "integrator's part. h [s]: largest fixed step; M4F: instructions of the law's step on a "
+    "Cortex-M4F (C: operations, where there are no tools to count); par: parameters / hard to "
+    "measure; class: smoothness, or event: a form whose modes switch by events"
 )
+GROUPS = {
+    RANKED: "show what is needed and keep the accuracy, by work:",
+    INACCURATE: "move otherwise, by their error, timed where their own error is the accuracy:",
+    LACKING: "do not show what is needed, by their error, timed likewise:",
+}
+"""Standing -> what its laws do; those of other standings did not run."""
 
 
 def lines(choice: "Choice", most: int | None = None) -> Iterator[str]:
@@ -28,17 +37,17 @@ def lines(choice: "Choice", most: int | None = None) -> Iterator[str]:
         f"{choice.friction}; from {choice.reference}, itself known to {choice.uncertain:.0e}", WIDTH
     )
     yield ""
-    yield HEAD
-    with_numbers = [row for row in choice.rows if row.standing in (RANKED, INACCURATE)]
-    shown = choice.ranked if most is None else choice.ranked[:most]
-    for row in shown:
-        yield _line(row)
-    if len(shown) < len(choice.ranked):
-        yield f"... and {len(choice.ranked) - len(shown)} more that are ranked"
-    if most is None:
-        rest = [row for row in with_numbers if not row.ranked]
-        for row in rest:
-            yield _line(row)
+    cores = any(isfinite(row.core) for row in choice.rows)
+    yield HEAD if cores else HEAD.replace("M4F", "  C")
+    shown = choice.rows if most is None else choice.ranked[:most]
+    for standing, text in GROUPS.items():
+        group = [row for row in shown if row.standing == standing and row.rank]
+        if group and most is None:
+            yield f"-- {text}"
+        for row in group:
+            yield _line(row, _tied(row, choice.rows), cores)
+    if most is not None and most < len(choice.placed):
+        yield f"... and {len(choice.placed) - len(shown)} more that ran"
     yield ""
     if most is None:
         for reason, names in _left_out(choice.rows).items():
@@ -48,25 +57,54 @@ def lines(choice: "Choice", most: int | None = None) -> Iterator[str]:
     for sentence in choice.verdict:
         yield from wrap(sentence, WIDTH)
     if choice.interrupted:
-        yield "Interrupted: laws without a row were not measured."
+        yield from wrap(interrupted(choice), WIDTH)
+
+
+def interrupted(choice: "Choice") -> str:
+    """Which laws have no row since somebody stopped it."""
+    count = len(choice.unmeasured)
+    return f"Interrupted: {count} of {count + len(choice.rows)} laws were not measured: " + (
+        f"{', '.join(choice.unmeasured)}."
+    )
 
 
 def _left_out(rows: Iterable[Row]) -> dict[str, list[str]]:
-    """Why laws are not ranked -> those of which this is said, in the order of the rows."""
+    """Why laws are not among the first -> those of which this is said, in the order of the rows."""
     found: dict[str, list[str]] = {}
     for row in rows:
         if not row.ranked:
-            reason = row.reason.removeprefix(f"{row.law} ")
+            reason = row.reason.removeprefix(f"{row.law} ").removeprefix(f"{row.error:.1e} off: ")
             found.setdefault(f"{row.standing}, {reason}", []).append(row.called)
     return found
 
 
-def _line(row: Row) -> str:
-    step = "-" if row.fixed_step is None else f"{row.fixed_step:.0e}".replace("e-0", "e-")
-    operations = "-" if row.c_operations is None else str(row.c_operations)
-    time = f"{1e3 * row.time_s:.2f}" if isfinite(row.time_s) else "-"
-    mark = "" if row.ranked else "*"
+def _tied(row: Row, rows: Iterable[Row]) -> bool:
+    return sum(other.rank == row.rank for other in rows) > 1
+
+
+def _line(row: Row, tied: bool, cores: bool) -> str:
+    counts = f"{row.core:.0f}" if isfinite(row.core) else "-"
+    if not cores:
+        counts = "-" if row.c_operations is None else str(row.c_operations)
     return (
-        f"{mark + row.law:<20}{time:>8}{row.attempts:>7}{row.error:>9.1e}{step:>7}{operations:>6}"
-        f"{f'{row.parameters}/{len(row.hard)}':>6} {row.smoothness:<5} {''.join(row.phenomena)}"
+        f"{row.rank:>2}{'=' if tied else ' '} {row.law:<19}{number(1e-6 * row.work):>6}"
+        f"{number(1e3 * row.time_s):>6}{short(row.error):>7}{short(row.own_error):>6}"
+        f"{short(row.fixed_step):>6}{counts:>5}{f'{row.parameters}/{len(row.hard)}':>6} "
+        f"{row.smoothness:<5} {''.join(row.phenomena)}"
     )
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number >= 0 in five places; a dash for none."""
+    if not isfinite(value):
+        return "-"
+    if value >= 10 ** (digits - 1):
+        return f"{value:.0f}"
+    return f"{value:.{digits}g}" if value >= 0.1 else f"{value:.2f}"
+
+
+def short(value: float | None) -> str:
+    """A power of ten with one digit; a dash for none."""
+    if value is None or not isfinite(value):
+        return "-"
+    return f"{value:.0e}".replace("e-0", "e-").replace("e+00", "")

@@ -1,12 +1,13 @@
 """What to take, and why, in sentences."""
 
 from collections.abc import Sequence
+from math import isfinite
 
 from symfric.choice.nature import EVENT, is_smooth
 from symfric.choice.row import FAILED, INACCURATE, LACKING, REFUSED, Row
 
-ALIKE = 1.1
-"""Times within this ratio are the same, on any machine."""
+FASTER = 1.25
+"""The clock contradicts the work beyond this ratio."""
 
 
 def verdict(
@@ -31,18 +32,21 @@ def verdict(
 
 
 def _fastest(ranked: Sequence[Row], asked: str) -> str:
+    """The law of the least work, who is as good, and what the clock says against it."""
     best = ranked[0]
-    near = [row.called for row in ranked[1:] if row.time_s <= ALIKE * best.time_s]
     text = (
-        f"Simulation: take {best.called}, the fastest of {len(ranked)} that show {asked} and "
+        f"Simulation: take {best.called}, the least work of {len(ranked)} that show {asked} and "
         f"keep the accuracy: {1e3 * best.time_s:.3g} ms in {best.attempts} attempts by "
         f"{best.method}, {best.error:.1e} off"
     )
+    near = [row.called for row in ranked[1:] if row.rank == best.rank]
     if near:
-        return f"{text}; {_listed(near)} {'are' if len(near) > 1 else 'is'} as fast."
-    if len(ranked) > 1:
-        second = ranked[1]
-        return f"{text}; {second.called} takes {second.time_s / best.time_s:.2g} times as long."
+        text += f"; {_listed(near)} {'are' if len(near) > 1 else 'is'} as good"
+    elif len(ranked) > 1:
+        text += f"; {ranked[1].called} takes {ranked[1].work / best.work:.2g} times the work"
+    fastest = min(ranked, key=lambda row: row.time_s)
+    if fastest.rank != best.rank and FASTER * fastest.time_s < best.time_s:
+        text += f". By the clock {fastest.called} is faster, {1e3 * fastest.time_s:.3g} ms"
     return f"{text}."
 
 
@@ -68,16 +72,23 @@ def _fixed(ranked: Sequence[Row], control: float) -> str:
     if not any(row.fixed_step or row.fixed_why for row in ranked):
         return "Controller: fixed steps were not measured."
     able = [row for row in ranked if row.fixed_step is not None and row.c_operations is not None]
+    counted = all(isfinite(row.core) for row in able)
     if not able:
         return (
             f"Controller: none of them follows within {control:g} in fixed steps that were tried."
         )
-    take = min(able, key=lambda row: (row.c_operations or 0) / (row.fixed_step or 1.0))
+    take = min(able, key=lambda row: _in_c(row, counted) / (row.fixed_step or 1.0))
+    what = "instructions on a Cortex-M4F" if counted else "operations"
     return (
-        f"Controller: take {take.called}: its C takes {take.c_operations} operations, and with it "
-        f"the plant stays within {control:g} in steps of {take.fixed_step:g} s (backward Euler): "
-        "the fewest operations for a second of motion."
+        f"Controller: take {take.called}: its C takes {_in_c(take, counted):.0f} {what}, and with "
+        f"it the plant stays within {control:g} in steps of {take.fixed_step:g} s (backward "
+        "Euler): the least for a second of motion."
     )
+
+
+def _in_c(row: Row, counted: bool) -> float:
+    """What a step of the law costs in C."""
+    return row.core if counted else float(row.c_operations or 0)
 
 
 def _states(row: Row) -> str:
@@ -88,7 +99,7 @@ def _others(rows: Sequence[Row]) -> str:
     """How many fell out, by the reason."""
     what = {
         LACKING: "for what they show",
-        INACCURATE: "for their error",
+        INACCURATE: "that move otherwise",
         FAILED: "whose run fails",
         REFUSED: "that do not fit into this machine",
     }

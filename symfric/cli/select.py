@@ -1,10 +1,14 @@
 """`symfric select`: rank friction laws on a machine, and say which to take."""
 
-from collections.abc import Callable
+import signal
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from dataclasses import replace
 from os import cpu_count
 from pathlib import Path
+from sys import stderr
 from textwrap import fill
+from time import perf_counter
 from typing import Annotated, Any
 
 import typer
@@ -145,7 +149,7 @@ def select(
         read = reading(columns, units, None, None, kind == "points", missing, resample)
         able = {n: c for n, c in candidates.items() if not lacking(words, phenomena(c))}
         candidates, misfits = fitted(able, read, data, kind, normal_force)
-    with output.progress(f"select {scene}") as tell:
+    with told(f"select {scene}") as tell, stoppable():
         found = select_law(
             machine,
             {n: (c,) if n in formed_by_hand else forms(c) for n, c in candidates.items()},
@@ -158,7 +162,7 @@ def select(
             control=control,
             fixed_steps=fixed_steps,
             workers=cpu_count() or 1 if workers is None else workers,
-            progress=lambda _, share: tell(share),
+            progress=tell,
         )
     output.emit_json(found.to_dict(), json)
     if json != "-":
@@ -174,6 +178,40 @@ def select(
         raise SolveError("select: interrupted", Status.INTERRUPTED, found)
     if found.best is None:
         raise SolveError(f"select: {found.verdict[0]}", Status.SOLVER_FAILED, found)
+
+
+@contextmanager
+def stoppable() -> Generator[None]:
+    """Take what ends a batch job (SIGTERM, as of `timeout`) as Ctrl-C: what is there is kept."""
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+OFTEN = 10.0
+"""Seconds between two lines about progress where there is no terminal."""
+
+
+@contextmanager
+def told(text: str) -> Generator[Callable[[str, float], None]]:
+    """Progress: a bar on a terminal, else a line on standard error now and then."""
+    last = began = perf_counter()
+    with output.progress(text) as tell:
+
+        def say(name: str, share: float) -> None:
+            nonlocal last
+            tell(share)
+            if not stderr.isatty() and perf_counter() - last > OFTEN:
+                last = perf_counter()
+                output.note(f"{text}: {100 * share:.0f} % after {last - began:.0f} s, {name} last")
+
+        yield say
 
 
 OF_FRICTION = ("mu_s", "mu_d", "v_s")

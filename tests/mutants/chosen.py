@@ -12,7 +12,7 @@ CHOSEN = (
     ),
     Mutant(
         "a law that is far off is ranked", f"{FOLDER}/measured.py",
-        "not row.error <= task.accuracy", "not row.error <= 1e6 * task.accuracy", TESTS,
+        "if row.error <= task.accuracy:", "if row.error <= 1e6 * task.accuracy:", TESTS,
     ),
     Mutant(
         "nobody asks what a law shows", f"{FOLDER}/needs.py",

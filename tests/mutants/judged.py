@@ -25,13 +25,13 @@ def figure(name: str) -> tuple[str, ...]:
 
 JUDGED = (
     Mutant(
-        "the finest tolerance is timed", CHOICE + "measured.py",
-        "rtol, before = LOOSEST, None", "rtol, before = task.fine, None",
+        "the finest tolerance is timed", CHOICE + "climb.py",
+        "rtol, last = LOOSEST, nan", "rtol, last = 1.2 * finest, nan",
         (T_SELECT + "the_tolerance_is_the_loosest_that_keeps_the_accuracy",),
     ),
     Mutant(
-        "any tolerance is loose enough", CHOICE + "measured.py",
-        "goal = max(task.accuracy, 1.0001 * row.error)", "goal = inf",
+        "any tolerance is loose enough", CHOICE + "climb.py",
+        "good = run is not None and last <= asked.accuracy", "good = run is not None",
         (T_SELECT + "the_tolerance_is_the_loosest_that_keeps_the_accuracy",),
     ),
     Mutant(
@@ -40,11 +40,32 @@ JUDGED = (
     ),
     Mutant(
         "what is ranked is ordered by its error", CHOICE + "row.py",
-        "row.time_s if row.ranked else row.error", "row.error", T_JUDGED,
+        "0.0 if row.ranked else error", "error", T_JUDGED,
     ),
     Mutant(
-        "laws that are as fast are not named", CHOICE + "verdict.py",
-        "row.time_s <= ALIKE * best.time_s", "row.time_s <= best.time_s", T_JUDGED,
+        "the clock decides the order", CHOICE + "row.py",
+        "error, row.work or inf, row.law", "error, row.time_s, row.law", T_JUDGED,
+    ),
+    Mutant(
+        "laws that are alike have ranks of their own", CHOICE + "row.py",
+        "row.work <= ALIKE * head.work", "row.work <= head.work", T_JUDGED,
+    ),
+    Mutant(
+        "widths go below their bounds", CHOICE + "softness.py",
+        'if p.role == "width" else value', 'if p.role == "none" else value', T_JUDGED,
+    ),
+    Mutant(
+        "no step is left out where errors stay the same", CHOICE + "softness.py",
+        "LEAP = 4", "LEAP = 1", T_JUDGED,
+    ),
+    Mutant(
+        "a law that moves otherwise is judged by its distance alone", CHOICE + "climb.py",
+        "reference.off(run.motion) if whole else own(run)", "reference.off(run.motion)",
+        (T_SELECT + "a_law_that_moves_otherwise_is_counted_at_its_own_error",),
+    ),
+    Mutant(
+        "what the clock says against the order is not told", CHOICE + "verdict.py",
+        "FASTER * fastest.time_s < best.time_s", "FASTER * fastest.time_s < 0", T_JUDGED,
     ),
     Mutant(
         "an optimiser is given the steepest law", CHOICE + "verdict.py",
@@ -53,8 +74,8 @@ JUDGED = (
     ),
     Mutant(
         "a controller is given the law of the shortest steps", CHOICE + "verdict.py",
-        "(row.c_operations or 0) / (row.fixed_step or 1.0)",
-        "(row.c_operations or 0) * (row.fixed_step or 1.0)", T_JUDGED,
+        "_in_c(row, counted) / (row.fixed_step or 1.0)",
+        "_in_c(row, counted) * (row.fixed_step or 1.0)", T_JUDGED,
     ),
     Mutant(
         "words of papers for what is needed are not known", CHOICE + "needs.py",

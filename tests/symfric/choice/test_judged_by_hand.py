@@ -1,21 +1,33 @@
 """Rungs, standings, order and verdict of rows that are written down, not measured."""
 
 from dataclasses import replace
+from math import nan
 
+import numpy as np
 import pytest
 
 from symfric.choice import Friction
+from symfric.choice.friction import alike
 from symfric.choice.measured import _by_data  # pyright: ignore[reportPrivateUsage]
+from symfric.choice.nature import otherwise
 from symfric.choice.needs import needed
-from symfric.choice.row import INACCURATE, RANKED, Row, ordered
+from symfric.choice.row import INACCURATE, RANKED, REFUSED, Row, ordered
 from symfric.choice.softness import Ladder, Rung, ladder, softness
 from symfric.choice.verdict import verdict
 from symfric.foundation.parameters import parameters
-from symfric.laws import LuGre
+from symfric.laws import (
+    ALL_LAWS,
+    GMS,
+    BrownMcPhee,
+    Gonthier,
+    LeineSwitch,
+    LuGre,
+    steady_force,
+)
 
 ROW = Row(
-    "a", RANKED, error=1e-5, method="Rodas5P", attempts=10, time_s=1e-3, steepness=5.0,
-    smoothness="C∞", c_operations=100, fixed_step=0.01,
+    "a", RANKED, error=1e-5, method="Rodas5P", attempts=10, instructions=100, time_s=1e-3,
+    steepness=5.0, smoothness="C∞", c_operations=100, fixed_step=0.01,
 )  # fmt: skip
 
 
@@ -35,6 +47,26 @@ def test_between_two_rungs_the_error_is_a_power_of_the_softness() -> None:
     assert rungs.softest(9.0) == 1.0
 
 
+def test_errors_that_stay_the_same_are_followed_once_by_a_leap() -> None:
+    """A law whose widths are far above the speeds of a machine looks settled, and is not."""
+    found = ladder(lambda s: Rung(s, min(0.4, 1e3 * s), 1), 1e-3, 1e-3, True, (ValueError,))
+    assert found.stopped == ""
+    assert found.rungs[4].s == found.rungs[3].s / 4**4
+    other = ladder(lambda s: Rung(s, 0.4, 1), 1e-3, 1e-3, True, (ValueError,))
+    assert (len(other.rungs), other.stopped) == (5, "it tends to another motion")
+
+
+def test_where_a_drier_run_fails_shorter_steps_are_tried() -> None:
+    def run(s: float) -> Rung:
+        if s < 0.1:
+            raise ValueError("too dry")
+        return Rung(s, s, 1)
+
+    found = ladder(run, 1e-3, 1e-3, True, (ValueError,))
+    assert [rung.s for rung in found.rungs] == [1.0, 0.25, 0.125]
+    assert found.stopped == "too dry"
+
+
 def test_bristles_of_all_stiffnesses_are_damped_alike() -> None:
     """sigma_1^2 / sigma_0 stays, and with it the share of the damping that is critical."""
     law = LuGre(sigma_0=1e5, sigma_1=200.0)
@@ -43,30 +75,64 @@ def test_bristles_of_all_stiffnesses_are_damped_alike() -> None:
     assert found["sigma_1"].value == pytest.approx(2000.0)
 
 
+def test_a_width_at_its_bound_stays_there() -> None:
+    law = Gonthier()
+    found = parameters(softness(law, Friction(0.2, 0.1), 10.0).at(1e-12))
+    assert found["s_eps"].value == parameters(law)["s_eps"].lower
+
+
+def test_the_peaks_of_sums_and_products_are_the_static_level() -> None:
+    """Of laws whose peak is no parameter: a hyperbola, two hyperbolic tangents, a sum of falls."""
+    for name in ("popp_stelter", "makkar_dixon", "bittencourt"):
+        friction = Friction(0.3, 0.2)
+        law = softness(alike(ALL_LAWS[name](), friction, 5.0), friction, 5.0).at(1e-4)
+        v = np.geomspace(1e-9, 10.0, 100_001)
+        F = steady_force(law, v, 5.0) / 5.0
+        assert F.max() == pytest.approx(0.3, abs=1e-6)
+        assert F[-1] == pytest.approx(0.2, abs=1e-6)
+
+
+def test_why_a_law_moves_otherwise() -> None:
+    assert "rubs with 0.115 of the load, not 0.1" in otherwise(LeineSwitch(), 0.1, 2.0)
+    assert otherwise(GMS(), 0.1, 2.0) == "nothing damps its bristle, which rings"
+    assert otherwise(LuGre(), 0.1, 2.0) == otherwise(BrownMcPhee(), 0.1, 2.0) == ""
+
+
 def test_words_of_papers_are_known() -> None:
     assert needed("n", ["break-away", "Frictional lag", "P"]) == ("stiction", "presliding", "lag")
 
 
-def test_ranked_laws_stand_by_time_others_by_error() -> None:
+def test_ranked_laws_stand_by_work_others_by_error_whatever_the_clock_says() -> None:
     rows = [
-        replace(ROW, law="slow", time_s=2.0, error=1e-9), replace(ROW, law="fast", time_s=1.0),
-        replace(ROW, law="far", standing=INACCURATE, error=0.3, time_s=0.1),
-        replace(ROW, law="near", standing=INACCURATE, error=0.2, time_s=0.9),
+        replace(ROW, law="slow", attempts=20, time_s=1e-9), replace(ROW, law="fast"),
+        replace(ROW, law="alike", attempts=11, time_s=9.0),
+        replace(ROW, law="far", standing=INACCURATE, error=0.3, attempts=1),
+        replace(ROW, law="near", standing=INACCURATE, error=0.2, attempts=90),
+        replace(ROW, law="close", standing=INACCURATE, error=0.21, attempts=80),
+        replace(ROW, law="none", standing=REFUSED, attempts=0, error=nan),
     ]  # fmt: skip
-    assert [row.law for row in ordered(rows)] == ["fast", "slow", "near", "far"]
+    found = {row.law: row.rank for row in ordered(rows)}
+    assert list(found.items()) == [
+        ("fast", 1), ("alike", 1), ("slow", 3), ("close", 4), ("near", 5), ("far", 6), ("none", 0),
+    ]  # fmt: skip
+    shuffled = [replace(row, time_s=k) for k, row in enumerate(reversed(rows))]
+    assert [row.law for row in ordered(shuffled)] == [*found]
 
 
-def test_the_verdict_names_the_fastest_the_flattest_and_the_cheapest() -> None:
-    rows = [
+def test_the_verdict_names_the_least_work_the_flattest_and_the_cheapest() -> None:
+    rows = ordered([
         ROW,
-        replace(ROW, law="alike", time_s=1.05e-3, steepness=2.0),
-        replace(ROW, law="later", time_s=2e-3, fixed_step=0.05, c_operations=200),
-    ]
+        replace(ROW, law="alike", attempts=11, steepness=2.0),
+        replace(ROW, law="later", attempts=20, time_s=5e-4, fixed_step=0.05, c_operations=200),
+    ])  # fmt: skip
     fast, smooth, fixed, others = verdict(rows, ["stiction"], 1e-4, 0.05)
-    assert fast.startswith("Simulation: take a, ") and fast.endswith("; alike is as fast.")
+    assert fast.startswith("Simulation: take a, ")
+    assert fast.endswith("; alike is as good. By the clock later is faster, 0.5 ms.")
     assert smooth.startswith("Optimal control: take alike ")
     assert fixed.startswith("Controller: take later: ")  # 4000 operations a second, not 10000
     assert others == "None is left out."
+    counted = [replace(row, core=core) for row, core in zip(rows, (20, 300, 600), strict=True)]
+    assert "take a: its C takes 20 instructions on a Cortex-M4F" in verdict(counted, [], 1, 1)[2]
 
 
 def test_laws_are_ranked_that_fit_as_well_as_the_best() -> None:

@@ -1,0 +1,199 @@
+"""One law towards dry friction, and at the loosest tolerance at equal error, within its budget.
+
+    error      largest difference from the reference: of law and integrator
+    own error  largest difference from the finest run of the same law: of the integrator alone
+
+A law that models something else than dry friction, such as a bristle that rings, keeps no small
+error however dry it is made. It is timed where its own error is the accuracy that was asked for.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf, nan
+from typing import final
+
+from symfric.choice.budget import GROWTH, LEAST, Budget, SpentError
+from symfric.choice.machine import FAILURES, distance
+from symfric.choice.reference import Reference
+from symfric.choice.softness import MARGIN, Ladder, Rung, ladder
+from symfric.figures.regularisation import Sample
+from symfric.foundation.status import SolveError, Status
+from symfric.model import Model
+from symfric.results.trajectory import Trajectory
+
+LOOSEST, PER_DECADE = 1e-3, 2
+"""Relative tolerances that are tried: half decades from here on."""
+LOOSER = (1e-6, 1e-5, 1e-4)
+"""Relative tolerances for runs that take too many attempts at another."""
+COARSE, FINEST = 1e-6, 1e-11
+"""Relative tolerances of the runs on the way to dry friction, and the finest of all."""
+NEAR = 100.0
+"""Beyond so many times the accuracy a coarse run says enough."""
+AS_NEAR = 2.0
+"""Errors of a law that never keeps the accuracy are alike within this ratio of its smallest."""
+FINER = 3
+"""Times the attempts of a coarse run that a fine one takes, about."""
+ON_THE_WAY = 0.4
+"""Share of the budget for the way to dry friction; the rest is for the run at equal error."""
+
+
+@final
+@dataclass(frozen=True)
+class Asked:
+    """Errors that are asked for, and tolerances for them.
+
+    Attributes:
+        accuracy: largest error relative to the motion, of law and integrator together.
+        softest: largest error of a law that is of interest.
+    """
+
+    accuracy: float
+    softest: float
+
+    @property
+    def fine(self) -> float:
+        """Relative tolerance at which the integrator's error is negligible."""
+        return min(1e-7, max(FINEST, 1e-4 * self.accuracy))
+
+    @property
+    def coarse(self) -> float:
+        """That of a first look."""
+        return min(COARSE, max(self.fine, 1e-2 * self.accuracy))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class AtEqualError:
+    """The run that a law is judged by.
+
+    Attributes:
+        s: its softness.
+        model, run, rtol: what ran.
+        error, own: from the reference, and from the finest run of the law itself.
+    """
+
+    s: float
+    model: Model
+    run: Sample
+    rtol: float
+    error: float
+    own: float
+
+
+def climbed(runs: Budget, reference: Reference, asked: Asked) -> Ladder:
+    """Error against softness, to where two runs in a row keep the accuracy, or no more helps.
+
+    Raises:
+        one of `FAILURES`: the law as it comes does not run at any tolerance.
+    """
+
+    def run(s: float) -> Rung:
+        if not runs.left(ON_THE_WAY):
+            raise SpentError(f"drier runs take more than {sum(runs.attempts)} tries in all")
+        before = runs.attempts[-1] if runs.attempts else runs.most
+        found, rtol = _first_that_ends(runs, s, asked.coarse, GROWTH * before + LEAST)
+        error = reference.off(found.motion)
+        if rtol > asked.fine and error <= NEAR * asked.accuracy:
+            try:
+                found = runs.run(s, asked.fine, GROWTH * found.attempts + LEAST)
+                error, rtol = reference.off(found.motion), asked.fine
+            except SolveError:
+                pass  # the coarse run is what there is
+        return Rung(s, error, found.attempts, rtol)
+
+    wanted = MARGIN * asked.accuracy
+    softest = max(asked.accuracy, asked.softest)
+    return ladder(run, wanted, softest, runs.held.scalable, FAILURES, short)
+
+
+def _first_that_ends(runs: Budget, s: float, rtol: float, most: int) -> tuple[Sample, float]:
+    """The run at `rtol`, or at the next looser of `LOOSER` that takes no more than `most` attempts.
+
+    Drier than it comes a law has one further chance, since what fails at one takes about as much.
+
+    Raises:
+        SolveError: none does, or a run fails otherwise.
+    """
+    looser = [x for x in LOOSER if x > 1.1 * rtol]
+    for other in looser if s >= 1.0 else looser[-1:]:
+        try:
+            return runs.run(s, rtol, most), rtol
+        except SolveError as problem:
+            if problem.status is not Status.MAX_STEPS:
+                raise
+            rtol = other
+    return runs.run(s, rtol, most), rtol
+
+
+def nearest(rungs: Ladder) -> Rung:
+    """The softest rung whose error is about the smallest that the law reaches."""
+    least = min(rung.error for rung in rungs.rungs)
+    return next(rung for rung in rungs.rungs if not rung.error > AS_NEAR * least)
+
+
+def at_equal_error(
+    runs: Budget, s: float, reference: Reference, asked: Asked,
+    near: Rung, whole: bool,
+) -> AtEqualError:  # fmt: skip
+    """The loosest tolerance at which an error is at most the accuracy.
+
+    A tolerance counts if the next tighter one keeps the accuracy, too; where none does the finest
+    that ends within the budget.
+
+    Args:
+        near: a run of about this softness, which says what a fine one costs.
+        whole: whether that is the error from the reference, or the law's own.
+
+    Raises:
+        SolveError: no run ends.
+    """
+    able = near.rtol <= asked.fine or FINER * near.attempts <= runs.most
+    first = asked.fine if able else max(near.rtol, asked.fine)
+    best, finest = _first_that_ends(runs, s, first, GROWTH * near.attempts + LEAST)
+
+    def own(motion: Sample) -> float:
+        return distance(motion.motion, best.motion, best.size)
+
+    def error(run: Sample) -> float:
+        return reference.off(run.motion) if whole else own(run)
+
+    rtol, found, gap = _loosest(runs, s, error, asked, finest)
+    if found is None:
+        rtol, found = finest, best
+    said = own(found) if rtol > finest else gap
+    return AtEqualError(s, runs.model(s), found, rtol, reference.off(found.motion), said)
+
+
+def _loosest(
+    runs: Budget, s: float, error: Callable[[Sample], float], asked: Asked, finest: float
+) -> tuple[float, Sample | None, float]:
+    """The tolerance and its run, if any above `finest`, and the error of the last one."""
+    rtol, last = LOOSEST, nan
+    before: tuple[float, Sample] | None = None
+    while rtol > 1.1 * finest and runs.left():
+        try:
+            run = runs.run(s, rtol)
+            last = error(run)
+        except SolveError:
+            run, last = None, inf
+        good = run is not None and last <= asked.accuracy
+        if good and before is not None:
+            return *before, last
+        before = (rtol, run) if run is not None and good else None
+        rtol *= 10 ** (-1 / PER_DECADE)
+    return (*before, last) if before is not None else (finest, None, last)
+
+
+def short(problem: object) -> str:
+    """The first sentence of an error; of a run that failed what its status says."""
+    if isinstance(problem, SolveError) and isinstance(problem.partial, Trajectory):
+        run = problem.partial
+        said = {
+            Status.MAX_STEPS: f"more than {run.statistics.steps + run.statistics.rejections} tries",
+            Status.JAMMED: "friction jams",
+            Status.STEP_TOO_SMALL: "the step becomes too small",
+            Status.EVENT_STORM: "events pile up",
+        }
+        if problem.status in said:
+            return f"{said[problem.status]} by t = {run.t[-1]:.3g} s"
+    return " ".join(str(problem).split()).partition("; ")[0]
