@@ -65,7 +65,7 @@ def pages() -> dict[str, str]:
     """Name of each page, relative to `laws`, -> its text."""
     laws = every()
     found = {name: law_page(name, law) for name, law in laws.items()}
-    found |= {name: wrapper_page(name, kind) for name, kind in MADE_OF_LAWS.items()}
+    found |= {name: wrapper_page(kind) for name, kind in MADE_OF_LAWS.items()}
     return found | {"index": index(laws)}
 
 
@@ -160,7 +160,7 @@ def law_page(name: str, law: AnyLaw) -> str:
     return text + usage(name, law)
 
 
-def wrapper_page(name: str, kind: type[Any]) -> str:
+def wrapper_page(kind: type[Any]) -> str:
     """A law that takes laws or data."""
     doc = getdoc(kind) or ""
     text = rst.title(first_line(doc).split(":")[0].rstrip("."))

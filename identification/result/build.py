@@ -11,7 +11,7 @@ from identification.data.dataset import Dataset
 from identification.data.findings import Finding
 from identification.result.calls import written
 from identification.result.curve import Curve, of_drive, of_points
-from identification.result.estimate import Errors, Estimate
+from identification.result.estimate import Estimate
 from identification.result.fitted import Fitted, Tried
 from identification.result.live import Asked, Kind, Live, errors_of, labels
 from identification.result.series import Series, points_each, series
@@ -49,7 +49,6 @@ def fitted(
     message: str = "",
     seconds: float = 0.0,
     call: str = "",
-    validation: Errors | None = None,
     asked: Asked | None = None,
 ) -> Fitted:
     """The result.
@@ -65,7 +64,6 @@ def fitted(
         message: more about the end; the sentence of `status` stands before it.
         seconds: of all starts.
         call: how it was asked for, as Python.
-        validation: what is left of other data.
         asked: what puts the problem again, from a file.
     """
     names = task.residuals.names
@@ -89,7 +87,7 @@ def fitted(
         message=" ".join(part for part in (status.value, message) if part),
         verdict=verdict,
         errors=errors_of(task.residuals, records, point.evaluation.r, verdict.effective),
-        validation=validation,
+        validation=None,
         noise=dict(task.noise),
         starts=_tried(task, starts),
         findings=tuple(findings),

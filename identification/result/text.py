@@ -107,14 +107,14 @@ def best_starts(fit: "Fitted") -> int:
     return sum(s.above < SAME for s in fit.starts)
 
 
-def correlated(fit: "Fitted", least: float = CLOSE) -> list[tuple[str, str, float]]:
-    """Pairs of estimates with a correlation above `least`, the closest first."""
+def correlated(fit: "Fitted") -> list[tuple[str, str, float]]:
+    """Pairs of estimates with a correlation above `CLOSE`, the closest first."""
     n = len(fit.names)
     pairs = [
         (fit.names[i], fit.names[j], float(fit.correlation[i, j]))
         for i in range(n)
         for j in range(i)
-        if isfinite(fit.correlation[i, j]) and abs(fit.correlation[i, j]) > least
+        if isfinite(fit.correlation[i, j]) and abs(fit.correlation[i, j]) > CLOSE
     ]
     return sorted(pairs, key=lambda pair: -abs(pair[2]))
 

@@ -21,9 +21,7 @@ WIDE = 1e3
 """Ratio of bounds up to which all of the range is searched; others are bounds by nature."""
 
 
-def scattered(
-    at: Unknowns, centre: Array, count: int, seed: int = 0, sure: frozenset[str] = frozenset()
-) -> list[Array]:
+def scattered(at: Unknowns, centre: Array, count: int, seed: int = 0) -> list[Array]:
     """`count` coordinates, the first one the `centre`, the same for the same `seed`.
 
     Args:
@@ -31,7 +29,6 @@ def scattered(
         centre: coordinates, shape (n,).
         count: number of starts.
         seed: of the random numbers.
-        sure: names of unknowns that stay where they are.
     """
     rng = np.random.default_rng(seed)
     n, others = centre.size, max(count - 1, 0)
@@ -40,7 +37,7 @@ def scattered(
     starts = [at.inside(centre)]
     for row in shares:
         w = [
-            _moved(u, float(x), float(share), *box) if u.name not in sure else float(x)
+            _moved(u, float(x), float(share), *box)
             for u, x, share, *box in zip(at.unknowns, centre, row, at.lower, at.upper, strict=True)
         ]
         starts.append(at.inside(np.array(w)))

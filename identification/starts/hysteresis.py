@@ -93,14 +93,14 @@ def turning_points(x: Array, dead: float) -> list[int]:
     return found
 
 
-def travelled(measured: Measured, *, dead: float = DEAD) -> Array:
+def travelled(measured: Measured) -> Array:
     """Path [m] since the last reversal at each sample; inf before the first one."""
     found = np.full(measured.v.size, np.inf)
     if measured.x is None:
         return found
     for record in measured.records:
         x, path = measured.x[record], found[record]
-        ends = turning_points(x, dead * float(np.ptp(x)))
+        ends = turning_points(x, DEAD * float(np.ptp(x)))
         for first, last in pairwise([*ends, x.size]):
             path[first:last] = np.abs(x[first:last] - x[first])
     return found

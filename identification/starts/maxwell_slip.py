@@ -69,10 +69,6 @@ class Elements:
         """Shares alpha_i of the friction, sum 1."""
         return self.levels / self.levels.sum()
 
-    def virgin(self, x: Array) -> Array:
-        """Force [N] after the path `x` >= 0 [m] from rest without load."""
-        return np.minimum(x[:, None], self.radii) @ self.k
-
     def force(self, measured: Measured) -> Array:
         """The force [N] along records that begin as `loaded` says."""
         e = _stretches(measured, _path(measured), self.radii, self.loaded)[0]

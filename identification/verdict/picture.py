@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification.verdict.whiteness import Whiteness
 from symfric.foundation.panels import grid, panels, save
 from symfric.foundation.style import colour
 
@@ -33,23 +32,6 @@ def plot_profile(found: "Profile", path: str | Path | None = None) -> "Figure":
     axis.set_ylabel("rise of the cost, in variances")
     axis.set_title("\n".join(found.sentences), fontsize="small", wrap=True)
     axis.legend(fontsize="small")
-    return save(figure, path)
-
-
-def plot_lags(found: Mapping[str, Whiteness], path: str | Path | None = None) -> "Figure":
-    """Autocorrelations of the residuals of each channel over the lag, with limits of 95 %."""
-    some = {name: w for name, w in found.items() if w.lags.size}
-    figure, axes = panels(max(1, len(some)), width=6.5, height=1.9)
-    for axis, (name, w) in zip(axes, some.items(), strict=False):
-        axis.fill_between(w.lags, w.low, w.high, color="0.85", label="white: 95 %")
-        axis.vlines(w.lags, 0.0, w.correlation, color=colour(0), lw=1.5)
-        axis.plot(w.lags, w.correlation, "o", color=colour(0), ms=3)
-        axis.axhline(0.0, color="k", lw=0.6)
-        axis.set_ylim(min(-0.3, float(np.min(w.correlation)) - 0.1), 1.05)
-        axis.set_ylabel(name)
-        axis.legend(fontsize="small", loc="upper right")
-    axes[0].set_title("autocorrelation of the residuals", fontsize="medium")
-    axes[-1].set_xlabel("lag [samples]")
     return save(figure, path)
 
 

@@ -45,14 +45,13 @@ class Whiteness:
     __repr__ = brief
 
 
-def whiteness(r: Array, J: Array, position: Count, most: int = LAGS) -> Whiteness:
+def whiteness(r: Array, J: Array, position: Count) -> Whiteness:
     """Autocorrelations of residuals and their limits.
 
     Args:
         r: residuals of one channel in the order of time, shape (n,).
         J: sensitivities to what was fitted, shape (n, k), of any rank.
         position: neighbours before each row, see `positions`; 0 everywhere: nothing to test.
-        most: largest lag; at most a quarter of the rows.
     """
     from scipy.special import chdtrc  # noqa: PLC0415  (SciPy is loaded by those who fit)
 
@@ -61,7 +60,7 @@ def whiteness(r: Array, J: Array, position: Count, most: int = LAGS) -> Whitenes
     power = float(r @ r)
     lags = [
         lag
-        for lag in range(1, min(most, max(1, n // 4)) + 1)
+        for lag in range(1, min(LAGS, max(1, n // 4)) + 1)
         if (position >= lag).sum() > max(n // 4, 2 * k, 3)
     ]
     if not lags or not power > 0:

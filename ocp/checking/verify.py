@@ -167,9 +167,9 @@ def _size(runs: Sequence[Run], cost: float) -> float:
     return max(parts) or 1.0
 
 
-def near_runs(arcs: Sequence[Arc], tolerance: float, rtol: float = RTOL) -> tuple[Run, ...]:
+def near_runs(arcs: Sequence[Arc], tolerance: float) -> tuple[Run, ...]:
     """Runs from optimised nodes that stay near the optimised motion; none where that fails."""
-    return _restarted(arcs, tolerance, rtol)[0]
+    return _restarted(arcs, tolerance, RTOL)[0]
 
 
 def _restarted(

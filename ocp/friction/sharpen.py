@@ -54,7 +54,6 @@ from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Transcription
 
 Array = NDArray[np.float64]
-Meshes = Sequence[Array]
 Solver = Ipopt | Fatrop | Sqp
 
 FIRST = 0.3

@@ -83,7 +83,7 @@ def horizon_of(problem: Problem, step: float, *, method: str, steps: int) -> Hor
     for i in bare:
         k = len(model.x) + i
         early.hessian[k, k] = small[i]
-    limits = _limits(span, inputs)
+    limits = _limits(span)
     end_limits = _end_limits(span)
     return Horizon(
         model, count, step, references, at.x, at.u, at.after, at.t, at.r, at.r_after, at.p,
@@ -188,7 +188,7 @@ def _curvatures(
     return max(float(own.min()), FLAT * largest), largest
 
 
-def _limits(span: Span, inputs: ca.SX) -> list[Limit]:
+def _limits(span: Span) -> list[Limit]:
     rows = box_rows(span) + [(row, row.nominal) for row in span.path]
     symbols = {v.symbol.__hash__() for v in span.model.u}
     found: list[Limit] = []

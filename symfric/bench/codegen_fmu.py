@@ -17,7 +17,6 @@ from symfric.fmu import Exported, export_fmu
 from symfric.fmu.running import running
 from symfric.foundation.compiler import find_compiler
 from symfric.integrator import Input
-from symfric.model import Model
 from symfric.scenes import ALL_SCENES, Scene
 
 Array = NDArray[np.float64]
@@ -91,7 +90,7 @@ def _row(scene: Scene) -> tuple[list[Cell], float, str | int]:
             for name, column in zip(names, found.T, strict=True)
             if np.abs(same[name]).max() > 0
         )
-        tiny, spent = _tiny(unit, model)
+        tiny, spent = _tiny(unit)
         row: list[Cell] = [
             round(unit.size / 1024), round(unit.times[1], 1), round(worst / RTOL, 3), attempts,
             round(1e6 * each), round(1e6 * tiny, 1), round(spent, 3),
@@ -115,7 +114,7 @@ def _stepped(
         return np.array(rows), float(one.get(["attempts"])[0]), (perf_counter() - begin) / len(rows)
 
 
-def _tiny(unit: Exported, model: Model) -> tuple[float, float]:
+def _tiny(unit: Exported) -> tuple[float, float]:
     """Seconds and attempts of a tiny communication step, of many over a tenth of a second."""
     count = round(0.1 / TINY)
     with running(unit.path) as one:

@@ -69,28 +69,28 @@ def hysteretic() -> Model:
     )
 
 
-def multisine(seed: int, rms: float = 50.0) -> tuple[Array, Array]:
-    """Times [s] and a force [N] of all frequencies of the band with random phases."""
+def multisine(seed: int) -> tuple[Array, Array]:
+    """Times [s] and a force of all frequencies of the band with random phases, 50 N in the mean."""
     t, f = np.arange(SAMPLES) / RATE, np.arange(1, SAMPLES // 2) * RATE / SAMPLES
     f = f[(f >= BAND[0]) & (f <= BAND[1])]
     phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, f.size)
     u = np.cos(2 * np.pi * np.outer(t, f) + phases).sum(axis=1)
-    return t, u * rms / np.std(u)
+    return t, u * 50.0 / np.std(u)
 
 
-def hysteretic_data(model: Model, seed: int, noise: float = 8e-6) -> Dataset:
-    """The simulated oscillator under a multisine, its position with noise [m]."""
+def hysteretic_data(model: Model, seed: int) -> Dataset:
+    """The simulated oscillator under a multisine, its position with noise of 8 um."""
     t, u = multisine(seed)
     y = simulate(model, float(t[-1]), u={"u": Linear(t, u)}, t_eval=t, rtol=1e-9)["y"]
-    y = y + noise * np.random.default_rng([seed, 1]).standard_normal(t.size)
+    y = y + 8e-6 * np.random.default_rng([seed, 1]).standard_normal(t.size)
     return Dataset.of(t=t, y=y, u=u, units={"y": "m", "u": "N"}, name="multisine")
 
 
-def car_data(car: QuarterCar, seed: int, noise: float = 5e-5) -> Dataset:
-    """Displacements of body and wheel over the three ramps of the road, with noise [m]."""
+def car_data(car: QuarterCar, seed: int) -> Dataset:
+    """Displacements of body and wheel over the three ramps of the road, with noise of 50 um."""
     t = np.linspace(0.0, car.t_end, 2001)
     run = simulate(car.model(), car.t_end, rtol=1e-9, t_eval=t)
-    body, wheel = noise * np.random.default_rng(seed).standard_normal((2, t.size))
+    body, wheel = 5e-5 * np.random.default_rng(seed).standard_normal((2, t.size))
     return Dataset.of(
         t=t, X_b=run["X_b"] + body, X_w=run["X_w"] + wheel,
         units={"X_b": "m", "X_w": "m"}, name="three ramps",

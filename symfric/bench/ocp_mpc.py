@@ -67,11 +67,11 @@ PLANTS: dict[str, Callable[[], Model]] = {
 }
 
 
-def receding(v_t: float = 1e-2) -> Problem:
+def receding() -> Problem:
     """A drive goes to a place and stays: 20 intervals of 10 ms."""
     cost = track("x", "goal", 900.0) + track("v", 0.0, 1.0) + effort("force", 1e-3)
     cost += at_end(lambda s: 100.0 * (s.x - s.goal) ** 2 + s.v**2)
-    stage = drive(guide(v_t), m=1.0, N=1.0)
+    stage = drive(guide(1e-2), m=1.0, N=1.0)
     return Problem(
         Phase(stage, T=STEP * HORIZON), cost, bounds={"force": (-20.0, 20.0)}, p={"goal": 0.0}
     )

@@ -101,6 +101,6 @@ def show_gallery(done: Gallery) -> None:
         output.note(f"symfric: {done.left} of {len(done.asked)} figures were not computed")
 
 
-def brief(text: str, width: int = 84) -> str:
+def brief(text: str) -> str:
     """The first sentence or clause, cut to two lines of the table."""
-    return shorten(split(r"(?<!\.)[.;:](?: |$)", text)[0], width, placeholder=" ...")
+    return shorten(split(r"(?<!\.)[.;:](?: |$)", text)[0], 84, placeholder=" ...")

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from symfric.codegen import Block, generate
 from symfric.codegen.running.compiler import FLAGS
+from symfric.codegen.running.runner import bound
 from symfric.codegen.writing.layout import prefix
 from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
@@ -121,18 +122,12 @@ class Members:
         return f"{idle}out[i] = {name}({', '.join(given)})"
 
     def _in_vm(self) -> Any:
-        step = self.block.step.map(len(self.state))
-        buffer: Any
-        buffer, evaluate = step.buffer()
         # CasADi's columns are the rows of the arrays
         arrays = [np.array(a, float) for a in (self.state, self.param, self.input)]
         results = [np.zeros(a.shape) for a in (self.state, self.output)]
-        for place, group in ((buffer.set_arg, arrays), (buffer.set_res, results)):
-            for i, array in enumerate(group):
-                if array.size:
-                    place(i, array.data)
+        evaluate = bound(self.block.step.map(len(self.state)), arrays, results)
 
-        def go(alive: object = (step, buffer)) -> None:
+        def go() -> None:
             for own, given in zip(arrays, (self.state, self.param, self.input), strict=True):
                 own[:] = given
             evaluate()

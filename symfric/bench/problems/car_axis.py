@@ -11,7 +11,7 @@ from symfric.foundation.parameters import Variable
 from symfric.model import Model, Output
 
 NAMES = ("xl", "yl", "xr", "yr")
-L, L0, EPSILON, M, TAU, BUMP, OMEGA = 1.0, 0.5, 1e-2, 10.0, 0.6283185307179586, 0.1, 10.0
+L, L0, EPSILON, M, BUMP, OMEGA = 1.0, 0.5, 1e-2, 10.0, 0.1, 10.0
 K = EPSILON**2 * M / 2
 
 

@@ -284,7 +284,7 @@ def _machine(mechanism: Mechanism | str | Path, p: Variables, options: Options) 
     made = mechanism.prepare(parameters)
     eq, u = made.eq, tuple(mechanism.inputs)
     _check(eq, mechanism)
-    T, offset, leads = _couplings(eq, made.q, parameters)
+    T, offset, leads = _couplings(eq)
     joints = tuple(made.q[i] for i in leads)
     groups = [
         tuple(
@@ -342,7 +342,7 @@ def _check(eq: Equations, mechanism: Mechanism) -> None:
         )
 
 
-def _couplings(eq: Equations, q: Variables, p: Variables) -> tuple[ca.DM, ca.DM, list[int]]:
+def _couplings(eq: Equations) -> tuple[ca.DM, ca.DM, list[int]]:
     """T, c and the coordinates that lead: all coordinates are T times those, plus c.
 
     Raises:

@@ -151,10 +151,10 @@ def run_vm(
         inputs, said = model.inputs(inputs)
     p, x, u = model.default.copy(), model.start.copy(), np.zeros(len(block.inputs))
     following, y = np.zeros_like(x), np.zeros(len(block.outputs))
-    step = _bound(block.step, (x, p, u), (following, y))
+    step = bound(block.step, (x, p, u), (following, y))
     others = [np.zeros_like(x) for _ in block.resets]
     calls = [
-        _bound(block.reset(reset), (x, p, u), (other,))
+        bound(block.reset(reset), (x, p, u), (other,))
         for reset, other in zip(block.resets, others, strict=True)
     ]
     rows = np.zeros((len(inputs), len(signals(block, guards=guards))))
@@ -181,7 +181,7 @@ def run_vm(
     return rows
 
 
-def _bound(
+def bound(
     function: ca.Function, arguments: Sequence[Array], results: Sequence[Array]
 ) -> Callable[[], None]:
     """A call without copies: CasADi reads and writes the arrays themselves."""

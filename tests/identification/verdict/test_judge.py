@@ -12,7 +12,6 @@ from identification.unknowns.unknown import Unknown
 from identification.verdict.covariance import covariance
 from identification.verdict.judge import judge, judged
 from identification.verdict.minimum import minimum
-from identification.verdict.picture import plot_lags
 from identification.verdict.profile import Profile, profile
 from symfric.foundation.status import Status
 
@@ -27,7 +26,6 @@ def test_right_model_is_good() -> None:
     assert verdict.status(Status.SOLVED) is Status.SOLVED
     assert verdict.status(Status.MAX_ITERATIONS, gain=0.05) is Status.MAX_ITERATIONS
     assert verdict.effective == {"x": 300.0}
-    assert plot_lags(verdict.whiteness).axes
 
 
 def test_coloured_noise_alone_is_not_doubtful_and_widens() -> None:
