@@ -3,6 +3,7 @@
 import os
 import shlex
 import shutil
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,6 +58,12 @@ class Compiler:
             CompileError: as `run`.
         """
         return [line for line in self.run(*arguments).splitlines() if "warning:" in line]
+
+
+def is_clang(compiler: Compiler) -> bool:
+    """Whether it is a clang, which refuses some options of gcc; `cc` often is a link to one."""
+    names = (path.name for path in (Path(compiler.command[0]), Path(compiler.command[0]).resolve()))
+    return sys.platform == "darwin" or any("clang" in name for name in names)
 
 
 def patience(code: str) -> float:

@@ -21,6 +21,7 @@ from symfric.foundation.compiler import (
     Compiler,
     find_compiler,
     first_error,
+    is_clang,
     needed_compiler,
     patience,
 )
@@ -36,6 +37,8 @@ result does not depend on which of them ran: no fused multiply-add, no reciproca
 divisions are taken out of the graph instead), no reordering. Looking for common parts in code that
 has none left would take a third of the compiler's time."""
 
+OF_GCC = ("-fno-tree-pre", "-fno-code-hoisting", "-fno-gcse")
+"""Those that only gcc knows. clang refuses them."""
 NICENESS = 10
 """Of a compiler beside something else."""
 
@@ -114,7 +117,9 @@ def _made(
     compiler, flags = how
     with place.new(key) as temporary:
         try:
-            compiler.run(*_arguments(flags, temporary), code=source, variables=_folders(place))
+            compiler.run(
+                *_arguments(compiler, flags, temporary), code=source, variables=_folders(place)
+            )
         except CompileError as error:
             raise CompileError(f"compile: {first_error(str(error))}") from None
         opened(temporary, names)  # what cannot be used is not kept
@@ -125,7 +130,9 @@ def _made(
     return found
 
 
-def _arguments(flags: tuple[str, ...], path: Path) -> tuple[str, ...]:
+def _arguments(compiler: Compiler, flags: tuple[str, ...], path: Path) -> tuple[str, ...]:
+    if is_clang(compiler):
+        flags = tuple(flag for flag in flags if flag not in OF_GCC)
     return (*flags, "-x", "c", "-", "-o", str(path), "-lm")
 
 
@@ -197,7 +204,7 @@ def begun(source: str, names: tuple[str, ...]) -> Unfinished:
             path = place.begin(key)
             try:
                 process = started(
-                    (*compiler.command, *_arguments(FLAGS, path)),
+                    (*compiler.command, *_arguments(compiler, FLAGS, path)),
                     stdin=text,
                     variables=_folders(place),
                     name=str(compiler),

@@ -2,6 +2,7 @@
 
 import gc
 import os
+import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -294,3 +295,12 @@ def test_code_that_nobody_uses_is_not_kept_in_memory(folder: Path) -> None:
     del answer
     gc.collect()
     assert mapped() == 0
+
+
+@pytest.mark.skipif(shutil.which("clang") is None, reason="needs clang")
+def test_clang_gives_the_bits_of_the_virtual_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It refuses options of gcc: nothing was compiled with it."""
+    monkeypatch.setenv("CC", "clang")
+    runs = [simulate(rabinowicz(LuGre()), 5.0, backend=backend) for backend in ("vm", "compiled")]
+    assert runs[1].statistics.backend == "compiled"
+    assert (runs[0]["x"] == runs[1]["x"]).all()
