@@ -15,7 +15,7 @@ from ocp.mpc.controller import Controller as Controller
 from ocp.mpc.controller import controller_of as controller_of
 from ocp.result.solution import Mode as Mode
 from ocp.result.solution import Solution as Solution
-from ocp.result.stored import load as load
+from ocp.result.solution import load as load
 from ocp.solve import solve as solve
 from ocp.solvers.fatrop import Fatrop as Fatrop
 from ocp.solvers.ipopt import Ipopt as Ipopt

@@ -1,7 +1,7 @@
 """The result of an optimal control problem: named signals that plot, write and save themselves."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from math import isfinite
 from pathlib import Path
@@ -13,14 +13,18 @@ from numpy.typing import NDArray
 from ocp.result.motion import Motion, Stretch
 from ocp.result.stored import Stored, stored_spans, structure_of
 from ocp.solvers.outcome import Iterate, SolverStatistics
+from ocp.text.posed import posed
 from ocp.text.problem import Problem
 from ocp.text.ranges import Free
 from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
+from symfric.foundation import packed
 from symfric.foundation.files import write_table, write_text
 from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Shown
 from symfric.foundation.status import Status
+from symfric.results import tables
+from symfric.results.stored import Format
 from symfric.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -80,7 +84,7 @@ class Solution:
     `solution.scenarios["oiled"]["v"]` is that of another.
 
     Attributes:
-        problem: what was solved.
+        problem: what was solved; of a stored solution its resolved form, `ocp.text.posed.Posed`.
         status: how it ended; `message` says it in a sentence.
         cost: J.
         motions: what moves, for each scenario.
@@ -240,11 +244,28 @@ class Solution:
         )
 
     def save(self, path: str | Path) -> None:
-        """Write it to a file from which `ocp.load` makes a start for any mesh or model.
+        """Write all of it to one file, which `ocp.load` reads to the bit.
 
-        The file is NumPy's `.npz`, whatever its ending. Models and costs are code and not in it.
+        A loaded solution has its signals, modes and re-simulated motions; it draws and writes
+        itself, is verified again, and starts others on any mesh or model as `guess`. Functions
+        such as costs are kept as the expressions they gave.
+
+        Raises:
+            ValueError: the file cannot be written.
         """
-        self.stored.save(path)
+        SOLUTION.save(path, self)
+
+    def to_pack(self) -> dict[str, Any]:
+        """The fields, of the problem what was resolved."""
+        return packed.state_of(self) | {"problem": posed(self.problem), "cause": None}
+
+    def __copy__(self) -> "Solution":
+        """One with the same fields."""
+        return packed.shallow(self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A pickle holds what a file does."""
+        return packed.loads, (packed.dumps(self),)
 
     def plot(self, *names: str, path: str | Path | None = None) -> "Figure":
         """One panel per signal over time; optimised points against the re-simulated line.
@@ -271,6 +292,22 @@ class Solution:
             for row in np.column_stack([motion.t, *motion.signals.values()]).tolist()
         )
         write_table(path, [*(["scenario"] * several), *header], rows)
+
+    def to_dataframe(self) -> Any:
+        """The signals as a pandas table over t, with scenarios over scenario and t.
+
+        Units stand in its `attrs`; an input is the value from each time on.
+
+        Raises:
+            ImportError: no pandas.
+        """
+        pandas = tables.module("to_dataframe", "pandas")
+        parts = {m.name: pandas.DataFrame({"t": m.t, **m.signals}) for m in self.motions}
+        frame = pandas.concat(parts, names=["scenario"]).droplevel(1).set_index("t", append=True)
+        frame = frame if len(parts) > 1 else frame.droplevel("scenario")
+        about = {"scene": self.problem.name, "status": self.status.name, "cost": self.cost}
+        frame.attrs.update(about | {"units": {"t": "s", **self.units}})
+        return frame
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain data; a number that is not finite is None."""
@@ -300,6 +337,23 @@ class Solution:
     def to_json(self, path: str | Path) -> None:
         """Write `to_dict` as JSON."""
         write_text(path, json.dumps(self.to_dict(), allow_nan=False))
+
+
+SOLUTION = Format("symfric ocp solution", 2, "ocp.load", "a saved solution", Solution)
+
+
+def load(path: str | Path, own: Iterable[type | Callable[..., Any]] = ()) -> Solution:
+    """The solution that `solution.save(path)` wrote: `solve(problem, guess=load(path))`.
+
+    Args:
+        path: the file.
+        own: your classes in it, such as a law of yours.
+
+    Raises:
+        ValueError: no such file, one that something else wrote, a damaged one, one of another
+            version, or classes that are not known.
+    """
+    return SOLUTION.load(path, own)
 
 
 def _plain(values: Array) -> list[float | None]:

@@ -1,12 +1,9 @@
-"""What a warm start needs, in memory and in a file: named values, free of models and meshes."""
+"""What a warm start needs: named values, free of models and meshes."""
 
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from io import BytesIO
-from pathlib import Path
-from typing import Any, final
-from zipfile import BadZipFile
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +12,8 @@ from ocp.solvers.outcome import Iterate
 from ocp.text.problem import Problem
 from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
-from symfric.foundation import checks
-from symfric.foundation.files import written
 
 Array = NDArray[np.float64]
-
-KIND = "symfric ocp solution"
-FORMAT = 1
-"""Raised whenever older programs could not read the file or would misread it."""
 
 
 @final
@@ -112,100 +103,6 @@ class Stored:
 
     def __repr__(self) -> str:
         return f"<Stored solution of '{self.name}': {self.status}, J = {self.cost:.6g}>"
-
-    def save(self, path: str | Path) -> None:
-        """Write it to a file that `load` reads."""
-        arrays: dict[str, Array] = {
-            "w": self.iterate.w, "lam_w": self.iterate.lam_w, "lam_g": self.iterate.lam_g,
-        }  # fmt: skip
-        heads: list[dict[str, Any]] = []
-        for k, span in enumerate(self.spans):
-            arrays |= {f"{k} mesh": span.mesh, f"{k} nodes": span.nodes}
-            for letter in "xzu":
-                named: Mapping[str, Array] = getattr(span, letter)
-                arrays |= {f"{k} {letter} {name}": values for name, values in named.items()}
-            heads.append(
-                {
-                    "scenario": span.scenario,
-                    "phase": span.phase,
-                    "T": span.T,
-                    "x_end": dict(span.x_end),
-                }
-            )
-        head = {
-            "kind": KIND, "format": FORMAT, "name": self.name, "status": self.status,
-            "message": self.message, "cost": self.cost, "structure": self.structure,
-            "chosen": dict(self.chosen), "spans": heads,
-        }  # fmt: skip
-        buffer = BytesIO()
-        np.savez_compressed(buffer, head=np.array(json.dumps(head)), **arrays)  # pyright: ignore[reportArgumentType]
-        with written(path) as temporary:
-            temporary.write_bytes(buffer.getvalue())
-
-
-def load(path: str | Path) -> Stored:
-    """Read what `solution.save(path)` wrote: `solve(problem, guess=load(path))`.
-
-    Raises:
-        ValueError: no such file, one that something else wrote, or one of a later version.
-    """
-    place = checks.path("load", path)
-    try:
-        opened = np.load(BytesIO(place.read_bytes()), allow_pickle=False)
-        if not isinstance(opened, np.lib.npyio.NpzFile):
-            raise _foreign(path)
-        with opened as file:
-            head = json.loads(str(file["head"]))
-            if not isinstance(head, dict) or head.get("kind") != KIND:
-                raise _foreign(path)
-            if head["format"] != FORMAT:
-                raise ValueError(
-                    f"load '{path}': expected format {FORMAT}, got {head['format']}; it was "
-                    "written by another version of symfric"
-                )
-            return _stored(head, {name: np.asarray(file[name]) for name in file.files})
-    except OSError as error:
-        reason = "a folder" if isinstance(error, IsADirectoryError) else "an unreadable file"
-        if isinstance(error, FileNotFoundError):
-            reason = "no such file"
-        raise ValueError(f"load '{path}': expected a saved solution, got {reason}") from None
-    except (BadZipFile, KeyError, EOFError, json.JSONDecodeError):
-        raise _foreign(path) from None
-    except ValueError as error:
-        if str(error).startswith("load '"):
-            raise
-        raise _foreign(path) from None
-
-
-def _foreign(path: str | Path) -> ValueError:
-    return ValueError(
-        f"load '{path}': expected a file that solution.save(path) wrote, got something else"
-    )
-
-
-def _stored(head: Mapping[str, Any], arrays: Mapping[str, Array]) -> Stored:
-    spans: list[StoredSpan] = []
-    for k, one in enumerate(head["spans"]):
-        groups = {
-            letter: {
-                name.removeprefix(f"{k} {letter} "): values
-                for name, values in arrays.items()
-                if name.startswith(f"{k} {letter} ")
-            }
-            for letter in "xzu"
-        }
-        mesh, nodes = arrays[f"{k} mesh"], arrays[f"{k} nodes"]
-        spans.append(
-            StoredSpan(
-                int(one["scenario"]), int(one["phase"]), float(one["T"]), mesh, nodes,
-                groups["x"], one["x_end"], groups["z"], groups["u"],
-            )
-        )  # fmt: skip
-    iterate = Iterate(arrays["w"], arrays["lam_w"], arrays["lam_g"])
-    return Stored(
-        head["name"], head["status"], head["message"], float(head["cost"]), head["structure"],
-        tuple(spans), head["chosen"], iterate,
-    )  # fmt: skip
 
 
 def along(spans: Sequence[StoredSpan], name: str, fractions: Array) -> Array | None:

@@ -56,7 +56,8 @@ def shallow(thing: T) -> T:
 def dump(file: IO[bytes], thing: object, kind: str = "", form: int = 0) -> None:
     """Write the pack of `thing` to an open file.
 
-    An object that has `to_pack()` says itself what its fields are in a pack.
+    An object that has `to_pack()` says itself what its fields are in a pack; one that has
+    `packed_as()` is packed as another object, whose `unpacked()` makes it again.
 
     Args:
         file: open for writing.
@@ -228,6 +229,8 @@ class _Writer:
         if id(value) in self._known:
             return {"same": self._known[id(value)]}
         kind = type(value)
+        if hasattr(kind, "packed_as") and not isinstance(value, type):
+            return {"was": self.write(where, value.packed_as())}
         if isinstance(value, type) or not (is_dataclass(kind) or hasattr(kind, "to_pack")):
             what = "numbers, texts, expressions and objects made of them"
             raise checks.refused(f"pack{where}", what, value)
@@ -266,6 +269,7 @@ class _Reader:
             "tuple": lambda several: tuple(map(self.read, several)),
             "dict": lambda pairs: {self.read(name): self.read(value) for name, value in pairs},
             "same": lambda k: self._known[k],
+            "was": lambda content: self.read(content).unpacked(),
             "function": self._function,
             "partial": lambda parts: self._partial(*map(self.read, parts)),
         }

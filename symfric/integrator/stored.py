@@ -167,7 +167,7 @@ class Stored:
         except ValueError as error:
             return replace(self, unable=str(error))
 
-    def trajectory(self) -> Trajectory:
+    def unpacked(self) -> Trajectory:
         """The run again."""
         from symfric.integrator.outcome import trajectory_of  # noqa: PLC0415  (which knows this)
 
@@ -274,4 +274,4 @@ def load_run(
         ValueError: no such file, one that something else wrote, a damaged one, one of another
             format, or classes that are not known.
     """
-    return RUN.load(path, own).trajectory()
+    return RUN.load(path, own).unpacked()

@@ -1,6 +1,5 @@
 """The result of many runs: signals of all members, what was varied, and what became of each."""
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.files import written
+from symfric.foundation.files import write_table
 from symfric.foundation.shown import Showing, Shown
 from symfric.foundation.status import Status
 from symfric.results import tables_many
@@ -166,11 +165,8 @@ class Ensemble(Showing):
         columns = tables_many.columns(self, names)
         header = ["member"]
         header += [f"{name} [{unit}]" for name, unit in tables_many.units(self, columns).items()]
-        with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(header)
-            for m, rows in enumerate(tables_many.by_member(self, columns)):
-                writer.writerows([m, *row] for row in rows.tolist())
+        members = enumerate(tables_many.by_member(self, columns))
+        write_table(path, header, ([m, *row] for m, rows in members for row in rows.tolist()))
 
     def to_dataframe(self, *names: str) -> Any:
         """A row for each member and time, as a pandas table with what was varied as columns.

@@ -35,18 +35,13 @@ Array = NDArray[np.float64]
 class Kept(Protocol):
     """A run as data, see `symfric.integrator.stored`."""
 
-    def trajectory(self) -> "Trajectory":
+    def unpacked(self) -> "Trajectory":
         """The run again."""
         ...
 
     def save(self, path: str | Path) -> None:
         """Write it to a file."""
         ...
-
-
-def _again(data: bytes) -> "Trajectory":
-    """The run of a pickle."""
-    return packed.loads(data).trajectory()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -329,10 +324,10 @@ class Trajectory(Showing, Derivatives):
         Raises:
             ValueError: the file cannot be written, or a model holds what no file does.
         """
-        self._kept.save(path)
+        self.packed_as().save(path)
 
-    @property
-    def _kept(self) -> "Kept":
+    def packed_as(self) -> "Kept":
+        """The run as data."""
         if self.keep is None:
             raise ValueError(f"trajectory of '{self.scene}': expected one of simulate, got another")
         return self.keep(self)
@@ -343,7 +338,7 @@ class Trajectory(Showing, Derivatives):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A pickle holds what a file does."""
-        return _again, (packed.dumps(self._kept),)
+        return packed.loads, (packed.dumps(self),)
 
     def to_csv(self, path: str | Path, *names: str) -> None:
         """Write signals as columns with units in the header, such as `v [m/s]`.

@@ -120,7 +120,8 @@ RESULTS = (
         "a phase starts at zero", MOTION, "begin += points[k].T", "begin += 0.0", T_SOLVED,
     ),
     Mutant(
-        "files of later versions are read", STORED, 'if head["format"] != FORMAT:', "if False:",
+        "a stored problem forgets its phases", "ocp/text/posed.py",
+        "        problem.spans,\n", "        problem.spans[:1],\n",
         T_STORED,
     ),
     Mutant(
