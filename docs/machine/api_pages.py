@@ -66,7 +66,7 @@ def entry(public: Public) -> str:
     if inspect.isclass(item):
         kind = "autoexception" if issubclass(item, BaseException) else "autoclass"
         return rst.directive(kind, public.full, members="")
-    if callable(item) and hasattr(item, "__name__"):
+    if is_function(item):
         return rst.directive("autofunction", public.full)
     return rst.directive("py:data", public.full, sentence(summary(public), linked) + "\n")
 
@@ -74,10 +74,15 @@ def entry(public: Public) -> str:
 def summary(public: Public) -> str:
     """The first line of its docstring; of data, the text below them in their source."""
     item: Any = public.object
-    if inspect.isclass(item) or (callable(item) and hasattr(item, "__name__")):
+    if inspect.isclass(item) or is_function(item):
         return first_line(item.__doc__).rstrip(".")
     said = data_docs(source_of(public.front, public.name))
     return first_line(said.get(public.name, "")).rstrip(".")
+
+
+def is_function(item: Any) -> bool:
+    """A function, also a wrapped one; types such as `float | None` can be called, too."""
+    return inspect.isroutine(item) or hasattr(item, "__wrapped__")
 
 
 @cache

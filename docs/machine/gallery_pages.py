@@ -3,6 +3,7 @@
 `symfric gallery` computes them; here they are shown. SYMFRIC_DOCS=quick takes the reduced size.
 """
 
+import ast
 import json
 import os
 import re
@@ -143,4 +144,11 @@ def page(record: Mapping[str, Any]) -> str:
     module = scripts()[record["name"]]
     source = ROOT.joinpath(*module.split(".")).with_suffix(".py")
     text += rst.title("Script", "-") + f"``{source.relative_to(ROOT)}``\n\n"
-    return text + rst.literal(source.read_text("utf-8"), "python")
+    return text + rst.literal(without_docstring(source.read_text("utf-8")), "python")
+
+
+def without_docstring(source: str) -> str:
+    """A script without its first words, which stand above it already."""
+    first = ast.parse(source).body[0]
+    said = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
+    return "".join(source.splitlines(keepends=True)[first.end_lineno if said else 0 :]).lstrip()

@@ -57,6 +57,21 @@ def as_rst(app: Any, what: str, name: str, item: Any, options: Any, lines: list[
     lines[:] = to_rst("\n".join(lines), linked, formulas=False).splitlines()
 
 
+ARRAY = re.compile(
+    r"(?:~?numpy\.)?ndarray\[(?:~?builtins\.)?tuple\[(?:~?typing\.)?Any, \.\.\.\], "
+    r"(?:~?numpy\.)?dtype\[(?:~?numpy\.)?(\w+)\]\]"
+)
+"""What Python makes of `NDArray[np.float64]`."""
+
+
+def short(
+    app: Any, what: str, name: str, item: Any, options: Any, given: str | None, back: str | None
+) -> tuple[str | None, str | None]:
+    """A signature with types of arrays as they are written."""
+    del app, what, name, item, options
+    return tuple(text and ARRAY.sub(r"NDArray[\1]", text) for text in (given, back))  # pyright: ignore
+
+
 def find_type(app: Any, env: Any, node: Any, content: Any) -> Any:
     """A type in a signature: linked where it is public, as it stands where it is not."""
     if node.get("refdomain") != "py" or node.get("reftype") not in ("class", "exc", "data"):
@@ -86,6 +101,7 @@ def setup(app: Any) -> dict[str, bool]:
     app.connect("source-read", show_made)
     app.connect("doctree-read", link)
     app.connect("autodoc-process-docstring", as_rst)
+    app.connect("autodoc-process-signature", short)
     app.connect("missing-reference", find_type)
     app.connect("build-finished", forget)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

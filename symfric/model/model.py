@@ -29,6 +29,7 @@ from symfric.model.sketch import Sketch
 from symfric.model.start import Starting
 
 Variables = tuple[Variable, ...]
+"""Variables in their order; () for none."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

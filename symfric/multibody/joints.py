@@ -259,3 +259,4 @@ ALL_JOINTS: tuple[type[Joint], ...] = (
     Revolute, Prismatic, Cylindrical, Spherical, Universal, Planar, Fixed, Floating, Distance,
     PointOnLine, PlanarRevolute, PlanarPrismatic, PinInSlot,
 )  # fmt: skip
+"""Every joint that a mechanism takes."""
