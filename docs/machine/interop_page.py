@@ -8,7 +8,6 @@ from typing import Any
 
 from docs.machine import rst
 from docs.machine.bench_pages import made_by, stored
-from docs.machine.docstrings import text as sentence
 from docs.machine.drawing import MADE
 
 FOLDER = MADE / "tables"
@@ -36,7 +35,7 @@ def rows(one: Mapping[str, Any]) -> list[Row]:
 
 def moves(lines: Sequence[Row]) -> str:
     """A row for each law and route, a column for each tool: miss, iterations, time."""
-    head = ["law", "in as", *TOOLS.values(), "J [N² s]"]
+    head = ["law", "in as", "J [N² s]", *TOOLS.values()]
     keys = dict.fromkeys((line["law"], line["route"]) for line in lines)
     body: list[list[str]] = []
     for law, route in keys:
@@ -44,8 +43,8 @@ def moves(lines: Sequence[Row]) -> str:
         costs = sorted({m["J"] for m in own.values() if not m[""]})
         cost = " ... ".join(dict.fromkeys((costs[0], costs[-1]))) if costs else ""
         cells = [cell(own[tool]) if tool in own else "" for tool in TOOLS]
-        body.append([f":doc:`{law} </laws/{law}>`", ROUTES[route], *cells, cost])
-    return rst.table(head, body)
+        body.append([f":doc:`{law} </laws/{law}>`", ROUTES[route], cost, *cells])
+    return rst.table(head, body, "numbers")
 
 
 def cell(line: Row) -> str:
@@ -67,7 +66,7 @@ def integrators(lines: Sequence[Row]) -> str:
         cells = [off(own[law]) for law in laws]
         shown = "``simulate``, virtual machine" if name == "symfric" else f"``{name}``"
         body.append([shown, *cells])
-    return rst.table(["", *(sentence(f"`{law}`") for law in laws)], body)
+    return rst.table(["", *(f":doc:`{law} </laws/{law}>`" for law in laws)], body)
 
 
 def off(line: Row) -> str:

@@ -29,13 +29,13 @@ def page() -> str:
         [rst.plain(source), ", ".join(f":doc:`{name} </laws/{name}>`" for name in names)]
         for source, names in laws().items()
     ]
-    text += rst.table(["source", "laws"], rows, "options")
+    text += rst.table(["source", "laws"], rows)
     text += rst.title("Figures", "-")
     text += "Papers whose figures are computed again in the :doc:`gallery </gallery/index>`.\n\n"
     text += "".join(f"* {rst.plain(paper)}\n" for paper in papers()) + "\n"
     text += rst.title("Scenes and methods", "-")
     rows = [[rst.plain(said), rst.code(where)] for said, where in methods()]
-    return text + rst.table(["source", "used in"], rows, "options")
+    return text + rst.table(["source", "used in"], rows)
 
 
 def cite() -> str:

@@ -18,7 +18,8 @@
   }
   for (const e of all('article pre, article .table-wrapper, article div.math, article img')) {
     const scrolls = /auto|scroll/.test(getComputedStyle(e).overflowX);
-    if (seen(e) && e.scrollWidth > e.clientWidth + 2 && (kind.print || !scrolls))
+    const table = e.classList.contains('table-wrapper') && kind.width > 1000;  // there it has room
+    if (seen(e) && e.scrollWidth > e.clientWidth + 2 && (kind.print || table || !scrolls))
       found.push(`cut at the right: '${short(e.textContent)}'`);
   }
   if (kind.print) return found;

@@ -4,11 +4,13 @@ import re
 from collections.abc import Iterable, Sequence
 
 MARKUP = re.compile(r"([*|_\\<>`])")
+LISTED = re.compile(r"^(\w{1,3})([.)] )")
+"""What begins an item of a list, such as the initial of a name."""
 
 
 def plain(text: str) -> str:
     """Text in which nothing is markup."""
-    return MARKUP.sub(r"\\\1", text)
+    return LISTED.sub(r"\1\\\2", MARKUP.sub(r"\\\1", text))
 
 
 def code(text: str) -> str:
