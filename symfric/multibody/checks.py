@@ -25,6 +25,8 @@ Position = Callable[[Array], tuple[ca.DM, ca.DM, ca.DM]]
 """q -> (phi, phi_q, phi_t) as numbers at time 0."""
 FITS = 1e-8
 """Largest violation of a constraint at the start [m, m/s]."""
+FASTEST = 1e4
+"""Rates that follow others may be so many times as large; they are larger at a dead centre only."""
 RANK = 1e-9
 """Singular values below this times the largest count as zero."""
 SINGULAR = 1e-12
@@ -241,6 +243,23 @@ def weightless(M: Array) -> NDArray[np.bool_]:
         return own <= 0
     least, along = np.linalg.eigh((M + M.T) / 2 / np.sqrt(np.outer(own, own)))
     return (least[0] < SINGULAR) & (np.abs(along[:, 0]) > 0.1)
+
+
+def following(J: Array, wanted: Array, phi_t: Array) -> Array:
+    """Rates near `wanted` that satisfy J rates + phi_t = 0.
+
+    Those other than zero are kept, and the others follow; where they cannot, the nearest are taken.
+    """
+    if not J.size:
+        return wanted
+    miss, rest = J @ wanted + phi_t, wanted == 0.0
+    step = np.zeros_like(wanted)
+    step[rest] = np.linalg.lstsq(J[:, rest], miss, rcond=1e-10)[0]
+    fits = np.abs(J @ step - miss).max() <= FITS * (1.0 + np.abs(miss).max())
+    near_a_dead_centre = np.abs(step).max() > FASTEST * max(1.0, np.abs(wanted).max())
+    if not fits or near_a_dead_centre:
+        step = np.linalg.lstsq(J, miss, rcond=None)[0]
+    return wanted - step
 
 
 def project(at: Position, q: Array, iterations: int = 30) -> Array | None:

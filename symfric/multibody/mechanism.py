@@ -292,6 +292,8 @@ class Mechanism(Showing):
     def assembled(self, p: Variables = ()) -> "Mechanism":
         """A copy whose joints start at the nearest position and velocity that close all loops.
 
+        Rates that are given, those other than zero, stay where the other joints can follow them.
+
         Args:
             p: parameters, at whose start values they close.
 
@@ -309,8 +311,7 @@ class Mechanism(Showing):
             self._refuse(["start: expected positions from which the loops can be closed"])
             near = made.q0
         _, J, phi_t = (part.full() for part in at(near))
-        speed = J @ made.qd0 + phi_t[:, 0]
-        rates = made.qd0 - np.linalg.lstsq(J, speed, rcond=None)[0] if J.size else made.qd0
+        rates = checks.following(J, made.qd0, phi_t[:, 0])
         start = {
             link.joint.name: replace(
                 link.joint,

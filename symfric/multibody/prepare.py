@@ -80,7 +80,7 @@ def _misfits(made: Prepared, at: checks.Position) -> Iterator[str]:
     if not np.isfinite(speed).all():
         yield f"start: expected a finite velocity of {made.labels[worst]}, got {speed[worst]:.3g}"
     elif abs(speed[worst]) > checks.FITS * max(1.0, float(np.abs(made.qd0).max())):
-        near = made.qd0 - np.linalg.lstsq(J, speed, rcond=None)[0]
+        near = checks.following(J, made.qd0, phi_t[:, 0])
         pairs = zip(made.qd, near, strict=True)
         yield (
             f"start: expected velocities that satisfy {made.labels[worst]}, got "
