@@ -20,6 +20,7 @@ from identification.data.findings import Findings
 from identification.first import centre, explained, findings_of, measured, slowest, strongest
 from identification.residuals.choice import choose
 from identification.residuals.evaluation import Residuals
+from identification.residuals.inverse import InverseDynamics
 from identification.residuals.points import Points
 from identification.residuals.shooting import Shooting
 from identification.result.build import fitted, levels_of
@@ -206,6 +207,8 @@ class Fit:
         made = asked.task.with_noise(end.noise)
         verdict = judge(made, point, asked.findings)
         status, message = _status(end, verdict, remaining(made, point) / max(point.cost, 1e-300))
+        if status is Status.DOUBTFUL:
+            message += _unseen(asked)
         levels = levels_of(asked.subject, asked.strongest(point, self.data), self.data.rotary)
         question = Asked(replace(self, kind=asked.kind), dict(made.noise), point.w)
         result = fitted(
@@ -254,6 +257,17 @@ def _status(end: Start, verdict: Verdict, gain: float) -> tuple[Status, str]:
         message = f"The search was not finished, so that a better fit may be near: {message}"
     said = [message, *verdict.sentences]
     return status, " ".join(_sentence(text) for text in said if text)
+
+
+def _unseen(asked: Prepared) -> str:
+    """What a fit at the measured velocity cannot know of a law with states."""
+    law = asked.subject.law
+    if law is None or not law.states or not isinstance(asked.kind, InverseDynamics):
+        return ""
+    return (
+        f" The states of {type(law).__name__} follow the measured velocity, of which noise and few "
+        "samples leave little near rest: take Fit(Shooting(windows=1.0), ...), which simulates."
+    )
 
 
 def _sentence(text: str) -> str:

@@ -24,13 +24,19 @@ class Variable(Symbolic):
     A column is `ca.vertcat(*variables)`.
 
     Attributes:
+        name: C identifier, such as x or theta_1.
         unit: as text, SI where a law or a mechanism takes the variable; a text that is no unit is
             warned of, with what may be meant.
         symbol: SX symbol, shape (1, 1).
         start: initial or default value; an expression in other symbols where it depends on them.
         nominal: typical magnitude; absolute tolerances and scalings are relative to it.
-        lower, upper: bounds for optimisation and identification.
+        lower, upper: bounds for optimisation and identification, and of a given parameter.
+        doc: what it is, in a few words.
         kind: what it is among the signals of a model, see `symfric.model.kinds`.
+
+    Raises:
+        ValueError: no text as name or unit, a start that is no number or expression, a nominal that
+            is not above zero, bounds that are none.
     """
 
     name: str

@@ -44,6 +44,11 @@ class Model(Showing, Starting):
     matrix of rates may be singular (capacitors between nodes), or `holonomic` for a mechanism,
     whose equations then are the only ones: `ode` and `alg` are made of them.
 
+    Equations are SX expressions of the variables, which stand for their symbols:
+
+        x, v, u = Variable("x", "m"), Variable("v", "m/s"), Variable("u", "N")
+        Model("mass", x=(x, v), u=(u,), ode=ca.vertcat(v, (u - 50 * x) / 2.0))
+
     Attributes:
         name: what the scene is called.
         x, z, u, p: named variables; an absent group is empty and costs nothing.

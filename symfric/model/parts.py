@@ -12,9 +12,13 @@ from symfric.foundation.symbolic import take_symbols
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Output:
-    """A named result of a model: an expression in t, x, z, u, p, with its unit.
+    """A named result of a model, as in `Model(outputs={"force": Output(50 * s, "N")})`.
 
-    `kind` says what it is, see `symfric.model.kinds`; it may be empty.
+    Attributes:
+        expression: in t, x, z, u, p, shape (1, 1).
+        unit: as text; a text that is no unit is warned of.
+        doc: what it is, in a few words.
+        kind: what it is among the signals, see `symfric.model.kinds`; it may be empty.
     """
 
     expression: Scalar

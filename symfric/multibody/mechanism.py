@@ -57,6 +57,13 @@ class Mechanism(Showing):
         m.frame("bob.pivot", at=(0, 0, 0.5), z=(0, 1, 0))
         m.joint(Revolute("hinge", "ground.pivot", "bob.pivot", start=0.3))
         model = m.build()
+
+    Numbers may be variables, which are handed to `build(p=(mass, length))`. Bodies, frames and
+    joints may come in any order; what is wrong with them, all of it, is the ValueError of `build`.
+
+    Args:
+        name: C identifier.
+        gravity: in world components [m/s^2]; (0, 0, 0) for none.
     """
 
     def __init__(self, name: str, gravity: Vector = (0.0, 0.0, -9.81)) -> None:

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from identification.data.dataset import Dataset
+from identification.data.synthetic import synthetic_drive_data
 from identification.fit import Fit
 from identification.residuals.inverse import InverseDynamics
 from identification.residuals.points import Points
 from identification.residuals.shooting import Shooting
 from identification.unknowns.spec import above, log, tied
 from symfric.foundation.status import SolveError, Status
-from symfric.laws import Coulomb, LuGre, Stribeck, Sum, Viscous
+from symfric.laws import Coulomb, Dahl, LuGre, Stribeck, Sum, Viscous
 from symfric.laws.steady import steady_force
 from symfric.scenes import Drive
 
@@ -49,6 +50,7 @@ def test_points_at_low_speeds_narrow_the_smoothing() -> None:
 def test_a_wrong_law_is_doubtful_and_no_error() -> None:
     fit = Fit(Points(), "coulomb+viscous", points()).solve()
     assert fit.status is Status.DOUBTFUL
+    assert "measured velocity" not in fit.message
 
 
 def test_specs_reach_the_result() -> None:
@@ -172,3 +174,11 @@ def test_outliers_that_the_loss_allows_for_do_not_make_given_noise_too_small() -
     for loss, status in (("huber", Status.SOLVED), ("squares", Status.DOUBTFUL)):
         fit = Fit(Points(), "coulomb+viscous", data, noise={"F": 0.05}, loss=loss)
         assert fit.solve(throw=False).status is status, loss
+
+
+def test_who_fits_bristles_at_the_measured_velocity_is_told_to_simulate() -> None:
+    data = synthetic_drive_data(seed=1, rate=500.0)  # of a law without states, with a peak
+    fit = Fit(InverseDynamics(), Dahl(), data, free=["mu_d"]).solve(throw=False)
+    assert fit.status is Status.DOUBTFUL
+    assert "The states of Dahl follow the measured velocity" in fit.message
+    assert "Fit(Shooting(windows=1.0), ...)" in fit.message

@@ -12,6 +12,7 @@ from symfric.integrator.equations.manifold import grows, pulls, singular
 from symfric.integrator.equations.pivots import regular
 from symfric.integrator.equations.system import System
 from symfric.integrator.running.integrator import Integrator
+from symfric.model import Model
 
 Array = NDArray[np.float64]
 NEARLY = 0.1
@@ -47,6 +48,20 @@ def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> t
         f"{where}: the step fell to {h:.1e} s, fastest equation {fastest}; "
         f"{_advice(integrator) or guess}{_coarse(t)}",
     )
+
+
+def chattering(model: Model) -> str:
+    """What to do about equations of one's own with a sign, at which steps never end; else nothing.
+
+    At rest a sign changes from step to step: what holds there is between -1 and 1.
+    """
+    if model.contacts or model.holonomic is not None:
+        return ""
+    symbols = ca.symvar(model.residual)
+    written = ca.Function("equations", symbols, [model.residual])
+    if ca.OP_SIGN not in {written.instruction_id(k) for k in range(written.n_instructions())}:
+        return ""
+    return " The equations hold sign(...): write friction with contact(...) and a law, which rests."
 
 
 def _coarse(t: float) -> str:

@@ -14,7 +14,7 @@ from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import JammedError, consistent, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.onsets import pace
-from symfric.integrator.running.diagnosis import explain
+from symfric.integrator.running.diagnosis import chattering, explain
 from symfric.integrator.running.engine import Stop
 from symfric.integrator.running.events import Eventful
 from symfric.integrator.running.integrator import Integrator
@@ -209,9 +209,9 @@ class _March:
         self.run.engine = engine.name
         allowed = min(ATTEMPTS[engine.name], self.tolerances.max_steps - self.run.attempts)
         if allowed <= 0:
-            self.run.stop(
-                Status.MAX_STEPS, f"{Status.MAX_STEPS.value} It stands at t = {self.t:g} s."
-            )
+            hint = chattering(self.integrator.model)
+            said = f"{Status.MAX_STEPS.value} It stands at t = {self.t:g} s.{hint}"
+            self.run.stop(Status.MAX_STEPS, said)
             return self.work.rows[:0], Stop.ATTEMPTS, left
         virtual = engine.name == "vm"
         began, from_t = (perf_counter(), self.t) if virtual else (0.0, 0.0)

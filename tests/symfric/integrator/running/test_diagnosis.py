@@ -7,6 +7,7 @@ from backends import each_backend
 
 from symfric import (
     BrownMcPhee,
+    ExactCoulomb,
     Model,
     SolveError,
     Status,
@@ -15,6 +16,7 @@ from symfric import (
     rabinowicz,
     simulate,
 )
+from symfric.integrator.running.diagnosis import chattering
 
 t = ca.SX.sym("t")
 x, y = Variable("x", "m"), Variable("y", "m", start=1.0)
@@ -159,3 +161,14 @@ def test_failure_is_returned_where_nothing_is_to_be_thrown() -> None:
     assert run.status is Status.NOT_FINITE
     assert not run.status.ok
     assert run.t[-1] <= run.step_times[-1] < 2.0
+
+
+def test_a_sign_of_ones_own_is_told_from_a_law() -> None:
+    v = Variable("v", "m/s", start=1.0)
+    chatters = Model("slide", x=(v,), ode=-ca.sign(v))
+    with pytest.raises(SolveError, match=r"hold sign\(\.\.\.\): write friction with contact") as e:
+        simulate(chatters, 5.0, max_steps=300, backend="vm")
+    assert e.value.status is Status.MAX_STEPS
+    assert chattering(chatters)
+    assert not chattering(Model("smooth", x=(v,), ode=-v.symbol))
+    assert not chattering(rabinowicz(ExactCoulomb()))
