@@ -76,12 +76,13 @@ def drift(
         loaded = ca.if_else(t < hold_from, 0.0, held)
         return ca.if_else(t < RELEASED, peak * ca.fmin(t, 1.0), loaded)
 
-    run = pushed(law, N, magnitudes.mass, force, t_end)
-    t = np.linspace(RELEASED, t_end, 1 + round(400 * (t_end - RELEASED)))
+    last = t_end + 1 / frequency  # the mean around the end needs what follows
+    run = pushed(law, N, magnitudes.mass, force, last)
+    t = np.linspace(RELEASED, last, 1 + round(400 * (last - RELEASED)))
     found = run.at(t)
     rest = float(run.at(vibrate_from)["x"][0])
     columns = {"t": t, "F_e": found["force"], "x": found["x"] - rest, "F": found["friction"]}
-    keep = t >= vibrate_from - 0.2
+    keep = (t >= vibrate_from - 0.2) & (t <= t_end + 1e-9)
     once = over_period(t, columns["x"], 1 / frequency)
     columns["x_mean"] = over_period(
         t, once, 1 / frequency

@@ -59,14 +59,14 @@ def require(where: str, law: AnyLaw, *codes: str) -> None:
     check_any(where, law)
     shown = phenomena(law)
     needed = [i.name for i in law.inputs if i.name not in GIVEN] if isinstance(law, Law) else []
-    if needed:
+    if set(codes) & set(shown) and not needed:
+        return
+    if set(codes) & set(shown):
         raise ValueError(
             f"{where} of {law_name(law)}: expected a law that needs no more than velocity, load, "
             f"acceleration and applied force, got one that needs {', '.join(needed)}; a figure of "
             "a scene that has them shows it, see `symfric scenes`"
         )
-    if set(codes) & set(shown):
-        return
     missing = " or ".join(PHENOMENA[code] for code in codes)
     kinds = (ALL_LAWS | POPULATIONS).items()
     able = [name for name, kind in kinds if set(codes) & set(kind.facts.phenomena)]

@@ -138,7 +138,7 @@ JUDGED = (
     ),
     Mutant(
         "a road of 30 mm rises by 60", SCENES + "quarter_car.py",
-        '"amplitude": millimetres / 1000,', '"amplitude": millimetres / 500}', T_PRESETS,
+        '"amplitude": millimetres / 1000,', '"amplitude": millimetres / 500,', T_PRESETS,
     ),
     Mutant(
         "elements keep their sizes where their level changes", SCENES + "presets.py",

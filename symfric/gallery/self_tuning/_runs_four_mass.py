@@ -102,7 +102,7 @@ def picture(ending: str, label: str, t_end: float) -> Figure:
         for k, slider in enumerate(pair, start=2):
             apart_by = first[slider + ending] - other[slider + ending]
             axis.plot(first["t"], apart_by, **line(k), label=f"mass {slider[1]}")
-        axis.legend(fontsize="small")
+        axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2, frameon=False)
         axis.set_xlabel("time [s]")
     axes[2][0].set_ylabel(f"self-tuning minus\nBrown-McPhee {label[label.index('[') :]}")
     for axis, slider in zip((a for row in axes[:2] for a in row), SLIDERS, strict=True):

@@ -21,7 +21,7 @@ def plate(quick: bool = False) -> Plate:
     numbers = {"laws apart [rad/s^2]": largest(apart("crank''", t_end))}
     slowest = min(float(run(law, t_end)["crank'"].min()) for law in LAWS)
     numbers["slowest slip in the bearing / velocity of the peak [1]"] = 0.1 * slowest / V_T
-    numbers["largest norm of the constraints"] = max(
+    numbers["largest norm of the constraints [m]"] = max(
         largest(run(law, t_end)["constraint"]) for law in LAWS
     )
     greatest = largest(run("Brown-McPhee", t_end)["crank''"])
@@ -29,7 +29,7 @@ def plate(quick: bool = False) -> Plate:
     claims = {
         "the bearing slides at 800 times the velocity of the peak": 0.1 * slowest > 800 * V_T,
         "the laws overlap within 0.2 %": largest(apart("crank''", t_end)) < 2e-3 * greatest,
-        "constraints hold": numbers["largest norm of the constraints"] < 1e-7,
+        "constraints hold": numbers["largest norm of the constraints [m]"] < 1e-7,
     }
     figure = picture("crank''", "crank acceleration\n[rad/s²]", t_end)
     return plate_of(__name__, figure, distance("crank''", t_end), "rad/s^2", numbers, claims)

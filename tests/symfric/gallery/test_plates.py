@@ -1,5 +1,6 @@
 """Every figure of the gallery at reduced size: what it says, how far it is, what is refuted."""
 
+import re
 from functools import cache
 from pathlib import Path
 
@@ -76,6 +77,7 @@ def test_a_plate_is_drawn_and_says_how_far_we_are(name: str) -> None:
     values = np.array([plate.distance, *plate.numbers.values()], dtype=float)
     assert np.isfinite(values).all()
     assert plate.numbers
+    assert all(re.search(r" \[[^\]]+\]$", name) for name in plate.numbers), "a number has a unit"
     assert plate.how_far
     assert plate.distance < FARTHEST[name]
     assert plate.checked, "what the evidence says is checked on the numbers"
