@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from symfric.results.ensemble import Ensemble
 
 MOST = 5_000_000
-"""Numbers that are read without being asked for."""
+"""Numbers that are read without being asked for; of a file every page, for its last column."""
 LINES = 200
 """Members in a picture."""
 
@@ -34,7 +34,9 @@ def shown(runs: "Ensemble") -> Shown:
         lines.append(f"member {number} failed: {why}")
     if len(runs.failed) > 3:
         lines.append(f"failed: {len(runs.failed)}, members {among(map(str, runs.failed))}")
-    rows, read = list[tuple[str, ...]](), members * times <= MOST
+    rows = list[tuple[str, ...]]()
+    mapped = any(isinstance(values, np.memmap) for values in runs.signals.values())
+    read = (members * times if mapped else members) <= MOST
     for name in runs.signals:
         rows.append((name, runs.units[name], *(_ends(runs, name) if read else ("", "", ""))))
     header = ("signal", "unit", "least", "median", "greatest")
