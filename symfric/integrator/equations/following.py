@@ -139,6 +139,14 @@ def following(system: System) -> Following | None:
     return Following(_round(system, blocks, ca.MX) if large else inlined, contraction)
 
 
+def corrected(system: System) -> ca.Function:
+    """(y, d) -> y with its algebraic unknowns after the first correction of a round, in SX."""
+    y, d = ca.SX.sym("y", system.n), ca.SX.sym("d", system.d.numel())
+    blocks = _blocks(system)
+    _, change = blocks.solve(blocks.pack(blocks.entries(y, d)), blocks.residual(y, d))
+    return ca.Function("corrected", [y, d], [y + change], {"cse": True})
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class _Blocks:

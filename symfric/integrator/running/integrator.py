@@ -15,7 +15,7 @@ from symfric.foundation.symbols import stacked
 from symfric.integrator.compiled.background import Prospect
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.blocks import refinement
-from symfric.integrator.equations.following import Following, following
+from symfric.integrator.equations.following import Following, corrected, following
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.lu import Order
@@ -95,9 +95,20 @@ class Integrator:
         return tuple(ca.SX.serialize(e) for e in alone)
 
     def _event_function(self) -> ca.Function:
-        """Event expressions as a Function (t, y, d)."""
+        """Event expressions (t, y, d), where algebraic unknowns solve their equations.
+
+        Within a step they do to the tolerance, and behind an event exactly: without one step of
+        Newton's method an event that depends on them may pass through zero a second time there.
+        Those of a mechanism are left as they are.
+        """
         values = stacked(ca.SX(e.expression) for e in self.model.events)
-        return self.of_time("events", ca.densify(_solved(self.model, values)))
+        events, s = self.of_time("events", ca.densify(values)), self.system
+        moved = s.y[[int(i) for i in np.flatnonzero(s.free.any(axis=1))]]
+        if s.manifold is not None or not ca.depends_on(events(ca.SX(0), s.y, s.d), moved):
+            return events
+        t = ca.SX.sym("time")
+        solved = events(t, corrected(s)(s.y, s.d), s.d)
+        return ca.Function("events", [t, s.y, s.d], [solved], {"cse": True})
 
     def _reset_function(self) -> ca.Function:
         """Values of all resets, event after event, as a Function (t, y, d)."""
@@ -300,19 +311,3 @@ class Integrator:
             except CompileError:  # a broken compiler is no reason not to simulate
                 self.prospect.hopeless = True
         return self.vm()
-
-
-def _solved(model: Model, expression: ca.SX) -> ca.SX:
-    """`expression` where the algebraic variables z solve their equations, by one step of Newton's.
-
-    Within a step they do to the tolerance, and behind an event exactly: without this, an event that
-    depends on them may pass through zero a second time there. That of a mechanism is left as it is.
-    Written out by QR, which is sound without a search for pivots, and long for dozens of z: 20 that
-    are coupled as a chain take half a second to build, 60 take four.
-    """
-    z = model.vector("z")
-    explicit = model.ode is not None and model.holonomic is None and bool(model.z)
-    if not (explicit and ca.depends_on(expression, z)):
-        return expression
-    change = ca.solve(ca.jacobian(model.alg, z), model.alg)
-    return ca.substitute(expression, z, z - change)

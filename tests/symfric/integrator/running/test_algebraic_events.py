@@ -8,15 +8,35 @@ import pytest
 from backends import each_backend
 
 from symfric import Event, Model, Variable, simulate
+from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.methods.tableaux import RODAS5P
+from symfric.integrator.running.integrator import Integrator
 
 LEVELS = (-0.4, -0.35, -0.29, -0.22, -0.15, 0.05, 0.12, 0.21, 0.28, 0.35)
 SPAN = 20.0
 
 
-def watched() -> Model:
+def watched(form: str) -> Model:
     """x'' = -x with z + 20 z^3 = 4 x, watched as z rises through `level`."""
     x, v = Variable("x", "1", start=0.1), Variable("v", "1", start=1.0)
     z, level = Variable("z", "1"), Variable("level", "1")
+    rates = ca.SX.sym("rates", 2)
+    factor = 1 + x.symbol**2 if form == "changing masses" else 1.0
+    equations = ca.vertcat(
+        factor * (rates[0] - v.symbol),
+        factor * (rates[1] + x.symbol),
+        z.symbol + 20 * z.symbol**3 - 4 * x.symbol,
+    )
+    if form != "explicit":
+        return Model(
+            "watched",
+            x=(x, v),
+            z=(z,),
+            p=(level,),
+            xdot=rates,
+            residual=equations,
+            events=(Event("up", z.symbol - level.symbol, direction=1),),
+        )
     return Model(
         "watched",
         x=(x, v),
@@ -29,13 +49,31 @@ def watched() -> Model:
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8])
+@pytest.mark.parametrize("form", ["explicit", "implicit", "changing masses"])
 @each_backend
-def test_each_passage_is_one_event(backend: str, rtol: float) -> None:
+def test_each_passage_is_one_event(backend: str, form: str, rtol: float) -> None:
     """Behind an event z solves its equation exactly, and once was below the level again there."""
-    model = watched()
+    model = watched(form)
     for level in LEVELS:
         run = simulate(model, SPAN, p={"level": level}, rtol=rtol, backend=backend)
         x, size = (level + 20 * level**3) / 4, sqrt(1.01)
         first = (asin(x / size) - atan2(0.1, 1.0)) % (2 * pi)  # x = size sin(t + atan2(0.1, 1))
         times = np.arange(first, SPAN, 2 * pi)
         assert [t for t, _ in run.happened] == pytest.approx(times, abs=30 * rtol)
+
+
+def test_events_of_coupled_variables_grow_with_their_number() -> None:
+    """Without the zeros of their equations: by a QR factorisation their length went with n^2."""
+
+    def length(n: int) -> int:
+        x, z = Variable("x", "1"), [Variable(f"z_{i}", "1") for i in range(n)]
+        own = [x.symbol, *(v.symbol for v in z), 0.0]
+        equations = [own[i] - 3 * own[i + 1] - own[i + 1] ** 3 + own[i + 2] for i in range(n)]
+        events = (Event("up", z[n // 2].symbol - 0.1),)
+        model = Model(
+            "chain", x=(x,), z=tuple(z), ode=ca.SX(1), alg=ca.vertcat(*equations), events=events
+        )
+        data = input_data(model, None, 0.0, 1.0)
+        return int(Integrator(model, data, RODAS5P).events.n_instructions())
+
+    assert length(40) < 2.5 * length(20)
