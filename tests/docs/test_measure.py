@@ -1,0 +1,42 @@
+"""A measurement is stored with all that makes it judgeable, and keeps what people wrote."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from docs.machine import bench_pages, measure
+from symfric.bench.interop import InteropBenchmark, Move, Run
+
+
+def test_a_measurement_is_stored_with_machine_load_and_commit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    move = Move("opti", "flow", "lugre", "Solve_Succeeded", 8, 1.114, 1.5e-6, 0.3)
+    run = Run("cvodes", "lugre", 2e-5, 1.5)
+    monkeypatch.setattr(measure, "STORED", tmp_path)
+    monkeypatch.setattr(
+        measure, "result_of", lambda *_: InteropBenchmark((move,), (run,), ("rockit",))
+    )
+    monkeypatch.setattr(measure, "commit", lambda: "abc")
+    path = tmp_path / "interop.json"
+    short = dict.fromkeys(bench_pages.SHORT, "-") | {"tables": []}
+    path.write_text(json.dumps({"title": "T", "about": "A.", "short": short}), "utf-8")
+    assert measure.main(["--quick", "interop"]) == 0
+    found = json.loads(path.read_text("utf-8"))
+    assert {*found} == {*bench_pages.KEYS, "short"}
+    assert (found["title"], found["about"], found["short"]) == ("T", "A.", short)
+    assert found["command"] == "symfric bench interop --quick"
+    assert all(float(load) >= 0 for load in found["load"].split(" to "))
+    assert found["tables"][0]["rows"][0][:3] == ["opti", "flow", "lugre"]
+    assert found["tables"][1]["rows"][0][:2] == ["cvodes", "lugre"]
+    page = bench_pages.section("interop", found)
+    assert "load " in page and "Condensed by hand" in page
+    capsys.readouterr()
+
+
+def test_what_is_no_subject_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert measure.main(["nothing"]) == 2
+    assert "expected some of integrator" in capsys.readouterr().out
+    assert measure.main([]) == 2
+    capsys.readouterr()
