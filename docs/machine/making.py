@@ -27,10 +27,12 @@ def make_page_pictures(say: Callable[[str], None]) -> list[str]:
         if not page.is_relative_to(DOCS):
             continue
         text = page.read_text("utf-8")
-        if not made_pictures(text, page.parent):
+        wanted = made_pictures(text, page.parent)
+        if not wanted:
             continue
         key = digest([code_hash(), *(b.body for b in blocks(text) if b.language == "python")])
-        if not is_fresh(place(page), key):
+        there = all((place(page) / name).exists() for name in wanted)
+        if not (there and is_fresh(place(page), key)):
             stale.append((page, key))
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         found = pool.map(lambda item: _make(*item, say), stale)
