@@ -14,7 +14,7 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, is_number, is_symbolic
 from symfric.foundation.parameters import Parametric, Variable, parameters, symbolise
 from symfric.foundation.shown import WIDTH
-from symfric.foundation.symbols import symbols_of
+from symfric.foundation.symbols import strays, symbols_of
 from symfric.foundation.units import turned
 from symfric.foundation.variable import check_si
 from symfric.laws import Law
@@ -138,11 +138,11 @@ class Scene(Parametric, ABC):
         """
         name = type(self).__name__
         scene, p = symbolise(self, *checks.names(f"{name}: free", free))
-        known = parameters(scene).items()
-        if held := [n for n, q in known if is_symbolic(q.value) and n not in {v.name for v in p}]:
+        known, own = parameters(scene).items(), symbols_of(p)
+        if held := [n for n, q in known if is_symbolic(q.value) and strays(q.value, own)]:
             raise ValueError(
                 f"{name}: expected numbers, got a symbol for {', '.join(held)}; "
-                f"{name.lower()}(law, free={held}) makes parameters of the model"
+                f"free={held} makes parameters of the model"
             )
         return scene.equations(p)
 
@@ -212,8 +212,8 @@ def contact(
     where = f"contact '{checks.text('contact: name', name, 'a text, and then a law')}'"
     check_law(f"{where}: law", law)
     check_si(f"{where}: v", v)
-    if checks.as_number(v) is not None:
-        raise checks.refused(f"{where}: v", "what depends on variables", v, "v comes before N")
+    if isinstance(N, Variable) and N.unit in ("m/s", "rad/s"):
+        raise checks.refused(f"{where}: N", "a normal force", N, "v comes before N")
     if (load := checks.as_number(N)) is not None and load < 0:
         raise checks.refused(f"{where}: N", "a normal force >= 0 N", N)
     missing = [f"{i.name} ({i.doc})" for i in law.inputs if i.name not in inputs]
