@@ -146,7 +146,7 @@ def _rows(table: Table, most: int) -> list[str]:
 
 def _html_table(table: Table) -> str:
     def cells(row: Sequence[str], mark: str, style: str) -> str:
-        right = ";text-align:right"
+        right = ";text-align:right;white-space:nowrap"
         return "".join(
             f'<{mark} style="{style}{right if j in table.numbers else ";text-align:left"}">'
             f"{escape(text)}</{mark}>"
@@ -155,7 +155,8 @@ def _html_table(table: Table) -> str:
 
     head = f"<thead><tr>{cells(table.header, 'th', HEAD)}</tr></thead>" * any(table.header)
     body = "".join(f"<tr>{cells(row, 'td', CELL)}</tr>" for row in table.rows)
-    return f'<table style="{TABLE}">{head}<tbody>{body}</tbody></table>'
+    table = f'<table style="{TABLE}">{head}<tbody>{body}</tbody></table>'
+    return f'<div style="overflow-x:auto">{table}</div>'  # narrow cells scroll it
 
 
 def _image(figure: "Figure", words: str) -> str:
