@@ -388,5 +388,5 @@ class _Exact:
 
     @property
     def worth(self) -> tuple[bool, bool, float]:
-        """Order among several."""
+        """The larger the better: right before wrong, solved before failed, then by cost."""
         return self.right, self.solution.ok, -self.solution.cost

@@ -30,7 +30,7 @@ class Finding:
     severity: Severity
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything by name."""
+        """The fields by name, ready for JSON."""
         return dict(self.__dict__)
 
 
@@ -65,7 +65,7 @@ class Findings:
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
-        """The others."""
+        """Doubtful ones, which a fit says and goes on."""
         return tuple(f for f in self.items if f.severity == "warning")
 
     @property
@@ -75,7 +75,7 @@ class Findings:
 
     @property
     def text(self) -> str:
-        """All in lines."""
+        """A line a finding, errors first."""
         if not self.items:
             return f"{self.name}: nothing doubtful found"
         lines = [f"  {f.severity}: {self._record(f)}{f.sentence}" for f in self.items]

@@ -165,7 +165,7 @@ class Record:
 
     @property
     def size(self) -> int:
-        """Number of samples."""
+        """Number of samples, the same of all signals."""
         return next(iter(self.signals.values())).size
 
     @property

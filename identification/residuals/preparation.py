@@ -67,7 +67,7 @@ class Preparation:
         self.first = len(model.p)
 
     def shots(self) -> Shots:
-        """The residuals."""
+        """The residuals of all records, cut into windows."""
         estimated = self.kind.estimates_dead_time
         if estimated:
             low, high = self.kind.dead_time  # type: ignore[misc]

@@ -130,7 +130,7 @@ class Shots:
 
     @property
     def rows(self) -> int:
-        """Number of residuals."""
+        """Number of residuals, of all channels."""
         return self.channels[-1].rows.stop
 
     def at(self, values: Array) -> Evaluation | str:

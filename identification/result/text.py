@@ -23,7 +23,7 @@ MANY = 12
 
 
 def text_of(fit: "Fitted") -> str:
-    """The whole report."""
+    """What `print(fit)` shows, within 80 columns."""
     blocks = [
         [f"{fit.name} fitted by {fit.kind}: {fit.status.name}", *_indented(sentences(fit))],
         [*_head(fit)],

@@ -48,12 +48,12 @@ class Colour:
 
     @property
     def order(self) -> int:
-        """P."""
+        """Order p of the autoregression."""
         return self.partial.size
 
     @property
     def phi(self) -> Array:
-        """Coefficients, shape (p,)."""
+        """Coefficients of the autoregression, shape (p,)."""
         return predictors(self.partial)[0][-1]
 
     @property

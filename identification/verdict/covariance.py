@@ -71,7 +71,7 @@ class Covariance:
 
     @property
     def standard_errors(self) -> Array:
-        """Shape (k,)."""
+        """Standard errors with the colour of the residuals, shape (k,)."""
         return np.sqrt(np.diag(self.matrix))
 
     @property

@@ -86,7 +86,7 @@ class ClosedLoop:
 
     @property
     def worst(self) -> float:
-        """Longest cycle [s]."""
+        """Longest of the cycle times [s]."""
         return float(self.seconds.max())
 
     @property
@@ -285,7 +285,7 @@ class _Rows:
     def add(
         self, u: Mapping[str, float], action: Any, opinion: float, wanted: Mapping[str, Array]
     ) -> None:
-        """Take a cycle."""
+        """Take what was decided in a cycle, and the references it saw."""
         for name, value in u.items():
             self._controls[name].append(value)
         for name, values in wanted.items():
@@ -294,7 +294,7 @@ class _Rows:
         self._opinions.append(opinion)
 
     def loop(self, design: Design, plant: Model, step: float, cycles: int) -> ClosedLoop:
-        """All of it."""
+        """All that was gathered, as arrays."""
         actions = self._actions
         controls = {name: np.array(values) for name, values in self._controls.items()}
         signals = {n: np.array(v) for n, v in self._signals.items() if n not in controls}

@@ -44,7 +44,7 @@ class Engine(Protocol):
         ...
 
     def forget(self) -> None:
-        """Start afresh."""
+        """Start afresh, from a plan that rests."""
         ...
 
     @property
@@ -62,7 +62,7 @@ class InVm:
         self.forget()
 
     def forget(self) -> None:
-        """Start afresh."""
+        """Start afresh, from a plan that rests."""
         design = self._design
         n = design.horizon.count
         self._warm = False
@@ -74,7 +74,7 @@ class InVm:
 
     @property
     def plan(self) -> Plan:
-        """The plan."""
+        """A copy of the plan."""
         return Plan(self._plan.X.copy(), self._plan.U.copy(), self._plan.z.copy())
 
     def cycle(self, measured: Array, given: Given, tolerance: float, iterations: int) -> Cycle:
@@ -183,12 +183,12 @@ class InC:
         self.forget()
 
     def forget(self) -> None:
-        """Start afresh."""
+        """Start afresh, from a plan that rests."""
         self._library.sf_init(ctypes.c_void_p(address(self._self)))
 
     @property
     def plan(self) -> Plan:
-        """The plan."""
+        """A copy of the plan."""
         parts = sizes(self._design)
         X, U = np.zeros((parts["N"] + 1, parts["NX"])), np.zeros((parts["N"], parts["NU"]))
         z = np.zeros(parts["ALL"])
@@ -197,7 +197,7 @@ class InC:
         return Plan(X, U, z)
 
     def cycle(self, measured: Array, given: Given, tolerance: float, iterations: int) -> Cycle:
-        """One cycle."""
+        """One cycle; `given` has the reference of every node."""
         columns = [measured, given.R.T.ravel()]
         if self._timed:
             columns.append(given.t[:1])

@@ -35,7 +35,7 @@ class Stretch:
 
     @property
     def end(self) -> float:
-        """Its end [s]."""
+        """Time at its end [s]."""
         return self.begin + self.T
 
 

@@ -195,7 +195,7 @@ class Solution:
 
     @property
     def units(self) -> dict[str, str]:
-        """Name -> unit."""
+        """SI unit of each signal by name."""
         return self.motions[0].units
 
     @property

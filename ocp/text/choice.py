@@ -27,7 +27,7 @@ class Choice:
 
     @property
     def nominal(self) -> float:
-        """Typical magnitude."""
+        """Typical magnitude: of the guess, else of the larger bound, else 1."""
         sizes = [abs(b) for b in (self.lower, self.upper) if isfinite(b)]
         return abs(self.guess) or max(sizes, default=0.0) or 1.0
 

@@ -65,7 +65,7 @@ class SpanLayout:
 
     @property
     def intervals(self) -> int:
-        """Their number N."""
+        """Number N of intervals."""
         return self.u.shape[1]
 
     @property
@@ -123,7 +123,7 @@ class Sizes:
 
 
 def lay_out(sizes: Sequence[Sizes], degree: int, chosen: int, largest: bool) -> Layout:
-    """Number the unknowns."""
+    """Places of all unknowns in one vector, span by span and interval by interval."""
     spans: list[SpanLayout] = []
     first = 0
     for s in sizes:

@@ -167,7 +167,7 @@ CASES = (
 @final
 @dataclass(frozen=True)
 class RegularisationBenchmark:
-    """All rows."""
+    """Errors and costs of all cases over width and tolerance; see `bench_regularisation`."""
 
     rows: tuple[RegularisationRow, ...]
 

@@ -1,5 +1,7 @@
 """The figures of the source papers, a script each, with what is compared and how far we are.
 
+What users do with the packages, from data or equations to a result, is in the folder `examples`.
+
 from symfric.gallery import plates
 
 plate = plates()["self_tuning/fig_07_shape_factor"](quick=True)

@@ -45,7 +45,7 @@ class Model:
 
     @cached_property
     def default(self) -> Array:
-        """Default parameters."""
+        """Parameters as the block has them by default, in its type."""
         return self.typed([v.start for v in self.block.parameters])
 
     def inputs(self, rows: Array) -> tuple[Array, NDArray[np.int64]]:
