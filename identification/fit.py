@@ -179,7 +179,15 @@ class Fit:
         found = dict(zip(made.residuals.names, point.values.tolist(), strict=True))
         certain = covariance(made, point, levels)
         model = asked.subject.close(found).model
-        return Live(asked.kind, asked.subject, self.data, made, point, certain, model)
+        return Live(
+            kind=asked.kind,
+            subject=asked.subject,
+            data=self.data,
+            task=made,
+            point=point,
+            covariance=certain,
+            model=model,
+        )
 
     def _quickly(self, kind: Kind, data: Dataset) -> dict[str, float] | None:
         """Values of a fit to other data, from one start and without a verdict."""

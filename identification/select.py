@@ -327,7 +327,19 @@ def _over(value: float, best: float) -> float:
 
 
 def _lost(t: _Tried) -> Row:
-    return Row(t.name, "", nan, nan, nan, nan, 0, None, 0.0, t.why, None)
+    return Row(
+        law=t.name,
+        status="",
+        validation=nan,
+        fitted=nan,
+        aicc=nan,
+        bic=nan,
+        parameters=0,
+        operations=None,
+        seconds=0.0,
+        sentence=t.why,
+        fit=None,
+    )
 
 
 def _row(t: _Tried, validation: float, fitted: float, aicc: float, bic: float) -> Row:
@@ -339,9 +351,18 @@ def _row(t: _Tried, validation: float, fitted: float, aicc: float, bic: float) -
     far = f"On data that were not fitted its error exceeds {DIVERGED:g} %." if away else ""
     sentence = " ".join(s for s in (*fit.verdict.sentences[:1], far, t.why) if s)
     return Row(
-        t.name, fit.status.name, inf if away else validation, fitted, aicc, bic, _count(t),
-        operations, fit.seconds, sentence, fit,
-    )  # fmt: skip
+        law=t.name,
+        status=fit.status.name,
+        validation=inf if away else validation,
+        fitted=fitted,
+        aicc=aicc,
+        bic=bic,
+        parameters=_count(t),
+        operations=operations,
+        seconds=fit.seconds,
+        sentence=sentence,
+        fit=fit,
+    )
 
 
 def _count(t: _Tried) -> int:

@@ -131,8 +131,9 @@ def solve(
     if not isinstance(solver, Ipopt | Fatrop | Sqp):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise checks.refused("solve: solver", "a solver, such as Ipopt()", solver)
     job = _Job(
-        problem, scheme, solver, intervals, guess, friction, tolerance, refine, verify, starts,
-        progress, Clock(max_time),
+        problem=problem, scheme=scheme, solver=solver, intervals=intervals, guess=guess,
+        friction=friction, tolerance=tolerance, refine=refine, verify=verify, starts=starts,
+        progress=progress, clock=Clock(max_time),
     )  # fmt: skip
     solution = job.solved()
     odd = "" if solution.ok else doubts(problem)

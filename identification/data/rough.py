@@ -124,9 +124,21 @@ def rough_model(view: View, *, exchanged: bool = False, curve: bool = False) -> 
     values, errors = _robust(A[::every], b[::every])
     explained = _explained(A[::every], b[::every], values)
     return Rough(
-        record.time[rows], xs[rows], v[rows], a[rows], b, width, step, values, errors, A,
-        explained, b - A @ values, b.size / every, clean,
-    )  # fmt: skip
+        t=record.time[rows],
+        x=xs[rows],
+        v=v[rows],
+        a=a[rows],
+        force=b,
+        width=width,
+        step=step,
+        values=values,
+        errors=errors,
+        columns=A,
+        explained=explained,
+        residual=b - A @ values,
+        independent=b.size / every,
+        clean=clean,
+    )
 
 
 def explained_when_late(model: Rough, late: float) -> float:

@@ -255,8 +255,9 @@ class ClosedLoop:
         units = {name: record.unit(name) for name in self.signals}
         first = np.array([record["x"][0], _first_velocity(record)])
         return Run(
-            number, record.name, chain, controller.begin(), rows, record.time, first, measured,
-            units, _regressors(record, given, self.signals),
+            number=number, name=record.name, chain=chain, begin=controller.begin(), rows=rows,
+            t=record.time, first=first, measured=measured, units=units,
+            regressors=_regressors(record, given, self.signals),
         )  # fmt: skip
 
 

@@ -167,14 +167,14 @@ class InverseRows:
                 breaks = np.flatnonzero(np.diff(part.kept[k]) > 1) + 1
                 found.append(
                     Channel(
-                        number,
-                        row.signal,
-                        row.unit,
-                        slice(first, first + size),
-                        part.times(k),
-                        columns[:, 0],
-                        dict(zip(signals, columns[:, 1:].T, strict=True)),
-                        tuple(breaks.tolist()),
+                        record=number,
+                        signal=row.signal,
+                        unit=row.unit,
+                        rows=slice(first, first + size),
+                        t=part.times(k),
+                        measured=columns[:, 0],
+                        regressors=dict(zip(signals, columns[:, 1:].T, strict=True)),
+                        breaks=tuple(breaks.tolist()),
                     )
                 )
                 first += size

@@ -103,7 +103,14 @@ def measure(
     inputs = slice(len(rows), len(rows) + len(forces))
     rows += [*forces, record.time]
     return Motion(
-        record.name, record.time, step, np.vstack(rows), inputs, inside, np.array(noise), chosen
+        name=record.name,
+        t=record.time,
+        step=step,
+        w=np.vstack(rows),
+        inputs=inputs,
+        inside=inside,
+        noise=np.array(noise),
+        filter=chosen,
     )
 
 

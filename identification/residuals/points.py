@@ -101,7 +101,15 @@ class Points:
         if not imposed and any(table.rest.any() for table in tables):
             breaks = _break_away(symbolic, p).compiled()
         unit, shift = _unit(data, self.F), _middle(tables) if self.offset else None
-        return PointRows(subject.names, slides, breaks, tuple(tables), imposed, unit, shift)
+        return PointRows(
+            parameters=subject.names,
+            slides=slides,
+            breaks=breaks,
+            tables=tuple(tables),
+            imposed=imposed,
+            unit=unit,
+            shift=shift,
+        )
 
     def _table(self, record: Record, load: float, further: list[str]) -> "Table":
         v, F = record[self.v], record[self.F]
@@ -175,9 +183,9 @@ class PointRows:
             v, n = table.w[0], table.F.size
             found.append(
                 Channel(
-                    number, "F", self.unit, slice(first, first + n),
-                    v if table.t is None else table.t, table.F,
-                    {"v": v, "sign(v)": np.sign(v)}, ordered=table.t is not None,
+                    record=number, signal="F", unit=self.unit, rows=slice(first, first + n),
+                    t=v if table.t is None else table.t, measured=table.F,
+                    regressors={"v": v, "sign(v)": np.sign(v)}, ordered=table.t is not None,
                 )
             )  # fmt: skip
             first += n

@@ -93,9 +93,15 @@ class Preparation:
         tau = self.kind.dead_time if not estimated else None
         backend = "compiled" if find_compiler() else "vm"
         shots = Shots(
-            model, names, tuple(self.own), tuple(channels), tuple(pieces), tau,  # type: ignore
-            self.kind.rtol or RTOLS[-1], backend,
-        )  # fmt: skip
+            model=model,
+            parameters=names,
+            own=tuple(self.own),
+            channels=tuple(channels),
+            shots=tuple(pieces),
+            dead_time=tau,  # type: ignore
+            rtol=self.kind.rtol or RTOLS[-1],
+            backend=backend,
+        )
         shots = replace(shots, substeps=self._substeps(shots))
         if self.kind.rtol is None and not shots.substeps:
             shots = replace(shots, rtol=self._rtol(shots))
@@ -249,9 +255,16 @@ class Preparation:
             held, free = self._start(number, sensed, int(look[0]), label)
             last = windows[w].stop - 1
             yield Shot(
-                record.name, origin, t[look], float(t[last]),
-                {s: y[look] for s, y in measured.items()}, places, drives, held, free,
-            )  # fmt: skip
+                record=record.name,
+                origin=origin,
+                t=t[look],
+                end=float(t[last]),
+                measured={s: y[look] for s, y in measured.items()},
+                places=places,
+                drives=drives,
+                held=held,
+                free=free,
+            )
             done += look.size
 
     def _start(
@@ -301,7 +314,14 @@ class Preparation:
         for s in pieces[0].measured:
             y = np.concatenate([piece.measured[s] for piece in pieces])
             yield Channel(
-                number, s, self.model.signals[s], slice(row, row + t.size), t, y, inputs, breaks
+                record=number,
+                signal=s,
+                unit=self.model.signals[s],
+                rows=slice(row, row + t.size),
+                t=t,
+                measured=y,
+                regressors=inputs,
+                breaks=breaks,
             )
             row += t.size
 

@@ -98,7 +98,15 @@ def fitted(
         seconds=seconds,
         evaluations=sum(s.evaluations for s in starts),
         made=_made(call, written(kind)),
-        live=Live(kind, subject, data, task, point, covariance, closed.model),
+        live=Live(
+            kind=kind,
+            subject=subject,
+            data=data,
+            task=task,
+            point=point,
+            covariance=covariance,
+            model=closed.model,
+        ),
         asked=asked,
     )
 

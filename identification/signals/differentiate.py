@@ -162,7 +162,14 @@ def differentiate(
     inside = slice(cut, max(cut, record.size - cut))
     x_, v_, a_ = (signal[inside] for signal in motion)
     signals = MotionSignals(
-        record.name, record.time[inside], x_, v_, a_, record[force][inside], chosen, slow[inside]
+        name=record.name,
+        t=record.time[inside],
+        x=x_,
+        v=v_,
+        a=a_,
+        force=record[force][inside],
+        filter=chosen,
+        slow=slow[inside],
     )
     if signals.decimation.rows == 0 or signals.kept.size < 10:
         limit = "by the data" if chosen.v_min is None else f"{chosen.v_min:g} m/s"

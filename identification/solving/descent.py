@@ -165,7 +165,18 @@ def descend(
     except KeyboardInterrupt:
         first, status = "interrupted by the user before the first residuals", Status.INTERRUPTED
     if isinstance(first, str):
-        return Start(number, w0, w0, np.inf, status, first, 1, task.noise, np.inf, (np.inf,))
+        return Start(
+            number=number,
+            w0=w0,
+            w=w0,
+            cost=np.inf,
+            status=status,
+            message=first,
+            evaluations=1,
+            noise=task.noise,
+            objective=np.inf,
+            evidence=(np.inf,),
+        )
     search = _Search(task, first, evaluations - 1, costs=[first.cost], tell=tell)
     if task.estimated:
         _renew(search)
@@ -183,9 +194,17 @@ def descend(
     status, message = _verdict(search)
     end = search.best
     return Start(
-        number, w0, end.w, end.cost, status, message, spent, search.task.noise,
-        objective(search.task, end), tuple(search.costs),
-    )  # fmt: skip
+        number=number,
+        w0=w0,
+        w=end.w,
+        cost=end.cost,
+        status=status,
+        message=message,
+        evaluations=spent,
+        noise=search.task.noise,
+        objective=objective(search.task, end),
+        evidence=tuple(search.costs),
+    )
 
 
 def _back(search: _Search) -> int:

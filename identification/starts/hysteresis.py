@@ -159,7 +159,15 @@ def _branches(
             continue
         speed = side * v[first : first + k + 1]
         slope, damping = _slopes(along[: k + 1], speed, force[: k + 1])
-        yield Branch(first + shift, last + shift, side, level, half, slope, damping)
+        yield Branch(
+            first=first + shift,
+            last=last + shift,
+            side=side,
+            level=level,
+            half=half,
+            slope=slope,
+            damping=damping,
+        )
 
 
 def _median_of_three(F: Array) -> Array:

@@ -98,7 +98,9 @@ def _as_if_slow(friction: Measured, curve: StribeckCurve) -> Measured:
     breaks = tuple(np.cumsum([r.stop - r.start for r in kept])[:-1].tolist())
     path = None if friction.x is None else friction.x[rows]
     t = None if friction.t is None else friction.t[rows]
-    return Measured(friction.v[rows], force[rows], path, t, None, friction.N, breaks)
+    return Measured(
+        v=friction.v[rows], F=force[rows], x=path, t=t, a=None, N=friction.N, breaks=breaks
+    )
 
 
 def carrying(law: Law, values: Mapping[str, float]) -> dict[str, float]:

@@ -175,7 +175,15 @@ def _thinned(measured: Measured, most: int) -> Measured:
     rows = np.concatenate(kept)
     breaks = tuple(np.cumsum([k.size for k in kept])[:-1].tolist())
     t = None if measured.t is None else measured.t[rows]
-    return Measured(measured.v[rows], measured.F[rows], path[rows], t, None, measured.N, breaks)
+    return Measured(
+        v=measured.v[rows],
+        F=measured.F[rows],
+        x=path[rows],
+        t=t,
+        a=None,
+        N=measured.N,
+        breaks=breaks,
+    )
 
 
 def _beside(measured: Measured, viscous: bool, offset: bool) -> Array:

@@ -140,7 +140,9 @@ def six_steps(v: Array, F: Array, *, unstable: float = 0.0) -> SixSteps:
         Step(6, "delta: exponential part again", count, {"delta": delta, "v_s": v_s}),
     )
     if count:
-        found = StribeckCurve(F_S, F_C, v_s, delta, sigma_2, 0.0, 0.0)
+        found = StribeckCurve(
+            F_S=F_S, F_C=F_C, v_s=v_s, delta=delta, sigma_2=sigma_2, offset=0.0, rms=0.0
+        )
         error = found.force(speed) - force
         errors = standard_errors(found, speed, _noise(error))
         doubts = (*_doubts(found, curve, low, count, unstable), *_undetermined(errors))

@@ -123,7 +123,16 @@ def facts_of(measured: Measured, *, mass: bool = False, offset: bool = False) ->
             reversals = hysteresis(pure, offset=stribeck.offset) or reversals
     shift = stribeck.offset if offset else 0.0
     points = replace(curve, F=curve.F - shift)
-    return Facts(stribeck, points, pure, reversals, m, shift, measured.N, measured.fastest)
+    return Facts(
+        stribeck=stribeck,
+        curve=points,
+        friction=pure,
+        reversals=reversals,
+        m=m,
+        offset=shift,
+        N=measured.N,
+        fastest=measured.fastest,
+    )
 
 
 def slowest(measured: Measured) -> float:

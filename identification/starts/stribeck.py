@@ -165,7 +165,15 @@ def fit_curve(curve: Curve, *, delta: float | None = None) -> StribeckCurve:
     w, cost = _levels(curve, v_s, best)
     offset = w[3] - w[4] if curve.both else 0.0
     rms = cost / np.sqrt(curve.v.size)
-    return StribeckCurve(w[0] + w[1], w[0], float(v_s), float(best), w[2], offset, float(rms))
+    return StribeckCurve(
+        F_S=w[0] + w[1],
+        F_C=w[0],
+        v_s=float(v_s),
+        delta=float(best),
+        sigma_2=w[2],
+        offset=offset,
+        rms=float(rms),
+    )
 
 
 def _columns(curve: Curve, v_s: float, delta: float) -> Array:

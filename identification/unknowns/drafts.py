@@ -119,9 +119,9 @@ def of_parameter(parameter: Parameter, unit: str, speeds: roles.Speeds) -> Limit
     """The limits of a parameter of a law or a scene, by its role."""
     value = float(parameter.value)
     return Limits(
-        parameter.name, unit, value, parameter.lower, parameter.upper,
-        roles.window(parameter, speeds), roles.is_logarithmic(parameter),
-        abs(value) or abs(parameter.default) or 1.0,
+        name=parameter.name, unit=unit, value=value, lower=parameter.lower, upper=parameter.upper,
+        window=roles.window(parameter, speeds), logarithmic=roles.is_logarithmic(parameter),
+        scale=abs(value) or abs(parameter.default) or 1.0,
     )  # fmt: skip
 
 
@@ -129,10 +129,15 @@ def of_variable(variable: Variable) -> Limits:
     """The limits of a parameter of a model: logarithmic where it starts and stays positive."""
     value = float(variable.start)
     return Limits(
-        variable.name, variable.unit, value, variable.lower, variable.upper,
-        (variable.lower, variable.upper), variable.lower >= 0 and value > 0,
-        abs(value) or variable.nominal,
-    )  # fmt: skip
+        name=variable.name,
+        unit=variable.unit,
+        value=value,
+        lower=variable.lower,
+        upper=variable.upper,
+        window=(variable.lower, variable.upper),
+        logarithmic=variable.lower >= 0 and value > 0,
+        scale=abs(value) or variable.nominal,
+    )
 
 
 def drafted(
@@ -192,7 +197,15 @@ def _draft(limits: Limits, spec: Spec, problems: list[str]) -> Unknown:
         low, high = min(low, start), max(high, start)
     if logarithmic and not start > 0:
         start = sqrt(low * high) if low > 0 and high < inf else limits.scale
-    return Unknown(limits.name, limits.unit, start, low, high, limits.scale, logarithmic)
+    return Unknown(
+        name=limits.name,
+        unit=limits.unit,
+        start=start,
+        lower=low,
+        upper=high,
+        scale=limits.scale,
+        logarithmic=logarithmic,
+    )
 
 
 def _order(

@@ -193,12 +193,22 @@ def _of_parts(whole: Scene | Law, wished: Wishes, setting: _Setting) -> Subject:
     ties = {n: s for n, s in wished.free.items() if isinstance(s, Tied)}
     mine = tuple(drafts[n] for n in free if n not in ties)
     return Subject(
-        law_name(law), tuple(free), model, law, scene, mine, ties,
-        {n: reasons[n] for n in known if n in reasons}, held,
-        {n: Variable(n, units[n], q.value, lower=q.lower, upper=q.upper, doc=q.doc)
-         for n, q in known.items()},
-        partial(with_values, whole), wished.started,
-    )  # fmt: skip
+        name=law_name(law),
+        names=tuple(free),
+        model=model,
+        law=law,
+        scene=scene,
+        unknowns=mine,
+        ties=ties,
+        reasons={n: reasons[n] for n in known if n in reasons},
+        held=held,
+        variables={
+            n: Variable(n, units[n], q.value, lower=q.lower, upper=q.upper, doc=q.doc)
+            for n, q in known.items()
+        },
+        guard=partial(with_values, whole),
+        started=wished.started,
+    )
 
 
 def _reasons(whole: Scene | Law, wished: Wishes, setting: _Setting) -> dict[str, str]:
@@ -260,10 +270,19 @@ def _of_model(model: Model, wished: Wishes) -> Subject:
     guard = _guard(laws, p)
     ties = {n: s for n, s in wished.free.items() if isinstance(s, Tied)}
     return Subject(
-        model.name, tuple(v.name for v in free), replace(model, p=p), guard({}), None,
-        tuple(drafts[v.name] for v in free if v.name not in ties), ties, reasons, held,
-        {v.name: v for v in model.p}, guard, wished.started,
-    )  # fmt: skip
+        name=model.name,
+        names=tuple(v.name for v in free),
+        model=replace(model, p=p),
+        law=guard({}),
+        scene=None,
+        unknowns=tuple(drafts[v.name] for v in free if v.name not in ties),
+        ties=ties,
+        reasons=reasons,
+        held=held,
+        variables={v.name: v for v in model.p},
+        guard=guard,
+        started=wished.started,
+    )
 
 
 def _guard(laws: Sequence[Law], p: Variables) -> "Laws":

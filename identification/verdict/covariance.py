@@ -130,10 +130,17 @@ def covariance_of(found: Minimum, change: Trace, levels: Levels | None = None) -
     labels = [found.label(c) for c in found.channels]
     effective = {n: c.effective for n, c in zip(labels, inside.colours, strict=True)}
     made = Covariance(
-        names, matrix, white, inside.freedom, low, high, at_bound,
-        tuple(tuple(names[own[i]] for i in g.members) for g in groups),
-        effective, tuple(g.sentence for g in groups),
-    )  # fmt: skip
+        names=names,
+        matrix=matrix,
+        white=white,
+        freedom=inside.freedom,
+        low=low,
+        high=high,
+        at_bound=at_bound,
+        undetermined=tuple(tuple(names[own[i]] for i in g.members) for g in groups),
+        effective=effective,
+        sentences=tuple(g.sentence for g in groups),
+    )
     far = {} if levels is None else dict(levels.beyond(dict(zip(names, values, strict=True))))
     gone = dict(_gone(found, made))
     weak = _weak(found, made, (*far, *gone))

@@ -90,9 +90,15 @@ def dependences(
                 found = _added(r, basis, columns, other.partial, position) or found
         share = found.size**2 / power
         yield Dependence(
-            family.what, family.hint, found.statistic, found.q, found.p, found.size, share,
-            family.smoothed,
-        )  # fmt: skip
+            what=family.what,
+            hint=family.hint,
+            statistic=found.statistic,
+            columns=found.q,
+            p=found.p,
+            size=found.size,
+            share=share,
+            smoothed=family.smoothed,
+        )
 
 
 @final

@@ -154,7 +154,14 @@ def judged(found: Minimum, findings: Findings | None = None) -> Verdict:
 def _white(name: str, found: Whiteness, colour: Colour) -> Test:
     if not found.lags.size:
         return Test(
-            name, "whiteness", 0.0, 1.0, WHITE, True, False, f"{name}: not ordered in time."
+            channel=name,
+            name="whiteness",
+            statistic=0.0,
+            p=1.0,
+            limit=WHITE,
+            passed=True,
+            decides=False,
+            sentence=f"{name}: not ordered in time.",
         )
     passed = found.p >= WHITE
     text = f"The residuals of {name} look like white noise."
@@ -167,7 +174,16 @@ def _white(name: str, found: Whiteness, colour: Colour) -> Test:
             if colour.order
             else ", too little to matter for the intervals."
         )
-    return Test(name, "whiteness", found.statistic, found.p, WHITE, passed, False, text)
+    return Test(
+        channel=name,
+        name="whiteness",
+        statistic=found.statistic,
+        p=found.p,
+        limit=WHITE,
+        passed=passed,
+        decides=False,
+        sentence=text,
+    )
 
 
 def _independent(
@@ -187,7 +203,16 @@ def _independent(
         )
         if passed:
             text = f"The residuals of {name} do not depend on {d.what}."
-        test = Test(name, f"independence of {d.what}", d.statistic, d.p, limit, passed, True, text)
+        test = Test(
+            channel=name,
+            name=f"independence of {d.what}",
+            statistic=d.statistic,
+            p=d.p,
+            limit=limit,
+            passed=passed,
+            decides=True,
+            sentence=text,
+        )
         yield test
 
 
@@ -219,7 +244,16 @@ def _size(found: Minimum, channel: Channel, colour: Colour) -> Iterator[Test]:
         f"The residuals of {name} are {rms:.2g} {channel.unit}, {rms / sigma:.2g} times the noise "
         f"that was given."
     )
-    yield Test(name, "size", rms / sigma, p, ALARM / len(found.channels), passed, True, text)
+    yield Test(
+        channel=name,
+        name="size",
+        statistic=rms / sigma,
+        p=p,
+        limit=ALARM / len(found.channels),
+        passed=passed,
+        decides=True,
+        sentence=text,
+    )
 
 
 def _unexplained(found: Minimum, effective: Mapping[str, float]) -> Iterator[str]:

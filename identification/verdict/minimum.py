@@ -64,10 +64,18 @@ def minimum(task: Task, point: Point) -> Minimum:
             gain[rows] = max(float(np.mean(above[rows] - below[rows])) / (2 * h), 0.05)
     known = {s: sigma for s, sigma in task.noise.items() if s not in task.estimated}
     return Minimum(
-        task.channels, task.unknowns.unknowns, task.unknowns.names, point.values, point.slope,
-        task.unknowns.at_bound(point.w), point.weights * point.r, point.J, gain,
-        point.evaluation.r, known,
-    )  # fmt: skip
+        channels=task.channels,
+        unknowns=task.unknowns.unknowns,
+        names=task.unknowns.names,
+        values=point.values,
+        slope=point.slope,
+        held=task.unknowns.at_bound(point.w),
+        r=point.weights * point.r,
+        J=point.J,
+        gain=gain,
+        raw=point.evaluation.r,
+        noise=known,
+    )
 
 
 def trace(task: Task, found: Minimum) -> Callable[[Array], float]:

@@ -127,9 +127,19 @@ def profile(
         better = float(values[np.argmin(rise)])
         said.append(f"The model fits better at {name} = {better:.4g}: the fit is no minimum.")
     return Profile(
-        name, walk.unit, walk.best, values, rise, np.array([s[2] for s in stations]),
-        task.unknowns.names, walk.limit, low, high, walk.logarithmic, tuple(said),
-    )  # fmt: skip
+        name=name,
+        unit=walk.unit,
+        best=walk.best,
+        values=values,
+        rise=rise,
+        others=np.array([s[2] for s in stations]),
+        names=task.unknowns.names,
+        limit=walk.limit,
+        low=low,
+        high=high,
+        logarithmic=walk.logarithmic,
+        sentences=tuple(said),
+    )
 
 
 Station = tuple[float, float, Array]
@@ -176,9 +186,18 @@ class _Walk:
         rows, n = point.r.size, task.unknowns.lower.size
         variance = max(point.cost / max(rows - n, 1), 1e-300)
         return _Walk(
-            task, point, name, unknown.unit, index, own, best, step, variance * colour, t**2,
-            logarithmic,
-        )  # fmt: skip
+            task=task,
+            point=point,
+            name=name,
+            unit=unknown.unit,
+            index=index,
+            own=own,
+            best=best,
+            step=step,
+            scale=variance * colour,
+            limit=t**2,
+            logarithmic=logarithmic,
+        )
 
     def at(self, distance: float) -> float:
         """The value so far away."""

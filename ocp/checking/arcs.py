@@ -87,7 +87,18 @@ def arcs_of(problem: Problem, meshes: Sequence[Array], points: Points) -> tuple[
     ):
         begin = found[-1].end if span.phase else 0.0
         p = _chosen(span, points.chosen)
-        found.append(Arc(number, span, begin, own.T, np.asarray(mesh), own.nodes, own.u, p))
+        found.append(
+            Arc(
+                number=number,
+                span=span,
+                begin=begin,
+                T=own.T,
+                mesh=np.asarray(mesh),
+                nodes=own.nodes,
+                u=own.u,
+                p=p,
+            )
+        )
     return tuple(found)
 
 

@@ -59,7 +59,15 @@ def against_optimised(run: Run) -> Iterator[Miss]:
         model.x, values.tolist(), arc.nodes[:, node].tolist(), arc.sizes.tolist(), strict=True
     ):
         if not fixed(asked.get(v.name, FREE)):
-            yield Miss("motion", v.name, run.end, value, wanted, size, v.unit)
+            yield Miss(
+                what="motion",
+                name=v.name,
+                time=run.end,
+                value=value,
+                wanted=wanted,
+                size=size,
+                unit=v.unit,
+            )
 
 
 def between_nodes(runs: Sequence[Run]) -> Iterator[Miss]:
@@ -115,7 +123,15 @@ def periodic(problem: Problem, first: Run, last: Run) -> Iterator[Miss]:
         start = first.of(v.symbol, first.begin)[0, 0]
         end = last.of(last.arc.span.model.expression(name), last.end)[0, 0]
         size = first.arc.sizes[[x.name for x in model.x].index(name)]
-        yield Miss("period", name, last.end, float(end), float(start), float(size), v.unit)
+        yield Miss(
+            what="period",
+            name=name,
+            time=last.end,
+            value=float(end),
+            wanted=float(start),
+            size=float(size),
+            unit=v.unit,
+        )
 
 
 @final
@@ -170,7 +186,7 @@ def _miss(
     what: str, name: str, time: float, value: float, box: Box, size: float, unit: str = ""
 ) -> Miss:
     wanted = min(max(value, box[0]), box[1]) if value == value else box[0]
-    return Miss(what, name, time, value, wanted, size, unit)
+    return Miss(what=what, name=name, time=time, value=value, wanted=wanted, size=size, unit=unit)
 
 
 def _size(row: Row, value: float) -> float:

@@ -106,14 +106,14 @@ def _judged(
     if bad is None:
         checked.append(Miss("cost", "the cost", runs[-1].end, value, cost, _size(runs, value)))
     return Verification(
-        tolerance,
-        rtol,
-        tuple(sorted(checked, key=lambda miss: -miss.relative)),
-        tuple(errors),
-        tuple(run.trajectory for run in runs),
-        value,
-        "" if bad is None else bad.trajectory.message,
-        Status.SUCCESS if bad is None else bad.trajectory.status,
+        tolerance=tolerance,
+        rtol=rtol,
+        checked=tuple(sorted(checked, key=lambda miss: -miss.relative)),
+        local_errors=tuple(errors),
+        trajectories=tuple(run.trajectory for run in runs),
+        cost=value,
+        failed="" if bad is None else bad.trajectory.message,
+        failure=Status.SUCCESS if bad is None else bad.trajectory.status,
     )
 
 

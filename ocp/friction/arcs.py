@@ -111,16 +111,16 @@ def places_of(problem: Problem, legs: Sequence[Leg]) -> tuple[Place, ...]:
                     break
         found.append(
             Place(
-                i,
-                problem.chain[leg.phase].model,
-                arcs[i],
-                leg,
-                first or phases[i - 1] != leg.phase,
-                last or phases[i + 1] != leg.phase,
-                k == len(leg.arcs) - 1,
-                {} if first or broken[i] else arcs[i - 1].modes,
-                {} if last or broken[i + 1] else arcs[i + 1].modes,
-                leaves,
+                number=i,
+                model=problem.chain[leg.phase].model,
+                arc=arcs[i],
+                leg=leg,
+                opens=first or phases[i - 1] != leg.phase,
+                closes=last or phases[i + 1] != leg.phase,
+                ends=k == len(leg.arcs) - 1,
+                before={} if first or broken[i] else arcs[i - 1].modes,
+                after={} if last or broken[i + 1] else arcs[i + 1].modes,
+                leaves=leaves,
             )
         )
     return tuple(found)

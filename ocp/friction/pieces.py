@@ -90,10 +90,20 @@ class SetValued:
         units |= {f"{name}_F": contacts[name].unit("N") for name in self.contacts}
         changes = ((p.end, "change") for p in self.pieces[:-1])
         return Trajectory(
-            self.model.name, self.t, units, self.status, self.message,
-            self._statistics, self.span, self._ends, self._states, self._evaluated,
-            self._expressed, self.model, tuple(changes),
-        )  # fmt: skip
+            scene=self.model.name,
+            t=self.t,
+            units=units,
+            status=self.status,
+            message=self.message,
+            count=self._statistics,
+            span=self.span,
+            ends=self._ends,
+            states=self._states,
+            evaluate=self._evaluated,
+            express=self._expressed,
+            model=self.model,
+            happened=tuple(changes),
+        )
 
     @cached_property
     def _known(self) -> set[str]:

@@ -144,14 +144,14 @@ def polished(
     """`polish` from a motion that may come from anywhere, on about so many intervals at first."""
     whole = known.motion.T
     polisher = Polisher(
-        problem,
-        sizes_of(problem, known),
-        starts_at_rest(problem, known, widths),
-        _patient(solver or Ipopt()),
-        scheme or Radau(3),
-        SHORTEST * whole,
-        KICK * whole,
-        progress,
+        problem=problem,
+        sizes=sizes_of(problem, known),
+        at_rest=starts_at_rest(problem, known, widths),
+        solver=_patient(solver or Ipopt()),
+        scheme=scheme or Radau(3),
+        shortest=SHORTEST * whole,
+        kick=KICK * whole,
+        progress=progress,
     )
     tried: list[Solved] = []
 

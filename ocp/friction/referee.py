@@ -58,14 +58,14 @@ def verify_exactly(
         size = max(abs(value), abs(solution.cost)) or 1.0
         checked.append(Miss("cost", "the cost", runs[-1].end, value, solution.cost, size))
     return Verification(
-        tolerance,
-        rtol,
-        tuple(sorted(checked, key=lambda miss: -miss.relative)),
-        (),
-        tuple(run.trajectory for run in runs),
-        value,
-        failed,
-        Status.SOLVER_FAILED if failed else Status.SUCCESS,
+        tolerance=tolerance,
+        rtol=rtol,
+        checked=tuple(sorted(checked, key=lambda miss: -miss.relative)),
+        local_errors=(),
+        trajectories=tuple(run.trajectory for run in runs),
+        cost=value,
+        failed=failed,
+        failure=Status.SOLVER_FAILED if failed else Status.SUCCESS,
     )
 
 

@@ -149,7 +149,15 @@ def sharpened(
         clock: when to stop.
         progress: called after each iteration.
     """
-    path = _Path(problem, smoothed(problem), scheme, solver, tolerance, clock or Clock(), progress)
+    path = _Path(
+        user=problem,
+        problem=smoothed(problem),
+        scheme=scheme,
+        solver=solver,
+        tolerance=tolerance,
+        clock=clock or Clock(),
+        progress=progress,
+    )
     step = path.first(guess, starts, intervals)
     factor, steady = FACTOR, True
     yield path.told(step, steady)
@@ -293,7 +301,19 @@ class _Path:
         old = step.transcription
         spans = stored_spans(self.problem, self.scheme, old.meshes, step.points)
         iterate = step.outcome.iterate
-        return resample(into, Stored("", "", "", 0.0, "", spans, step.points.chosen, iterate))
+        return resample(
+            into,
+            Stored(
+                name="",
+                status="",
+                message="",
+                cost=0.0,
+                structure="",
+                spans=spans,
+                chosen=step.points.chosen,
+                iterate=iterate,
+            ),
+        )
 
     def judged(self, step: Step) -> Step:
         """`step` with the local errors of its intervals."""

@@ -208,16 +208,16 @@ def controller_of(
     parameters = dict(zip((v.name for v in span.model.p), span.p.tolist(), strict=True))
     inputs = horizon.model.values("u")
     design = Design(
-        name or f"{own.name}_mpc",
-        horizon,
-        settings,
-        tuple(i for i, v in enumerate(horizon.model.x) if v.name in wanted),
-        _controls(own, horizon),
-        horizon.model.initial_state(p=parameters),
-        np.clip(inputs, *_boxes(horizon)),
-        np.array([parameters[name] for name in horizon.parameters]),
-        np.array([parameters[name] for name in horizon.references]),
-        checks.number("to_mpc: penalty", penalty, above=0.0),
+        name=name or f"{own.name}_mpc",
+        horizon=horizon,
+        settings=settings,
+        measured=tuple(i for i, v in enumerate(horizon.model.x) if v.name in wanted),
+        controls=_controls(own, horizon),
+        x0=horizon.model.initial_state(p=parameters),
+        u0=np.clip(inputs, *_boxes(horizon)),
+        p0=np.array([parameters[name] for name in horizon.parameters]),
+        r0=np.array([parameters[name] for name in horizon.references]),
+        penalty=checks.number("to_mpc: penalty", penalty, above=0.0),
     )
     _check_names(where, design)
     return Controller(design)

@@ -49,32 +49,8 @@ def horizon_of(problem: Problem, step: float, *, method: str, steps: int) -> Hor
     inputs = model.vector("u")
     terms = [(w * step, e) for w, e in span.squares]
     rest = [(w * step, e) for w, e in _others(problem, span)]
-    moving = [ca.depends_on(e, inputs) for _, e in terms]
-    early_of = ca.vertcat(at.x, at.u)
-    split = [ca.depends_on(e, inputs) for _, e in rest]
     where = f"to_mpc '{model.name}'"
-    early = total(
-        [
-            squares([(w, at.early(e)) for (w, e), yes in _both(terms, moving) if yes], early_of),
-            *(
-                quadratic(where, w * at.early(e), early_of)
-                for (w, e), yes in _both(rest, split)
-                if yes
-            ),
-        ],
-        early_of.numel(),
-    )
-    late = total(
-        [
-            squares([(w, at.late(e)) for (w, e), yes in _both(terms, moving) if not yes], at.after),
-            *(
-                quadratic(where, w * at.late(e), at.after)
-                for (w, e), yes in _both(rest, split)
-                if not yes
-            ),
-        ],
-        at.after.numel(),
-    )
+    early, late = _split(where, at, inputs, terms, rest)
     end = quadratic(f"{where}: end", at.early(span.end), at.x)
     curvature, weight = _curvatures(at, model, early, late, end)
     small = FLAT * weight / model.nominal("u") ** 2
@@ -86,14 +62,66 @@ def horizon_of(problem: Problem, step: float, *, method: str, steps: int) -> Hor
     limits = _limits(span)
     end_limits = _end_limits(span)
     return Horizon(
-        model, count, step, references, at.x, at.u, at.after, at.t, at.r, at.r_after, at.p,
-        ca.SX.sym("b", len(limits) + len(end_limits)),
-        _advance(at, step_function(model, method), step / steps), steps,
-        early, late, end,
-        tuple(_placed(limit, at, inputs) for limit in limits),
-        tuple(_placed(limit, at, None) for limit in end_limits),
-        curvature, weight,
-    )  # fmt: skip
+        model=model,
+        count=count,
+        step=step,
+        references=references,
+        x=at.x,
+        u=at.u,
+        after=at.after,
+        t=at.t,
+        r=at.r,
+        r_after=at.r_after,
+        p=at.p,
+        b=ca.SX.sym("b", len(limits) + len(end_limits)),
+        advance=_advance(at, step_function(model, method), step / steps),
+        substeps=steps,
+        early=early,
+        late=late,
+        end=end,
+        limits=tuple(_placed(limit, at, inputs) for limit in limits),
+        end_limits=tuple(_placed(limit, at, None) for limit in end_limits),
+        curvature=curvature,
+        weight=weight,
+    )
+
+
+def _split(
+    where: str,
+    at: Places,
+    inputs: ca.SX,
+    squared: list[tuple[float, ca.SX]],
+    others: list[tuple[float, ca.SX]],
+) -> tuple[Costs, Costs]:
+    """Costs of an interval: those with inputs in them at its begin, the others at its end."""
+    moving = [ca.depends_on(e, inputs) for _, e in squared]
+    split = [ca.depends_on(e, inputs) for _, e in others]
+    early_of = ca.vertcat(at.x, at.u)
+    early = total(
+        [
+            squares([(w, at.early(e)) for (w, e), yes in _both(squared, moving) if yes], early_of),
+            *(
+                quadratic(where, w * at.early(e), early_of)
+                for (w, e), yes in _both(others, split)
+                if yes
+            ),
+        ],
+        early_of.numel(),
+    )
+    late = total(
+        [
+            squares(
+                [(w, at.late(e)) for (w, e), yes in _both(squared, moving) if not yes], at.after
+            ),
+            *(
+                quadratic(where, w * at.late(e), at.after)
+                for (w, e), yes in _both(others, split)
+                if not yes
+            ),
+        ],
+        at.after.numel(),
+    )
+    return early, late
 
 
 def _advance(at: Places, following: ca.Function, h: float) -> ca.Function:

@@ -103,14 +103,14 @@ class Session:
         report = cycle.report
         names = (control.name for control in design.controls)
         return Action(
-            dict(zip(names, cycle.u.tolist(), strict=True)),
-            report.residual,
-            report.violation,
-            report.iterations,
-            report.program,
-            report.status,
-            cycle.seconds,
-            cycle.cpu,
+            controls=dict(zip(names, cycle.u.tolist(), strict=True)),
+            residual=report.residual,
+            violation=report.violation,
+            iterations=report.iterations,
+            program_iterations=report.program,
+            status=report.status,
+            seconds=cycle.seconds,
+            cpu=cycle.cpu,
         )
 
     def forget(self) -> None:

@@ -133,9 +133,9 @@ def motion_of(
     ends = [piece.t.size - int(k + 1 < len(pieces) and not pieces[k + 1].jumps)
             for k, piece in enumerate(pieces)]  # fmt: skip
     return Motion(
-        name,
-        np.concatenate([p.t[:n] for p, n in zip(pieces, ends, strict=True)]),
-        {
+        name=name,
+        t=np.concatenate([p.t[:n] for p, n in zip(pieces, ends, strict=True)]),
+        signals={
             signal: np.concatenate(
                 [
                     p.values.get(signal, np.full(p.t.size, np.nan))[:n]
@@ -144,17 +144,17 @@ def motion_of(
             )
             for signal in ordered
         },
-        {signal: units[signal] for signal in ordered},
-        np.concatenate([p.nodes[:n] for p, n in zip(pieces, ends, strict=True)]),
-        np.concatenate([p.edges[:-1] for p in pieces]),
-        {
+        units={signal: units[signal] for signal in ordered},
+        nodes=np.concatenate([p.nodes[:n] for p, n in zip(pieces, ends, strict=True)]),
+        t_control=np.concatenate([p.edges[:-1] for p in pieces]),
+        controls={
             u: np.concatenate(
                 [p.controls.get(u, np.full(p.edges.size - 1, np.nan)) for p in pieces]
             )
             for u in inputs
         },
-        tuple(phases),
-        tuple(number for number, _ in spans),
+        phases=tuple(phases),
+        spans=tuple(number for number, _ in spans),
     )
 
 

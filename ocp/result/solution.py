@@ -233,14 +233,14 @@ class Solution:
     def stored(self) -> Stored:
         """What a warm start needs of it, free of models."""
         return Stored(
-            self.problem.name,
-            self.status.name,
-            self.message,
-            self.cost,
-            structure_of(self.problem, self.scheme),
-            stored_spans(self.problem, self.scheme, self.meshes, self.points),
-            self.chosen,
-            self.iterate,
+            name=self.problem.name,
+            status=self.status.name,
+            message=self.message,
+            cost=self.cost,
+            structure=structure_of(self.problem, self.scheme),
+            spans=stored_spans(self.problem, self.scheme, self.meshes, self.points),
+            chosen=self.chosen,
+            iterate=self.iterate,
         )
 
     def save(self, path: str | Path) -> None:

@@ -267,16 +267,16 @@ class Prepared:
             solve_time=times[1],
         )
         return Outcome(
-            Iterate(point.w, point.lam_w, point.lam_g),
-            point.f,
-            outside(point.g, program.lower_g, program.upper_g),
-            outside(point.w, program.lower_w, program.upper_w),
-            status,
-            said,
-            answer,
-            not status.ok and watch.cycles,
-            statistics,
-            watch.error,
+            iterate=Iterate(point.w, point.lam_w, point.lam_g),
+            cost=point.f,
+            violations=outside(point.g, program.lower_g, program.upper_g),
+            bound_violations=outside(point.w, program.lower_w, program.upper_w),
+            status=status,
+            sentence=said,
+            answer=answer,
+            cycles=not status.ok and watch.cycles,
+            statistics=statistics,
+            cause=watch.error,
         )
 
 

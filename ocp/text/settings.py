@@ -66,13 +66,13 @@ def _setting(problem: "Problem", number: int, phase: Phase, where: str) -> Setti
     ranges = {rate_name(name): value for name, value in rates.items()}
     known = names_of(model, problem.bounds)
     return Setting(
-        number,
-        where,
-        phase,
-        model,
-        only(problem.bounds, known) | dict(phase.bounds) | ranges,
-        only(problem.p, [v.name for v in model.p]) | dict(phase.p),
-        costs,
+        number=number,
+        where=where,
+        phase=phase,
+        model=model,
+        bounds=only(problem.bounds, known) | dict(phase.bounds) | ranges,
+        p=only(problem.p, [v.name for v in model.p]) | dict(phase.p),
+        costs=costs,
     )
 
 

@@ -92,16 +92,16 @@ def block(name: str, v: Symbols, theta: Symbols, r: Symbols, q: Symbols | None =
         return ca.Function(f"{name}_{what}", list(inputs), list(outputs), OPTIONS)
 
     return Block(
-        v.numel(),
-        r.numel(),
-        function("rows", arguments, r),
-        None if q is None else function("share", arguments, ca.densify(cost)),
-        function("slopes", arguments, nz_q),
-        function("jacobian", arguments, r, nz_J),
-        function("hessian", [*arguments, sigma, lam], nz_H),
-        of_q,
-        of_J,
-        of_H,
+        n=v.numel(),
+        m=r.numel(),
+        rows=function("rows", arguments, r),
+        share=None if q is None else function("share", arguments, ca.densify(cost)),
+        slopes=function("slopes", arguments, nz_q),
+        jacobian=function("jacobian", arguments, r, nz_J),
+        hessian=function("hessian", [*arguments, sigma, lam], nz_H),
+        of_slopes=of_q,
+        of_jacobian=of_J,
+        of_hessian=of_H,
     )
 
 

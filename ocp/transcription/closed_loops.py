@@ -134,17 +134,17 @@ class Closing:
             zeros = np.zeros(self.m)
             found.append(
                 Piece(
-                    tuple(f"the {what} {i + 1}" for i in range(self.m)),
-                    self.scale,
-                    zeros,
-                    zeros,
-                    order_of(number, at, 1),
-                    number,
-                    interval,
-                    offset,
-                    self.levels[level],
-                    select(parts, at.size),
-                    data.theta(interval, offset, np.zeros(at.size)),
+                    names=tuple(f"the {what} {i + 1}" for i in range(self.m)),
+                    scale=self.scale,
+                    lower=zeros,
+                    upper=zeros,
+                    order=order_of(number, at, 1),
+                    span=number,
+                    interval=interval,
+                    offset=offset,
+                    block=self.levels[level],
+                    selection=select(parts, at.size),
+                    theta=data.theta(interval, offset, np.zeros(at.size)),
                 )
             )
         return found
@@ -186,16 +186,16 @@ def closing(
         ca.SX(len(span.model.x) - 2 * n, 1),
     )
     return Closing(
-        local,
-        loops,
-        m,
-        block("correction", ca.vertcat(local.v, multipliers), local.theta, moved),
-        (
+        local=local,
+        loops=loops,
+        m=m,
+        correction=block("correction", ca.vertcat(local.v, multipliers), local.theta, moved),
+        levels=(
             block("loops", local.v, local.theta, phi / ca.DM(size)),
             block("loop_rates", local.v, local.theta, phi_dot / ca.DM(size)),
         ),
-        size,
-        {at: _known(span, loops, at, before, (periodic, named)) for at in span.nodes},
+        scale=size,
+        known={at: _known(span, loops, at, before, (periodic, named)) for at in span.nodes},
     )
 
 

@@ -183,18 +183,18 @@ def pieces_of_points(
     )
     zeros = np.zeros(equations.block.m - len(equations.path))
     return Piece(
-        equations.names,
-        equations.scale,
-        np.concatenate([zeros, [row.lower / row.nominal for row in equations.path]]),
-        np.concatenate([zeros, [row.upper / row.nominal for row in equations.path]]),
-        order_of(number, interval, 2 + j),
-        number,
-        interval,
-        scheme.nodes[1 + j],
-        equations.engine.at(N * d),
-        select(parts, N * d),
-        data.theta(interval, scheme.nodes[1 + j], scheme.weights[j]),
-        linear,
+        names=equations.names,
+        scale=equations.scale,
+        lower=np.concatenate([zeros, [row.lower / row.nominal for row in equations.path]]),
+        upper=np.concatenate([zeros, [row.upper / row.nominal for row in equations.path]]),
+        order=order_of(number, interval, 2 + j),
+        span=number,
+        interval=interval,
+        offset=scheme.nodes[1 + j],
+        block=equations.engine.at(N * d),
+        selection=select(parts, N * d),
+        theta=data.theta(interval, scheme.nodes[1 + j], scheme.weights[j]),
+        linear=linear,
     )
 
 
@@ -216,14 +216,14 @@ def gaps(number: int, span: Span, layout: Layout, scheme: Coefficients) -> Piece
     weights = np.concatenate([np.ones((len(names), 1, own.intervals)), -weights], axis=1)
     zeros = np.zeros(len(names))
     return Piece(
-        tuple(f"the continuity of {name}" for name in names),
-        span.model.nominal("x"),
-        zeros,
-        zeros,
-        order_of(number, interval, 0),
-        number,
-        interval,
-        np.ones(own.intervals),
+        names=tuple(f"the continuity of {name}" for name in names),
+        scale=span.model.nominal("x"),
+        lower=zeros,
+        upper=zeros,
+        order=order_of(number, interval, 0),
+        span=number,
+        interval=interval,
+        offset=np.ones(own.intervals),
         linear=Linear.of(
             np.repeat(np.arange(len(names)), weights.shape[1]),
             columns.reshape(-1, own.intervals),

@@ -54,17 +54,17 @@ class AtNode:
         stage, inside = (interval, LAST - 1) if self.inside else (node, 1)
         at = np.array([interval])
         return Piece(
-            tuple(row.name for row in self.rows),
-            np.array([row.nominal for row in self.rows]),
-            np.array([row.lower / row.nominal for row in self.rows]),
-            np.array([row.upper / row.nominal for row in self.rows]),
-            order_of(number, np.array([stage]), inside),
-            number,
-            at,
-            np.array([offset]),
-            self.block,
-            select(parts, 1),
-            data.theta(at, np.array([offset]), np.zeros(1)),
+            names=tuple(row.name for row in self.rows),
+            scale=np.array([row.nominal for row in self.rows]),
+            lower=np.array([row.lower / row.nominal for row in self.rows]),
+            upper=np.array([row.upper / row.nominal for row in self.rows]),
+            order=order_of(number, np.array([stage]), inside),
+            span=number,
+            interval=at,
+            offset=np.array([offset]),
+            block=self.block,
+            selection=select(parts, 1),
+            theta=data.theta(at, np.array([offset]), np.zeros(1)),
         )
 
 
@@ -139,17 +139,17 @@ class AtStarts:
         z = span.z[:, at * scheme.degree]
         parts = self.local.columns(layout, span.nodes[:, at], z, span.u[:, at], at.size)
         return Piece(
-            tuple(row.name for row in self.rows),
-            np.array([row.nominal for row in self.rows]),
-            np.array([row.lower / row.nominal for row in self.rows]),
-            np.array([row.upper / row.nominal for row in self.rows]),
-            order_of(number, at, LAST - 1),
-            number,
-            at,
-            np.zeros(at.size),
-            self.block,
-            select(parts, at.size),
-            data.theta(at, np.zeros(at.size), np.zeros(at.size)),
+            names=tuple(row.name for row in self.rows),
+            scale=np.array([row.nominal for row in self.rows]),
+            lower=np.array([row.lower / row.nominal for row in self.rows]),
+            upper=np.array([row.upper / row.nominal for row in self.rows]),
+            order=order_of(number, at, LAST - 1),
+            span=number,
+            interval=at,
+            offset=np.zeros(at.size),
+            block=self.block,
+            selection=select(parts, at.size),
+            theta=data.theta(at, np.zeros(at.size), np.zeros(at.size)),
         )
 
 
@@ -200,17 +200,17 @@ class Between:
         starts = columns_at(self.after, layout, scheme, 0, False)[2]
         theta = data[a].theta(last, one, 0 * one), data[b].theta(zero, 0 * one, 0 * one)
         return Piece(
-            self.names,
-            self.scale,
-            np.array([low for low, _ in self.boxes]) / self.scale,
-            np.array([high for _, high in self.boxes]) / self.scale,
-            order_of(a, np.array([N]), 0 if self.link else LAST),
-            b,
-            zero,
-            0 * one,
-            self.block,
-            select([*ends, *starts], 1),
-            ca.vertcat(*theta),
+            names=self.names,
+            scale=self.scale,
+            lower=np.array([low for low, _ in self.boxes]) / self.scale,
+            upper=np.array([high for _, high in self.boxes]) / self.scale,
+            order=order_of(a, np.array([N]), 0 if self.link else LAST),
+            span=b,
+            interval=zero,
+            offset=0 * one,
+            block=self.block,
+            selection=select([*ends, *starts], 1),
+            theta=ca.vertcat(*theta),
         )
 
 
@@ -228,14 +228,34 @@ def between(before: Local, after: Local) -> list[Between]:
         starts = after.values[1][[states.index(link.state) for link in links]]
         made = block("link", v, theta, (starts - ends) / ca.DM(sizes))
         names = tuple(f"the start of {link.state}" for link in links)
-        found.append(Between(before, after, made, names, sizes, ((0.0, 0.0),) * len(links), True))
+        found.append(
+            Between(
+                before=before,
+                after=after,
+                block=made,
+                names=names,
+                scale=sizes,
+                boxes=((0.0, 0.0),) * len(links),
+                link=True,
+            )
+        )
     if span.joins:
         sizes = np.array([_nominal(join) for join in span.joins])
         rows = [join.function.call([*before.values, *after.values])[0] for join in span.joins]
         made = block("join", v, theta, stacked(rows) / ca.DM(sizes))
         names = tuple(join.name for join in span.joins)
         boxes = tuple((join.lower, join.upper) for join in span.joins)
-        found.append(Between(before, after, made, names, sizes, boxes, False))
+        found.append(
+            Between(
+                before=before,
+                after=after,
+                block=made,
+                names=names,
+                scale=sizes,
+                boxes=boxes,
+                link=False,
+            )
+        )
     return found
 
 
@@ -288,14 +308,14 @@ class LinearRows:
         rows = np.repeat(np.arange(len(self.names)), columns.shape[1])
         kept = weights.ravel() != 0.0
         return Piece(
-            self.names,
-            self.scale,
-            np.array([low for low, _ in self.boxes]) / self.scale,
-            np.array([high for _, high in self.boxes]) / self.scale,
-            np.reshape(order, (1,)),
-            span,
-            np.zeros(1, np.int64),
-            np.zeros(1),
+            names=self.names,
+            scale=self.scale,
+            lower=np.array([low for low, _ in self.boxes]) / self.scale,
+            upper=np.array([high for _, high in self.boxes]) / self.scale,
+            order=np.reshape(order, (1,)),
+            span=span,
+            interval=np.zeros(1, np.int64),
+            offset=np.zeros(1),
             linear=Linear.of(rows[kept], columns.ravel()[kept, None], weights.ravel()[kept, None]),
         )
 

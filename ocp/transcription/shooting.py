@@ -183,15 +183,15 @@ def _path_piece(
     interval, node, offset = at
     parts = local.columns(layout, own.nodes[:, node], own.z, own.u[:, interval], node.size)
     return Piece(
-        tuple(row.name for row in rows),
-        np.array([row.nominal for row in rows]),
-        np.array([row.lower / row.nominal for row in rows]),
-        np.array([row.upper / row.nominal for row in rows]),
-        order_of(number, node, LAST - 2),
-        number,
-        interval,
-        offset,
-        written,
-        select(parts, node.size),
-        data.theta(interval, offset, np.zeros(node.size)),
+        names=tuple(row.name for row in rows),
+        scale=np.array([row.nominal for row in rows]),
+        lower=np.array([row.lower / row.nominal for row in rows]),
+        upper=np.array([row.upper / row.nominal for row in rows]),
+        order=order_of(number, node, LAST - 2),
+        span=number,
+        interval=interval,
+        offset=offset,
+        block=written,
+        selection=select(parts, node.size),
+        theta=data.theta(interval, offset, np.zeros(node.size)),
     )

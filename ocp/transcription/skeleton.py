@@ -170,14 +170,14 @@ def _layout(made: Equations, scheme: Coefficients, meshes: Sequence[Array]) -> L
         shared = [i for i, name in enumerate(inputs) if name in problem.shared_inputs]
         sizes.append(
             Sizes(
-                len(model.x),
-                len(model.z),
-                len(inputs),
-                0 if loops is None or not scheme.degree else 2 * loops.m,
-                mesh.size - 1,
-                isinstance(span.T, Free),
-                like,
-                tuple(shared) if like >= 0 else (),
+                nx=len(model.x),
+                nz=len(model.z),
+                nu=len(inputs),
+                extra=0 if loops is None or not scheme.degree else 2 * loops.m,
+                intervals=mesh.size - 1,
+                free_time=isinstance(span.T, Free),
+                like=like,
+                shared=tuple(shared) if like >= 0 else (),
             )
         )
     return lay_out(sizes, scheme.degree, len(problem.chosen), problem.kind == "worst")

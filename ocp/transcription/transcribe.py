@@ -109,6 +109,12 @@ def discretise(
             joined += between(spans[-2].local, local)
     held = tuple(at_starts(spans[k].local, rows) for k, rows in (starts or {}).items() if rows)
     equations = Equations(
-        problem, scheme, tuple(spans), tuple(loops), tuple(nodes), tuple(joined), held
+        problem=problem,
+        scheme=scheme,
+        spans=tuple(spans),
+        closing=tuple(loops),
+        nodes=tuple(nodes),
+        between=tuple(joined),
+        starts=held,
     )
     return Discretisation(equations)

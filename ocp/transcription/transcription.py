@@ -127,22 +127,22 @@ class Transcription:
         made = self.skeleton.assembled
         s = self.skeleton
         return Program(
-            s.w,
-            s.p,
-            made.f,
-            made.g,
-            made.gradient,
-            made.jacobian,
-            made.hessian,
-            s.lower,
-            s.upper,
-            s.lower_g,
-            s.upper_g,
-            numbers_of(self.problem, self.meshes, {}),
-            Places(made.g.numel(), lambda: _row_places(s, self.meshes)),
-            Places(s.w.numel(), lambda: _unknown_places(self)),
-            s.scale,
-            lambda: s.structure,
+            w=s.w,
+            p=s.p,
+            f=made.f,
+            g=made.g,
+            gradient=made.gradient,
+            jacobian=made.jacobian,
+            hessian=made.hessian,
+            lower_w=s.lower,
+            upper_w=s.upper,
+            lower_g=s.lower_g,
+            upper_g=s.upper_g,
+            values=numbers_of(self.problem, self.meshes, {}),
+            rows=Places(made.g.numel(), lambda: _row_places(s, self.meshes)),
+            unknowns=Places(s.w.numel(), lambda: _unknown_places(self)),
+            scale=s.scale,
+            structure=lambda: s.structure,
         )
 
 

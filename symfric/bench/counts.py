@@ -108,14 +108,14 @@ def count(mechanism: str, variant: str, formulation: str, of: Mechanism) -> Coun
     made = integrator(model)
     whole = made.system
     return CountRow(
-        mechanism,
-        variant,
-        formulation,
-        len(model.x),
-        len(model.z),
-        model.function("ode").n_instructions(),
-        made.instructions,
-        ca.jacobian(whole.f, whole.y).nnz(),
+        mechanism=mechanism,
+        variant=variant,
+        formulation=formulation,
+        states=len(model.x),
+        algebraic=len(model.z),
+        ode=model.function("ode").n_instructions(),
+        step=made.instructions,
+        nonzeros=ca.jacobian(whole.f, whole.y).nnz(),
     )
 
 

@@ -74,17 +74,17 @@ def measure_ensemble(case: str, law: Law, quick: bool) -> list[EnsembleRow]:
         alone = rows[0].time_s if rows else time
         rows.append(
             EnsembleRow(
-                case,
-                RTOL,
-                members,
-                workers,
-                time,
-                time / members,
-                alone / (workers * time),
-                _error(result["x"][picked, 0], exact),
-                cvodes_s / sample,
-                _error(found, exact),
-                (cvodes_s / sample) / (time / members),
+                case=case,
+                rtol=RTOL,
+                members=members,
+                workers=workers,
+                time_s=time,
+                member_s=time / members,
+                efficiency=alone / (workers * time),
+                error=_error(result["x"][picked, 0], exact),
+                cvodes_member_s=cvodes_s / sample,
+                cvodes_error=_error(found, exact),
+                ratio=(cvodes_s / sample) / (time / members),
             )
         )
     return rows

@@ -125,17 +125,17 @@ def measure(
     time_s, run = best_time(solve)
     scd, worst = correct_digits(problem, run) if run.status.ok else (-inf, "")
     return IvpRow(
-        problem.name,
-        method,
-        rtol,
-        scd,
-        worst,
-        problem.digits.get(rtol, 0),
-        run.statistics.steps,
-        run.statistics.rejections,
-        time_s,
-        _drift(problem, run),
-        "" if run.status.ok else run.message,
+        problem=problem.name,
+        method=method,
+        rtol=rtol,
+        scd=scd,
+        worst=worst,
+        wanted=problem.digits.get(rtol, 0),
+        steps=run.statistics.steps,
+        rejections=run.statistics.rejections,
+        time_s=time_s,
+        drift=_drift(problem, run),
+        message="" if run.status.ok else run.message,
     )
 
 

@@ -120,16 +120,16 @@ def _row(name: str, model: Model, state: str, middle: float, end: float, members
     own = S[:, State.Y][:, : y.shape[1]]
     off = (np.abs(y - own) / (np.abs(own).max(axis=0) + 1e-300)).max(axis=1)
     return LaneRow(
-        name,
-        members,
-        _lanes(model, end),
-        1e6 * best["together"] / members,
-        1e6 * best["alone"] / members,
-        best["alone"] / best["together"],
-        1e3 * best["again"],
-        float(attempts.mean()),
-        float((attempts == many.attempts).mean()),
-        float(np.median(off)),
+        case=name,
+        members=members,
+        lanes=_lanes(model, end),
+        member_us=1e6 * best["together"] / members,
+        alone_us=1e6 * best["alone"] / members,
+        ratio=best["alone"] / best["together"],
+        again_ms=1e3 * best["again"],
+        attempts=float(attempts.mean()),
+        equal=float((attempts == many.attempts).mean()),
+        difference=float(np.median(off)),
     )
 
 

@@ -205,14 +205,14 @@ def bench_multibody(
     runs, skipped = _runs(quick, tell)
     tell("counts, compilation, chains", 0.6)
     return MultibodyBenchmark(
-        tuple(runs),
-        tuple(compile_rows(formulations)),
-        tuple(counts(formulations)),
-        tuple(scaling(partial(chain, law=BrownMcPhee(v_t=0.01)), links)),
-        tuple(facts()),
-        tuple(norms(formulations)),
-        tuple(drifts(1.0 if quick else DRIFT_S)),
-        skipped,
+        runs=tuple(runs),
+        compiled=tuple(compile_rows(formulations)),
+        counts=tuple(counts(formulations)),
+        chains=tuple(scaling(partial(chain, law=BrownMcPhee(v_t=0.01)), links)),
+        facts=tuple(facts()),
+        norms=tuple(norms(formulations)),
+        drifts=tuple(drifts(1.0 if quick else DRIFT_S)),
+        skipped=skipped,
     )
 
 
@@ -272,7 +272,15 @@ def _row(
         skipped[f"{case}: {name} at {setting:g}"] = last.rpartition(": ")[2]
         return None
     error = np.abs(found - exact).max() / np.abs(exact).max() if found.size else inf
-    return RunRow(case, name, setting, float(error), time_s, steps, contender.compile_s)
+    return RunRow(
+        case=case,
+        integrator=name,
+        setting=setting,
+        error=float(error),
+        time_s=time_s,
+        steps=steps,
+        compile_s=contender.compile_s,
+    )
 
 
 def _exact(what: Case) -> Array:

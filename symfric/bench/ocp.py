@@ -213,21 +213,21 @@ def _row(
     cost = median(a.cost for a in found)
     size = abs(known) or 1.0
     return OcpRow(
-        ready.name,
-        solver,
-        starts,
-        len(found),
-        _share([a.answer in SOLVED for a in found]),
-        _share(holds),
-        _share([good and a.cost <= known + BEST * size
+        case=ready.name,
+        solver=solver,
+        starts=starts,
+        count=len(found),
+        solved=_share([a.answer in SOLVED for a in found]),
+        landed=_share(holds),
+        best=_share([good and a.cost <= known + BEST * size
                 for a, good in zip(found, holds, strict=True)]),
-        cost,
-        ready.optimum,
-        (cost - known) / size,
-        _middle(misses),
-        _middle(exact),
-        median(a.iterations for a in found),
-        median(a.time_s for a in found),
+        cost=cost,
+        optimum=ready.optimum,
+        off=(cost - known) / size,
+        miss=_middle(misses),
+        exact=_middle(exact),
+        iterations=median(a.iterations for a in found),
+        time_s=median(a.time_s for a in found),
     )  # fmt: skip
 
 

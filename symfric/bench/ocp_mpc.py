@@ -85,16 +85,16 @@ def mpc_rows(quick: bool) -> Iterator[MpcRow]:
         found = controller.simulate(plant(), cycles * STEP, {"goal": _there_and_back})
         moved = int(np.searchsorted(found.t, LOOK))
         yield MpcRow(
-            name,
-            found.t.size,
-            1e3 * found.median,
-            1e3 * found.worst,
-            1e3 * found.worst_cpu,
-            int(found.iterations.max()),
-            found.unconverged,
-            found.unreported,
-            1e3 * abs(float(found["x"][min(moved, found.t.size - 1)]) - GOAL),
-            find_compiler() is not None,
+            plant=name,
+            cycles=found.t.size,
+            median_ms=1e3 * found.median,
+            worst_ms=1e3 * found.worst,
+            worst_cpu_ms=1e3 * found.worst_cpu,
+            iterations=int(found.iterations.max()),
+            unconverged=found.unconverged,
+            unreported=found.unreported,
+            off_mm=1e3 * abs(float(found["x"][min(moved, found.t.size - 1)]) - GOAL),
+            compiled=find_compiler() is not None,
         )
 
 

@@ -25,13 +25,13 @@ def attempt_of(solution: Solution, time_s: float) -> Attempt:
         meshes.append((motion.t_control[inside] - stretch.begin) / stretch.T)
         controls.append({name: u[inside] for name, u in motion.controls.items()})
     return Attempt(
-        solution.cost,
-        solution.iterations,
-        solution.status.name,
-        time_s,
-        tuple(stretch.T for stretch in motion.phases),
-        tuple(controls),
-        tuple(meshes),
+        cost=solution.cost,
+        iterations=solution.iterations,
+        answer=solution.status.name,
+        time_s=time_s,
+        durations=tuple(stretch.T for stretch in motion.phases),
+        controls=tuple(controls),
+        meshes=tuple(meshes),
     )
 
 

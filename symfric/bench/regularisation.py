@@ -154,8 +154,24 @@ def _slow_crank(law: Law) -> Scene:
 
 
 CASES = (
-    Case("rabinowicz brown_mcphee", _brown(0.15, 0.1), Rabinowicz, 20.0, _coulomb, True, ("x",)),
-    Case("rabinowicz lugre", _lugre(LuGre), Rabinowicz, 20.0, _falling, True, ("x",)),
+    Case(
+        name="rabinowicz brown_mcphee",
+        law=_brown(0.15, 0.1),
+        scene=Rabinowicz,
+        t_end=20.0,
+        exact=_coulomb,
+        cycle=True,
+        of=("x",),
+    ),
+    Case(
+        name="rabinowicz lugre",
+        law=_lugre(LuGre),
+        scene=Rabinowicz,
+        t_end=20.0,
+        exact=_falling,
+        cycle=True,
+        of=("x",),
+    ),
     Case("pendulum_box brown_mcphee", _brown(0.15, 0.1), PendulumBox, 15.0, _coulomb),
     Case("pendulum_box lugre_normalised", _lugre(LuGreNormalised), PendulumBox, 15.0, _falling),
     Case("four_mass coulomb", Coulomb(mu_d=0.1, v_eps=1e-2), FourMass, 4.0, _flat),
@@ -234,10 +250,21 @@ def _measured(
             before = s, error
             rows.append(
                 RegularisationRow(
-                    case.name, name, unit, run.values[name], rtol, error, in_cycle, order,
-                    run.time_s, run.steps, run.attempts, of_what, uncertain,
+                    case=case.name,
+                    parameter=name,
+                    unit=unit,
+                    value=run.values[name],
+                    rtol=rtol,
+                    error=error,
+                    cycle_error=in_cycle,
+                    order=order,
+                    time_s=run.time_s,
+                    steps=run.steps,
+                    attempts=run.attempts,
+                    reference=of_what,
+                    uncertain=uncertain,
                 )
-            )  # fmt: skip
+            )
     return rows
 
 

@@ -86,14 +86,14 @@ def _measured(
     except RuntimeError:
         adjoint_s = None
     return SensitivityRow(
-        case,
-        integrator,
-        exact.size,
-        RTOL,
-        alone,
-        forward_s / alone,
-        None if adjoint_s is None else adjoint_s / alone,
-        float(np.max(np.abs(found / exact - 1))),
+        case=case,
+        integrator=integrator,
+        parameters=exact.size,
+        rtol=RTOL,
+        plain_s=alone,
+        forward=forward_s / alone,
+        adjoint=None if adjoint_s is None else adjoint_s / alone,
+        error=float(np.max(np.abs(found / exact - 1))),
     )
 
 

@@ -112,7 +112,16 @@ def close_loop(
     if backend == "c" and compiler is None:
         raise no_compiler()
     wanted = {"compensated": {}} if cases is None else checks.named(f"{WHERE}: cases", cases)
-    setup = Setup(controller, delay, noise, seed, real, compiler, (position, velocity), load)
+    setup = Setup(
+        controller=controller,
+        delay=delay,
+        noise=noise,
+        seed=seed,
+        real=real,
+        compiler=compiler,
+        measured=(position, velocity),
+        load=load,
+    )
 
     def going(count: int) -> Plant:
         start, own = ({n: np.full(count, v) for n, v in (of or {}).items()} for of in (x0, p))

@@ -101,7 +101,7 @@ def lugre_observer(
     doc = "Observer of the bristle deflection by the position error."
     formula = "dz/dt of the law + k_e e, |z| <= mu_s N / sigma_0"
     called = "lugre_observer" if name is None else name
-    setup = Setup(called, doc, formula, gain, N, ramp, limit)
+    setup = Setup(name=called, doc=doc, equations=formula, gain=gain, N=N, ramp=ramp, limit=limit)
     return _observer(law, setup, corrected, h, turning, where)
 
 
@@ -158,7 +158,7 @@ def gms_observer(
     doc = "Observer of the spring forces by the position error."
     formula = "F_i+ = F_i of the law + k_i h k_e e, |F_i| <= alpha_i mu_s N"
     called = "gms_observer" if name is None else name
-    setup = Setup(called, doc, formula, gain, N, ramp, limit)
+    setup = Setup(name=called, doc=doc, equations=formula, gain=gain, N=N, ramp=ramp, limit=limit)
     return _observer(law, setup, corrected, h, turning, where)
 
 

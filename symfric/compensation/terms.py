@@ -164,7 +164,9 @@ def terms(law: Law, block: Block) -> Terms:
             peaks = {}
     elif not _made_of(dry, levels, block):
         levels, peaks = (), {}
-    return Terms(symbolic, v, N, force, dry, viscous, levels, peaks)
+    return Terms(
+        law=symbolic, v=v, N=N, force=force, dry=dry, viscous=viscous, levels=levels, peaks=peaks
+    )
 
 
 def _without_viscous(law: Law, force: ca.SX) -> ca.SX:

@@ -113,7 +113,14 @@ def equations(
     d = np.concatenate([model.values("p"), model.values("u")])
     integrator = integrator.suited([(guess, d)], span[1] - span[0])
     return Equations(
-        model, integrator, integrator.start(guess, d), rtol, step, method, span, exchange
+        model=model,
+        integrator=integrator,
+        y0=integrator.start(guess, d),
+        rtol=rtol,
+        step=step,
+        method=method,
+        span=span,
+        exchange=exchange,
     )
 
 

@@ -152,25 +152,33 @@ def export_fmu(
     loops = made.holonomic is not None and made.holonomic.phi.numel() > 0
     listed = entries(made, own.start, 0.0 if step else own.rtol, not loops, exchange)
     what = Described(
-        made.name,
-        identifier,
-        token,
-        f"{made.name}: {own.formula} of symfric",
-        f"symfric {version('symfric')}",
-        span,
-        None if step else own.rtol,
-        step,
-        (span[1] - span[0]) / INTERVALS,
-        ("all.c",),
-        exchange,
-        not loops,
+        name=made.name,
+        identifier=identifier,
+        token=token,
+        doc=f"{made.name}: {own.formula} of symfric",
+        tool=f"symfric {version('symfric')}",
+        span=span,
+        rtol=None if step else own.rtol,
+        step=step,
+        interval=(span[1] - span[0]) / INTERVALS,
+        files=("all.c",),
+        exchange=exchange,
+        slopes=not loops,
     )
     build = build_description(what) if fmi == 3 else ""
     size = packed(target, described(what, listed, fmi), build, texts, binary)
     return Exported(
-        target, size, fmi, kind, identifier, listed, binary.name if binary.content else "",
-        binary.missing, own.formula, (write_time, compile_time),
-    )  # fmt: skip
+        path=target,
+        size=size,
+        fmi=fmi,
+        kind=kind,
+        identifier=identifier,
+        variables=listed,
+        binary=binary.name if binary.content else "",
+        missing=binary.missing,
+        method=own.formula,
+        times=(write_time, compile_time),
+    )
 
 
 def _model(

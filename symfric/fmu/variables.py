@@ -78,9 +78,17 @@ def entries(
         return (*found, *_rates(model, number + 2))
     tuned, idle = ("tunable", "") if rtol else ("fixed", "; without effect: steps are fixed")
     tolerance = Entry(
-        _free("rtol", taken), number, "parameter", tuned, "exact", rtol or 1e-6, "1",
-        lower=LEAST_RTOL, upper=LARGEST_RTOL, doc=f"relative tolerance of a step{idle}",
-    )  # fmt: skip
+        name=_free("rtol", taken),
+        reference=number,
+        causality="parameter",
+        variability=tuned,
+        initial="exact",
+        start=rtol or 1e-6,
+        unit="1",
+        lower=LEAST_RTOL,
+        upper=LARGEST_RTOL,
+        doc=f"relative tolerance of a step{idle}",
+    )
     attempts = Entry(
         _free("attempts", taken), number + 1, "local", "discrete", "calculated", unit="1",
         doc="steps of the integrator so far, rejected ones included",
@@ -138,9 +146,20 @@ def _bounded(
 ) -> Entry:  # fmt: skip
     nominal = v.nominal if v.nominal != 1.0 else None
     return Entry(
-        v.name, number, causality, variability, initial, start, v.unit, nominal, v.lower, v.upper,
-        v.doc, needs, kind=kind,
-    )  # fmt: skip
+        name=v.name,
+        reference=number,
+        causality=causality,
+        variability=variability,
+        initial=initial,
+        start=start,
+        unit=v.unit,
+        nominal=nominal,
+        lower=v.lower,
+        upper=v.upper,
+        doc=v.doc,
+        needs=needs,
+        kind=kind,
+    )
 
 
 def _free(name: str, taken: set[str]) -> str:

@@ -148,20 +148,20 @@ def draw(seed: int, number: int) -> Case:
         if scene == "drive" or dice.chance(0.3)
     }
     return Case(
-        seed,
-        number,
-        scene,
-        text,
-        values,
-        forms,
-        tuple(name for name in values if dice.chance(0.5)) if dice.chance(0.15) else (),
-        _starts(dice, scene, law, values),
-        inputs,
-        t_start,
-        t_start + span,
-        rtol,
-        dice.pick(ADAPTED if scene in MECHANISMS and not dice.chance(0.1) else METHODS),
-        "compiled" if scene in ("rabinowicz", "drive") and dice.chance(0.01) else "vm",
+        seed=seed,
+        number=number,
+        scene=scene,
+        law=text,
+        values=values,
+        forms=forms,
+        free=tuple(name for name in values if dice.chance(0.5)) if dice.chance(0.15) else (),
+        x0=_starts(dice, scene, law, values),
+        inputs=inputs,
+        t_start=t_start,
+        t_end=t_start + span,
+        rtol=rtol,
+        method=dice.pick(ADAPTED if scene in MECHANISMS and not dice.chance(0.1) else METHODS),
+        backend="compiled" if scene in ("rabinowicz", "drive") and dice.chance(0.01) else "vm",
     )
 
 

@@ -301,11 +301,15 @@ def _machine(mechanism: Mechanism | str | Path, p: Variables, options: Options) 
     y, yd, ydd = (symbols_of(group) for group in groups)
     T_sx = ca.SX(T)
     return _Machine(
-        mechanism.name, eq, joints, tuple(v for group in groups for v in group), parameters,
-        [eq.q, eq.qd, eq.a, eq.lam, symbols_of(u)],
-        [T_sx @ y + offset, T_sx @ yd, T_sx @ ydd, ca.SX.zeros(eq.m), ca.SX(starts_of(u))],
-        T,
-    )  # fmt: skip
+        name=mechanism.name,
+        eq=eq,
+        joints=joints,
+        inputs=tuple(v for group in groups for v in group),
+        parameters=parameters,
+        symbols=[eq.q, eq.qd, eq.a, eq.lam, symbols_of(u)],
+        values=[T_sx @ y + offset, T_sx @ yd, T_sx @ ydd, ca.SX.zeros(eq.m), ca.SX(starts_of(u))],
+        T=T,
+    )
 
 
 def _check(eq: Equations, mechanism: Mechanism) -> None:

@@ -72,7 +72,15 @@ def rubbing(contact: Contact, along: str, normal: ca.SX, h: ca.SX, *, fold: bool
         [contact.slip, normal, h if sizes else ca.SX(0, 1)],
     )
     parameters = tuple(v for v in block.parameters if v.name != "h")
-    return Rubbing(along, block, force, (*parameters, *level), block.states, following, sliding)
+    return Rubbing(
+        along=along,
+        law=block,
+        force=force,
+        parameters=(*parameters, *level),
+        states=block.states,
+        following=following,
+        sliding=sliding,
+    )
 
 
 def _level(friction: JointFriction) -> Variables:
