@@ -30,8 +30,8 @@ def page() -> str:
         "otherwise. ``symfric bench SUBJECT`` measures on your machine; ``python -m "
         "docs.machine.measure SUBJECT`` stores what it finds for this page.\n\n"
         "*Load* is the mean number of processes that wanted a processor before and after, of which "
-        "the machine has two. Above two, times are too long; counts and errors are not touched by "
-        "it, ratios within a table hardly.\n\n"
+        "the machine has two. Above two, times are too long, and their ratios are off, too; counts "
+        "and errors are not touched by it.\n\n"
     )
     return text + "".join(section(name, found) for name, found in stored().items())
 
@@ -55,7 +55,7 @@ def shown(tables: Iterable[Mapping[str, Any]]) -> Iterable[str]:
     """Tables with their titles."""
     for one in tables:
         if one["title"]:
-            yield f"**{sentence(one['title'])}**\n\n"
+            yield f"**{rst.plain(one['title'].replace('`', ''))}**\n\n"
         rows = [[sentence(cell) for cell in row] for row in one["rows"]]
         yield rst.table([sentence(c) for c in one["columns"]], rows)
 

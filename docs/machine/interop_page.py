@@ -49,12 +49,9 @@ def moves(lines: Sequence[Row]) -> str:
 
 def cell(line: Row) -> str:
     """What one tool made of the move: its miss, iterations and seconds, or why it ended."""
-    if line["miss"] in ("nan", "-"):
+    if line[""] or line["miss"] in ("nan", "-"):
         return rst.plain(line[""] or "none")
-    found = f"{float(line['miss']):.1e}"
-    return rst.plain(
-        f"{line['']} ({found})" if line[""] else f"{found}, {line['it.']}, {line['s']} s"
-    )
+    return rst.plain(f"{float(line['miss']):.1e}, {line['it.']}, {line['s']} s")
 
 
 def integrators(lines: Sequence[Row]) -> str:

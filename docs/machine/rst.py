@@ -51,7 +51,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") ->
     lines: list[str] = []
     for row in (head, *rows) if head else rows:
         for k, cell in enumerate(row):
-            first, *others = cell.splitlines() or [""]
+            first, *others = (r"\-" if cell == "-" else cell).splitlines() or [""]
             lines.append(f"{'* -' if k == 0 else '  -'} {first}".rstrip())
             lines += [f"    {line}".rstrip() for line in others]
     heads = {"header_rows": "1"} if head else {"stub_columns": "1", "class": "facts"}

@@ -40,3 +40,7 @@ def test_an_initial_begins_no_list() -> None:
     assert rst.plain("A. Janot: x_1") == r"A\. Janot: x\_1"
     assert rst.plain("1) so") == r"1\) so"
     assert rst.plain("2.5 m") == "2.5 m"
+
+
+def test_a_dash_in_a_table_begins_no_list() -> None:
+    assert rst.table(["a", "b"], [["x", "-"]]).rstrip().endswith("   * - x\n     - \\-")
