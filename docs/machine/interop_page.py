@@ -44,14 +44,15 @@ def moves(lines: Sequence[Row]) -> str:
         cost = " ... ".join(dict.fromkeys((costs[0], costs[-1]))) if costs else ""
         cells = [cell(own[tool]) if tool in own else "" for tool in TOOLS]
         body.append([f":doc:`{law} </laws/{law}>`", ROUTES[route], cost, *cells])
-    return rst.table(head, body, "numbers")
+    return rst.table(head, body)
 
 
 def cell(line: Row) -> str:
     """What one tool made of the move: its miss, iterations and seconds, or why it ended."""
     if line[""] or line["miss"] in ("nan", "-"):
         return rst.plain(line[""] or "none")
-    return rst.plain(f"{float(line['miss']):.1e}, {line['it.']}, {line['s']} s")
+    miss = f"{float(line['miss']):.1e}".replace("e-0", "e-")
+    return rst.plain(f"{miss}, {line['it.']}, {line['s']} s")
 
 
 def integrators(lines: Sequence[Row]) -> str:
