@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, ClassVar, final
 
 from symfric.foundation.numeric import Scalar, is_casadi, is_number
 
@@ -27,7 +27,18 @@ HEAD = f"{CELL};border-bottom:1px solid #888;font-weight:600"
 
 
 class Showing(ABC):
-    """What shows itself: `repr` in one screen, and as HTML in notebooks."""
+    """What shows itself: `repr` in one screen, and as HTML in notebooks.
+
+    Attributes:
+        hidden: names that completion leaves out: what other parts of the program ask.
+    """
+
+    hidden: ClassVar[frozenset[str]] = frozenset(
+        {"hidden", "shown", "thumbnail", "to_pack", "packed_as"}
+    )
+
+    def __dir__(self) -> list[str]:
+        return sorted(set(super().__dir__()) - self.hidden)
 
     @abstractmethod
     def shown(self) -> "Shown":
@@ -155,8 +166,8 @@ def _html_table(table: Table) -> str:
 
     head = f"<thead><tr>{cells(table.header, 'th', HEAD)}</tr></thead>" * any(table.header)
     body = "".join(f"<tr>{cells(row, 'td', CELL)}</tr>" for row in table.rows)
-    table = f'<table style="{TABLE}">{head}<tbody>{body}</tbody></table>'
-    return f'<div style="overflow-x:auto">{table}</div>'  # narrow cells scroll it
+    whole = f'<table style="{TABLE}">{head}<tbody>{body}</tbody></table>'
+    return f'<div style="overflow-x:auto">{whole}</div>'  # narrow cells scroll it
 
 
 def _image(figure: "Figure", words: str) -> str:

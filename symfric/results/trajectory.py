@@ -72,6 +72,10 @@ class Trajectory(Showing, Derivatives):
         keep: what a file and a pickle hold of it.
     """
 
+    hidden = Showing.hidden | {
+        "count", "delays", "ends", "evaluate", "express", "keep", "pull_back", "states",
+    }  # fmt: skip
+
     scene: str
     t: Array
     units: dict[str, str]

@@ -94,3 +94,10 @@ def test_a_figure_says_the_range_of_its_columns() -> None:
     assert on_a_screen(repr(data))
     assert repr(data).startswith("figure 'profile': ")
     assert len(shown(data).pictures) == 1
+
+
+def test_completion_offers_what_users_ask_for() -> None:
+    run = simulate(rabinowicz(BrownMcPhee()), 0.1, samples=11)
+    offered = {name for name in dir(run) if not name.startswith("_")}
+    assert {"at", "plot", "save", "extremes", "t", "final", "sensitivities"} <= offered
+    assert offered.isdisjoint({"evaluate", "express", "keep", "packed_as", "shown", "hidden"})
