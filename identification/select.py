@@ -45,6 +45,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 INTERRUPTED = "interrupted by the user"
+HEADER = ("law", "validation", "fit", "AICc", "BIC", "par.", "op.", "status", "")
+NUMBERS = (1, 2, 3, 4, 5, 6)
+"""What tables of laws hold, and which of it are numbers."""
+LOST = "not fitted"
 OWN = ("kind", "what", "data")
 """Arguments of a fit that `select` gives itself."""
 
@@ -79,6 +83,17 @@ class Row:
     seconds: float
     sentence: str
     fit: Fitted | None
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """It below `HEADER`, as text."""
+        numbers = (
+            *map(percent, (self.validation, self.fitted)), *map(_number, (self.aicc, self.bic)),
+            str(self.parameters), "-" if self.operations is None else str(self.operations),
+        )  # fmt: skip
+        if self.fit is None:
+            numbers = ("-",) * len(numbers)
+        return self.law, *numbers, self.status or LOST, self.sentence
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data; numbers that are none are None."""
@@ -126,44 +141,30 @@ class Ranking:
         checks.choice("select: law", law, [row.law for row in self.rows])
         return next(row for row in self.rows if row.law == law)
 
+    @property
+    def title(self) -> str:
+        """The data and what was validated, in a line."""
+        return f"laws on {self.data}: {self.how}; {self.effective:.0f} effective samples"
+
     def __str__(self) -> str:
-        wide = max([len(row.law) for row in self.rows], default=4)
-        lines = [f"laws on {self.data}: {self.how}; {self.effective:.0f} effective samples"]
-        lines.append(
-            f"{'law':{wide}}  {'validation':>10}  {'fit':>8}  {'AICc':>8}  {'BIC':>8}  "
-            f"{'par.':>4}  {'op.':>4}  status"
-        )
-        for row in self.rows:
-            if row.fit is None:
-                lines.append(f"{row.law:{wide}}  not fitted: {row.sentence}")
-                continue
-            operations = "-" if row.operations is None else str(row.operations)
-            lines.append(
-                f"{row.law:{wide}}  {percent(row.validation):>10}  {percent(row.fitted):>8}  "
-                f"{_number(row.aicc):>8}  {_number(row.bic):>8}  {row.parameters:>4}  "
-                f"{operations:>4}  {row.status}"
-            )
-        return "\n".join(lines)
+        lines = [HEADER[:-1], *(row.cells[:-1] for row in self.rows if row.fit is not None)]
+        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+        widths[0] = max(widths[0], *(len(row.law) for row in self.rows), 0)
+        texts = [
+            "  ".join(
+                text.rjust(w) if j in NUMBERS else text.ljust(w)
+                for j, (text, w) in enumerate(zip(line, widths, strict=True))
+            ).rstrip()
+            for line in lines
+        ]
+        lost = [f"{r.law:{widths[0]}}  {LOST}: {r.sentence}" for r in self.rows if r.fit is None]
+        return "\n".join([self.title, *texts, *lost])
 
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction]
         """What a notebook shows: the table and its picture."""
-        header = ("law", "validation", "fit", "AICc", "BIC", "parameters", "status", "")
-        rows = tuple(
-            (
-                row.law,
-                *map(percent, (row.validation, row.fitted)),
-                *map(_number, (row.aicc, row.bic)),
-                str(row.parameters),
-                row.status or "not fitted",
-                row.sentence,
-            )
-            for row in self.rows
-        )
         drawn = any(row.fit is not None for row in self.rows)
-        shown = Shown(
-            f"laws on {self.data}: {self.how}", table=Table(header, rows, (1, 2, 3, 4, 5))
-        )
-        return shown.html(self.plot() if drawn else None)
+        table = Table(HEADER, tuple(row.cells for row in self.rows), NUMBERS)
+        return Shown(self.title, table=table).html(self.plot() if drawn else None)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but the fits as plain data."""

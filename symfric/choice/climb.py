@@ -27,13 +27,13 @@ LOOSER = (1e-6, 1e-5, 1e-4)
 """Relative tolerances for runs that take too many attempts at another."""
 COARSE, FINEST = 1e-6, 1e-11
 """Relative tolerances of the runs on the way to dry friction, and the finest of all."""
-NEAR = 100.0
+NEAR = 10.0
 """Beyond so many times the accuracy a coarse run says enough."""
 AS_NEAR = 2.0
 """Errors of a law that never keeps the accuracy are alike within this ratio of its smallest."""
 FINER = 3
 """Times the attempts of a coarse run that a fine one takes, about."""
-ON_THE_WAY = 0.4
+ON_THE_WAY = 0.6
 """Share of the budget for the way to dry friction; the rest is for the run at equal error."""
 
 
@@ -53,7 +53,7 @@ class Asked:
     @property
     def fine(self) -> float:
         """Relative tolerance at which the integrator's error is negligible."""
-        return min(1e-7, max(FINEST, 1e-4 * self.accuracy))
+        return min(1e-7, max(FINEST, 1e-3 * self.accuracy))
 
     @property
     def coarse(self) -> float:

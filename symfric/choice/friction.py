@@ -161,13 +161,16 @@ def alike(law: Law, friction: Friction, load: float | None) -> Law:
     known, make = parameters(law), LEVELS.get(type(law))
     same = {"mu_s": friction.mu_s, "mu_d": friction.mu_d}
     values = {name: value for name, value in same.items() if name in known}
-    in_newton = [n for n, p in known.items() if p.role == "level" and p.unit in ("N", "N m")]
+    if make is not None:
+        values |= make(friction, 1.0 if load is None else load)
+    in_newton = [
+        n for n, p in known.items()
+        if p.role == "level" and p.unit in ("N", "N m") and values.get(n) != 0.0
+    ]  # fmt: skip
     if in_newton and load is None:
         raise ValueError(
             f"its levels ({', '.join(in_newton)}) are forces, and the load here is not one number"
         )
-    if make is not None:
-        values |= make(friction, 1.0 if load is None else load)
     fall = fall_of(law)
     if friction.v_s is not None and fall is not None:
         inverse = known[fall].unit in ("s/m", "s/rad")

@@ -140,7 +140,7 @@ def _by_name(axis: Axes, named: Sequence[Row], milliseconds: float) -> None:
     axis.set_yticks(range(len(named)), [f"{row.law}  {row.rank}" for row in named], fontsize=SMALL)
     axis.set(xscale="log")
     axis.set_xlabel(
-        f"work [million instructions], {milliseconds:.2g} ms each here",
+        f"work [million instructions]\n{milliseconds:.2g} ms each here",
         fontsize=SMALL + 1,
     )
     axis.set_ylim(len(named) - 0.4, -0.6)

@@ -97,6 +97,9 @@ RATIO, SHORTER = 4.0, 2.0
 """From one softness of the ladder to the next; towards dry friction after a run that failed."""
 LEAP = 4
 """Rungs that are left out once where errors stay the same."""
+LEAST_ORDER, SAME_ORDER, LONGEST, WITHIN = 0.2, 0.2, 3, 0.8
+"""Errors follow a power of the softness if it is so large, and changes by no more than this share;
+then so many rungs at most are made in one, to this share of the wanted error."""
 ANOTHER = "it tends to another motion"
 DRIEST, SOFTEST = 16, 5
 """Rungs on either side of the law as it comes."""
@@ -174,7 +177,7 @@ def ladder(
     rungs, stopped = [run(1.0)], ""
     ratio, leapt = RATIO, False
     while scalable and not stopped and not _kept(rungs, wanted):
-        step = ratio
+        step = ratio if ratio < RATIO else _stride(rungs, wanted)
         if _settled(rungs):  # a law whose widths are far from the machine's speeds looks so, too
             step, stopped = ratio**LEAP, ANOTHER if leapt else ""
             leapt = True
@@ -194,6 +197,18 @@ def ladder(
 def _kept(rungs: list[Rung], wanted: float) -> bool:
     """Whether two runs in a row keep the error."""
     return len(rungs) > 1 and max(rung.error for rung in rungs[-2:]) <= wanted
+
+
+def _stride(rungs: list[Rung], wanted: float) -> float:
+    """Ratio to the next run: to where errors that follow a power are at `wanted`."""
+    if len(rungs) < 3 or not all(0.0 < rung.error < inf for rung in rungs[-3:]):
+        return RATIO
+    e = [log(rung.error) for rung in rungs[-3:]]
+    s = [log(rung.s) for rung in rungs[-3:]]
+    before, order = ((e[k] - e[k + 1]) / (s[k] - s[k + 1]) for k in (0, 1))
+    if order < LEAST_ORDER or abs(order - before) > SAME_ORDER * order:
+        return RATIO
+    return min(max((rungs[-1].error / (WITHIN * wanted)) ** (1 / order), RATIO), RATIO**LONGEST)
 
 
 def _settled(rungs: list[Rung]) -> bool:

@@ -87,7 +87,7 @@ JUDGED = (
     ),
     Mutant(
         "errors between two rungs follow another power", CHOICE + "softness.py",
-        "** (1 / order)", "** order", T_JUDGED,
+        "(wanted / good.error) ** (1 / order)", "(wanted / good.error) ** order", T_JUDGED,
     ),
     Mutant(
         "bristles are damped another way as they grow stiff", CHOICE + "softness.py",

@@ -56,6 +56,14 @@ def test_errors_that_stay_the_same_are_followed_once_by_a_leap() -> None:
     assert (len(other.rungs), other.stopped) == (5, "it tends to another motion")
 
 
+def test_errors_that_follow_a_power_are_followed_in_strides() -> None:
+    """0.5 s^(1/2) is 1e-3 at s = 4e-6: seven runs, where four times each would take eleven."""
+    found = ladder(lambda s: Rung(s, 0.5 * s**0.5, 1), 1e-3, 1e-3, True, (ValueError,))
+    assert len(found.rungs) == 7
+    assert [rung.s for rung in found.rungs[:4]] == pytest.approx([1, 1 / 4, 1 / 16, 1 / 1024])
+    assert found.softest(1e-3) == pytest.approx(4e-6)
+
+
 def test_where_a_drier_run_fails_shorter_steps_are_tried() -> None:
     def run(s: float) -> Rung:
         if s < 0.1:
