@@ -221,7 +221,7 @@ def plot_figure(data: "FigureData", path: str | Path | None = None) -> Figure:
     abscissae = {x for x, _ in data.panels}
     height = {1: 4.0, 2: 2.6}.get(len(data.panels), 1.7)
     figure, axes = panels(len(data.panels), 7.0, height, shared=len(abscissae) == 1)
-    drawn, omitted = clear(data.curves)
+    drawn, omitted = clear(data.curves, loops=data.name == "hysteresis")
     for axis, panel in zip(axes, data.panels, strict=True):
         _curves(axis, data, panel, drawn, laws if len(laws) > 1 else ())
         if axis is not axes[-1] and len(abscissae) == 1:
@@ -237,16 +237,18 @@ def plot_figure(data: "FigureData", path: str | Path | None = None) -> Figure:
     return save(figure, path)
 
 
-def clear(curves: Sequence[Curve]) -> tuple[list[Curve], str]:
+def clear(curves: Sequence[Curve], *, loops: bool = False) -> tuple[list[Curve], str]:
     """Those of `curves` that can be told apart in one picture, and a word about the others.
 
-    Where laws are compared these are no references, and of three laws and more the first and the
-    last case.
+    Where laws are compared these are no references; of three laws and more the first and the last
+    case, and of `loops` within loops, which lie on each other, the first.
     """
     laws = {c.law for c in curves}
     shown = [c for c in curves if not (c.reference and len(laws) > 1)]
     cases = list(dict.fromkeys(c.case for c in shown))
-    if len(laws) > 2 and len(cases) > 2:
+    if loops and len(laws) > 1:
+        shown = [c for c in shown if c.case == cases[0]]
+    elif len(laws) > 2 and len(cases) > 2:
         shown = [c for c in shown if c.case in (cases[0], cases[-1])]
     left = list(dict.fromkeys(c.case for c in curves if c not in shown))
     return shown, f"not drawn: {', '.join(left)}" if left else ""

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from symfric import BrownMcPhee, Karnopp, LuGre, law_from_text, with_values
-from symfric.figures import compare, figure
+from symfric.figures import compare, figure, hysteresis
 from symfric.figures.data import Curve, FigureData
 from symfric.figures.nature import behaviours
 from symfric.figures.pictures import clear, decades, plot_catalogue, plot_figure, plot_laws, window
@@ -165,7 +165,7 @@ def test_one_colour_a_law_one_line_style_a_case() -> None:
 @pytest.mark.slow
 def test_of_many_laws_the_first_and_last_case_are_drawn_and_all_are_in_the_data() -> None:
     data = compare(["lugre", "gms", "dahl"], "hysteresis")
-    drawn, said = clear(data.curves)
+    drawn, said = clear(data.curves)  # as of any figure
     assert (len(data.curves), len(drawn), said) == (9, 6, "not drawn: 5x")
 
 
@@ -176,3 +176,11 @@ def test_measured_levels_stand_above_zero() -> None:
                       log=("rate",), dots=True)  # fmt: skip
     axis = plot_figure(data).axes[0]
     assert axis.get_ylim() == pytest.approx((0.0, 1.1), rel=1e-3)
+
+
+def test_loops_of_several_laws_are_drawn_at_one_speed_and_the_picture_says_so() -> None:
+    figure = compare(["lugre", "maxwell_slip"], "hysteresis").plot()
+    (axis,) = figure.axes
+    assert [line.get_label() for line in axis.lines] == ["lugre, 1x", "maxwell_slip, 1x"]
+    assert axis.get_title(loc="left") == "not drawn: 5x, 20x"
+    assert len(hysteresis(LuGre()).plot().axes[0].lines) == 3  # of one law
