@@ -81,15 +81,15 @@ def _identifier(name: object) -> bool:
 
 def _moving(where: str, pairs: Iterable[tuple[str, str]], joints: Sequence[Joint]) -> Iterator[str]:
     """Joints that do not exist, and directions in which they do not move."""
-    known = {joint.name: joint.directions for joint in joints}
+    known = {joint.name: joint for joint in joints}
     for name, direction in pairs:
         if name not in known:
             near = get_close_matches(name, list(known), n=1, cutoff=0.4)
             hint = f"; did you mean {near[0]}?" if near else ""
             yield f"{where}: expected a joint, got {name}{hint}"
-        elif direction not in known[name]:
-            expected = " or ".join(known[name]) or "a joint that moves along an axis"
-            yield f"{where} > direction: expected {expected}, got {direction}"
+        elif known[name].way(direction) not in known[name].directions:
+            expected = " or ".join(known[name].directions) or "a joint that moves along an axis"
+            yield f"{where} > direction: expected {expected}, got {direction or 'none'}"
 
 
 def _place(where: str, place: str, bodies: Mapping[str, Body]) -> Iterator[str]:

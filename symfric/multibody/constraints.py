@@ -111,6 +111,8 @@ def wraps(kin: Kinematics, joint: Joint, direction: str) -> bool:
 class PrescribedMotion(Constraint):
     """A joint moves as a function of time says: s = motion(t).
 
+    A joint with one direction needs no `direction`; of others it is "turn" where nothing is said.
+
     `motion` takes the SX symbol of time and returns a displacement [m] or angle [rad], twice
     differentiable; it may contain parameters, but no input, whose derivatives nobody knows. Its
     multiplier is the force `<name>_force` [N] or moment `<name>_moment` [N m] on the joint's child
@@ -125,7 +127,7 @@ class PrescribedMotion(Constraint):
 
     joint: str
     motion: Callable[[ca.SX], Scalar]
-    direction: str = "turn"
+    direction: str = ""
 
     def joints(self) -> Iterable[tuple[str, str]]:
         """The joint that is driven, and along which direction."""
@@ -147,8 +149,9 @@ class PrescribedMotion(Constraint):
         if target.numel() != 1:
             return impossible(f"motion: expected one expression, got {target.numel()}")
         joint = joints[self.joint]
-        period = 2 * pi if wraps(kin, joint, self.direction) else None
-        return linear(kin, self.name, [(joint, self.direction, 1.0)], target, period)
+        direction = joint.way(self.direction)
+        period = 2 * pi if wraps(kin, joint, direction) else None
+        return linear(kin, self.name, [(joint, direction, 1.0)], target, period)
 
 
 @final

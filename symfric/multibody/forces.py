@@ -177,6 +177,8 @@ class SpringDamper(Force):
 class JointSpringDamper(Force):
     """Spring, damper and actuator in one of the directions of a joint: "slide", "turn", ...
 
+    A joint with one direction needs none; of others it is "turn" where nothing is said.
+
         f = -stiffness (s - rest) - damping s' + actuator
 
     with s the displacement [m] or angle [rad]; f acts on the child, its opposite on the parent.
@@ -186,7 +188,7 @@ class JointSpringDamper(Force):
     """
 
     joint: str
-    direction: str = "turn"
+    direction: str = ""
     stiffness: Scalar = 0.0
     rest: Scalar = 0.0
     damping: Scalar = 0.0
@@ -204,18 +206,20 @@ class JointSpringDamper(Force):
     def loads(self, kin: Kinematics, joints: dict[str, Joint]) -> Iterator[Load | Axial]:
         """One load along the direction of its joint: actuator, spring and damper."""
         joint = joints[self.joint]
+        direction = joint.way(self.direction)
         f = ca.SX(self.actuator)
         if not equals(self.stiffness, 0.0):
-            f -= self.stiffness * (kin.along(joint, self.direction)[0] - self.rest)
+            f -= self.stiffness * (kin.along(joint, direction)[0] - self.rest)
         if not equals(self.damping, 0.0):
-            f -= self.damping * kin.rate(joint, self.direction)
-        yield Axial(joint, self.direction, f)
+            f -= self.damping * kin.rate(joint, direction)
+        yield Axial(joint, direction, f)
 
     def energy(self, kin: Kinematics, joints: dict[str, Joint]) -> ca.SX:
         """Stiffness (s - rest)^2 / 2."""
         if equals(self.stiffness, 0.0):
             return ca.SX(0)
-        s, _ = kin.along(joints[self.joint], self.direction)
+        joint = joints[self.joint]
+        s, _ = kin.along(joint, joint.way(self.direction))
         return self.stiffness * (s - self.rest) ** 2 / 2
 
 

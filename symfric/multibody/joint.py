@@ -87,6 +87,13 @@ class Joint(ABC):
         """What is wrong with its own numbers."""
         return iter(())
 
+    def way(self, direction: str) -> str:
+        """The direction that is meant; of none, the only one, else "turn" where it can turn."""
+        if direction:
+            return direction
+        (only,) = self.directions if len(self.directions) == 1 else ("turn",)
+        return only
+
     def linear(self, direction: str) -> bool:
         """Whether motion in this direction is a translation [m], not a rotation [rad]."""
         return self.coordinates[self.directions[direction]][1] == "m"

@@ -20,6 +20,7 @@ from symfric.multibody import (
     Revolute,
     Spherical,
     SpringDamper,
+    Universal,
 )
 
 LAW = BrownMcPhee()
@@ -88,9 +89,17 @@ MISTAKES: dict[str, tuple[Callable[[Mechanism], object], str]] = {
         lambda m: (
             m.body("block", 1.0, (1.0, 1.0, 1.0)),
             m.joint(Prismatic("rail", "ground", "block")),
-            m.force(JointSpringDamper("motor", "rail")),
+            m.force(JointSpringDamper("motor", "rail", "turn")),
         ),
         "> force 'motor' > direction: expected slide, got turn",
+    ),
+    "one way of several": (
+        lambda m: (
+            m.body("block", 1.0, (1.0, 1.0, 1.0)),
+            m.joint(Universal("cross", "ground", "block")),
+            m.force(JointSpringDamper("motor", "cross")),
+        ),
+        "> force 'motor' > direction: expected x or y, got none",
     ),
     "loose body": (
         lambda m: m.body("bob", 1.0, (1.0, 1.0, 1.0)),

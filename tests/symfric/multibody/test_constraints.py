@@ -85,7 +85,7 @@ def test_pivot_that_is_shaken_drives_the_pendulum() -> None:
     m.frame("bob.pivot", at=(0.0, 0.0, L), z=Y)
     m.joint(Prismatic("x", "ground.rail", "cart.rail", rate=A * w))
     m.joint(Revolute("theta", "cart.pivot", "bob.pivot", start=0.5))
-    m.constraint(PrescribedMotion("shaker", "x", lambda t: A * ca.sin(w * t), "slide"))
+    m.constraint(PrescribedMotion("shaker", "x", lambda t: A * ca.sin(w * t)))
     run = simulate(m.build(), 3.0, rtol=1e-9, samples=301)
 
     def rate(t: float, y: np.ndarray) -> list[float]:
@@ -280,7 +280,7 @@ def test_a_run_that_starts_later_starts_where_the_drive_is() -> None:
 MISTAKES: dict[str, tuple[Constraint, str]] = {
     "no joint": (PrescribedMotion("d", "y", lambda t: t), "> drive 'd': expected a joint, got y"),
     "no direction": (
-        PrescribedMotion("d", "x", lambda t: t),
+        PrescribedMotion("d", "x", lambda t: t, "turn"),
         "> drive 'd' > direction: expected slide, got turn",
     ),
     "two motions": (

@@ -1,10 +1,20 @@
 """Forces: power is minus the rate of their energy, actuators do what their rate says."""
 
+from math import cos
+
 import casadi as ca
 import pytest
 from chains import chain, state
 
-from symfric.multibody import Gravity, JointSpringDamper, SpringDamper, UserForce
+from symfric import simulate
+from symfric.multibody import (
+    Gravity,
+    JointSpringDamper,
+    Mechanism,
+    Prismatic,
+    SpringDamper,
+    UserForce,
+)
 from symfric.multibody.equations import equations
 from symfric.multibody.forces import Axial, Force, Load
 
@@ -14,6 +24,7 @@ CONSERVATIVE: dict[str, Force] = {
     "spring without length": SpringDamper("s", "b1.out", "b4", stiffness=30.0),
     "torsion": JointSpringDamper("t", "j0", "turn", 5.0, 0.3),
     "sliding spring": JointSpringDamper("t", "j2", "slide", 5.0, 0.3),
+    "torsion, of the only direction": JointSpringDamper("t", "j0", stiffness=5.0, rest=0.3),
     "spring in a turn of a cylinder": JointSpringDamper("t", "j2", "turn", 5.0, 0.3),
 }
 
@@ -106,3 +117,19 @@ def test_absent_terms_cost_nothing() -> None:
         for more in ((), (1.0,), (1.0, 2.0))
     )
     assert linear < spring < damped
+
+
+def test_a_slide_needs_no_direction() -> None:
+    """Released at 0.1 m on a rail: x = 0.1 cos(w t), w^2 = k / m."""
+    m = Mechanism("cart", gravity=(0.0, 0.0, 0.0))
+    m.body("block", 2.0, (1.0, 1.0, 1.0))
+    m.joint(Prismatic("rail", "ground", "block", start=0.1))
+    m.force(JointSpringDamper("spring", "rail", stiffness=18.0))
+    assert simulate(m.build(), 1.0, rtol=1e-9).final["rail"] == pytest.approx(
+        0.1 * cos(3.0), abs=1e-9
+    )
+
+
+def test_of_a_joint_that_slides_and_turns_the_turn_is_meant_as_ever() -> None:
+    said, meant = (JointSpringDamper("t", "j2", way, 5.0, 0.3) for way in ("", "turn"))
+    assert power_of(said) == power_of(meant)
