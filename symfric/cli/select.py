@@ -1,12 +1,12 @@
 """`symfric select`: rank friction laws on a machine, and say which to take."""
 
 import signal
+import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import replace
 from os import cpu_count
 from pathlib import Path
-from sys import stderr
 from textwrap import fill
 from time import perf_counter
 from typing import Annotated, Any
@@ -207,7 +207,7 @@ def told(text: str) -> Generator[Callable[[str, float], None]]:
         def say(name: str, share: float) -> None:
             nonlocal last
             tell(share)
-            if not stderr.isatty() and perf_counter() - last > OFTEN:
+            if not sys.stderr.isatty() and perf_counter() - last > OFTEN:
                 last = perf_counter()
                 output.note(f"{text}: {100 * share:.0f} % after {last - began:.0f} s, {name} last")
 
