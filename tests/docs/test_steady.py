@@ -1,6 +1,7 @@
 """Numbers with more digits than they deserve are found, others are let alone."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,8 @@ def test_a_number_that_is_another_is_told_and_a_count_by_rounding_alone() -> Non
     assert told(good, piece("x 1.235 m, 634 steps"), LOOSER) == ["1.234 is 1.235"]
     assert told(good, piece("x 1.234 m, 640 steps"), LOOSER) == []
     assert told(good, piece("x 1.234 m, 640 steps"), BITS) == ["634 is 640"]
+    below = Piece("code", "-634 steps", "-634 steps", ())
+    assert told(below, replace(below, printed="-640 steps"), LOOSER) == []
     assert told(good, piece("x -0.0 m"), BITS) == ["the text of a block is another"]
 
 
@@ -36,6 +39,9 @@ def test_a_number_that_soon_will_be_another_is_told_with_its_value() -> None:
     edge, beside = piece(text, ("1.234", 1.23445)), piece(text, ("1.234", 1.23441))
     (found,) = findings("page", {HERE: [edge], LOOSER: [beside]})
     assert found.moved == pytest.approx(0.04) and found.room == pytest.approx(0.05)
+    farther = piece(text, ("1.234", 1.2344))
+    runs = {HERE: [edge], LOOSER: [farther], BITS: [beside]}
+    assert [(f.moved, f.under) for f in findings("page", runs)] == [(pytest.approx(0.05), LOOSER)]
     unseen = Piece("code", text, "x 1.2... m, 634 steps", edge.values)
     assert told(unseen, beside, LOOSER) == []
 
@@ -51,8 +57,10 @@ def test_tolerances_of_a_page_are_nudged_and_what_it_formats_is_heard(tmp_path: 
         "run = simulate(rabinowicz(LuGre()), 5.0, backend='vm')\n"
         "print(f'{run.final[\"x\"]:.3f} {run.statistics.steps} {run.scene!r} {1.5:>6.2f}')\n```\n"
         "```text\n0.500 ...\n```\n"
+        "```python\nprint(f'{2.5:.1f}')\n```\n"
     )
-    plain, other = (next(iter(printed(page, factor))) for factor in (1.0, 0.5))
+    (plain, second), (other, _) = (printed(page, factor) for factor in (1.0, 0.5))
+    assert second.values == (("2.5", 2.5),)
     run = simulate(rabinowicz(LuGre()), 5.0, backend="vm")
     assert plain.printed == f"{run.final['x']:.3f} {run.statistics.steps} 'rabinowicz'   1.50\n"
     assert plain.values == ((f"{run.final['x']:.3f}", run.final["x"]), ("1.50", 1.5))

@@ -22,6 +22,7 @@ def cart(reach: float, most: float) -> Problem:
         (0.3, 40.0, ""),
         (29.0, 0.07, ""),
         (0.0, 40.0, ""),
+        (0.3, 0.0, ""),
         (300.0, 40.0, "end: x = 300 m is 3000 times its nominal 0.1 m: check the unit."),
         (0.3, 0.04, "bounds: force = 0.04 N is 500 times less than its nominal 20 N"),
     ],
@@ -29,6 +30,13 @@ def cart(reach: float, most: float) -> Problem:
 def test_what_is_odd_is_said_with_its_size(reach: float, most: float, said: str) -> None:
     assert said in doubts(cart(reach, most))
     assert bool(doubts(cart(reach, most))) == bool(said)
+
+
+def test_an_algebraic_variable_has_a_usual_size_too() -> None:
+    x, z, f = Variable("x", "m"), Variable("z", "N", nominal=2.0), Variable("f", "N")
+    model = Model("rod", x=(x,), z=(z,), u=(f,), ode=z.symbol, alg=z.symbol - f.symbol)
+    problem = Problem(Phase(model, 1.0, end={"z": 2000.0}), integral(lambda s: s.f**2))
+    assert "z = 2000 N is 1000 times its nominal 2 N" in doubts(problem)
 
 
 def test_only_a_solve_that_fails_asks() -> None:

@@ -13,6 +13,7 @@ from symfric.choice.nature import otherwise
 from symfric.choice.needs import needed
 from symfric.choice.row import INACCURATE, RANKED, REFUSED, Row, ordered
 from symfric.choice.softness import Ladder, Rung, ladder, softness
+from symfric.choice.text import number, short
 from symfric.choice.verdict import verdict
 from symfric.foundation.parameters import parameters
 from symfric.laws import (
@@ -75,6 +76,11 @@ def test_where_a_drier_run_fails_shorter_steps_are_tried() -> None:
     assert found.stopped == "too dry"
 
 
+def test_an_error_that_falls_too_slowly_is_not_followed_for_ever() -> None:
+    found = ladder(lambda s: Rung(s, 0.4 * s**0.01, 1), 1e-3, 1e-3, True, (ValueError,))
+    assert (len(found.rungs), found.stopped) == (17, "its error falls too slowly")
+
+
 def test_bristles_of_all_stiffnesses_are_damped_alike() -> None:
     """sigma_1^2 / sigma_0 stays, and with it the share of the damping that is critical."""
     law = LuGre(sigma_0=1e5, sigma_1=200.0)
@@ -87,6 +93,8 @@ def test_a_width_at_its_bound_stays_there() -> None:
     law = Gonthier()
     found = parameters(softness(law, Friction(0.2, 0.1), 10.0).at(1e-12))
     assert found["s_eps"].value == parameters(law)["s_eps"].lower
+    with pytest.raises(ValueError, match="v_t"):  # which shapes the law: another one is refused
+        softness(BrownMcPhee(), Friction(0.2, 0.1), 10.0).at(1e-10)
 
 
 def test_the_peaks_of_sums_and_products_are_the_static_level() -> None:
@@ -103,6 +111,7 @@ def test_the_peaks_of_sums_and_products_are_the_static_level() -> None:
 def test_why_a_law_moves_otherwise() -> None:
     assert "rubs with 0.115 of the load, not 0.1" in otherwise(LeineSwitch(), 0.1, 2.0)
     assert otherwise(GMS(), 0.1, 2.0) == "nothing damps its bristle, which rings"
+    assert "by times of its own (tau_dw)" in otherwise(Gonthier(), 0.1, 2.0)
     assert otherwise(LuGre(), 0.1, 2.0) == otherwise(BrownMcPhee(), 0.1, 2.0) == ""
 
 
@@ -123,6 +132,8 @@ def test_ranked_laws_stand_by_work_others_by_error_whatever_the_clock_says() -> 
     assert list(found.items()) == [
         ("fast", 1), ("alike", 1), ("slow", 3), ("close", 4), ("near", 5), ("far", 6), ("none", 0),
     ]  # fmt: skip
+    chain = [replace(ROW, law=name, attempts=n) for name, n in (("x", 100), ("y", 110), ("z", 120))]
+    assert [row.rank for row in ordered(chain)] == [1, 1, 3]  # z is alike with y, not with x
     shuffled = [replace(row, time_s=k) for k, row in enumerate(reversed(rows))]
     assert [row.law for row in ordered(shuffled)] == [*found]
 
@@ -139,8 +150,19 @@ def test_the_verdict_names_the_least_work_the_flattest_and_the_cheapest() -> Non
     assert smooth.startswith("Optimal control: take alike ")
     assert fixed.startswith("Controller: take later: ")  # 4000 operations a second, not 10000
     assert others == "None is left out."
+    near = ordered([ROW, replace(ROW, law="alike", attempts=11, time_s=1e-4)])
+    assert verdict(near, ["stiction"], 1e-4, 0.05)[0].endswith("; alike is as good.")
     counted = [replace(row, core=core) for row, core in zip(rows, (20, 300, 600), strict=True)]
     assert "take a: its C takes 20 instructions on a Cortex-M4F" in verdict(counted, [], 1, 1)[2]
+
+
+def test_numbers_of_the_table_are_short() -> None:
+    assert [short(x) for x in (None, nan, 1.0, 0.0123, 2e5, 3e-12)] == [
+        "-", "-", "1", "1e-2", "2e+05", "3e-12",
+    ]  # fmt: skip
+    assert [number(x) for x in (nan, 123.4, 12.34, 0.1234, 0.0123)] == [
+        "-", "123", "12.3", "0.123", "0.01",
+    ]  # fmt: skip
 
 
 def test_laws_are_ranked_that_fit_as_well_as_the_best() -> None:

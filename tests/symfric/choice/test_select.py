@@ -232,6 +232,9 @@ def test_laws_left_out_stand_by_the_reason(choice: Choice) -> None:
         replace(row, law=n) for row in rows if row.law == "coulomb" for n in ("one", "two")
     )
     assert "lacks, shows no stiction, no stribeck: coulomb" in said
+    tied = {row.rank for row in rows if [r.rank for r in rows].count(row.rank) > 1}
+    marked = [line[2] == "=" for line in said if line[:2].strip().isdigit()]
+    assert marked == [row.rank in tied for row in choice.placed]
     both = list(lines(replace(choice, rows=rows + alike)))
     assert "lacks, shows no stiction, no stribeck: coulomb, one, two" in both
 

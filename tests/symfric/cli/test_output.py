@@ -1,12 +1,14 @@
 """What the commands print."""
 
 import json
+from errno import ENOSPC
 from math import inf, nan
 from pathlib import Path
 
 import pytest
 
 from symfric.cli import output
+from symfric.cli.app import sentence
 
 
 def test_tables_align_numbers_and_stay_within_80_columns(
@@ -66,3 +68,10 @@ def test_a_command_line_of_another_locale_can_be_written_down() -> None:
     kept = "bericht ä.html".encode().decode("ascii", errors="surrogateescape")
     assert output.printable(kept).encode() == "bericht ä.html".encode()
     assert output.printable("bericht ä.html") == "bericht ä.html"
+
+
+def test_a_full_disk_is_told_with_the_way_out() -> None:
+    for file in (("run.npz",), ()):
+        told = sentence(OSError(ENOSPC, "No space left on device", *file))
+        place = " for 'run.npz'" if file else ""
+        assert told.startswith(f"expected room on the disk, got none left{place}; free some")

@@ -63,6 +63,13 @@ def test_names_end_with_what_travelled() -> None:
     assert same(one.mu_s, other.mu_s)
 
 
+def test_a_name_that_another_symbol_has_does_not_make_them_one() -> None:
+    """As a file may say that was put together by hand."""
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    kept = [identity.again([one], [one], ["of both"])[0] for one in (x, y)]
+    assert same(kept[0], x) and same(kept[1], y)
+
+
 def test_the_context_of_casadi_works_as_before() -> None:
     with ca.global_pickle_context():
         data = pickle.dumps(ca.SX.sym("q"))

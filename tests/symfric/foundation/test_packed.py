@@ -1,6 +1,6 @@
 """Packs: frozen data with expressions as plain arrays."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from io import BytesIO
 from math import inf, nan
@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symfric.foundation import packed
+from symfric.foundation import identity, packed
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import Status
@@ -54,6 +54,43 @@ def test_an_object_that_stands_twice_is_one_object() -> None:
     shared = Pair(1, 2)
     back = again(Pair(shared, [shared]))
     assert back.a is back.b[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Shell:
+    """Is packed as a pair that nobody keeps."""
+
+    value: int
+
+    def packed_as(self) -> "Kernel":
+        return Kernel(self.value)
+
+
+@dataclass(frozen=True, eq=False)
+class Kernel:
+    """What is in it."""
+
+    value: int
+
+    def unpacked(self) -> Shell:
+        return Shell(self.value)
+
+
+def test_objects_that_are_made_for_a_pack_are_told_apart() -> None:
+    """Where one is gone the next one may lie in its place."""
+    shells = again([Shell(k) for k in range(50)])
+    assert [shell.value for shell in shells] == [*range(50)]
+
+
+def test_two_symbols_of_one_name_are_a_damaged_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    named = identity.named
+
+    def alike(expressions: Any) -> Any:
+        return tuple(replace(atom, name="of both") for atom in named(expressions))
+
+    monkeypatch.setattr(identity, "named", alike)
+    with pytest.raises(ValueError, match="expected a file that symfric wrote"):
+        load((ca.SX.sym("x"), ca.SX.sym("x")))
 
 
 def test_laws_and_variables() -> None:

@@ -2,13 +2,15 @@
 
 import copy
 import operator
+from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
 
 from symfric import BrownMcPhee, LuGre, Model, Variable, contact, simulate
-from symfric.foundation.symbolic import plain
+from symfric.foundation.symbolic import plain, with_symbols
 from symfric.multibody import JointFriction, Mechanism, Revolute
 
 A, B = Variable("a", "m"), Variable("b", "m/s")
@@ -75,6 +77,15 @@ def test_equality_is_an_expression_where_casadi_or_a_number_asks():
     assert same(A == 0, A.symbol == 0)
     assert same(B.symbol != A, A.symbol != B.symbol)
     assert repr(A == A) == "True"
+    assert same(Variable("c", "1", start=A == B).start, A.symbol == B.symbol)
+    assert same(A * (A == B), A.symbol * (A.symbol == B.symbol))
+
+
+@pytest.mark.filterwarnings("ignore:\\s*casadi:FutureWarning")
+def test_functions_of_numpy_take_variables():
+    assert same(np.dot(np.array([1.0, 2.0]), A), ca.vertcat(A.symbol, 2 * A.symbol))
+    assert same(np.maximum(A, 2.0), ca.fmax(A.symbol, 2.0))
+    assert same(np.clip(A, 0.0, 1.0), ca.fmin(ca.fmax(A.symbol, 0.0), 1.0))
 
 
 def test_what_does_not_fit_is_told():
@@ -96,6 +107,20 @@ def test_plain_goes_into_lists_tuples_and_mappings():
     assert plain({"x": A, "y": 2})["x"] is A.symbol
     given = {"y": 2}
     assert plain(given) is given
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Of a mechanism."""
+
+    at: Any
+
+
+def test_a_part_has_symbols_for_variables_alone_or_in_a_place():
+    assert with_symbols(Part(A)).at is A.symbol
+    assert with_symbols(Part((A, [B, 0.0]))).at[1][0] is B.symbol
+    whole = Part((1.0, A.symbol))
+    assert with_symbols(whole) is whole
 
 
 def test_models_are_the_same_with_variables_and_with_their_symbols():
@@ -132,3 +157,6 @@ def test_variables_in_other_units_are_refused_where_si_is_meant():
         BrownMcPhee(v_t=v)
     with pytest.raises(ValueError, match=r"friction: radius: expected SI .*'d' \[mm\]"):
         JointFriction(LuGre(), radius=Variable("d", "mm"))
+    with pytest.warns(UserWarning, match="no_unit"):
+        own = Variable("v", "no_unit")
+    assert same(BrownMcPhee(v_t=own).v_t, own.symbol)  # of which nobody knows how large it is

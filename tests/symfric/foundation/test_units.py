@@ -1,9 +1,10 @@
 """Units as text, and those of contacts that turn."""
 
 from dataclasses import replace
-from math import pi
+from math import pi, sqrt
 
 import pytest
+from scipy import constants
 
 from symfric import ALL_LAWS, Output, Variable, parameters
 from symfric.foundation.units import in_si, nearest, turned, written
@@ -58,6 +59,7 @@ def test_other_ways_to_write_a_unit_are_taken(text: str, same: str) -> None:
         ("mm/s", 1e-3), ("um", 1e-6), ("%", 0.01), ("rpm", pi / 30), ("deg/s^2", pi / 180),
         ("km/h", 1 / 3.6), ("N/mm^2", 1e6), ("m/s/ms", 1e3), ("1/min", 1 / 60), ("mol/L", 1e3),
         ("mN m", 1e-3), ("10 N", 10.0), ("1e-3 m", 1e-3), ("ms", 1e-3), ("min", 60.0),
+        ("mm^(1/2)", sqrt(1e-3)), ("mm^(2/1)", 1e-6),
     ],
 )  # fmt: skip
 def test_sizes_are_those_of_the_prefixes(text: str, size: float) -> None:
@@ -70,11 +72,25 @@ def test_sizes_are_those_of_the_prefixes(text: str, size: float) -> None:
         ("m/sec", "m/s"), ("newton", "N"), ("Newton meters", "N m"), ("rad/sec", "rad/s"),
         ("meters per second", "m/s"), ("Kg", "kg"), ("N-m", "N m"), ("[m/s]", "m/s"), ("hz", "Hz"),
         ("degrees", "deg"), ("furlong", ""), ("m//s", ""), ("(m", ""), ("N/", ""), ("m,s", ""),
+        ("m)", ""), ("N (mm/s)^d", ""),
     ],
 )  # fmt: skip
 def test_what_is_no_unit_is_told_with_what_is_meant(text: str, meant: str) -> None:
     assert in_si(text) is None
     assert nearest(text) == meant
+
+
+SCIPY = {
+    "degF": "degree_Fahrenheit", "deg": "degree", "arcmin": "arcmin", "arcsec": "arcsec",
+    "min": "minute", "h": "hour", "d": "day", "week": "week", "year": "Julian_year", "in": "inch",
+    "ft": "foot", "lb": "pound", "lbf": "lbf", "kgf": "kgf", "psi": "psi", "atm": "atm",
+    "mmHg": "mmHg", "hp": "hp", "bar": "bar", "cal": "calorie", "L": "liter", "t": "metric_ton",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", [*SCIPY])
+def test_units_outside_the_si_are_as_large_as_scipy_has_them(text: str) -> None:
+    assert in_si(text) == pytest.approx(getattr(constants, SCIPY[text]), rel=1e-6)
 
 
 def test_a_misspelt_unit_is_warned_of_once_in_the_line_that_has_it() -> None:

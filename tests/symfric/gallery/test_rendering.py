@@ -65,6 +65,18 @@ def test_a_plate_refuses_numbers_that_are_not_finite() -> None:
         plate_of(script.__name__, None, float("nan"), "m", {"period [s]": float("inf")}, {})  # type: ignore[arg-type]
 
 
+def test_a_plate_whose_text_is_untrue_is_not_drawn() -> None:
+    import symfric.gallery.self_tuning.fig_07_shape_factor as script  # noqa: PLC0415
+
+    claims = {"it is round": True, "it is flat": False}
+    with pytest.raises(
+        ValueError, match=r"bear out its text, got others for 'it is flat'; correct"
+    ):
+        plate_of(script.__name__, None, 0.1, "m", {}, claims)  # type: ignore[arg-type]
+    held = plate_of(script.__name__, None, 0.1, "m", {}, {"it is round": 1})  # type: ignore[arg-type]
+    assert held.checked == ("it is round",)
+
+
 def test_a_plate_is_written_whole(tmp_path: Path) -> None:
     record = draw(NAME, tmp_path, quick=True)
     assert (tmp_path / f"{NAME}.png").stat().st_size > 10_000

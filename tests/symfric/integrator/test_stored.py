@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from symfric.foundation import packed
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator import Hold, load_run, simulate, simulate_by_peer, simulate_many
@@ -161,6 +162,38 @@ def test_derivatives_between_the_times_of_the_result_are_found_again(tmp_path: P
             assert twice.differentiate is not None
 
 
+def test_what_a_file_holds_is_not_computed_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = simulate(rabinowicz(LuGre(), free=["mu_s"]), 1.0, sensitivities=["mu_s"], samples=11)
+    loaded = through_file(run, tmp_path)
+
+    def never(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr("symfric.integrator.stored.built", never)
+    np.testing.assert_array_equal(loaded["friction"], run["friction"])
+    assert {*loaded.sensitivities["mu_s"]} == {*run.signals}
+    assert loaded.event_sensitivities["mu_s"].size == 0
+
+
+def test_a_motion_without_derivative_says_so_out_of_its_file(tmp_path: Path) -> None:
+    """An event where an input jumps: behind it the motion leads elsewhere in another order."""
+    x, u = Variable("x", "m"), Variable("u", "m/s")
+    done = Event("done", x.symbol - 1.0, terminal=True)
+    model = Model("filled", x=(x,), u=(u,), ode=u.symbol, events=(done,))
+    push = {"u": Hold([0.0, 1.0], [1.0, 2.0])}
+    run = simulate(model, 2.0, u=push, samples=3, sensitivities=["x0.x"])
+    loaded = through_file(run, tmp_path)
+    for asked in ("sensitivities", "event_sensitivities"):
+        told = list[str]()
+        for one in (run, loaded):
+            with pytest.raises(ValueError, match="apart from the jumps of the inputs") as error:
+                getattr(one, asked)
+            told.append(str(error.value))
+        assert told[0] == told[1]
+
+
 def test_an_interrupted_write_leaves_the_old_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -202,6 +235,10 @@ def test_foreign_and_damaged_files_are_refused(tmp_path: Path) -> None:
         load_run(tmp_path / "none.npz")
     with pytest.raises(ValueError, match="expected a saved run, got a folder"):
         load_run(tmp_path)
+    with path.open("wb") as file:
+        packed.dump(file, LuGre(), RUN.kind, RUN.number)
+    with pytest.raises(ValueError, match="expected a saved run, got LuGre"):
+        load_run(path)
 
 
 def test_a_file_of_another_version_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -36,6 +36,7 @@ def test_what_was_varied_is_kept_with_its_unit() -> None:
         "u.force": [2.0, 3.0],
         "t_end": [0.5, 1.0],
     }
+    assert (other.unit("u.force"), other.unit("t_end")) == ("N", "s")
     assert simulate_many(model, 1.0, u={"force": pushes}, backend="vm").varied == {}
 
 
@@ -113,6 +114,11 @@ def test_pictures_over_what_was_varied() -> None:
     np.testing.assert_array_equal(line.get_xdata(), MU)
     np.testing.assert_array_equal(line.get_ydata(), made["x"][:, -1])
     assert figure.axes[1].get_xlabel() == "mu_s"
+    model = rabinowicz(LuGre(), free=["mu_s"])
+    mixed = simulate_many(model, 0.1, p={"mu_s": [0.3, 0.1, 0.2]}, backend="vm")
+    line = mixed.plot("x", over="mu_s").axes[0].lines[0]
+    np.testing.assert_array_equal(line.get_xdata(), [0.1, 0.2, 0.3])
+    np.testing.assert_allclose(line.get_ydata(), 1e3 * mixed["x"][[1, 2, 0], -1])  # mm
     top = made.plot("v", over="mu_s", at="greatest").axes[0].lines[0]
     np.testing.assert_array_equal(top.get_ydata(), made.extremes["v"][1])
     middle = made.plot("x", over="mu_s", at=12.4).axes[0]
@@ -130,6 +136,8 @@ def test_a_second_parameter_of_few_values_gives_a_line_each() -> None:
     made = simulate_many(model, 0.2, p=grid, backend="vm")
     lines = made.plot("x", over="mu_s").axes[0].lines
     assert [line.get_label() for line in lines] == ["k = 1 N/m", "k = 500 N/m"]
+    shown = [line.get_ydata() for line in lines]
+    np.testing.assert_allclose(shown, 1e3 * made["x"].reshape(2, 7))  # mm
     axis = made.plot("x", over="k").axes[0]  # seven of mu_s: points alone
     assert len(axis.lines) == 1
     assert axis.get_xscale() == "log"
@@ -155,6 +163,7 @@ def test_tables_of_pandas() -> None:
     assert frame.index.names == ["member", "t"]
     np.testing.assert_array_equal(frame.loc[3, "x"], made["x"][3])
     assert frame.attrs["units"]["mu_s"] == "1"
+    assert frame.attrs["x0.v"] == 0.01
     ends = simulate_many(rabinowicz(LuGre(), free=["mu_s"]), 1.0, p={"mu_s": MU}, backend="vm")
     assert ends.to_dataframe("x").shape == (7, 2)
 

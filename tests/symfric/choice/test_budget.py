@@ -1,0 +1,137 @@
+"""What runs of a law may cost, and which run it is judged by, with runs that are written down."""
+
+from dataclasses import dataclass, field
+from math import log
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from symfric import Model, SolveError, Status, Variable, rabinowicz, simulate
+from symfric.choice.budget import EVENTS, LEAST, LEAST_WHOLE, Budget, counted
+from symfric.choice.climb import ON_THE_WAY, Asked, at_equal_error, climbed, nearest
+from symfric.choice.machine import Candidate
+from symfric.choice.reference import Reference
+from symfric.choice.softness import Ladder, Rung
+from symfric.figures.regularisation import Sample
+from symfric.laws import LuGre
+from symfric.model import Event
+
+TRUTH = Reference("one", np.ones((1, 1)), np.ones(1), 0.0)
+
+
+@dataclass
+class Written:
+    """A law in a machine: (s, rtol) -> error and attempts; more than are allowed is a failure."""
+
+    error: Any
+    attempts: Any
+    fails: Status = Status.MAX_STEPS
+    asked: list[tuple[float, float]] = field(default_factory=list[tuple[float, float]])
+    law: str = "written down"
+    scalable: bool = True
+
+    @property
+    def machine(self) -> "Written":
+        return self
+
+    def model(self, s: float) -> float:
+        return s
+
+    def run(self, s: float, law: str, rtol: float, most: int) -> Sample:
+        self.asked.append((s, rtol))
+        if (made := self.attempts(s, rtol)) > most:
+            raise SolveError("too many", self.fails, PARTIAL)
+        return Sample(s, {}, rtol, made, made, 0.0, np.array([[1 + self.error(s, rtol)]]), ONE)
+
+
+ONE = np.ones(1)
+PARTIAL = simulate(rabinowicz(LuGre()), 0.01, samples=2, backend="vm")
+TRIED = PARTIAL.statistics.steps + PARTIAL.statistics.rejections
+
+
+def budget(held: Written, instructions: int = 1000, work: int = 20_000_000) -> Budget:
+    return Budget(cast(Candidate, held), instructions, work)
+
+
+def test_no_run_is_made_twice_and_those_that_fail_count() -> None:
+    held = Written(lambda s, _: s, lambda s, _: 100 if s > 0.5 else 10**9)
+    runs = budget(held)
+    assert runs.run(1.0, 1e-6) is runs.run(1.0, 1e-6)
+    assert (runs.attempts, len(held.asked)) == ([100], 1)
+    with pytest.raises(SolveError):
+        runs.run(0.25, 1e-6)
+    assert runs.attempts == [100, TRIED]
+
+
+def test_a_run_of_a_large_machine_may_take_a_few_attempts_all_the_same() -> None:
+    runs = budget(Written(None, None))
+    assert (runs.most, runs.whole) == (20_000, 100_000)
+    large = budget(Written(None, None), instructions=10**9)
+    assert (large.most, large.whole) == (LEAST, LEAST_WHOLE)
+    runs.attempts.append(50_000)
+    assert runs.left() and runs.left(0.6) and not runs.left(0.5)
+
+
+def test_the_search_for_events_counts() -> None:
+    x = Variable("x", "m")
+    models = [Model("m", x=(x,), ode=-x.symbol, events=e) for e in ((), (Event("zero", x - 1),))]
+    machine: Any = Written(None, None)
+    machine.instructions = lambda model, rtol: (70, "Rodas5P")
+    assert [counted(machine, model, 1e-6)[0] for model in models] == [70, 70 + EVENTS]
+
+
+ASKED = Asked(1e-3, 0.0)
+
+
+def test_the_way_to_dry_friction_leaves_a_part_of_the_budget() -> None:
+    held = Written(lambda s, _: 0.9 / (1 - log(s, 4)), lambda s, _: round(4_000 / s**0.15))
+    runs = budget(held)
+    found = climbed(runs, TRUTH, ASKED)
+    assert found.stopped.startswith("drier runs take more than")
+    spent = sum(runs.attempts)
+    assert 0 <= spent - ON_THE_WAY * runs.whole < runs.most
+
+
+@pytest.mark.parametrize("status", [Status.MAX_STEPS, Status.JAMMED])
+def test_only_a_run_of_too_many_attempts_is_made_at_a_looser_tolerance(status: Status) -> None:
+    held = Written(lambda *_: 1e-2, lambda s, rtol: 10**9 if rtol < 5e-6 else 100, status)
+    if status is Status.JAMMED:
+        with pytest.raises(SolveError):
+            climbed(budget(held), TRUTH, ASKED)
+        assert held.asked == [(1.0, 1e-6)]
+        return
+    held.scalable = False
+    found = climbed(budget(held), TRUTH, ASKED)
+    assert [rung.rtol for rung in found.rungs] == [pytest.approx(1e-5)]
+
+
+def test_the_nearest_rung_is_the_softest_of_about_the_smallest_error() -> None:
+    rungs = tuple(Rung(4.0**-k, e, 1) for k, e in enumerate((0.9, 0.15, 0.1, 0.12)))
+    assert nearest(Ladder(rungs, "")).s == 0.25
+
+
+def test_the_own_error_is_that_of_the_tolerance_that_is_taken() -> None:
+    """Of a law that is 0.3 off however fine it runs, and whose integrator errs by rtol."""
+    held = Written(lambda _, rtol: 0.3 + 2 * rtol, lambda *_: 100)
+    rung = Rung(1.0, 0.3, 100, ASKED.fine)
+    found = at_equal_error(budget(held), 1.0, TRUTH, ASKED, rung, whole=False)
+    assert found.rtol == pytest.approx(10**-3.5)
+    assert found.own == pytest.approx(2 * found.rtol, rel=1e-3)
+    assert found.error == pytest.approx(0.3, abs=1e-3)
+
+
+def test_where_only_the_finest_run_keeps_the_accuracy_its_own_error_is_that_of_the_next() -> None:
+    held = Written(lambda _, rtol: 1e6 * rtol, lambda *_: 100)
+    rung = Rung(1.0, 0.0, 100, ASKED.fine)
+    found = at_equal_error(budget(held), 1.0, TRUTH, ASKED, rung, whole=False)
+    assert found.rtol == ASKED.fine
+    assert found.own > 1e-3  # not zero, the difference from itself
+
+
+def test_a_fine_run_that_would_take_too_much_is_not_begun() -> None:
+    held = Written(lambda _, rtol: 2 * rtol, lambda _, rtol: 10**9 if rtol < 1e-6 else 9_000)
+    rung = Rung(1.0, 1e-6, 9_000, 1e-6)
+    found = at_equal_error(budget(held), 1.0, TRUTH, ASKED, rung, whole=True)
+    assert all(rtol >= 1e-6 for _, rtol in held.asked)
+    assert found.rtol == pytest.approx(10**-3.5)
