@@ -6,6 +6,8 @@ sensor has, if one is lucky. So
 
 * dependence on inputs, speed, direction, place or history makes a fit doubtful: the model is wrong;
 * residuals larger than a noise level that was given do, too;
+* a signal of which nearly all is left does, even if what is left looks like noise, and so does a
+  value at its bound where much is left;
 * colour alone does not: intervals carry it, see `covariance`;
 * errors in the data, a mass at its bound, or residuals as large as the signal are no physics.
 """
@@ -41,6 +43,8 @@ SMOOTHED = 5e-3
 """Share of the range of a signal that the smoothing of an acceleration may leave of its own."""
 UNEXPLAINED = 0.7
 """Residuals over the spread of the signal from which on a model says next to nothing."""
+LITTLE = 0.9
+"""Residuals over the spread of the signal from which on a fit rests on a fifth of its variance."""
 CHANCE = 10.0
 """What a model explains, over what as many free numbers explain of noise, that is no chance."""
 INERTIA = ("kg", "kg m^2")
@@ -142,6 +146,7 @@ def judged(found: Minimum, findings: Findings | None = None) -> Verdict:
     count = sum(len(some) for _, some in every)
     for channel, some in every:
         tests += _independent(found, channel, some, ALARM / max(count, 1))
+    tests += _explained(found)
     errors = () if findings is None else tuple(e.sentence for e in findings.errors)
     nonsense = (*errors, *_unexplained(found, effective), *_no_mass(found))
     bounds = tuple(_bounds(found))
@@ -256,16 +261,37 @@ def _size(found: Minimum, channel: Channel, colour: Colour) -> Iterator[Test]:
     )
 
 
+def _left(found: Minimum) -> Iterator[tuple[str, float, float]]:
+    """Signal, sum of the squares of its residuals, and of what it deviates from its mean."""
+    for signal in dict.fromkeys(c.signal for c in found.channels):
+        some = [c for c in found.channels if c.signal == signal]
+        left = sum(float(np.sum(found.raw[c.rows] ** 2)) for c in some)
+        yield signal, left, sum(float(np.sum((c.measured - c.measured.mean()) ** 2)) for c in some)
+
+
+def _explained(found: Minimum) -> Iterator[Test]:
+    """Whether a fit rests on enough of a signal: on all but its noise, or on a little beside it."""
+    at = _at_bound(found)
+    for signal, left, there in _left(found):
+        share = float(np.sqrt(left / there)) if there > 0 else 0.0
+        limit = UNEXPLAINED if at else LITTLE
+        bound = f" and {', '.join(at)} at a bound" if at else ""
+        text = (
+            f"The model leaves {100 * share:.3g} % of {signal} unexplained{bound}: take another "
+            f"model, or, if {signal} is mostly noise or chatter, a lower cut-off with as many "
+            "samples an equation as it allows, InverseDynamics(filter=Filter(10.0, decimation=10))."
+        )
+        yield Test(signal, "explained", share, 0.0, limit, share < limit, True, text)
+
+
 def _unexplained(found: Minimum, effective: Mapping[str, float]) -> Iterator[str]:
     """Signals of which a model leaves nearly everything.
 
     Of a signal that is mostly noise a right model leaves much; but what it explains is many times
     the share k / n_eff that any k numbers explain of n_eff independent samples.
     """
-    for signal in dict.fromkeys(c.signal for c in found.channels):
+    for signal, left, there in _left(found):
         some = [c for c in found.channels if c.signal == signal]
-        left = sum(float(np.sum(found.raw[c.rows] ** 2)) for c in some)
-        there = sum(float(np.sum((c.measured - c.measured.mean()) ** 2)) for c in some)
         by_chance = (~found.held).sum() / sum(effective[found.label(c)] for c in some)
         if not there > 0 or left <= UNEXPLAINED**2 * there:
             continue
@@ -287,11 +313,12 @@ def _no_mass(found: Minimum) -> Iterator[str]:
             )
 
 
+def _at_bound(found: Minimum) -> list[str]:
+    both = zip(found.unknowns, found.held, strict=True)
+    return [u.name for u, held in both if held and not u.nuisance]
+
+
 def _bounds(found: Minimum) -> Iterator[str]:
-    at = [
-        u.name
-        for u, held in zip(found.unknowns, found.held, strict=True)
-        if held and not u.nuisance
-    ]
+    at = _at_bound(found)
     if at:
         yield f"At a bound: {', '.join(at)}."

@@ -47,6 +47,24 @@ def test_wrong_model_is_doubtful() -> None:
     assert "depend on force" in verdict.sentences[0]
 
 
+@pytest.mark.parametrize(("noise", "at_bound", "good"), [
+    (2.8, False, False), (1.2, True, False), (1.2, False, True), (0.5, True, True),
+])  # fmt: skip
+def test_a_fit_that_explains_little_is_doubtful_even_if_what_is_left_is_white(
+    noise: float, at_bound: bool, good: bool
+) -> None:
+    """Noise of s spreads of the signal leaves s / sqrt(1 + s^2): 94 %, 77 %, 45 % of it."""
+    task, point = solved(Decay(T, TRUE + noise * np.std(TRUE) * ar1(300, 0.0, 1)))
+    found = minimum(task, point)
+    held = np.arange(found.held.size) == (0 if at_bound else -1)
+    verdict = judged(replace(found, held=held))
+    assert not verdict.nonsense
+    assert verdict.status(Status.SOLVED) is (Status.SOLVED if good else Status.DOUBTFUL)
+    said = verdict.sentences[0] if verdict.sentences else ""
+    assert ("unexplained" in said and "lower cut-off" in said) != good
+    assert ("at a bound" in said) == (at_bound and not good)
+
+
 def test_no_physics_is_implausible() -> None:
     noise = ar1(300, 0.0, 1)
     task, point = solved(Decay(T, noise))
