@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from symfric.compensation.reference import Reference
 from symfric.foundation import checks
 from symfric.foundation.files import write_table
-from symfric.foundation.panels import panels, save
 from symfric.foundation.style import line
 
 if TYPE_CHECKING:
@@ -224,6 +223,8 @@ class Comparison:
             names: cases to show, by default all.
             path: image file.
         """
+        from symfric.foundation.panels import panels, save  # noqa: PLC0415  (matplotlib is slow)
+
         checks.check_names("comparison", names, self.loops)
         shown: Sequence[Loop] = [self.loops[n] for n in names] or list(self.loops.values())
         x, force = self.units

@@ -74,6 +74,11 @@ def test_simulating_on_a_belt_loads_neither_mechanisms_nor_processes() -> None:
     assert not [name for name in slow if name in loaded]
 
 
+def test_writing_c_loads_no_pictures() -> None:
+    """Their library tells of its cache wherever it cannot write it."""
+    assert "matplotlib" not in fresh("import symfric.cli.codegen, sys; print(*sys.modules)").split()
+
+
 def test_names_pickle_star_and_rooms() -> None:
     everything: dict[str, object] = {}
     exec("from symfric import *", everything)
