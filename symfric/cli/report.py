@@ -25,9 +25,9 @@ from symfric.results.report import report as write_report
 def report(
     scene: SceneArgument,
     law: LawsOption,
-    out: Annotated[Path, typer.Option("--out", metavar="FILE.html", help="The page.")] = Path(
-        "report.html"
-    ),
+    html: Annotated[
+        Path, typer.Option("--html", "--out", metavar="FILE.html", help="Write one page of it all.")
+    ] = Path("report.html"),
     settings: SetOption = None,
     preset: PresetOption = None,
     law_of: LawOfOption = None,
@@ -47,9 +47,9 @@ def report(
     The error of every run is measured by another formula at a hundredth of the tolerance. The page
     needs nothing from elsewhere; it holds the laws with their limits and how to run it again.
 
-    Example: symfric report rabinowicz --law lugre --law brown_mcphee --out report.html
+    Example: symfric report rabinowicz --law lugre --law brown_mcphee --html report.html
     """
-    check_outputs(out)
+    check_outputs(html)
     laws = law_names(law)
     machines = scenes_with(scene, laws, assignments("--set", settings), preset, law_of)
     models = {name: machine.model() for name, machine in machines.items()}
@@ -68,11 +68,11 @@ def report(
             found[name] = simulate(model, given.until, **how, measure_error=True, progress=tell)
     write_report(
         found,
-        out,
+        html,
         settings={name: parameters(machine) for name, machine in machines.items()},
         command=output.printable(shlex.join(["symfric", *sys.argv[1:]])),
     )
-    output.say_written(out)
+    output.say_written(html)
     for trajectory in found.values():
         if not trajectory.status.ok:
             raise SolveError(trajectory.message, trajectory.status, trajectory)

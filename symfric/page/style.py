@@ -1,5 +1,9 @@
 """The style sheet of a page: light and dark by the reader's setting, black on white in print."""
 
+from collections.abc import Sequence
+
+from symfric.foundation.style import COLOURS, dash
+
 STYLE = """
 :root { color-scheme: light dark; --ink: #1c2530; --soft: #5b6775; --paper: #ffffff;
   --panel: #f4f6f8; --line: #d5dbe1; --grid: #e6eaee; --measured: #9aa5b1; --predicted: #c23b22;
@@ -68,4 +72,27 @@ code { font-size: .9em; overflow-wrap: anywhere; white-space: pre-wrap; }
   svg.chart { min-width: 0; break-inside: avoid; }
   tr { break-inside: avoid; } h2 { break-after: avoid; }
   .wide { overflow: visible; } table { font-size: .78rem; } }
+"""
+
+
+def _lighter(colour: str) -> str:
+    """Half way to white, to be seen on dark paper."""
+    return "#" + "".join(f"{(int(colour[k : k + 2], 16) + 255) // 2:02x}" for k in (1, 3, 5))
+
+
+def _dashes(k: int) -> str:
+    pattern = dash(k)
+    return "none" if isinstance(pattern, str) else " ".join(f"{1.2 * x:.3g}" for x in pattern[1])
+
+
+def _runs(colours: Sequence[str]) -> str:
+    """Classes run0, run1, ...: the colours and dashes that pictures give to simulations."""
+    return "\n".join(
+        f"svg .run{k} {{ stroke: {colour}; stroke-dasharray: {_dashes(k)}; }}"
+        for k, colour in enumerate(colours)
+    )
+
+
+STYLE += f"""{_runs(COLOURS)}
+@media screen and (prefers-color-scheme: dark) {{ {_runs([_lighter(c) for c in COLOURS])} }}
 """

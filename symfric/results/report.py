@@ -16,6 +16,7 @@ import numpy as np
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Parameter, parameters
+from symfric.foundation.style import COLOURS
 from symfric.model import Contact
 from symfric.page import html
 from symfric.page.scale import around
@@ -33,8 +34,8 @@ CONTENTS = (
     ("settings", "Parameters"),
     ("made", "How it was made"),
 )
-COLOURS = ("predicted", "residual", "second", "measured")
-"""Classes of lines; a page with more runs has its friction in several charts."""
+LINES = 4
+"""Runs in one chart; a page with more has its friction in several."""
 
 
 def report(
@@ -127,17 +128,20 @@ def _friction(runs: Mapping[str, Trajectory]) -> Iterator[str]:
     for contact in first.model.contacts:
         name = _force_name(contact)
         if all(name in run.units for run in runs.values()):
-            for start in range(0, len(runs), len(COLOURS)):
-                shown = dict([*runs.items()][start : start + len(COLOURS)])
-                yield html.figure(_loop(shown, contact, name))
+            kinds = {label: f"run{k % len(COLOURS)}" for k, label in enumerate(runs)}
+            for start in range(0, len(runs), LINES):
+                shown = dict([*runs.items()][start : start + LINES])
+                yield html.figure(_loop(shown, kinds, contact, name))
 
 
 def _force_name(contact: Contact) -> str:
     return "friction" if contact.bare else f"{contact.name}_friction"
 
 
-def _loop(runs: Mapping[str, Trajectory], contact: Contact, name: str) -> str:
-    """Friction of one contact over its sliding velocity."""
+def _loop(
+    runs: Mapping[str, Trajectory], kinds: Mapping[str, str], contact: Contact, name: str
+) -> str:
+    """Friction of one contact over its sliding velocity, in the colours of the picture above."""
     lines: list[tuple[str, Any, Any]] = []
     for label, run in runs.items():
         own = next(c for c in run.model.contacts if c.name == contact.name)
@@ -147,10 +151,7 @@ def _loop(runs: Mapping[str, Trajectory], contact: Contact, name: str) -> str:
     speed = "rad/s" if contact.turning else "m/s"
     x = around("sliding velocity", speed, slips)
     y = around(name, first.units[name], forces)
-    marks = [
-        Line(kind, across, up, label)
-        for kind, (label, across, up) in zip(COLOURS, lines, strict=False)
-    ]
+    marks = [Line(kinds[label], across, up, label) for label, across, up in lines]
     return chart(f"Friction over sliding velocity: {contact.name}", x, y, marks, height=300.0)
 
 

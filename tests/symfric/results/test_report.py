@@ -1,5 +1,6 @@
 """Runs as one page."""
 
+import re
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -7,6 +8,8 @@ import pytest
 
 from symfric import BrownMcPhee, LuGre, parameters, report, simulate
 from symfric.cli import main
+from symfric.page.style import STYLE
+from symfric.results.pictures import plot_trajectories
 from symfric.scenes import Pendulum, Rabinowicz
 
 EMPTY = {"meta", "img", "path", "rect", "br"}
@@ -64,6 +67,17 @@ def test_a_page_holds_the_numbers_of_the_runs_and_needs_nothing(tmp_path: Path) 
     assert text.count("Source:") == len(runs)
 
 
+def test_a_law_has_one_colour_on_its_page() -> None:
+    """That of the picture of the motion, also in the second chart of friction."""
+    run = simulate(Rabinowicz(BrownMcPhee()).model(), 0.1)
+    runs = {f"law {k}": run for k in range(5)}
+    drawn = re.findall(r'<polyline class="(run\d)"', report(runs))
+    assert drawn == [f"run{k}" for k in range(5)]
+    positions = plot_trajectories(runs, ["x"]).axes[0].lines
+    for kind, line in zip(drawn, positions, strict=True):
+        assert f"svg .{kind} {{ stroke: {line.get_color()};" in STYLE
+
+
 def test_a_run_that_failed_is_not_called_done() -> None:
     run = simulate(Pendulum(BrownMcPhee()).model(), 5.0, max_steps=5, throw=False)
     text = report({"pendulum": run})
@@ -83,7 +97,7 @@ def test_what_is_no_run_is_refused(bad: dict[str, object]) -> None:
 
 def test_the_command_writes_one_page_of_several_laws(tmp_path: Path) -> None:
     out = tmp_path / "r.html"
-    words = "report rabinowicz --law dahl --law coulomb --t-end 2 --set m=0.5 --out"
+    words = "report rabinowicz --law dahl --law coulomb --t-end 2 --set m=0.5 --html"
     assert main([*words.split(), str(out)]) == 0
     cells = Page(out.read_text("utf-8")).cells
     assert {"dahl", "coulomb", "0.5", "sigma_0"} <= set(cells)
