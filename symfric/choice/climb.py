@@ -89,7 +89,7 @@ def climbed(runs: Budget, reference: Reference, asked: Asked) -> Ladder:
 
     def run(s: float) -> Rung:
         if not runs.left(ON_THE_WAY):
-            raise SpentError(f"drier runs take more than {sum(runs.attempts)} tries in all")
+            raise SpentError(f"drier runs take more than {sum(runs.attempts)} tries, see effort")
         before = runs.attempts[-1] if runs.attempts else runs.most
         found, rtol = _first_that_ends(runs, s, asked.coarse, GROWTH * before + LEAST)
         error = reference.off(found.motion)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import asin, e, log, pi
+from math import asin, e, exp, log, pi
 from typing import final
 
 import numpy as np
@@ -67,6 +67,11 @@ class Friction:
         if self.v_s is None:
             return ExactCoulomb(mu_s=self.mu_s, mu_d=self.mu_d)
         return ExactCoulomb(mu_s=self.mu_s, mu_d=self.mu_d, v_s=self.v_s, form="stribeck")
+
+    def sliding(self, speed: float) -> float:
+        """The coefficient of steady sliding at a speed [m/s] > 0."""
+        fall = 0.0 if self.v_s is None else exp(-((speed / self.v_s) ** 2))
+        return self.mu_d + (self.mu_s - self.mu_d) * fall
 
     def __str__(self) -> str:
         """Its numbers."""

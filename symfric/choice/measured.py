@@ -160,7 +160,8 @@ def _placed(task: Task, held: Candidate, rungs: Ladder, runs: Budget, row: Row) 
         return replace(row, standing=LACKING, reason=f"shows no {', no '.join(missing)}")
     if row.error <= task.accuracy:
         return replace(row, standing=RANKED)
-    known = "" if task.own else nature.otherwise(law, task.frictions[""].mu_d, task.load)
+    driest = held.law_at(rungs.rungs[-1].s)
+    known = "" if task.own else nature.otherwise(driest, task.frictions[""], task.load)
     said = [short(rungs.stopped) or "the integrator keeps no more", known]
     why = "; ".join(text for text in said if text)
     return replace(row, standing=INACCURATE, reason=f"{row.error:.1e} off: {why}")

@@ -6,6 +6,7 @@ from math import isfinite, nan
 
 import numpy as np
 
+from symfric.choice.friction import Friction
 from symfric.codegen.blocks.from_law import law_block
 from symfric.codegen.writing.routines import routines
 from symfric.embedded import measure
@@ -118,7 +119,7 @@ def _is_step(name: str) -> bool:
     return not name.endswith(("_init", "_reset", "_init_sliding"))
 
 
-def otherwise(law: Law, mu_d: float, load: float | None) -> str:
+def otherwise(law: Law, friction: Friction, load: float | None) -> str:
     """Why `law` may move otherwise than dry friction, however dry it is made; "" if nobody knows.
 
     A static law whose steady friction is another one, a bristle that nothing damps, one that ages.
@@ -133,9 +134,10 @@ def otherwise(law: Law, mu_d: float, load: float | None) -> str:
     if law.inputs:
         return ""
     level = float(steady_force(law, np.array([FAST]), load or 1.0)[0]) / (load or 1.0)
-    if abs(level - mu_d) <= ANOTHER * mu_d:
+    wanted = friction.sliding(FAST)
+    if abs(level - wanted) <= ANOTHER * wanted:
         return ""
-    return f"sliding at {FAST:g} m/s it rubs with {level:.3g} of the load, not {mu_d:g}"
+    return f"sliding at {FAST:g} m/s it rubs with {level:.3g} of the load, not {wanted:.3g}"
 
 
 FAST, ANOTHER = 0.1, 0.05

@@ -9,6 +9,7 @@ from multiprocessing.context import ForkProcess
 from time import perf_counter
 from typing import Any
 
+from symfric.choice.budget import RUN
 from symfric.choice.friction import Friction
 from symfric.choice.machine import FAILURES, frictions_of, load_of, machine_of
 from symfric.choice.measured import Task, best_form
@@ -46,6 +47,7 @@ def select(
     fitted: bool | None = None,
     control: float = 0.05,
     fixed_steps: bool = True,
+    effort: float = 1.0,
     workers: int = 1,
     progress: Progress | None = None,
 ) -> Choice:
@@ -89,6 +91,8 @@ def select(
         control: largest error of fixed steps, of a law that is as soft as that allows.
         fixed_steps: measure what a controller needs, too: the largest fixed steps, and instructions
             on a Cortex-M4F where a cross compiler and QEMU are.
+        effort: what the runs of a law may cost, in times of what is usual; more brings laws whose
+            bristles ring, such as GMS, nearer to dry friction.
         workers: processes; more than one needs a system that can fork (not Windows).
         progress: called with the name of a law that is done, and the share of all.
 
@@ -105,6 +109,7 @@ def select(
     accuracy = checks.number(f"{where}: accuracy", accuracy, above=0.0, upper=1.0)
     control = checks.number(f"{where}: control", control, above=0.0, upper=1.0)
     count = checks.count(f"{where}: workers", workers)
+    effort = checks.number(f"{where}: effort", effort, above=0.0, upper=1e6)
     if friction is not None:
         such = "a friction, such as Friction(mu_s=0.2, mu_d=0.15)"
         checks.kind(f"{where}: friction", friction, Friction, such)
@@ -127,7 +132,7 @@ def select(
     own = of_data if fitted is None else checks.flag(f"{where}: fitted", fitted)
     task = Task(
         machine, compared, asked, frictions, load, accuracy, control, own,
-        checks.flag(f"{where}: fixed_steps", fixed_steps), misfits=misfits,
+        checks.flag(f"{where}: fixed_steps", fixed_steps), max(1, round(effort * RUN)), misfits,
     )  # fmt: skip
     rows = _rows(task, known, count, progress)
     return Choice(

@@ -92,6 +92,9 @@ def select(
     fixed_steps: Annotated[
         bool, typer.Option("--fixed-steps/--no-fixed-steps", help="Measure them, too.")
     ] = True,
+    effort: Annotated[
+        float, typer.Option("--effort", help="What a law may cost, in times of the usual.")
+    ] = 1.0,
     workers: WorkersOption = None,
     data: Annotated[
         list[str] | None,
@@ -161,6 +164,7 @@ def select(
             of=None if of is None else [name.strip() for name in of.split(",")],
             control=control,
             fixed_steps=fixed_steps,
+            effort=effort,
             workers=cpu_count() or 1 if workers is None else workers,
             progress=tell,
         )

@@ -109,10 +109,12 @@ def test_the_peaks_of_sums_and_products_are_the_static_level() -> None:
 
 
 def test_why_a_law_moves_otherwise() -> None:
-    assert "rubs with 0.115 of the load, not 0.1" in otherwise(LeineSwitch(), 0.1, 2.0)
-    assert otherwise(GMS(), 0.1, 2.0) == "nothing damps its bristle, which rings"
-    assert "by times of its own (tau_dw)" in otherwise(Gonthier(), 0.1, 2.0)
-    assert otherwise(LuGre(), 0.1, 2.0) == otherwise(BrownMcPhee(), 0.1, 2.0) == ""
+    dry = Friction(0.15, 0.1)
+    assert Friction(0.15, 0.1, v_s=0.05).sliding(0.05) == pytest.approx(0.1 + 0.05 / np.e)
+    assert "rubs with 0.115 of the load, not 0.1" in otherwise(LeineSwitch(), dry, 2.0)
+    assert otherwise(GMS(), dry, 2.0) == "nothing damps its bristle, which rings"
+    assert "by times of its own (tau_dw)" in otherwise(Gonthier(), dry, 2.0)
+    assert otherwise(LuGre(), dry, 2.0) == otherwise(BrownMcPhee(), dry, 2.0) == ""
 
 
 def test_words_of_papers_are_known() -> None:

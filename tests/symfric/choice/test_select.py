@@ -95,7 +95,8 @@ def test_a_fall_that_is_known_is_kept() -> None:
     )  # fmt: skip
     assert [row.law for row in found.ranked] == ["stribeck"]
     assert (found["stribeck"].values or {})["v_s"] == 0.05
-    assert found["tustin"].reason.endswith("it tends to another motion")
+    assert "it tends to another motion; sliding at 0.1 m/s it" in found["tustin"].reason
+    assert "rubs with 0.107 of the load, not 0.101" in found["tustin"].reason  # e^-2 and e^-4
 
 
 def press(law: Law) -> Model:
@@ -179,9 +180,12 @@ TWO_FORMS = ("gms", "karnopp", "threlfall")
 
 
 @pytest.mark.heavy
-def test_gms_keeps_an_accuracy_by_events_that_its_smooth_form_does_not() -> None:
+def test_gms_keeps_an_accuracy_by_events_where_it_may_cost_more() -> None:
     asked: dict[str, Any] = {"accuracy": 1e-2, "t_end": SHORT, "fixed_steps": False}
-    both = select(Rabinowicz, {"named": GMS(), "event": GMS(form="event")}, **asked)
+    law = {"event": GMS(form="event")}
+    usual, both = (select(Rabinowicz, law, effort=effort, **asked) for effort in (1.0, 5.0))
+    assert "tries, see effort" in usual["event"].reason
+    assert usual["event"].error > 1e-2 > both["event"].error
     assert [row.law for row in both.ranked] == ["event"]
     assert "(form = event)" in both.verdict[0]
     assert "switches by events" in both.verdict[1]
@@ -274,6 +278,7 @@ def test_bad_input_is_refused_in_a_sentence() -> None:
         ({"scene": press}, "t_end: expected the end of the motion"),
         ({"scene": lambda law: 3, "t_end": 1.0}, "expected a scene or a Model, got 3"),
         ({"friction": (0.2, 0.1)}, "friction: expected"),
+        ({"effort": 0.0}, "effort: expected a number > 0"),
         ({"reference": "exakt"}, "expected one of exact, sharpest"),
     )
     for given, said in cases:
