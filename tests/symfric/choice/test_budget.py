@@ -1,7 +1,7 @@
 """What runs of a law may cost, and which run it is judged by, with runs that are written down."""
 
 from dataclasses import dataclass, field
-from math import log
+from math import log, log10
 from typing import Any, cast
 
 import numpy as np
@@ -119,6 +119,15 @@ def test_the_own_error_is_that_of_the_tolerance_that_is_taken() -> None:
     assert found.rtol == pytest.approx(10**-3.5)
     assert found.own == pytest.approx(2 * found.rtol, rel=1e-3)
     assert found.error == pytest.approx(0.3, abs=1e-3)
+
+
+def test_a_tolerance_that_keeps_the_accuracy_by_chance_is_not_taken() -> None:
+    """Errors change their sign with the tolerance: at 1e-3 it is small, at half a decade not."""
+    errors = {-6: 1e-4, -7: 5e-3, -8: 6e-4, -9: 2e-4}
+    held = Written(lambda _, rtol: errors.get(round(2 * log10(rtol)), 0.0), lambda *_: 100)
+    rung = Rung(1.0, 0.0, 100, ASKED.fine)
+    found = at_equal_error(budget(held), 1.0, TRUTH, ASKED, rung, whole=True)
+    assert (found.rtol, found.error) == (pytest.approx(1e-4), pytest.approx(6e-4))
 
 
 def test_where_only_the_finest_run_keeps_the_accuracy_its_own_error_is_that_of_the_next() -> None:

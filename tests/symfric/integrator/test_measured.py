@@ -4,24 +4,29 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symfric import BrownMcPhee, Model, Trajectory, Variable, contact, simulate
+from symfric import BrownMcPhee, Hold, Model, Trajectory, Variable, contact, simulate
 from symfric.integrator.measured import differences_of_derivatives
 from symfric.model import Event
 from symfric.scenes import rabinowicz
 
 
-def decaying() -> Model:
-    """x = x_0 e^(-k t) with a state that nothing moves."""
-    x, k, still = Variable("x", "m"), Variable("k", "1/s", start=2.0), Variable("still", "m")
+def decaying(size: float) -> Model:
+    """x = x_0 e^(-k t) of this size with a state that nothing moves."""
+    x, k, still = (
+        Variable("x", "m", nominal=size),
+        Variable("k", "1/s", start=2.0),
+        Variable("still", "m"),
+    )
     return Model("decay", x=(x, still), p=(k,), ode=ca.vertcat(-k.symbol * x.symbol, 0.0))
 
 
-def test_the_measured_error_is_the_error_where_a_closed_form_tells_it() -> None:
+@pytest.mark.parametrize("size", [1.0, 1e-9])
+def test_the_measured_error_is_the_error_where_a_closed_form_tells_it(size: float) -> None:
     asked = ["k", "x0.x"]
     run = simulate(
-        decaying(), 3.0, x0={"x": 1.0}, rtol=1e-5, sensitivities=asked, measure_error=True
+        decaying(size), 3.0, x0={"x": size}, rtol=1e-5, sensitivities=asked, measure_error=True
     )
-    exact = {"k": -run.t * np.exp(-2 * run.t), "x0.x": np.exp(-2 * run.t)}
+    exact = {"k": -size * run.t * np.exp(-2 * run.t), "x0.x": np.exp(-2 * run.t)}
     assert {*run.statistics.sensitivity_errors} == {*asked}
     for name, measured in run.statistics.sensitivity_errors.items():
         off = np.abs(run.sensitivities[name]["x"] - exact[name]).max() / np.abs(exact[name]).max()
@@ -106,6 +111,16 @@ def test_derivatives_are_compared_on_the_same_side_of_events() -> None:
     assert np.abs(slopes[0] - slopes[1]).max() > 0.2 * np.abs(slopes[1]).max()
     for both in (whole, found):
         assert differences_of_derivatives(model, ["drag"], *both)["drag"] < 1e-4
+
+
+def test_an_event_at_a_jump_of_an_input_leaves_derivatives_without_an_error() -> None:
+    x, u = Variable("x", "m"), Variable("u", "m/s")
+    model = Model("filled", x=(x,), u=(u,), ode=u.symbol, events=(Event("full", x - 1.0),))
+    push = {"u": Hold([0.0, 1.0], [1.0, 2.0])}
+    run = simulate(model, 2.0, u=push, sensitivities=["x0.x"], measure_error=True)
+    with pytest.raises(ValueError, match="apart from the jumps of the inputs"):
+        _ = run.sensitivities
+    assert np.isnan(run.statistics.sensitivity_errors["x0.x"])
 
 
 def test_motions_without_derivative_have_no_error_of_it() -> None:

@@ -4,12 +4,14 @@ import csv
 from pathlib import Path
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 
-from symfric import BrownMcPhee, Ensemble, ExactCoulomb, Hold, LuGre, Status
+from symfric import BrownMcPhee, Ensemble, ExactCoulomb, Hold, LuGre, Model, Status, Variable
+from symfric.integrator.running import run as running
 
-from symfric import drive, load_ensemble, load_run, rabinowicz, simulate, simulate_many  # isort: skip
+from symfric import Event, drive, load_ensemble, load_run, rabinowicz, simulate, simulate_many  # isort: skip
 
 MU = np.linspace(0.12, 0.4, 7)
 END = 24.0
@@ -55,6 +57,23 @@ def test_extremes_of_states_are_those_of_all_steps(backend: str) -> None:
             assert high == pytest.approx(greatest, abs=0.02 * width)
             missed += made[name][m].min() > least + 0.2 * width
     assert missed > 3  # without the steps it would have been wrong
+
+
+@pytest.mark.parametrize("watched", [False, True])  # members with events run one by one
+@pytest.mark.parametrize("backend", ["vm", "compiled"])
+def test_a_member_that_is_greatest_at_its_start_is_that_in_a_long_run(
+    backend: str, watched: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where there is one look at the end, and steps are left out since there are too many."""
+    x, v, k = Variable("x", "m"), Variable("v", "m/s"), Variable("k", "1/s^2")
+    events = (Event("far", x - 100.0),) if watched else ()
+    rates = ca.vertcat(v, -k * x - 0.05 * v)
+    swings = Model("swings", x=(x, v), p=(k,), ode=rates, events=events)
+    monkeypatch.setattr(running, "MOST_BYTES", 10_000)
+    starts = {"x0": {"x": np.array([1.0, 2.0])}, "p": {"k": [1.0, 4.0]}}
+    made = simulate_many(swings, 60.0, backend=backend, **starts)
+    assert made.attempts.min() > 100
+    assert made.extremes["x"][1].tolist() == [1.0, 2.0]
 
 
 def test_extremes_of_members_with_events_and_of_those_that_failed() -> None:
