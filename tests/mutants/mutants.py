@@ -21,10 +21,12 @@ from mutants.machines import MACHINES
 from mutants.mutant import Mutant
 from mutants.pictured import PICTURED
 from mutants.plants import PLANTS
+from mutants.ranked import RANKED
 from mutants.robots import ROBOTS
 from mutants.shown import SHOWN
 from mutants.solvers import RESULTS, SOLVERS
 from mutants.told import TOLD
+from mutants.written import WRITTEN
 
 STEP = "symfric/integrator/step/attempt.py"
 WATCH = "symfric/integrator/step/watch.py"
@@ -364,4 +366,5 @@ MUTANTS = (
     *CHOSEN, *CACHES, *COMPENSATED, *DEVICES, *DRY, *EMITTED, *ENSEMBLES, *EXPORTED,
     *GENERATED, *LEFT_OUT, *LOOPS, *DERIVATIVES, *MACHINES, *PICTURED, *PLANTS, *RESULTS, *ROBOTS,
     *HELD, *JUDGED, *SHOWN, *SOLVERS, *TOLD,
+    *RANKED, *WRITTEN,
 )  # fmt: skip
