@@ -2,12 +2,12 @@
 
 import json
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 from docs.machine import gallery_pages, stamp
 from symfric.gallery import scripts
+from symfric.gallery.rendering import Gallery, Record
 
 NAME = "self_tuning/fig_07_shape_factor"
 
@@ -88,10 +88,11 @@ def test_a_plate_that_failed_is_tried_again(
     monkeypatch.setattr(gallery_pages, "read", lambda _: there)  # pyright: ignore
     asked = list[list[str]]()
 
-    def render(_: Path, names: list[str], **__: object) -> SimpleNamespace:
+    def render(folder: Path, names: list[str], **_: object) -> Gallery:
         asked.append(names)
         there["good"] = {}
-        return SimpleNamespace(records={"good": {}}, failures={"bad": "no"})
+        made: dict[str, Record] = {name: {} for name in names if name == "good"}
+        return Gallery(folder, tuple(names), made, {"bad": "no"}, 0.0)
 
     monkeypatch.setattr(gallery_pages, "render", render)
     said = list[str]()
