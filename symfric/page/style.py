@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from symfric.foundation.style import COLOURS, dash
 
-STYLE = """
+_PAGE = """
 :root { color-scheme: light dark; --ink: #1c2530; --soft: #5b6775; --paper: #ffffff;
   --panel: #f4f6f8; --line: #d5dbe1; --grid: #e6eaee; --measured: #9aa5b1; --predicted: #c23b22;
   --residual: #2b6ca3; --second: #7a4fa3; --good: #1d7a3e; --doubtful: #9a6200; --bad: #b3261e;
@@ -93,6 +93,6 @@ def _runs(colours: Sequence[str]) -> str:
     )
 
 
-STYLE += f"""{_runs(COLOURS)}
+STYLE = f"""{_PAGE}{_runs(COLOURS)}
 @media screen and (prefers-color-scheme: dark) {{ {_runs([_lighter(c) for c in COLOURS])} }}
 """

@@ -24,8 +24,8 @@ def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(method)
     def checked(law: "Law", v: Scalar, N: Scalar, z: Scalar = (), *more: Any, **inputs: Any) -> Any:
-        v, N, z = plain(v), plain(N), plain(z)
-        return method(law, v, N, states_of(law, v, z), *more, **inputs)
+        slip, load = plain(v), plain(N)
+        return method(law, slip, load, states_of(law, slip, plain(z)), *more, **inputs)
 
     return checked
 
