@@ -93,7 +93,10 @@ def select(
         bool, typer.Option("--fixed-steps/--no-fixed-steps", help="Measure them, too.")
     ] = True,
     effort: Annotated[
-        float, typer.Option("--effort", help="What a law may cost, in times of the usual.")
+        float,
+        typer.Option(
+            "--effort", metavar="NUMBER", help="What a law may cost, in times of the usual."
+        ),
     ] = 1.0,
     workers: WorkersOption = None,
     data: Annotated[
