@@ -15,8 +15,8 @@ from docs.machine import (
 )
 from docs.machine.api_pages import pages as api_pages
 from docs.machine.generated import stale, write
-from docs.machine.mentioned import place
 from docs.machine.names import catalogue, known, linked
+from docs.machine.places import place
 from docs.machine.scene_pages import pages as scene_pages
 from symfric import ALL_LAWS, POPULATIONS, LuGre, parameters
 from symfric.cli.commands import COMMANDS, prose_and_examples

@@ -41,7 +41,7 @@ def test_all_of_a_fit_comes_back_to_the_bit(fit: Fitted, data: Dataset, tmp_path
             np.testing.assert_array_equal(one.residual.y, other.residual.y)  # JSON has six digits
         assert back.live is None
         assert back.model.signals == fit.model.signals
-    assert copies[0].validate(data) == fit.validate(data)
+    assert repr(copies[0].validate(data)) == repr(fit.validate(data))  # with NaN, which equals none
     ours, theirs = (f.profile("mu_d", points=2) for f in (fit, copies[0]))
     np.testing.assert_array_equal(ours.rise, theirs.rise)
     np.testing.assert_array_equal(ours.values, theirs.values)
