@@ -25,6 +25,8 @@ SMALL = 7
 OFFSETS = ((5, 3), (5, -9), (-5, 3), (-5, -9), (0, 8), (0, -13), (9, 9), (9, -15), (-9, 9))
 """Places of a label beside its point [points], the best first."""
 BEHIND = {"fc": "w", "alpha": 0.75, "lw": 0.0, "pad": 0.6}
+GAP = 3.0
+"""Around a name [pixel], so that its ground hides nothing of the next."""
 APART = 1e-2
 """Ranked laws of less than this share of the error allowed stand apart, and are named there."""
 COLUMN, PLANE, ROW = 3.35, 2.1, 0.135
@@ -53,7 +55,7 @@ def plot_choice(choice: "Choice", path: str | Path | None = None, wide: bool = T
         _by_name(dressed(listed), named, _milliseconds(choice.placed))
     else:
         figure.delaxes(listed)
-    _plane(figure, dressed(plane), choice)
+    rows = _plane(dressed(plane), choice)
     figure.suptitle("\n".join(wrap(choice.title, 90 if wide else 48)), fontsize=SMALL + 2 * wide)
     handles = [
         Line2D([], [], ls="", marker=MARKERS[k], color=colour(k), label=kind, markersize=5)
@@ -72,6 +74,7 @@ def plot_choice(choice: "Choice", path: str | Path | None = None, wide: bool = T
         handletextpad=0.2,
         columnspacing=1.2,
     )
+    _label(figure, plane, _told(choice, rows), rows)  # last: it looks where everything stands
     return save(figure, path)
 
 
@@ -80,8 +83,8 @@ def _milliseconds(rows: Sequence[Row]) -> float:
     return median(1e9 * row.time_s / row.work for row in rows) if rows else 0.0
 
 
-def _plane(figure: Figure, axis: Axes, choice: "Choice") -> None:
-    """All laws where they are at equal error."""
+def _plane(axis: Axes, choice: "Choice") -> list[Row]:
+    """All laws where they are at equal error; those that stand in the picture."""
     rows = [row for row in choice.placed if 0.0 < row.error < 1e3]
     for row in rows:
         k = KINDS.index(shown(row.phenomena))
@@ -98,9 +101,14 @@ def _plane(figure: Figure, axis: Axes, choice: "Choice") -> None:
         _round(axis, [1e-6 * row.work for row in rows])
     least = min((row.error for row in rows if row.error > 1e-9), default=1e-6)
     axis.set_ylim(bottom=max(1e-9, 0.1 * min(least, choice.accuracy)))
+    return rows
+
+
+def _told(choice: "Choice", rows: Sequence[Row]) -> list[Row]:
+    """Which are named there: the first, those that stand apart, and all that are not ranked."""
     apart = (row for row in choice.ranked[1:] if row.error < APART * choice.accuracy)
     others = sorted((row for row in rows if not row.ranked), key=lambda row: row.work)
-    _label(figure, axis, [*choice.ranked[:1], *apart, *others], rows)
+    return [*choice.ranked[:1], *apart, *others]
 
 
 def _label(figure: Figure, axis: Axes, named: Sequence[Row], rows: Sequence[Row]) -> None:
@@ -116,7 +124,7 @@ def _label(figure: Figure, axis: Axes, named: Sequence[Row], rows: Sequence[Row]
                 row.law, (1e-6 * row.work, row.error), (dx, dy), textcoords="offset points",
                 fontsize=SMALL - 1, bbox=BEHIND, ha=side,
             )  # fmt: skip
-            box = text.get_window_extent()
+            box = text.get_window_extent().padded(GAP)
             text.set_in_layout(False)
             within = inside.contains(box.x0, box.y0) and inside.contains(box.x1, box.y1)
             if within and not any(box.overlaps(other) for other in taken):

@@ -305,6 +305,21 @@ def test_the_picture_has_round_numbers_and_names_the_exact_law(
     assert "exact_coulomb" in [text.get_text() for text in left.texts]
 
 
+@pytest.mark.parametrize("wide", [False, True])
+def test_names_in_the_picture_stand_inside_and_apart(choice: Choice, wide: bool) -> None:
+    """Where they stand in the end: titles and legends move panels."""
+    figure = choice.plot(wide=wide)
+    figure.draw_without_rendering()
+    plane = figure.axes[0]
+    boxes = [text.get_window_extent() for text in plane.texts]
+    whole = plane.get_window_extent()
+    assert boxes
+    for k, box in enumerate(boxes):
+        assert whole.contains(*box.min)
+        assert whole.contains(*box.max)
+        assert not any(box.padded(2.0).overlaps(other) for other in boxes[:k])
+
+
 def test_it_shows_and_saves_itself(choice: Choice, tmp_path: Path) -> None:
     shown = repr(choice).splitlines()
     assert len(shown) <= 30
