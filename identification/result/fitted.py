@@ -25,6 +25,7 @@ from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Parametric
 from symfric.foundation.shown import Shown, Table
 from symfric.foundation.status import Status
+from symfric.foundation.typed import agree
 from symfric.laws import Law
 from symfric.model import Model
 from symfric.results import tables
@@ -103,14 +104,15 @@ class Fitted:
     def __str__(self) -> str:
         return text_of(self)
 
+    def check_fields(self) -> None:
+        """Refuse estimates that do not belong to the names; for files."""
+        n = len(self.names)
+        agree("Fitted", self.correlation.shape == (n, n), {*self.names} <= self.parameters.keys())
+
     def to_pack(self) -> dict[str, Any]:
         """The fields; without the question where that holds functions that no file takes."""
-        state = packed.state_of(self) | {"live": None}
-        try:
-            packed.dumps(self.asked)
-        except ValueError:
-            state["asked"] = None
-        return state
+        asked = self.asked if packed.holds(self.asked) else None
+        return packed.state_of(self) | {"live": None, "asked": asked}
 
     def __copy__(self) -> "Fitted":
         """One with the same fields."""
@@ -256,7 +258,7 @@ class Fitted:
         return read(Fitted, path, own)
 
 
-FIT = Format("symfric fit", 1, "load_fit", "a saved fit", Fitted)
+FIT = Format("symfric fit", 2, "load_fit", "a saved fit", Fitted)
 
 
 def load_fit(path: str | Path, own: Iterable[type | Callable[..., Any]] = ()) -> Fitted:

@@ -1,6 +1,5 @@
 """A fit in a file: everything that a page needs and the law, without data and equations."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -8,7 +7,8 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 
 from identification.result.coding import plain, revived
 from identification.result.law_data import from_data, known, to_data
-from symfric.foundation import checks
+from symfric.foundation import checks, typed
+from symfric.foundation.files import read_json
 from symfric.foundation.parameters import Parametric
 from symfric.laws import law_name
 
@@ -46,16 +46,10 @@ def _data(held: Parametric | None) -> dict[str, Any] | None:
 
 def read(kind: "type[Fitted]", path: str | Path, own: Mapping[str, type[Parametric]] | None) -> Any:
     """The fit that was written to `path`; see `Fitted.from_json`."""
-    place = checks.path("fit", path)
-    try:
-        data = json.loads(place.read_text(encoding="utf-8"))
-    except OSError as error:
-        reason = "no such file" if isinstance(error, FileNotFoundError) else "an unreadable file"
-        raise ValueError(f"fit '{path}': expected a stored fit, got {reason}") from None
-    except (UnicodeDecodeError, json.JSONDecodeError):
-        raise _foreign(path) from None
-    if not isinstance(data, dict) or data.get("file") != FILE:
-        raise _foreign(path)
+    what = "a file that fit.to_json(path) wrote"
+    data = read_json("fit", path, what)
+    if data.get("file") != FILE:
+        raise ValueError(f"fit '{path}': expected {what}, got something else")
     if data.get("format") != FORMAT:
         raise ValueError(
             f"fit '{path}': expected format {FORMAT}, got {checks.shown(data.get('format'))}; it "
@@ -63,16 +57,10 @@ def read(kind: "type[Fitted]", path: str | Path, own: Mapping[str, type[Parametr
         )
     try:
         return _made(kind, data, own)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
         raise ValueError(
             f"fit '{path}': expected what fit.to_json(path) wrote, got it changed: {error}"
         ) from None
-
-
-def _foreign(path: str | Path) -> ValueError:
-    return ValueError(
-        f"fit '{path}': expected a file that fit.to_json(path) wrote, got something else"
-    )
 
 
 def _made(kind: "type[Fitted]", data: dict[str, Any], own: Mapping[str, type[Parametric]] | None):
@@ -81,11 +69,12 @@ def _made(kind: "type[Fitted]", data: dict[str, Any], own: Mapping[str, type[Par
         f.name: revived(hints[f.name], data[f.name]) for f in fields(kind) if f.name not in APART
     }
     law, machine = data["law_data"], data["machine"]
-    return kind(
-        **plain_ones,
-        law=_known(law, own),
-        machine=_known(machine, own),
-    )
+    made = kind(**plain_ones, law=_known(law, own), machine=_known(machine, own))
+    for name, value in plain_ones.items():
+        if not typed.fits(value, hints[name]):
+            raise ValueError(f"{name} of another type")
+    made.check_fields()
+    return made
 
 
 def _known(data: Any, own: Mapping[str, type[Parametric]] | None) -> Any:

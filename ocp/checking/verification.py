@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.brief import brief
 from symfric.foundation.status import Status
+from symfric.foundation.typed import agree
 from symfric.results.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -99,6 +100,10 @@ class Verification:
     growth: float = float("nan")
 
     __repr__ = brief
+
+    def check_fields(self) -> None:
+        """Refuse local errors that are not one number an interval; for files."""
+        agree("Verification", all(errors.ndim == 1 for errors in self.local_errors))
 
     @property
     def misses(self) -> tuple[Miss, ...]:

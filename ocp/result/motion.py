@@ -11,6 +11,7 @@ from ocp.text.span import Span
 from ocp.transcription.points import SpanPoints
 from ocp.transcription.schemes import Coefficients
 from symfric.foundation.parameters import check_names
+from symfric.foundation.typed import agree
 
 Array = NDArray[np.float64]
 
@@ -69,6 +70,17 @@ class Motion:
     controls: dict[str, Array]
     phases: tuple[Stretch, ...]
     spans: tuple[int, ...]
+
+    def check_fields(self) -> None:
+        """Refuse signals that do not belong to the times; for files."""
+        agree(
+            "Motion",
+            self.t.ndim == self.t_control.ndim == 1,
+            all(v.shape == self.t.shape for v in (self.nodes, *self.signals.values())),
+            all(v.shape == self.t_control.shape for v in self.controls.values()),
+            self.signals.keys() <= self.units.keys(),
+            len(self.phases) == len(self.spans),
+        )
 
     def __repr__(self) -> str:
         named = f" of scenario '{self.name}'" if self.name else ""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ocp.result.motion import Motion, Stretch
 from ocp.result.stored import Stored, stored_spans, structure_of
 from ocp.solvers.outcome import Iterate, SolverStatistics
-from ocp.text.posed import posed
+from ocp.text.posed import Posed, posed
 from ocp.text.problem import Problem
 from ocp.text.ranges import Free
 from ocp.transcription.points import Points
@@ -96,7 +96,7 @@ class Solution:
         cause: the exception in `progress` that stopped the solver, if any.
     """
 
-    problem: Problem
+    problem: Problem = field(metadata={"packed": Posed})
     status: Status
     message: str
     cost: float
@@ -339,7 +339,7 @@ class Solution:
         write_text(path, json.dumps(self.to_dict(), allow_nan=False))
 
 
-SOLUTION = Format("symfric ocp solution", 2, "ocp.load", "a saved solution", Solution)
+SOLUTION = Format("symfric ocp solution", 3, "ocp.load", "a saved solution", Solution)
 
 
 def load(path: str | Path, own: Iterable[type | Callable[..., Any]] = ()) -> Solution:

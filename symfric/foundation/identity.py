@@ -63,8 +63,14 @@ def named(expressions: Sequence[Expression]) -> tuple[Atom, ...]:
         for symbol in _symbols(expressions):
             found = _by_node.get(_node(symbol))
             atoms.append(found or _known(symbol, uuid4().hex))
-    _keep(expressions, atoms)
+    keep(expressions, atoms)
     return tuple(atoms)
+
+
+def atoms_of(labels: Sequence[str], names: Sequence[str]) -> list[Atom]:
+    """The SX symbols of these unique names in this process, made where there are none."""
+    with _lock:
+        return [_known(ca.SX.sym(label), name) for label, name in zip(labels, names, strict=True)]
 
 
 def again(
@@ -88,7 +94,7 @@ def again(
     if pairs:
         old, new = map(list, zip(*pairs, strict=True))
         found = list(ca.substitute(found, old, new))  # pyright: ignore
-    _keep(found, atoms)
+    keep(found, atoms)
     return found
 
 
@@ -98,28 +104,38 @@ def _symbols(expressions: Sequence[Any]) -> Iterable[Any]:
     return ca.symvar(ca.vertcat(*flat)) if flat else ()
 
 
-def _keep(expressions: Iterable[Any], atoms: Sequence[Atom]) -> None:
+def keep(expressions: Iterable[Any], atoms: Sequence[Atom]) -> None:
+    """Keep the names of `atoms` as long as one of the expressions lives."""
     kept = tuple(atoms)
     for expression in expressions:
         vars(expression)[KEPT] = kept
 
 
-def _read(text: str, names: Sequence[str]) -> Any:
-    """What `_written` wrote."""
+def deserialized(text: str, names: Sequence[str] | None) -> Any:
+    """The expression or Function that `serialized` wrote; CasADi may run what it finds there."""
+    if names is None:
+        return ca.Function.deserialize(text)
     reader: Any = ca.StringDeserializer(text)
     symbols = reader.unpack()
     return again([reader.unpack()], symbols, names)[0]
+
+
+def serialized(value: Any) -> tuple[str, tuple[str, ...] | None]:
+    """An expression or Function in CasADi's own format, and the names of its symbols."""
+    if isinstance(value, ca.Function):
+        return str(value.serialize()), None
+    atoms = named([value])
+    writer: Any = ca.StringSerializer()
+    writer.pack([atom.symbol for atom in atoms])
+    writer.pack(value)
+    return writer.encode(), tuple(atom.name for atom in atoms)
 
 
 def _written(expression: Any) -> Any:
     """How `pickle` writes an expression; in CasADi's own context as CasADi does."""
     if getattr(ca.casadi, "_current_pickle_context", lambda: None)():
         return object.__reduce_ex__(expression, 2)
-    atoms = named([expression])
-    writer: Any = ca.StringSerializer()
-    writer.pack([atom.symbol for atom in atoms])
-    writer.pack(expression)
-    return _read, (writer.encode(), tuple(atom.name for atom in atoms))
+    return deserialized, serialized(expression)
 
 
 for _kind in (ca.SX, ca.MX):

@@ -1,34 +1,35 @@
 """Frozen data with expressions in it as plain arrays: for files, and for pickles.
 
 A pack is an archive of arrays (NPZ): one holds JSON, in which objects are named by class and
-fields, one the expressions, as CasADi writes them, all together, with the names of their symbols
-(`symfric.foundation.identity`); the others are arrays as they are. Nothing is run to read one:
-classes of symfric get their fields, and those of others only if they are handed over. Numbers come
-back to the bit.
+fields and expressions by number; the others are arrays as they are. Numbers come back to the bit.
+
+A file cannot run code. Expressions are lists of instructions (`symfric.foundation.instructions`),
+arrays are never pickles (`symfric.foundation.archive`), and objects are of a fixed list of classes
+(`symfric.foundation.storable`) or of those that the caller passes; their fields are checked against
+their annotations. A pickle is trusted, as all pickles are: it may also hold other classes and
+CasADi's own serialization.
 """
 
 import json
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
 from functools import partial
-from importlib import import_module
 from io import BytesIO
 from types import BuiltinFunctionType, FunctionType
 from typing import IO, Any, TypeVar, cast, final
-from zipfile import BadZipFile
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation import checks, identity
+from symfric.foundation import archive, checks, identity, storable, typed
+from symfric.foundation.instructions import Instructions
 
-OWN = ("symfric", "ocp", "identification")
-"""Packages whose classes are known."""
-ABOUT, EXPRESSIONS = "about", "expressions"
-CASADI = ca.SX | ca.MX | ca.DM | ca.Function
-Bytes = NDArray[np.uint8]
+FUNCTION = tuple[str, list[ca.SX], list[ca.SX], list[str], list[str]]
+"""Name, arguments and results of a Function in a file, and their names."""
+ABOUT, OLD = "about", "expressions"
 
 
 @final
@@ -66,23 +67,25 @@ def dump(file: IO[bytes], thing: object, kind: str = "", form: int = 0) -> None:
         form: number of the format, raised whenever older programs would misread it.
 
     Raises:
-        ValueError: something that no pack holds, such as a function, and where it is.
+        ValueError: something that no file holds, such as a function, and where it is.
     """
-    writer = _Writer()
-    content = writer.write("", thing)
-    expressions, symbols = writer.expressions()
-    head = {"kind": kind, "format": form, "symbols": symbols, "content": content}
-    arrays = {f"a{k}": array for k, array in enumerate(writer.arrays)}
-    words = {ABOUT: json.dumps(head).encode(), EXPRESSIONS: expressions.encode()}
-    plain = {name: np.frombuffer(text, np.uint8) for name, text in words.items()}
-    np.savez(file, **plain, **arrays)  # pyright: ignore[reportArgumentType]
+    _Writer(trusted=False).pack(file, thing, kind, form)
 
 
 def dumps(thing: object) -> bytes:
-    """The pack of `thing`."""
+    """The pack of `thing` in a pickle."""
     buffer = BytesIO()
-    dump(buffer, thing)
+    _Writer(trusted=True).pack(buffer, thing, "", 0)
     return buffer.getvalue()
+
+
+def holds(thing: object) -> bool:
+    """Return True if a file can hold `thing`."""
+    try:
+        _Writer(trusted=False).pack(BytesIO(), thing, "", 0)
+    except ValueError:
+        return False
+    return True
 
 
 def load(
@@ -102,81 +105,74 @@ def load(
             function that is not known.
     """
     try:
-        opened = np.load(file, allow_pickle=False)
-        if not isinstance(opened, np.lib.npyio.NpzFile):
-            raise _foreign
-        with opened as archive:
-            arrays = {name: archive[name] for name in archive.files}
+        arrays = archive.read(file)
+        if OLD in arrays:
+            raise UnreadableError(
+                "expected a current file, got one of an older format, which could run code; repeat "
+                "the computation, or export JSON or CSV with the version that wrote the file"
+            )
         about = json.loads(arrays.pop(ABOUT).tobytes())
         if about["kind"] != kind:
-            raise UnreadableError(f"expected a file of the kind '{kind}', got a '{about['kind']}'")
+            raise UnreadableError(
+                f"expected a file of the kind '{kind}', got a {checks.shown(about['kind'])}"
+            )
         if not 1 <= about["format"] <= form:
             raise UnreadableError(
-                f"expected format {form} or older, got {about['format']}; it was written by a "
-                "newer version of symfric, which reads it"
+                f"expected format {form} or older, got {checks.shown(about['format'])}; it was "
+                "written by a newer version of symfric, which reads it"
             )
-        known = {_path(one): one for one in own}
-        return _Reader(arrays, about.get("symbols"), known, reader).read(about["content"])
-    except (BadZipFile, KeyError, IndexError, EOFError, OSError, TypeError) as error:
-        raise _foreign from error
-    except (ValueError, RuntimeError) as error:
-        raise (error if isinstance(error, UnreadableError) else _foreign) from error
+        known = {storable.path_of(one): one for one in own}
+        return _Reader(arrays, known, reader).unpack(about)
+    except UnreadableError:
+        raise
+    except Exception as error:  # a damaged file makes zipfile, NumPy and CasADi raise anything
+        raise _foreign() from error
 
 
 def loads(data: bytes) -> Any:
     """What `dumps` wrote, in a pickle: with classes of anybody."""
-    arrays = dict(np.load(BytesIO(data), allow_pickle=False))
-    about = json.loads(arrays[ABOUT].tobytes())
-    return _Reader(arrays, about["symbols"], None).read(about["content"])
+    arrays = archive.read(BytesIO(data))
+    return _Reader(arrays, None).unpack(json.loads(arrays.pop(ABOUT).tobytes()))
 
 
 class UnreadableError(ValueError):
     """A pack of another version, or with a class that is neither symfric's nor handed over."""
 
 
-_foreign = ValueError("expected a file that symfric wrote, got something else or a damaged one")
-
-
-def _path(named: Any) -> str:
-    return f"{named.__module__}:{named.__qualname__}"
-
-
-def _found(path: str) -> Any:
-    """What stands under this name in its module.
-
-    Raises:
-        ImportError, AttributeError, ValueError: there is none.
-    """
-    place, _, name = path.partition(":")
-    found: Any = import_module(place)
-    for part in name.split("."):
-        found = getattr(found, part)
-    return found
+def _foreign() -> ValueError:
+    return ValueError("expected a file that symfric wrote, got something else or a damaged one")
 
 
 @final
 class _Writer:
-    """Turns objects into JSON; arrays and expressions are put aside."""
+    """Turns objects into JSON; arrays and expressions are put aside.
 
-    def __init__(self) -> None:
-        self.arrays: list[NDArray[Any]] = []
-        self._expressions: list[Any] = []
+    In a pickle, which is `trusted`, MX expressions and Functions are as CasADi serializes them.
+    """
+
+    def __init__(self, trusted: bool) -> None:
+        self._arrays: list[NDArray[Any]] = []
+        self._expressions: list[ca.SX] = []
         self._known: dict[int, int] = {}
         self._alive: list[object] = []
+        self._trusted = trusted
 
-    def expressions(self) -> tuple[str, list[list[str]]]:
-        """All expressions behind their symbols, as CasADi writes them; the names of the symbols."""
-        stream: Any = ca.StringSerializer()
-        names = list[list[str]]()
-        for kind in (ca.SX, ca.MX):
-            those: list[Any] = [e for e in self._expressions if isinstance(e, kind)]
-            atoms = identity.named(those)
-            stream.pack([atom.symbol for atom in atoms] or [kind(0)])
-            names.append([atom.name for atom in atoms])
-        stream.pack(len(self._expressions))
-        for expression in self._expressions:
-            stream.pack(expression)
-        return stream.encode(), names
+    def pack(self, file: IO[bytes], thing: object, kind: str, form: int) -> None:
+        """Write the archive."""
+        head: dict[str, Any] = {"kind": kind, "format": form, "content": self.write("", thing)}
+        try:
+            instructions = Instructions.of(self._expressions)
+            if not self._trusted:
+                instructions.check()
+        except ValueError as error:
+            if not self._trusted:
+                raise ValueError(f"pack: {error}") from None
+            head["serialized"] = [identity.serialized(e) for e in self._expressions]
+            instructions = Instructions.of(())
+        head["expressions"] = self.write("", instructions)
+        about = np.frombuffer(json.dumps(head).encode(), np.uint8)
+        arrays = {f"a{k}": array for k, array in enumerate(self._arrays)}
+        np.savez(file, **{ABOUT: about}, **arrays)  # pyright: ignore[reportArgumentType]
 
     def write(self, where: str, value: Any) -> Any:
         """`value` as JSON; what has more than a text or a number is {kind: content}."""
@@ -184,13 +180,15 @@ class _Writer:
             return value
         if isinstance(value, float | np.floating | np.integer | np.bool_):
             return value.item() if isinstance(value, np.generic) else value
-        if isinstance(value, CASADI):
-            self._expressions.append(value)
-            return {"casadi": len(self._expressions) - 1}
+        if isinstance(value, ca.SX | ca.DM):
+            self._expressions.append(value if isinstance(value, ca.SX) else ca.SX(value))
+            return {"DM" if isinstance(value, ca.DM) else "SX": len(self._expressions) - 1}
+        if isinstance(value, ca.MX | ca.Function):
+            return self._of_casadi(where, value)
         if isinstance(value, np.ndarray):
             return self._array(where, cast(NDArray[Any], value))
         if isinstance(value, Enum):
-            return {"enum": [_path(type(value)), value.name]}
+            return {"enum": [storable.path_of(type(value)), value.name]}
         if isinstance(value, tuple | list):
             several = [self.write(f"{where}[{i}]", v) for i, v in enumerate(value)]  # pyright: ignore
             return {type(value).__name__: several} if type(value) is tuple else several
@@ -206,14 +204,27 @@ class _Writer:
             return {"partial": [self.write(where, part) for part in held]}
         return self._object(where, value)
 
+    def _of_casadi(self, where: str, value: Any) -> Any:
+        """A Function as expressions of its arguments; in a pickle whatever CasADi serializes."""
+        if self._trusted:
+            return {"serialized": identity.serialized(value)}
+        if isinstance(value, ca.Function):
+            arguments = value.sx_in()
+            with suppress(RuntimeError, ValueError):
+                Instructions.of(results := value.call(arguments))
+                parts = [value.name(), arguments, results, value.name_in(), value.name_out()]
+                return {"Function": self.write(where, parts)}
+        what = "expressions in SX, and Functions that expand to SX"
+        raise checks.refused(f"pack{where}", what, value)
+
     def _function(self, where: str, value: Any) -> Any:
         """A function of Python, by where it stands."""
         try:
-            same = _found(_path(value)) is value
+            same = storable.found_at(storable.path_of(value)) is value
         except (ImportError, AttributeError, ValueError):
             same = False
         if same:
-            return {"function": _path(value)}
+            return {"function": storable.path_of(value)}
         what = "a function that can be imported: written by def at the top of a module"
         hint = "move it there (arguments by functools.partial), or write a casadi.Function"
         raise checks.refused(f"pack{where}", what, value, hint)
@@ -221,8 +232,8 @@ class _Writer:
     def _array(self, where: str, value: NDArray[Any]) -> Any:
         if value.dtype.kind not in "biufU":
             raise checks.refused(f"pack{where}", "an array of numbers", value)
-        self.arrays.append(value)
-        return {"array": len(self.arrays) - 1}
+        self._arrays.append(value)
+        return {"array": len(self._arrays) - 1}
 
     def _object(self, where: str, value: Any) -> Any:
         """An object by class and fields, once; "same" where it stands again."""
@@ -231,7 +242,9 @@ class _Writer:
         kind = type(value)
         if hasattr(kind, "packed_as") and not isinstance(value, type):
             return {"was": self.write(where, value.packed_as())}
-        if isinstance(value, type) or not (is_dataclass(kind) or hasattr(kind, "to_pack")):
+        known = self._trusted or storable.may_hold(storable.path_of(kind))
+        data = is_dataclass(kind) or hasattr(kind, "to_pack")
+        if isinstance(value, type) or not data or not known:
             what = "numbers, texts, expressions and objects made of them"
             raise checks.refused(f"pack{where}", what, value)
         self._known[id(value)] = len(self._known)
@@ -239,7 +252,7 @@ class _Writer:
         say: Callable[[], dict[str, Any]] = getattr(value, "to_pack", partial(state_of, value))
         state = say()
         has = {name: self.write(f"{where}.{name}", held) for name, held in state.items()}
-        return {"is": _path(kind), "has": has}
+        return {"is": storable.path_of(kind), "has": has}
 
 
 def state_of(thing: Any) -> dict[str, Any]:
@@ -249,30 +262,36 @@ def state_of(thing: Any) -> dict[str, Any]:
 
 @final
 class _Reader:
-    """Makes objects of JSON; `own` None lets classes and functions of anybody in."""
+    """Makes objects of JSON; `own` None, of a pickle, lets classes and functions of anybody in."""
 
     def __init__(
-        self,
-        arrays: Mapping[str, NDArray[Any]],
-        symbols: list[list[str]] | None,
-        own: Mapping[str, Any] | None,
-        reader: str = "",
+        self, arrays: Mapping[str, NDArray[Any]], own: Mapping[str, Any] | None, reader: str = ""
     ) -> None:
         self._arrays, self._own, self._reader = arrays, own, reader
-        stream: Any = ca.StringDeserializer(arrays[EXPRESSIONS].tobytes().decode())
-        expressions = None if symbols is None else _expressions(stream, symbols)
+        self._expressions: list[Any] = []
         self._known: list[object] = []
         self._ways: dict[str, Callable[[Any], Any]] = {
-            "casadi": lambda k: stream.unpack() if expressions is None else expressions[k],
+            "SX": lambda k: self._expressions[k],
+            "DM": lambda k: ca.DM(self._expressions[k]),
+            "Function": lambda parts: self._of_expressions(self.read(parts)),
+            "serialized": self._serialized,
             "array": lambda k: self._arrays[f"a{k}"],
-            "enum": lambda named: getattr(self._class(named[0], Enum), named[1]),
+            "enum": lambda named: self._class(named[0], Enum)[named[1]],
             "tuple": lambda several: tuple(map(self.read, several)),
             "dict": lambda pairs: {self.read(name): self.read(value) for name, value in pairs},
-            "same": lambda k: self._known[k],
+            "same": self._same,
             "was": lambda content: self.read(content).unpacked(),
             "function": self._function,
             "partial": lambda parts: self._partial(*map(self.read, parts)),
         }
+
+    def unpack(self, about: Mapping[str, Any]) -> Any:
+        """Return the packed object."""
+        instructions = checks.kind("pack", self.read(about["expressions"]), Instructions, "")
+        self._expressions = instructions.expressions(trusted=self._own is None)
+        self._expressions += map(self._serialized, about.get("serialized", ()))
+        self._known.clear()
+        return self.read(about["content"])
 
     def read(self, value: Any) -> Any:
         """The object that was written as `value`."""
@@ -286,21 +305,55 @@ class _Reader:
         return self._ways[cast(str, way)](content)
 
     def _object(self, kind: type, has: Mapping[str, Any]) -> Any:
-        made = object.__new__(kind)
-        self._known.append(made)
-        vars(made).update({name: self.read(held) for name, held in has.items()})
+        """An object with these fields; out of a file its own checks hold for them."""
+        made, place = object.__new__(kind), len(self._known)
+        self._known.append(None)
+        values = {name: self.read(held) for name, held in has.items()}
+        if self._own is not None and storable.path_of(kind).startswith(storable.OURS):
+            values = storable.checked(kind, values)
+        vars(made).update(values)
+        self._known[place] = made
+        check = getattr(made, "check_fields", getattr(made, "__post_init__", None))
+        if (
+            self._own is not None
+            and check is not None
+            and check.__module__.startswith(storable.OURS)
+        ):
+            check()
         return made
 
-    def _class(self, path: str, wanted: type) -> type:
+    def _same(self, k: int) -> object:
+        """The object of this number, which is complete."""
+        if self._known[k] is None:
+            raise _foreign()
+        return self._known[k]
+
+    def _class(self, path: str, wanted: type) -> Any:
         """The class of this name, if it is one that may be in a pack."""
+        if self._own is not None and not storable.may_hold(path):
+            raise _foreign()
         found = self._named(path, "classes")
-        if self._own is not None and path in self._own:
-            return found
-        if not (isinstance(found, type) and issubclass(found, wanted)):
-            raise _foreign
+        if not (
+            isinstance(found, type)
+            and issubclass(found, wanted)
+            and storable.path_of(found) == path
+        ):
+            raise _foreign()
         if not (is_dataclass(found) or hasattr(found, "to_pack") or issubclass(found, Enum)):
-            raise _foreign
-        return cast(type, found)
+            raise _foreign()
+        return found
+
+    def _of_expressions(self, parts: Any) -> ca.Function:
+        """A Function of SX expressions; options of CasADi, which could run code, have no place."""
+        if not typed.fits(tuple(parts), FUNCTION):
+            raise _foreign()
+        return ca.Function(*parts)
+
+    def _serialized(self, content: Any) -> Any:
+        """An expression or Function in CasADi's own format, which may run code."""
+        if self._own is not None:
+            raise _foreign()
+        return identity.deserialized(*content)
 
     def _function(self, path: str) -> Any:
         """The function of this name; out of a file only one that was handed over."""
@@ -316,10 +369,10 @@ class _Reader:
         place, _, name = path.partition(":")
         if self._own is not None and path in self._own:
             return self._own[path]
-        if self._own is not None and place.split(".")[0] not in OWN:
+        if self._own is not None and place.split(".")[0] not in storable.OWN:
             raise self._unknown(what, path)
         try:
-            return _found(path)
+            return storable.found_at(path)
         except (ImportError, AttributeError) as error:
             raise UnreadableError(
                 f"expected {what} that this version of symfric has, got {name} of {place}; it was "
@@ -332,17 +385,3 @@ class _Reader:
             f"expected {what} of symfric, got {name} of {place}; hand it over, as in "
             f"{self._reader}(path, own=[{name}])"
         )
-
-
-def _expressions(stream: Any, names: list[list[str]]) -> list[Any]:
-    """All expressions, in the symbols of this process."""
-    symbols = [stream.unpack() for _ in names]
-    found = [stream.unpack() for _ in range(stream.unpack())]
-    for kind, known, own in zip((ca.SX, ca.MX), symbols, names, strict=True):
-        places = [i for i, one in enumerate(found) if isinstance(one, kind)]
-        if len(set(own)) != len(own):
-            raise _foreign
-        here = identity.again([found[i] for i in places], known if own else [], own)
-        for i, one in zip(places, here, strict=True):
-            found[i] = one
-    return found

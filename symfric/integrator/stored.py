@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.status import Status
+from symfric.foundation.typed import agree
+from symfric.integrator.arguments import BACKENDS
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.derivatives.path import Path
 from symfric.integrator.derivatives.seeds import Seeds
@@ -160,6 +162,24 @@ class Stored:
         )
         return stored if trajectory.differentiate is None else stored._with_slopes(trajectory)
 
+    def check_fields(self) -> None:
+        """Refuse a file whose arrays do not fit each other: compiled code does not look again."""
+        steps, inputs, model = self.steps, self.inputs, self.model
+        (k, n), m = steps.y0.shape, self.times.size
+        agree(
+            "run",
+            self.method in METHODS and self.backend in BACKENDS,
+            k > 0 and steps.t0.shape == steps.t1.shape == (k,),
+            steps.y1.shape == (k, n) and steps.D.shape == (k, steps.D.shape[1], n),
+            n >= len(model.x) + len(model.z) and self.p.shape == (len(model.p),),
+            self.times.shape == (m,) and self.reached.shape == (n, m),
+            self.signals.shape == (len(model.signals), m),
+            inputs.expression.numel() == len(model.u),
+            inputs.values.shape == (inputs.data.numel(), inputs.breaks.size - 1),
+            bool((np.diff(inputs.breaks) > 0).all()),
+            all(bool(np.isfinite(a).all()) for a in (*vars(steps).values(), self.times, self.p)),
+        )
+
     def _with_slopes(self, trajectory: Trajectory) -> "Stored":
         try:
             delays = trajectory.event_sensitivities
@@ -256,15 +276,16 @@ class Stored:
         RUN.save(path, self)
 
 
-RUN = Format("symfric run", 2, "load_run", "a saved run", Stored)
+RUN = Format("symfric run", 3, "load_run", "a saved run", Stored)
 
 
 def load_run(
     path: str | PathLike[str], own: Iterable[type | Callable[..., Any]] = ()
 ) -> Trajectory:
-    """The run that `run.save(path)` wrote, to the bit.
+    """Load the run that `run.save(path)` wrote, equal to the bit.
 
-    Nothing in the file is run: classes of symfric get their fields.
+    Reading runs no code from the file: it holds arrays, lists of elementary operations and fields
+    of known classes, which are checked before use.
 
     Args:
         path: the file.

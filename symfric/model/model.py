@@ -114,6 +114,11 @@ class Model(Showing, Starting):
                 )
         self._refuse([*naming_problems(self), *equation_problems(self, self._symbols())])
 
+    def check_fields(self) -> None:
+        """Refuse what no model has, without making it again: for models out of files."""
+        self._refuse(kind_problems(self))
+        self._refuse([*naming_problems(self), *equation_problems(self, self._symbols())])
+
     def shown(self) -> Shown:
         """What it consists of, without its expressions."""
         return shown(self)

@@ -13,6 +13,7 @@ from symfric.foundation import checks
 from symfric.foundation.files import write_table
 from symfric.foundation.shown import Showing, Shown
 from symfric.foundation.status import Status
+from symfric.foundation.typed import agree
 from symfric.results import tables_many
 from symfric.results.stored import Format
 
@@ -63,6 +64,19 @@ class Ensemble(Showing):
     fixed: dict[str, float] = field(default_factory=dict[str, float])
     given_units: dict[str, str] = field(default_factory=dict[str, str])
     reach: dict[str, Array] = field(default_factory=dict[str, Array])
+
+    def check_fields(self) -> None:
+        """Refuse arrays that are not those of the same members; for files."""
+        n, k = self.attempts.size, self.t.shape[-1]
+        agree(
+            "Ensemble",
+            self.t.shape in ((k,), (n, k)),
+            all(values.shape == (n, k) for values in self.signals.values()),
+            self.signals.keys() == self.units.keys(),
+            all(v.shape == (n,) for v in (self.attempts, self.reached, *self.varied.values())),
+            {*self.varied, *self.fixed} <= self.given_units.keys() | self.units.keys(),
+            all(ends.shape == (2, n) for ends in self.reach.values()),
+        )
 
     def shown(self) -> Shown:
         """Members, failures, what was varied, and where signals end."""
@@ -190,7 +204,7 @@ class Ensemble(Showing):
         return tables_many.dataset(self, names)
 
 
-ENSEMBLE = Format("symfric ensemble", 1, "load_ensemble", "a saved ensemble", Ensemble)
+ENSEMBLE = Format("symfric ensemble", 2, "load_ensemble", "a saved ensemble", Ensemble)
 
 
 def load_ensemble(path: str | Path) -> Ensemble:

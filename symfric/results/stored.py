@@ -44,7 +44,7 @@ class Format(Generic[T]):
             packed.dump(file, thing, self.kind, self.number)
 
     def load(self, path: str | PathLike[str], own: Iterable[type | Callable[..., Any]] = ()) -> T:
-        """What `save` wrote. Nothing in the file is run: classes get their fields.
+        """Load what `save` wrote; reading runs no code from the file.
 
         Args:
             path: the file.

@@ -4,6 +4,8 @@ from mutants.mutant import Mutant
 
 PACKED = "symfric/foundation/packed.py"
 STORED = "symfric/integrator/stored.py"
+INSTRUCTIONS = "symfric/foundation/instructions.py"
+T_INSTRUCTIONS = ("tests/symfric/foundation/test_instructions.py",)
 T_PACKED = ("tests/symfric/foundation/test_packed.py",)
 T_STORED = ("tests/symfric/integrator/test_stored.py",)
 T_SHOWN = ("tests/symfric/foundation/test_shown.py",)
@@ -12,7 +14,40 @@ T_ACCELERATIONS = ("tests/symfric/model/test_accelerations.py",)
 HELD = (
     Mutant(
         "a file may name classes of anybody", PACKED,
-        'if self._own is not None and place.split(".")[0] not in OWN:', "if False:", T_PACKED,
+        'if self._own is not None and place.split(".")[0] not in storable.OWN:', "if False:",
+        T_PACKED,
+    ),
+    Mutant(
+        "options of CasADi are read from a file", PACKED,
+        "if not typed.fits(tuple(parts), FUNCTION):", "if False:", T_PACKED,
+    ),
+    Mutant(
+        "CasADi's serialization is read from a file", PACKED,
+        "            raise _foreign()\n        return identity",
+        "            pass\n        return identity", T_PACKED,
+    ),
+    Mutant(
+        "a file may name any class of ours", PACKED,
+        "if self._own is not None and not storable.may_hold(path):", "if False:", T_PACKED,
+    ),
+    Mutant(
+        "fields of a file may be of any type", "symfric/foundation/storable.py",
+        "if not typed.fits(value, hint):", "if False:", T_PACKED,
+    ),
+    Mutant(
+        "operands may follow their operation", INSTRUCTIONS,
+        "_within(self.code[:, 1:].T, count + np.arange(len(self.code)))",
+        "_within(self.code[:, 1:], count + len(self.code))", T_INSTRUCTIONS,
+    ),
+    Mutant(
+        "a file may give two symbols one name", INSTRUCTIONS,
+        "symbols == len(self.names) == len(set(self.names))", "symbols == len(self.names)",
+        T_INSTRUCTIONS,
+    ),
+    Mutant(
+        "rows of compiled loops may be short", "symfric/integrator/compiled/rows.py",
+        "if flat.shape[1] != size:", "if False:",
+        ("tests/symfric/integrator/compiled/test_columns.py",),
     ),
     Mutant(
         "a file of another version is read", PACKED,

@@ -62,11 +62,7 @@ TOLD = (
     ),
     Mutant(
         "packages that begin as ours are ours", FOUNDATION + "packed.py",
-        'place.split(".")[0] not in OWN', 'not place.startswith(OWN)', foundation("packed"),
-    ),
-    Mutant(
-        "a pack may run what it holds", FOUNDATION + "packed.py",
-        "allow_pickle=False)\n        if not", "allow_pickle=True)\n        if not",
+        'place.split(".")[0] not in storable.OWN', "not place.startswith(storable.OWN)",
         foundation("packed"),
     ),
     Mutant(

@@ -82,11 +82,6 @@ WRITTEN = (
         "if found is None:", T_IDENTITY,
     ),
     Mutant(
-        "a file may give two symbols one name", PACKED,
-        "        if len(set(own)) != len(own):\n            raise _foreign\n",
-        "", T_PACKED,
-    ),
-    Mutant(
         "what is gone is packed again as what lies in its place", PACKED,
         "        self._alive.append(value)\n", "", T_PACKED,
     ),

@@ -75,8 +75,14 @@ def _address(array: NDArray[Any]) -> int:
 
 
 def _in_rows(array: Array, size: int) -> Array:
-    """An array whose rows are `size` numbers side by side each; itself, where they are."""
+    """An array whose rows are `size` numbers side by side each; itself, where they are.
+
+    Raises:
+        ValueError: rows of another size, which the loop in C would read beyond their end.
+    """
     flat = array if array.ndim == 2 else array.reshape(array.shape[0], size)
+    if flat.shape[1] != size:
+        raise ValueError(f"expected rows of {size} numbers, got {flat.shape[1]}")
     beside = size <= 1 or flat.strides[1] == NUMBER
     return flat if beside and flat.dtype == np.float64 else np.ascontiguousarray(flat, dtype=float)
 

@@ -11,11 +11,11 @@ from hashlib import sha256
 from math import prod
 from pathlib import Path
 from typing import final
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation import archive
 from symfric.foundation.files import written
 from symfric.integrator.many.chunk import Solved
 
@@ -90,13 +90,14 @@ class Store:
         if mark is None or not mark.exists():
             return False
         try:
-            with mark.open("rb") as file, np.load(file) as saved:
-                attempts, reached, reach = (saved[n] for n in ("attempts", "reached", "reach"))
-                failed = dict(zip(saved["failed"].tolist(), saved["why"].tolist(), strict=True))
-                if str(saved["checksum"]) == self._checksum(first, attempts.size):
-                    self._note(first, attempts, reached, reach, failed)
-                    return True
-        except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+            with mark.open("rb") as file:
+                saved = archive.read(file)
+            attempts, reached, reach = (saved[n] for n in ("attempts", "reached", "reach"))
+            failed = dict(zip(saved["failed"].tolist(), saved["why"].tolist(), strict=True))
+            if str(saved["checksum"]) == self._checksum(first, attempts.size):
+                self._note(first, attempts, reached, reach, failed)
+                return True
+        except (OSError, ValueError, KeyError):
             pass  # the mark itself is damaged
         self.damaged.append(first)
         return False
@@ -126,10 +127,10 @@ class Store:
                     why=np.array(list(result.failed.values()), dtype=np.str_),
                     checksum=np.array(self._checksum(first, size)),
                 )
-        except OSError as error:
+        except (OSError, ValueError) as error:
             raise ValueError(
                 f"simulate_many: out: expected room for members from {first} on in "
-                f"'{self._folder}', got {error.strerror}; what is complete stays, call again to go "
+                f"'{self._folder}', got {_reason(error)}; what is complete stays, call again to go "
                 "on"
             ) from None
 
@@ -148,6 +149,12 @@ class Store:
         self.reached[first : first + attempts.size] = reached
         self.reach[first : first + attempts.size] = reach
         self.failed |= {first + m: why for m, why in failed.items()}
+
+
+def _reason(error: OSError | ValueError) -> str:
+    """Why a file cannot be written, in the words of the system."""
+    cause = error if isinstance(error, OSError) else error.__cause__
+    return cause.strerror if isinstance(cause, OSError) and cause.strerror else str(error)
 
 
 def _claim(temporary: Path, path: Path) -> None:
@@ -193,10 +200,10 @@ class _ArrayFile:
                         file.write(row * min(rows, self.shape[0] - first))
                 if missing:
                     _claim(temporary, self.path)
-        except OSError as error:
+        except (OSError, ValueError) as error:
             raise ValueError(
                 f"simulate_many: out: expected {8e-6 * prod(self.shape):.3g} MB of room for "
-                f"'{self.path}', got {error.strerror}"
+                f"'{self.path}', got {_reason(error)}"
             ) from None
 
     @property

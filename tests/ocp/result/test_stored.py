@@ -126,7 +126,7 @@ def test_files_of_others_are_refused(tmp_path: Path) -> None:
 def test_another_version_is_told(tmp_path: Path) -> None:
     about = json.dumps({"kind": SOLUTION.kind, "format": 99, "content": None}).encode()
     np.savez(tmp_path / "late.npz", about=np.frombuffer(about, np.uint8))
-    with pytest.raises(ValueError, match="expected format 2 or older, got 99; it was written by a"):
+    with pytest.raises(ValueError, match="expected format 3 or older, got 99; it was written by a"):
         load(tmp_path / "late.npz")
 
 

@@ -1,16 +1,19 @@
 """Packs: frozen data with expressions as plain arrays."""
 
-from dataclasses import dataclass, replace
+import json
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
 from io import BytesIO
 from math import inf, nan
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
 
-from symfric.foundation import identity, packed
+from symfric.foundation import packed
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import Status
@@ -82,17 +85,6 @@ def test_objects_that_are_made_for_a_pack_are_told_apart() -> None:
     assert [shell.value for shell in shells] == [*range(50)]
 
 
-def test_two_symbols_of_one_name_are_a_damaged_file(monkeypatch: pytest.MonkeyPatch) -> None:
-    named = identity.named
-
-    def alike(expressions: Any) -> Any:
-        return tuple(replace(atom, name="of both") for atom in named(expressions))
-
-    monkeypatch.setattr(identity, "named", alike)
-    with pytest.raises(ValueError, match="expected a file that symfric wrote"):
-        load((ca.SX.sym("x"), ca.SX.sym("x")))
-
-
 def test_laws_and_variables() -> None:
     law = again(GMS())
     assert repr(law) == repr(GMS())
@@ -150,19 +142,28 @@ def test_files_hold_classes_of_symfric_and_those_handed_over() -> None:
 
 
 def naming(path: str, **arrays: Any) -> BytesIO:
-    """A pack of an object of this class, without fields."""
-    text = f'{{"kind": "kind", "format": 1, "content": {{"is": "{path}", "has": {{}}}}}}'
-    words = {"about": text, "expressions": ca.StringSerializer().encode()}
+    """A file of an object of this class, without fields."""
+    return holding({"is": path, "has": {}}, **arrays)
+
+
+def holding(content: Any, **arrays: Any) -> BytesIO:
+    """A file with this content as JSON, whose only expression is the symbol v."""
     buffer = BytesIO()
-    plain = {n: np.frombuffer(w.encode(), np.uint8) for n, w in words.items()}
-    np.savez(buffer, **plain, **arrays)  # pyright: ignore[reportArgumentType]
+    packed.dump(buffer, ca.SX.sym("v"), "kind", 1)
+    buffer.seek(0)
+    whole = dict(np.load(buffer))
+    about = json.loads(whole.pop("about").tobytes()) | {"content": content}
+    head = np.frombuffer(json.dumps(about).encode(), np.uint8)
+    buffer = BytesIO()
+    np.savez(buffer, about=head, **whole, **arrays)  # pyright: ignore[reportArgumentType]
     buffer.seek(0)
     return buffer
 
 
 def test_a_file_cannot_name_what_is_no_data() -> None:
     for path in ("symfric.foundation.files:write_text", "symfric.foundation.checks:Path",
-                 "symfric.cli.app:typer.Typer"):  # fmt: skip
+                 "symfric.cli.app:typer.Typer", "symfric.foundation.compiler:Compiler",
+                 "identification.residuals.portable:unpacked", "symfric.laws:LuGre"):  # fmt: skip
         with pytest.raises(ValueError, match="expected a file that symfric wrote"):
             packed.load(naming(path), "kind", 1)
 
@@ -170,9 +171,70 @@ def test_a_file_cannot_name_what_is_no_data() -> None:
 def test_classes_of_other_packages_and_of_other_versions_are_named() -> None:
     with pytest.raises(ValueError, match="expected classes of symfric, got Law of symfriction"):
         packed.load(naming("symfriction:Law"), "kind", 1)
-    for path in ("symfric.laws.gone:Law", "symfric.laws:Gone"):
+    for path in ("symfric.laws.gone:Law", "symfric.laws.dynamic.lugre:Gone"):
         with pytest.raises(ValueError, match=r"this version of symfric has, got \w+ of symfric\."):
             packed.load(naming(path), "kind", 1)
+
+
+def test_fields_out_of_a_file_have_their_types_and_pass_the_checks_of_their_class() -> None:
+    path, good = "symfric.foundation.variable:Variable", {"name": "v", "unit": "m/s"}
+    found = packed.load(holding({"is": path, "has": good | {"symbol": {"SX": 0}}}), "kind", 1)
+    assert (found.name, found.nominal) == ("v", 1.0)
+    for wrong in ({"nominal": "1"}, {"nominal": True}, {"nominal": -1.0}, {"name": ["v"]},
+                  {"lower": 2.0, "upper": 1.0}, {"memory": {}}, {"__class__": 1}):  # fmt: skip
+        has = good | {"symbol": {"SX": 0}} | wrong
+        with pytest.raises(ValueError, match="expected a file that symfric wrote"):
+            packed.load(holding({"is": path, "has": has}), "kind", 1)
+
+
+def test_a_file_of_the_format_that_could_run_code_says_so() -> None:
+    with pytest.raises(
+        ValueError, match="got one of an older format, which could run code"
+    ) as error:
+        packed.load(naming("symfric.laws:LuGre", expressions=np.zeros(3)), "kind", 1)
+    assert "\n" not in str(error.value)
+
+
+def test_functions_and_symbols_of_mx_are_in_pickles_only() -> None:
+    x = ca.MX.sym("x")
+    table = ca.interpolant("table", "linear", [[0.0, 1.0]], [2.0, 4.0])
+    f = ca.Function("f", [x], [table(x)])
+    back = again(Pair((x, ca.sin(x)), f))
+    assert float(back.b(0.5)) == 3.0
+    assert float(ca.Function("g", [back.a[0]], [back.a[1]])(0.5)) == np.sin(0.5)
+    for thing in (x, f):
+        with pytest.raises(ValueError, match=r"pack\.a: expected expressions in SX, and Functions"):
+            load(Pair(thing, 0), own=[Pair])
+    text = {"serialized": [f.serialize(), None]}
+    with pytest.raises(ValueError, match="expected a file that symfric wrote"):
+        packed.load(holding(text), "kind", 1)
+
+
+def test_a_function_in_a_file_is_its_expressions() -> None:
+    x, y = ca.MX.sym("x", 2), ca.MX.sym("y")
+    f = ca.Function("f", [x, y], [y * x, ca.sum1(x)], ["x", "y"], ["a", "b"])
+    back = load(f)
+    assert (back.name(), back.name_in(), back.name_out()) == ("f", ["x", "y"], ["a", "b"])
+    assert float(back([1.0, 2.0], 3.0)[1]) == 3.0
+
+
+def test_a_function_in_a_file_has_no_options_and_no_path(tmp_path: Path) -> None:
+    """Options start a shell (`jit`), and a single text is the path of a file of CasADi's."""
+    mark, v = tmp_path / "mark", ca.SX.sym("v")
+    flags = {"compiler": "gcc", "flags": [f"$(touch {mark})"]}
+    options = {"jit": True, "compiler": "shell", "jit_options": flags}
+    with suppress(RuntimeError):  # as the compiler is
+        ca.Function("f", [v], [v * v], ["a"], ["b"], options)
+    assert mark.exists()
+    mark.unlink()
+    ca.Function("f", [v], [v * v]).save(str(tmp_path / "f.casadi"))
+    parts: list[Any] = ["f", [{"SX": 0}], [{"SX": 0}], ["a"], ["b"]]
+    assert float(packed.load(holding({"Function": parts}), "kind", 1)(2.0)) == 2.0
+    text = packed._Writer(trusted=False).write("", options)  # pyright: ignore[reportPrivateUsage]
+    for wrong in ([*parts, text], [*parts[:3], text], [str(tmp_path / "f.casadi")], parts[:3]):
+        with pytest.raises(ValueError, match="expected a file that symfric wrote"):
+            packed.load(holding({"Function": wrong}), "kind", 1)
+    assert not mark.exists()
 
 
 @dataclass
@@ -187,7 +249,7 @@ FIRED: list[int] = []
 
 
 def test_nothing_in_a_file_is_run() -> None:
-    buffer = naming("symfric.laws:LuGre", a0=np.array([Armed()], dtype=object))
+    buffer = naming("symfric.laws.dynamic.lugre:LuGre", a9=np.array([Armed()], dtype=object))
     with pytest.raises(ValueError, match="expected a file that symfric wrote"):
         packed.load(buffer, "kind", 1)
     assert FIRED == []

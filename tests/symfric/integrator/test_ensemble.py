@@ -1,7 +1,8 @@
 """Ensembles: every member as `simulate` runs it, on every executor, whatever happens."""
 
+import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from symfric import (
     Linear,
     LuGre,
     Model,
+    SolveError,
     Status,
     Variable,
     rabinowicz,
@@ -171,6 +173,17 @@ def test_every_executor_gives_the_same(kind: str, backend: str) -> None:
         model, 2.0, x0=x0, executor=executors()[kind](), backend=backend, chunk=2, workers=2
     )
     assert_same(serial, other)
+
+
+def test_a_worker_that_dies_leaves_what_was_finished() -> None:
+    model = rabinowicz(BrownMcPhee(), free=["m"])
+    with (
+        ProcessPoolExecutor(1, initializer=os._exit, initargs=(1,)) as dying,  # pyright: ignore
+        pytest.raises(SolveError, match=r"after 0 of 2 members .*out=FOLDER keeps") as error,
+    ):
+        simulate_many(model, 0.1, p={"m": [1.0, 2.0]}, executor=dying, backend="vm")
+    assert error.value.partial.status is Status.INTERRUPTED
+    assert np.isnan(error.value.partial["x"]).all()
 
 
 def test_executor_of_dask_gives_the_same() -> None:

@@ -38,6 +38,14 @@ def test_columns_side_by_side(backend: str, count: int) -> None:
     np.testing.assert_array_equal(found, pairs * factors[:, None])
 
 
+@each_engine
+def test_rows_of_another_size_are_refused(backend: str) -> None:
+    """The loop in C would read beyond their end."""
+    both = Columns(ca.Function("both", [x, u], [x * u]))
+    with pytest.raises(ValueError, match=r"rows of 2 numbers|cannot reshape"):
+        both([np.ones((3, 1)), np.ones(3)], backend=backend)
+
+
 def test_matrices_are_stored_column_by_column() -> None:
     A = ca.SX.sym("A", 2, 3)
     (found,) = Columns(ca.Function("same", [A], [A]))([np.arange(12.0).reshape(2, 6)])

@@ -1,0 +1,187 @@
+"""CasADi expressions as plain lists of instructions: for files, which must not run code.
+
+CasADi's own format holds any `Function`, and with it shell commands (`jit`), libraries (`external`)
+and callbacks. A list holds symbols, constants and the scalar operations of `OPERATIONS` only; it is
+checked as a whole before an expression is built. CasADi simplifies while it builds: an expression
+that was built with simplification on comes back operation by operation.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation import identity
+
+UNARY = (
+    "neg", "exp", "log", "sqrt", "sq", "twice", "sin", "cos", "tan", "asin", "acos", "atan",
+    "floor", "ceil", "not", "fabs", "sign", "erf", "inv", "sinh", "cosh", "tanh", "asinh", "acosh",
+    "atanh", "erfinv", "log1p", "expm1",
+)  # fmt: skip
+BINARY = (
+    "add", "sub", "mul", "div", "pow", "constpow", "lt", "le", "eq", "ne", "and", "or", "fmod",
+    "copysign", "if_else_zero", "fmin", "fmax", "atan2", "hypot", "remainder",
+)  # fmt: skip
+OPERATIONS = (*UNARY, *BINARY)
+"""The operations of a list by their names in CasADi, without "OP_"."""
+CODES: dict[str, int] = {name: getattr(ca, f"OP_{name.upper()}") for name in OPERATIONS}
+NAMES = {code: name for name, code in CODES.items()}
+MOST_ENTRIES = 10**7
+"""Largest number of entries of one expression, zeros included."""
+DEEPEST = 8000
+"""Operations on the longest path; printing deeper expressions, CasADi may overflow the stack."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Instructions:
+    """Expressions whose scalar operations are numbered: symbols, constants, then operations.
+
+    Attributes:
+        labels: name of each symbol.
+        names: unique name of each symbol (`symfric.foundation.identity`).
+        constants: values, shape (c,).
+        operations: names of the operations in use.
+        code: one row (operation, first operand, second operand) each, shape (k, 3); a unary
+            operation repeats its operand.
+        shapes: rows and columns of each expression, shape (e, 2).
+        entries: (expression, row, column, number) of each structural nonzero, by expression,
+            column and row, shape (nnz, 4).
+    """
+
+    labels: tuple[str, ...]
+    names: tuple[str, ...]
+    constants: NDArray[np.float64]
+    operations: tuple[str, ...]
+    code: NDArray[np.int64]
+    shapes: NDArray[np.int64]
+    entries: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, expressions: Sequence[ca.SX]) -> "Instructions":
+        """The instructions of some expressions, shared parts once.
+
+        Raises:
+            ValueError: an operation that is not one of `OPERATIONS`, such as a function call.
+        """
+        atoms = identity.named(expressions)
+        columns = [ca.vec(e.nz[:]) for e in expressions if e.nnz()]
+        symbols: Any = ca.vertcat(ca.SX(0, 1), *(atom.symbol for atom in atoms))
+        f = ca.Function("f", [symbols], [ca.vertcat(ca.SX(0, 1), *columns)])
+        slots: dict[int, int] = {}
+        constants, code, results = list[float](), list[tuple[int, int, int]](), dict[int, int]()
+        for k in range(f.n_instructions()):  # constants are -1, -2, ... until their count is known
+            op, of = f.instruction_id(k), f.instruction_input(k)
+            into = f.instruction_output(k)[0]
+            if op == ca.OP_OUTPUT:
+                results[f.instruction_output(k)[1]] = slots[of[0]]
+            elif op == ca.OP_ASSIGN:
+                slots[into] = slots[of[0]]
+            elif op == ca.OP_INPUT:
+                slots[into] = of[1]
+            elif op == ca.OP_CONST:
+                constants.append(f.instruction_constant(k))
+                slots[into] = -len(constants)
+            elif op in NAMES:
+                code.append((op, slots[of[0]], slots[of[-1]]))
+                slots[into] = len(atoms) + len(code) - 1
+            else:
+                what = "a call of a Function that does not expand to SX, such as an interpolant"
+                what = what if op == ca.OP_CALL else f"CasADi's operation {op}"
+                raise ValueError(f"expected elementary operations, got {what}")
+        used = sorted({op for op, _, _ in code})
+        rows = np.array(code, dtype=np.int64).reshape(-1, 3)
+        numbers = np.array([results[i] for i in range(f.numel_out(0))], dtype=np.int64)
+        for operands in (rows[:, 1], rows[:, 2], numbers):
+            operands[operands >= len(atoms)] += len(constants)
+            operands[operands < 0] = len(atoms) - 1 - operands[operands < 0]
+        rows[:, 0] = np.searchsorted(used, rows[:, 0])
+        places = [(k, *place) for k, e in enumerate(expressions) for place in _places(e)]
+        return cls(
+            tuple(atom.symbol.name() for atom in atoms),
+            tuple(atom.name for atom in atoms),
+            np.array(constants),
+            tuple(NAMES[op] for op in used),
+            rows,
+            np.array([e.shape for e in expressions], dtype=np.int64).reshape(-1, 2),
+            np.column_stack([np.array(places, dtype=np.int64).reshape(-1, 3), numbers]),
+        )
+
+    def expressions(self, trusted: bool = False) -> list[ca.SX]:
+        """The expressions, in the symbols that have these unique names in this process.
+
+        Raises:
+            ValueError: instructions that `of` does not write, unless they are `trusted`.
+        """
+        if not trusted:
+            self.check()
+        atoms = identity.atoms_of(self.labels, self.names)
+        nodes: list[Any] = [*(a.symbol for a in atoms), *map(ca.SX, self.constants.tolist())]
+        code = [CODES[name] for name in self.operations]
+        unary = [name in UNARY for name in self.operations]
+        for k, a, b in self.code.tolist():
+            one, other = nodes[a], nodes[b]
+            nodes.append(
+                ca.SX.unary(code[k], one) if unary[k] else ca.SX.binary(code[k], one, other)
+            )
+        ends = np.searchsorted(self.entries[:, 0], np.arange(len(self.shapes) + 1))
+        found = [
+            _matrix(rows, columns, self.entries[begin:end, 1:], nodes)
+            for (rows, columns), begin, end in zip(
+                self.shapes.tolist(), ends[:-1], ends[1:], strict=True
+            )
+        ]
+        identity.keep(found, atoms)
+        return found
+
+    def check(self) -> None:
+        """Refuse unknown operations, operands that are not earlier numbers, and wrong entries.
+
+        Raises:
+            ValueError: any of these, or a path of more than `DEEPEST` operations.
+        """
+        symbols, count = len(self.labels), len(self.labels) + len(self.constants)
+        places, shapes = self.entries[:, [0, 2, 1]], self.shapes
+        of, row, column, number = self.entries.T
+        sound = (
+            symbols == len(self.names) == len(set(self.names))
+            and set(self.operations) <= CODES.keys()
+            and self.code.shape[1] == 3
+            and _within(self.code[:, 0], len(self.operations))
+            and _within(self.code[:, 1:].T, count + np.arange(len(self.code)))
+            and shapes.shape[1] == 2
+            and _within(shapes, MOST_ENTRIES + 1)
+            and _within(np.prod(shapes, axis=1), MOST_ENTRIES + 1)
+            and _within(of, len(shapes))
+            and _within(row, shapes[of, 0])
+            and _within(column, shapes[of, 1])
+            and _within(number, count + len(self.code))
+            and np.array_equal(np.unique(places, axis=0), places)
+        )
+        if not sound:
+            raise ValueError("expected instructions that symfric wrote, got others")
+        depth = [0] * count
+        for a, b in self.code[:, 1:].tolist():
+            depth.append(1 + max(depth[a], depth[b]))
+        if max(depth, default=0) > DEEPEST:
+            raise ValueError(f"expected at most {DEEPEST} nested operations, got {max(depth)}")
+
+
+def _within(numbers: NDArray[np.int64], end: NDArray[np.int64] | int) -> bool:
+    """Return True if all numbers lie in [0, end)."""
+    return bool(((numbers >= 0) & (numbers < end)).all())
+
+
+def _places(expression: ca.SX) -> list[tuple[int, int]]:
+    """Row and column of each structural nonzero, column by column."""
+    return list(zip(*expression.sparsity().get_triplet(), strict=True))
+
+
+def _matrix(rows: int, columns: int, entries: NDArray[np.int64], nodes: Sequence[ca.SX]) -> ca.SX:
+    """The matrix with these (row, column, number), column by column."""
+    nonzeros = ca.vertcat(ca.SX(0, 1), *(nodes[i] for i in entries[:, 2].tolist()))
+    pattern = ca.Sparsity.triplet(rows, columns, entries[:, 0].tolist(), entries[:, 1].tolist())
+    return ca.SX(pattern, nonzeros)

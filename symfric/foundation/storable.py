@@ -1,0 +1,76 @@
+"""Classes that a file may name, and the checks that their fields pass."""
+
+from dataclasses import MISSING, Field, fields
+from functools import cached_property
+from importlib import import_module
+from typing import Any
+
+from symfric.foundation import typed
+
+OWN = ("symfric", "ocp", "identification")
+"""Packages whose classes are known."""
+MODULES = (
+    "symfric.foundation.instructions", "symfric.foundation.packed", "symfric.foundation.status",
+    "symfric.foundation.variable", "symfric.laws.", "symfric.model.", "symfric.scenes.",
+    "symfric.multibody.friction", "symfric.results.ensemble", "symfric.results.statistics",
+    "symfric.integrator.stored", "symfric.integrator.derivatives.seeds",
+    "symfric.integrator.equations.inputs", "symfric.integrator.running.dense",
+    "symfric.integrator.running.events",
+    "ocp.checking.verification", "ocp.result.", "ocp.solvers.outcome", "ocp.text.",
+    "ocp.transcription.points", "ocp.transcription.schemes",
+    "identification.data.", "identification.fit", "identification.residuals.closed_loop",
+    "identification.residuals.inverse", "identification.residuals.points",
+    "identification.residuals.shooting", "identification.result.", "identification.signals.filters",
+    "identification.signals.velocity", "identification.unknowns.spec", "identification.verdict.",
+)  # fmt: skip
+"""Modules whose classes a file may name; a dot at the end means all modules of that package."""
+OURS = tuple(f"{package}{mark}" for package in OWN for mark in ".:")
+
+
+def path_of(named: Any) -> str:
+    """Return module and name of a class or function."""
+    return f"{named.__module__}:{named.__qualname__}"
+
+
+def found_at(path: str) -> Any:
+    """Return the class or function of this path.
+
+    Raises:
+        ImportError, AttributeError, ValueError: there is none.
+    """
+    place, _, name = path.partition(":")
+    found: Any = import_module(place)
+    for part in name.split("."):
+        found = getattr(found, part)
+    return found
+
+
+def may_hold(path: str) -> bool:
+    """Return True if a file may name this class: one of `MODULES`, or of another package."""
+    inside = (path.startswith(m if m.endswith(".") else f"{m}:") for m in MODULES)
+    return not path.startswith(OURS) or any(inside)
+
+
+def checked(kind: type, values: dict[str, Any]) -> dict[str, Any]:
+    """The fields of a class of ours, of the annotated types; missing ones have their defaults."""
+    known = {item.name: item for item in fields(kind)}
+    for name, value in values.items():
+        hint = _hint(kind, known.get(name), name)
+        if not typed.fits(value, hint):
+            raise ValueError(f"{kind.__name__}.{name}: expected {hint}, got {value!r:.60}")
+    for item in known.values():
+        if item.name not in values:
+            made_by = item.default_factory
+            values[item.name] = item.default if made_by is MISSING else made_by()
+        if values[item.name] is MISSING:
+            raise ValueError(f"{kind.__name__}: expected {item.name}, got none")
+    return values
+
+
+def _hint(kind: type, item: "Field[Any] | None", name: str) -> Any:
+    """The type of a field in a file, or of a cached property that is kept along with the fields."""
+    if item is not None:
+        return item.metadata.get("packed", typed.hints_of(kind)[name])
+    if not isinstance(made := vars(kind).get(name), cached_property):
+        raise ValueError(f"{kind.__name__}: expected its fields, got {name}")
+    return typed.hints_of(made.func)["return"]
