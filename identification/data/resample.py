@@ -17,6 +17,8 @@ GAP = 5.0
 """An interval of more than so many median intervals is a gap."""
 SHORTEST = 10
 """Samples of a piece between two gaps that is kept."""
+MOST = 1e8
+"""Samples of a record."""
 
 
 def pieces(record: Record) -> list[slice]:
@@ -60,6 +62,12 @@ def resampled(
     checks.choice(f"{where}: gap", gap, ("split", "refuse"))
     step = record.median_step if step is None else step
     step = checks.number(f"{where}: step", step, unit="s", above=0.0)
+    span = float(record.time[-1] - record.time[0])
+    if span > MOST * step:
+        raise ValueError(
+            f"{where}: step: expected at most {MOST:.0e} samples, got {span / step:.1e} from "
+            f"{step:g} s over {span:g} s"
+        )
     if gap == "refuse":
         check_no_gap(record, where)
     parts = [record.at(part) for part in pieces(record) if part.stop - part.start >= SHORTEST]

@@ -8,7 +8,7 @@ depend on who computed it.
 
 import pickle
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import replace
 from functools import lru_cache
 from threading import get_ident
@@ -20,7 +20,7 @@ from identification.solving.descent import Start, Tell, descend
 from identification.solving.easier import descend_by_way
 from identification.solving.reduce import square
 from identification.solving.task import Point, Task
-from symfric.foundation.status import Status
+from symfric.foundation.status import SolveError, Status
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -65,10 +65,16 @@ def many_starts(
                 progress(f"start {len(done)} of {len(starts)}", len(done) / len(starts))
             if start.status is Status.INTERRUPTED or (agree and _enough(task, done, agree)):
                 break
+    except BrokenExecutor as error:
+        said = f"a worker process ended after {len(done)} of {len(starts)} starts (killed, or out "
+        said += "of memory); fewer workers need less memory"
+        if not done:
+            raise SolveError(f"fit: {said}", Status.INTERRUPTED) from error
+        _mark_interrupted(done, said)
     except KeyboardInterrupt:
         if not done:
             raise
-        _mark_interrupted(done)
+        _mark_interrupted(done, f"interrupted by the user after {len(done)} starts")
     finally:
         found.close()
     if all(start.status is not Status.INTERRUPTED for start in done):
@@ -76,11 +82,11 @@ def many_starts(
     return tuple(_alike(done))
 
 
-def _mark_interrupted(done: list[Start]) -> None:
+def _mark_interrupted(done: list[Start], why: str) -> None:
     """Say so of the best start, unless it is at a minimum."""
     best = best_of(done)
     if not best.status.ok:
-        said = f"interrupted by the user after {len(done)} starts; the best so far"
+        said = f"{why}; the best so far"
         done[done.index(best)] = replace(best, status=Status.INTERRUPTED, message=said)
 
 

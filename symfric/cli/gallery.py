@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 from symfric.cli import completions, output
-from symfric.cli.options import WorkersOption, check_folder
+from symfric.cli.options import WorkersOption
+from symfric.foundation.files import make_folder
 from symfric.gallery import chosen, short
 from symfric.gallery.plate import about
 from symfric.gallery.rendering import Gallery, render
@@ -55,7 +56,7 @@ def gallery(
     if workers is not None and workers < 1:
         raise ValueError(f"gallery: expected --workers >= 1, got {workers}")
     chosen(asked)
-    check_folder(out)
+    make_folder(out)
     with output.progress(f"{len(chosen(asked))} figures") as tell:
         done = render(out, asked, quick=quick, workers=workers, progress=tell)
     show_gallery(done)

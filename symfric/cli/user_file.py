@@ -3,13 +3,14 @@
 import runpy
 import traceback
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import partial, wraps
 from inspect import isclass, isfunction, signature
 from pathlib import Path
 from typing import Any
 
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
+from symfric.foundation.status import SolveError
 
 
 def held_by_file(
@@ -31,7 +32,7 @@ def held_by_file(
     name, held = _named(command, text, default, lambda value: isinstance(value, kind))
     found = held[name]
     if callable(found):
-        found = made(text, found, values)
+        found = made(text, _with_line(command, held, found), values)
     elif values:
         raise ValueError(f"--set: expected none for '{name}', which is no function")
     if not isinstance(found, kind):
@@ -52,7 +53,25 @@ def function_of_file(command: str, text: str, default: str, values: dict[str, fl
         raise checks.refused(f"{command} '{text}'", "a function law -> Model, or a scene", found)
     first, *others = signature(found).parameters or [""]
     check_names(f"--set of {text}, a function of {first}", values, others)
-    return partial(found, **values) if values else found
+    own = _with_line(command, held, found)
+    return partial(own, **values) if values else own
+
+
+def _with_line(command: str, held: Mapping[str, Any], function: Callable[..., Any]) -> Any:
+    """The function of a user's file; an error in it names its line in that file."""
+    if isclass(function):
+        return function
+
+    @wraps(function)
+    def called(*given: Any, **named: Any) -> Any:
+        try:
+            return function(*given, **named)
+        except (ValueError, SolveError):
+            raise
+        except Exception as error:
+            raise _failed(command, Path(held["__file__"]), error) from error
+
+    return called
 
 
 def _named(
@@ -87,13 +106,18 @@ def _run(command: str, file: Path) -> dict[str, Any]:
     try:
         return runpy.run_path(str(file))
     except Exception as error:
-        frames = reversed(traceback.extract_tb(error.__traceback__))
-        own = getattr(error, "lineno", None)  # of a syntax error
-        line = next((f.lineno for f in frames if f.filename == str(file)), own)
-        raise ValueError(
-            f"{command}: expected a file that runs, got {type(error).__name__} in line {line} of "
-            f"'{file}': {error}"
-        ) from error
+        raise _failed(command, file, error) from error
+
+
+def _failed(command: str, file: Path, error: Exception) -> ValueError:
+    """The error that names the line of a user's file."""
+    frames = reversed(traceback.extract_tb(error.__traceback__))
+    own = getattr(error, "lineno", None)  # of a syntax error
+    line = next((f.lineno for f in frames if f.filename == str(file)), own)
+    return ValueError(
+        f"{command}: expected a file that runs, got {type(error).__name__} in line {line} of "
+        f"'{file}': {error}"
+    )
 
 
 def made(text: str, make: Any, values: dict[str, float]) -> Any:

@@ -109,7 +109,7 @@ def equations(
     system = integrator.system
     if exchange:
         _check_rates(model, system)
-    guess = first_guess(system, model, model.initial_state(), span[0])
+    guess = first_guess(system, model, model.initial_state(t=span[0]), span[0])
     d = np.concatenate([model.values("p"), model.values("u")])
     integrator = integrator.suited([(guess, d)], span[1] - span[0])
     return Equations(
@@ -209,7 +209,9 @@ def source(own: Equations) -> str:
     model, y, d = own.model, system.y, system.d
     functions: dict[str, ca.Function] = {
         "model_signals": integrator.signals,
-        "model_start": start_function(model.x, model.vector("u"), model.vector("p"), model.z),
+        "model_start": start_function(
+            model.x, model.vector("u"), model.vector("p"), model.t, model.z
+        ),
         "model_rates": integrator.f,
     }
     if own.exchange:

@@ -4,7 +4,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from re import sub
 from time import perf_counter
 from typing import final
 
@@ -132,7 +131,9 @@ def export_fmu(
         raise ValueError(f"{where}: fmi: expected 2 or 3, got {fmi!r}")
     checks.choice(f"{where}: kind", kind, KINDS)
     rtol = checks.number(f"{where}: rtol", rtol, lower=LEAST_RTOL, upper=LARGEST_RTOL)
-    identifier = _identifier(where, made.name if name is None else name)
+    identifier = checks.as_identifier(made.name)
+    if name is not None:
+        identifier = checks.identifier(f"{where}: name", name)
     exchange = kind == "model-exchange"
     if exchange and (step is not None or method != "auto"):
         raise ValueError(
@@ -208,12 +209,6 @@ def _switches_on(value: object) -> bool:
     """Whether a parameter is a number other than zero."""
     number = checks.as_number(value)
     return number is not None and number != 0.0
-
-
-def _identifier(where: str, name: str) -> str:
-    """A C identifier."""
-    text = sub(r"\W+", "_", checks.text(f"{where}: name", name, "a name")).strip("_")
-    return f"m_{text}" if not text or text[0].isdigit() else text
 
 
 def _method(where: str, model: Model, method: str, step: float | None) -> str:

@@ -11,12 +11,14 @@ are none.
 """
 
 import operator
+import unicodedata
 from collections.abc import Collection, Iterable, Mapping
 from difflib import get_close_matches
 from math import inf, isfinite
 from numbers import Real
 from os import PathLike, fspath
 from pathlib import Path
+from re import ASCII, sub
 from typing import Any, TypeVar
 
 import casadi as ca
@@ -31,6 +33,8 @@ T = TypeVar("T")
 
 LONGEST = 60
 """Characters of a value that are shown in an error."""
+LONGEST_LINE = 200
+"""Characters of a name."""
 LISTED = 16
 """Names that are listed in an error; of more only the closest are offered."""
 
@@ -137,7 +141,7 @@ def _bounded(lower: float, upper: float, above: float | None) -> str:
 def parsed(where: str, text: str) -> float:
     """The finite number that a text from a command line or a file means."""
     try:
-        found = float(text)
+        found = None if "_" in text else float(text)
     except ValueError:
         found = None
     if found is None or not isfinite(found):
@@ -192,6 +196,33 @@ def text(where: str, value: object, what: str = "a text", hint: str = "") -> str
     if isinstance(value, str) and value.strip():
         return str(value)
     raise refused(where, what, value, hint)
+
+
+def identifier(where: str, value: object) -> str:
+    """`value` as a C identifier in ASCII letters, digits and underscores."""
+    name = text(where, value, "a C identifier")
+    if not (name.isascii() and name.isidentifier()):
+        raise refused(where, "a C identifier", value, f"write {as_identifier(name)}")
+    return name
+
+
+def as_identifier(name: str) -> str:
+    """A C identifier like a name: my_x for "my x", phi for its Greek letter."""
+    letters = (unicodedata.name(c, "").partition(" LETTER ")[2].lower() for c in name)
+    plain_ones = (
+        f"{'_' * (i > 0)}{letter.split()[0]}" if letter and not c.isascii() else c
+        for i, (c, letter) in enumerate(zip(name, letters, strict=True))
+    )
+    found = sub(r"\W+", "_", "".join(plain_ones), flags=ASCII).strip("_") or "x"
+    return f"x_{found}" if found[0].isdigit() else found
+
+
+def line(where: str, value: object, what: str = "a text") -> str:
+    """`value` as one line of printable text: names and units reach headers, XML and file names."""
+    found = text(where, value, what)
+    if not found.isprintable() or len(found) > LONGEST_LINE:
+        raise refused(where, f"{what} of one printable line", value)
+    return found
 
 
 def choice(where: str, value: object, choices: Collection[str]) -> str:

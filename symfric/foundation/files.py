@@ -1,15 +1,20 @@
 """Files are written whole or not at all."""
 
 import csv
+import json
 import os
 import tempfile
 from collections.abc import Generator, Iterable
 from contextlib import contextmanager, suppress
+from errno import EDQUOT, EFBIG, EIO, ENOSPC
 from pathlib import Path
 from threading import Lock
+from typing import Any, cast
 
 from symfric.foundation import checks
 
+FULL = (ENOSPC, EDQUOT, EFBIG, EIO)
+"""Errors of a disk that takes no more."""
 _ASKING = Lock()
 """To ask for the mask of the process is to change it for a moment: one thread at a time."""
 
@@ -22,7 +27,8 @@ def written(path: str | Path) -> Generator[Path, None, None]:
     old file, if any, is as it was and nothing is left behind.
 
     Raises:
-        ValueError: the path is a folder or a device, or its folder cannot be made or written.
+        ValueError: the path is a folder or a device, its folder cannot be made or written, or the
+            disk is full.
     """
     target = check_file(path)
     try:
@@ -43,6 +49,11 @@ def written(path: str | Path) -> Generator[Path, None, None]:
             os.umask(mask)
         temporary.chmod(0o666 & ~mask)
         temporary.replace(target)
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        got = str(error.strerror).lower()
+        raise ValueError(f"output '{path}': expected room on the disk, got {got}") from error
     finally:
         with suppress(FileNotFoundError):
             temporary.unlink()
@@ -101,6 +112,22 @@ def check_folder(folder: str | Path) -> Path:
     return absolute
 
 
+def make_folder(folder: str | Path) -> Path:
+    """Make an output folder where it is missing; see `check_folder`.
+
+    Raises:
+        ValueError: it cannot be made.
+    """
+    place = check_folder(folder)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(
+            f"output '{folder}': expected a writable place, got {_reason(error)}"
+        ) from None
+    return place
+
+
 def _reason(error: OSError | RuntimeError) -> str:
     if isinstance(error, OSError) and error.strerror:
         return error.strerror.lower()
@@ -111,6 +138,25 @@ def write_text(path: str | Path, text: str) -> None:
     """Write `text` to `path` as UTF-8, whole or not at all."""
     with written(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def read_json(where: str, path: str | Path, what: str) -> dict[str, Any]:
+    """Read the JSON object in a file.
+
+    Raises:
+        ValueError: no such file, no JSON, or no object; `what` says what was expected.
+    """
+    place = checks.path(where, path)
+    try:
+        data = json.loads(place.read_text(encoding="utf-8"))
+    except OSError as error:
+        reason = "no such file" if isinstance(error, FileNotFoundError) else "an unreadable file"
+        raise ValueError(f"{where} '{path}': expected {what}, got {reason}") from None
+    except (ValueError, RecursionError):
+        raise ValueError(f"{where} '{path}': expected {what}, got something else") from None
+    if not isinstance(data, dict):
+        raise ValueError(f"{where} '{path}': expected {what}, got something else")
+    return cast(dict[str, Any], data)
 
 
 def write_table(path: str | Path, header: Iterable[str], rows: Iterable[Iterable[object]]) -> None:

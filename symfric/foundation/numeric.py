@@ -5,6 +5,7 @@ a law written with these keeps the type it was given.
 """
 
 import ctypes
+import sys
 from collections.abc import Callable
 from math import erf as erf_of_float
 from numbers import Real
@@ -36,9 +37,14 @@ def is_casadi(*values: Scalar) -> bool:
 
 
 def is_number(value: Scalar) -> bool:
-    """Whether `value` is a plain number: int, float, NumPy's scalars and 0-d arrays of them."""
+    """Return True for a plain number: int, float, NumPy's scalars and 0-d arrays of them.
+
+    An int that no float can hold is none.
+    """
     if isinstance(value, np.ndarray):
         return value.ndim == 0 and value.dtype.kind in "iuf"
+    if isinstance(value, int) and value.bit_length() >= sys.float_info.max_exp:
+        return False
     return not isinstance(value, bool | np.bool_) and isinstance(value, Real)
 
 

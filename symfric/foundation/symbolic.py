@@ -58,6 +58,27 @@ def _written(operate: Callable[..., Any], *operands: Any) -> Any:
     return operate(*map(plain, operands))
 
 
+@final
+class Condition(ca.SX):
+    """A comparison with a symbol, which Python's `if`, `and` and `max` cannot decide."""
+
+    def __bool__(self) -> bool:
+        if self.is_constant():
+            return bool(ca.SX(self))
+        raise ValueError(
+            f"expected a number, got the condition {self}, which is true or false only once its "
+            "symbols have values; write casadi.if_else(condition, a, b)"
+        )
+
+
+def _comparison(operate: Callable[..., Any]) -> Callable[["Symbolic", Any], Any]:
+    def forward(self: "Symbolic", other: Any) -> Any:
+        found = _written(operate, self, other)
+        return Condition(found) if type(found) is ca.SX else found
+
+    return forward
+
+
 def _operator(operate: Callable[..., Any]) -> Callable[["Symbolic", Any], Any]:
     def forward(self: "Symbolic", other: Any) -> Any:
         return _written(operate, self, other)
@@ -98,8 +119,8 @@ class Symbolic:
     __mod__, __rmod__ = _operator(operator.mod), _reflected(operator.mod)
     __pow__, __rpow__ = _operator(operator.pow), _reflected(operator.pow)
     __matmul__, __rmatmul__ = _operator(operator.matmul), _reflected(operator.matmul)
-    __lt__, __le__ = _operator(operator.lt), _operator(operator.le)
-    __gt__, __ge__ = _operator(operator.gt), _operator(operator.ge)
+    __lt__, __le__ = _comparison(operator.lt), _comparison(operator.le)
+    __gt__, __ge__ = _comparison(operator.gt), _comparison(operator.ge)
 
     def __neg__(self) -> ca.SX:
         return -self.symbol

@@ -50,7 +50,7 @@ class Variable(Symbolic):
     kind: str = ""
 
     def __post_init__(self) -> None:
-        where = f"variable '{checks.text('variable: name', self.name)}'"
+        where = f"variable '{checks.line('variable: name', self.name)}'"
         if not isinstance(self.unit, str):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise checks.refused(f"{where}: unit", "a text such as 'N', or ''", self.unit)
         take_symbols(self, "start")

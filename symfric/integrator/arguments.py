@@ -10,7 +10,7 @@ from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.methods.method import Method
 from symfric.integrator.methods.radau import Radau
 from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS
-from symfric.integrator.running.run import Tolerances
+from symfric.integrator.running.run import MANY_STEPS, Tolerances
 from symfric.model import Model
 from symfric.model import check_model as check_model
 
@@ -84,7 +84,7 @@ def tolerances(
     atol: float | None,
     nominal: Array,
     event_tolerance: float,
-    max_steps: int,
+    max_steps: int | None,
     max_step: float | None = None,
 ) -> Tolerances:
     """What a run has to meet.
@@ -95,16 +95,17 @@ def tolerances(
         atol: in multiples of `nominal`; 0.1 rtol by default.
         nominal: typical magnitude of each state.
         event_tolerance: tolerance of event times [s].
-        max_steps: attempts allowed.
+        max_steps: attempts allowed; None for as many as the pace of the run asks for.
         max_step: longest step [s]; any by default.
     """
     relative = 0.1 * rtol if atol is None else checks.number(f"{where}: atol", atol, above=0.0)
     event = checks.number(f"{where}: event_tolerance", event_tolerance, unit="s", above=0.0)
-    max_steps = checks.count(f"{where}: max_steps", max_steps)
+    extends = max_steps is None
+    attempts = MANY_STEPS if extends else checks.count(f"{where}: max_steps", max_steps)
     longest = np.inf
     if max_step is not None:
         longest = checks.number(f"{where}: max_step", max_step, unit="s", above=0.0)
-    return Tolerances(rtol, relative * nominal, event, max_steps, longest, follow=atol is None)
+    return Tolerances(rtol, relative * nominal, event, attempts, longest, atol is None, extends)
 
 
 def stopping(

@@ -77,7 +77,7 @@ def simulate_by_peer(
     integrator, fresh = built(model, inputs, chosen(where, "auto", rtol))
     built_at, system = perf_counter(), integrator.system
     allowed = tolerances(where, rtol, atol, system.nominal, 1e-10, max_steps)
-    y0 = first_guess(system, model, model.initial_state(x0, p), t_start)
+    y0 = first_guess(system, model, model.initial_state(x0, p, t_start), t_start)
     values = model.values("p", p)
     run, counts = integrate_by_peer(system, inputs, y0, values, times, allowed, peer)
     run_time = perf_counter() - built_at

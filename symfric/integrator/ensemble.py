@@ -1,7 +1,7 @@
 """Many runs of one model: over arrays of parameters and start values, on one machine or many."""
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import Executor
+from concurrent.futures import BrokenExecutor, Executor
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.compiler import CompileError
-from symfric.foundation.status import Status
+from symfric.foundation.status import SolveError, Status
 from symfric.integrator.arguments import (
     BACKENDS,
     check_flags,
@@ -113,6 +113,7 @@ def simulate_many(
 
     Raises:
         ValueError: bad input; arrays of different lengths.
+        SolveError: a worker process ended; its `partial` has the members that were finished.
         RuntimeError: compiled code was asked for, and there is no compiler or it failed; or a
             graphics processor, and there is none, or no CuPy.
 
@@ -148,10 +149,9 @@ def simulate_many(
     if out is not None:
         place = checks.path("simulate_many: out", out)
         folder = place / _identity(way.job, integrator, allowed, given, picks)
-    times_each, states = max(1, looks.size), [v.name for v in model.x]
-    store = Store(folder, model.signals, members, times_each, len(states))
+    store = Store(folder, model.signals, members, max(1, looks.size), len(model.x))
     todo = {first: picks[first] for first in store.left(picks)}
-    done, status = members - sum(_size(pick) for pick in todo.values()), Status.SUCCESS
+    done, ended = members - sum(_size(pick) for pick in todo.values()), None
     if way.device is not None and progress is not None:
         way.device.report(progress, lambda: done, members)
     try:
@@ -164,8 +164,20 @@ def simulate_many(
                 done += _size(picks[first])
                 if progress is not None:
                     progress(done / members)
-    except KeyboardInterrupt:
-        status = Status.INTERRUPTED
+    except (KeyboardInterrupt, BrokenExecutor) as error:
+        ended = error
+    found = _ensemble(model, looks, given, store, ended)
+    if isinstance(ended, BrokenExecutor):
+        raise _worker_ended(found, done, folder is not None) from ended
+    return found
+
+
+def _ensemble(
+    model: Model, looks: Array, given: Members, store: Store, ended: BaseException | None
+) -> Ensemble:
+    """The result, of as many members as there are."""
+    units = {n: unit for n, unit in _units(model).items() if n in (given.varied | given.fixed)}
+    reach = zip((v.name for v in model.x), store.reach.transpose(2, 1, 0), strict=True)
     return Ensemble(
         model.name,
         looks if looks.size else given.ends[:, None],
@@ -174,12 +186,22 @@ def simulate_many(
         store.attempts,
         store.reached,
         dict(sorted(store.failed.items())),
-        status,
+        Status.SUCCESS if ended is None else Status.INTERRUPTED,
         given.varied,
         given.fixed,
-        {n: unit for n, unit in _units(model).items() if n in (given.varied | given.fixed)},
-        {name: store.reach[:, :, k].T for k, name in enumerate(states)},
+        units,
+        dict(reach),
     )
+
+
+def _worker_ended(found: Ensemble, done: int, kept: bool) -> SolveError:
+    """The error for a pool that lost a worker process."""
+    how = "the same call continues" if kept else "out=FOLDER keeps finished members"
+    said = (
+        f"simulate_many of '{found.scene}': a worker process ended after {done} of {len(found)} "
+        f"members (killed, or out of memory); {how}, fewer workers need less memory"
+    )
+    return SolveError(said, found.status, found)
 
 
 def _units(model: Model) -> dict[str, str]:

@@ -384,7 +384,7 @@ class Plant:
         every = {v.name: own[i] for i, v in enumerate(self.model.p)} | p
         if not count:
             return np.zeros((0, system.n)), np.zeros((0, len(every)))
-        x, values = self.model.initial_states(x0, every, count)
+        x, values = self.model.initial_states(x0, every, count, plants.begin[which])
         y = first_guess(system, self.model, x)
         if system.timed:
             y[:, -1] = plants.begin[which]

@@ -57,7 +57,7 @@ def settings(
     samples: int,
     method: str,
     event_tolerance: float,
-    max_steps: int,
+    max_steps: int | None,
     max_step: float | None,
 ) -> Settings:
     """Check how `simulate` is to run; arguments as there.
@@ -95,7 +95,7 @@ def _checked(
     samples: int,
     method: str,
     event_tolerance: float,
-    max_steps: int,
+    max_steps: int | None,
     max_step: float | None,
 ) -> Settings:
     t_start, t_end, rtol = check_span("simulate", model, t_start, t_end, rtol, stacklevel=6)

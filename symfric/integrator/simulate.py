@@ -53,7 +53,7 @@ def simulate(
     method: str = "auto",
     backend: str = "auto",
     event_tolerance: float = 1e-10,
-    max_steps: int = 10_000_000,
+    max_steps: int | None = None,
     max_step: float | None = None,
     times: ArrayLike = (),
     sensitivities: Sequence[str] = (),
@@ -99,7 +99,8 @@ def simulate(
             their own, `simulate_by_peer`.
         event_tolerance: events this near [s] happen together; they are located to a thousandth of
             it, or to rounding.
-        max_steps: attempts allowed.
+        max_steps: attempts allowed. By default a run takes as many as it needs, unless the last
+            10 million advance so little that a billion more would not reach `t_end`.
         max_step: longest step [s]; none by default. For what error control cannot see coming: a
             model with short events of its own, such as a function of time in its equations.
         times: increasing times [s] at which a step has to end.
@@ -146,8 +147,8 @@ def simulate(
     inputs = stopping("simulate", inputs, times, t_start, t_end)
     integrator, fresh = built(model, inputs, formula)
     build_time = perf_counter() - begin if fresh else 0.0
-    which = seeds(model, sensitivities, x0, p) if sensitivities else None
-    y0 = first_guess(integrator.system, model, model.initial_state(x0, p), t_start)
+    which = seeds(model, sensitivities, x0, p, t_start) if sensitivities else None
+    y0 = first_guess(integrator.system, model, model.initial_state(x0, p, t_start), t_start)
     values = model.values("p", p)
     if integrator.has_pivots:
         at_start = (y0, np.concatenate([values, inputs.values[:, 0]]))

@@ -91,7 +91,7 @@ class Contact:
     bare: bool = False
 
     def __post_init__(self) -> None:
-        where = f"contact '{checks.text('contact: name', self.name)}'"
+        where = f"contact '{checks.line('contact: name', self.name)}'"
         if not (isinstance(self.law, Parametric) and hasattr(self.law, "sliding")):
             raise checks.refused(f"{where}: law", "a law of a scalar slip, as LuGre()", self.law)
         take_si(where, self, "slip", "N")
@@ -149,12 +149,25 @@ class Contact:
     @cached_property
     def friction(self) -> ca.SX:
         """The friction force by the law [N]."""
-        return ca.SX(self.law.force(self.slip, self.N, symbols_of(self.states), **self.given))
+        return self._of_law("force", 1)
 
     @cached_property
     def rate(self) -> ca.SX:
         """Rates of the states of the law, (n, 1)."""
-        return ca.SX(self.law.rate(self.slip, self.N, symbols_of(self.states), **self.given))
+        return self._of_law("rate", len(self.states))
+
+    def _of_law(self, what: str, rows: int) -> ca.SX:
+        """The force or the rates that the law returns, (rows, 1)."""
+        value = getattr(self.law, what)(self.slip, self.N, symbols_of(self.states), **self.given)
+        where = f"contact '{self.name}': {type(self.law).__name__}.{what}"
+        try:
+            found = ca.SX(value)
+        except NotImplementedError:
+            hint = "write casadi.vertcat(...) for several"
+            raise checks.refused(where, "an SX expression", value, hint) from None
+        if found.numel() != rows:
+            raise checks.refused(where, f"{rows} row{'s' * (rows != 1)}", found)
+        return found
 
     def sliding(self, side: int) -> ca.SX:
         """The force of sliding to one side as the widths of the law vanish [N]."""

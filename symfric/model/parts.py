@@ -93,7 +93,7 @@ class Event:
     rtol: float = inf
 
     def __post_init__(self) -> None:
-        where = f"event '{checks.text('Event: name', self.name)}'"
+        where = f"event '{checks.line('Event: name', self.name)}'"
         take_symbols(self, "expression", "reset")
         checks.expression(where, self.expression)
         checks.count(f"{where}: direction", self.direction, least=-1, most=1)

@@ -1,8 +1,6 @@
 """What may be wrong with a model: kinds of its parts, names, rows, undeclared symbols."""
 
-import unicodedata
 from collections.abc import Iterator
-from re import ASCII, sub
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
@@ -34,7 +32,7 @@ def kind_problems(model: "Model") -> list[str]:
 
 
 def _wrong_kinds(model: "Model") -> Iterator[str]:
-    yield _said(checks.text, "name", model.name)
+    yield _said(checks.line, "name", model.name)
     for name, (kind, what) in GROUPS.items():
         yield _said(_group, name, getattr(model, name), kind, what)
     for name in ("ode", "alg", "xdot", "residual"):
@@ -99,7 +97,7 @@ def naming_problems(model: "Model") -> list[str]:
         problems.append(f"expected none of the names {known}, got {', '.join(taken)}")
     odd = [n for n in names if not (n.isascii() and n.isidentifier())]
     if odd:
-        offers = ", ".join(dict.fromkeys(map(_identifier, odd)))
+        offers = ", ".join(dict.fromkeys(map(checks.as_identifier, odd)))
         problems.append(
             f"expected names that are C identifiers, got {', '.join(odd)}; write {offers}"
         )
@@ -145,17 +143,6 @@ def equation_problems(model: "Model", known: ca.SX) -> list[str]:
         )
         return problems
     return problems + list(_start_problems(model, known))
-
-
-def _identifier(name: str) -> str:
-    """A C identifier like a name: my_x for "my x", phi for its Greek letter."""
-    letters = (unicodedata.name(c, "").partition(" LETTER ")[2].lower() for c in name)
-    plain = (
-        f"{'_' * (i > 0)}{letter.split()[0]}" if letter and not c.isascii() else c
-        for i, (c, letter) in enumerate(zip(name, letters, strict=True))
-    )
-    text = sub(r"\W+", "_", "".join(plain), flags=ASCII).strip("_") or "x"
-    return f"x_{text}" if text[0].isdigit() else text
 
 
 def _many(count: int, what: str) -> str:

@@ -23,6 +23,7 @@ class Starting(ABC):
     z: tuple[Variable, ...]
     p: tuple[Variable, ...]
     u: tuple[Variable, ...]
+    t: ca.SX
 
     @abstractmethod
     def vector(self, letter: str) -> ca.SX:
@@ -37,15 +38,16 @@ class Starting(ABC):
         """What a user gave by name."""
 
     def initial_state(
-        self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None
-    ) -> NDArray[np.float64]:
-        """Start values of x, shape (nx,), replaced by those `given` by name.
+        self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None,
+        t: float = 0.0,
+    ) -> NDArray[np.float64]:  # fmt: skip
+        """Start values of x at the time `t` [s], shape (nx,), replaced by those `given` by name.
 
         A start value that is an expression (a bristle at steady state depends on the sliding
         velocity) is evaluated with the given values of the other states and parameters, and with
         the start values of algebraic variables.
         """
-        if not given and not (p and self._start_by_p):
+        if not given and not (p and self._start_by_p) and not (t and self._start_by_t):
             if p:
                 self.values("p", p)
             return self._default_state.copy()
@@ -56,7 +58,7 @@ class Starting(ABC):
             if p:
                 self.values("p", p)
             return state
-        return self._checked(evaluate(self._start, *self._start_arguments(given, p)))
+        return self._checked(evaluate(self._start, *self._start_arguments(given, p, t)))
 
     def _checked(self, start: NDArray[np.float64]) -> NDArray[np.float64]:
         named = zip(self.x, start.tolist(), strict=True)
@@ -67,8 +69,12 @@ class Starting(ABC):
         given: Mapping[str, NDArray[np.float64]],
         p: Mapping[str, NDArray[np.float64]],
         count: int,
+        t: float | NDArray[np.float64] = 0.0,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Start values (count, nx) and parameters (count, n_p) of many members at once."""
+        """Start values (count, nx) at `t` [s], shape (count,) where times differ, and parameters.
+
+        Parameters have the shape (count, n_p).
+        """
         given, p = self.named("x0", given), self.named("p", p)
         parameters = np.tile(self.values("p")[:, None], (1, count))
         for i, v in enumerate(self.p):
@@ -84,40 +90,43 @@ class Starting(ABC):
             known[i] = given.get(v.name, known[i])
         every = np.tile(chosen[:, None], (1, count))
         inputs = np.tile(self.values("u")[:, None], (1, count))
-        start = self._start.map(count)(known, every, inputs, parameters).full()
+        times = np.broadcast_to(t, (1, count))
+        start = self._start.map(count)(known, every, inputs, parameters, times).full()
         return start.T, parameters.T
 
     def start_by_parameters(
-        self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None
-    ) -> NDArray[np.float64]:
+        self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None,
+        t: float = 0.0,
+    ) -> NDArray[np.float64]:  # fmt: skip
         """Derivative of `initial_state` with respect to p, shape (nx, n_p)."""
         if not self._start_follows:
             return np.zeros((len(self.x), len(self.p)))
-        return evaluate_all(self._start_slopes, *self._start_arguments(given, p))[0]
+        return evaluate_all(self._start_slopes, *self._start_arguments(given, p, t))[0]
 
     def start_by_state(
         self,
         name: str,
         given: Mapping[str, float] | None = None,
         p: Mapping[str, float] | None = None,
+        t: float = 0.0,
     ) -> NDArray[np.float64]:
         """Derivative of `initial_state` with respect to the start value of a state, shape (nx,)."""
         i = [v.name for v in self.x].index(name)
-        chosen = dict(given or {}) | {name: float(self.initial_state(given, p)[i])}
-        return evaluate_all(self._start_slopes, *self._start_arguments(chosen, p))[1][:, i]
+        chosen = dict(given or {}) | {name: float(self.initial_state(given, p, t)[i])}
+        return evaluate_all(self._start_slopes, *self._start_arguments(chosen, p, t))[1][:, i]
 
     def _start_arguments(
-        self, given: Mapping[str, float] | None, p: Mapping[str, float] | None
+        self, given: Mapping[str, float] | None, p: Mapping[str, float] | None, t: float
     ) -> tuple[NDArray[np.float64], ...]:
         numbers = self.named("x0", given)
         given = {name: checks.number(f"{self.name}.{name}", x) for name, x in numbers.items()}
         known = np.array([given.get(v.name, 0.0) for v in self.x])
         chosen = np.array([float(v.name in given) for v in self.x])
-        return known, chosen, self.values("u"), self.values("p", p)
+        return known, chosen, self.values("u"), self.values("p", p), np.array([t])
 
     @cached_property
     def _default_state(self) -> NDArray[np.float64]:
-        return self._checked(evaluate(self._start, *self._start_arguments(None, None)))
+        return self._checked(evaluate(self._start, *self._start_arguments(None, None, 0.0)))
 
     @cached_property
     def _places(self) -> dict[str, int]:
@@ -134,9 +143,14 @@ class Starting(ABC):
         return self._start.jac_sparsity(0, 3).nnz() > 0
 
     @cached_property
+    def _start_by_t(self) -> bool:
+        """Whether start values depend on time, as that of a bristle under a varying load does."""
+        return self._start.jac_sparsity(0, 4).nnz() > 0
+
+    @cached_property
     def _start(self) -> ca.Function:
-        """Start values as a Function of (values given, which are given, u, p)."""
-        return start_function(self.x, self.vector("u"), self.vector("p"), self.z)
+        """Start values as a Function of (values given, which are given, u, p, t)."""
+        return start_function(self.x, self.vector("u"), self.vector("p"), self.t, self.z)
 
     @cached_property
     def _start_follows(self) -> bool:
@@ -153,9 +167,9 @@ class Starting(ABC):
 
 
 def start_function(
-    x: Sequence[Variable], u: ca.SX, p: ca.SX, z: Sequence[Variable] = ()
+    x: Sequence[Variable], u: ca.SX, p: ca.SX, t: ca.SX, z: Sequence[Variable] = ()
 ) -> ca.Function:
-    """Start values of the states as a Function of (values known, which are known, u, p).
+    """Start values of the states as a Function of (values known, which are known, u, p, t).
 
     Where one depends on algebraic variables `z`, it takes their start values: what solves the
     equations is known only when the states are.
@@ -168,5 +182,5 @@ def start_function(
         if not ca.depends_on(values, states):
             break
         values = ca.substitute(values, states, values)
-    arguments = [known, chosen, u, p]
-    return ca.Function("start", arguments, [values], ["known", "chosen", "u", "p"], ["x"])
+    arguments = [known, chosen, u, p, t]
+    return ca.Function("start", arguments, [values], ["known", "chosen", "u", "p", "t"], ["x"])

@@ -21,6 +21,7 @@ from symfric.foundation.numeric import Scalar
 from symfric.multibody.body import GROUND
 from symfric.multibody.forces import Axial, Load
 from symfric.multibody.joint import Joint
+from symfric.multibody.keywords import Keywords
 from symfric.multibody.kinematics import Kinematics, Motion
 from symfric.multibody.spatial import skew
 
@@ -53,7 +54,7 @@ def impossible(*problems: str) -> Held:
 
 
 @dataclass(frozen=True, eq=False)
-class Constraint(ABC):
+class Constraint(Keywords, ABC):
     """Something that restricts the motion of bodies."""
 
     kind: ClassVar[str] = "constraint"

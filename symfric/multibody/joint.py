@@ -19,6 +19,7 @@ import numpy as np
 from symfric.foundation.numeric import Scalar, is_number
 from symfric.model.sketch import Symbol
 from symfric.multibody.friction import JointFriction
+from symfric.multibody.keywords import Keywords
 
 Pair = tuple[ca.SX, ca.SX]
 FORCE = ("Fx", "Fy", "Fz")
@@ -33,7 +34,7 @@ def unit(k: int) -> ca.SX:
 
 
 @dataclass(frozen=True, eq=False)
-class Joint(ABC):
+class Joint(Keywords, ABC):
     """A joint between two bodies.
 
     Attributes:

@@ -10,7 +10,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, final
 
-from symfric.foundation.files import write_text
+from symfric.foundation import typed
+from symfric.foundation.files import read_json, write_text
 from symfric.foundation.parameters import Parameter, options, parameters, with_values
 from symfric.laws import ALL_LAWS, Law, Viscous, law_from_text
 from symfric.scenes import ALL_SCENES, MECHANISMS, Scene
@@ -101,16 +102,18 @@ class Case:
             raise ValueError(
                 f"case: expected fields among {', '.join(sorted(known))}, got {', '.join(data)}"
             )
-        content: dict[str, Any] = dict(data) | {"free": tuple(data.get("free", ()))}
+        content = dict(data)
         try:
+            content["free"] = tuple(data.get("free", ()))
             content["inputs"] = {
                 name: Signal(s["kind"], tuple(map(float, s["values"])), tuple(map(float, s["t"])))
                 for name, s in data.get("inputs", {}).items()
             }
         except (TypeError, KeyError, AttributeError, ValueError) as error:
-            raise ValueError(
-                f"case: inputs: expected what `symfric stress` wrote, {error!r}"
-            ) from None
+            raise ValueError(f"case: expected what `symfric stress` wrote, {error!r}") from None
+        wrong = [n for n, v in content.items() if not typed.fits(v, typed.hints_of(cls)[n])]
+        if wrong:
+            raise ValueError(f"case: expected what `symfric stress` wrote, got others: {wrong}")
         return cls(**content)
 
     def write(self, path: str | Path) -> None:
@@ -120,12 +123,7 @@ class Case:
     @classmethod
     def read(cls, path: str | Path) -> "Case":
         """The case in a file; a file of a campaign may hold its verdict beside it."""
-        try:
-            data = json.loads(Path(path).read_text(encoding="utf-8"))
-        except ValueError as error:
-            raise ValueError(f"'{path}': expected JSON of a case, got {error}") from None
-        if not isinstance(data, dict):
-            raise ValueError(f"'{path}': expected an object, got {type(data).__name__}")
+        data = read_json("case", path, "JSON of a case")
         return cls.from_dict(data.get("case", data))
 
 

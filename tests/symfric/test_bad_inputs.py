@@ -54,7 +54,7 @@ def doors_of_simulation() -> Iterator[Door]:
         "t_eval": times()[1:],
         "method": [*choice(), "backward_euler", "rodas5"],
         "backend": [*choice(), "gpu"],
-        "max_steps": count(),
+        "max_steps": count(optional=True),
         "event_tolerance": number(0.0, -1.0),
         "u": values("force"),
     }

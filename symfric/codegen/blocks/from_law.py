@@ -110,7 +110,7 @@ def law_block(
     where = f"codegen '{law_name(law)}'"
     checks.flag(f"{where}: turning", turning)
     if name is not None:
-        checks.text(f"{where}: name", name, "a C identifier")
+        checks.identifier(f"{where}: name", name)
     known = parameters(law)
     symbols = [p.name for p in known.values() if is_casadi(p.value)]
     if symbols:

@@ -106,7 +106,7 @@ def plant_block(
     check_model("codegen", model)
     where = f"codegen '{model.name}'"
     if name is not None:
-        checks.text(f"{where}: name", name, "a C identifier")
+        checks.identifier(f"{where}: name", name)
     checks.choice(f"{where}: method", method, ["auto", *METHODS])
     if method == "auto":
         method = "backward_euler" if model.holonomic and model.monitors else "rodas3"

@@ -33,7 +33,7 @@ def contact_block(law: Population, *, name: str | None = None, h: float | None =
     """
     where = f"codegen '{law_name(law)}'"
     if name is not None:
-        checks.text(f"{where}: name", name, "a C identifier")
+        checks.identifier(f"{where}: name", name)
     states = tuple(Variable(s.name, s.unit, nominal=s.nominal, doc=s.doc) for s in law.states)
     v = Variable("v", "m/s", nominal=law.step / STEP_SIZE, doc="sliding velocity")
     N = Variable("N", "N", nominal=10.0, lower=0.0, doc="normal force of all contacts")

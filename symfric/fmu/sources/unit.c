@@ -55,7 +55,7 @@ static const char *start(Memory *m)
     memcpy(m->R + DATA, data, ND * sizeof(double));
     memcpy(y, model_start_values, N * sizeof(double));
     if (own) {
-        model_start(m->known, m->chosen, data + NP, data, y);
+        model_start(m->known, m->chosen, data + NP, data, &m->begin, y);
         for (i = 0; i < NZ; ++i) y[model_place_of_z[i]] = m->guess[i];
 #if TIMED
         y[N - 1] = m->begin;

@@ -46,8 +46,9 @@ def seeds(
     names: Sequence[str],
     x0: Mapping[str, float] | None,
     p: Mapping[str, float] | None,
+    t: float = 0.0,
 ) -> Seeds:
-    """Look the names up; `x0` and `p` as in `simulate`.
+    """Look the names up; `x0` and `p` as in `simulate`, which starts at `t` [s].
 
     A start value that follows from others, as a bristle's in steady sliding does, is differentiated
     along with them.
@@ -58,9 +59,10 @@ def seeds(
     free, states = [v.name for v in model.p], [v.name for v in model.x]
     known = [*free, *(f"x0.{name}" for name in states)]
     check_names(f"sensitivities of '{model.name}' (parameters must be free)", names, known)
-    by_p = model.start_by_parameters(x0, p)
+    by_p = model.start_by_parameters(x0, p, t)
     columns = [
-        by_p[:, free.index(n)] if n in free else model.start_by_state(n[3:], x0, p) for n in names
+        by_p[:, free.index(n)] if n in free else model.start_by_state(n[3:], x0, p, t)
+        for n in names
     ]
     rows = tuple(free.index(n) if n in free else -1 for n in names)
     return Seeds(tuple(names), rows, np.column_stack(columns))

@@ -55,8 +55,9 @@ class Members:
             {name: v[pick] for name, v in self.x0.items()},
             {name: v[pick] for name, v in self.p.items()},
             pick.stop - pick.start,
+            begin := float(self.inputs.breaks[0]),
         )
-        return first_guess(system, self.model, x, float(self.inputs.breaks[0])), values
+        return first_guess(system, self.model, x, begin), values
 
     def data(self, pick: slice) -> Array:
         """Input data (members, n_data, intervals); one row where they are common to all."""

@@ -34,6 +34,8 @@ ATTEMPTS = {"vm": 2_000, "compiled": 50_000}
 """Attempts between two looks at progress and interrupts: tens of milliseconds."""
 MOST_ORDERS = 8
 """How often pivots are replaced in a run."""
+MANY_STEPS, MOST_STEPS = 10_000_000, 1e9
+"""Attempts after which the pace of a run is looked at, and how many more it may ask for then."""
 
 
 @final
@@ -48,6 +50,7 @@ class Tolerances:
         max_steps: attempts allowed.
         max_step: longest step [s].
         follow: whether `atol` shrinks to the size of a motion that is tiny.
+        extends: whether more attempts are allowed where the pace of the run leads to its end.
     """
 
     rtol: float
@@ -56,6 +59,7 @@ class Tolerances:
     max_steps: int
     max_step: float = np.inf
     follow: bool = False
+    extends: bool = False
 
     def given(self, t_end: float, d: Array) -> Array:
         """What an attempt towards `t_end` does not change, for run data d (..., n_d)."""
@@ -127,7 +131,7 @@ def _integrated(
     run.integrator = march.integrator
     integrator.give_back(work)
     if not run.complete:
-        same = replace(tolerances, max_steps=run.attempts)
+        same = replace(tolerances, max_steps=run.attempts, extends=False)
         run.again = partial(_integrated, integrator, inputs, y0, p, same, backend, None)
     return run
 
@@ -163,6 +167,7 @@ class _March:
         work.over(inputs.breaks, inputs.values)
         self.run = Run(self.t_start, y, outputs)
         self.places = [y]
+        self.limit, self.limit_set_at = tolerances.max_steps, self.t_start
 
     @property
     def t(self) -> float:
@@ -207,7 +212,9 @@ class _March:
         """A batch of attempts: records, why it stopped, time [s] the VM will still need."""
         engine = self.integrator.choose(self.backend, left)
         self.run.engine = engine.name
-        allowed = min(ATTEMPTS[engine.name], self.tolerances.max_steps - self.run.attempts)
+        if self.run.attempts >= self.limit and self.tolerances.extends:
+            self.extend_limit()
+        allowed = min(ATTEMPTS[engine.name], self.limit - self.run.attempts)
         if allowed <= 0:
             hint = chattering(self.integrator.model)
             said = f"{Status.MAX_STEPS.value} It stands at t = {self.t:g} s.{hint}"
@@ -224,6 +231,12 @@ class _March:
             self.integrator.vm_time += spent
             left = spent * (self.t_end - self.t) / advance if advance > 0 else left
         return records, reason, left
+
+    def extend_limit(self) -> None:
+        """Allow more attempts if the pace of the last ones leads to the end in `MOST_STEPS`."""
+        advance, self.limit_set_at = self.t - self.limit_set_at, self.t
+        if (self.t_end - self.t) * MANY_STEPS <= MOST_STEPS * advance:
+            self.limit += MANY_STEPS
 
     def found_pivots(self) -> bool:
         """Whether steps failed for pivots that are not sound here; others are used from now on.

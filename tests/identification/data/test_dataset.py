@@ -88,6 +88,11 @@ def test_problems_of_a_record_have_their_place(t: np.ndarray, x: np.ndarray, mes
         Record("log", t, {"x": x}, {"x": "m"}, first_row=7)
 
 
+def test_resampling_beyond_memory_is_refused(stage_data: Dataset) -> None:
+    with pytest.raises(ValueError, match=r"resampled: step: expected at most 1e\+08 samples, got"):
+        stage_data.resampled(1e-12)
+
+
 def test_irregular_times_are_refused_by_uniform_and_put_right_by_resampled() -> None:
     rng = np.random.default_rng(0)
     t = T + 2e-3 * rng.random(T.size)

@@ -1,5 +1,6 @@
 """Weighted least squares from many starts against closed forms, counts and other processes."""
 
+import os
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -18,7 +19,7 @@ from identification.solving.reduce import triangle
 from identification.solving.task import Point, Task, task
 from identification.unknowns.unknown import Unknown
 from identification.unknowns.unknowns import unknowns_of
-from symfric.foundation.status import Status
+from symfric.foundation.status import SolveError, Status
 
 Array = NDArray[np.float64]
 
@@ -243,6 +244,15 @@ def test_any_executor_gives_the_same_bits() -> None:
             assert [s.number for s in there] == list(range(6))
             for a, b in zip(here, there, strict=True):
                 assert (a.w == b.w).all() and a.cost == b.cost
+
+
+def test_a_worker_that_dies_is_said() -> None:
+    at = problem(decay(other=1.0))
+    with (
+        ProcessPoolExecutor(1, initializer=os._exit, initargs=(1,)) as dying,  # pyright: ignore
+        pytest.raises(SolveError, match=r"fit: a worker process ended after 0 of 6 starts"),
+    ):
+        many_starts(at, starts(at), dying)
 
 
 def test_white_residuals_end_the_starts_and_wrong_models_go_on() -> None:

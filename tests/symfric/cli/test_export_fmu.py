@@ -14,6 +14,7 @@ def model(m=0.5):
     return drive(LuGre(), m=m, free=["mu_s"])
 stiff = model(2.0)
 number = 3
+def endless(): return endless()
 """
 
 
@@ -58,6 +59,8 @@ def test_a_file_of_python_becomes_a_unit(tmp_path, monkeypatch, capsys):
         ("mine.py:number", "a Model"),
         ("mine.py:stiff --set m=1", "no function"),
         ("mine.py --law lugre", "--law"),
+        ("mine.py:endless", "got RecursionError in line 7 of 'mine.py'"),
+        ("drive --law lugre --name a;b", "expected a C identifier, got 'a;b'; write a_b"),
     ],
 )
 def test_what_cannot_be_a_unit_is_refused(line, expected, tmp_path, monkeypatch, capsys):

@@ -107,6 +107,11 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: checks.path("w", 3), "expected a path, such as 'run.csv', got 3"),
     (lambda: checks.path("w", b"a"), "expected a path"),
     (lambda: checks.function("w", 3, "a function of t"), "expected a function of t, got 3"),
+    (lambda: checks.identifier("w", "a;b"), "expected a C identifier, got 'a;b'; write a_b"),
+    (lambda: checks.identifier("w", "2\u03c6"), r"got '2\u03c6'; write x_2_phi"),
+    (lambda: checks.line("w", "a\nb"), r"expected a text of one printable line, got 'a\\nb'"),
+    (lambda: checks.line("w", "a" * 201), "expected a text of one printable line"),
+    (lambda: checks.parsed("w", "1_0"), "expected a finite number, got '1_0'"),
 ]
 
 

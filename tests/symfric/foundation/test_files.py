@@ -1,11 +1,12 @@
 """Files are written whole or not at all."""
 
 import os
+from errno import ENOSPC
 from pathlib import Path
 
 import pytest
 
-from symfric.foundation.files import write_text, written
+from symfric.foundation.files import read_json, write_text, written
 
 
 def test_text_is_written_and_replaced(tmp_path: Path) -> None:
@@ -106,3 +107,28 @@ def test_a_circle_of_links_is_refused(tmp_path: Path) -> None:
         write_text(tmp_path / "a", "")
     with pytest.raises(ValueError, match=r"output '.*': expected a .*, got (a circle|too many)"):
         write_text(tmp_path / "a" / "c.txt", "")
+
+
+def test_a_full_disk_is_said_and_leaves_nothing(tmp_path: Path) -> None:
+    with (
+        pytest.raises(
+            ValueError, match=r"output '.*a.txt': expected room on the disk, got no space"
+        ),
+        written(tmp_path / "a.txt"),
+    ):
+        raise OSError(ENOSPC, os.strerror(ENOSPC))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_json_of_a_file_is_an_object(tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    for text in ("{", "[1]", "[" * 100_000, "\ud800".encode(errors="surrogatepass"), "1"):
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        with pytest.raises(
+            ValueError, match=r"case '.*a.json': expected a case, got something else"
+        ):
+            read_json("case", path, "a case")
+    path.write_text('{"a": 1}')
+    assert read_json("case", path, "a case") == {"a": 1}
+    with pytest.raises(ValueError, match="got no such file"):
+        read_json("case", tmp_path / "none.json", "a case")

@@ -97,6 +97,14 @@ def test_what_does_not_fit_is_told():
             odd()
 
 
+def test_a_condition_on_a_symbol_is_no_truth_value():
+    for decide in (lambda: max(A, 1.0), lambda: 1 if A > 0 else 2, lambda: A >= 0 and B):
+        with pytest.raises(ValueError, match=r"got the condition .*write casadi.if_else"):
+            decide()
+    chosen = ca.Function("f", [A.symbol], [ca.if_else(A > 0, 1, 2), (A <= 1) * A])
+    assert [float(x) for x in chosen(0.5)] == [1.0, 0.5]
+
+
 def test_a_copy_is_another_variable_of_the_same_symbol():
     assert copy.copy(A) != A
     assert same(copy.copy(A) - 1, A.symbol - 1)

@@ -27,7 +27,8 @@ from symfric import (
     rabinowicz,
     simulate,
 )
-from symfric.integrator import simulate_by_peer
+from symfric.integrator import arguments, simulate_by_peer
+from symfric.integrator.running import run as running
 
 M, C = 0.8, 2.0
 RUNNERS = ["auto", "rosenbrock", "sundials"]
@@ -255,6 +256,23 @@ def test_failed_solve_says_where_and_keeps_what_there_is(runner: str) -> None:
     assert 0.9 < partial.t[-1] <= 1.0
     early = partial.t < 0.9
     assert partial["x"][early] == pytest.approx(1 / (1 - partial.t[early]), rel=1e-4)
+
+
+def test_a_long_run_runs_on_and_one_without_progress_stops(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With limits scaled down from 10 million attempts and a billion."""
+    whole = simulate(rabinowicz(LuGre()), 20.0, backend="vm")
+    for module in (arguments, running):
+        monkeypatch.setattr(module, "MANY_STEPS", 50)
+    assert whole.statistics.steps > 200
+    found = simulate(rabinowicz(LuGre()), 20.0, backend="vm")
+    assert found.status is Status.SUCCESS
+    np.testing.assert_array_equal(found["x"], whole["x"])
+    monkeypatch.setattr(running, "MOST_STEPS", 100)
+    stopped = simulate(rabinowicz(LuGre()), 20.0, backend="vm", throw=False)
+    assert stopped.status is Status.MAX_STEPS
+    assert stopped.statistics.steps < whole.statistics.steps
+    few = simulate(rabinowicz(LuGre()), 20.0, backend="vm", max_steps=60, throw=False)
+    assert few.statistics.steps + few.statistics.rejections == 60
 
 
 def test_failed_solve_is_returned_where_nothing_is_to_be_thrown() -> None:

@@ -1,7 +1,8 @@
 """Contacts of a model: closed by their laws, open with the forces as inputs, closed otherwise."""
 
-from dataclasses import replace
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from symfric import (
     BrownMcPhee,
+    Dahl,
     ExactCoulomb,
     Karnopp,
     Law,
@@ -183,3 +185,33 @@ def test_contacts_and_forces_that_cannot_be_are_refused() -> None:
     for call, message in cases:
         with pytest.raises(ValueError, match=message):
             call()
+
+
+@dataclass(frozen=True, eq=False)
+class Returning(Dahl):
+    """A law whose rate or force is changed before it is returned."""
+
+    change: ClassVar[tuple[str, Callable[[Any], Any]]] = ("rate", lambda r: r)
+
+    def rate(self, v: Any, N: Any, z: Any, **inputs: Any) -> Any:
+        found = super().rate(v, N, z, **inputs)
+        return self.change[1](found) if self.change[0] == "rate" else found
+
+    def force(self, v: Any, N: Any, z: Any = (), **inputs: Any) -> Any:
+        found = super().force(v, N, z, **inputs)
+        return self.change[1](found) if self.change[0] == "force" else found
+
+
+@pytest.mark.parametrize("what", ["rate", "force"])
+def test_what_a_law_of_ones_own_returns_is_one_expression(
+    what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changes: dict[str, Callable[[Any], Any]] = {
+        "expected an SX expression, got .*vertcat": lambda r: [r],
+        "expected an SX expression, got None": lambda _: None,
+        "expected 1 row, got the expression": lambda r: ca.vertcat(r, r),
+    }
+    for message, change in changes.items():
+        monkeypatch.setattr(Returning, "change", (what, change))
+        with pytest.raises(ValueError, match=rf"contact 'guide': Returning\.{what}: {message}"):
+            behind_spring(Returning())

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symfric import LuGre, Model, RateAndState, Variable, contact, simulate
+from symfric import LuGre, Model, RateAndState, Variable, contact, simulate, simulate_many
 
 LAW = RateAndState(mu_0=0.6, a=0.01, b=0.015, v_0=1e-6, D_c=1e-3)
 PLATE, STRESS, ETA = 1e-9, 50e6, 5e6
@@ -55,3 +55,25 @@ def test_a_bristle_starts_by_the_start_value_of_an_algebraic_load() -> None:
     )
     law = LuGre(mu_s=0.5, mu_d=0.4)
     assert brake.initial_state()[1] == pytest.approx(law.steady_state(1.0, 12.0).item())
+
+
+def under_varying_load(law: LuGre) -> Model:
+    x, v, t = Variable("x", "m"), Variable("v", "m/s", start=0.3), ca.SX.sym("t")
+    floor = contact("floor", law, v, 5 + ca.sin(t))
+    return Model("varying", x=(x, v), ode=ca.vertcat(v, 1 - floor.force), contacts=(floor,), t=t)
+
+
+def test_a_bristle_under_a_load_that_varies_starts_at_its_steady_state() -> None:
+    law = LuGre()
+    model = under_varying_load(law)
+    for begin in (0.0, 1.5):
+        steady = float(law.steady_state(0.3, 5 + np.sin(begin))[0])
+        assert model.initial_state(t=begin)[2] == pytest.approx(steady, rel=1e-14)
+        run = simulate(model, begin + 0.5, t_start=begin, samples=3, sensitivities=["x0.v"])
+        many = simulate_many(
+            model, begin + 0.5, t_start=begin, x0={"v": [0.3, 0.4]}, backend="vm", executor="serial"
+        )
+        assert run["z"][0] == pytest.approx(steady, rel=1e-14)
+        assert many["x"][0, -1] == pytest.approx(run.final["x"], rel=1e-7)
+        slope = (many["x"][1, -1] - many["x"][0, -1]) / 0.1
+        assert run.sensitivities["x0.v"]["x"][-1] == pytest.approx(slope, rel=1e-4)

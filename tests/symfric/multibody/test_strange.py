@@ -1,6 +1,7 @@
 """Strange mechanisms end in a sentence, never in an error of CasADi."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import casadi as ca
@@ -12,6 +13,7 @@ from symfric.multibody import (
     Mechanism,
     PrescribedMotion,
     Revolute,
+    Screw,
     UserConstraint,
     UserForce,
 )
@@ -36,7 +38,10 @@ def held(expression: Callable[[Any], Any]) -> Mechanism:
     return m
 
 
-WRONG: list[tuple[Callable[[], Mechanism], str]] = [
+WRONG: list[tuple[Callable[[], Any], str]] = [
+    (lambda: body(mass=10**400), "body 'b' > mass"),
+    (partial(Revolute, "j", "a", "b", axis=(0, 0, 1)), "got axis; the axis of a joint is the z"),
+    (partial(Screw, "j", "a", 0.1, friction=None), "expected name, joint, lead, offset, got fric"),
     (lambda: body(mass=np.inf), "body 'b' > mass"),
     (lambda: body(inertia=(np.inf,) * 3), "body 'b' > .*inertia"),
     (lambda: pushed(lambda kin: None), "'push' > expression: expected a force and a moment"),

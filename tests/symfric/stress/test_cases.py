@@ -47,12 +47,12 @@ def test_a_file_gives_the_case_back(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("{", "expected JSON of a case"),
-        ("[1]", "expected an object, got list"),
+        ("[1]", "expected JSON of a case, got something else"),
         ('{"seed": 1}', "case: expected fields among"),
         ('{"seed": 1, "number": 2, "scene": "drive", "law": "dahl", "x": 1}', "expected fields"),
         (
             '{"seed": 1, "number": 2, "scene": "drive", "law": "dahl", "inputs": {"force": 1}}',
-            "case: inputs: expected what `symfric stress` wrote",
+            "case: expected what `symfric stress` wrote",
         ),
     ],
 )
