@@ -26,6 +26,11 @@ DRY = (
         "            mu += self.kappa * v * v", "            mu += self.kappa * v * v / N", PRINTED,
     ),
     Mutant(
+        "a law says that it is unverified, and not what that means", "symfric/laws/base/law.py",
+        'said = f"{self.confidence} ({CONFIDENCE[self.confidence]})"', "said = self.confidence",
+        ("tests/symfric/laws/test_contract.py",),
+    ),
+    Mutant(
         "a mode shows what error control adds to it", "symfric/model/kinds.py",
         "if kind != MODE:", "if kind:", ("tests/symfric/results/test_modes.py",),
     ),

@@ -35,7 +35,8 @@ class HaessigFriedland(Law):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "P", "N"),
         smoothness="C2 (jumps as knee -> 0)",
-        confidence="memory; smooth form constructed",
+        confidence="unverified",
+        checked="the smooth form is constructed",
         source="Haessig and Friedland, J. Dyn. Syst. Meas. Control 113(3), 1991",
         load="proportional in steady sliding",
     )

@@ -49,6 +49,7 @@ class Karnopp(Sticking):
         phenomena=("D", "S", "V"),
         smoothness="C2 at 0, |v| = D_v, |F_e| = mu_s N -+ F_eps (original: jump at |v| = D_v)",
         confidence="two sources",
+        checked="fellipegm/valve_estimation and other public code",
         source="Karnopp 1985, as in public codes",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -164,7 +165,8 @@ class Awrejcewicz(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C1 at |v| = epsilon, C2 at 0, |F_e| = mu_s N -+ F_eps (original: C0 in F_e)",
-        confidence="memory",
+        confidence="unverified",
+        checked="its four branches join",
         source="Awrejcewicz, Grzelczyk, Pyryev 2008",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -229,7 +231,11 @@ class LeineSwitch(Sticking):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C∞ (original: jump at |v| = eta)",
-        confidence="one source; memory for the switching",
+        confidence="one source",
+        checked=(
+            "rleine/Keynote_Nonsmooth_Dynamics_ENOC2024 stickslipsmooth.m for slip law and smooth"
+            " form; the switching is unverified"
+        ),
         source="Leine et al. 1998; the author's public code",
     )
 
@@ -312,7 +318,8 @@ class Wojewoda(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "L"),
         smoothness="C∞",
-        confidence="reconstruction",
+        confidence="rebuilt",
+        checked="of the paper only the abstract was read",
         source="after Wojewoda, Stefanski, Wiercigroch, Kapitaniak 2008",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)

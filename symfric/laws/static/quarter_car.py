@@ -48,6 +48,7 @@ class QuarterCarGeneral(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C2 at 0, |v| = v_eps, |f_sd| = F_brk -+ F_eps (as printed: jump at 0)",
         confidence="one source",
+        checked="the paper, corrected as said",
         source="Al-Zughaibi, quarter-car friction, corrected",
         odd=False,
         load="independent",
@@ -160,6 +161,7 @@ class QuarterCarSimple(StaticLaw):
         phenomena=("S", "St", "V"),
         smoothness="C∞",
         confidence="one source",
+        checked="the paper, corrected as said",
         source="Al-Zughaibi, quarter-car friction, corrected",
         load="independent",
     )
