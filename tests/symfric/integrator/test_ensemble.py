@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +10,12 @@ import casadi as ca
 import numpy as np
 import pytest
 from differentiable import oscillator, pendulum, root, switched
-from ensembles import Inline, after, assert_same, explosive, with_functions_of_libm
+from ensembles import EXECUTORS, after, assert_same, explosive, with_functions_of_libm
 
 from symfric import (
     BrownMcPhee,
     Ensemble,
-    ExactCoulomb,
     Hold,
-    Karnopp,
     Law,
     Linear,
     LuGre,
@@ -25,7 +23,6 @@ from symfric import (
     SolveError,
     Status,
     Variable,
-    drive,
     rabinowicz,
     simulate,
     simulate_many,
@@ -158,22 +155,13 @@ def test_numbers_alone_are_one_member() -> None:
     assert many.t == pytest.approx([1.0])
 
 
-def executors() -> dict[str, Callable[[], Any]]:
-    return {
-        "threads": lambda: "threads",
-        "processes": lambda: "processes",
-        "handed in": lambda: ThreadPoolExecutor(2),
-        "of one's own": Inline,
-    }
-
-
 @each_engine
-@pytest.mark.parametrize("kind", executors())
+@pytest.mark.parametrize("kind", EXECUTORS)
 def test_every_executor_gives_the_same(kind: str, backend: str) -> None:
     model, x0 = rabinowicz(LuGre()), {"v": VELOCITIES}
     serial = simulate_many(model, 2.0, x0=x0, executor="serial", backend=backend, chunk=2)
     other = simulate_many(
-        model, 2.0, x0=x0, executor=executors()[kind](), backend=backend, chunk=2, workers=2
+        model, 2.0, x0=x0, executor=EXECUTORS[kind](), backend=backend, chunk=2, workers=2
     )
     assert_same(serial, other)
 
@@ -290,18 +278,6 @@ def test_models_with_events_run_one_by_one(executor: str, backend: str) -> None:
     )
     for m, h in enumerate([0.3, 1.0, 5.0]):
         assert_member(many, m, model, 0.7, x0={"h": h}, backend=backend)
-
-
-@each_engine
-@pytest.mark.parametrize("kind", executors())
-@pytest.mark.parametrize("law", [ExactCoulomb(), Karnopp()])
-def test_every_executor_gives_the_same_by_events(law: Law, kind: str, backend: str) -> None:
-    model, load = drive(law), Linear([0.0, 1.0, 2.0], np.outer([1.0, 2.0, 3.0], [0.0, 9.0, -9.0]))
-    common: dict[str, Any] = {"u": {"force": load}, "t_eval": [1.0, 2.0], "backend": backend}
-    serial = simulate_many(model, 2.0, executor="serial", chunk=2, **common)
-    other = simulate_many(model, 2.0, executor=executors()[kind](), chunk=2, workers=2, **common)
-    assert np.ptp(serial["v"]) > 0
-    assert_same(serial, other)
 
 
 def test_terminal_event_ends_a_member_at_its_time() -> None:
