@@ -1,10 +1,22 @@
 """A case as a question to the referee, which takes numbers only."""
 
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+
 from symfric.foundation.parameters import parameters, with_values
 from symfric.laws import law_from_text
 from symfric.scenes import ALL_SCENES
 from symfric.stress.problem import Array, Problem
-from symfric.stress.referee.solve import NO_FORCE, SINE, Question, Signal, knows
+from symfric.stress.referee.solve import NO_FORCE, SINE, Question, Signal, knows, solve
+
+States = Callable[[Array], Array]
+"""From times to states, shape (nx, times)."""
+RTOL, ENOUGH = 1e-10, 0.3
+"""Tolerance of the referee, and the own error [tolerances] that needs no smaller one."""
+GAVE_UP = (ArithmeticError, ValueError)
 
 
 def question(ready: Problem, times: Array) -> Question | None:
@@ -29,3 +41,52 @@ def question(ready: Problem, times: Array) -> Question | None:
         scale=model.nominal("x"),
         times=times,
     )
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """The referee's motion of a case.
+
+    Attributes:
+        asked: the case.
+        rtol: at which SciPy solved it.
+        doubt: difference [tolerances] from another solve, at the times asked for.
+    """
+
+    asked: Question
+    rtol: float
+    doubt: Array
+
+    def states(self, times: Array) -> Array:
+        """States at times within the span, shape (nx, times)."""
+        at, back = np.unique([self.asked.times[0], *times], return_inverse=True)
+        return solve(replace(self.asked, times=at), self.rtol)[:, back[1:]]
+
+    def onward(self, times: Array, start: Array) -> Array | None:
+        """States at `times` of the motion that begins at the first of them with `start`."""
+        try:
+            return solve(replace(self.asked, times=times, y=start), self.rtol)
+        except GAVE_UP:
+            return None
+
+
+def answered(ready: Problem, distance: Callable[[Array, States], Array]) -> Answer | None:
+    """The referee's answer, or None where it has none.
+
+    `distance` is that of a table of states at the problem's times from others, over time. The
+    solve at 1e-10 is compared with one at 1e-9, and where that says too little with one at 1e-12.
+    """
+    asked = question(ready, ready.times)
+    if asked is None:
+        return None
+    try:
+        fine = solve(asked, RTOL)
+        coarse = Answer(asked, 10 * RTOL, np.zeros(0))
+        answer = Answer(asked, RTOL, distance(fine, coarse.states))
+        if answer.doubt.max() > ENOUGH:
+            finest = Answer(asked, RTOL / 100, np.zeros(0))
+            answer = replace(finest, doubt=distance(fine, finest.states))
+    except GAVE_UP:
+        return None
+    return answer

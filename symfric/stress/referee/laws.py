@@ -73,7 +73,10 @@ def stribeck(p: Numbers, _: Forms) -> Rub:
 
 
 def brown_mcphee(p: Numbers, _: Forms) -> Rub:
-    """x = v/v_t, F = N [mu_d tanh 4x + (mu_s - mu_d) x/(x^2/4 + 3/4)^2] + mu_v v tanh(4 N/N_t)."""
+    """Brown-McPhee friction.
+
+    x = v/v_t, F = N [mu_d tanh 4x + (mu_s - mu_d) x/(x^2/4 + 3/4)^2] + mu_v v tanh(4 N/N_t).
+    """
     mu_s, mu_d, v_t, mu_v, N_t = p["mu_s"], p["mu_d"], p["v_t"], p["mu_v"], p["N_t"]
 
     def rub(v: float, N: float, _: Sequence[float]) -> tuple[float, tuple[float, ...]]:
@@ -85,7 +88,9 @@ def brown_mcphee(p: Numbers, _: Forms) -> Rub:
 
 
 def specker(p: Numbers, _: Forms) -> Rub:
-    """F_p = N [mu_s - mu_d tanh(v_sp/v_t)] - sigma_2 v_sp,   r = v/v_sp,
+    """Specker's friction.
+
+    F_p = N [mu_s - mu_d tanh(v_sp/v_t)] - sigma_2 v_sp,   r = v/v_sp,
 
     F = F_p r exp((1 - r^2)/2) + mu_d N tanh(v/v_t) + sigma_2 v.
     """
@@ -100,10 +105,11 @@ def specker(p: Numbers, _: Forms) -> Rub:
 
 
 def dahl(p: Numbers, _: Forms) -> Rub:
-    """rho = 1 - sigma_0 z sign(v) / (mu_d N),   dz/dt = v rho |rho|^(n-1),   F = sigma_0 z."""
-    sigma_0, mu_d, n, v_eps, rho_eps = (
-        p[k] for k in ("sigma_0", "mu_d", "n", "v_eps", "rho_eps")
-    )
+    """Dahl friction with exponent n.
+
+    rho = 1 - sigma_0 z sign(v) / (mu_d N),   dz/dt = v rho |rho|^(n-1),   F = sigma_0 z.
+    """
+    sigma_0, mu_d, n, v_eps, rho_eps = (p[k] for k in ("sigma_0", "mu_d", "n", "v_eps", "rho_eps"))
 
     def rub(v: float, N: float, z: Sequence[float]) -> tuple[float, tuple[float, ...]]:
         F = sigma_0 * z[0]
@@ -120,7 +126,9 @@ def bristle(
     damping: Callable[[float], float],
     share: Callable[[float, float, float], float] = lambda v, z, z_ss: 1.0,
 ) -> Rub:
-    """g = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)],   dz/dt = v - alpha sigma_0 |v| z / g,
+    """A bristle.
+
+    g = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)],   dz/dt = v - alpha sigma_0 |v| z / g,
 
     F = sigma_0 z + sigma_1(v) dz/dt + sigma_2 v; `share` is alpha(v, z, g / sigma_0).
     """

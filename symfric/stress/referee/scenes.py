@@ -8,12 +8,8 @@ force F_e that it would carry at rest.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import asin, cos, hypot, sin, sqrt, tan
+from math import asin, cos, hypot, inf, sin, sqrt, tan
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 Numbers = Mapping[str, float]
 Force = Callable[[float], float]
 Friction = Callable[[int, float, float, float], float]
@@ -46,7 +42,10 @@ class Scene:
 
 
 def belt(p: Numbers, _: Force, __: float) -> Scene:
-    """x' = v,   m v' = -k x - F(v - v_belt, m g)."""
+    """Block on a belt.
+
+    x' = v,   m v' = -k x - F(v - v_belt, m g).
+    """
     m, k, v_belt, g = p["m"], p["k"], p["v_belt"], p["g"]
 
     def motion(t: float, y: Sequence[float], rub: Friction) -> Sequence[float]:
@@ -57,7 +56,10 @@ def belt(p: Numbers, _: Force, __: float) -> Scene:
 
 
 def drive(p: Numbers, force: Force, _: float) -> Scene:
-    """x' = v,   m v' = force - offset - F(v, N)."""
+    """Mass under a force.
+
+    x' = v,   m v' = force - offset - F(v, N).
+    """
 
     def motion(t: float, y: Sequence[float], rub: Friction) -> Sequence[float]:
         pull = force(t) - p["offset"]
@@ -67,7 +69,10 @@ def drive(p: Numbers, force: Force, _: float) -> Scene:
 
 
 def two_blocks(p: Numbers, _: Force, __: float) -> Scene:
-    """m_i v_i' = -k_i x_i +- k_c (x_2 - x_1) - F(v_i - v_belt, m_i g)."""
+    """Two blocks on a belt, a spring between them.
+
+    m_i v_i' = -k_i x_i +- k_c (x_2 - x_1) - F(v_i - v_belt, m_i g).
+    """
     m_1, m_2, v_belt, g = p["m_1"], p["m_2"], p["v_belt"], p["g"]
 
     def motion(t: float, y: Sequence[float], rub: Friction) -> Sequence[float]:
@@ -82,7 +87,9 @@ def two_blocks(p: Numbers, _: Force, __: float) -> Scene:
 
 
 def quarter_car(p: Numbers, _: Force, within: float) -> Scene:
-    """M_b X_b'' = f - F(X_b', N),   M_w X_w'' = -f + k_t (X_r - X_w) + b_t (X_r' - X_w'),
+    """Quarter car over a road of three ramps.
+
+    M_b X_b'' = f - F(X_b', N),   M_w X_w'' = -f + k_t (X_r - X_w) + b_t (X_r' - X_w'),
 
     f = k_s (X_w - X_b) + b_d (X_w' - X_b'),   N = N_0 + |f| / tan(theta - d_theta),
     sin d_theta = s cos(theta) / (L_d - s sin(theta)),   s = X_w - X_b.
@@ -119,64 +126,75 @@ def length(*forces: float) -> float:
 def pendulum(p: Numbers, _: Force, __: float) -> Scene:
     """(J + m L^2) phi'' = -m g L sin(phi) - R F(R phi', N), N the size of the bearing's force."""
     m, L, R, g = p["m"], p["L"], p["R"], p["g"]
-    inertia = p["J"] + m * L**2
+    inertia, guess = p["J"] + m * L**2, [m * g]
 
     def motion(t: float, y: Sequence[float], rub: Friction) -> Sequence[float]:
         phi, w = y
         weight = -m * g * L * sin(phi)
 
-        def accelerated(N: Array) -> tuple[list[float], Array]:
-            a = (weight - R * rub(0, R * w, float(N[0]), weight / R)) / inertia
+        def accelerated(N: list[float]) -> tuple[list[float], list[float]]:
+            a = (weight - R * rub(0, R * w, N[0], weight / R)) / inertia
             along, across = m * (L * w**2 + g * cos(phi)), m * (L * a + g * sin(phi))
-            return [a], np.array([length(along, across)])
+            return [a], [length(along, across)]
 
-        return w, *settled(accelerated, np.array([m * g]))
+        return w, *settled(accelerated, guess)
 
     return Scene(2, motion, ((1, 0.0),))
 
 
 def pendulum_box(p: Numbers, _: Force, __: float) -> Scene:
-    """Box (x) on rough ground and a pendulum (phi) hinged to it, friction in both places:
+    """Box (x) on rough ground and a pendulum (phi) hinged to it, friction in both places.
 
     (m_b + m) x'' + m L (phi'' cos(phi) - phi'^2 sin(phi)) = -F(x', N_1),
     m L x'' cos(phi) + (J + m L^2) phi'' + m g L sin(phi) = -R F(R phi', N_2),
     N_1 the size of the ground's force, N_2 that of the hinge's.
     """
     m, L, R, g, both = p["m"], p["L"], p["R"], p["g"], p["m_box"] + p["m"]
-    inertia = p["J"] + m * L**2
+    inertia, guess = p["J"] + m * L**2, [both * g, m * g]
 
     def motion(t: float, y: Sequence[float], rub: Friction) -> Sequence[float]:
         _, phi, v, w = y
         c, s = cos(phi), sin(phi)
 
-        def accelerated(N: Array) -> tuple[list[float], Array]:
-            f = m * L * s * w**2 - rub(0, v, float(N[0]), 0.0)
-            T = -m * g * L * s - R * rub(1, R * w, float(N[1]), 0.0)
+        def accelerated(N: list[float]) -> tuple[list[float], list[float]]:
+            f = m * L * s * w**2 - rub(0, v, N[0], 0.0)
+            T = -m * g * L * s - R * rub(1, R * w, N[1], 0.0)
             det = both * inertia - (m * L * c) ** 2
             a, b = (inertia * f - m * L * c * T) / det, (both * T - m * L * c * f) / det
             aside, up = m * (a + L * (c * b - s * w**2)), m * (g + L * (s * b + c * w**2))
-            return [a, b], np.array([length(up + p["m_box"] * g), length(aside, up)])
+            return [a, b], [length(up + p["m_box"] * g), length(aside, up)]
 
-        return v, w, *settled(accelerated, np.array([both * g, m * g]))
+        return v, w, *settled(accelerated, guess)
 
     return Scene(4, motion, ((2, 0.0), (3, 0.0)))
 
 
-def settled(accelerated: Callable[[Array], tuple[list[float], Array]], N: Array) -> list[float]:
-    """Accelerations under the normal forces N that follow from them, by Newton's method."""
-    last = np.inf
+def settled(
+    accelerated: Callable[[list[float]], tuple[list[float], list[float]]], N: list[float]
+) -> list[float]:
+    """Accelerations under the normal forces N that follow from them, by Broyden's method.
+
+    N is the first guess, and the result.
+    """
+    n, last = range(len(N)), inf
+    a, found = accelerated(N)
+    gap = [found[i] - N[i] for i in n]
+    inverse = [[-float(i == j) for j in n] for i in n]  # inverse slope of the gap
     for _ in range(LOOPS):
-        a, found = accelerated(N)
-        gap = found - N
-        size = float((np.abs(gap) / (1 + found)).max())
+        size = max(abs(gap[i]) / (1 + found[i]) for i in n)
         if size <= ROUNDING or last / 2 < size < CLOSE:  # rounding is all that is left
             return a
-        last, slope = size, np.empty((N.size, N.size))
-        for j in range(N.size):
-            beside = N.copy()
-            beside[j] += 1e-4 * (1 + abs(N[j]))
-            slope[:, j] = (accelerated(beside)[1] - found) / (beside[j] - N[j])
-        N = np.maximum(N + np.linalg.solve(np.eye(N.size) - slope, gap), N / 10)
+        step = [max(-sum(inverse[i][j] * gap[j] for j in n), -0.9 * N[i]) for i in n]
+        N[:] = [N[i] + step[i] for i in n]
+        a, found = accelerated(N)
+        before, gap, last = gap, [found[i] - N[i] for i in n], size
+        turned = [sum(inverse[i][j] * (gap[j] - before[j]) for j in n) for i in n]
+        back = [sum(step[j] * inverse[j][i] for j in n) for i in n]
+        along = sum(step[i] * turned[i] for i in n)
+        if along:
+            inverse = [
+                [inverse[i][j] + (step[i] - turned[i]) * back[j] / along for j in n] for i in n
+            ]
     raise UnsolvableError
 
 

@@ -125,7 +125,6 @@ class Motion:
         own = self.scene.motion(t, y[:n], friction)
         return [*own, *(rate for of_contact in rates for rate in of_contact)]
 
-
     def mode(self, i: int) -> int:
         """Number of the state that is the mode of contact `i`."""
         return self.scene.states + i
@@ -199,10 +198,10 @@ def by_events(
         if y[motion.mode(i)] == 0.0:
             y = motion.held(t, y, i, mu_s)
     for _ in range(EVENTS):
+        ends = [ending(motion, i, y[motion.mode(i)], mu_s, t + 1e-9 * longest) for i in contacts]
         done: Any = solve_ivp(
             motion, (t, end), y, method="LSODA", rtol=rtol, atol=1e-3 * rtol * asked.scale,
-            max_step=longest, dense_output=True,
-            events=[ending(motion, i, y[motion.mode(i)], mu_s, t + 1e-9 * longest) for i in contacts],
+            max_step=longest, dense_output=True, events=ends,
         )  # fmt: skip
         if not done.success:
             raise GaveUpError(done.message)
