@@ -46,6 +46,10 @@ SENSITIVE = 1e-2
 becomes of one tolerance, above which a run says nothing."""
 STRIDES = 100
 """Steps that a reference takes at least: what a run may leap over, a reference must not."""
+LADDER, FINEST = (1e-2, 1e-5, 1e-1), 1e-13
+"""Tolerances of the references over that of the case, and the smallest one."""
+PROBLEMS = ("sensitive", "adds up over steps")
+"""Undecided for reasons that no better reference takes away."""
 DOUBT = RIGHT / 3
 """Own error [tolerances] of the referee up to which it judges."""
 CHECKED = 3000
@@ -137,11 +141,13 @@ def _stopped(ready: Problem, error: SolveError) -> Verdict:
         return _refused("too many steps at the start", str(error), run.statistics.steps)
     part = replace(ready, case=replace(case, t_end=reached))
     begun = _compared(part, run)
-    if begun.kind in ("right", "loose"):
-        text = f"{error} Its motion up to {reached:g} s is {begun.kind}"
-        return replace(begun, kind="refused", reason=text, group="too many steps, right so far")
-    text = f"{error} Its motion up to {reached:g} s is {begun.kind}: {begun.reason}"
-    return replace(begun, kind="undecided", reason=text, group=f"too many steps, {begun.group}")
+    text = f"{error} Its motion up to {reached:g} s is {begun.kind}. {begun.reason}"
+    kind, group = "refused", "too many steps, right so far"
+    if begun.kind == "undecided":
+        group = "too many steps, motion so far not judged"
+    elif begun.kind not in ("right", "loose"):
+        kind, group = "undecided", "too many steps, motion so far wrong"
+    return replace(begun, kind=kind, reason=text, group=group)
 
 
 def _compared(ready: Problem, run: Trajectory) -> Verdict:
@@ -171,24 +177,36 @@ def _compared(ready: Problem, run: Trajectory) -> Verdict:
 
 
 def _by_methods(ready: Problem, run: Trajectory) -> Verdict:
-    """The verdict of symfric's own methods of other families."""
+    """The verdict of symfric's own methods of other families, at smaller and smaller tolerances."""
+    verdicts = list[Verdict]()
+    for factor in LADDER:
+        verdicts.append(_by_two(ready, run, max(factor * ready.case.rtol, FINEST)))
+        if verdicts[-1].kind != "undecided" or verdicts[-1].group in PROBLEMS:
+            return verdicts[-1]
+    return verdicts[0]
+
+
+def _by_two(ready: Problem, run: Trajectory, rtol: float) -> Verdict:
+    """The verdict of two methods, one at `rtol` and, where needed, the other at a tenth of it."""
     case, steps = ready.case, run.statistics.steps
     limit = 10 * (steps + run.statistics.rejections) + ready.attempts
-    fine, finest = max(case.rtol / 100, 1e-13), max(case.rtol / 1000, 1e-13)
-    reference = _run(ready, fine, _other(case), limit)
-    if isinstance(reference, SolveError):
-        return _without_reference(ready, run, reference, finest, limit)
-    error = distance(ready, run, _of(reference))
-    if error <= RIGHT:
-        return Verdict("right", "", "", error, steps)
-    third = _run(ready, finest, _third(case), limit)
+    reference = _run(ready, rtol, _other(case), limit)
+    if not isinstance(reference, SolveError):
+        error = distance(ready, run, _of(reference))
+        if error <= RIGHT:
+            return Verdict("right", "", "", error, steps)
+    third = _run(ready, max(rtol / 10, FINEST), _third(case), limit)
     if isinstance(third, SolveError):
-        text = f"{error:.3g} tolerances off; a third run at rtol/1000 failed: {third}"
-        return Verdict("undecided", text, "third run failed", error, steps)
-    doubt = distance(ready, reference, _of(third))
+        failed = reference if isinstance(reference, SolveError) else third
+        text = f"the reference failed: {failed}"
+        return Verdict("undecided", text, f"reference: {failed.status.name}", None, steps)
     error = distance(ready, run, _of(third))
     if error <= RIGHT:
         return Verdict("right", "", "", error, steps)
+    if isinstance(reference, SolveError):
+        text = f"{error:.3g} tolerances off one reference; the other failed: {reference}"
+        return Verdict("undecided", text, f"reference: {reference.status.name}", error, steps)
+    doubt = distance(ready, reference, _of(third))
     if doubt > error / 3:
         text = f"{error:.3g} tolerances off, and the references disagree by {doubt:.3g}"
         return Verdict("undecided", text, "references disagree", error, steps)
@@ -237,22 +255,6 @@ def _explained(
     text += f", and {less:.3g} are left at rtol/10"
     group = "adds up over steps, falls with rtol" if less <= error / 3 else "unexplained"
     return replace(loose, reason=text, group=group)
-
-
-def _without_reference(
-    ready: Problem, run: Trajectory, first: SolveError, finest: float, limit: int
-) -> Verdict:
-    """The reference failed: another one judges, and two that fail at one place are believed."""
-    steps = run.statistics.steps
-    second = _run(ready, finest, _third(ready.case), limit)
-    if isinstance(second, Trajectory):
-        error = distance(ready, run, _of(second))
-        if error <= RIGHT:
-            return Verdict("right", "", "", error, steps)
-        if error <= LOOSE:
-            return _graded(ready, run, _of(second), error, limit)
-    group = f"reference: {first.status.name}"
-    return Verdict("undecided", f"the reference failed: {first}", group, None, steps)
 
 
 def _run(
