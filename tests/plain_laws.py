@@ -146,7 +146,9 @@ def lorentzian(v: float) -> float:
 
 
 def duan_singh(v: float) -> float:
-    return F_C * (1 + (F_S / F_C - 1) * exp(-1e3 * (sqrt(v**2 + 1e-8) - 1e-4))) * tanh(1e4 * v)
+    """|v| rounded over 1e-4/sigma, as the law says."""
+    speed = v * v / sqrt(v**2 + 1e-16)
+    return F_C * (1 + (F_S / F_C - 1) * exp(-1e3 * speed)) * tanh(1e4 * v)
 
 
 def rui_wang(v: float) -> float:

@@ -6,9 +6,25 @@ from mutants.regularisation import REGULARISATION
 APPLIED, SLIPS = "symfric/multibody/applied.py", "symfric/multibody/slips.py"
 INITIAL = "symfric/integrator/equations/initial.py"
 TESTS = ("tests/symfric/multibody/test_applied.py",)
+SMOOTH = "symfric/laws/base/smooth.py"
+PRINTED = ("tests/symfric/laws/static/test_printed.py", "tests/symfric/laws/base/test_smooth.py")
 
 DRY = (
     *REGULARISATION,
+    Mutant(
+        "the fall of a static law is rounded over the width of its sign", SMOOTH,
+        "CORNER = 1e-4", "CORNER = 1.0", PRINTED,
+    ),
+    Mutant(
+        "the fall of a Stribeck curve is shifted by its rounding", SMOOTH,
+        "    return exp(-_rounded_power(u, delta, eps / v_s))\n",
+        "    return exp(-power(u, delta, eps / v_s))\n", PRINTED,
+    ),
+    Mutant(
+        "the quadratic rise of Popp and Stelter does not see the load",
+        "symfric/laws/static/falling.py",
+        "            mu += self.kappa * v * v", "            mu += self.kappa * v * v / N", PRINTED,
+    ),
     Mutant(
         "rest keeps what rounding left of its velocity", APPLIED,
         "change = self.change + self.rate / CALM if self.by_modes else self.change",

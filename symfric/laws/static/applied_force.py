@@ -217,7 +217,7 @@ class LeineSwitch(Sticking):
                    F = clip(F_e + c v, -mu_s N, mu_s N)          for |v| <= eta, stick
 
     c v draws a sticking body to the middle of the band: with m alpha for c, dv/dt = -alpha v.
-    |v| of the smooth form is smooth over v_eps.
+    |v| of the smooth form is rounded over 1e-4 v_eps.
     form = "event" (one state, the mode) has no band: sliding ends where v passes through zero,
     rest where |F_e| reaches mu_s N. It needs a scene with events.
     Limits: the level falls from mu_s N to zero, with no dynamic level. The smooth form creeps under
@@ -275,7 +275,7 @@ class LeineSwitch(Sticking):
         """Friction force [N]."""
         static = self.mu_s * N
         if self.form == "smooth":
-            falling = static / (1 + self.delta * smooth.magnitude(v, self.v_eps))
+            falling = static / (1 + self.delta * smooth.magnitude(v, smooth.CORNER * self.v_eps))
             return falling * (2 / pi * atan(v / self.v_eps))
         speed = smooth.magnitude(v, 0.0)
         if self.has_mode:
@@ -301,8 +301,8 @@ class Wojewoda(StaticLaw):
         F = N [mu_d + (mu_s - mu_d) h sign(v dv/dt)] sign(v)
         h = exp(-a_1 |v| / (|dv/dt| + a_2))
 
-    sign(v) and |v| are smooth over v_eps, |dv/dt| over a_eps, sign(v dv/dt) over v_eps a_eps. The
-    stick branch of the paper, clip(F_e), is left to laws with modes.
+    sign(v) is smooth over v_eps, |v| over 1e-4 v_eps, |dv/dt| over a_eps, sign(v dv/dt) over
+    v_eps a_eps. The stick branch of the paper, clip(F_e), is left to laws with modes.
     Limits: F -> mu_d N for fast sliding; at dv/dt = 0 it is Coulomb friction. Needs mu_s <= 2 mu_d,
     or the branch of deceleration turns forward. Given the acceleration of the body that it brakes,
     it closes an algebraic loop: pass a measured or filtered one.
@@ -354,7 +354,10 @@ class Wojewoda(StaticLaw):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, dv: Scalar = 0.0) -> Scalar:
         """Friction force [N]."""
-        speed, change = smooth.magnitude(v, self.v_eps), smooth.magnitude(dv, self.a_eps)
+        speed, change = (
+            smooth.magnitude(v, smooth.CORNER * self.v_eps),
+            smooth.magnitude(dv, self.a_eps),
+        )
         h = exp(-self.a_1 * speed / (change + self.a_2))
         phase = smooth.sign(v * dv, self.v_eps * self.a_eps)
         mu = self.mu_d + (self.mu_s - self.mu_d) * h * phase

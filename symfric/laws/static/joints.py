@@ -18,8 +18,8 @@ class Bittencourt(StaticLaw):
         F = {F_c0 + F_cl N + F_sl N exp(-|v/v_sl|^delta)
              + static(T) exp(-|v/v_s(T)|^delta)} sign(v) + (F_v0 + F_vT exp(-T/T_v)) v
 
-    N is the magnitude of the load torque [N m], v in rad/s, F in N m. |v|^delta and sign(v) are
-    smooth over v_eps, the maximum over F_eps. Temperature is a parameter, so that it may be a
+    N is the magnitude of the load torque [N m], v in rad/s, F in N m. sign(v) is smooth over v_eps,
+    |v| over 1e-4 v_eps, the maximum over F_eps. Temperature is a parameter, so that it may be a
     symbol. All defaults are invented.
     Limits: at fixed N and T a `Stribeck` law with two falls; not valid outside the temperatures of
     its identification. Creeps under load.
@@ -100,10 +100,12 @@ class Bittencourt(StaticLaw):
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction torque [N m]."""
         v_s = self.v_s0 + self.v_sT * self.T
-        loaded = self.F_sl * N * smooth.stribeck(v, self.v_sl, self.delta, self.v_eps)
+        loaded = (
+            self.F_sl * N * smooth.stribeck(v, self.v_sl, self.delta, smooth.CORNER * self.v_eps)
+        )
         static = smooth.positive(self.F_s0 + self.F_sT * self.T, self.F_eps)
         level = self.F_c0 + self.F_cl * N + loaded
-        level += static * smooth.stribeck(v, v_s, self.delta, self.v_eps)
+        level += static * smooth.stribeck(v, v_s, self.delta, smooth.CORNER * self.v_eps)
         viscous = self.F_v0 + self.F_vT * exp(-self.T / self.T_v)
         return level * smooth.sign(v, self.v_eps) + viscous * v
 
@@ -121,8 +123,8 @@ class BAM(StaticLaw):
 
     tau_m is the torque of the motor, tau_e the external one. Zero coefficients switch terms off:
     M5 has no quadratic; M4 also K_e = K_m and K_es = K_ms; M3 of M4 no Stribeck part; M2 of M4 no
-    load; M1 neither. The motor drives where |tau_m| > |tau_e|. |v|, sign(v) are smooth over v_eps,
-    magnitudes and cases of the torques over tau_eps.
+    load; M1 neither. The motor drives where |tau_m| > |tau_e|. sign(v) is smooth over v_eps, |v|
+    over 1e-4 v_eps, magnitudes and cases of the torques over tau_eps.
     Limits: M1 is Coulomb + viscous, M2 is `Stribeck`. `N` has no effect. Creeps under load; BAM
     itself limits the torque that stops the motor within a step.
     Source: Duclusaud et al. 2025, as in their public code.
@@ -188,7 +190,7 @@ class BAM(StaticLaw):
         self, v: Scalar, N: Scalar, z: Scalar = (), *, tau_m: Scalar = 0.0, tau_e: Scalar = 0.0
     ) -> Scalar:
         """Friction torque [N m]."""
-        falling = smooth.stribeck(v, self.v_s, self.alpha, self.v_eps)
+        falling = smooth.stribeck(v, self.v_s, self.alpha, smooth.CORNER * self.v_eps)
         return self._level(falling, tau_m, tau_e) * smooth.sign(v, self.v_eps) + self.K_v * v
 
     def outside(

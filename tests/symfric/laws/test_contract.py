@@ -121,7 +121,7 @@ def test_static_force_stays_below_static_level_plus_viscous(
     law = with_values(SYMMETRIC[name], {n: x for n, x in chosen.items() if n in known})
     top = level(law, "mu_s") or level(law, "mu_d")
     viscous = level(law, "sigma_2") + level(law, "mu_v") * max(N, 1.0)
-    bound = top * N + (viscous + level(law, "kappa") * abs(v)) * abs(v)
+    bound = top * N + (viscous + level(law, "kappa") * N * abs(v)) * abs(v)
     # the peaks of two laws overshoot by what tanh(10) lacks of 1
     excess = 1e-8 if name.startswith(("specker", "simscape")) else 1e-15
     assert abs(law.force(v, N)) <= bound * (1 + excess)
