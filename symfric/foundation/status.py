@@ -86,3 +86,7 @@ class SolveError(RuntimeError):
         super().__init__(message)
         self.status = status
         self.partial = partial
+
+
+class OverloadWarning(UserWarning):
+    """Friction above its static level, as of a bristle that does not relax."""
