@@ -106,9 +106,15 @@ class Contact:
             object.__setattr__(self, part, value if part == "slip" else getattr(self, part))
         missing = [f"{i.name} ({i.doc})" for i in self.law.inputs if i.name not in self.given]
         if missing:
+            hint = "give it by name, as given={...}"
+            if any(i.name == APPLIED and i.name not in self.given for i in self.law.inputs):
+                hint += (
+                    "; F_e is the sum of all other forces along the slip, m dv/dt = F_e - F, which "
+                    "drive(...) and mechanisms find themselves"
+                )
             raise ValueError(
                 f"{where}: expected what {type(self.law).__name__} needs besides v and N, got no "
-                f"{', '.join(missing)}; give it by name, as given={{...}}"
+                f"{', '.join(missing)}; {hint}"
             )
         names = [i.name for i in self.law.inputs]
         object.__setattr__(self, "given", {name: self.given[name] for name in names})
