@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from math import isfinite, nan
 from typing import Literal, final
 
 import numpy as np
@@ -45,6 +46,8 @@ EXACT_RTOL = 1e-7
 SHARPEST = 1e-4
 """Layers, in multiples of the speeds, that are too narrow for one solve with them."""
 MISSED = (Status.TERMINAL_MISS, Status.BOUND_MISS)
+FOUND = (*MISSED, Status.UNSTABLE)
+"""How a motion ends that was found and does not do what it should."""
 FAILURES = (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError, ValueError)
 """What may come out of a way of friction that fails: another way is gone then."""
 
@@ -68,6 +71,7 @@ class Job:
     refine: bool
     verify: bool
     starts: int
+    resting_margin: float
     progress: Report | None
     clock: Clock
 
@@ -197,7 +201,7 @@ class Job:
             if following is None:
                 break
             reached = following
-        if any(one.solution.ok or one.solution.status in MISSED for one in tried):
+        if any(one.solution.ok or one.solution.status in FOUND for one in tried):
             return max(tried, key=lambda one: one.worth).solution
         if tried:
             said = f"{said} Modes were not found: {tried[-1].solution.message}".lstrip()
@@ -205,14 +209,13 @@ class Job:
 
     def polished(self, sharp: Sharp) -> "_Exact":
         """The exact motion next to a sharpened one, verified with the user's own laws."""
-        solver = self.solver if isinstance(self.solver, Ipopt) else Ipopt()
-        limits = [t for t in (solver.max_time, self.clock.left) if t is not None]
-        solver = Ipopt(max_time=min(limits, default=None), **solver.options)
         speeds = speeds_at(self.problem, sharp.scales, sharp.level)
-        exact = polish(
+        found = polish(
             sharp.solution, self.problem, speeds,
-            solver=solver, scheme=self.scheme, progress=self.progress,
+            solver=self.solver if isinstance(self.solver, Ipopt) else Ipopt(), scheme=self.scheme,
+            progress=self.progress, margin=self.resting_margin, clock=self.clock,
         )  # fmt: skip
+        exact, margin = next(found)
         if exact.status in STOPPED and not exact.modes:
             by = "The time limit was reached" if exact.status is Status.TIME_LIMIT else "Stopped"
             name = self.problem.name
@@ -231,7 +234,36 @@ class Job:
             if own.verified:
                 return _Exact(_after(exact, replace(own, modes=exact.modes)), True)
             exact = _after(own, exact)
-        return self.judged(exact)
+        one = self.judged(exact)
+        return self.closer(one, margin, found, sharp.solution) if one.right else one
+
+    def closer(
+        self,
+        one: "_Exact",
+        margin: float,
+        others: Iterator[tuple[Solution, float]],
+        sharp: Solution,
+    ) -> "_Exact":
+        """The motion whose rests come closest to their levels of those that are right."""
+        kept, slope, best, last = margin, nan, one, one.solution
+        for exact, less in others:
+            last = _after(sharp, exact)
+            if exact.status is Status.INTERRUPTED:
+                return _Exact(last, right=False)
+            if exact.ok:
+                slope = max(0.0, one.solution.cost - exact.cost) / (margin - less)
+            if exact.status in STOPPED or less < self.resting_margin:
+                break
+            if exact.ok and (nearer := self.judged(self.checked(last))).right:
+                best, kept = nearer, less
+                break
+        if last is one.solution:
+            return one
+        found = replace(best.solution, statistics=last.statistics)
+        costs = f"about {slope * kept:.2g} of {found.cost:.6g}" if isfinite(slope) else "is open"
+        few = "" if kept <= self.resting_margin else "; with less none was found that is right"
+        said = f"Rests keep {kept:.2g} of their static levels, which costs {costs}{few}."
+        return _Exact(_said(found, said), right=True)
 
     def by_own_law(self, exact: Solution) -> Solution:
         """A motion that misses with a law with states, found with that law itself by shooting.

@@ -36,6 +36,7 @@ def solve(
     refine: bool = True,
     verify: bool = True,
     starts: int = STARTS,
+    resting_margin: float = 1e-4,
     progress: Report | None = None,
     max_time: float | None = None,
     throw: bool = True,
@@ -78,6 +79,10 @@ def solve(
             them; with False it stays, where no friction is sharpened.
         verify: simulate the models under the control.
         starts: with friction, number of coarse solves of which the best goes on.
+        resting_margin: share of its static level that a contact at rest keeps from it, where modes
+            are found: a smooth law creeps just below that level. The search begins with 0.01 and
+            ends with this, if the motion is still right then; where a rest is at that margin the
+            message says what it costs.
         progress: called with a `Progress` after each iteration. Ctrl-C, or an exception raised
             here, stops the solver.
         max_time: wall time [s] for all; what was found by then is returned.
@@ -95,6 +100,7 @@ def solve(
     for name, flag in (("refine", refine), ("verify", verify), ("throw", throw)):
         checks.flag(f"solve: {name}", flag)
     starts = checks.count("solve: starts", starts)
+    resting_margin = checks.number("solve: resting_margin", resting_margin, above=0.0, upper=0.1)
     if progress is not None:
         checks.function("solve: progress", progress, "a function of the progress")
     checks.choice("solve: friction", friction, get_args(Friction))
@@ -111,7 +117,7 @@ def solve(
     job = Job(
         problem=problem, scheme=scheme, solver=solver, intervals=intervals, guess=guess,
         friction=friction, tolerance=tolerance, refine=refine, verify=verify, starts=starts,
-        progress=progress, clock=Clock(max_time),
+        resting_margin=resting_margin, progress=progress, clock=Clock(max_time),
     )  # fmt: skip
     solution = job.solved()
     odd = "" if solution.ok else doubts(problem)

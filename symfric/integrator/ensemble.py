@@ -36,6 +36,7 @@ from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import Tolerances
 from symfric.integrator.step.layout import State
 from symfric.model import Model
+from symfric.model.kinds import in_results
 from symfric.results.ensemble import Ensemble
 
 if TYPE_CHECKING:
@@ -180,7 +181,10 @@ def _ensemble(
 ) -> Ensemble:
     """The result, of as many members as there are."""
     units = {n: unit for n, unit in _units(model).items() if n in (given.varied | given.fixed)}
-    reach = zip((v.name for v in model.x), store.reach.transpose(2, 1, 0), strict=True)
+    reach = {
+        v.name: in_results(v.kind, ends)
+        for v, ends in zip(model.x, store.reach.transpose(2, 1, 0), strict=True)
+    }
     return Ensemble(
         model.name,
         looks if looks.size else given.ends[:, None],
@@ -193,7 +197,7 @@ def _ensemble(
         given.varied,
         given.fixed,
         units,
-        dict(reach),
+        reach,
     )
 
 

@@ -24,6 +24,7 @@ from symfric.foundation.symbolic import take_symbols
 from symfric.foundation.symbols import at_start, stacked, starts_of, symbols_of
 from symfric.foundation.units import turned
 from symfric.foundation.variable import take_si
+from symfric.model.kinds import MODE
 from symfric.model.parts import Event, Monitor, Output
 
 if TYPE_CHECKING:
@@ -131,7 +132,7 @@ class Contact:
         return tuple(
             Variable(
                 self._called(s.name), self.unit(s.unit), start=start[i], nominal=s.nominal,
-                doc=s.doc or "internal friction state",
+                doc=s.doc or "internal friction state", kind=MODE if s.whole else "",
             )
             for i, s in enumerate(self.law.states)
         )  # fmt: skip

@@ -26,6 +26,15 @@ DRY = (
         "            mu += self.kappa * v * v", "            mu += self.kappa * v * v / N", PRINTED,
     ),
     Mutant(
+        "a mode shows what error control adds to it", "symfric/model/kinds.py",
+        "if kind != MODE:", "if kind:", ("tests/symfric/results/test_modes.py",),
+    ),
+    Mutant(
+        "the mode of a loop is no mode", APPLIED,
+        "doc=doc, kind=kinds.MODE", "doc=doc, kind=kinds.RATE",
+        ("tests/symfric/results/test_modes.py",),
+    ),
+    Mutant(
         "rest keeps what rounding left of its velocity", APPLIED,
         "change = self.change + self.rate / CALM if self.by_modes else self.change",
         "change = self.change", TESTS,

@@ -178,4 +178,9 @@ RESULTS = (
         "what fails among modes is raised", "ocp/job.py",
         'said = f"Modes were not found: {_why(error)}."', "raise", T_FALLBACK,
     ),
+    Mutant(
+        "rests keep one margin whatever was asked for", "ocp/friction/arcs.py",
+        "LEVEL if side == open_side else margin", "LEVEL if side == open_side else MARGIN",
+        ("tests/ocp/friction/test_resting_margin.py",),
+    ),
 )  # fmt: skip

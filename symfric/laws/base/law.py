@@ -56,7 +56,8 @@ class State:
     """An internal state of a law: name, unit, typical magnitude and what it is.
 
     `even` states (a mode, an age) keep their value when the motion is mirrored; the others, such
-    as deflections and forces, change sign with it.
+    as deflections and forces, change sign with it. A `whole` state is a mode: -1, 0 or 1, and
+    results give these numbers.
     """
 
     name: str
@@ -64,6 +65,7 @@ class State:
     nominal: float
     even: bool = False
     doc: str = ""
+    whole: bool = False
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,7 @@ class HaessigFriedland(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """The bristle deflection, and in the event form the mode."""
-        slip = State("slip", "1", 1.0, even=True, doc="1 in slip")
+        slip = State("slip", "1", 1.0, even=True, doc="1 in slip", whole=True)
         deflection = State("z", "m", 1e-5, doc="bristle deflection")
         return (deflection, slip) if self.form == "event" else (deflection,)
 

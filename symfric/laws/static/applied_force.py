@@ -80,7 +80,7 @@ class Karnopp(Sticking):
         return (
             (
                 *super().states,
-                State("leaving", "1", 1.0, even=True, doc="1 while it leaves the band"),
+                State("leaving", "1", 1.0, True, "1 while it leaves the band", whole=True),
             )
             if self.has_mode
             else ()
