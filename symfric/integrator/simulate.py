@@ -22,7 +22,7 @@ from symfric.integrator.arguments import (
 from symfric.integrator.derivatives.seeds import seeds
 from symfric.integrator.differentiated import Differentiated
 from symfric.integrator.equations.initial import first_guess
-from symfric.integrator.equations.inputs import Input, InputData, input_data
+from symfric.integrator.equations.inputs import Input, InputData, input_data, paced
 from symfric.integrator.measured import difference, differences_of_derivatives
 from symfric.integrator.methods.tableaux import FOR_DERIVATIVES
 from symfric.integrator.outcome import trajectory_of
@@ -147,7 +147,7 @@ def simulate(
     else:
         looks = check_times("simulate", t_start, t_end, t_eval)
     begin = perf_counter()
-    inputs = input_data(model, u, t_start, t_end)
+    inputs = paced(input_data(model, u, t_start, t_end), model)
     inputs = stopping("simulate", inputs, times, t_start, t_end)
     integrator, fresh = built(model, inputs, formula)
     build_time = perf_counter() - begin if fresh else 0.0

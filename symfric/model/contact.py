@@ -24,6 +24,7 @@ from symfric.foundation.symbolic import take_symbols
 from symfric.foundation.symbols import at_start, stacked, starts_of, symbols_of
 from symfric.foundation.units import turned
 from symfric.foundation.variable import take_si
+from symfric.model.kinds import MODE
 from symfric.model.parts import Event, Monitor, Output
 
 if TYPE_CHECKING:
@@ -105,9 +106,15 @@ class Contact:
             object.__setattr__(self, part, value if part == "slip" else getattr(self, part))
         missing = [f"{i.name} ({i.doc})" for i in self.law.inputs if i.name not in self.given]
         if missing:
+            hint = "give it by name, as given={...}"
+            if any(i.name == APPLIED and i.name not in self.given for i in self.law.inputs):
+                hint += (
+                    "; F_e is the sum of all other forces along the slip, m dv/dt = F_e - F, which "
+                    "drive(...) and mechanisms find themselves"
+                )
             raise ValueError(
                 f"{where}: expected what {type(self.law).__name__} needs besides v and N, got no "
-                f"{', '.join(missing)}; give it by name, as given={{...}}"
+                f"{', '.join(missing)}; {hint}"
             )
         names = [i.name for i in self.law.inputs]
         object.__setattr__(self, "given", {name: self.given[name] for name in names})
@@ -132,7 +139,7 @@ class Contact:
         return tuple(
             Variable(
                 self._called(s.name), self.unit(s.unit), start=start[i], nominal=s.nominal,
-                doc=s.doc or "internal friction state",
+                doc=s.doc or "internal friction state", kind=MODE if s.whole else "",
             )
             for i, s in enumerate(self.law.states)
         )  # fmt: skip

@@ -25,7 +25,7 @@ class Sum(Law):
     Source: superposition, as in Coulomb + viscous friction.
     """
 
-    facts: ClassVar[Facts] = Facts((), "that of its terms", "superposition", "superposition")
+    facts: ClassVar[Facts] = Facts((), "that of its terms", "constructed", "constructed")
 
     laws: tuple[Law, ...]
 
@@ -212,7 +212,7 @@ class LoadDependent(Wrapper):
     """
 
     facts: ClassVar[Facts] = Facts(
-        (), "that of its law", "memory", "Bittencourt and Gunnarsson 2012"
+        (), "that of its law", "unverified", "Bittencourt and Gunnarsson 2012"
     )
 
     law: Law

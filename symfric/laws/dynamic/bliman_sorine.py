@@ -34,7 +34,8 @@ class BlimanSorine(Law):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "P"),
         smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
-        confidence="memory, verified by its closed forms",
+        confidence="unverified",
+        checked="its closed forms hold",
         source="Bliman and Sorine, ECC 1995; Olsson et al. 1998",
         load="proportional in steady sliding",
     )

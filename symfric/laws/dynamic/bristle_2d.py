@@ -35,7 +35,8 @@ class Bristle2D(Law):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "P", "N"),
         smoothness="C2 (C0 as kappa -> 0)",
-        confidence="memory, behaviour verified",
+        confidence="one source",
+        checked="JuliaRobotics/RigidBodyDynamics.jl contact.jl (viscoelastic Coulomb friction)",
         source="Kikuuwe et al., IEEE T-RO 22(6), 2006; Liang, Fillmore, Ma 2012",
         load="proportional in steady sliding",
     )

@@ -34,7 +34,11 @@ class Dahl(Law):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "P"),
         smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
-        confidence="two sources for n = 1; memory for the exponent",
+        confidence="two sources",
+        checked=(
+            "documentation of Altair MotionSolve and public code for n = 1; the exponent is "
+            "unverified"
+        ),
         source="Dahl 1968, 1976",
     )
 

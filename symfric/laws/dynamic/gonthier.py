@@ -36,7 +36,8 @@ class Gonthier(Law):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V", "P", "L", "B", "T"),
         smoothness="C1 (dir at v_d; C2 elsewhere)",
-        confidence="memory, behaviour verified; saturation constructed",
+        confidence="unverified",
+        checked="behaviour checked; the saturation is constructed",
         source="Gonthier, McPhee, Lange, Piedboeuf, Multibody Syst. Dyn. 11, 2004",
         load="proportional in steady sliding",
     )

@@ -35,7 +35,8 @@ class HaessigFriedland(Law):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "P", "N"),
         smoothness="C2 (jumps as knee -> 0)",
-        confidence="memory; smooth form constructed",
+        confidence="unverified",
+        checked="the smooth form is constructed",
         source="Haessig and Friedland, J. Dyn. Syst. Meas. Control 113(3), 1991",
         load="proportional in steady sliding",
     )
@@ -68,7 +69,7 @@ class HaessigFriedland(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """The bristle deflection, and in the event form the mode."""
-        slip = State("slip", "1", 1.0, even=True, doc="1 in slip")
+        slip = State("slip", "1", 1.0, even=True, doc="1 in slip", whole=True)
         bristle = State("z", "m", deflection(self.sigma_0), doc="bristle deflection")
         return (bristle, slip) if self.form == "event" else (bristle,)
 
