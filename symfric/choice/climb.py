@@ -149,7 +149,12 @@ def at_equal_error(
     """
     able = near.rtol <= asked.fine or FINER * near.attempts <= runs.most
     first = asked.fine if able else max(near.rtol, asked.fine)
-    best, finest = _first_that_ends(runs, s, first, GROWTH * near.attempts + LEAST)
+    try:
+        best, finest = _first_that_ends(runs, s, first, GROWTH * near.attempts + LEAST)
+    except SolveError:
+        if s != near.s:
+            raise
+        best, finest = runs.run(s, near.rtol), near.rtol  # which has ended
 
     def own(motion: Sample) -> float:
         return distance(motion.motion, best.motion, best.size)

@@ -169,8 +169,7 @@ class Candidate:
     @property
     def power(self) -> float:
         """The least power of the softness that its velocities have; 0 where nothing is smooth."""
-        powers = [OF_BRISTLES if k.law.states else 1.0 for k in self.knobs.values() if k.powers]
-        return min(powers, default=0.0)
+        return min((k.velocities for k in self.knobs.values() if k.powers), default=0.0)
 
     def law_at(self, s: float) -> Law:
         """The law at the softness `s`; of several places the first."""
@@ -194,14 +193,16 @@ class Candidate:
 
 
 def candidate(
-    machine: Machine, law: Law, frictions: Mapping[str, Friction], load: float | None, own: bool
-) -> Candidate:
+    machine: Machine, law: Law, frictions: Mapping[str, Friction], load: float | None, own: bool,
+    bristles: float = OF_BRISTLES[0],
+) -> Candidate:  # fmt: skip
     """`law` in `machine`.
 
     Args:
         frictions: that it is to describe, by the place in the machine; "" for any other place.
         load: normal force [N] where it is one number.
         own: it has its numbers already: they were fitted, nothing is to be scaled.
+        bristles: the power of the velocities of a law with states, see `softness`.
 
     Raises:
         ValueError: the machine refuses the law, or no numbers of the law describe the friction.
@@ -218,7 +219,7 @@ def candidate(
         if own:
             knobs[place] = Softness(there, {}, friction.mu_s, load)
         else:
-            knobs[place] = softness(alike(there, friction, load), friction, load)
+            knobs[place] = softness(alike(there, friction, load), friction, load, bristles)
     return Candidate(machine, same, knobs, scene)
 
 
