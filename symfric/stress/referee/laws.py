@@ -40,7 +40,7 @@ def power(x: float, n: float, width: float) -> float:
 
 def stribeck_weight(p: Numbers, v: float) -> float:
     """exp(-|v/v_s|^delta)."""
-    return decay(power(v / p["v_s"], p["delta"], p["v_eps"] / p["v_s"]))
+    return decay(abs(v / p["v_s"]) ** p["delta"])
 
 
 SIGNS: dict[str, Callable[[float], float]] = {
