@@ -1,32 +1,39 @@
 """How soft a law may be: its widths and bristles scaled together, until it keeps a wanted error.
 
     static laws      widths and velocities s
-    bristles         stiffness 1/s, paths s, damping and velocities 1/sqrt(s) and sqrt(s)
+    bristles         stiffness 1/s, paths and widths s, damping 1/sqrt(s), velocities sqrt(s)
 
 and dry friction at s = 0: bristles break away at mu_s N only where the load grows slowly beside
-sigma_0 v_s.
+sigma_0 v_s, and relax only where they creep, with the loading rate over sigma_0, faster than v_eps.
+So no width is negligible there, and errors fall with s^(1/3): (load rate / (sigma_0 v_s))^(2/3) is
+the lag of break-away, v_s^(2/3) that of the fall behind it.
 Limits: where a load turns bristles within their own period they swing past it and break away,
 however stiff they are, unless sigma_1 damps them: that motion is theirs, not that of dry friction.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from math import inf, log
 from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from symfric.choice.friction import Friction, fall_of, peaked
 from symfric.foundation.parameters import Parameter, parameters, with_values
 from symfric.laws import Law, LeineSwitch, RateAndState
 from symfric.laws.base.sticking import Sticking
 
+Array = NDArray[np.float64]
 NEGLIGIBLE = 1e-7
-"""Widths below this only round off a modulus; they are not what makes a law smooth."""
+"""Widths of static laws below this only round off a modulus."""
 RELATIVE = ("u_eps",)
 """Widths that are shares of another."""
 LEVEL_LIKE: dict[type[Law], tuple[str, ...]] = {LeineSwitch: ("delta", "c"), RateAndState: ("v_0",)}
 """Velocities that say how high friction is, and no width."""
-OF_BRISTLES = 0.5
+OF_BRISTLES = 0.45
 """Power of the velocities of laws with states."""
 DIGITS = 12
 """Of scaled parameters: what is behind is rounding."""
@@ -85,8 +92,8 @@ def _power(law: Law, p: Parameter) -> float:
     inverse = -1.0 if p.unit in ("s/m", "s/rad") else 1.0
     if p.role == "velocity scale":
         return inverse * (OF_BRISTLES if law.states else 1.0)
-    if p.role == "width" and value > NEGLIGIBLE:
-        return 1.0 if law.states or p.unit != "1" else 0.0
+    if p.role == "width":
+        return 1.0 if law.states or (value > NEGLIGIBLE and p.unit != "1") else 0.0
     if not law.states or value == 0.0:
         return 0.0
     of_bristles = {"stiffness": -1.0, "damping": -0.5, "length": 1.0}
@@ -96,13 +103,18 @@ def _power(law: Law, p: Parameter) -> float:
 RATIO, SHORTER = 4.0, 2.0
 """From one softness of the ladder to the next; towards dry friction after a run that failed."""
 LEAP = 4
-"""Rungs that are left out once where errors stay the same."""
+"""Rungs that are left out where errors stay the same."""
 LEAST_ORDER, SAME_ORDER, LONGEST, WITHIN = 0.2, 0.2, 3, 0.8
 """Errors follow a power of the softness if it is so large, and changes by no more than this share;
 then so many rungs at most are made in one, to this share of the wanted error."""
-ANOTHER = "it tends to another motion"
-DRIEST, SOFTEST = 16, 5
-"""Rungs on either side of the law as it comes."""
+NARROW = 3e-5
+"""Share of its own velocities at which a law is dry for machines that are not far slower."""
+ORDERS = 0.05, 4.0
+"""Orders that differences of runs may show; they tend to nothing yet if they fall otherwise."""
+CERTAIN = 0.25
+"""Part of its error that a law may still move by, by the order of its runs, to be another one."""
+MOST, SOFTEST = 24, 5
+"""Rungs in all, and those on the soft side of the law as it comes."""
 MARGIN = 0.7
 """Part of the wanted error that is left to the law; the rest is the integrator's."""
 ROUNDING = 5e-3
@@ -112,12 +124,13 @@ ROUNDING = 5e-3
 @final
 @dataclass(frozen=True)
 class Rung:
-    """A run of the ladder: factor of the widths, error, attempts and tolerance."""
+    """A run of the ladder: factor of the widths, error, attempts, tolerance, motion over size."""
 
     s: float
     error: float
     attempts: int
     rtol: float = 0.0
+    motion: Array | None = None
 
 
 @final
@@ -158,40 +171,76 @@ def ladder(
     run: Run,
     wanted: float,
     softest: float,
-    scalable: bool,
+    powers: float,
     failures: tuple[type[Exception], ...],
     said: Callable[[Exception], str] = str,
 ) -> Ladder:
     """Runs towards dry friction until two keep the error `wanted`, and away from it to `softest`.
 
+    A law tends to another motion where its own runs converge, and their limit is off. That is said
+    of runs at `NARROW` and below alone: a law whose widths are far from the speeds of a machine
+    converges to something else first.
+
     Args:
         run: one run.
         wanted, softest: errors of the driest and of the softest law that are of interest.
-        scalable: there is something to scale.
+        powers: the least power of s that its velocities have; 0 where nothing is scaled.
         failures: what a run may raise, which ends the ladder on its side.
         said: such a failure in words.
 
     Raises:
         one of `failures`: the law as it comes, s = 1, does not run.
     """
-    rungs, stopped = [run(1.0)], ""
-    ratio, leapt = RATIO, False
-    while scalable and not stopped and not _kept(rungs, wanted):
-        step = ratio if ratio < RATIO else _stride(rungs, wanted)
-        if _settled(rungs):  # a law whose widths are far from the machine's speeds looks so, too
-            step, stopped = ratio**LEAP, ANOTHER if leapt else ""
-            leapt = True
-        elif len(rungs) > DRIEST:
-            stopped = "its error falls too slowly"
+    rungs, stopped = [run(1.0)], "" if powers else "nothing of it is scaled"
+    ratio, leap = RATIO, RATIO**LEAP
+    while not stopped and not _kept(rungs, wanted):
+        settled = _settled(rungs)
+        step = ratio if ratio < RATIO else leap if settled else _stride(rungs, wanted)
+        order = limit_order(rungs) if rungs[-1].s ** powers <= NARROW else None
+        if settled and order is not None:
+            stopped = f"it tends to another motion, with order {order:.2g}"
+        elif len(rungs) > MOST:
+            stopped = f"not decided: its error still changes at softness {rungs[-1].s:.0e}"
         try:
             rungs += [] if stopped else [run(rungs[-1].s / step)]
         except failures as problem:
             stopped = said(problem) if ratio < RATIO else ""
-            ratio = SHORTER
+            ratio, leap = (SHORTER, SHORTER) if leap == RATIO else (RATIO, RATIO)
     with suppress(*failures):  # softer than the law allows
-        while scalable and rungs[0].error <= softest and rungs[0].s < RATIO**SOFTEST:
+        while powers and rungs[0].error <= softest and rungs[0].s < RATIO**SOFTEST:
             rungs.insert(0, run(rungs[0].s * RATIO))
     return Ladder(tuple(rungs), "" if rungs[-1].error <= wanted else stopped)
+
+
+def limit_order(rungs: Sequence[Rung]) -> float | None:
+    """The order in s with which motions tend to one that is off; None where that is not shown.
+
+    Three runs show the order q of x_0 + c s^q, whose c s_2^q the limit still is from the last one:
+
+        |x_0 - x_1| / |x_1 - x_2| = (s_0^q - s_1^q) / (s_1^q - s_2^q)
+    """
+    if len(rungs) < 3:
+        return None
+    one, two, three = rungs[-3:]
+    before, after = _apart(one, two), _apart(two, three)
+    a, b = one.s / two.s, two.s / three.s
+    if not 0.0 < after < before < inf:
+        return None
+
+    def excess(q: float) -> float:
+        return (a**q - 1) / (1 - b**-q) - before / after
+
+    low, high = ORDERS
+    if not excess(low) < 0.0 < excess(high):
+        return None
+    order = float(brentq(excess, low, high))  # pyright: ignore[reportArgumentType]
+    return order if after / (b**order - 1) <= CERTAIN * three.error else None
+
+
+def _apart(one: Rung, other: Rung) -> float:
+    """Largest difference of two motions relative to their size; infinite where unknown."""
+    a, b = one.motion, other.motion
+    return inf if a is None or b is None or a.shape != b.shape else float(np.abs(a - b).max())
 
 
 def _kept(rungs: list[Rung], wanted: float) -> bool:

@@ -55,7 +55,7 @@ def in_periods(t: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def said(numbers: dict[str, float], names: list[str], quick: bool) -> dict[str, bool]:
-    """What the evidence says of the ways and the break-aways."""
+    """The claims on the ways and the break-aways."""
     first, last, rate = (
         {name: numbers[f"{key}, {name}{end}"] for name in names}
         for key, end in (

@@ -207,6 +207,13 @@ class Law(Parametric, ABC):
         """
         return self.outside(0.0, N)
 
+    def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Largest force [N] that the states carry in any motion at a steady load: a bound.
+
+        The static level, unless the law says otherwise. Raises as `outside`.
+        """
+        return self.static_level(N, side, **inputs)
+
     @abstractmethod
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Time derivative of the internal states, shape (n, 1) or (n, ...)."""

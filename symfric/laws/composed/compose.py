@@ -82,6 +82,11 @@ class Sum(Law):
         first, *rest = [law.static_level(N, side, **chosen(law, inputs)) for law in self.laws]
         return sum(rest, start=first)
 
+    def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """That of all terms together."""
+        first, *rest = [law.most_held(N, side, **chosen(law, inputs)) for law in self.laws]
+        return sum(rest, start=first)
+
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Rates of all states."""
         rates = [

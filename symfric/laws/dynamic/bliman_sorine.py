@@ -83,6 +83,10 @@ class BlimanSorine(Law):
         slow, fast = q ** (self.eta / (1 - self.eta)), q ** (1 / (1 - self.eta))
         return N * (self.mu_1 * (1 - fast) - self.mu_2 * (1 - slow))
 
+    def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """That of both parts, which point the same way behind a reversal."""
+        return N * (self.mu_1 if self.order == "1" else self.mu_1 + self.mu_2)
+
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
         return z[0] if self.order == "1" else z[0] + z[1]

@@ -7,6 +7,7 @@ from symfric.foundation.numeric import Scalar, column, equals, exp
 from symfric.foundation.parameters import param
 from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, Law, State
+from symfric.laws.dynamic.element import deflection
 
 ROOT_STEPS = 40
 """Steps of Newton's method that reach a cubic root of 1e-15 of its start."""
@@ -57,7 +58,7 @@ class Bristle2D(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """z: deflection of the bristle [m], a vector in a plane."""
-        return (State("z", "m", 1e-5, doc="bristle deflection"),)
+        return (State("z", "m", deflection(self.sigma_0), doc="bristle deflection"),)
 
     @property
     def velocity_scale(self) -> Scalar:

@@ -33,14 +33,15 @@ def decay(x: float) -> float:
 
 def power(x: float, n: float, width: float) -> float:
     """|x|^n, rounded at rest."""
-    if n == 2.0:
-        return x * x
-    return abs(x) ** n if width == 0.0 else (x * x + width * width) ** (n / 2) - width**n
+    return x * x if n == 2.0 else (x * x + width * width) ** (n / 2) - width**n
 
 
-def stribeck_weight(p: Numbers, v: float) -> float:
-    """exp(-|v/v_s|^delta)."""
-    return decay(abs(v / p["v_s"]) ** p["delta"])
+def stribeck_weight(p: Numbers, v: float, width: float) -> float:
+    """Exponential exp(-|v/v_s|^delta), rounded at rest for delta other than 2."""
+    u, n, w = v / p["v_s"], p["delta"], width / p["v_s"]
+    if n == 2.0 or w == 0.0:
+        return decay(abs(u) ** n)
+    return decay(u**2 * (u**2 + w**2) ** (n / 2 - 1))
 
 
 SIGNS: dict[str, Callable[[float], float]] = {
@@ -66,7 +67,7 @@ def stribeck(p: Numbers, _: Forms) -> Rub:
     mu_s, mu_d, v_eps, sigma_2 = p["mu_s"], p["mu_d"], p["v_eps"], p["sigma_2"]
 
     def rub(v: float, N: float, _: Sequence[float]) -> tuple[float, tuple[float, ...]]:
-        mu = mu_d + (mu_s - mu_d) * stribeck_weight(p, v)
+        mu = mu_d + (mu_s - mu_d) * stribeck_weight(p, v, 1e-4 * v_eps)
         return mu * N * sign(v, v_eps) + sigma_2 * v, ()
 
     return rub
@@ -137,7 +138,7 @@ def bristle(
     )
 
     def rub(v: float, N: float, z: Sequence[float]) -> tuple[float, tuple[float, ...]]:
-        g = N * (mu_d + (mu_s - mu_d) * stribeck_weight(p, v))
+        g = N * (mu_d + (mu_s - mu_d) * stribeck_weight(p, v, v_eps))
         alpha = share(v, z[0], g / sigma_0)
         rate = v - alpha * sigma_0 * v * sign(v, v_eps) * z[0] / g
         return sigma_0 * z[0] + damping(v) * rate + sigma_2 * v, (rate,)

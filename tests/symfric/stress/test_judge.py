@@ -16,7 +16,6 @@ from symfric.stress.judge import (
     tolerances,
     worst_step,
 )
-from symfric.stress.peer import by_scipy
 from symfric.stress.problem import Problem, problem
 
 EASY = Case(1, 1, "rabinowicz", "brown_mcphee", t_end=2.0)
