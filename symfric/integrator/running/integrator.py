@@ -27,6 +27,7 @@ from symfric.integrator.running.engine import BATCH, CompiledEngine, Engine, VmE
 from symfric.integrator.running.loop import Work, loop_source
 from symfric.integrator.step.written import written
 from symfric.model import Model
+from symfric.model.kinds import in_results
 
 Array = NDArray[np.float64]
 Point = tuple[bytes | float, ...]
@@ -157,10 +158,11 @@ class Integrator:
 
     @property
     def _every(self) -> ca.SX:
-        """All signals of the model."""
+        """All signals of the model, modes as the whole numbers that they are."""
         m = self.model
+        x = (in_results(v.kind, v.symbol) for v in m.x)
         outputs = (ca.SX(o.expression) for o in m.outputs.values())
-        return ca.vertcat(m.vector("x"), m.vector("z"), m.vector("u"), *outputs)
+        return ca.vertcat(*x, m.vector("z"), m.vector("u"), *outputs)
 
     @cached_property
     def signals(self) -> ca.Function:

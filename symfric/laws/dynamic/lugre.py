@@ -36,6 +36,7 @@ class LuGre(Bristle):
         phenomena=("D", "S", "St", "V", "P", "L", "B"),
         smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
         confidence="two sources",
+        checked="auralius/LuGre lugre.m; jchristopherson/FrictionModels.jl",
         source="Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE TAC 40(3), 1995",
     )
 
@@ -66,6 +67,7 @@ class LuGreNormalised(Bristle):
         phenomena=("D", "S", "St", "V", "P", "L", "B"),
         smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
         confidence="two sources",
+        checked="documentation of Altair MotionSolve; LuGre at constant load",
         source="LuGre in coefficients of friction; Canudas de Wit and Tsiotras, CDC 1999",
     )
 
@@ -118,7 +120,10 @@ class LuGrePassive(Bristle):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V", "P", "L", "B"),
         smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
-        confidence="memory; passivity verified by computation",
+        confidence="one source",
+        checked=(
+            "jchristopherson/FrictionModels.jl LuGreModels.jl (v_d = v_s); passivity by computation"
+        ),
         source="Olsson, PhD thesis, Lund 1996",
     )
 

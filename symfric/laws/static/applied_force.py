@@ -49,6 +49,7 @@ class Karnopp(Sticking):
         phenomena=("D", "S", "V"),
         smoothness="C2 at 0, |v| = D_v, |F_e| = mu_s N -+ F_eps (original: jump at |v| = D_v)",
         confidence="two sources",
+        checked="fellipegm/valve_estimation and other public code",
         source="Karnopp 1985, as in public codes",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -80,7 +81,7 @@ class Karnopp(Sticking):
         return (
             (
                 *super().states,
-                State("leaving", "1", 1.0, even=True, doc="1 while it leaves the band"),
+                State("leaving", "1", 1.0, True, "1 while it leaves the band", whole=True),
             )
             if self.has_mode
             else ()
@@ -164,7 +165,8 @@ class Awrejcewicz(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C1 at |v| = epsilon, C2 at 0, |F_e| = mu_s N -+ F_eps (original: C0 in F_e)",
-        confidence="memory",
+        confidence="unverified",
+        checked="its four branches join",
         source="Awrejcewicz, Grzelczyk, Pyryev 2008",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -217,7 +219,7 @@ class LeineSwitch(Sticking):
                    F = clip(F_e + c v, -mu_s N, mu_s N)          for |v| <= eta, stick
 
     c v draws a sticking body to the middle of the band: with m alpha for c, dv/dt = -alpha v.
-    |v| of the smooth form is smooth over v_eps.
+    |v| of the smooth form is rounded over 1e-4 v_eps.
     form = "event" (one state, the mode) has no band: sliding ends where v passes through zero,
     rest where |F_e| reaches mu_s N. It needs a scene with events.
     Limits: the level falls from mu_s N to zero, with no dynamic level. The smooth form creeps under
@@ -229,7 +231,11 @@ class LeineSwitch(Sticking):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C∞ (original: jump at |v| = eta)",
-        confidence="one source; memory for the switching",
+        confidence="one source",
+        checked=(
+            "rleine/Keynote_Nonsmooth_Dynamics_ENOC2024 stickslipsmooth.m for slip law and smooth"
+            " form; the switching is unverified"
+        ),
         source="Leine et al. 1998; the author's public code",
     )
 
@@ -275,7 +281,7 @@ class LeineSwitch(Sticking):
         """Friction force [N]."""
         static = self.mu_s * N
         if self.form == "smooth":
-            falling = static / (1 + self.delta * smooth.magnitude(v, self.v_eps))
+            falling = static / (1 + self.delta * smooth.magnitude(v, smooth.CORNER * self.v_eps))
             return falling * (2 / pi * atan(v / self.v_eps))
         speed = smooth.magnitude(v, 0.0)
         if self.has_mode:
@@ -301,8 +307,8 @@ class Wojewoda(StaticLaw):
         F = N [mu_d + (mu_s - mu_d) h sign(v dv/dt)] sign(v)
         h = exp(-a_1 |v| / (|dv/dt| + a_2))
 
-    sign(v) and |v| are smooth over v_eps, |dv/dt| over a_eps, sign(v dv/dt) over v_eps a_eps. The
-    stick branch of the paper, clip(F_e), is left to laws with modes.
+    sign(v) is smooth over v_eps, |v| over 1e-4 v_eps, |dv/dt| over a_eps, sign(v dv/dt) over
+    v_eps a_eps. The stick branch of the paper, clip(F_e), is left to laws with modes.
     Limits: F -> mu_d N for fast sliding; at dv/dt = 0 it is Coulomb friction. Needs mu_s <= 2 mu_d,
     or the branch of deceleration turns forward. Given the acceleration of the body that it brakes,
     it closes an algebraic loop: pass a measured or filtered one.
@@ -312,7 +318,8 @@ class Wojewoda(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "L"),
         smoothness="C∞",
-        confidence="reconstruction",
+        confidence="rebuilt",
+        checked="of the paper only the abstract was read",
         source="after Wojewoda, Stefanski, Wiercigroch, Kapitaniak 2008",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -354,7 +361,10 @@ class Wojewoda(StaticLaw):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, dv: Scalar = 0.0) -> Scalar:
         """Friction force [N]."""
-        speed, change = smooth.magnitude(v, self.v_eps), smooth.magnitude(dv, self.a_eps)
+        speed, change = (
+            smooth.magnitude(v, smooth.CORNER * self.v_eps),
+            smooth.magnitude(dv, self.a_eps),
+        )
         h = exp(-self.a_1 * speed / (change + self.a_2))
         phase = smooth.sign(v * dv, self.v_eps * self.a_eps)
         mu = self.mu_d + (self.mu_s - self.mu_d) * h * phase
