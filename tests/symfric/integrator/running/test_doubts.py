@@ -174,7 +174,7 @@ class Pushing(BrownMcPhee):
     ],
 )
 def test_friction_that_adds_energy_is_said(machine: Scene, u: dict[str, float]) -> None:
-    with pytest.warns(EnergyWarning, match=r"by Pushing adds \d\S* J .* check the sign"):
+    with pytest.warns(EnergyWarning, match=r"by Pushing adds \d\S* J .* check its sign"):
         run = simulate(machine.model(), 2.0, u=u)
     assert run.status is Status.SUCCESS
     assert run.doubts in run.message and "along the slip" in run.doubts
