@@ -109,7 +109,7 @@ EVENT = (
     ),
     Mutant(
         "no piece of a step is in doubt", ISOLATION,
-        "& long & (self.left > 0)", "& long & (self.left > FINER)", T_ISOLATION,
+        "suspects = (doubts != 0) & long", "suspects = (doubts < 0) & long", T_ISOLATION,
     ),
     Mutant(
         "no piece of a step is in doubt in compiled code", SEARCH,
