@@ -235,10 +235,7 @@ class LeineSwitch(Sticking):
         phenomena=("D", "S", "St"),
         smoothness="C∞ (original: jump at |v| = eta)",
         confidence="one source",
-        checked=(
-            "rleine/Keynote_Nonsmooth_Dynamics_ENOC2024 stickslipsmooth.m for slip law and smooth"
-            " form; the switching is unverified"
-        ),
+        checked="rleine's stickslipsmooth.m (slip law, smooth form); switching unverified",
         source="Leine et al. 1998; the author's public code",
     )
 
