@@ -109,7 +109,7 @@ EVENT = (
     ),
     Mutant(
         "no piece of a step is in doubt", ISOLATION,
-        "unsure = doubt & (b - a > ", "unsure = doubt & (a - b > ", T_ISOLATION,
+        "suspects = (doubts != 0) & long", "suspects = (doubts < 0) & long", T_ISOLATION,
     ),
     Mutant(
         "compiled code looks at each piece once", SEARCH,
