@@ -93,3 +93,7 @@ class SolveError(RuntimeError):
 
 class OverloadWarning(UserWarning):
     """Friction above its static level, as of a bristle that does not relax."""
+
+
+class EnergyWarning(UserWarning):
+    """Friction that adds energy to the motion, as by a law whose force has the wrong sign."""

@@ -7,7 +7,7 @@ from time import perf_counter
 from numpy.typing import ArrayLike
 
 from symfric.foundation import checks
-from symfric.foundation.status import OverloadWarning, SolveError
+from symfric.foundation.status import SolveError
 from symfric.integrator.arguments import (
     check_flags,
     check_model,
@@ -99,7 +99,7 @@ def simulate_by_peer(
 
     for said in doubts(integrator, inputs, run, values):
         run.message += f" {said}"
-        warnings.warn(f"simulate_by_peer '{model.name}': {said}", OverloadWarning, stacklevel=2)
+        warnings.warn(type(said)(f"simulate_by_peer '{model.name}': {said}"), stacklevel=2)
     trajectory = trajectory_of(integrator, inputs, run, values, count)
     if throw and not trajectory.status.ok:
         raise SolveError(trajectory.message, trajectory.status, trajectory)

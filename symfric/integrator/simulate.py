@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.status import OverloadWarning, SolveError, Status
+from symfric.foundation.status import SolveError, Status
 from symfric.integrator.arguments import (
     BACKENDS,
     another,
@@ -130,6 +130,7 @@ def simulate(
         UserWarning: rtol above 1e-5, where stick phases may get lost.
         OverloadWarning: friction above its static level, as of a bristle that does not relax. The
             run ended well all the same; its `doubts` say where.
+        EnergyWarning: friction that adds energy to the motion, as by a law of the wrong sign.
     """
     check_model("simulate", model)
     check_flags("simulate", progress, measure_error=measure_error, throw=throw)
@@ -162,7 +163,7 @@ def simulate(
     )
     for said in doubts(run.integrator or integrator, inputs, run, values):
         run.message += f" {said}"
-        warnings.warn(f"simulate '{model.name}': {said}", OverloadWarning, stacklevel=2)
+        warnings.warn(type(said)(f"simulate '{model.name}': {said}"), stacklevel=2)
     trajectory = trajectory_of(integrator, inputs, run, values, count, backend)
     if throw and not trajectory.status.ok and trajectory.status is not Status.INTERRUPTED:
         raise SolveError(trajectory.message, trajectory.status, trajectory)

@@ -1,28 +1,42 @@
-"""How a case is judged: against another method at a hundredth of its tolerance.
+"""How a case is judged: against a referee that shares no code with symfric, or by other methods.
 
     tolerance of a state = rtol max|x| + atol,   error = max over states and times of
-                                                         |run - reference| / tolerance
+                                                         |run - truth| / tolerance
 
-is at most RIGHT tolerances where a run is right. A larger error is not yet the run's fault: a
-third run at a thousandth of rtol must agree with the reference, and the problem must not be one
-that turns a tolerance at some time into much more at a later one (a block at the edge of
-sticking, a chaotic pendulum). What no method can tell is "undecided", never "right". A method
-that allows a tolerance in each step may be off by all of them together where nothing damps: the
-steps are judged one by one then, each from where the run itself stood at its start.
+is at most RIGHT tolerances where a run is right. The truth is the referee's motion where it knows
+law and scene and its own error, the difference of two of its solves, is small; else that of two of
+symfric's other methods at a hundredth and a thousandth of the tolerance, which must agree. A larger
+error is not yet the run's fault: the problem may turn a tolerance at some time into much more at a
+later one (a block at the edge of sticking, a chaotic pendulum), and a method that allows a
+tolerance in each step may be off by all of them together where nothing damps: the error then falls
+with rtol. What no reference can tell is "undecided", never "right". A run that says itself that its
+steps were used up is refused, and what it hands out is compared.
 """
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from itertools import pairwise
 from typing import Any, final
 
 import numpy as np
 
 from symfric.foundation.status import SolveError, Status
-from symfric.integrator.arguments import chosen
 from symfric.results.trajectory import Trajectory
 from symfric.stress.cases import Case
-from symfric.stress.problem import TIMES, WORK, Array, Problem, problem
+from symfric.stress.measures import (
+    RIGHT,
+    amplification,
+    apart,
+    at_steps,
+    attempt,
+    distance,
+    of,
+    other_method,
+    table,
+    third_method,
+    tolerances,
+    worst_step,
+)
+from symfric.stress.problem import TIMES, WORK, Problem, problem
 from symfric.stress.refereed import Answer, States, answered
 
 CLASSES = {
@@ -40,12 +54,10 @@ CLASSES = {
 FAILING = ("silent", "nan", "crash", "hang")
 """Classes that must be empty."""
 
-RIGHT, LOOSE = 10.0, 100.0
+LOOSE = 100.0
 SENSITIVE = 1e-2
 """Relative error above which what steps add up to is no longer small; and relative size of what
 becomes of one tolerance, above which a run says nothing."""
-STRIDES = 100
-"""Steps that a reference takes at least: what a run may leap over, a reference must not."""
 LADDER, FINEST = (1e-2, 1e-5, 1e-1), 1e-13
 """Tolerances of the references over that of the case, and the smallest one."""
 PROBLEMS = ("sensitive", "adds up over steps")
@@ -125,7 +137,7 @@ def _failed(ready: Problem, error: SolveError) -> Verdict:
         return _stopped(ready, error)
     steps = error.partial.statistics.steps if isinstance(error.partial, Trajectory) else 0
     case = ready.case
-    other = _run(ready, case.rtol, _other(case), ready.attempts)
+    other = attempt(ready, case.rtol, other_method(case), ready.attempts)
     through = isinstance(other, Trajectory)
     group = f"{error.status.name}{', another method goes through' if through else ''}"
     return _refused(group, str(error), steps)
@@ -154,9 +166,9 @@ def _compared(ready: Problem, run: Trajectory) -> Verdict:
     """The referee's verdict; that of other methods where it has none, or is in doubt."""
     answer = answered(ready, lambda y, states: apart(ready, y, states).max(0))
     if answer is None or answer.doubt[1:].min() > DOUBT:
-        return _by_methods(ready, run)
+        return by_methods(ready, run)
     sure = int(np.argmax(answer.doubt > DOUBT)) or TIMES
-    y = _table(run, ready.times)
+    y = table(run, ready.times)
     over_time = apart(ready, y, answer.states).max(0)
     error, steps = float(over_time[:sure].max()), run.statistics.steps
     if error > RIGHT:
@@ -168,7 +180,7 @@ def _compared(ready: Problem, run: Trajectory) -> Verdict:
     elif sure == TIMES:
         verdict = Verdict("right", "", "", error, steps)
     else:
-        verdict = _by_methods(ready, run)
+        verdict = by_methods(ready, run)
         if verdict.kind != "undecided":
             return verdict
         text = f"right up to {ready.times[sure - 1]:g} s, where the referee's error grows as well"
@@ -176,7 +188,7 @@ def _compared(ready: Problem, run: Trajectory) -> Verdict:
     return replace(verdict, by="referee")
 
 
-def _by_methods(ready: Problem, run: Trajectory) -> Verdict:
+def by_methods(ready: Problem, run: Trajectory) -> Verdict:
     """The verdict of symfric's own methods of other families, at smaller and smaller tolerances."""
     verdicts = list[Verdict]()
     for factor in LADDER:
@@ -190,27 +202,27 @@ def _by_two(ready: Problem, run: Trajectory, rtol: float) -> Verdict:
     """The verdict of two methods, one at `rtol` and, where needed, the other at a tenth of it."""
     case, steps = ready.case, run.statistics.steps
     limit = 10 * (steps + run.statistics.rejections) + ready.attempts
-    reference = _run(ready, rtol, _other(case), limit)
+    reference = attempt(ready, rtol, other_method(case), limit)
     if not isinstance(reference, SolveError):
-        error = distance(ready, run, _of(reference))
+        error = distance(ready, run, of(reference))
         if error <= RIGHT:
             return Verdict("right", "", "", error, steps)
-    third = _run(ready, max(rtol / 10, FINEST), _third(case), limit)
+    third = attempt(ready, max(rtol / 10, FINEST), third_method(case), limit)
     if isinstance(third, SolveError):
         failed = reference if isinstance(reference, SolveError) else third
         text = f"the reference failed: {failed}"
         return Verdict("undecided", text, f"reference: {failed.status.name}", None, steps)
-    error = distance(ready, run, _of(third))
+    error = distance(ready, run, of(third))
     if error <= RIGHT:
         return Verdict("right", "", "", error, steps)
     if isinstance(reference, SolveError):
         text = f"{error:.3g} tolerances off one reference; the other failed: {reference}"
         return Verdict("undecided", text, f"reference: {reference.status.name}", error, steps)
-    doubt = distance(ready, reference, _of(third))
+    doubt = distance(ready, reference, of(third))
     if doubt > error / 3:
         text = f"{error:.3g} tolerances off, and the references disagree by {doubt:.3g}"
         return Verdict("undecided", text, "references disagree", error, steps)
-    return _graded(ready, run, _of(third), error, limit)
+    return _graded(ready, run, of(third), error, limit)
 
 
 def _graded(
@@ -248,151 +260,10 @@ def _explained(
     if (between := at_steps(ready, run, truth)) <= RIGHT:
         text += f", and the ends of its steps are off by {between:.3g}"
         return replace(loose, reason=text, group="between steps only")
-    finer = _run(ready, max(ready.case.rtol / 10, 1e-13), ready.case.method, 10 * ready.attempts)
+    finer = attempt(ready, max(ready.case.rtol / 10, 1e-13), ready.case.method, 10 * ready.attempts)
     if isinstance(finer, SolveError):
         return replace(loose, group="unexplained")
     less = distance(ready, finer, truth)
     text += f", and {less:.3g} are left at rtol/10"
     group = "adds up over steps, falls with rtol" if less <= error / 3 else "unexplained"
     return replace(loose, reason=text, group=group)
-
-
-def _run(
-    ready: Problem,
-    rtol: float,
-    method: str,
-    limit: int,
-    x0: Mapping[str, float] | None = None,
-    times: Array | None = None,
-) -> Trajectory | SolveError:
-    try:
-        span = ready.case.t_end - ready.case.t_start
-        return ready.run(
-            rtol, method, max_steps=limit, x0=x0, t_eval=times, max_step=span / STRIDES
-        )
-    except SolveError as error:
-        return error
-
-
-def _other(case: Case) -> str:
-    """A method of another family than that of the case."""
-    return "rodas5p" if chosen("case", case.method, case.rtol).name == "radau5" else "radau5"
-
-
-def _third(case: Case) -> str:
-    """The method that is not the reference's."""
-    return "radau5" if _other(case) == "rodas5p" else "rodas5p"
-
-
-def distance(ready: Problem, run: Trajectory, truth: States) -> float:
-    """Largest difference of a state [tolerances], see `apart`."""
-    return float(apart(ready, _table(run, ready.times), truth).max())
-
-
-def at_steps(ready: Problem, run: Trajectory, truth: States) -> float:
-    """Largest difference at times [tolerances] where the run's own steps end.
-
-    An implicit step may go over a fast transient and end right, and its polynomial leads there by
-    another way.
-    """
-    times = run.step_times[run.step_times <= ready.case.t_end]
-    times = times[:: 1 + times.size // TIMES]
-    size = tolerances(ready, truth(ready.times))
-    return float((np.abs(_table(run, times) - truth(times)) / size).max())
-
-
-def apart(ready: Problem, y: Array, truth: States) -> Array:
-    """Differences of states y at the times of the problem [tolerances], shape (nx, times).
-
-    Where the model has events y may be early or late by rtol of the span: regimes jump.
-    """
-    if not ready.model.events:
-        z = truth(ready.times)
-        return np.abs(y - z) / tolerances(ready, z)
-    late = ready.case.rtol * (ready.times[-1] - ready.times[0])
-    shifted = [np.clip(ready.times + s * late, *ready.times[[0, -1]]) for s in (-1, 0, 1)]
-    near = truth(np.concatenate(shifted)).reshape(y.shape[0], 3, -1)
-    off = np.maximum(0.0, np.maximum(y - near.max(1), near.min(1) - y))
-    return off / tolerances(ready, near[:, 1])
-
-
-def _of(run: Trajectory) -> States:
-    return lambda times: _table(run, times)
-
-
-def tolerances(ready: Problem, z: Array) -> Array:
-    """Tolerances rtol max|x| + atol of each state, shape (nx, 1); z (nx, times) are the states."""
-    rtol, nominal = ready.case.rtol, ready.model.nominal("x")[:, None]
-    return rtol * np.abs(z).max(1, keepdims=True) + 0.1 * rtol * nominal
-
-
-def _table(run: Trajectory, times: Array) -> Array:
-    """States over time, shape (nx, times)."""
-    values = run.states(times)
-    return np.stack([values[v.name] for v in run.model.x])
-
-
-def amplification(ready: Problem, y: Array, limit: int, answer: Answer | None = None) -> float:
-    """What becomes of one tolerance [tolerances], put in at the start or on the way of y."""
-    size, worst = tolerances(ready, y), 1.0
-    for k in STATIONS:
-        times, ends = ready.times[k:], list[Array]()
-        for added in (0.0, 1.0):
-            start = y[:, k] + added * size[:, 0]
-            if answer is not None and not ready.model.events:
-                end = answer.onward(times, start)
-            else:
-                end = _onward(ready, times, start, limit)
-            if end is None:
-                return float("inf")
-            ends.append(end)
-        worst = max(worst, float((np.abs(ends[1] - ends[0]) / size).max()))
-    return worst
-
-
-def _onward(ready: Problem, times: Array, y: Array, limit: int) -> Array | None:
-    """States at `times` of the motion that begins at the first of them with y, if it ends."""
-    start = dict(zip((v.name for v in ready.model.x), y.tolist(), strict=True))
-    try:
-        run = _run(ready, ready.case.rtol / 100, _third(ready.case), limit, start, times)
-    except ValueError:  # no algebraic unknowns found for the states on the way
-        return None
-    return None if isinstance(run, SolveError) else _table(run, times)
-
-
-def worst_step(ready: Problem, run: Trajectory, size: Array, limit: int) -> float:
-    """Largest error of a single step [tolerances], from where the run stood at its start.
-
-    Stretches of steps are followed by another method, and those off by more than `RIGHT` halved
-    until one step is left; the first such step is returned, or else the largest error of a
-    stretch. Infinite where no other method can start or go on. What is damped within a stretch
-    is not seen: it adds nothing to the error of the run.
-    """
-    t = run.step_times
-    y = _table(run, t)
-    cuts = np.unique(np.linspace(0, t.size - 1, STRIDES + 1).astype(int)).tolist()
-    stretches, worst = list(pairwise(cuts)), 0.0
-    while stretches:
-        first, last = stretches.pop()
-        span = t[[first, last]]
-        part = replace(ready, case=replace(ready.case, t_end=float(span[1])))
-        start = dict(zip((v.name for v in ready.model.x), y[:, first].tolist(), strict=True))
-        try:
-            other = _run(part, ready.case.rtol / 100, _other(ready.case), limit, start, span)
-        except ValueError:  # no algebraic unknowns found for the states on the way
-            return float("inf")
-        if isinstance(other, SolveError):
-            return float("inf")
-        error = float((np.abs(y[:, [last]] - _table(other, span[1:])) / size).max())
-        if error > RIGHT and last - first > 1:
-            middle = (first + last) // 2
-            stretches += [(first, middle), (middle, last)]
-        elif error > RIGHT:
-            return error
-        else:
-            worst = max(worst, error)
-    return worst
-
-
-STATIONS = (0, TIMES // 3, 2 * TIMES // 3)
-"""Times, by number, at which a tolerance is put in."""

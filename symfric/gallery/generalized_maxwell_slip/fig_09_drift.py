@@ -9,7 +9,7 @@ Distance: of the two, over the way.
 
 Reproduced: LuGre and Dahl drift, GMS, Leuven, Maxwell slip and the generic model stay, the
 elasto-plastic law stops after a while, as the paper says; and break-away falls with the rate of the
-force, but for Maxwell slip and Dahl, of which the paper does not claim it, and stays above F_c.
+force, but for Maxwell slip and Dahl, of which the paper does not claim it, and never below F_c.
 
 Undecided: how fast the block drifts. Nothing damps it on its spring with table 1, and while it
 rings the drift of LuGre is more than three times that of the vibration alone.
@@ -57,6 +57,7 @@ def plate(quick: bool = False) -> Plate:
         numbers[f"way in the last periods, {name} [m]"] = means[-1] - means[-2]
         peaks = break_away(law, 1.0, SIGNALS, RATES[1:4:2] if quick else RATES).curves[0]
         rates.semilogx(peaks["rate"], peaks["F"], **mark, marker="o", markersize=3)
+        numbers[f"least break-away, {name} [N]"] = float(peaks["F"].min())
         slowly, fast = np.interp((1.0, 10.0), peaks["rate"], peaks["F"])
         numbers[f"break-away at 1 N/s over that at 10 N/s, {name} [1]"] = slowly / fast
     away.set_xlim(-0.3, 8.5)

@@ -1,4 +1,6 @@
-"""What a run that ended well leaves in doubt: `doubts` is the one place where that is collected.
+"""Doubts about a run that ended well: friction above its level, and friction that gains energy.
+
+Energy: see `symfric.integrator.running.gains`.
 
 Overload: the states of a law carry more than they may in any motion, mostly its static level.
 
@@ -23,9 +25,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.status import EnergyWarning, OverloadWarning
 from symfric.foundation.symbols import strays, symbols_of
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.inputs import InputData
+from symfric.integrator.running.gains import closed, gains
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Run
 from symfric.model import Model
@@ -104,11 +108,14 @@ class Held:
         return values[:, 0], values[:, 1], values[:, 2]
 
 
-def doubts(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> tuple[str, ...]:
-    """Sentences about a run that ended well; none where nothing is known against it."""
+def doubts(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> list[UserWarning]:
+    """Return warnings about a run that ended well; none where nothing is known against it."""
     if not run.status.ok:
-        return ()
-    return tuple(_overloads(integrator, inputs, run, p))
+        return []
+    found: list[UserWarning] = [
+        OverloadWarning(said) for said in _overloads(integrator, inputs, run, p)
+    ]
+    return found + [EnergyWarning(said) for said in gains(integrator, inputs, run, p)]
 
 
 def _overloads(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> Iterator[str]:
@@ -159,11 +166,8 @@ def _held(model: Model, contact: Contact) -> Held | None:
         level = contact.most_held
     except (ValueError, TypeError, NotImplementedError):
         return None
-    forces = {c.force: c.friction for c in model.contacts}
-    for _ in forces:  # a load may follow from the friction of another contact
-        old, new = ca.vertcat(*forces), ca.vertcat(*forces.values())
-        force, level = (ca.substitute(e, old, new) for e in (force, level))
-    both, p = ca.vertcat(force, level), model.vector("p")
+    force, level = ca.vertsplit(both := closed(model, ca.vertcat(force, level)))
+    p = model.vector("p")
     known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
     if strays(both, known) or not ca.depends_on(force, z):
         return None

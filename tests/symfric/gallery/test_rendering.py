@@ -140,13 +140,13 @@ def test_what_was_there_before_is_not_what_was_done_now(
     first, second, third = names
     folder = tmp_path / "laminator_nips"
     folder.mkdir()
-    record = {"paper": "P", "figure": "F", "title": "T", "text": "", "compared": "c", "measure": "",
-              "note": "", "verdicts": {}, "within": 0.0, "checked": [], "how_far": "0", "numbers": {},
-              "quick": True, "seconds": 0.1, "unit": "1", "distance": 0.0, "symfric": "0"}  # fmt: skip
+    texts = dict.fromkeys(("paper", "figure", "text", "compared", "measure", "note", "unit"), "")
+    kept = {"verdicts": {}, "within": 0.0, "checked": [], "how_far": "0", "numbers": {}}
+    record = texts | kept | {"quick": True, "seconds": 0.1, "distance": 0.0, "symfric": "0"}
 
     def put(name: str, title: str) -> None:
-        kept = record | {"name": name, "title": title, "picture": f"{name}.png"}
-        (tmp_path / f"{name}.json").write_text(json.dumps(kept), "utf-8")
+        said = record | {"name": name, "title": title, "picture": f"{name}.png"}
+        (tmp_path / f"{name}.json").write_text(json.dumps(said), "utf-8")
 
     for name in names:
         put(name, "before")

@@ -23,13 +23,22 @@ from symfric.stress.refereed import question
 Array = NDArray[np.float64]
 PAIRS = [(law, scene) for scene in SCENES for law in LAWS if knows(law, scene)]
 FORMS = {"coulomb": [{"shape": s} for s in SIGNS], "exact_coulomb": [{"form": "stribeck"}]}
-SHARED = {"mu_s": 0.31, "mu_d": 0.17, "v_s": 3e-3, "sigma_2": 0.7, "delta": 1.3, "n": 1.7}
-SHARED |= {"v_d": 2e-3, "v_eps": 1e-4, "z_ba": 2e-7, "mu_v": 0.4, "A": 1.2, "beta": 0.6}
+LEVELS = {"mu_s": 0.31, "mu_d": 0.17, "v_s": 3e-3, "sigma_2": 0.7, "delta": 1.3, "n": 1.7}
+SHARED = LEVELS | {"v_d": 2e-3, "v_eps": 1e-4, "z_ba": 2e-7, "mu_v": 0.4, "A": 1.2, "beta": 0.6}
 
 
 def test_referee_imports_no_symfric_beyond_itself() -> None:
     folder = Path(symfric.stress.referee.__file__).parent
-    allowed = {"math", "warnings", "itertools", "collections", "dataclasses", "typing", "numpy", "scipy"}
+    allowed = {
+        "math",
+        "warnings",
+        "itertools",
+        "collections",
+        "dataclasses",
+        "typing",
+        "numpy",
+        "scipy",
+    }
     for file in sorted(folder.glob("*.py")):
         for node in ast.walk(ast.parse(file.read_text())):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []

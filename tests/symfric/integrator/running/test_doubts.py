@@ -1,6 +1,7 @@
 """Friction above its level is said, and only that."""
 
 import warnings
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -10,13 +11,16 @@ import pytest
 from symfric import (
     GMS,
     BlimanSorine,
+    BrownMcPhee,
     Dahl,
     ElastoPlastic,
+    EnergyWarning,
     Law,
     LuGre,
     Model,
     OverloadWarning,
     SolveError,
+    Status,
     Variable,
     contact,
     report,
@@ -24,11 +28,13 @@ from symfric import (
     simulate_many,
     with_values,
 )
+from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import parameters
-from symfric.integrator.running import record
+from symfric.integrator.running import gains, record
 from symfric.integrator.running.doubts import places
 from symfric.laws import ALL_LAWS, Asymmetric, LoadNormalised, Sum
 from symfric.scenes import ALL_SCENES, Drive, Rabinowicz
+from symfric.scenes.base import Scene
 
 SLOW = {"m": 2.0, "k": 37.0, "v_belt": 0.03}
 """A belt with a load that grows by 1.1 N/s, of 6.5 N at break-away."""
@@ -149,3 +155,44 @@ def test_random_laws_are_not_doubted() -> None:
 @pytest.mark.slow
 def test_hundreds_of_random_laws_are_not_doubted() -> None:
     assert alarms(2, 600) == []
+
+
+@dataclass(frozen=True, eq=False)
+class Pushing(BrownMcPhee):
+    """A law whose author forgot that friction is positive where it opposes the slip."""
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        return -super().force(v, N, z)
+
+
+@pytest.mark.parametrize(
+    ("machine", "u"),
+    [
+        (Rabinowicz(Pushing()), {}),
+        (Drive(Pushing()), {"force": 30.0}),
+        (Rabinowicz(Pushing(mu_d=0.1)), {}),
+    ],
+)
+def test_friction_that_adds_energy_is_said(machine: Scene, u: dict[str, float]) -> None:
+    with pytest.warns(EnergyWarning, match=r"by Pushing adds \d\S* J .* check its sign"):
+        run = simulate(machine.model(), 2.0, u=u)
+    assert run.status is Status.SUCCESS
+    assert run.doubts in run.message and "along the slip" in run.doubts
+
+
+PLAIN = [n for n, law in ALL_LAWS.items() if {i.name for i in law().inputs} <= {"F_e"}]
+
+
+@pytest.mark.parametrize("name", PLAIN)
+def test_steady_friction_of_no_law_adds_energy(name: str) -> None:
+    model = Drive(ALL_LAWS[name]()).model()
+    for sliding in gains.places(model):
+        assert not sliding.suspect(model.values("p"))
+
+
+def test_bristles_that_give_back_what_they_stored_are_not_said() -> None:
+    """A block at rest on stretched bristles: at first friction does nothing but push it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", EnergyWarning)
+        run = simulate(Drive(LuGre(sigma_1=0.0)).model(), 0.01, x0={"z": 5e-6})
+    assert run["friction"][0] * run["v"][1] < 0
