@@ -173,7 +173,8 @@ def _placed(task: Task, held: Candidate, rungs: Ladder, runs: Budget, row: Row) 
         return replace(row, standing=RANKED)
     driest = held.law_at(rungs.rungs[-1].s)
     known = "" if task.own else nature.otherwise(driest, task.frictions[""], task.load)
-    said = [short(rungs.stopped) or "the integrator keeps no more", known]
+    mark = "" if rungs.decided or not rungs.stopped else "not decided: "
+    said = [mark + (short(rungs.stopped) or "the integrator keeps no more"), known]
     why = "; ".join(text for text in said if text)
     return replace(row, standing=INACCURATE, reason=f"{row.error:.1e} off: {why}")
 

@@ -8,8 +8,8 @@ from typing import Any, final
 RANKED, INACCURATE, LACKING, REFUSED, FAILED = (
     "ranked", "inaccurate", "lacks", "cannot run", "failed",
 )  # fmt: skip
-"""Standings: does all that is asked; moves otherwise, by more than the accuracy; does not show what
-is needed; the machine does not take it; its run fails."""
+"""Standings: does all that is asked; does not keep the accuracy, as it moves otherwise or nobody
+knows yet; does not show what is needed; the machine does not take it; its run fails."""
 ORDER = (RANKED, INACCURATE, LACKING, FAILED, REFUSED)
 ALIKE = 1.1
 """Work within this ratio is the same: attempts differ by so much with a digit of a tolerance."""

@@ -214,7 +214,7 @@ def ladder(
         if settled and order is not None:
             stopped, decided = f"it tends to another motion, with order {order:.2g}", True
         elif len(rungs) > MOST:
-            stopped = f"not decided: its error still changes at softness {rungs[-1].s:.0e}"
+            stopped = f"its error still changes at softness {rungs[-1].s:.0e}"
         try:
             rungs += [] if stopped else [run(rungs[-1].s / step)]
         except failures as problem:

@@ -22,6 +22,7 @@ from mutants.mutant import Mutant
 from mutants.pictured import PICTURED
 from mutants.plants import PLANTS
 from mutants.ranked import RANKED
+from mutants.refereed import REFEREED
 from mutants.robots import ROBOTS
 from mutants.shown import SHOWN
 from mutants.solvers import RESULTS, SOLVERS
@@ -385,5 +386,5 @@ MUTANTS = (
     *CHOSEN, *CACHES, *COMPENSATED, *DEVICES, *DRY, *EMITTED, *ENSEMBLES, *EXPORTED,
     *GENERATED, *LEFT_OUT, *LOOPS, *DERIVATIVES, *MACHINES, *PICTURED, *PLANTS, *RESULTS, *ROBOTS,
     *HELD, *JUDGED, *SHOWN, *SOLVERS, *TOLD,
-    *RANKED, *WRITTEN,
+    *RANKED, *REFEREED, *WRITTEN,
 )  # fmt: skip
