@@ -89,3 +89,11 @@ class SolveError(RuntimeError):
         super().__init__(message)
         self.status = status
         self.partial = partial
+
+
+class OverloadWarning(UserWarning):
+    """Friction above its static level, as of a bristle that does not relax."""
+
+
+class EnergyWarning(UserWarning):
+    """Friction that adds energy to the motion, as by a law whose force has the wrong sign."""
