@@ -323,7 +323,7 @@ class Job:
         widths = speeds_at(self.problem, sharp.scales, sharp.level)
         told = ", ".join(f"{name} over {width:.2g}" for name, width in widths.items())
         said = f"Friction is still smooth: {told} (m/s or rad/s). {why}"
-        return self.checked(_said(found, said))
+        return _said(self.checked(found), said)
 
     def checked(self, solution: Solution) -> Solution:
         """`solution` with its verification.

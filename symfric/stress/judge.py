@@ -43,7 +43,7 @@ CLASSES = {
     "right": "as the reference, within ten tolerances",
     "refused": "an error in a sentence: bad input, or a solve that failed",
     "loose": "off by up to a hundred tolerances, or what those of all steps add up to",
-    "undecided": "references disagree or fail, or tolerances of steps grow or add up to much",
+    "undecided": "references disagree, fail or are too sensitive, and steps cannot be judged",
     "silent": "success, and wrong",
     "nan": "success, and a signal is not finite",
     "crash": "a foreign exception, or the process died",
@@ -56,12 +56,12 @@ FAILING = ("silent", "nan", "crash", "hang")
 
 LOOSE = 100.0
 SENSITIVE = 1e-2
-"""Relative error above which what steps add up to is no longer small; and relative size of what
-becomes of one tolerance, above which a run says nothing."""
+"""Relative error above which what steps add up to is no longer small, so that each is judged; and
+relative size of what becomes of one tolerance, above which a step that is off proves nothing."""
+SUSPECT = "adds up over steps"
+"""The group of undecided runs that are silently wrong if a single step is off."""
 LADDER, FINEST = (1e-2, 1e-5, 1e-1), 1e-13
 """Tolerances of the references over that of the case, and the smallest one."""
-PROBLEMS = ("sensitive", "adds up over steps")
-"""Undecided for reasons that no better reference takes away."""
 DOUBT = RIGHT / 3
 """Own error [tolerances] of the referee up to which it judges."""
 CHECKED = 3000
@@ -163,29 +163,38 @@ def _stopped(ready: Problem, error: SolveError) -> Verdict:
 
 
 def _compared(ready: Problem, run: Trajectory) -> Verdict:
-    """The referee's verdict; that of other methods where it has none, or is in doubt."""
+    """The verdict of the referee or of other methods; where they do not know, that on each step."""
     answer = answered(ready, lambda y, states: apart(ready, y, states).max(0))
     if answer is None or answer.doubt[1:].min() > DOUBT:
-        return by_methods(ready, run)
-    sure = int(np.argmax(answer.doubt > DOUBT)) or TIMES
-    y = table(run, ready.times)
-    over_time = apart(ready, y, answer.states).max(0)
-    error, steps = float(over_time[:sure].max()), run.statistics.steps
-    if error > RIGHT:
-        limit = 10 * (steps + run.statistics.rejections) + ready.attempts
-        if sure < TIMES:
-            ready = replace(ready, case=replace(ready.case, t_end=float(ready.times[sure - 1])))
-            answer = replace(answer, asked=replace(answer.asked, times=ready.times))
-        verdict = _graded(ready, run, answer.states, error, limit, answer)
-    elif sure == TIMES:
-        verdict = Verdict("right", "", "", error, steps)
-    else:
         verdict = by_methods(ready, run)
-        if verdict.kind != "undecided":
-            return verdict
-        text = f"right up to {ready.times[sure - 1]:g} s, where the referee's error grows as well"
-        verdict = Verdict("undecided", text, "sensitive", error, steps)
-    return replace(verdict, by="referee")
+    else:
+        verdict = _by_referee(ready, run, answer)
+    if verdict.kind != "undecided":
+        return verdict
+    steps = run.statistics.steps
+    limit = 10 * (steps + run.statistics.rejections) + ready.attempts
+    step = worst_step(ready, run, tolerances(ready, table(run, ready.times)), limit)
+    text = f"{verdict.reason}, and a single step is off by up to {step:.3g}"
+    if step > RIGHT:
+        kind = "silent" if verdict.group == SUSPECT else "undecided"
+        return replace(verdict, kind=kind, reason=text)
+    return replace(verdict, kind="loose", reason=text, group=f"{verdict.group}, each step is right")
+
+
+def _by_referee(ready: Problem, run: Trajectory, answer: Answer) -> Verdict:
+    """The referee's verdict, as far as its own error is small; beyond that of other methods."""
+    sure = int(np.argmax(answer.doubt > DOUBT)) or TIMES
+    over_time = apart(ready, table(run, ready.times), answer.states).max(0)
+    error, steps = float(over_time[:sure].max()), run.statistics.steps
+    if sure == TIMES and error <= RIGHT:
+        return Verdict("right", "", "", error, steps, "referee")
+    if error <= RIGHT:
+        return by_methods(ready, run)
+    if sure < TIMES:
+        ready = replace(ready, case=replace(ready.case, t_end=float(ready.times[sure - 1])))
+        answer = replace(answer, asked=replace(answer.asked, times=ready.times))
+    limit = 10 * (steps + run.statistics.rejections) + ready.attempts
+    return replace(_graded(ready, run, answer.states, error, limit, answer), by="referee")
 
 
 def by_methods(ready: Problem, run: Trajectory) -> Verdict:
@@ -193,7 +202,7 @@ def by_methods(ready: Problem, run: Trajectory) -> Verdict:
     verdicts = list[Verdict]()
     for factor in LADDER:
         verdicts.append(_by_two(ready, run, max(factor * ready.case.rtol, FINEST)))
-        if verdicts[-1].kind != "undecided" or verdicts[-1].group in PROBLEMS:
+        if verdicts[-1].kind != "undecided" or verdicts[-1].group in ("sensitive", SUSPECT):
             return verdicts[-1]
     return verdicts[0]
 
@@ -242,11 +251,8 @@ def _graded(
     if error <= max(LOOSE, steps) * grown:
         if error * ready.case.rtol < SENSITIVE:
             return _explained(ready, run, truth, Verdict("loose", text, "", error, steps), grown)
-        if grown * ready.case.rtol > SENSITIVE:
-            return Verdict("undecided", text, "sensitive", error, steps)
-        if (step := worst_step(ready, run, tolerances(ready, y), limit)) <= RIGHT:
-            text += f", but no step is off by more than {step:.3g}"
-            return Verdict("undecided", text, "adds up over steps", error, steps)
+        group = "sensitive" if grown * ready.case.rtol > SENSITIVE else SUSPECT
+        return Verdict("undecided", text, group, error, steps)
     return Verdict("silent", text, "", error, steps)
 
 

@@ -138,7 +138,7 @@ def worst_step(ready: Problem, run: Trajectory, size: Array, limit: int) -> floa
     stretch. Infinite where no other method can start or go on. What is damped within a stretch
     is not seen: it adds nothing to the error of the run.
     """
-    t = run.step_times
+    t = run.step_times[run.step_times <= ready.case.t_end]
     y = table(run, t)
     cuts = np.unique(np.linspace(0, t.size - 1, STRIDES + 1).astype(int)).tolist()
     stretches, worst = list(pairwise(cuts)), 0.0

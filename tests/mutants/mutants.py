@@ -22,6 +22,7 @@ from mutants.mutant import Mutant
 from mutants.pictured import PICTURED
 from mutants.plants import PLANTS
 from mutants.ranked import RANKED
+from mutants.refereed import REFEREED
 from mutants.robots import ROBOTS
 from mutants.shown import SHOWN
 from mutants.solvers import RESULTS, SOLVERS
@@ -112,16 +113,21 @@ EVENT = (
         "suspects = (doubts != 0) & long", "suspects = (doubts < 0) & long", T_ISOLATION,
     ),
     Mutant(
-        "compiled code looks at each piece once", SEARCH,
-        "if (may && doubt[i] != 0)", "if (!may && doubt[i] != 0)", T_ISOLATION,
+        "no piece of a step is in doubt in compiled code", SEARCH,
+        "suspects[k][i] = doubts[k * EVENTS + i] != 0", "suspects[k][i] = f->left > 64",
+        T_ISOLATION,
     ),
     Mutant(
-        "corners are taken for straight lines", CROSSINGS,
-        "bow = 2.1 * (bows[0]", "bow = 0.1 * (bows[0]", T_ISOLATION,
+        "outer pieces are never in doubt", CROSSINGS,
+        "sizes[0] < first - noise", "sizes[0] < first - inf", T_ISOLATION,
     ),
     Mutant(
         "a piece before a sure root is taken for empty", ISOLATION,
-        "if not unsure.any() or sure <= a:", "if not unsure.any() or sure <= b:", T_ISOLATION,
+        "if at[k] >= sure:", "if sure <= 1:", T_ISOLATION,
+    ),
+    Mutant(
+        "rounding is taken for crossings", CROSSINGS, "ROUNDING = 64 *", "ROUNDING = 0 *",
+        ("tests/symfric/integrator/test_hybrid.py",),
     ),
     Mutant(
         "an expression that a jump leaves at zero counts as passed", EVENTS,
@@ -380,5 +386,5 @@ MUTANTS = (
     *CHOSEN, *CACHES, *COMPENSATED, *DEVICES, *DRY, *EMITTED, *ENSEMBLES, *EXPORTED,
     *GENERATED, *LEFT_OUT, *LOOPS, *DERIVATIVES, *MACHINES, *PICTURED, *PLANTS, *RESULTS, *ROBOTS,
     *HELD, *JUDGED, *SHOWN, *SOLVERS, *TOLD,
-    *RANKED, *WRITTEN,
+    *RANKED, *REFEREED, *WRITTEN,
 )  # fmt: skip

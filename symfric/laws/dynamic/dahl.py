@@ -35,10 +35,7 @@ class Dahl(Law):
         phenomena=("D", "P"),
         smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
         confidence="two sources",
-        checked=(
-            "documentation of Altair MotionSolve and public code for n = 1; the exponent is "
-            "unverified"
-        ),
+        checked="n = 1: Altair MotionSolve's manual and public code; n is unverified",
         source="Dahl 1968, 1976",
     )
 

@@ -28,7 +28,8 @@ class HaessigFriedland(Law):
         smooth: dz/dt = v [1 - |r|^n (1 + sign(v r)) / 2]
 
     Limits: steady state mu_d N sign(v); rate-independent for sigma_1 = 0; drifts as little as
-    `MaxwellSlip` with one element. |v| is smooth over v_eps. Not valid for N = 0.
+    `MaxwellSlip` with one element. While the bristle unloads F v < 0: it gives back what it stored,
+    at most mu_s mu_d N^2 / (2 sigma_0). |v| is smooth over v_eps. Not valid for N = 0.
     Source: Haessig and Friedland, ASME J. Dyn. Syst. Meas. Control 113(3), 1991.
     """
 

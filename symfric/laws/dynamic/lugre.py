@@ -121,9 +121,7 @@ class LuGrePassive(Bristle):
         phenomena=("D", "S", "St", "V", "P", "L", "B"),
         smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
         confidence="one source",
-        checked=(
-            "jchristopherson/FrictionModels.jl LuGreModels.jl (v_d = v_s); passivity by computation"
-        ),
+        checked="jchristopherson/FrictionModels.jl (v_d = v_s); passivity by computation",
         source="Olsson, PhD thesis, Lund 1996",
     )
 

@@ -53,10 +53,7 @@ class Coulomb(StaticLaw):
         phenomena=("D",),
         smoothness="C∞ (shape saturation C0 at |v| = v_eps, quadratic C1 at 0 and |v| = v_eps)",
         confidence="two sources",
-        checked=(
-            "projectchrono/chrono ChContactSMC (tanh); rleine/Keynote_Nonsmooth_Dynamics_ENOC2024"
-            " stickslipsmooth.m (arctangent)"
-        ),
+        checked="projectchrono/chrono ChContactSMC (tanh); rleine's stickslipsmooth.m (arctangent)",
         source="Amontons 1699, Coulomb 1785; regularised by tanh",
     )
 

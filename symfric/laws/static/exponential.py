@@ -26,10 +26,7 @@ class Tustin(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="one source",
-        checked=(
-            "Modelica Standard Library 4, "
-            "Mechanics.Translational.Components.MassWithStopAndFriction; the name was not checked"
-        ),
+        checked="MassWithStopAndFriction of the Modelica Standard Library; not the name",
         source="Tustin 1947, as cited in control literature",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -270,10 +267,7 @@ class SteadyStateLuGre(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="two sources",
-        checked=(
-            "A Friction Model for Laminator Nips, Lund 2015, equation 4.1; auralius/LuGre lugre.m"
-            " (delta = 2)"
-        ),
+        checked="the thesis, equation 4.1; auralius/LuGre lugre.m (delta = 2)",
         source="A Friction Model for Laminator Nips, MSc thesis, Lund 2015; LuGre",
         load="independent",
     )

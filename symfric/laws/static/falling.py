@@ -26,7 +26,7 @@ class Lorentzian(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="one source",
-        checked="g(v) of jchristopherson/friction README with alpha = 2; the name was not checked",
+        checked="g(v) of jchristopherson/friction README with alpha = 2; not the name",
         source="Hess and Soom 1990",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)

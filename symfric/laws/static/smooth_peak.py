@@ -76,9 +76,7 @@ class Specker(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="unverified",
-        checked=(
-            "with v_t = v_sp/10 it is SimscapeBreakaway; the correction by sigma_2 is uncertain"
-        ),
+        checked="v_t = v_sp/10 is SimscapeBreakaway; the part of sigma_2 is uncertain",
         source="Specker, Buchholz, Dietmayer 2014",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)

@@ -4,6 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from backends import each_backend
+from grazing import near_limits, wrong
 from oracles import damped_block_events
 
 from symfric import Event, ExactCoulomb, Model, Variable, rabinowicz, simulate
@@ -125,3 +126,15 @@ def test_a_block_that_just_reaches_the_speed_of_its_belt_sticks_each_time() -> N
 @pytest.mark.slow
 def test_all_speeds_up_to_the_last_that_sticks() -> None:
     assert wrong_speeds(np.linspace(0.30, 0.3902, 1000)) == []
+
+
+def test_machines_next_to_a_limit_have_the_events_of_exact_runs() -> None:
+    """Belt, two blocks, pendulum and drive with parameters a share of 1e-5 to 1e-2 from where their
+    events change; the references are runs at rtol = 1e-11 in short steps.
+    """
+    assert wrong(2, near_limits(2, 20)) == []
+
+
+@pytest.mark.slow
+def test_two_thousand_machines_next_to_a_limit() -> None:
+    assert wrong(0, near_limits(0, 2000)) == []
