@@ -2,7 +2,7 @@
 
 import weakref
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -77,3 +77,11 @@ def after(chunks: int) -> Callable[[float], None]:
             raise KeyboardInterrupt
 
     return progress
+
+
+EXECUTORS: dict[str, Callable[[], Any]] = {
+    "threads": lambda: "threads",
+    "processes": lambda: "processes",
+    "handed in": lambda: ThreadPoolExecutor(2),
+    "of one's own": Inline,
+}

@@ -64,6 +64,7 @@ FLOORS: dict[str, set[str]] = {
         "symfric.model",
         "symfric.integrator.compiled",
         "symfric.integrator.equations",
+        "symfric.integrator.methods",
         "symfric.integrator.running",
         "symfric.integrator.step",
     },

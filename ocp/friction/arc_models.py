@@ -12,9 +12,9 @@ from ocp.text.span import Span
 from symfric.foundation.parameters import Variable
 from symfric.model import Contact, Model, Output
 
-CATCH = 0.05
-"""Share of the sliding force that catches a contact which has slipped back for an instant, or that
-stops one: with none it would only graze rest, and the least deviation lets it slip on."""
+CATCH = 5.0
+"""Margins of the sliding force that catch a contact which has slipped back for an instant, or that
+stop one: with none it would only graze rest, and the least deviation lets it slip on."""
 
 FIRST = "_first_"
 PULLED = "_pull"
@@ -89,7 +89,7 @@ def arc_model(
     if key not in kept:
         made = mode_model(model, modes)
         outputs: dict[str, ca.SX] = {}
-        fading = ca.SX(0)
+        fading, catch = ca.SX(0), 1.0 - CATCH * margin[0]
         if leaving:
             made, left = _with_clock(made)
             fading = margin[0] * ca.tanh((left / margin[1]) ** 2)
@@ -108,10 +108,10 @@ def arc_model(
                 outputs[f"{c.name}{FIRST}{name}"] = rooms[side] / size
             if side := stopped.get(c.name, 0):
                 ahead = side * c.sliding(side)
-                outputs[f"{c.name}{STOPPED}"] = ((1.0 - CATCH) * ahead - side * force) / size
+                outputs[f"{c.name}{STOPPED}"] = (catch * ahead - side * force) / size
             if side := caught.get(c.name, 0):
                 back = -side * c.sliding(-side)
-                outputs[f"{c.name}{CAUGHT}"] = (side * force + (1.0 - CATCH) * back) / size
+                outputs[f"{c.name}{CAUGHT}"] = (side * force + catch * back) / size
         new = {name: Output(expression, "1") for name, expression in outputs.items()}
         kept[key] = with_outputs(made, new)
     return kept[key]

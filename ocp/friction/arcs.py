@@ -40,17 +40,14 @@ from ocp.text.ranges import Free, Range, meet
 from symfric.foundation.symbols import stacked
 from symfric.model import Contact, Model
 
-GRIP = 1e-2
-"""Share of the static level that a rest keeps away from it: a smooth law creeps over its peak a
-little below, and where the force follows its limit, controls that are held make a saw of it. Where
-the contact leaves by a force that cannot jump the rest gives that up at last."""
+MARGIN = 1e-2
+"""Share of the static level that a rest keeps away from it at first, and by which a control that
+jumps exceeds it where it breaks away: a smooth law creeps over its peak a little below and stays on
+it a little above for long, and where the force follows its limit, controls that are held make a saw
+of it. Where the contact leaves by a force that cannot jump the rest gives that up at last."""
 
 FADE = 1e-3
 """For how long before, as a share of the whole duration."""
-
-PULL = 1e-2
-"""Share of the static level by which a control that jumps exceeds it: held exactly there, a smooth
-law of any width would stay on its peak, and a little above it for long."""
 
 LEVEL = -1e-6
 """What is allowed on that side: at its end the rest is at its level, which the condition of
@@ -132,6 +129,7 @@ def in_arcs(
     sizes: Mapping[str, float],
     at_rest: Sequence[str],
     shortest: float,
+    margin: float = MARGIN,
 ) -> Problem:
     """The problem of mode models that follows the sequence `legs`, one phase for each arc.
 
@@ -141,10 +139,11 @@ def in_arcs(
         sizes: contact -> typical static level [N], which scales conditions on forces.
         at_rest: contacts that are at rest at the very start.
         shortest: least duration of an arc [s].
+        margin: share of the static level that rests and controls that break away keep from it.
     """
     places = places_of(problem, legs)
-    whole = sum(leg.duration for leg in legs)
-    phases = [_phase(problem, place, sizes, at_rest, shortest, whole) for place in places]
+    margins = margin, FADE * sum(leg.duration for leg in legs)
+    phases = [_phase(problem, place, sizes, at_rest, shortest, margins) for place in places]
     states = {v.name for v in phases[0].model.x}
     signals = {name for phase in phases for name in (*phase.model.signals, *phase.model.further)}
     parameters = {v.name for phase in phases for v in phase.model.p}
@@ -165,7 +164,7 @@ def _phase(
     sizes: Mapping[str, float],
     at_rest: Sequence[str],
     shortest: float,
-    whole: float,
+    margin: tuple[float, float],
 ) -> Phase:
     """The phase of one arc: what the user says of it, and the conditions of its modes."""
     base, modes = problem.chain[place.leg.phase], place.arc.modes
@@ -174,7 +173,6 @@ def _phase(
     tight = _tight(place, limited)
     leaving = {name: side for name, side in tight.items() if place.after.get(name) == side}
     caught, stopped = _caught(place, limited)
-    margin = (GRIP, FADE * whole)
     model = arc_model(base.model, modes, released, leaving, caught, stopped, sizes, margin)
     start: Ranges = dict(base.start) if place.opens else {}
     link: dict[str, Start] = dict(base.link) if place.opens else {}
@@ -189,7 +187,7 @@ def _phase(
         if place.number:
             link |= dict.fromkeys(zero)
         end = _end_of(place, contact, end)
-        inside = _inside(problem, place, contact, tight)
+        inside = _inside(problem, place, contact, tight, margin[0])
         bounds |= inside
         if not modes[contact.name]:  # between the start and the first point, too
             for side in SIDES.values():
@@ -200,7 +198,7 @@ def _phase(
             if contact.name in stopped:
                 start[f"{contact.name}{STOPPED}"] = (0.0, None)
         if contact.name in released:
-            start[f"{contact.name}{PULLED}"] = _pull(place, contact.name, limited)
+            start[f"{contact.name}{PULLED}"] = _pull(place, contact.name, limited, margin[0])
     signals = {*model.signals, *model.further}
     return replace(
         base,
@@ -228,14 +226,14 @@ def _breaks_away(place: Place, name: str, at_rest: Sequence[str]) -> bool:
     )  # fmt: skip
 
 
-def _pull(place: Place, name: str, limited: Collection[str]) -> Range:
+def _pull(place: Place, name: str, limited: Collection[str], margin: float) -> Range:
     """How far the force that would hold a contact exceeds its static level when it breaks away.
 
     One that cannot jump was below it until then: it reaches the level exactly.
     """
     modes = place.arc.modes
     if _jumps(place.model, modes, name, limited):
-        return (PULL, None)
+        return (margin, None)
     alone = all(modes[other] == mode for other, mode in place.before.items() if other != name)
     return 0.0 if alone and place.before.get(name) == 0 else (0.0, None)
 
@@ -289,13 +287,15 @@ def _tight(place: Place, limited: Collection[str]) -> dict[str, int]:
     }
 
 
-def _inside(problem: Problem, place: Place, contact: Contact, tight: Mapping[str, int]) -> Ranges:
+def _inside(
+    problem: Problem, place: Place, contact: Contact, tight: Mapping[str, int], margin: float
+) -> Ranges:
     """The side of slipping, or the room of a rest, over the whole arc."""
     name, mode = contact.name, place.arc.modes[contact.name]
     if not mode:
         open_side = tight.get(name)
         return {
-            f"{name}_{row}": (LEVEL if side == open_side else GRIP, None)
+            f"{name}_{row}": (LEVEL if side == open_side else margin, None)
             for side, row in SIDES.items()
         }
     found = carrier(problem.chain[place.leg.phase].model, contact)

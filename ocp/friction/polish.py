@@ -16,16 +16,17 @@ Source: Betts, Practical Methods for Optimal Control, 2nd ed., 2010, 3.7 (phases
 Applied Optimal Control, 1975, 3.7 (conditions at instants that are free).
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from math import inf
+from math import inf, sqrt
 
 import numpy as np
 
 from ocp.checking.arcs import arcs_of
 from ocp.checking.local_errors import local_errors
 from ocp.checking.refine import MeshErrors, refined
+from ocp.friction.arcs import MARGIN
 from ocp.friction.carry import Known
 from ocp.friction.mode_models import restless
 from ocp.friction.reading import Reading, sequence_of, sizes_of, starts_at_rest
@@ -36,6 +37,7 @@ from ocp.friction.whole import whole_solution
 from ocp.result.solution import Solution
 from ocp.solvers.ipopt import Ipopt
 from ocp.solvers.outcome import Report
+from ocp.solving.clock import Clock
 from ocp.text.problem import Problem
 from ocp.transcription.schemes import Radau, Scheme
 from symfric.foundation.status import Status
@@ -81,6 +83,9 @@ HALVED = 4.0
 MOST_ITERATIONS = 100
 """Of one solve: a sequence that needs more is a wrong one."""
 
+CLOSER = 5.0
+"""Factor to the margin of a motion that only shows what a margin costs."""
+
 LEAST_INTERVALS = 40
 MOST = 800
 
@@ -101,8 +106,14 @@ def polish(
     solver: Ipopt | None = None,
     scheme: Scheme | None = None,
     progress: Report | None = None,
-) -> Solution:
-    """The exact motion next to a sharpened one, in the terms of `problem`.
+    margin: float = MARGIN,
+    clock: Clock | None = None,
+) -> Iterator[tuple[Solution, float]]:
+    """Exact motions next to a sharpened one, in the terms of `problem`, with their margins.
+
+    The rests of the first keep `MARGIN` of their static levels, or `margin` if that is more. Where
+    that costs anything others follow that start there: with `margin`, and between both, for who
+    finds that too close; where it is `MARGIN` or more, with less, to see what it costs.
 
     Args:
         smooth: solution of `problem` with smooth friction, of widths of about a hundredth of the
@@ -110,8 +121,10 @@ def polish(
         problem: what the user has written.
         widths: contact -> sliding velocity [m/s] over which its friction is smoothed in `smooth`.
         solver, scheme, progress: as in `ocp.solve`.
+        margin: share of the static level that rests keep from it.
+        clock: when to stop.
 
-    Returns:
+    Yields:
         A solution with `modes`, valid for exact Coulomb friction with stiction; not verified. One
         whose status is not ok where no sequence led to a solution; where that was stopped before
         any did, without `modes`.
@@ -128,21 +141,7 @@ def polish(
         raise ValueError(f"polish: {reason}")
     known = Known(smooth.motions[0], parameters_of(problem, smooth.chosen), smooth.chosen)
     N = max(LEAST_INTERVALS, smooth.motions[0].t_control.size // 2)
-    return polished(problem, known, widths, N, solver=solver, scheme=scheme, progress=progress)
-
-
-def polished(
-    problem: Problem,
-    known: Known,
-    widths: Mapping[str, float],
-    intervals: int,
-    *,
-    solver: Ipopt | None = None,
-    scheme: Scheme | None = None,
-    progress: Report | None = None,
-) -> Solution:
-    """`polish` from a motion that may come from anywhere, on about so many intervals at first."""
-    whole = known.motion.T
+    whole, first = known.motion.T, max(MARGIN, margin)
     polisher = Polisher(
         problem=problem,
         sizes=sizes_of(problem, known),
@@ -152,6 +151,8 @@ def polished(
         shortest=SHORTEST * whole,
         kick=KICK * whole,
         progress=progress,
+        margin=first,
+        clock=clock or Clock(),
     )
     tried: list[Solved] = []
 
@@ -164,13 +165,27 @@ def polished(
     best: Solved | None = None
     with suppress(_StoppedError):
         for legs in _readings(problem, known, widths):
-            first = keep(polisher.solve(legs, known, intervals, 1e-2))
-            if first.ok:
-                best = first
+            found = keep(polisher.solve(legs, known, N, 1e-2))
+            if found.ok:
+                best = found
                 best = settled(polisher, best, keep)
                 best = better(polisher, best, NEW_ARC * whole, keep)
                 best = _fine(polisher, best, keep)
                 break
+    yield _solution(problem, best, tried), first
+    if best is None or tried[-1].outcome.status in STOPPED or not best.pressed(first):
+        return
+    least = margin if margin < first else margin / CLOSER
+    for closer in (least, sqrt(least * first)):
+        near, found = replace(polisher, margin=closer), None
+        with suppress(_StoppedError):
+            found = keep(near.again(best))
+            found = _fine(near, found, keep) if found.ok else found
+        yield _solution(problem, found, tried), closer
+
+
+def _solution(problem: Problem, best: Solved | None, tried: Sequence[Solved]) -> Solution:
+    """The best of several sequences, or the first, with what all have cost; why it ended early."""
     found = whole_solution(problem, best or tried[0], [s.outcome.statistics for s in tried])
     last = tried[-1].outcome
     if last.status not in STOPPED:

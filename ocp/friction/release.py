@@ -53,8 +53,8 @@ def holding(model: Model, modes: Mapping[str, int], contact: str) -> tuple[ca.SX
     names = [f"{contact}_reaction", *(f"{contact}_grip_{side}" for side in SIDES.values())]
     asked = ca.Function("asked", symbols, [held.expression(name) for name in names])
     t, x, u, p = moving.t, *(moving.vector(letter) for letter in "xup")
-    known = {v.name for v in moving.z}
-    found = ca.vertcat(*(v.symbol if v.name in known else ca.SX(0) for v in held.z))
+    known = {v.name: v.symbol for v in moving.z}  # each mode model has its own reactions
+    found = ca.vertcat(*(known.get(v.name, ca.SX(0)) for v in held.z))
     for _ in range(NEWTON_STEPS):
         found = step(t, x, found, u, p)
     force, *rooms = (ca.SX(value) for value in asked.call([t, x, found, u, p]))

@@ -1,7 +1,7 @@
 """A sequence of modes solved: its durations, its motion."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import final
 
@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.holding import holding_losses
-from ocp.friction.arc_models import FIRST, breaks_away
-from ocp.friction.arcs import in_arcs
+from ocp.friction.arc_models import CAUGHT, FIRST, PULLED, STOPPED, breaks_away
+from ocp.friction.arcs import MARGIN, in_arcs
 from ocp.friction.carry import Known, points_in
 from ocp.friction.release import SIDES
 from ocp.friction.sequence import Leg, flat, placed, shown
 from ocp.result.motion import motion_of
 from ocp.solvers.ipopt import Ipopt
 from ocp.solvers.outcome import Iterate, Outcome, Report, in_stage
+from ocp.solving.clock import Clock
 from ocp.solving.one_solve import when
 from ocp.text.problem import Problem
 from ocp.text.span import Row
@@ -31,6 +32,9 @@ Array = NDArray[np.float64]
 
 LEAST = 3
 """Intervals of the shortest arc."""
+
+NEAR = 1.5
+"""Margins from its level at which a rest is no closer than it need be."""
 
 CLOSE = {"constr_mult_init_max": 1e8}
 """Options of a start that is nearly a solution: estimated multipliers are kept however large they
@@ -98,6 +102,25 @@ class Solved:
             found.append((values < 0.0).any(axis=0))
         return tuple(found)
 
+    def pressed(self, margin: float) -> bool:
+        """Whether some rest, or what ends or begins one, is as close to its level as it may be."""
+        spans = self.transcription.problem.spans
+        for span, points in zip(spans, self.points.spans, strict=True):
+            n, outputs = points.u.shape[1], span.model.outputs
+            rooms = {name: o.expression for name, o in outputs.items() if FIRST in name}
+            rooms |= {
+                name: ca.SX(o.expression) + (0 if PULLED in name else margin)
+                for name, o in outputs.items()
+                if name.endswith((PULLED, CAUGHT, STOPPED))
+            }
+            column = ca.Function("rooms", span.symbols, [stacked(map(ca.SX, rooms.values()))])
+            z, p = points.z[:, :: points.z.shape[1] // n], np.tile(span.p[:, None], (1, n))
+            values = column.map(n)(np.zeros((1, n)), points.nodes[:, :-1], z, points.u, p).full()
+            for name, row in zip(rooms, values, strict=True):
+                if (row if FIRST in name else row[:1]).min() < NEAR * margin:
+                    return True
+        return False
+
     @property
     def ok(self) -> bool:
         """Whether this is a solution."""
@@ -121,6 +144,8 @@ class Polisher:
         solver, scheme, progress: as in `polish`.
         shortest: least duration of an arc [s].
         kick: least length of the interval in which a contact breaks away or is caught [s].
+        margin: share of the static level that rests keep from it.
+        clock: when to stop.
     """
 
     problem: Problem
@@ -131,6 +156,8 @@ class Polisher:
     shortest: float
     kick: float
     progress: Report | None
+    margin: float = MARGIN
+    clock: Clock = field(default_factory=Clock)
 
     def solve(self, legs: Sequence[Leg], known: Known, intervals: int, barrier: float) -> Solved:
         """Find the durations and the motion of a sequence.
@@ -141,13 +168,21 @@ class Polisher:
             intervals: about how many, all of a length.
             barrier: parameter of the interior-point method to start with: small from close by.
         """
-        problem = in_arcs(self.problem, legs, self.sizes, self.at_rest, self.shortest)
         whole = sum(leg.duration for leg in legs)
         parts = [max(LEAST, round(intervals * arc.duration / whole)) for arc in flat(legs)]
         meshes = [np.linspace(0.0, 1.0, n + 1) for n in parts]
-        return self.on(
-            legs, discretise(problem, self.scheme, _sawn(problem)), meshes, known, barrier
-        )
+        return self.on(legs, self.discretised(legs), meshes, known, barrier)
+
+    def discretised(self, legs: Sequence[Leg]) -> Discretisation:
+        """The problem of a sequence, ready for meshes."""
+        rests = self.sizes, self.at_rest, self.shortest, self.margin
+        problem = in_arcs(self.problem, legs, *rests)
+        return discretise(problem, self.scheme, _sawn(problem))
+
+    def again(self, solved: Solved) -> Solved:
+        """A motion that was found with another margin, on its meshes."""
+        made = self.discretised(solved.legs)
+        return self.on(solved.legs, made, solved.transcription.meshes, solved.known, 1e-4)
 
     def on(
         self,
@@ -170,7 +205,7 @@ class Polisher:
         )
         stage = in_stage(self.progress, f"modes {shown(legs)}")
         rows = transcription.program.g.numel()
-        outcome = prepared.run(
+        outcome = self.clock.within(prepared).run(
             Iterate.cold(start, rows), progress=stage, at=partial(when, transcription)
         )
         durations = [span.T for span in transcription.unpack(outcome.iterate.w).spans]

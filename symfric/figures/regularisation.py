@@ -39,7 +39,7 @@ from symfric.laws import Law
 from symfric.laws.base.law import check_law
 from symfric.laws.base.sticking import Sticking
 from symfric.model import Model
-from symfric.model.kinds import FRICTION_STATE, POSITION
+from symfric.model.kinds import FRICTION_STATE, MODE, POSITION
 from symfric.results.trajectory import Trajectory
 from symfric.scenes import Scene
 
@@ -294,7 +294,7 @@ def positions(model: Model, law: Law) -> tuple[str, ...]:
     """The states of the machine, not of friction, that are no rates of others."""
     inside = {state.name for contact in model.contacts for state in contact.states}
     inside |= {state.name for state in law.states}
-    machine = [v for v in model.x if v.name not in inside and v.kind != FRICTION_STATE]
+    machine = [v for v in model.x if v.name not in inside and v.kind not in (FRICTION_STATE, MODE)]
     found = [v.name for v in machine if v.kind == POSITION]
     rates = {f"{v.unit}/s" for v in machine}
     return tuple(found or [v.name for v in machine if v.unit not in rates])

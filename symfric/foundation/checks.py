@@ -11,6 +11,7 @@ are none.
 """
 
 import operator
+import sys
 import unicodedata
 from collections.abc import Collection, Iterable, Mapping
 from difflib import get_close_matches
@@ -57,6 +58,8 @@ def shown(value: object) -> str:
         return f"the {kind} {_cut(str(value))}{size}"
     if isinstance(value, np.generic | np.ndarray):
         value = value.item()
+    if isinstance(value, int) and value.bit_length() >= sys.float_info.max_exp:
+        return f"an integer of {value.bit_length()} bits"
     if callable(value) and hasattr(value, "__name__"):
         return f"the function {value.__name__}"
     if isinstance(value, Showing):

@@ -161,7 +161,8 @@ def _problems(obj: Parametric) -> Iterator[str]:
             continue
         numbers, unit, low, high = _numbers(value), meta["unit"], meta["lower"], meta["upper"]
         if not numbers.size or not np.isfinite(numbers).all():
-            yield f"{item.name}: expected a finite number [{unit}] or a symbol, got {value!r}"
+            got = checks.shown(value)
+            yield f"{item.name}: expected a finite number [{unit}] or a symbol, got {got}"
         elif not ((low <= numbers) & (numbers <= high)).all():
             beyond = numbers[(numbers < low) | (numbers > high)][0]
             yield (

@@ -1,8 +1,9 @@
 """Many runs of one model: over arrays of parameters and start values, on one machine or many."""
 
+import warnings
 from collections.abc import Callable, Mapping
 from concurrent.futures import BrokenExecutor, Executor
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -11,9 +12,9 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symfric.foundation import checks
+from symfric.foundation import checks, packed
 from symfric.foundation.compiler import CompileError
-from symfric.foundation.status import SolveError, Status
+from symfric.foundation.status import OverloadWarning, SolveError, Status
 from symfric.integrator.arguments import (
     BACKENDS,
     check_flags,
@@ -27,14 +28,17 @@ from symfric.integrator.arguments import (
 from symfric.integrator.equations.initial import first_steps
 from symfric.integrator.many.chunk import Chunk, Job, Solved, digest, solve_chunk
 from symfric.integrator.many.given import MemberInput, Members, members_of
-from symfric.integrator.many.one_by_one import solve_one_by_one
+from symfric.integrator.many.one_by_one import Recipe, solve_elsewhere, solve_one_by_one, suited
 from symfric.integrator.many.store import Store
 from symfric.integrator.many.workers import EXECUTORS, pool_of, solved
+from symfric.integrator.methods.tableaux import key_of
 from symfric.integrator.running.built import built
+from symfric.integrator.running.doubts import of_members
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import Tolerances
 from symfric.integrator.step.layout import State
 from symfric.model import Model
+from symfric.model.kinds import in_results
 from symfric.results.ensemble import Ensemble
 
 if TYPE_CHECKING:
@@ -95,7 +99,8 @@ def simulate_many(
         executor: "serial", "threads" (the compiled loop holds no lock), "processes", or any
             `concurrent.futures.Executor`, such as a dask client's or mpi4py's: a task is plain
             data and the C source, so a worker needs nothing but this package and, for compiled
-            code, a compiler. Models with events are no plain data: "serial" or "threads" only.
+            code, a compiler. The task of a model with events holds the model, and each worker
+            builds its integrator once.
         workers: number of threads or processes, or of the executor's workers; default all cores
             of this machine. Twice as many chunks are under way at once.
         chunk: members per task; default 500, on a graphics processor so many that an attempt of
@@ -120,6 +125,7 @@ def simulate_many(
     Warns:
         UserWarning: rtol above 1e-5, where stick phases may get lost; results in `out` that are
             damaged, and computed again.
+        OverloadWarning: friction above its static level in some members (`Ensemble.doubtful`).
     """
     check_model("simulate_many", model)
     check_flags("simulate_many", progress)
@@ -141,7 +147,8 @@ def simulate_many(
     integrator, _ = built(model, inputs, formula)
     nominal = integrator.system.nominal
     allowed = tolerances("simulate_many", rtol, None, nominal, event_tolerance, max_steps, max_step)
-    integrator = _suited(integrator, given)
+    points = _points(integrator, given)
+    integrator = suited(integrator, points, given.inputs)
     way = _way(integrator, given, allowed, looks, (backend, real, executor))
     size = chunk or way.chunk
     picks = {first: slice(first, min(first + size, members)) for first in range(0, members, size)}
@@ -166,7 +173,7 @@ def simulate_many(
                     progress(done / members)
     except (KeyboardInterrupt, BrokenExecutor) as error:
         ended = error
-    found = _ensemble(model, looks, given, store, ended)
+    found = _doubted(_ensemble(model, looks, given, store, ended), model, given)
     if isinstance(ended, BrokenExecutor):
         raise _worker_ended(found, done, folder is not None) from ended
     return found
@@ -177,7 +184,10 @@ def _ensemble(
 ) -> Ensemble:
     """The result, of as many members as there are."""
     units = {n: unit for n, unit in _units(model).items() if n in (given.varied | given.fixed)}
-    reach = zip((v.name for v in model.x), store.reach.transpose(2, 1, 0), strict=True)
+    reach = {
+        v.name: in_results(v.kind, ends)
+        for v, ends in zip(model.x, store.reach.transpose(2, 1, 0), strict=True)
+    }
     return Ensemble(
         model.name,
         looks if looks.size else given.ends[:, None],
@@ -190,8 +200,22 @@ def _ensemble(
         given.varied,
         given.fixed,
         units,
-        dict(reach),
+        reach,
     )
+
+
+def _doubted(found: Ensemble, model: Model, given: Members) -> Ensemble:
+    """The result with what is doubtful of it, and one warning about all of that."""
+    p = np.tile(model.values("p"), (given.count, 1))
+    for k, v in enumerate(model.p):
+        p[:, k] = given.p.get(v.name, p[:, k])
+    doubtful = of_members(model, found.reach, p, given.x0)
+    doubtful = {m: why for m, why in doubtful.items() if m not in found.failed}
+    for first, why in list(doubtful.items())[:1]:
+        count = f"{len(doubtful)} of {given.count} members, the first is {first}"
+        said = f"simulate_many '{model.name}': friction is overloaded in {count}: {why}"
+        warnings.warn(said, OverloadWarning, stacklevel=3)
+    return replace(found, doubtful=doubtful)
 
 
 def _worker_ended(found: Ensemble, done: int, kept: bool) -> SolveError:
@@ -229,11 +253,6 @@ def _check(model: Model, backend: str, executor: object, real: str) -> None:
         raise checks.refused("simulate_many: executor", what, executor)
     if isinstance(executor, str):
         checks.choice("simulate_many: executor", executor, EXECUTORS)
-    if model.events and executor not in ("serial", "threads"):
-        raise ValueError(
-            f"simulate_many: executor: expected serial or threads for a model with events "
-            f"('{model.name}' has {len(model.events)}), got {executor}"
-        )
 
 
 def _ends(t_end: float | ArrayLike) -> float | Array:
@@ -256,19 +275,15 @@ def _all_later(ends: float | Array, t_start: float) -> None:
         )
 
 
-def _suited(integrator: Integrator, given: Members) -> Integrator:
-    """The integrator with pivots that are sound for the first, the middle and the last member."""
-    if integrator.system.manifold is not None or integrator.system.is_ode:
-        return integrator
-    span = float(given.inputs.breaks[-1] - given.inputs.breaks[0])
+def _points(integrator: Integrator, given: Members) -> tuple[tuple[Array, Array], ...]:
+    """Return (y, d) at the start of the first, the middle and the last member."""
+    if not integrator.has_pivots:
+        return ()
     points = list[tuple[Array, Array]]()
     for m in sorted({0, given.count // 2, given.count - 1}):
         y, p, data, _ = (rows[0] for rows in _alone(integrator, given, slice(m, m + 1)))
-        d = np.concatenate([p, data[:, 0]])
-        with suppress(ValueError):  # no consistent start: that member is reported by its number
-            points.append((integrator.start(y, d), d))
-            integrator = integrator.suited(points, span)
-    return integrator
+        points.append((y, np.concatenate([p, data[:, 0]])))
+    return tuple(points)
 
 
 @final
@@ -311,6 +326,10 @@ def _way(
     job = _job(partial(Job.of, integrator, inputs.breaks, looks), backend, most, here)
     if model.events:
         alone = partial(solve_one_by_one, integrator, inputs, allowed, backend, looks)
+        if executor not in ("serial", "threads"):
+            points, method = _points(integrator, given), key_of(integrator.tableau)
+            recipe = Recipe(model, inputs, method, points, allowed, backend, looks)
+            alone = partial(solve_elsewhere, packed.dumps(recipe))
         return _Way(job, partial(_alone, integrator, given), alone)
     return _Way(job, partial(_chunk, integrator, given, allowed), partial(solve_chunk, job))
 

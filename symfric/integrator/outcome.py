@@ -12,6 +12,7 @@ from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Run
 from symfric.integrator.stored import Later, Stored
+from symfric.model.kinds import in_results
 from symfric.results.statistics import Statistics
 from symfric.results.trajectory import Trajectory
 
@@ -50,7 +51,7 @@ def trajectory_of(
         y, columns = unknowns(at), None if drifts else integrator.states
         if columns is not None:
             y = columns([y.T, data(at)], backend=engine)[0].T
-        return dict(zip(names, y[: len(model.x)], strict=False))
+        return {v.name: in_results(v.kind, row) for v, row in zip(model.x, y, strict=False)}
 
     def data(at: Array) -> Array:
         return np.hstack([np.tile(p, (at.size, 1)), inputs.values[:, inputs.interval(at)].T])

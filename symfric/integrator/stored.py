@@ -18,7 +18,7 @@ from symfric.integrator.derivatives.path import Path
 from symfric.integrator.derivatives.seeds import Seeds
 from symfric.integrator.differentiated import Differentiated
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.methods.tableaux import METHODS, key_of
 from symfric.integrator.running.built import built
 from symfric.integrator.running.dense import Dense
 from symfric.integrator.running.events import Jumps
@@ -142,12 +142,11 @@ class Stored:
         trajectory: Trajectory, basis: Basis | None = None,
     ) -> "Stored":  # fmt: skip
         """A run and its trajectory, with steps that are found again where there were too many."""
-        method = integrator.tableau
         stored = cls(
             integrator.model,
             inputs,
             p,
-            next(key for key, known in METHODS.items() if known.name == method.name),
+            key_of(integrator.tableau),
             backend,
             run.engine,
             run.dense,

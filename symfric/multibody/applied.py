@@ -219,9 +219,7 @@ class _Maker:
         if by_modes and not single:
             begin = ca.SX(smooth.sign(rate, 0.0))
             doc = "sense in which the loop moves, 0 at rest"
-            variable = Variable(
-                f"{name}_direction", "1", start=begin, doc=doc, kind=kinds.FRICTION_STATE
-            )
+            variable = Variable(f"{name}_direction", "1", start=begin, doc=doc, kind=kinds.MODE)
             direction = (variable,)
         unit = contacts[0].unit("N") if single else ""
         doc = f"friction force of no sliding acceleration of {name}"

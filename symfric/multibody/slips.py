@@ -135,7 +135,7 @@ def _states(contact: Contact, begin: ca.SX) -> Variables:
             start=begin[i],
             nominal=s.nominal,
             doc=s.doc,
-            kind=kinds.FRICTION_STATE,
+            kind=kinds.MODE if s.whole else kinds.FRICTION_STATE,
         )
         for i, s in enumerate(contact.law.states)
     )

@@ -105,6 +105,11 @@ class Trajectory(Showing, Derivatives, Quadrature):
 
         return picture(self)
 
+    @property
+    def doubts(self) -> str:
+        """What its tolerances do not vouch for, in sentences; "" where nothing is known."""
+        return self.message.removeprefix(self.status.value).strip() if self.status.ok else ""
+
     @cached_property
     def statistics(self) -> Statistics:
         """Steps, evaluations, times."""

@@ -54,6 +54,11 @@ class Report:
         }
 
     @property
+    def refereed(self) -> int:
+        """Cases judged by the referee, which shares no code with symfric."""
+        return sum(v.by == "referee" for v in self.verdicts.values())
+
+    @property
     def passed(self) -> bool:
         """Whether no case is silently wrong, not finite, crashing or hanging."""
         return not any(self.classes[name] for name in FAILING)
@@ -76,6 +81,7 @@ class Report:
             "asked": self.asked,
             "seconds": round(self.seconds, 1),
             "classes": self.classes,
+            "refereed": self.refereed,
             "groups": self.groups,
             "errors_in_tolerances": self.errors(),
             "notable": [

@@ -16,9 +16,15 @@ from symfric.foundation.parameters import Parameter, options, parameters, with_v
 from symfric.laws import ALL_LAWS, Law, Viscous, law_from_text
 from symfric.scenes import ALL_SCENES, MECHANISMS, Scene
 from symfric.stress.dice import Dice, rounded
+from symfric.stress.referee import scenes as referee_scenes
+from symfric.stress.referee.laws import LAWS
+from symfric.stress.referee.solve import knows
 
 SCENES = ("rabinowicz",) * 6 + ("drive",) * 6 + ("quarter_car",) * 2 + tuple(MECHANISMS)
 """Scenes as often as they are drawn: those of one contact find most for their cost."""
+
+REFEREED = 0.5
+"""Share of the cases that are drawn from what the referee knows."""
 
 OFFERED: dict[str, set[str]] = {
     "quarter_car": {"F_e", "x_rel", "v_rel"},
@@ -130,8 +136,9 @@ class Case:
 def draw(seed: int, number: int) -> Case:
     """Case `number` of the campaign `seed`; each case has a sequence of its own."""
     dice = Dice(seed, number)
-    scene = dice.pick(SCENES)
-    text, law = _law(dice, scene)
+    refereed = dice.chance(REFEREED)
+    scene = dice.pick(tuple(referee_scenes.SCENES) if refereed else SCENES)
+    text, law = _of_the_referee(dice, scene) if refereed else _law(dice, scene)
     machine = ALL_SCENES[scene](law)
     forms = {
         name: dice.pick(form.choices) for name, form in options(law).items() if dice.chance(0.3)
@@ -161,6 +168,11 @@ def draw(seed: int, number: int) -> Case:
         method=dice.pick(ADAPTED if scene in MECHANISMS and not dice.chance(0.1) else METHODS),
         backend="compiled" if scene in ("rabinowicz", "drive") and dice.chance(0.01) else "vm",
     )
+
+
+def _of_the_referee(dice: Dice, scene: str) -> tuple[str, Law]:
+    name = dice.pick([name for name in LAWS if knows(name, scene)])
+    return name, law_from_text(name)
 
 
 def _law(dice: Dice, scene: str) -> tuple[str, Law]:

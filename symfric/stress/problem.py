@@ -17,6 +17,7 @@ from symfric.results.trajectory import Trajectory
 from symfric.scenes import ALL_SCENES
 from symfric.stress.cases import Case, Signal
 
+Array = NDArray[np.float64]
 WORK = 120_000
 TIMES = 101
 """Times at which runs are compared."""

@@ -8,6 +8,7 @@ CONVEXIFY, STAGES = "ocp/solvers/convexify.py", "ocp/transcription/stages.py"
 MOTION, STORED = "ocp/result/motion.py", "ocp/result/stored.py"
 STARTS, ONE = "ocp/solving/starts.py", "ocp/solving/one_solve.py"
 
+T_FALLBACK = ("tests/ocp/friction/test_fallback.py",)
 T_WATCH = ("tests/ocp/solvers/test_watch.py",)
 T_IPOPT = ("tests/ocp/solvers/test_ipopt_runs.py",)
 T_ANSWERS = ("tests/ocp/solvers/test_answers.py",)
@@ -168,5 +169,22 @@ RESULTS = (
     Mutant(
         "contacts that never turn round are blamed", "ocp/solving/kinks.py",
         "if turns and 0.0 < width", "if 0.0 < width", ("tests/ocp/solving/test_kinks.py",),
+    ),
+    Mutant(
+        "one mode asks for the reactions of another", "ocp/friction/release.py",
+        "for v in moving.z}", "for v in held.z}", T_FALLBACK,
+    ),
+    Mutant(
+        "what fails among modes is raised", "ocp/job.py",
+        'said = f"Modes were not found: {_why(error)}."', "raise", T_FALLBACK,
+    ),
+    Mutant(
+        "rests keep one margin whatever was asked for", "ocp/friction/arcs.py",
+        "LEVEL if side == open_side else margin", "LEVEL if side == open_side else MARGIN",
+        ("tests/ocp/friction/test_resting_margin.py",),
+    ),
+    Mutant(
+        "meshes are looked at where they are used", "ocp/solve.py",
+        "    if intervals is not None:\n", "    if False:\n", ("tests/ocp/test_arguments.py",),
     ),
 )  # fmt: skip

@@ -176,6 +176,22 @@ def input_data(
     return found.stopping_at(onsets) if onsets else found
 
 
+def paced(inputs: InputData, model: Model) -> InputData:
+    """The same inputs, with breaks where a function of time in the model's own equations, the ramp
+    of a road, changes its pace: with states at zero, and parameters at their start values.
+    """
+    if (rows := model.memory.get("rows of time")) is None:
+        of_time = np.flatnonzero(ca.which_depends(model.residual, model.t, 1, True)).tolist()
+        others = ca.vertcat(model.xdot, *(model.vector(letter) for letter in "xzup"))
+        still = ca.DM.zeros(others.numel())
+        still[others.numel() - len(model.p) :] = model.values("p")
+        frozen = ca.substitute(model.residual[of_time], others, ca.SX(still))
+        rows = tuple(ca.SX.serialize(row) for row in ca.vertsplit(frozen)) if of_time else ()
+        model.memory["rows of time"] = rows
+    times = [t for row in rows for t in onsets(row, *inputs.span)]
+    return inputs.stopping_at(times) if times else inputs
+
+
 def _written(model: Model, parts: "list[_Part]") -> tuple[ca.SX, ca.SX]:
     """Expression and data of inputs of this structure, written once and kept with the model."""
     known: dict[Hashable, tuple[ca.SX, ca.SX]] = model.memory.setdefault("inputs", {})

@@ -1,4 +1,4 @@
-"""Where an input that is a function of time changes its pace, so that no pulse is leapt over.
+"""Where a function of time, an input or a model's own, changes its pace: no pulse is leapt over.
 
 While a machine rests, steps grow until they are longer than a pulse that is still to come, and no
 stage falls on it. The function is known, however, and cheap: it is looked at on a grid, and the

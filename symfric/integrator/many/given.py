@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
 from symfric.integrator.equations.initial import first_guess
-from symfric.integrator.equations.inputs import Hold, Input, InputData, Sampled, input_data
+from symfric.integrator.equations.inputs import Hold, Input, InputData, Sampled, input_data, paced
 from symfric.integrator.equations.system import System
 from symfric.model import Model
 
@@ -121,7 +121,7 @@ def members_of(
         count,
         {v.name: every[f"x0.{v.name}"] for v in model.x if f"x0.{v.name}" in every},
         {v.name: every[f"p.{v.name}"] for v in model.p if f"p.{v.name}" in every},
-        input_data(model, common, t_start, last),
+        paced(input_data(model, common, t_start, last), model),
         own,
         _between(times, t_start, last),
         np.broadcast_to(ends, (count,)).astype(float),

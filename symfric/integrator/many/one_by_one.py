@@ -1,16 +1,79 @@
 """Members of an ensemble one by one, for models with events."""
 
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import final
+
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation import packed
 from symfric.foundation.status import Status
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.many.chunk import Solved
 from symfric.integrator.many.given import input_of
+from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.running.built import built
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import Tolerances, integrate
+from symfric.model import Model
 
 Array = NDArray[np.float64]
+Points = Sequence[tuple[Array, Array]]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Recipe:
+    """How another process builds the integrator of an ensemble; `packed.dumps` takes it.
+
+    Attributes:
+        model, inputs: what is integrated.
+        method: a key of `METHODS`.
+        points: see `suited`.
+        tolerances, backend, times: see `solve_one_by_one`.
+    """
+
+    model: Model
+    inputs: InputData
+    method: str
+    points: tuple[tuple[Array, Array], ...]
+    tolerances: Tolerances
+    backend: str
+    times: Array
+
+    def integrator(self) -> Integrator:
+        """Build the integrator, with the pivots that the calling process has."""
+        plain, _ = built(self.model, self.inputs, METHODS[self.method])
+        return suited(plain, self.points, self.inputs)
+
+
+def suited(integrator: Integrator, points: Points, inputs: InputData) -> Integrator:
+    """Return the integrator with pivots that are sound where members start, at (y, d) each."""
+    begin, end = inputs.span
+    known = list[tuple[Array, Array]]()
+    for y, d in points:
+        with suppress(ValueError):  # no consistent start: that member is reported by its number
+            known.append((integrator.start(y, d), d))
+            integrator = integrator.suited(known, end - begin)
+    return integrator
+
+
+@lru_cache(4)
+def _followed(recipe: bytes) -> tuple[Recipe, Integrator]:
+    """The recipe and its integrator; built once in a process."""
+    loaded: Recipe = packed.loads(recipe)
+    return loaded, loaded.integrator()
+
+
+def solve_elsewhere(recipe: bytes, given: tuple[Array, Array, Array, Array]) -> Solved:
+    """Integrate members as `solve_one_by_one`, from the pack of a `Recipe` alone."""
+    known, integrator = _followed(recipe)
+    return solve_one_by_one(
+        integrator, known.inputs, known.tolerances, known.backend, known.times, given
+    )
 
 
 def solve_one_by_one(

@@ -280,3 +280,8 @@ METHODS: dict[str, Method] = {
 
 ADAPTIVE: dict[str, Method] = {name: m for name, m in METHODS.items() if m.adaptive}
 """Those that control their step size, for `simulate`."""
+
+
+def key_of(method: Method) -> str:
+    """Return the name by which a user writes `method`."""
+    return next(key for key, known in METHODS.items() if known.name == method.name)

@@ -27,6 +27,7 @@ from symfric.integrator.running.engine import BATCH, CompiledEngine, Engine, VmE
 from symfric.integrator.running.loop import Work, loop_source
 from symfric.integrator.step.written import written
 from symfric.model import Model
+from symfric.model.kinds import in_results
 
 Array = NDArray[np.float64]
 Point = tuple[bytes | float, ...]
@@ -122,11 +123,20 @@ class Integrator:
             self.model.events,
             [v.name for v in self.model.x],
             self.events,
+            self._sizes(),
             self.resets,
             self.tableau.H.shape[0],
             self.follows,
             manifold is not None and manifold.m > 0,
         )
+
+    def _sizes(self) -> ca.Function:
+        """What t and y contribute to event expressions (t, y, d), in magnitude."""
+        s, t = self.system, ca.SX.sym("time")
+        values = stacked(ca.SX(e.expression) for e in self.model.events)
+        own = ca.vertcat(t, s.y)
+        slopes = ca.jacobian(self.of_time("events", ca.densify(values))(t, s.y, s.d), own)
+        return ca.Function("sizes", [t, s.y, s.d], [ca.fabs(slopes) @ ca.fabs(own)])
 
     def of_time(self, name: str, expression: ca.SX) -> ca.Function:
         """`expression` of the model as a Function (t, y, d), inputs put in."""
@@ -148,10 +158,11 @@ class Integrator:
 
     @property
     def _every(self) -> ca.SX:
-        """All signals of the model."""
+        """All signals of the model, modes as the whole numbers that they are."""
         m = self.model
+        x = (in_results(v.kind, v.symbol) for v in m.x)
         outputs = (ca.SX(o.expression) for o in m.outputs.values())
-        return ca.vertcat(m.vector("x"), m.vector("z"), m.vector("u"), *outputs)
+        return ca.vertcat(*x, m.vector("z"), m.vector("u"), *outputs)
 
     @cached_property
     def signals(self) -> ca.Function:

@@ -19,12 +19,16 @@ def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
     """`method(law, v, N, z)` that takes states as people have them, and refuses others.
 
     Raises:
-        ValueError: as many states as the law does not have, and which it has.
+        ValueError: another number of states than the law has; an integer that no float holds.
     """
 
     @wraps(method)
     def checked(law: "Law", v: Scalar, N: Scalar, z: Scalar = (), *more: Any, **inputs: Any) -> Any:
         slip, load = plain(v), plain(N)
+        for name, value in (("v", slip), ("N", load)):
+            if type(value) is int and not is_number(value):
+                where = f"{type(law).__name__}.{method.__name__}: {name}"
+                raise checks.refused(where, "a number that a float can hold", value)
         return method(law, slip, load, states_of(law, slip, plain(z)), *more, **inputs)
 
     return checked

@@ -30,7 +30,7 @@ class Sticking(Law):
     def states(self) -> tuple[State, ...]:
         """The mode: direction of sliding, or 0 at rest."""
         return (
-            (State("mode", "1", 1.0, doc="direction of sliding, 0 at rest"),)
+            (State("mode", "1", 1.0, doc="direction of sliding, 0 at rest", whole=True),)
             if self.has_mode
             else ()
         )

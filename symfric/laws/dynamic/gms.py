@@ -58,7 +58,8 @@ class GMS(Law):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V", "P", "M", "L", "B", "N"),
         smoothness="C2 (switched as rho -> 0)",
-        confidence="two sources; smooth form constructed",
+        confidence="two sources",
+        checked="jchristopherson/friction README; the paper of 2003; smooth form constructed",
         source="Al-Bender, Lampaert, Swevers, IEEE TAC 50(11), 2005",
         load="proportional in steady sliding",
     )
@@ -96,8 +97,8 @@ class GMS(Law):
         """The spring forces and the modes."""
         count = range(1, len(self.elements) + 1)
         forces = tuple(State(f"F_{i}", "N", 0.1, doc="spring force") for i in count)
-        mode = "0 in stick, 1 in slip"
-        return forces + tuple(State(f"p_{i}", "1", 1.0, even=True, doc=mode) for i in count)
+        mode, whole = "0 in stick, 1 in slip", self.form == "event"
+        return forces + tuple(State(f"p_{i}", "1", 1.0, True, mode, whole) for i in count)
 
     @property
     def velocity_scale(self) -> Scalar:

@@ -53,6 +53,7 @@ class MaxwellSlip(Law):
         phenomena=("D", "P", "M", "N"),
         smoothness="C∞ (C0 at the corners as n -> inf)",
         confidence="two sources",
+        checked="jchristopherson/friction README; Lampaert, Al-Bender, Swevers 2003",
         source="Iwan, J. Appl. Mech. 33(4), 1966",
         load="proportional in steady sliding",
     )
@@ -79,7 +80,7 @@ class MaxwellSlip(Law):
         count = range(1, len(self.elements) + 1)
         forces = tuple(State(f"F_{i}", "N", 0.1, doc="spring force") for i in count)
         mode = "1 while the element slips"
-        modes = tuple(State(f"slip_{i}", "1", 1.0, even=True, doc=mode) for i in count)
+        modes = tuple(State(f"slip_{i}", "1", 1.0, True, mode, whole=True) for i in count)
         return forces + (modes if self.form == "event" else ())
 
     @property

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from symfric.foundation.numeric import Scalar, equals, exp, tanh
+from symfric.foundation.numeric import Scalar, equals, tanh
 from symfric.foundation.parameters import param
 from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, StaticLaw
@@ -16,7 +16,7 @@ class Tustin(StaticLaw):
 
         F = N [mu_d + (mu_s - mu_d) exp(-|v|/v_s)] sign(v) + sigma_2 v
 
-    |v| and sign(v) are smooth over v_eps; the float v_eps = 0 is the original.
+    sign(v) is smooth over v_eps, |v| over 1e-4 v_eps; the float v_eps = 0 is the original.
     Limits: `Stribeck` with delta = 1; mu_s = mu_d gives Coulomb + viscous, which some papers call
     Tustin's law. Keep v_eps << v_s, as there. Creeps under load.
     Source: Tustin, J. IEE 94, 1947, in the form of Armstrong-Helouvry 1994 (neither was read).
@@ -25,7 +25,8 @@ class Tustin(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
-        confidence="memory",
+        confidence="one source",
+        checked="MassWithStopAndFriction of the Modelica Standard Library; not the name",
         source="Tustin 1947, as cited in control literature",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -52,7 +53,7 @@ class Tustin(StaticLaw):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
-        falling = smooth.stribeck(v, self.v_s, 1.0, self.v_eps)
+        falling = smooth.stribeck(v, self.v_s, 1.0, smooth.CORNER * self.v_eps)
         mu = self.mu_d + (self.mu_s - self.mu_d) * falling
         return mu * N * smooth.sign(v, self.v_eps) + self.sigma_2 * v
 
@@ -64,7 +65,7 @@ class Benson(StaticLaw):
 
         F = N [mu_d + (mu_s - mu_d) exp(-d_c |v|)] sign(v)
 
-    |v| and sign(v) are smooth over v_eps; the float v_eps = 0 is the original.
+    sign(v) is smooth over v_eps, |v| over 1e-4 v_eps; the float v_eps = 0 is the original.
     Limits: `Tustin` with v_s = 1/d_c and without viscous friction. Creeps under load.
     Source: Benson and Hallquist 1990 (not read), as documented in LS-DYNA (FS, FD, DC) and COMSOL.
     """
@@ -73,6 +74,7 @@ class Benson(StaticLaw):
         phenomena=("D", "S", "St"),
         smoothness="C∞",
         confidence="two sources",
+        checked="documentation of LS-DYNA and of COMSOL",
         source="Benson and Hallquist 1990, as in LS-DYNA and COMSOL",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -98,7 +100,7 @@ class Benson(StaticLaw):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
-        falling = exp(-self.d_c * smooth.power(v, 1.0, self.v_eps))
+        falling = smooth.stribeck(v, 1 / self.d_c, 1.0, smooth.CORNER * self.v_eps)
         mu = self.mu_d + (self.mu_s - self.mu_d) * falling
         return mu * N * smooth.sign(v, self.v_eps)
 
@@ -110,8 +112,8 @@ class Berger(StaticLaw):
 
         F = N [mu_d + (mu_s - mu_d) exp(-|v|/v_s)] tanh(v / v_t)
 
-    Berger's paper is a review that lists mu(v) laws and proposes no single one; this is the choice
-    here for papers that compare "Berger's model".
+    |v| is smooth over 1e-4 v_t. Berger's paper is a review that lists mu(v) laws and proposes no
+    single one; this is the choice here for papers that compare "Berger's model".
     Limits: `Tustin` with v_eps = v_t, without viscous friction. Creeps under load.
     Source: interpretation of Berger, Appl. Mech. Rev. 55(6), 2002 (not read).
     """
@@ -119,7 +121,8 @@ class Berger(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C∞",
-        confidence="reconstruction (interpretation of a review)",
+        confidence="rebuilt",
+        checked="an interpretation of a review that proposes no law",
         source="after Berger 2002",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -145,7 +148,7 @@ class Berger(StaticLaw):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
-        falling = smooth.stribeck(v, self.v_s, 1.0, self.v_t)
+        falling = smooth.stribeck(v, self.v_s, 1.0, smooth.CORNER * self.v_t)
         return (self.mu_d + (self.mu_s - self.mu_d) * falling) * N * tanh(v / self.v_t)
 
 
@@ -156,7 +159,7 @@ class DuanSingh(StaticLaw):
 
         F = mu_d N [1 + (mu_s/mu_d - 1) exp(-c |v|)] tanh(sigma v)
 
-    |v| is smooth over 1/sigma.
+    |v| is smooth over 1e-4/sigma.
     Limits: mu_s = mu_d gives mu_d N tanh(sigma v); F -> mu_d N; `Andersson` with p = 1, k_t = sigma
     and v_s = 1/c. Creeps under load.
     Source: Duan and Singh 2006 (not read).
@@ -165,7 +168,8 @@ class DuanSingh(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S"),
         smoothness="C∞",
-        confidence="memory",
+        confidence="unverified",
+        checked="the expression is that of Andersson with p = 1",
         source="Duan and Singh 2006",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -189,7 +193,7 @@ class DuanSingh(StaticLaw):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
-        falling = exp(-self.c * smooth.power(v, 1.0, 1 / self.sigma))
+        falling = smooth.stribeck(v, 1 / self.c, 1.0, smooth.CORNER / self.sigma)
         return (self.mu_d + (self.mu_s - self.mu_d) * falling) * N * tanh(self.sigma * v)
 
 
@@ -200,7 +204,7 @@ class Andersson(StaticLaw):
 
         F = N [mu_d + (mu_s - mu_d) exp(-(|v|/v_s)^p)] tanh(k_t v) + sigma_2 v
 
-    |v|^p is smooth over 1/k_t; p = 2 is exact.
+    |v|^p is smooth over 1e-4/k_t; p = 2 is exact.
     Limits: `Stribeck` with v_eps = 1/k_t, and its original form as k_t -> inf. The peak is 0.968
     mu_s N at k_t v_s = 10, p = 2. Creeps under load.
     Source: Andersson, Soderberg, Bjorklund, Tribol. Int. 40, 2007 (not read), as in public code.
@@ -210,6 +214,7 @@ class Andersson(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="one source",
+        checked="public MATLAB function Friction_A",
         source="Andersson, Soderberg, Bjorklund 2007, as in public code",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -237,7 +242,7 @@ class Andersson(StaticLaw):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
-        falling = smooth.stribeck(v, self.v_s, self.p, 1 / self.k_t)
+        falling = smooth.stribeck(v, self.v_s, self.p, smooth.CORNER / self.k_t)
         mu = self.mu_d + (self.mu_s - self.mu_d) * falling
         return mu * N * tanh(self.k_t * v) + self.sigma_2 * v
 
@@ -249,9 +254,10 @@ class SteadyStateLuGre(StaticLaw):
 
         F = [F_C + (F_S - F_C) exp(-|v/v_s|^delta)] sign(v) + sigma_2 v
 
-    |v| and sign(v) are smooth over v_eps; the float v_eps = 0 is the original. The levels are
-    forces, since the normal force of the published sets is not reported. The sets `pilot` and
-    `main` hold from 140 to 500 mm/min only: at 1 m/s the viscous term of `pilot` alone is 230 N.
+    sign(v) is smooth over v_eps, |v| over 1e-4 v_eps; the float v_eps = 0 is the original. The
+    levels are forces, since the normal force of the published sets is not reported. The sets
+    `pilot` and `main` hold from 140 to 500 mm/min only: at 1 m/s the viscous term of `pilot` alone
+    is 230 N.
     Limits: `LuGre` in steady sliding; `Stribeck` with N mu = F.
     Source: A Friction Model for Laminator Nips, MSc thesis, Lund 2015, equation 4.1, tables 5.1
     and 5.2.
@@ -261,6 +267,7 @@ class SteadyStateLuGre(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="two sources",
+        checked="the thesis, equation 4.1; auralius/LuGre lugre.m (delta = 2)",
         source="A Friction Model for Laminator Nips, MSc thesis, Lund 2015; LuGre",
         load="independent",
     )
@@ -293,7 +300,7 @@ class SteadyStateLuGre(StaticLaw):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
-        falling = smooth.stribeck(v, self.v_s, self.delta, self.v_eps)
+        falling = smooth.stribeck(v, self.v_s, self.delta, smooth.CORNER * self.v_eps)
         level = self.F_C + (self.F_S - self.F_C) * falling
         return level * smooth.sign(v, self.v_eps) + self.sigma_2 * v
 

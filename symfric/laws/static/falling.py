@@ -25,7 +25,8 @@ class Lorentzian(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
-        confidence="memory",
+        confidence="one source",
+        checked="g(v) of jchristopherson/friction README with alpha = 2; not the name",
         source="Hess and Soom 1990",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -63,18 +64,18 @@ class Lorentzian(StaticLaw):
 class PoppStelter(StaticLaw):
     """Popp-Stelter friction: a hyperbolic fall and a quadratic rise.
 
-        F = {mu_s N [(1 - eta) / (1 + d |v|) + eta] + kappa v^2} sign(v)
+        F = N {mu_s [(1 - eta) / (1 + d |v|) + eta] + kappa v^2} sign(v)
 
-    |v| and sign(v) are smooth over v_eps; the float v_eps = 0 is the original.
-    Limits: eta mu_s N is the level that the fall tends to; kappa v^2 is independent of the load.
-    Creeps under load.
+    sign(v) is smooth over v_eps, |v| over 1e-4 v_eps; the float v_eps = 0 is the original.
+    Limits: eta mu_s N is the level that the fall tends to. The braces are the coefficient mu(v),
+    so that the quadratic rise is proportional to the load, too. Creeps under load.
     Source: Popp and Stelter, Phil. Trans. R. Soc. A 332, 1990 (not read).
     """
 
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
-        confidence="memory",
+        confidence="unverified",
         source="Popp and Stelter 1990",
     )
 
@@ -84,7 +85,7 @@ class PoppStelter(StaticLaw):
         1e3, unit="s/m", role="velocity scale", doc="steepness of the fall", lower=1e-12
     )
     kappa: Scalar = param(
-        0.0, unit="N s^2/m^2", role="viscous", doc="quadratic coefficient", lower=0.0
+        0.0, unit="s^2/m^2", role="viscous", doc="quadratic coefficient", lower=0.0
     )
     v_eps: Scalar = param(
         1e-4, unit="m/s", role="width", width=1, doc="smoothing velocity", lower=0.0
@@ -98,13 +99,15 @@ class PoppStelter(StaticLaw):
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""
         fall = (1 - self.eta) / (1 + smooth.onward(self.d * speed)) + self.eta
-        level = self.mu_s * N * fall
-        return level if equals(self.kappa, 0.0) else level + self.kappa * speed * speed
+        mu = self.mu_s * fall
+        return N * (mu if equals(self.kappa, 0.0) else mu + self.kappa * speed * speed)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
-        fall = (1 - self.eta) / (1 + self.d * smooth.magnitude(v, self.v_eps)) + self.eta
-        level = self.mu_s * N * fall
+        fall = (1 - self.eta) / (
+            1 + self.d * smooth.magnitude(v, smooth.CORNER * self.v_eps)
+        ) + self.eta
+        mu = self.mu_s * fall
         if not equals(self.kappa, 0.0):
-            level += self.kappa * v * v
-        return level * smooth.sign(v, self.v_eps)
+            mu += self.kappa * v * v
+        return mu * N * smooth.sign(v, self.v_eps)

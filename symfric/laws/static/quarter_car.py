@@ -39,7 +39,8 @@ class QuarterCarGeneral(StaticLaw):
     at rest is not limited, and exp(|v|/e_1) needs e_1 < 0: here e_1 is its magnitude.
     C_e, e_1, mu, sigma_v and L_d are not given in the paper; their defaults are invented, sigma_v
     so that friction lessens the overshoot of the body, as the paper says.
-    Limits: holds |f_sd| <= F_brk - F_eps at rest; mu = 0 leaves the simple law beyond v_eps;
+    Limits: holds |f_sd| <= F_brk - F_eps at rest; within v_eps friction may drive, F v >= -0.274
+    F_brk v_eps (as printed at any speed); mu = 0 leaves the simple law beyond v_eps;
     x_rel < L_d / (2 sin(theta)).
     Source: Al-Zughaibi, quarter-car friction, equations 7-12 and 24, corrected as said.
     """
@@ -48,6 +49,7 @@ class QuarterCarGeneral(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C2 at 0, |v| = v_eps, |f_sd| = F_brk -+ F_eps (as printed: jump at 0)",
         confidence="one source",
+        checked="the paper, corrected as said",
         source="Al-Zughaibi, quarter-car friction, corrected",
         odd=False,
         load="independent",
@@ -147,9 +149,10 @@ class QuarterCarSimple(StaticLaw):
 
         F = C_e exp(-|v|/e_1) sign(v) + sigma_v v
 
-    |v| and sign(v) are smooth over v_eps; the float v_eps = 0 is the original. As printed the
-    exponent grows: here e_1 is the magnitude of the paper's. `N` has no effect. C_e, e_1 and
-    sigma_v are not given in the paper; their defaults are invented, as for `QuarterCarGeneral`.
+    sign(v) is smooth over v_eps, |v| over 1e-4 v_eps; the float v_eps = 0 is the original. As
+    printed the exponent grows: here e_1 is the magnitude of the paper's. `N` has no effect. C_e,
+    e_1 and sigma_v are not given in the paper; their defaults are invented, as for
+    `QuarterCarGeneral`.
     Limits: `Tustin` with a dynamic level of zero. Creeps under load; `QuarterCarGeneral` with
     mu = 0 holds at rest.
     Source: Al-Zughaibi, quarter-car friction, equation 21, with the sign of e_1 corrected.
@@ -159,6 +162,7 @@ class QuarterCarSimple(StaticLaw):
         phenomena=("S", "St", "V"),
         smoothness="C∞",
         confidence="one source",
+        checked="the paper, corrected as said",
         source="Al-Zughaibi, quarter-car friction, corrected",
         load="independent",
     )
@@ -185,5 +189,5 @@ class QuarterCarSimple(StaticLaw):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
-        dry = self.C_e * exp(-smooth.power(v, 1.0, self.v_eps) / self.e_1)
+        dry = self.C_e * smooth.stribeck(v, self.e_1, 1.0, smooth.CORNER * self.v_eps)
         return dry * smooth.sign(v, self.v_eps) + self.sigma_v * v

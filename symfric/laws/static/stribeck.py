@@ -16,9 +16,10 @@ class Stribeck(StaticLaw):
 
         F = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)] tanh(v / v_eps) + sigma_2 v
 
-    delta = 1 is Tustin's law, delta = 2 the Gaussian one. Keep v_eps << v_s: the peak is
-    0.968 mu_s N at v_eps = v_s/10 and tends to mu_s N as v_eps -> 0; the float v_eps = 0 is the
-    original with sign(v), 0 at rest.
+    delta = 1 is Tustin's law, delta = 2 the Gaussian one. For other delta |v| is rounded over
+    1e-4 v_eps, which changes F by less than 1e-4 (mu_s - mu_d) N. Keep v_eps << v_s: for delta = 2
+    the peak is 0.968 mu_s N at v_eps = v_s/10 and tends to mu_s N as v_eps -> 0; the float
+    v_eps = 0 is the original with sign(v), 0 at rest.
     Limits: mu_s = mu_d gives `Coulomb` + `Viscous`; at |v| = v_s the bracket is
     mu_d + (mu_s - mu_d)/e for every delta. Creeps under load like `Coulomb`.
     Source: Stribeck 1902; Hess and Soom 1990; Bo and Pavelescu, Wear 82, 1982 (exponent).
@@ -28,6 +29,7 @@ class Stribeck(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="two sources",
+        checked="jchristopherson/friction (delta = 2); the Lund thesis on laminator nips (delta)",
         source="Stribeck 1902; Bo and Pavelescu 1982 (exponent)",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -57,6 +59,6 @@ class Stribeck(StaticLaw):
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""
-        falling = smooth.stribeck(v, self.v_s, self.delta, self.v_eps)
+        falling = smooth.stribeck(v, self.v_s, self.delta, smooth.CORNER * self.v_eps)
         mu = self.mu_d + (self.mu_s - self.mu_d) * falling
         return mu * N * smooth.sign(v, self.v_eps) + self.sigma_2 * v

@@ -37,7 +37,7 @@ def polished() -> Solution:
     problem = out_and_back()
     smooth = solve_once(smoothed(problem, 0.05), intervals=25)
     smooth = solve_once(smoothed(problem, 0.015), intervals=25, guess=smooth)
-    return polish(smooth, problem, {"guide": 0.015})
+    return next(polish(smooth, problem, {"guide": 0.015}))[0]
 
 
 def test_out_and_back_is_the_closed_form() -> None:

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from symfric import LuGre
 from symfric.foundation import checks
 
 NUMBERS: list[Any] = [
@@ -149,3 +150,11 @@ def test_a_long_value_is_cut() -> None:
     with pytest.raises(ValueError, match=r"got 'xxxxx.*\.\.\.$") as caught:
         checks.number("w", "x" * 10_000)
     assert len(str(caught.value)) < 120
+
+
+def test_integers_that_no_float_holds_are_refused_in_a_sentence() -> None:
+    huge = 10**5000
+    with pytest.raises(ValueError, match=r"LuGre\.force: N: expected a number .*16610 bits"):
+        LuGre().force(0.1, huge, [0.0])
+    with pytest.raises(ValueError, match=r"LuGre: mu_s: expected a finite number .*16610 bits"):
+        LuGre(mu_s=huge)

@@ -80,7 +80,7 @@ def test_derivatives_at_rest_are_those_of_the_side(name: str, side: int) -> None
     assert np.isfinite(here).all()
     if "delta 0.78" in name:  # infinite as it stands: its power is rounded over 1e-6 v_s
         return
-    h = side * 1e-7
+    h = side * 1e-8
     quotient = (4 * float(at(h)[0]) - float(at(2 * h)[0]) - 3 * here[0]) / (2 * h)
     assert here[1] == pytest.approx(quotient, rel=2e-3, abs=2e-3 * abs(here[0]))
     beyond = [float(x) for x in at(-side * 10.0)]

@@ -81,9 +81,8 @@ def general(v: float, x_rel: float, v_rel: float) -> float:
 
 
 def simple(v: float, x_rel: float, v_rel: float) -> float:
-    """Equation 21, decaying, with a smooth velocity."""
-    speed = sqrt(v * v + 1e-6) - 1e-3
-    return 180 * exp(-speed / 0.01) * np.tanh(v / 1e-3) + 50 * v
+    """Equation 21, decaying, with a smooth sign."""
+    return 180 * exp(-abs(v) / 0.01) * np.tanh(v / 1e-3) + 50 * v
 
 
 def loaded(v: float, x_rel: float, v_rel: float) -> float:

@@ -9,20 +9,31 @@ from symfric.stress.campaign import Report, campaign, rerun
 from symfric.stress.cases import Case, draw
 from symfric.stress.judge import CLASSES, FAILING, Verdict, judge
 
-COSTLY = {"arm": 10, "four_bar": 10, "double_pendulum": 2}
-"""Scenes of which the suite takes one case in so many."""
+COSTLY = ("arm", "four_bar", "double_pendulum")
+"""Scenes of which the suite takes no case."""
+SEEDS = (20261, 20262, 20263, 20264)
 
 
-@pytest.mark.parametrize("count", [200, pytest.param(500, marks=pytest.mark.slow)])
-def test_of_random_cases_none_is_silently_wrong_or_ends_badly(count: int) -> None:
-    """The suite's share of `symfric stress`, with a tenth of its work; 18 s of one core."""
-    numbers = [n for n in range(700) if n % COSTLY.get(draw(1, n).scene, 1) == 0][:count]
+def test_of_a_few_random_cases_none_is_silently_wrong_or_ends_badly() -> None:
+    """The suite's share of `symfric stress`."""
+    numbers = [n for n in range(60) if draw(1, n).scene not in COSTLY][:24]
     report = campaign(numbers, work=12_000)
     failing = {n: v.reason for n, v in report.verdicts.items() if v.kind in FAILING}
     assert not failing
-    assert report.classes["right"] > 0.64 * count
-    assert report.classes["undecided"] < 0.18 * count
-    assert len(report.verdicts) == count
+    assert report.classes["right"] > 0.6 * len(numbers)
+    assert report.refereed > 0.3 * len(numbers)
+    assert len(report.verdicts) == len(numbers)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", SEEDS)
+def test_of_500_random_cases_none_is_silently_wrong_and_few_are_undecided(seed: int) -> None:
+    report = campaign(500, seed)
+    failing = {n: v.reason for n, v in report.verdicts.items() if v.kind in FAILING}
+    assert not failing
+    assert report.classes["undecided"] < 5
+    assert report.classes["right"] > 350
+    assert report.refereed > 200
 
 
 def test_workers_do_not_change_what_is_found() -> None:

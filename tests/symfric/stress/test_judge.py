@@ -7,17 +7,18 @@ import pytest
 
 from symfric.foundation.status import SolveError, Status
 from symfric.stress.cases import Case, Signal
-from symfric.stress.judge import (
+from symfric.stress.judge import by_methods, judge
+from symfric.stress.measures import (
     RIGHT,
     amplification,
     at_steps,
     distance,
-    judge,
+    of,
     tolerances,
     worst_step,
 )
-from symfric.stress.peer import by_scipy
 from symfric.stress.problem import Problem, problem
+from symfric.stress.refereed import question
 
 EASY = Case(1, 1, "rabinowicz", "brown_mcphee", t_end=2.0)
 """A block that the belt takes along and loses."""
@@ -81,10 +82,10 @@ def test_a_foreign_exception_comes_through(monkeypatch: pytest.MonkeyPatch) -> N
 def test_distance_counts_tolerances() -> None:
     ready = problem(EASY)
     run = ready.run(1e-6, "rodas5p", max_steps=10_000)
-    assert distance(ready, run, run) == 0.0
+    assert distance(ready, run, of(run)) == 0.0
     shifted = replace(run, states=lambda t: {n: y + 2e-6 for n, y in run.states(t).items()})
     table = np.stack([run["x"], run["v"]])
-    assert distance(ready, shifted, run) == pytest.approx(2e-6 / tolerances(ready, table).min())
+    assert distance(ready, shifted, of(run)) == pytest.approx(2e-6 / tolerances(ready, table).min())
 
 
 def test_what_a_problem_makes_of_a_tolerance_is_measured() -> None:
@@ -94,21 +95,47 @@ def test_what_a_problem_makes_of_a_tolerance_is_measured() -> None:
     run = ready.run(1e-9, "radau5", max_steps=ready.attempts)
     angle, rate = tolerances(ready, np.stack([run["phi"], run["phi_rate"]]))[:, 0]
     grown = angle * w * np.sinh(w) + rate * np.cosh(w)
-    assert amplification(ready, run, ready.attempts) == pytest.approx(grown / rate, rel=0.01)
+    assert amplification(ready, of(run)(ready.times), ready.attempts) == pytest.approx(
+        grown / rate, rel=0.01
+    )
 
 
-def test_scipy_agrees_with_symfric_and_gives_up_where_it_must() -> None:
-    for case in (
-        EASY,
-        Case(1, 1, "drive", "lugre", inputs={"force": Signal("hold", (2.0, -2.0), (0.0, 0.5))}),
-    ):
-        ready = problem(case)
-        run = ready.run(1e-8, "radau5", max_steps=10_000)
-        states = by_scipy(ready)
-        assert states is not None
-        mine = np.stack([run[v.name] for v in ready.model.x])
-        assert (np.abs(states - mine) / tolerances(ready, mine)).max() < 10
-    assert by_scipy(problem(Case(1, 1, "drive", "exact_coulomb"))) is None
+def test_the_referee_sees_what_all_methods_share(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A spring of another stiffness in symfric's model, as a term written wrongly would be."""
+    long = replace(EASY, t_end=9.0)
+    stiffer = problem(replace(long, values={"k": 2.11})).model
+    wrong = replace(problem(long), model=stiffer)
+    monkeypatch.setattr("symfric.stress.judge.problem", lambda *_: wrong)
+    verdict = judge(long)
+    assert (verdict.kind, verdict.by) == ("silent", "referee")
+    run = wrong.run(long.rtol, long.method, max_steps=wrong.attempts)
+    assert by_methods(wrong, run).kind == "right"
+
+
+def test_what_the_referee_does_not_know_is_judged_by_methods() -> None:
+    case = Case(1, 1, "rabinowicz", "viscous", t_end=2.0)
+    assert question(problem(case), problem(case).times) is None
+    assert (judge(case).kind, judge(case).by) == ("right", "methods")
+    assert judge(EASY).by == "referee"
+
+
+def test_a_run_whose_steps_are_used_up_is_refused_and_its_beginning_compared() -> None:
+    short = judge(EASY, work=80)
+    assert (short.kind, short.group) == ("refused", "too many steps, right so far")
+    assert "is right" in short.reason
+
+
+def test_a_loose_run_has_a_measured_reason() -> None:
+    """An undamped bristle keeps what each step adds to its swing."""
+    force = {"force": Signal("constant", (0.0997,))}
+    case = Case(
+        1, 23, "drive", "dahl", {"v_eps": 0.0}, inputs=force, t_end=0.872, rtol=1e-3,
+        method="dopri5",
+    )  # fmt: skip
+    verdict = judge(case)
+    assert verdict.kind == "loose"
+    assert verdict.group == "the problem amplifies tolerances"
+    assert "the problem makes" in verdict.reason
 
 
 def test_what_is_off_between_right_ends_of_steps_is_told_apart() -> None:
@@ -120,21 +147,21 @@ def test_what_is_off_between_right_ends_of_steps_is_told_apart() -> None:
         ends = np.isin(t, run.step_times)
         return {name: y + np.where(ends, 0.0, 1e-3) for name, y in run.states(t).items()}
 
-    assert distance(ready, replace(run, states=bent), run) > 100
-    assert at_steps(ready, replace(run, states=bent), run) == 0.0
-    assert at_steps(ready, replace(run, states=lambda t: bent(t - 1e-9)), run) > 100
+    assert distance(ready, replace(run, states=bent), of(run)) > 100
+    assert at_steps(ready, replace(run, states=bent), of(run)) == 0.0
+    assert at_steps(ready, replace(run, states=lambda t: bent(t - 1e-9)), of(run)) > 100
 
 
 def test_a_step_that_leaps_is_found_and_steps_that_add_up_are_not_blamed() -> None:
     ready = problem(EASY)
     fine = ready.run(1e-8, "radau5", max_steps=10_000)
     run = ready.run(1e-6, "rodas5p", max_steps=10_000)
-    assert worst_step(ready, run, fine, 10_000) <= RIGHT
+    sizes = tolerances(ready, np.stack([fine["x"], fine["v"]]))
+    assert worst_step(ready, run, sizes, 10_000) <= RIGHT
     late = run.step_times[run.step_times.size // 2]
 
     def shifted(t: np.ndarray) -> dict[str, np.ndarray]:
         return {name: y + np.where(t > late, 1e-4, 0.0) for name, y in run.states(t).items()}
 
-    size = tolerances(ready, np.stack([fine["x"], fine["v"]])).min()
-    found = worst_step(ready, replace(run, states=shifted), fine, 10_000)
-    assert found == pytest.approx(1e-4 / size, rel=0.1)
+    found = worst_step(ready, replace(run, states=shifted), sizes, 10_000)
+    assert found == pytest.approx(1e-4 / sizes.min(), rel=0.1)

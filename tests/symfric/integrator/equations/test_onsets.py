@@ -112,3 +112,29 @@ def test_load_that_is_too_strong_for_a_moment_in_every_period_ends_rest() -> Non
         slips = np.array([t for t, name in run.happened if name == "slip"])
         first = np.arcsin(0.15 * 0.5327 / A) / w
         assert slips == pytest.approx(first + pi / w * np.arange(6), abs=1e-6)
+
+
+@pytest.mark.parametrize("method", ["auto", "radau5", "rodas5p", "dopri5"])
+def test_a_ramp_in_the_equations_of_a_model_is_not_leapt_over(method: str) -> None:
+    """Radau's stages lay on both sides of a short ramp under a car at rest: it never moved."""
+    t = ca.SX.sym("t")
+    ramp = ca.fmin(ca.fmax((t - 0.5) / 0.226, 0.0), 1.0)
+    v = Variable("v", "m/s")
+    rate = ca.jtimes(ramp, t, ca.SX(1)) - v.symbol / 10
+    model = Model("bump", x=(v,), ode=rate, t=t)
+    exact = 10 / 0.226 * (np.exp(-(3.5 - 0.726) / 10) - np.exp(-(3.5 - 0.5) / 10))
+    run = simulate(model, 3.5, method=method, rtol=1e-5, backend="vm")
+    assert run.final["v"] == pytest.approx(exact, rel=1e-3)
+    many = simulate_many(model, 3.5, p={}, x0={"v": [0.0, 0.0]}, rtol=1e-5, backend="vm")
+    assert many["v"][:, -1] == pytest.approx(exact, rel=1e-3)
+
+
+def test_time_that_enters_beside_parameters_is_seen_at_their_start_values() -> None:
+    t, at, width = (
+        ca.SX.sym("t"),
+        Variable("at", "s", start=2.0),
+        Variable("width", "s", start=0.01),
+    )
+    pulse = ca.exp(-(((t - at.symbol) / width.symbol) ** 2)) / (width.symbol * sqrt(pi))
+    model = Model("pulsed", x=(x,), p=(at, width), ode=pulse, t=t)
+    assert simulate(model, 10.0, backend="vm").final["x"] == pytest.approx(1.0, rel=1e-5)

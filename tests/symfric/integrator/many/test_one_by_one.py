@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ensembles import EXECUTORS, assert_same
 
-from symfric import Model, Variable
+from symfric import ExactCoulomb, Karnopp, Law, Linear, Model, Variable, drive, simulate_many
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.many import one_by_one
 from symfric.integrator.many.one_by_one import solve_one_by_one
@@ -64,3 +65,15 @@ def test_interrupt_goes_on_to_the_ensemble(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(one_by_one, "integrate", pressed)
     with pytest.raises(KeyboardInterrupt):
         solve([[0.01, 1.0]])
+
+
+@pytest.mark.parametrize("backend", ["vm", "compiled"])
+@pytest.mark.parametrize("kind", EXECUTORS)
+@pytest.mark.parametrize("law", [ExactCoulomb(), Karnopp()])
+def test_every_executor_gives_the_same(law: Law, kind: str, backend: str) -> None:
+    model, load = drive(law), Linear([0.0, 1.0, 2.0], np.outer([1.0, 2.0, 3.0], [0.0, 9.0, -9.0]))
+    common: dict[str, Any] = {"u": {"force": load}, "t_eval": [1.0, 2.0], "backend": backend}
+    serial = simulate_many(model, 2.0, executor="serial", chunk=2, **common)
+    other = simulate_many(model, 2.0, executor=EXECUTORS[kind](), chunk=2, workers=2, **common)
+    assert np.ptp(serial["v"]) > 0
+    assert_same(serial, other)

@@ -21,7 +21,7 @@ AT_ZERO: dict[str, tuple[Callable[[ca.SX], ca.SX], float, float, float]] = {
     "signed_power 2": (lambda x: smooth.signed_power(x, 2.0, EPS), 0.0, EPS, 0.0),
     "positive": (lambda x: smooth.positive(x, EPS), EPS / 2, 0.5, 0.5 / EPS),
     "stribeck 2": (lambda x: smooth.stribeck(x, 1.0, 2.0, EPS), 1.0, 0.0, -2.0),
-    "stribeck 1": (lambda x: smooth.stribeck(x, 1.0, 1.0, EPS), 1.0, 0.0, -1 / EPS),
+    "stribeck 1": (lambda x: smooth.stribeck(x, 1.0, 1.0, EPS), 1.0, 0.0, -2 / EPS),
     "phi1": (smooth.phi1, 1.0, 1 / 2, 1 / 3),
 }
 TINY = [0.0, 1e-300, -1e-300, 1e-12, -1e-12, 1e-3, -1e-3, 1.0, -1.0, 1e3, -1e3]

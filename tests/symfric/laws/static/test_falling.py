@@ -25,11 +25,10 @@ def test_popp_stelter_falls_to_the_share_that_remains() -> None:
 
 
 @given(v=st.floats(-1.0, 1.0), N=st.floats(0.0, 100.0))
-def test_quadratic_rise_of_popp_stelter_does_not_see_the_load(v: float, N: float) -> None:
-    rise = [
-        PoppStelter(kappa=0.3).force(v, load) - PoppStelter().force(v, load) for load in (0.0, N)
-    ]
-    assert rise[0] == pytest.approx(rise[1], abs=1e-13)
+def test_quadratic_rise_of_popp_stelter_is_part_of_the_coefficient(v: float, N: float) -> None:
+    rise = [PoppStelter(kappa=0.3).force(v, L) - PoppStelter().force(v, L) for L in (1.0, N)]
+    assert rise[1] == pytest.approx(N * rise[0], abs=1e-11)
+    assert abs(PoppStelter(kappa=0.3, v_eps=0.0).force(2.0, 5.0)) > 5.0 * 0.3 * 4.0
 
 
 def test_nothing_falls_when_everything_remains() -> None:

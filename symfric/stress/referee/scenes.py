@@ -1,0 +1,208 @@
+"""Six machines with friction as a textbook writes them, in plain Python.
+
+A scene is made from its numbers `p`, its force over time and a time within the piece between two
+kinks on which it is to hold, and gives the rates of its own states y at t. Each contact asks
+`rub(i, v, N, F_e)` for its friction force, from the sliding velocity v, the normal force N and the
+force F_e that it would carry at rest.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import asin, cos, hypot, inf, sin, sqrt, tan
+
+Numbers = Mapping[str, float]
+Force = Callable[[float], float]
+Friction = Callable[[int, float, float, float], float]
+Motion = Callable[[float, Sequence[float], Friction], Sequence[float]]
+
+ROUNDING, CLOSE, LOOPS = 4e-16, 1e-11, 60
+WIDTH = 1e-4
+"""Rounding [N] of the length of a bearing's force."""
+
+
+class UnsolvableError(ArithmeticError):
+    """Accelerations and normal forces that fit each other were not found."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A machine: how it moves, and for each contact the state that slides and its value at rest.
+
+    Attributes:
+        states: how many it has of its own.
+        motion: the equations.
+        slides: per contact, (number of a velocity state, its value where nothing slides).
+        breaks: times at which the equations have a kink [s].
+    """
+
+    states: int
+    motion: Motion
+    slides: tuple[tuple[int, float], ...]
+    breaks: tuple[float, ...] = ()
+
+
+def belt(p: Numbers, _: Force, __: float) -> Scene:
+    """Block on a belt.
+
+    x' = v,   m v' = -k x - F(v - v_belt, m g).
+    """
+    m, k, v_belt, g = p["m"], p["k"], p["v_belt"], p["g"]
+
+    def motion(t: float, y: Sequence[float], rub: Friction) -> Sequence[float]:
+        x, v = y
+        return v, (-k * x - rub(0, v - v_belt, m * g, -k * x)) / m
+
+    return Scene(2, motion, ((1, v_belt),))
+
+
+def drive(p: Numbers, force: Force, _: float) -> Scene:
+    """Mass under a force.
+
+    x' = v,   m v' = force - offset - F(v, N).
+    """
+
+    def motion(t: float, y: Sequence[float], rub: Friction) -> Sequence[float]:
+        pull = force(t) - p["offset"]
+        return y[1], (pull - rub(0, y[1], p["N"], pull)) / p["m"]
+
+    return Scene(2, motion, ((1, 0.0),))
+
+
+def two_blocks(p: Numbers, _: Force, __: float) -> Scene:
+    """Two blocks on a belt, a spring between them.
+
+    m_i v_i' = -k_i x_i +- k_c (x_2 - x_1) - F(v_i - v_belt, m_i g).
+    """
+    m_1, m_2, v_belt, g = p["m_1"], p["m_2"], p["v_belt"], p["g"]
+
+    def motion(t: float, y: Sequence[float], rub: Friction) -> Sequence[float]:
+        x_1, x_2, v_1, v_2 = y
+        between = p["k_c"] * (x_2 - x_1)
+        pull_1, pull_2 = between - p["k_1"] * x_1, -between - p["k_2"] * x_2
+        a_1 = (pull_1 - rub(0, v_1 - v_belt, m_1 * g, pull_1)) / m_1
+        a_2 = (pull_2 - rub(1, v_2 - v_belt, m_2 * g, pull_2)) / m_2
+        return v_1, v_2, a_1, a_2
+
+    return Scene(4, motion, ((2, v_belt), (3, v_belt)))
+
+
+def quarter_car(p: Numbers, _: Force, within: float) -> Scene:
+    """Quarter car over a road of three ramps.
+
+    M_b X_b'' = f - F(X_b', N),   M_w X_w'' = -f + k_t (X_r - X_w) + b_t (X_r' - X_w'),
+
+    f = k_s (X_w - X_b) + b_d (X_w' - X_b'),   N = N_0 + |f| / tan(theta - d_theta),
+    sin d_theta = s cos(theta) / (L_d - s sin(theta)),   s = X_w - X_b.
+    """
+    heights = (p["middle"], p["amplitude"], -2 * p["amplitude"])
+    lengths = (p["t_first"], p["t_ramp"], p["t_ramp"])
+    second = p["t_0"] + p["t_first"] + p["t_hold"]
+    starts = (p["t_0"], second, second + p["t_ramp"] + p["t_hold"])
+    ramps = tuple(zip(heights, starts, lengths, strict=True))
+    v_r = sum(h / d for h, a, d in ramps if a < within < a + d)
+    height = sum(h * min(max((within - a) / d, 0.0), 1.0) for h, a, d in ramps)
+
+    def motion(t: float, y: Sequence[float], rub: Friction) -> Sequence[float]:
+        X_b, X_w, v_b, v_w = y
+        X_r = height + v_r * (t - within)
+        s = X_w - X_b
+        f = p["k_s"] * s + p["b_d"] * (v_w - v_b)
+        lean = asin(s * cos(p["theta"]) / (p["L_d"] - s * sin(p["theta"])))
+        side = f / tan(p["theta"] - lean)
+        N = p["N_0"] + sqrt(side**2 + p["eps"] ** 2) - p["eps"]
+        a_b = (f - rub(0, v_b, N, f)) / p["M_b"]
+        tyre = p["k_t"] * (X_r - X_w) + p["b_t"] * (v_r - v_w)
+        return v_b, v_w, a_b, (tyre - f) / p["M_w"]
+
+    kinks = tuple(time for _, a, d in ramps for time in (a, a + d))
+    return Scene(4, motion, ((2, 0.0),), kinks)
+
+
+def length(*forces: float) -> float:
+    """Length of a force [N], rounded at zero."""
+    return hypot(*forces, WIDTH) - WIDTH
+
+
+def pendulum(p: Numbers, _: Force, __: float) -> Scene:
+    """(J + m L^2) phi'' = -m g L sin(phi) - R F(R phi', N), N the size of the bearing's force."""
+    m, L, R, g = p["m"], p["L"], p["R"], p["g"]
+    inertia, guess = p["J"] + m * L**2, [m * g]
+
+    def motion(t: float, y: Sequence[float], rub: Friction) -> Sequence[float]:
+        phi, w = y
+        weight = -m * g * L * sin(phi)
+
+        def accelerated(N: list[float]) -> tuple[list[float], list[float]]:
+            a = (weight - R * rub(0, R * w, N[0], weight / R)) / inertia
+            along, across = m * (L * w**2 + g * cos(phi)), m * (L * a + g * sin(phi))
+            return [a], [length(along, across)]
+
+        return w, *settled(accelerated, guess)
+
+    return Scene(2, motion, ((1, 0.0),))
+
+
+def pendulum_box(p: Numbers, _: Force, __: float) -> Scene:
+    """Box (x) on rough ground and a pendulum (phi) hinged to it, friction in both places.
+
+    (m_b + m) x'' + m L (phi'' cos(phi) - phi'^2 sin(phi)) = -F(x', N_1),
+    m L x'' cos(phi) + (J + m L^2) phi'' + m g L sin(phi) = -R F(R phi', N_2),
+    N_1 the size of the ground's force, N_2 that of the hinge's.
+    """
+    m, L, R, g, both = p["m"], p["L"], p["R"], p["g"], p["m_box"] + p["m"]
+    inertia, guess = p["J"] + m * L**2, [both * g, m * g]
+
+    def motion(t: float, y: Sequence[float], rub: Friction) -> Sequence[float]:
+        _, phi, v, w = y
+        c, s = cos(phi), sin(phi)
+
+        def accelerated(N: list[float]) -> tuple[list[float], list[float]]:
+            f = m * L * s * w**2 - rub(0, v, N[0], 0.0)
+            T = -m * g * L * s - R * rub(1, R * w, N[1], 0.0)
+            det = both * inertia - (m * L * c) ** 2
+            a, b = (inertia * f - m * L * c * T) / det, (both * T - m * L * c * f) / det
+            aside, up = m * (a + L * (c * b - s * w**2)), m * (g + L * (s * b + c * w**2))
+            return [a, b], [length(up + p["m_box"] * g), length(aside, up)]
+
+        return v, w, *settled(accelerated, guess)
+
+    return Scene(4, motion, ((2, 0.0), (3, 0.0)))
+
+
+def settled(
+    accelerated: Callable[[list[float]], tuple[list[float], list[float]]], N: list[float]
+) -> list[float]:
+    """Accelerations under the normal forces N that follow from them, by Broyden's method.
+
+    N is the first guess, and the result.
+    """
+    n, last = range(len(N)), inf
+    a, found = accelerated(N)
+    gap = [found[i] - N[i] for i in n]
+    inverse = [[-float(i == j) for j in n] for i in n]  # inverse slope of the gap
+    for _ in range(LOOPS):
+        size = max(abs(gap[i]) / (1 + found[i]) for i in n)
+        if size <= ROUNDING or last / 2 < size < CLOSE:  # rounding is all that is left
+            return a
+        step = [max(-sum(inverse[i][j] * gap[j] for j in n), -0.9 * N[i]) for i in n]
+        N[:] = [N[i] + step[i] for i in n]
+        a, found = accelerated(N)
+        before, gap, last = gap, [found[i] - N[i] for i in n], size
+        turned = [sum(inverse[i][j] * (gap[j] - before[j]) for j in n) for i in n]
+        back = [sum(step[j] * inverse[j][i] for j in n) for i in n]
+        along = sum(step[i] * turned[i] for i in n)
+        if along:
+            inverse = [
+                [inverse[i][j] + (step[i] - turned[i]) * back[j] / along for j in n] for i in n
+            ]
+    raise UnsolvableError
+
+
+SCENES: dict[str, Callable[[Numbers, Force, float], Scene]] = {
+    "rabinowicz": belt,
+    "drive": drive,
+    "coupled_blocks": two_blocks,
+    "quarter_car": quarter_car,
+    "pendulum": pendulum,
+    "pendulum_box": pendulum_box,
+}

@@ -1,0 +1,242 @@
+"""Motion of the machines in `scenes` under the laws in `laws`, by SciPy.
+
+Smooth laws are solved by LSODA from kink to kink of the force and the machine. Exact Coulomb
+friction is solved from event to event: each contact slides forward, slides back or rests, until
+its slip passes through zero or its load passes mu_s N.
+"""
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import pi, sin, tanh
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.stress.referee.laws import LAWS, STATES
+from symfric.stress.referee.scenes import SCENES, Force, Scene
+
+Array = NDArray[np.float64]
+EVALUATIONS = 300_000
+"""Calls of the equations after which a solve is given up."""
+PIECES = 200
+"""Steps that a solve takes at least: what SciPy's first estimates of an error may overlook."""
+EVENTS = 10_000
+CLOSE = 1e-14
+UNKNOWN = {("exact_coulomb", "pendulum_box")}
+"""Rest of two contacts that load each other, which has no equation of its own here."""
+
+
+class GaveUpError(ArithmeticError):
+    """SciPy did not reach the end."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A force over time: constant (c), hold or linear (values at t), sine, pulse; see `between`."""
+
+    kind: str
+    values: Sequence[float]
+    t: Sequence[float] = ()
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Times [s] at which it jumps, bends, or is quickest."""
+        if self.kind == "pulse":
+            return self.values[1], self.values[1] + self.values[2]
+        return tuple(self.t)
+
+    def between(self, a: float, b: float) -> Force:
+        """The force for times from a to b, between which there is no kink."""
+        if self.kind == "constant":
+            return lambda t: self.values[0]
+        if self.kind == "sine":
+            size, rate, offset = self.values
+            return lambda t: size * sin(rate * t) + offset
+        if self.kind == "pulse":
+            size, begin, width = self.values
+            return lambda t: (
+                size / 2 * (tanh(20 * (t - begin) / width) - tanh(20 * (t - begin - width) / width))
+            )
+        if self.kind == "linear":
+            f, g = np.interp([a, b], self.t, self.values).tolist()
+            return lambda t: f + (g - f) * (t - a) / (b - a)
+        known = [v for time, v in zip(self.t, self.values, strict=True) if time < (a + b) / 2]
+        held = known[-1] if known else self.values[0]
+        return lambda t: held
+
+
+NO_FORCE, SINE = Signal("constant", (0.0,)), Signal("sine", (2.0, pi, 0.0))
+
+
+@dataclass(frozen=True)
+class Question:
+    """A case as data.
+
+    Attributes:
+        law, scene, forms, p: names, options, and all numbers of law and scene.
+        signal: the force of a drive.
+        y: start values, the machine's states before those of the laws.
+        scale: typical sizes of the states.
+        times: when states are asked for, from the start to the end [s].
+    """
+
+    law: str
+    scene: str
+    p: Mapping[str, float]
+    y: Array
+    scale: Array
+    times: Array
+    forms: Mapping[str, str] = field(default_factory=dict[str, str])
+    signal: Signal = NO_FORCE
+
+
+def knows(law: str, scene: str) -> bool:
+    """Whether this law in this scene is written here."""
+    return law in LAWS and scene in SCENES and (law, scene) not in UNKNOWN
+
+
+class Motion:
+    """The equations between two kinks: rates of all states, with friction from the laws."""
+
+    def __init__(self, asked: Question, a: float, b: float) -> None:
+        law, force = LAWS[asked.law], asked.signal.between(a, b)
+        self.scene: Scene = SCENES[asked.scene](asked.p, force, (a + b) / 2)
+        self.rub, self.count = law(asked.p, asked.forms), STATES[asked.law]
+        self.by_modes = asked.law == "exact_coulomb"
+        self.loads = [(0.0, 0.0)] * len(self.scene.slides)
+        self.calls = 0
+
+    def __call__(self, t: float, y: Sequence[float]) -> list[float]:
+        """Rates of the states at t."""
+        self.calls += 1
+        if self.calls > EVALUATIONS:
+            raise GaveUpError(f"no end after {EVALUATIONS} evaluations")
+        n, k = self.scene.states, self.count
+        y = [float(value) for value in y]
+        rates: list[Sequence[float]] = [()] * len(self.scene.slides)
+
+        def friction(i: int, v: float, N: float, F_e: float) -> float:
+            z = y[n + k * i : n + k * (i + 1)]
+            F, rates[i] = self.rub(v, N, z)
+            self.loads[i] = N, F_e
+            return F_e if self.by_modes and z[0] == 0.0 else F
+
+        own = self.scene.motion(t, y[:n], friction)
+        return [*own, *(rate for of_contact in rates for rate in of_contact)]
+
+    def mode(self, i: int) -> int:
+        """Number of the state that is the mode of contact `i`."""
+        return self.scene.states + i
+
+    def held(self, t: float, y: Array, i: int, mu_s: float) -> Array:
+        """States with contact `i` at rest if that carries the load, else beginning to slide."""
+        velocity, rest = self.scene.slides[i]
+        y[velocity], y[self.mode(i)] = rest, 0.0
+        self(t, y.tolist())
+        N, F_e = self.loads[i]
+        y[self.mode(i)] = 0.0 if abs(F_e) <= mu_s * N else float(np.sign(F_e))
+        return y
+
+    def changed(self, t: float, y: Array, i: int, mu_s: float) -> Array:
+        """States after the mode of contact `i` has ended."""
+        if y[self.mode(i)]:
+            return self.held(t, y, i, mu_s)
+        self(t, y.tolist())
+        y[self.mode(i)] = np.sign(self.loads[i][1])
+        return y
+
+
+def solve(asked: Question, rtol: float = 1e-10) -> Array:
+    """States at the times asked for, shape (nx, times).
+
+    Raises:
+        ArithmeticError, ValueError: SciPy gave up, or a number left the range of the equations.
+    """
+    begin, end = float(asked.times[0]), float(asked.times[-1])
+    kinks = {*asked.signal.kinks, *SCENES[asked.scene](asked.p, abs, begin).breaks}
+    cuts = [begin, *sorted(t for t in kinks if begin < t < end), end]
+    y, found = np.array(asked.y, float), np.empty((asked.y.size, asked.times.size))
+    for a, b in pairwise(cuts):
+        motion = Motion(asked, a, b)
+        here = (asked.times >= a) & (asked.times <= b)
+        way = by_events if motion.by_modes else by_lsoda
+        states, y = way(motion, y, asked.times[here], (a, b), rtol, asked)
+        found[:, here] = states
+    if not np.isfinite(found).all():
+        raise GaveUpError("not finite")
+    return found
+
+
+def by_lsoda(
+    motion: Motion, y: Array, times: Array, span: tuple[float, float], rtol: float, asked: Question
+) -> tuple[Array, Array]:
+    """States at `times`, and at the end."""
+    from scipy.integrate import odeint  # noqa: PLC0415  (a third of a second)
+
+    at = np.unique([*span, *times])  # LSODA takes no two that differ by rounding alone
+    at = at[np.append(True, np.diff(at) > CLOSE * np.abs(at).max())]
+    longest = (asked.times[-1] - asked.times[0]) / PIECES
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the message says it, too
+        states, told = odeint(
+            motion, y, at, rtol=rtol, atol=1e-3 * rtol * asked.scale, tcrit=[span[1]],
+            tfirst=True, mxstep=10 * EVALUATIONS, hmax=longest, full_output=True,
+        )  # fmt: skip
+    if told["message"] != "Integration successful.":
+        raise GaveUpError(told["message"])
+    nearest = np.abs(at[:, None] - times).argmin(0)
+    return states[nearest].T, states[-1]
+
+
+def by_events(
+    motion: Motion, y: Array, times: Array, span: tuple[float, float], rtol: float, asked: Question
+) -> tuple[Array, Array]:
+    """States at `times`, and at the end, from event to event."""
+    from scipy.integrate import solve_ivp  # noqa: PLC0415
+
+    contacts, mu_s, (t, end) = range(len(motion.scene.slides)), asked.p["mu_s"], span
+    longest = (asked.times[-1] - asked.times[0]) / PIECES
+    found, y = np.empty((y.size, times.size)), y.copy()
+    for i in contacts:
+        if y[motion.mode(i)] == 0.0:
+            y = motion.held(t, y, i, mu_s)
+    for _ in range(EVENTS):
+        ends = [ending(motion, i, y[motion.mode(i)], mu_s, t + 1e-9 * longest) for i in contacts]
+        done: Any = solve_ivp(
+            motion, (t, end), y, method="LSODA", rtol=rtol, atol=1e-3 * rtol * asked.scale,
+            max_step=longest, dense_output=True, events=ends,
+        )  # fmt: skip
+        if not done.success:
+            raise GaveUpError(done.message)
+        here = (times >= t) & (times <= done.t[-1])
+        if here.any():
+            found[:, here] = done.sol(times[here])
+        t, y = float(done.t[-1]), done.y[:, -1].copy()
+        if done.status == 0:
+            return found, y
+        for i in contacts:
+            if done.t_events[i].size:
+                y = motion.changed(t, y, i, mu_s)
+    raise GaveUpError(f"no end after {EVENTS} events")
+
+
+def ending(
+    motion: Motion, i: int, mode: float, mu_s: float, begun: float
+) -> Callable[[float, Array], float]:
+    """A function of time and states that passes through zero where the mode of a contact ends."""
+    velocity, rest = motion.scene.slides[i]
+
+    def sliding(t: float, y: Array) -> float:
+        return mode * (y[velocity] - rest) if t > begun else 1.0
+
+    def resting(t: float, y: Array) -> float:
+        motion(t, y.tolist())
+        N, F_e = motion.loads[i]
+        return abs(F_e) - mu_s * N
+
+    event: Any = sliding if mode else resting
+    event.terminal, event.direction = True, -1.0 if mode else 1.0
+    return event
