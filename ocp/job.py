@@ -155,7 +155,7 @@ class Job:
             self.scheme,
             self.solver,
             self.guess,
-            intervals=self.intervals if isinstance(self.intervals, int) else FINE,
+            intervals=self.first_intervals,
             starts=self.starts,
             last=0.0 if reason else LAST,
             clock=self.clock,
@@ -169,6 +169,14 @@ class Job:
             smooth = self.checked(self.plain(self.guess))
             return _said(smooth, f"Friction was not sharpened: {_why(error)}.")
         return self.along(path, reached, reason)
+
+    @property
+    def first_intervals(self) -> int:
+        """Intervals of the whole motion before refinement, where layers narrow."""
+        if self.intervals is None:
+            return FINE
+        meshes = make_meshes(self.problem, self.intervals)
+        return sum(mesh.size - 1 for mesh in meshes[: len(self.problem.chain)])
 
     def along(self, path: Iterator[Sharp], reached: Sharp, reason: str) -> Solution:
         """The first motion on the way that is right; else the best one, and what was not done.
@@ -315,7 +323,7 @@ class Job:
         widths = speeds_at(self.problem, sharp.scales, sharp.level)
         told = ", ".join(f"{name} over {width:.2g}" for name, width in widths.items())
         said = f"Friction is still smooth: {told} (m/s or rad/s). {why}"
-        return self.checked(_said(found, said))
+        return _said(self.checked(found), said)
 
     def checked(self, solution: Solution) -> Solution:
         """`solution` with its verification.

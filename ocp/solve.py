@@ -68,8 +68,8 @@ def solve(
     Args:
         problem: what to solve.
         scheme: `Radau(3)` if none; or `Legendre(d)`, `Shooting(method, steps)`.
-        intervals: their number for each phase, fractions of T, or a list of these; 50 if none, and
-            with friction so many that the whole motion has 60. Refinement changes them.
+        intervals: their number for each phase, fractions of T, or a list of these; 50 if none.
+            Where layers narrow, as many even ones in all; 60 if none. Refinement changes them.
         solver: `Ipopt()` if none; or `Fatrop()`, `Sqp()`.
         guess: values by name (see `ocp.solving.starts`), a solution, or one that was saved. With
             friction, further starts are made around it.

@@ -47,6 +47,8 @@ if TYPE_CHECKING:
     from symfric.foundation.parameters import symbolise as symbolise
     from symfric.foundation.parameters import with_values as with_values
     from symfric.foundation.printing import for_print as for_print
+    from symfric.foundation.status import EnergyWarning as EnergyWarning
+    from symfric.foundation.status import OverloadWarning as OverloadWarning
     from symfric.foundation.status import SolveError as SolveError
     from symfric.foundation.status import Status as Status
     from symfric.integrator import Ensemble as Ensemble
@@ -155,7 +157,7 @@ else:
             "symfric.figures": "FigureData Recommendation compare figure recommended",
             "symfric.foundation.parameters": "Parameter Variable parameters symbolise with_values",
             "symfric.foundation.printing": "for_print",
-            "symfric.foundation.status": "SolveError Status",
+            "symfric.foundation.status": "EnergyWarning OverloadWarning SolveError Status",
             "symfric.integrator": """
                 Ensemble Hold Linear Plant Statistics Trajectory flow load_ensemble load_run
                 rate_of simulate simulate_many stepper

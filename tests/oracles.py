@@ -165,3 +165,56 @@ def _back_at(a: float, b: float, level: float, mode: int) -> float:
     size, phase = hypot(a, b), atan2(a, b)  # b cos(q) - a sin(q) = size cos(q + phase)
     turns = (sign * acos(level / size) - phase for sign in (1.0, -1.0))
     return min(turn % (2 * pi) for turn in turns)
+
+
+def damped_block_events(
+    v_belt: float,
+    t_end: float,
+    *,
+    m: float,
+    k: float,
+    g: float,
+    mu_s: float,
+    mu_d: float,
+    sigma_2: float,
+) -> list[float]:
+    """Times at which a block on a belt, with viscous friction, too, sticks and slips in turn.
+
+    It starts at x = 0 at rest. Slower than the belt it swings about a centre with damping, and
+    sticks before the first maximum of its velocity that reaches the belt's.
+    """
+    decay, centre = sigma_2 / (2 * m), (mu_d * m * g + sigma_2 * v_belt) / k
+    w = sqrt(k / m - decay**2)
+    found: list[float] = []
+    t, x, v = 0.0, 0.0, 0.0
+    while True:
+        a, b = x - centre, (v + decay * (x - centre)) / w
+
+        def swing(s: float, a: float = a, b: float = b) -> tuple[float, float]:
+            c, d = (b * cos(w * s), a * cos(w * s)), (b * sin(w * s), a * sin(w * s))
+            fade = exp(-decay * s)
+            return fade * (c[1] + d[0]), fade * (w * (c[0] - d[1]) - decay * (c[1] + d[0]))
+
+        # extremes of v: v' is a sinusoid that fades, of which this is the phase
+        rise = -k / m * a - 2 * decay * v
+        slope = (-k / m * v - 2 * decay * rise + decay * rise) / w
+        first = atan2(-rise, slope) % pi / w
+        peaks = [first + j * pi / w for j in range(int((t_end - t) * w / pi) + 2)]
+        low = 0.0
+        for peak in peaks:
+            if swing(peak)[1] >= v_belt and swing(low)[1] < v_belt:
+                break
+            low = peak
+        else:
+            return found
+        high = peak
+        for _ in range(80):
+            middle = (low + high) / 2
+            low, high = (low, middle) if swing(middle)[1] >= v_belt else (middle, high)
+        t, x, v = t + high, centre + swing(high)[0], v_belt
+        held = max(0.0, (mu_s * m * g / k - x) / v_belt)
+        for event in (t, t + held):
+            if event > t_end:
+                return found
+            found.append(event)
+        t, x = t + held, x + held * v_belt

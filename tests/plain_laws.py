@@ -214,6 +214,6 @@ def bam(v: float, tau_m: float, tau_e: float) -> float:
 
 
 def bittencourt(v: float, N: float) -> float:
-    level = 0.03 + 0.02 * N + 0.1 * N * exp(-((v / 10) ** 1.3))
-    level += 1e-3 * 30 * exp(-((v / (5 + 0.5 * 30)) ** 1.3))
-    return level + (1e-3 + 2e-3 * exp(-30 / 20)) * v
+    level = 0.031 + 0.023 * N + 0.126 * N * exp(-((v / 9.2) ** 1.3))
+    level += (1.6e-3 * 30 - 0.025) * exp(-((v / (30 - 25)) ** 1.3))
+    return level + (1.3e-3 + 1.3e-3 * exp(-30 / 20.7)) * v

@@ -1,4 +1,4 @@
-"""A page of each figure of the papers: picture, what is compared, how far we are, what was refuted.
+"""A page of each figure of the papers: picture, what is compared, how far we are, the verdicts.
 
 `symfric gallery` computes them; here they are shown. SYMFRIC_DOCS=quick takes the reduced size.
 """
@@ -84,14 +84,16 @@ def index(papers: Mapping[str, list[Mapping[str, Any]]]) -> str:
     text = rst.title("Figures of the papers")
     text += (
         "Figures of the papers that the laws come from, computed again by scripts of less than a "
-        "hundred lines. Beside each: what is compared, how far we are, and what was refuted by "
-        "what evidence. ``symfric gallery`` computes them on your machine.\n\n"
+        "hundred lines. Beside each: what is compared, how far we are, and three kinds of "
+        "verdicts: an observation of the paper is reproduced, an explanation is refuted, or the "
+        "text does not decide. ``symfric gallery`` computes them on your machine.\n\n"
     )
     if quick():
         text += rst.directive("note", "", "These figures are computed at reduced size.\n")
     for paper, records in papers.items():
         head = re.split(r", (?:doi|J\.|[A-Z]\w+ [\d(])", paper)[0]
         text += rst.title(head, "-") + (f"*{rst.plain(paper)}*\n\n" if paper != head else "")
+        text += f"{sentence(records[0]['note'], linked)}\n\n" * bool(records[0]["note"])
         text += cards(records)
         rows = [
             [
@@ -124,14 +126,16 @@ def page(record: Mapping[str, Any]) -> str:
     text += f"*{rst.plain(record['paper'])}*\n\n"
     text += "".join(f"{sentence(p, linked)}\n\n" for p in record["text"].split("\n\n") if p)
     if record["quick"]:
-        text += rst.directive("note", "", "Computed at reduced size.\n")
+        text += rst.directive(
+            "note", "", "Computed at reduced size; the verdicts rest on the full one.\n"
+        )
     text += rst.directive(
         "figure", f"/made/gallery/{record['picture']}", alt=rst.plain(record["title"])
     )
     said = {
         "Compared": record["compared"],
         "How far we are": f"{record['how_far']}: {record['measure']}",
-        "Refuted, and by what evidence": record["evidence"],
+        **{kind.capitalize(): words for kind, words in record["verdicts"].items()},
     }
     for name, words in said.items():
         text += f"**{name}.** {sentence(words, linked)}\n\n"

@@ -77,7 +77,8 @@ def index(laws: dict[str, AnyLaw]) -> str:
         f"and {len(MADE_OF_LAWS)} that are made of laws or data. Names are those of "
         "``symfric laws NAME`` and of ``symfric run SCENE --law NAME``. What the letters under "
         "*shows* mean stands at the end; *instructions* are those of CasADi for force and rate, "
-        "and for their derivatives; *formula* says how it was confirmed.\n\n"
+        "and for their derivatives; *formula* says what it was compared with, *unverified* that it "
+        "was written from memory.\n\n"
     )
     for title, about in FAMILIES.items():
         text += rst.title(title, "-") + about + "\n\n"
@@ -200,7 +201,7 @@ def facts(law: AnyLaw) -> str:
             "for their derivatives",
         ],
         ["source", rst.plain(law.facts.source)],
-        ["formula confirmed by", rst.plain(law.facts.confidence)],
+        ["formula", rst.plain(law.facts.formula)],
     ]
     rows += [["warning", rst.plain(warning)] for warning in law.warnings()]
     return rst.table((), rows)

@@ -219,14 +219,19 @@ class _Path:
         if best.ended:
             return best
         now = scales_of(self.user, self.problem, best.points, self.scales)
-        alike, self.scales = same_size(now, self.scales, SAME), now
-        if not alike:
-            found = self.each(coarse, [best.points, *tries])
+        before, self.scales = self.scales, now
+        if not same_size(now, before, SAME):
+            again = self.each(coarse, [best.points, *tries])
+            if least(again).good or least(again).ended:
+                found = again
+            else:  # layers that much narrower are too far away
+                self.scales = before
         fine = self.discretisation.on(_meshes(self.problem, intervals))
         step = least(self.each(fine, [self.moved(one, fine) for one in finalists(found)], ONTO))
         if not step.good and not step.ended:
             step = least(self.each(fine, [self.moved(best, fine)], LATER | {"max_iter": 300}))
-        self.scales = scales_of(self.user, self.problem, step.points, self.scales)
+        now = scales_of(self.user, self.problem, step.points, self.scales)
+        self.scales = now if same_size(now, self.scales, SAME) else self.scales
         return self.refined(step, None) if step.good else step
 
     def each(

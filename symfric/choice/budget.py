@@ -18,7 +18,7 @@ EVENTS = 12_000
 """Instructions that the search for events after an attempt counts as."""
 RUN, RUNS = 250_000_000, 5
 """Work that a run may take, about 0.7 s, and to how many such runs all of a law may come."""
-LEAST, LEAST_WHOLE = 5_000, 60_000
+LEAST, LEAST_WHOLE = 5_000, 30_000
 """Attempts that they may take of a machine however large."""
 GROWTH = 8
 """A run may take so many times the attempts of the run before, which was a bit softer."""

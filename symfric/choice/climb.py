@@ -99,11 +99,11 @@ def climbed(runs: Budget, reference: Reference, asked: Asked) -> Ladder:
                 error, rtol = reference.off(found.motion), asked.fine
             except SolveError:
                 pass  # the coarse run is what there is
-        return Rung(s, error, found.attempts, rtol)
+        return Rung(s, error, found.attempts, rtol, found.motion / reference.size[:, None])
 
     wanted = MARGIN * asked.accuracy
     softest = max(asked.accuracy, asked.softest)
-    return ladder(run, wanted, softest, runs.held.scalable, FAILURES, short)
+    return ladder(run, wanted, softest, runs.held.power, FAILURES, short)
 
 
 def _first_that_ends(runs: Budget, s: float, rtol: float, most: int) -> tuple[Sample, float]:
@@ -149,7 +149,12 @@ def at_equal_error(
     """
     able = near.rtol <= asked.fine or FINER * near.attempts <= runs.most
     first = asked.fine if able else max(near.rtol, asked.fine)
-    best, finest = _first_that_ends(runs, s, first, GROWTH * near.attempts + LEAST)
+    try:
+        best, finest = _first_that_ends(runs, s, first, GROWTH * near.attempts + LEAST)
+    except SolveError:
+        if s != near.s:
+            raise
+        best, finest = runs.run(s, near.rtol), near.rtol  # which has ended
 
     def own(motion: Sample) -> float:
         return distance(motion.motion, best.motion, best.size)

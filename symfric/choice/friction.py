@@ -197,7 +197,7 @@ def peaked(law: Law, mu_s: float, load: float | None) -> Law:
     if "mu_d" in known and known["mu_s"].value == known["mu_d"].value:
         return law
     widths = [p for p in known.values() if p.role in ("velocity scale", "width")]
-    speeds = [float(p.value) for p in widths if p.unit in ("m/s", "rad/s")]
+    speeds = [float(p.value) for p in widths if p.unit in ("m/s", "rad/s") and p.value > 0]
     speeds += [1 / float(p.value) for p in widths if p.unit in ("s/m", "s/rad")]
     wide = np.geomspace(0.02 * min(speeds), 20 * max(speeds), 2001)
     for _ in range(PASSES):

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.choice.friction import Friction, alike, friction_of
-from symfric.choice.softness import Softness, softness
+from symfric.choice.softness import OF_BRISTLES, Softness, softness
 from symfric.figures.regularisation import Bed, Measure, Sample, sample
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number
+from symfric.foundation.status import OverloadWarning, SolveError, Status
 from symfric.integrator.arguments import chosen
 from symfric.integrator.equations.inputs import Input, input_data
 from symfric.integrator.running.built import built
@@ -26,6 +27,8 @@ from symfric.scenes import Scene
 Array = NDArray[np.float64]
 
 
+OVERLOAD = "drier bristles creep too slowly for their v_eps or for the rounding of velocities"
+"""What is said of runs whose friction passes its level."""
 FAILURES = (RuntimeError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError)
 """What a law, or a function of the user that makes a machine of it, may raise."""
 
@@ -76,7 +79,11 @@ class Machine:
         """
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # loose tolerances are tried on purpose
-            return sample(self.bed(model), law, rtol, max_steps=most)
+            warnings.simplefilter("error", OverloadWarning)
+            try:
+                return sample(self.bed(model), law, rtol, max_steps=most)
+            except OverloadWarning:
+                raise SolveError(OVERLOAD, Status.SOLVER_FAILED) from None
 
     def instructions(self, model: Model, rtol: float) -> tuple[int, str]:
         """CasADi instructions of one attempt at this tolerance, and the method."""
@@ -160,9 +167,9 @@ class Candidate:
     scene: Scene | None
 
     @property
-    def scalable(self) -> bool:
-        """Whether anything is smooth."""
-        return any(knob.powers for knob in self.knobs.values())
+    def power(self) -> float:
+        """The least power of the softness that its velocities have; 0 where nothing is smooth."""
+        return min((k.velocities for k in self.knobs.values() if k.powers), default=0.0)
 
     def law_at(self, s: float) -> Law:
         """The law at the softness `s`; of several places the first."""
@@ -186,14 +193,16 @@ class Candidate:
 
 
 def candidate(
-    machine: Machine, law: Law, frictions: Mapping[str, Friction], load: float | None, own: bool
-) -> Candidate:
+    machine: Machine, law: Law, frictions: Mapping[str, Friction], load: float | None, own: bool,
+    bristles: float = OF_BRISTLES[0],
+) -> Candidate:  # fmt: skip
     """`law` in `machine`.
 
     Args:
         frictions: that it is to describe, by the place in the machine; "" for any other place.
         load: normal force [N] where it is one number.
         own: it has its numbers already: they were fitted, nothing is to be scaled.
+        bristles: the power of the velocities of a law with states, see `softness`.
 
     Raises:
         ValueError: the machine refuses the law, or no numbers of the law describe the friction.
@@ -210,7 +219,7 @@ def candidate(
         if own:
             knobs[place] = Softness(there, {}, friction.mu_s, load)
         else:
-            knobs[place] = softness(alike(there, friction, load), friction, load)
+            knobs[place] = softness(alike(there, friction, load), friction, load, bristles)
     return Candidate(machine, same, knobs, scene)
 
 

@@ -10,8 +10,9 @@ from typing import final
 import numpy as np
 
 from symfric.choice import nature
-from symfric.choice.budget import RUN, Budget, counted
+from symfric.choice.budget import LEAST, RUN, Budget, counted
 from symfric.choice.climb import (
+    ON_THE_WAY,
     Asked,
     AtEqualError,
     at_equal_error,
@@ -24,8 +25,8 @@ from symfric.choice.friction import Friction
 from symfric.choice.machine import FAILURES, Candidate, Machine, candidate
 from symfric.choice.needs import lacking
 from symfric.choice.reference import OWN, Reference
-from symfric.choice.row import FAILED, INACCURATE, LACKING, RANKED, REFUSED, Row, best_of
-from symfric.choice.softness import MARGIN, Ladder
+from symfric.choice.row import FAILED, INACCURATE, LACKING, RANKED, REFUSED, Row, best_of, place
+from symfric.choice.softness import MARGIN, OF_BRISTLES, Ladder
 from symfric.figures.regularisation import positions
 from symfric.figures.requirements import phenomena
 from symfric.foundation.parameters import parameters
@@ -95,22 +96,32 @@ def measured(task: Task, name: str, law: Law) -> Row:
     )  # fmt: skip
     operations, why = nature.c_operations(law)
     row = replace(row, c_operations=operations, c_why=why)
-    try:
-        held = candidate(task.machine, law, task.frictions, task.load, task.own)
-        instructions, _ = counted(task.machine, held.first, task.asked.coarse)
-    except FAILURES as problem:
-        return replace(row, reason=_refusal(task.machine, problem))
-    runs = Budget(held, instructions, task.work)
-    try:
-        task = _from_own(task, held, runs)
-        found = climbed(runs, task.reference, task.asked)
-        row = _placed(task, held, found, runs, row)
-    except FAILURES as problem:
-        return replace(row, standing=FAILED, reason=short(problem))
+    tried = list[tuple[Row, Candidate, Ladder]]()
+    for bristles in OF_BRISTLES if law.states else OF_BRISTLES[:1]:
+        try:
+            held = candidate(task.machine, law, task.frictions, task.load, task.own, bristles)
+            instructions, _ = counted(task.machine, held.first, task.asked.coarse)
+        except FAILURES as problem:
+            return replace(row, reason=_refusal(task.machine, problem))
+        runs = Budget(held, instructions, task.work)
+        try:
+            task = _from_own(task, held, runs)
+            found = climbed(runs, task.reference, task.asked)
+            placed = _placed(task, held, found, runs, row)
+            tried.append((replace(placed, spent=not runs.left()), held, found))
+        except FAILURES as problem:
+            failed = replace(row, standing=FAILED, reason=short(problem))
+            tried.append((failed, held, Ladder((), "")))
+        again = tried[-1][0].standing in (INACCURATE, FAILED) and not tried[-1][2].decided
+        if not again or not runs.left(ON_THE_WAY):
+            break
+    row, held, found = min(tried, key=lambda each: place(each[0]))
+    if row.standing == FAILED:
+        return row
     if task.fixed:
         core, why = nature.on_core(law) if operations is not None else (nan, row.c_why)
         row = replace(_stepped(task, held, found, row), core=core, core_why=why)
-    return _by_data(task.misfits, replace(row, spent=not runs.left()))
+    return _by_data(task.misfits, row)
 
 
 def _refusal(machine: Machine, problem: Exception) -> str:
@@ -162,7 +173,8 @@ def _placed(task: Task, held: Candidate, rungs: Ladder, runs: Budget, row: Row) 
         return replace(row, standing=RANKED)
     driest = held.law_at(rungs.rungs[-1].s)
     known = "" if task.own else nature.otherwise(driest, task.frictions[""], task.load)
-    said = [short(rungs.stopped) or "the integrator keeps no more", known]
+    mark = "" if rungs.decided or not rungs.stopped else "not decided: "
+    said = [mark + (short(rungs.stopped) or "the integrator keeps no more"), known]
     why = "; ".join(text for text in said if text)
     return replace(row, standing=INACCURATE, reason=f"{row.error:.1e} off: {why}")
 
@@ -216,7 +228,8 @@ def _stepped(task: Task, held: Candidate, rungs: Ladder, row: Row) -> Row:
     try:
         model, law = held.model(s or row.softness), held.law_at(s or row.softness)
         machine = replace(task.machine, of=None, times=None)
-        run = machine.run(model, law, row.rtol if s is None else task.asked.fine, 10**6)
+        most = max(LEAST, task.work // row.instructions)
+        run = machine.run(model, law, row.rtol if s is None else task.asked.fine, most)
     except FAILURES as problem:
         return replace(row, fixed_why=short(problem), explicit_why=short(problem))
     names = positions(model, law)

@@ -23,6 +23,8 @@ SHARP = 1e-9
 """Widths [m/s] below this are none for an optimiser or a fixed step."""
 EVENT = "event"
 """Form of laws with modes, and the class of what switches by events."""
+CLASSES = ("jumps", EVENT, "?", "C0", "C1", "C2", "C3", "C4", "C∞")
+"""Classes in the velocity, the least smooth first."""
 CORE, STEPS_ON_CORE = "m4f", 200
 """Core whose instructions are counted, over so many steps."""
 STEP = 1e-3
@@ -43,10 +45,14 @@ def smoothness(law: Law) -> str:
     """The class in the velocity, as the numbers of `law` are.
 
     A law that is smooth only over a width says what it is without: "C∞ (C0 at v = 0 as v_eps -> 0)"
-    with v_eps = 1e-15 m/s is C0. One that switches by events is of the class "event".
+    with v_eps = 1e-15 m/s is C0. One that switches by events is of the class "event". A law of laws
+    has the least of theirs, and "?" is what does not say.
     """
     if form(law) == EVENT:
         return EVENT
+    inside = getattr(law, "laws", None) or [x for x in vars(law).values() if isinstance(x, Law)]
+    if inside:
+        return min(map(smoothness, inside), key=CLASSES.index)
     said = law.facts.smoothness
     first = said.split()[0]
     if first.startswith("set"):
@@ -55,7 +61,8 @@ def smoothness(law: Law) -> str:
     sharp = eps is not None and float(eps.value) < SHARP  # pyright: ignore[reportArgumentType]
     if sharp and "(C0" in said:
         return "C0"
-    return first.strip(",;")
+    found = first.strip(",;")
+    return found if found in CLASSES else "?"
 
 
 def form(law: Law) -> str:

@@ -16,20 +16,19 @@ if TYPE_CHECKING:
 
 STYLE = """
 body { font: 15px/1.5 system-ui, "DejaVu Sans", Arial, sans-serif; color: #1c2530; margin: 0; }
-main { max-width: 66rem; margin: 0 auto; padding: 1.5rem 1.25rem 4rem; }
+main { max-width: 76rem; margin: 0 auto; padding: 1.5rem 1.25rem 4rem; }
 h1 { font-size: 1.5rem; margin: 0 0 .3rem; } h2 { font-size: 1.1rem; margin: 2rem 0 .5rem; }
 .soft { color: #5b6775; } img { max-width: 100%; height: auto; }
 .verdict { background: #f4f6f8; border-left: .4rem solid #1d7a3e; padding: .5rem 1rem; }
 .verdict.none { border-color: #b3261e; } .verdict p { margin: .4rem 0; }
 .wide { overflow-x: auto; }
-table { border-collapse: collapse; font-size: .87rem; font-variant-numeric: tabular-nums; }
-th, td { padding: .2rem .7rem .2rem 0; border-bottom: 1px solid #d5dbe1; text-align: left;
-  vertical-align: top; white-space: nowrap; } thead th { color: #5b6775; }
-td.n { text-align: right; } td.why { white-space: normal; min-width: 20rem; }
+table { border-collapse: collapse; font-size: .8rem; font-variant-numeric: tabular-nums; }
+th, td { padding: .2rem .5rem .2rem 0; border-bottom: 1px solid #d5dbe1; text-align: left;
+  vertical-align: top; } thead th { color: #5b6775; }
+td.n { text-align: right; white-space: nowrap; } td.why { min-width: 20rem; }
 tr.best td { font-weight: 600; }
 tr.group td { padding-top: .8rem; color: #5b6775; font-style: italic; }
-td .soft { display: block; font-weight: 400; font-size: .8rem; white-space: normal;
-  min-width: 14rem; }
+td .soft { display: block; font-weight: 400; font-size: .75rem; min-width: 12rem; }
 """
 
 COLUMNS = (

@@ -1,4 +1,4 @@
-"""The choice as a picture: error against work of all laws, and the ranked ones by name."""
+"""The choice as a picture: error against work of all laws, and all of them by name."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -33,17 +33,17 @@ COLUMN, PLANE, ROW = 3.35, 2.1, 0.135
 """Width of a column of print, height of the plane and of a name beside it [inch]."""
 LEAST = 3
 """Ticks of an axis of work."""
-MOST = 30
-"""Ranked laws that are drawn by name."""
+MOST = 80
+"""Laws that are listed by name: all of the catalogue, so that no marker is without one."""
 
 
 def plot_choice(choice: "Choice", path: str | Path | None = None, wide: bool = True) -> Figure:
-    """Error against work, marked by what a law shows, and the ranked laws by their work.
+    """Error against work, marked by what a law shows, and every law by its work.
 
     Args:
         wide: the panels side by side; else above each other, in the width of a column of print.
     """
-    named = choice.ranked[:MOST] or choice.placed[:MOST]
+    named = choice.placed[:MOST]
     tall = ROW * len(named) + (0.75 if wide else 0.55)
     if wide:
         figure = blank(2 * COLUMN + 0.6, max(3.6, tall + 0.6))
@@ -63,7 +63,7 @@ def plot_choice(choice: "Choice", path: str | Path | None = None, wide: bool = T
         if any(shown(row.phenomena) == kind for row in choice.placed)
     ]
     hollow = Line2D(
-        [], [], ls="", marker="o", mfc="none", mec="k", label="moves otherwise", markersize=5
+        [], [], ls="", marker="o", mfc="none", mec="k", label="not ranked", markersize=5
     )
     figure.legend(
         handles=[*handles, hollow],
@@ -140,7 +140,7 @@ def _around(axis: Axes, row: Row, size: float) -> Bbox:
 
 
 def _by_name(axis: Axes, named: Sequence[Row], milliseconds: float) -> None:
-    """The work of each of them, the least on top."""
+    """The work of each of them, by rank."""
     for place, row in enumerate(named):
         k = KINDS.index(shown(row.phenomena))
         face = colour(k) if row.ranked else "none"

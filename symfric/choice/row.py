@@ -8,8 +8,8 @@ from typing import Any, final
 RANKED, INACCURATE, LACKING, REFUSED, FAILED = (
     "ranked", "inaccurate", "lacks", "cannot run", "failed",
 )  # fmt: skip
-"""Standings: does all that is asked; moves otherwise, by more than the accuracy; does not show what
-is needed; the machine does not take it; its run fails."""
+"""Standings: does all that is asked; does not keep the accuracy, as it moves otherwise or nobody
+knows yet; does not show what is needed; the machine does not take it; its run fails."""
 ORDER = (RANKED, INACCURATE, LACKING, FAILED, REFUSED)
 ALIKE = 1.1
 """Work within this ratio is the same: attempts differ by so much with a digit of a tolerance."""
@@ -114,7 +114,7 @@ def ordered(rows: Iterable[Row]) -> list[Row]:
     """
     found = list[Row]()
     head, rank = None, 0
-    for row in sorted(rows, key=_place):
+    for row in sorted(rows, key=place):
         if not row.attempts:
             found.append(replace(row, rank=0))
             continue
@@ -126,10 +126,10 @@ def ordered(rows: Iterable[Row]) -> list[Row]:
 
 def best_of(rows: Sequence[Row]) -> Row:
     """The first of them, were they ordered."""
-    return min(rows, key=_place)
+    return min(rows, key=place)
 
 
-def _place(row: Row) -> tuple[int, float, float, str]:
+def place(row: Row) -> tuple[int, float, float, str]:
     """What rows are ordered by: errors to a digit, work to the last."""
     error = float(f"{row.error:.0e}") if isfinite(row.error) else inf
     return ORDER.index(row.standing), 0.0 if row.ranked else error, row.work or inf, row.law
@@ -137,4 +137,4 @@ def _place(row: Row) -> tuple[int, float, float, str]:
 
 def _tied(head: Row, row: Row) -> bool:
     """Whether `row` is as good as the first of its rank."""
-    return _place(head)[:2] == _place(row)[:2] and row.work <= ALIKE * head.work
+    return place(head)[:2] == place(row)[:2] and row.work <= ALIKE * head.work

@@ -61,8 +61,11 @@ def select(
     counted, attempts times instructions, and timed; the count ranks, so that every run of `select`
     gives the same order, and laws within 10 % share a rank.
 
-    A law that moves otherwise, whatever its widths, or does not show what is needed, stands behind
-    those by its error, and is counted where its own error, that of the integrator, is the accuracy.
+    A law that does not keep the accuracy, or does not show what is needed, stands behind those by
+    its error, and is counted where its own error, that of the integrator, is the accuracy. That it
+    moves otherwise is said where its runs tend to another motion with an order; else the reason
+    says what was not decided: runs fail, cost too much, or creep by less than velocities are
+    rounded.
     A law that the machine does not take has its row, too, and the reason in it. What a law may cost
     is counted as well (`symfric.choice.budget`): it does not depend on how busy the computer is.
 

@@ -1,33 +1,41 @@
 """How soft a law may be: its widths and bristles scaled together, until it keeps a wanted error.
 
     static laws      widths and velocities s
-    bristles         stiffness 1/s, paths s, damping and velocities 1/sqrt(s) and sqrt(s)
+    bristles         stiffness 1/s, paths and widths s, damping 1/sqrt(s), velocities s^p
 
-and dry friction at s = 0: bristles break away at mu_s N only where the load grows slowly beside
-sigma_0 v_s.
+and dry friction at s = 0: bristles relax only where they creep, with the loading rate over sigma_0,
+faster than v_eps, so that no width is negligible. They break away at mu_s N but for a share of
+(loading rate / (sigma_0 v_s))^(2/3), and their fall behind it takes v_s^(2/3). Both vanish alike
+with p = 1/2, as s^(1/3); which is the larger one is a matter of the machine, so a smaller p is
+tried, too. The end of all this is where they creep by less than velocities are rounded.
 Limits: where a load turns bristles within their own period they swing past it and break away,
 however stiff they are, unless sigma_1 damps them: that motion is theirs, not that of dry friction.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from math import inf, log
 from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from symfric.choice.friction import Friction, fall_of, peaked
 from symfric.foundation.parameters import Parameter, parameters, with_values
 from symfric.laws import Law, LeineSwitch, RateAndState
 from symfric.laws.base.sticking import Sticking
 
+Array = NDArray[np.float64]
 NEGLIGIBLE = 1e-7
-"""Widths below this only round off a modulus; they are not what makes a law smooth."""
+"""Widths of static laws below this only round off a modulus."""
 RELATIVE = ("u_eps",)
 """Widths that are shares of another."""
 LEVEL_LIKE: dict[type[Law], tuple[str, ...]] = {LeineSwitch: ("delta", "c"), RateAndState: ("v_0",)}
 """Velocities that say how high friction is, and no width."""
-OF_BRISTLES = 0.5
-"""Power of the velocities of laws with states."""
+OF_BRISTLES = 0.45, 0.5
+"""Powers of the velocities of laws with states, tried in this order."""
 DIGITS = 12
 """Of scaled parameters: what is behind is rounding."""
 
@@ -40,12 +48,14 @@ class Softness:
     Attributes:
         powers: parameter -> power of s.
         mu_s, load: the peak that static laws are to keep at every s, and the normal force [N].
+        velocities: the power of s for velocities; 0 where nothing is scaled.
     """
 
     law: Law
     powers: dict[str, float]
     mu_s: float
     load: float | None
+    velocities: float = 0.0
 
     def at(self, s: float) -> Law:
         """The law at the factor `s`.
@@ -67,26 +77,34 @@ def _within(p: Parameter, value: float) -> float:
     return min(max(value, p.lower), p.upper) if p.role == "width" else value
 
 
-def softness(law: Law, friction: Friction, load: float | None) -> Softness:
-    """What may be scaled of `law`; nothing of one that rests exactly or has no widths."""
+def softness(
+    law: Law, friction: Friction, load: float | None, bristles: float = OF_BRISTLES[0]
+) -> Softness:
+    """What may be scaled of `law`; nothing of one that rests exactly or has no widths.
+
+    Args:
+        law, friction, load: what it describes, and under which load.
+        bristles: the power of the velocities of a law with states.
+    """
     known = parameters(law)
     exact = isinstance(law, Sticking) and law.has_mode
     fixed = fall_of(law) if friction.v_s is not None else None
-    powers = {} if exact else {n: _power(law, p) for n, p in known.items() if n != fixed}
+    of_speed = bristles if law.states else 1.0
+    powers = {} if exact else {n: _power(law, p, of_speed) for n, p in known.items() if n != fixed}
     found = {name: power for name, power in powers.items() if power}
-    return Softness(law, found, friction.mu_s, load)
+    return Softness(law, found, friction.mu_s, load, of_speed if found else 0.0)
 
 
-def _power(law: Law, p: Parameter) -> float:
+def _power(law: Law, p: Parameter, of_speed: float) -> float:
     """The power of s for a parameter; 0 for one that makes nothing smooth."""
     value = float(p.value)  # pyright: ignore[reportArgumentType]  (numbers only)
     if p.name in RELATIVE or p.field in LEVEL_LIKE.get(type(law), ()):
         return 0.0
     inverse = -1.0 if p.unit in ("s/m", "s/rad") else 1.0
     if p.role == "velocity scale":
-        return inverse * (OF_BRISTLES if law.states else 1.0)
-    if p.role == "width" and value > NEGLIGIBLE:
-        return 1.0 if law.states or p.unit != "1" else 0.0
+        return inverse * of_speed
+    if p.role == "width":
+        return 1.0 if law.states or (value > NEGLIGIBLE and p.unit != "1") else 0.0
     if not law.states or value == 0.0:
         return 0.0
     of_bristles = {"stiffness": -1.0, "damping": -0.5, "length": 1.0}
@@ -96,13 +114,18 @@ def _power(law: Law, p: Parameter) -> float:
 RATIO, SHORTER = 4.0, 2.0
 """From one softness of the ladder to the next; towards dry friction after a run that failed."""
 LEAP = 4
-"""Rungs that are left out once where errors stay the same."""
+"""Rungs that are left out where errors stay the same."""
 LEAST_ORDER, SAME_ORDER, LONGEST, WITHIN = 0.2, 0.2, 3, 0.8
 """Errors follow a power of the softness if it is so large, and changes by no more than this share;
 then so many rungs at most are made in one, to this share of the wanted error."""
-ANOTHER = "it tends to another motion"
-DRIEST, SOFTEST = 16, 5
-"""Rungs on either side of the law as it comes."""
+NARROW = 3e-5
+"""Share of its own velocities at which a law is dry for machines that are not far slower."""
+ORDERS = 0.05, 4.0
+"""Orders that differences of runs may show; they tend to nothing yet if they fall otherwise."""
+CERTAIN = 0.25
+"""Part of its error that a law may still move by, by the order of its runs, to be another one."""
+MOST, SOFTEST = 24, 5
+"""Rungs in all, and those on the soft side of the law as it comes."""
 MARGIN = 0.7
 """Part of the wanted error that is left to the law; the rest is the integrator's."""
 ROUNDING = 5e-3
@@ -112,12 +135,13 @@ ROUNDING = 5e-3
 @final
 @dataclass(frozen=True)
 class Rung:
-    """A run of the ladder: factor of the widths, error, attempts and tolerance."""
+    """A run of the ladder: factor of the widths, error, attempts, tolerance, motion over size."""
 
     s: float
     error: float
     attempts: int
     rtol: float = 0.0
+    motion: Array | None = None
 
 
 @final
@@ -128,10 +152,12 @@ class Ladder:
     Attributes:
         rungs: softest first.
         stopped: why it went no further towards dry friction; "" where the wanted error is kept.
+        decided: there is nothing to find out on another way there.
     """
 
     rungs: tuple[Rung, ...]
     stopped: str
+    decided: bool = False
 
     def softest(self, wanted: float) -> float | None:
         """The softest factor below which every run keeps the error; None where none does."""
@@ -150,6 +176,7 @@ class Ladder:
         return min(good.s * (wanted / good.error) ** (1 / order), 0.999 * bad.s)
 
 
+FIXED = "nothing of it is scaled"
 Run = Callable[[float], Rung]
 """s -> the run; raises what a run raises, see `ladder`."""
 
@@ -158,40 +185,77 @@ def ladder(
     run: Run,
     wanted: float,
     softest: float,
-    scalable: bool,
+    powers: float,
     failures: tuple[type[Exception], ...],
     said: Callable[[Exception], str] = str,
 ) -> Ladder:
     """Runs towards dry friction until two keep the error `wanted`, and away from it to `softest`.
 
+    A law tends to another motion where its own runs converge, and their limit is off. That is said
+    of runs at `NARROW` and below alone: a law whose widths are far from the speeds of a machine
+    converges to something else first.
+
     Args:
         run: one run.
         wanted, softest: errors of the driest and of the softest law that are of interest.
-        scalable: there is something to scale.
+        powers: the least power of s that its velocities have; 0 where nothing is scaled.
         failures: what a run may raise, which ends the ladder on its side.
         said: such a failure in words.
 
     Raises:
         one of `failures`: the law as it comes, s = 1, does not run.
     """
-    rungs, stopped = [run(1.0)], ""
-    ratio, leapt = RATIO, False
-    while scalable and not stopped and not _kept(rungs, wanted):
-        step = ratio if ratio < RATIO else _stride(rungs, wanted)
-        if _settled(rungs):  # a law whose widths are far from the machine's speeds looks so, too
-            step, stopped = ratio**LEAP, ANOTHER if leapt else ""
-            leapt = True
-        elif len(rungs) > DRIEST:
-            stopped = "its error falls too slowly"
+    rungs, stopped, decided = [run(1.0)], "" if powers else FIXED, not powers
+    ratio, leap = RATIO, RATIO**LEAP
+    while not stopped and not _kept(rungs, wanted):
+        settled = _settled(rungs)
+        step = ratio if ratio < RATIO else leap if settled else _stride(rungs, wanted)
+        order = limit_order(rungs) if rungs[-1].s ** powers <= NARROW else None
+        if settled and order is not None:
+            stopped, decided = f"it tends to another motion, with order {order:.2g}", True
+        elif len(rungs) > MOST:
+            stopped = f"its error still changes at softness {rungs[-1].s:.0e}"
         try:
             rungs += [] if stopped else [run(rungs[-1].s / step)]
         except failures as problem:
             stopped = said(problem) if ratio < RATIO else ""
-            ratio = SHORTER
+            ratio, leap = (SHORTER, SHORTER) if leap == RATIO else (RATIO, RATIO)
     with suppress(*failures):  # softer than the law allows
-        while scalable and rungs[0].error <= softest and rungs[0].s < RATIO**SOFTEST:
+        while powers and rungs[0].error <= softest and rungs[0].s < RATIO**SOFTEST:
             rungs.insert(0, run(rungs[0].s * RATIO))
-    return Ladder(tuple(rungs), "" if rungs[-1].error <= wanted else stopped)
+    return Ladder(tuple(rungs), "" if rungs[-1].error <= wanted else stopped, decided)
+
+
+def limit_order(rungs: Sequence[Rung]) -> float | None:
+    """The order in s with which motions tend to one that is off; None where that is not shown.
+
+    Three runs show the order q of x_0 + c s^q, whose c s_2^q the limit still is from the last one,
+    if they are leaps apart: at an extremum of their error neighbours are alike, too.
+
+        |x_0 - x_1| / |x_1 - x_2| = (s_0^q - s_1^q) / (s_1^q - s_2^q)
+    """
+    if len(rungs) < 3:
+        return None
+    one, two, three = rungs[-3:]
+    before, after = _apart(one, two), _apart(two, three)
+    a, b = one.s / two.s, two.s / three.s
+    if not 0.0 < after < before < inf or min(a, b) < RATIO**LEAP:
+        return None
+
+    def excess(q: float) -> float:
+        return (a**q - 1) / (1 - b**-q) - before / after
+
+    low, high = ORDERS
+    if not excess(low) < 0.0 < excess(high):
+        return None
+    order = float(brentq(excess, low, high))  # pyright: ignore[reportArgumentType]
+    return order if after / (b**order - 1) <= CERTAIN * three.error else None
+
+
+def _apart(one: Rung, other: Rung) -> float:
+    """Largest difference of two motions relative to their size; infinite where unknown."""
+    a, b = one.motion, other.motion
+    return inf if a is None or b is None or a.shape != b.shape else float(np.abs(a - b).max())
 
 
 def _kept(rungs: list[Rung], wanted: float) -> bool:

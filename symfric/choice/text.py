@@ -24,7 +24,7 @@ LEGEND = (
 )
 GROUPS = {
     RANKED: "show what is needed and keep the accuracy, by work:",
-    INACCURATE: "move otherwise, by their error, timed where their own error is the accuracy:",
+    INACCURATE: "do not keep the accuracy, by their error, timed where their own error does:",
     LACKING: "do not show what is needed, by their error, timed likewise:",
 }
 """Standing -> what its laws do; those of other standings did not run."""

@@ -99,7 +99,7 @@ def _others(rows: Sequence[Row]) -> str:
     """How many fell out, by the reason."""
     what = {
         LACKING: "for what they show",
-        INACCURATE: "that move otherwise",
+        INACCURATE: "that do not keep the accuracy",
         FAILED: "whose run fails",
         REFUSED: "that do not fit into this machine",
     }

@@ -41,8 +41,9 @@ def gallery(
 ) -> None:
     """Compute the figures of the papers again.
 
-    Beside each: what is compared, how far we are, and what was refuted by what evidence. Writes a
-    picture and a JSON file of its numbers for every figure, and index.html with all of them.
+    Beside each: what is compared, how far we are, which observation is reproduced, which
+    explanation refuted, and what the text leaves open. Writes a picture and a JSON file of its
+    numbers for every figure, and index.html with all of them.
     Ctrl-C keeps what is done. A figure that fails is told, the others go on, and the exit status
     is 1; it is 130 after Ctrl-C.
 

@@ -3,7 +3,6 @@
 from dataclasses import asdict
 from inspect import getdoc
 from pathlib import Path
-from re import split
 from typing import Annotated, Any
 
 import typer
@@ -140,6 +139,7 @@ def to_dict(law: AnyLaw) -> dict[str, Any]:
         "states": {state.name: state.unit for state in law.states},
         "smoothness": law.facts.smoothness,
         "confidence": law.facts.confidence,
+        "checked": law.facts.checked,
         "source": law.facts.source,
         "warnings": list(law.warnings()),
         "odd": law.facts.odd,
@@ -183,7 +183,7 @@ def show_list(chosen: dict[str, AnyLaw]) -> None:
                 f"{len(law.states)} {law.facts.smoothness.split()[0].removesuffix('-valued')}",
                 cost(law).value,
                 cost(law).gradient,
-                _confirmed(law.facts.confidence),
+                law.facts.confidence,
             )
             for name, law in chosen.items()
         ],
@@ -194,20 +194,13 @@ def show_list(chosen: dict[str, AnyLaw]) -> None:
         f"\nshows:\n{codes}\n"
         "z: number of states, then smoothness (set: set-valued)\n"
         "value, slope: CasADi instructions for force and rate, and for their derivatives\n"
-        "formula: how it was confirmed; rebuilt: from what its paper says about it\n"
+        "formula: what it was compared with; unverified: written from memory\n"
         "symfric laws NAME shows equation, parameters and more;\n"
         f"symfric laws NAME --figure draws {', '.join(FIGURES)}.\n"
         f"Other names: {others}.\n"
         "Sums are written coulomb+viscous, wrappers asymmetric(lugre), load_dependent(lugre),\n"
         "lagged(stribeck), temperature_dependent(lugre)."
     )
-
-
-def _confirmed(confidence: str) -> str:
-    """How a formula was confirmed, in a word or two."""
-    if "construct" in confidence:
-        return "rebuilt"
-    return split(r"[;,]| \(| for | from ", confidence)[0]
 
 
 def show_law(name: str, law: AnyLaw) -> None:
@@ -217,7 +210,7 @@ def show_law(name: str, law: AnyLaw) -> None:
     shown = ", ".join(PHENOMENA[code] for code in phenomena(law))
     output.show(
         f"{name} shows {shown}.\n"
-        f"Smoothness: {law.facts.smoothness}.\nFormula confirmed by: {law.facts.confidence}.\n"
+        f"Smoothness: {law.facts.smoothness}.\nFormula: {law.facts.formula}.\n"
         f"Cost: {cost(law).value} CasADi instructions for {costs(law)}, "
         f"{cost(law).gradient} for their derivatives.\n"
     )

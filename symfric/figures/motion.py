@@ -116,18 +116,25 @@ def through(points: Sequence[float], leg: float) -> Callable[[ca.SX, ca.SX], ca.
 
 
 def pushed(
-    law: AnyLaw, N: float, mass: float, force: Input, t_end: float, until: float | None = None
+    law: AnyLaw,
+    N: float,
+    mass: float,
+    force: Input,
+    t_end: float,
+    until: float | None = None,
+    way: float = 0.0,
 ) -> Run:
     """A block of `mass` [kg] under `law`, at rest at first, pushed with `force` [N] to `t_end` [s].
 
-    With `until` the run ends where the velocity rises beyond it [m/s].
+    With `until` the run ends where the velocity is beyond it [m/s], and the position beyond `way`.
     """
     if isinstance(law, Population):
-        return shoved(law, N, mass, force, t_end, until)
+        return shoved(law, N, mass, force, t_end, until, way)
     model = Drive(law, m=mass, N=N).model()
     if until is not None:
-        v = next(variable.symbol for variable in model.x if variable.name == "v")
-        over = Event("broken_away", v - until, direction=1, terminal=True)
+        x, v = (model.expression(name) for name in ("x", "v"))
+        beyond = v - until if way == 0.0 else ca.fmin(v / until, x / way) - 1
+        over = Event("broken_away", beyond, direction=1, terminal=True)
         model = replace(model, events=(*model.events, over))
     return simulate(model, t_end, u={"force": force})
 

@@ -55,7 +55,13 @@ class Steps:
 
 
 def shoved(
-    law: Population, N: float, mass: float, force: Input, t_end: float, until: float | None
+    law: Population,
+    N: float,
+    mass: float,
+    force: Input,
+    t_end: float,
+    until: float | None,
+    way: float = 0.0,
 ) -> Steps:
     """A block of `mass` [kg] on random contacts pushed with `force` [N], by explicit steps.
 
@@ -70,7 +76,7 @@ def shoved(
     rows = np.zeros((t.size, 3))
     for i in range(t.size):
         rows[i] = x, v, held
-        if until is not None and v > until:
+        if until is not None and v > until and x >= way:
             t, rows, load = t[: i + 1], rows[: i + 1], load[: i + 1]
             break
         v += h / mass * (load[i] - held)

@@ -41,7 +41,10 @@ class Status(Enum):
         "No step makes progress although the conditions do not hold: nearly dependent or badly "
         "scaled constraints, or a derivative that jumps, are near this point."
     )
-    UNBOUNDED = "The cost falls without bound; bound the inputs or the states, or check its sign."
+    UNBOUNDED = (
+        "The unknowns grow without bound: no least cost was found where they are finite; bound the "
+        "inputs or the states, or check the sign of the cost."
+    )
     NO_DESCENT = (
         "No step fits better, although the derivatives say that one should: this is no minimum; "
         "start elsewhere or narrow the bounds."
@@ -86,3 +89,11 @@ class SolveError(RuntimeError):
         super().__init__(message)
         self.status = status
         self.partial = partial
+
+
+class OverloadWarning(UserWarning):
+    """Friction above its static level, as of a bristle that does not relax."""
+
+
+class EnergyWarning(UserWarning):
+    """Friction that adds energy to the motion, as by a law whose force has the wrong sign."""

@@ -21,6 +21,11 @@ nav { overflow-x: auto; } summary { color: var(--soft); cursor: pointer; }
 @media (max-width: 40rem) { dl { grid-template-columns: 1fr; } dd { margin-bottom: .4rem; } }
 """
 
+REDUCED = (
+    "Some figures are computed at reduced size: beside them stands what was checked there, without "
+    "the verdicts, which rest on the full size."
+)
+
 
 def index_page(records: Sequence[Mapping[str, Any]]) -> str:
     """One page of HTML with the plates `records`, grouped by paper; its pictures lie beside it."""
@@ -28,9 +33,10 @@ def index_page(records: Sequence[Mapping[str, Any]]) -> str:
     for record in records:
         papers.setdefault(record["paper"], []).append(record)
     reduced = any(record["quick"] for record in records)
-    note = "<p><strong>Some figures are computed at reduced size.</strong></p>" if reduced else ""
+    note = f"<p><strong>{REDUCED}</strong></p>" if reduced else ""
     body = "".join(
-        f"<h2>{escape(paper)}</h2>{_overview(group)}{''.join(map(figure_block, group))}"
+        f"<h2>{escape(paper)}</h2><p>{written(group[0]['note'])}</p>{_overview(group)}"
+        f"{''.join(map(figure_block, group))}"
         for paper, group in papers.items()
     )
     return (
@@ -39,7 +45,8 @@ def index_page(records: Sequence[Mapping[str, Any]]) -> str:
         '<link rel="icon" href="data:,">'
         f"<title>Gallery</title><style>{STYLE}</style></head><body>"
         "<h1>Figures of the papers, computed again</h1>"
-        "<p>Beside each: what is compared, how far we are, and what was refuted by what evidence."
+        "<p>Beside each: what is compared, how far we are, and which observation is reproduced, "
+        "which explanation refuted, and what the text leaves open."
         f"</p>{note}{body}</body></html>\n"
     )
 
@@ -49,8 +56,8 @@ def figure_block(record: Mapping[str, Any]) -> str:
     said = {
         "compared": record["compared"],
         "how far": f"{record['how_far']}: {record['measure']}",
-        "evidence": record["evidence"],
-        "checked": "; ".join(record.get("checked", ())),
+        **record["verdicts"],
+        "checked at reduced size" if record["quick"] else "checked": "; ".join(record["checked"]),
     }
     title = f"{record['figure']}. {record['title']}"
     text = "".join(f"<p>{written(p)}</p>" for p in record["text"].split("\n\n") if p)

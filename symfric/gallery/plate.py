@@ -17,8 +17,14 @@ from matplotlib.figure import Figure
 from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Showing, Shown, Table
 
-SECTIONS = ("Compared", "Distance", "Evidence")
-"""What the docstring of every script says under these words."""
+VERDICTS = {
+    "Reproduced": "observation reproduced",
+    "Refuted": "explanation refuted",
+    "Undecided": "not decidable from the text",
+}
+"""Section of a docstring -> kind of verdict on what the paper says; a script has one at least."""
+SECTIONS = ("Compared", "Distance", *VERDICTS)
+"""What the docstring of a script says under these words."""
 SCRIPT = re.compile(r"fig_(\d+)(?:_(\d+))?_\w+")
 
 
@@ -27,40 +33,48 @@ SCRIPT = re.compile(r"fig_(\d+)(?:_(\d+))?_\w+")
 class Plate(Showing):
     """One figure of a paper, computed again.
 
-    Everything but the last five is said once, in the docstrings of the script and of its folder.
+    The texts are said once, in the docstrings of the script and of its folder.
 
     Attributes:
         paper: authors and title.
+        note: what was invented or reconstructed for all figures of the paper; may be empty.
         figure: such as "Figure 7".
         title: what it shows.
         text: what else there is to say; may be empty.
         compared: what is compared with what.
         measure: what `distance` measures.
-        evidence: what was refuted, and by what evidence.
-        distance: how far we are, in `unit`; computed by the script.
+        verdicts: kind of `VERDICTS` -> what falls under it, and by what evidence; empty at reduced
+            size, since verdicts rest on the full one.
+        distance: how far we are, in `unit`; computed by the script, and `within` at most.
         unit: SI, "1" for a ratio.
+        within: the largest distance at which the figure counts as computed again.
         picture: made outside pyplot.
-        numbers: name with unit, such as "period [s]" -> value; what the evidence stands on.
-        checked: sentences of the evidence that were checked on these numbers; all of them hold.
+        numbers: name with unit, such as "period [s]" -> value; what the verdicts stand on.
+        checked: sentences that were checked on these numbers; all of them hold.
+        quick: whether it is computed at reduced size.
     """
 
     paper: str
+    note: str
     figure: str
     title: str
     text: str
     compared: str
     measure: str
-    evidence: str
+    verdicts: Mapping[str, str]
     distance: float
     unit: str
+    within: float
     picture: Figure
     numbers: Mapping[str, float]
     checked: tuple[str, ...] = ()
+    quick: bool = False
 
     @property
     def how_far(self) -> str:
-        """The distance with its unit."""
-        return f"{self.distance:.2g} {self.unit}" if self.unit != "1" else f"{self.distance:.2g}"
+        """The distance with its unit and its bound."""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"{self.distance:.2g}{unit} (at most {self.within:.2g}{unit})"
 
     def shown(self) -> Shown:
         """Figure, what is compared, how far we are, and the numbers."""
@@ -69,7 +83,7 @@ class Plate(Showing):
             self.paper,
             f"compared: {self.compared}",
             f"how far: {self.how_far}; {self.measure}",
-            f"evidence: {self.evidence}",
+            *(f"{kind}: {text}" for kind, text in self.verdicts.items()),
             *(f"checked: {'; '.join(self.checked)}" for _ in self.checked[:1]),
         )
         lines = tuple(line for text in told for line in wrap(text, 98, subsequent_indent="  "))
@@ -82,9 +96,11 @@ class Plate(Showing):
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but the picture as plain data."""
-        texts = ("paper", "figure", "title", "text", "compared", "measure", "evidence")
+        texts = ("paper", "note", "figure", "title", "text", "compared", "measure", "quick")
         return {name: getattr(self, name) for name in texts} | {
+            "verdicts": dict(self.verdicts),
             "distance": float(self.distance),
+            "within": float(self.within),
             "unit": self.unit,
             "how_far": self.how_far,
             "numbers": {name: float(value) for name, value in self.numbers.items()},
@@ -99,6 +115,9 @@ def plate_of(
     unit: str,
     numbers: Mapping[str, float],
     claims: Mapping[str, Any],
+    *,
+    within: float,
+    quick: bool,
 ) -> Plate:
     """The plate of a script, its texts taken from the docstrings.
 
@@ -107,16 +126,19 @@ def plate_of(
         picture: the figure.
         distance: how far we are.
         unit: of the distance; "1" for a ratio.
-        numbers: what the evidence stands on.
-        claims: sentence of the evidence -> whether the numbers bear it out. At reduced size there
-            may be fewer; a plate whose text is untrue is not drawn.
+        numbers: what the verdicts stand on.
+        claims: sentence -> whether the numbers bear it out. At reduced size these sentences are
+            all that is said; a plate whose text is untrue is not drawn.
+        within: the largest distance of a figure that is computed again.
+        quick: whether it is computed at reduced size.
 
     Raises:
-        ValueError: a docstring without one of its sections, numbers that are not finite, a claim
-            that does not hold.
+        ValueError: a docstring without one of its sections, numbers that are not finite, a distance
+            beyond its bound, a claim that does not hold.
     """
     said = sections(modules[script].__doc__ or "")
-    missing = [name for name in ("title", *SECTIONS) if not said.get(name)]
+    missing = [name for name in ("title", "Compared", "Distance") if not said.get(name)]
+    missing += [" or ".join(VERDICTS)] * (not said.keys() & VERDICTS.keys())
     if missing:
         raise ValueError(
             f"gallery '{script}': expected a docstring with {', '.join(missing)}, got none"
@@ -125,6 +147,8 @@ def plate_of(
     if odd:
         raise ValueError(f"gallery '{script}': expected finite numbers, got {', '.join(odd)}")
     untrue = [f"'{sentence}'" for sentence, holds in claims.items() if not holds]
+    if distance > within:
+        untrue.append(f"a distance within {within:.2g} {unit}, {distance:.3g}")
     if untrue:
         raise ValueError(
             f"gallery '{script}': expected numbers that bear out its text, got others for "
@@ -133,17 +157,20 @@ def plate_of(
     folder, _, name = script.rpartition(".")
     return Plate(
         paper=paper_of(folder),
+        note=note_of(folder),
         figure=figure_of(name),
         title=said["title"],
-        text=said["text"],
+        text="" if quick else said["text"],
         compared=said["Compared"],
         measure=said["Distance"],
-        evidence=said["Evidence"],
+        verdicts={} if quick else {VERDICTS[name]: said[name] for name in VERDICTS if name in said},
         distance=float(distance),
         unit=unit,
+        within=float(within),
         picture=picture,
         numbers=dict(numbers),
         checked=tuple(claims),
+        quick=quick,
     )
 
 
@@ -171,6 +198,12 @@ def paper_of(folder: str) -> str:
     """Authors and title: the first paragraph of the folder's docstring."""
     doc = cleandoc(import_module(folder).__doc__ or "")
     return " ".join(doc.split("\n\n")[0].split()).rstrip(".")
+
+
+def note_of(folder: str) -> str:
+    """What was invented for all figures of a paper: what follows in the folder's docstring."""
+    _, _, rest = cleandoc(import_module(folder).__doc__ or "").partition("\n\n")
+    return " ".join(rest.split())
 
 
 @cache
@@ -231,4 +264,4 @@ def about(name: str) -> dict[str, str]:
     module = scripts()[name]
     folder, _, stem = module.rpartition(".")
     said = sections(import_module(module).__doc__ or "")
-    return {"paper": paper_of(folder), "figure": figure_of(stem)} | said
+    return {"paper": paper_of(folder), "note": note_of(folder), "figure": figure_of(stem)} | said

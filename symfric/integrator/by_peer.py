@@ -1,5 +1,6 @@
 """Simulate a model with an integrator of others, as a second opinion."""
 
+import warnings
 from collections.abc import Mapping
 from time import perf_counter
 
@@ -20,6 +21,7 @@ from symfric.integrator.equations.inputs import Input, input_data
 from symfric.integrator.outcome import trajectory_of
 from symfric.integrator.peers.casadi_integrators import PEERS, integrate_by_peer
 from symfric.integrator.running.built import built
+from symfric.integrator.running.doubts import doubts
 from symfric.model import Model
 from symfric.results.statistics import Statistics
 from symfric.results.trajectory import Trajectory
@@ -95,6 +97,9 @@ def simulate_by_peer(
             **counts,
         )
 
+    for said in doubts(integrator, inputs, run, values):
+        run.message += f" {said}"
+        warnings.warn(type(said)(f"simulate_by_peer '{model.name}': {said}"), stacklevel=2)
     trajectory = trajectory_of(integrator, inputs, run, values, count)
     if throw and not trajectory.status.ok:
         raise SolveError(trajectory.message, trajectory.status, trajectory)

@@ -1,5 +1,6 @@
 """Many runs of one model: over arrays of parameters and start values, on one machine or many."""
 
+import warnings
 from collections.abc import Callable, Mapping
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import closing
@@ -13,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks, packed
 from symfric.foundation.compiler import CompileError
-from symfric.foundation.status import SolveError, Status
+from symfric.foundation.status import OverloadWarning, SolveError, Status
 from symfric.integrator.arguments import (
     BACKENDS,
     check_flags,
@@ -32,6 +33,7 @@ from symfric.integrator.many.store import Store
 from symfric.integrator.many.workers import EXECUTORS, pool_of, solved
 from symfric.integrator.methods.tableaux import key_of
 from symfric.integrator.running.built import built
+from symfric.integrator.running.doubts import of_members
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import Tolerances
 from symfric.integrator.step.layout import State
@@ -123,6 +125,7 @@ def simulate_many(
     Warns:
         UserWarning: rtol above 1e-5, where stick phases may get lost; results in `out` that are
             damaged, and computed again.
+        OverloadWarning: friction above its static level in some members (`Ensemble.doubtful`).
     """
     check_model("simulate_many", model)
     check_flags("simulate_many", progress)
@@ -170,7 +173,7 @@ def simulate_many(
                     progress(done / members)
     except (KeyboardInterrupt, BrokenExecutor) as error:
         ended = error
-    found = _ensemble(model, looks, given, store, ended)
+    found = _doubted(_ensemble(model, looks, given, store, ended), model, given)
     if isinstance(ended, BrokenExecutor):
         raise _worker_ended(found, done, folder is not None) from ended
     return found
@@ -199,6 +202,20 @@ def _ensemble(
         units,
         reach,
     )
+
+
+def _doubted(found: Ensemble, model: Model, given: Members) -> Ensemble:
+    """The result with what is doubtful of it, and one warning about all of that."""
+    p = np.tile(model.values("p"), (given.count, 1))
+    for k, v in enumerate(model.p):
+        p[:, k] = given.p.get(v.name, p[:, k])
+    doubtful = of_members(model, found.reach, p, given.x0)
+    doubtful = {m: why for m, why in doubtful.items() if m not in found.failed}
+    for first, why in list(doubtful.items())[:1]:
+        count = f"{len(doubtful)} of {given.count} members, the first is {first}"
+        said = f"simulate_many '{model.name}': friction is overloaded in {count}: {why}"
+        warnings.warn(said, OverloadWarning, stacklevel=3)
+    return replace(found, doubtful=doubtful)
 
 
 def _worker_ended(found: Ensemble, done: int, kept: bool) -> SolveError:

@@ -1,5 +1,6 @@
 """Simulate a model: one call for every method and engine."""
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -26,6 +27,7 @@ from symfric.integrator.measured import difference, differences_of_derivatives
 from symfric.integrator.methods.tableaux import FOR_DERIVATIVES
 from symfric.integrator.outcome import trajectory_of
 from symfric.integrator.running.built import built
+from symfric.integrator.running.doubts import doubts
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Run
 from symfric.integrator.running.run import Tolerances, integrate
@@ -126,6 +128,9 @@ def simulate(
 
     Warns:
         UserWarning: rtol above 1e-5, where stick phases may get lost.
+        OverloadWarning: friction above its static level, as of a bristle that does not relax. The
+            run ended well all the same; its `doubts` say where.
+        EnergyWarning: friction that adds energy to the motion, as by a law of the wrong sign.
     """
     check_model("simulate", model)
     check_flags("simulate", progress, measure_error=measure_error, throw=throw)
@@ -156,6 +161,9 @@ def simulate(
     run, count = _solve(
         integrator, inputs, y0, values, allowed, backend, progress, build_time, looks
     )
+    for said in doubts(run.integrator or integrator, inputs, run, values):
+        run.message += f" {said}"
+        warnings.warn(type(said)(f"simulate '{model.name}': {said}"), stacklevel=2)
     trajectory = trajectory_of(integrator, inputs, run, values, count, backend)
     if throw and not trajectory.status.ok and trajectory.status is not Status.INTERRUPTED:
         raise SolveError(trajectory.message, trajectory.status, trajectory)

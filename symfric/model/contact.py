@@ -49,6 +49,7 @@ class FrictionLaw(Protocol):
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar: ...  # noqa: D102
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar: ...  # noqa: D102
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar: ...  # noqa: D102
+    def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar: ...  # noqa: D102
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Any, ...]: ...  # noqa: D102
     def sliding(self, v: Scalar, N: Scalar, side: int) -> Scalar: ...  # noqa: D102
     def static_level(self, N: Scalar, side: int = 1) -> Scalar: ...  # noqa: D102
@@ -105,9 +106,15 @@ class Contact:
             object.__setattr__(self, part, value if part == "slip" else getattr(self, part))
         missing = [f"{i.name} ({i.doc})" for i in self.law.inputs if i.name not in self.given]
         if missing:
+            hint = "give it by name, as given={...}"
+            if any(i.name == APPLIED and i.name not in self.given for i in self.law.inputs):
+                hint += (
+                    "; F_e is the sum of all other forces along the slip, m dv/dt = F_e - F, which "
+                    "drive(...) and mechanisms find themselves"
+                )
             raise ValueError(
                 f"{where}: expected what {type(self.law).__name__} needs besides v and N, got no "
-                f"{', '.join(missing)}; give it by name, as given={{...}}"
+                f"{', '.join(missing)}; {hint}"
             )
         names = [i.name for i in self.law.inputs]
         object.__setattr__(self, "given", {name: self.given[name] for name in names})
@@ -177,6 +184,12 @@ class Contact:
     def static_level(self, side: int = 1) -> ca.SX:
         """The largest force at rest against being pulled to one side [N]."""
         return ca.SX(self.law.static_level(self.N, side, **self.further))
+
+    @property
+    def most_held(self) -> ca.SX:
+        """The largest force that the states of the law carry in any motion [N]."""
+        sides = [ca.SX(self.law.most_held(self.N, s, **self.further)) for s in (1, -1)]
+        return ca.fmax(*sides)
 
     def events(self) -> tuple[Event, ...]:
         """The changes of mode of the law."""

@@ -4,7 +4,7 @@
     rod_tension             force in a massless rod, negative under pressure
     body_x ... body_vz      position and velocity of a centre of mass in the world
     force_work_rate         power that a force which is not conservative puts into the bodies
-    friction_work_rate      the same of friction in all joints, at most zero
+    friction_work_rate      the same of friction in all joints, above zero where it drives
     drive_work_rate         the same of prescribed motions
     conserved               kinetic and potential energy without potentials of time or inputs
 
@@ -125,7 +125,7 @@ def _work(
         taken = sum((-ca.dot(c.F, c.slip) for c in eq.contacts), ca.SX(0))
         yield (
             "friction_work_rate",
-            Output(taken, "W", "power put in by friction, at most zero", WORK),
+            Output(taken, "W", "power put in by friction, above zero where it drives", WORK),
         )
     if eq.m and not eq.phi_t.is_zero():
         drive = ca.dot(eq.lam, eq.phi_t)

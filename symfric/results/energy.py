@@ -1,4 +1,4 @@
-"""Work by quadrature over the accepted steps, and the balance of energy of a mechanism."""
+"""The balance of energy of a mechanism, its work by quadrature over the accepted steps."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, final
@@ -10,35 +10,12 @@ from numpy.typing import NDArray
 from symfric.foundation.shown import Showing, Shown, Table
 from symfric.foundation.symbols import stacked
 from symfric.model.kinds import WORK
+from symfric.results.quadrature import integrals
 
 if TYPE_CHECKING:
     from symfric.results.trajectory import Trajectory
 
 Array = NDArray[np.float64]
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
-"""Of Gauss quadrature on (-1, 1): exact to degree 9, beyond any dense output."""
-
-
-def integrals(trajectory: "Trajectory", expression: ca.SX, times: Array) -> Array:
-    """Integrals of the rows of a column from the start up to `times`, shape (rows, times).
-
-    Steps end at jumps of inputs and at events, so that the integrand is smooth inside each.
-    """
-    ends = trajectory.step_times
-    k = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, ends.size - 2)
-    whole = _pieces(trajectory, expression, ends[:-1], ends[1:])
-    before = np.concatenate([np.zeros((whole.shape[0], 1)), np.cumsum(whole, axis=1)], axis=1)
-    return before[:, k] + _pieces(trajectory, expression, ends[k], times)
-
-
-def _pieces(trajectory: "Trajectory", expression: ca.SX, a: Array, b: Array) -> Array:
-    """Integrals over the intervals from a to b, each within a step, shape (rows, intervals)."""
-    half = (b - a)[:, None] / 2
-    at = (a + b)[:, None] / 2 + half * NODES
-    if not at.size:
-        return np.zeros((expression.numel(), 0))
-    values = np.atleast_2d(trajectory.of(expression, at.ravel()))
-    return np.einsum("rkg,g,k->rk", values.reshape(-1, *at.shape), WEIGHTS, half[:, 0])
 
 
 @final

@@ -50,6 +50,7 @@ class Ensemble(Showing):
         given_units: name -> unit of `varied` and `fixed`.
         reach: state -> its least and greatest value over the start and the ends of all accepted
             steps, shape (2, members); NaN for members that were not started.
+        doubtful: number of a member that ended well -> sentence on what is doubtful of it.
     """
 
     scene: str
@@ -64,6 +65,7 @@ class Ensemble(Showing):
     fixed: dict[str, float] = field(default_factory=dict[str, float])
     given_units: dict[str, str] = field(default_factory=dict[str, str])
     reach: dict[str, Array] = field(default_factory=dict[str, Array])
+    doubtful: dict[int, str] = field(default_factory=dict[int, str])
 
     def check_fields(self) -> None:
         """Refuse arrays that are not those of the same members; for files."""

@@ -90,9 +90,12 @@ def report(
 
 def _verdict(runs: Mapping[str, Trajectory]) -> str:
     """How the runs ended."""
-    good = all(run.status.ok for run in runs.values())
+    ended = all(run.status.ok for run in runs.values())
+    good = ended and not any(run.doubts for run in runs.values())
     said = [f"{name}: {run.message}" for name, run in runs.items()]
-    return html.verdict("good" if good else "bad", "Done" if good else "Not finished", said)
+    return html.verdict(
+        "good" if good else "bad", "Done" if good else "In doubt" if ended else "Not finished", said
+    )
 
 
 def _picture(runs: Mapping[str, Trajectory]) -> str:

@@ -32,6 +32,9 @@ def shown(runs: "Ensemble") -> Shown:
         lines.append(f"fixed: {valued(known)}")
     for number, why in list(runs.failed.items())[:3]:
         lines.append(f"member {number} failed: {why}")
+    if runs.doubtful:
+        first, why = next(iter(runs.doubtful.items()))
+        lines.append(f"doubtful: {len(runs.doubtful)}, the first is {first}: {why}")
     if len(runs.failed) > 3:
         lines.append(f"failed: {len(runs.failed)}, members {among(map(str, runs.failed))}")
     rows = list[tuple[str, ...]]()

@@ -21,8 +21,9 @@ from symfric.foundation.symbols import strays
 from symfric.model import Model
 from symfric.results import tables
 from symfric.results.derivatives import Derivatives
-from symfric.results.energy import EnergyBalance, energy_balance, integrals
+from symfric.results.energy import EnergyBalance, energy_balance
 from symfric.results.extremes import extremes, looks
+from symfric.results.quadrature import Quadrature
 from symfric.results.shown import shown
 from symfric.results.statistics import Statistics
 
@@ -45,7 +46,7 @@ class Kept(Protocol):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(Showing, Derivatives):
+class Trajectory(Showing, Derivatives, Quadrature):
     """Named signals of a simulated model.
 
     `trajectory["v"]` is a signal at the times `trajectory.t`; `trajectory.at(times)` evaluates
@@ -103,6 +104,11 @@ class Trajectory(Showing, Derivatives):
         from symfric.results.thumbnail import picture  # noqa: PLC0415  (matplotlib is slow to import)
 
         return picture(self)
+
+    @property
+    def doubts(self) -> str:
+        """What its tolerances do not vouch for, in sentences; "" where nothing is known."""
+        return self.message.removeprefix(self.status.value).strip() if self.status.ok else ""
 
     @cached_property
     def statistics(self) -> Statistics:
@@ -213,23 +219,6 @@ class Trajectory(Showing, Derivatives):
             )
         values = self.express(ca.vec(column), self.t if times is None else self._inside(times))
         return values[0] if column.is_scalar() else values
-
-    def integral(self, name: str, times: ArrayLike | None = None) -> Array:
-        """Integral of a signal or detail over time from the start, such as energy from power.
-
-        By Gauss quadrature over the dense output of every accepted step, which costs the
-        simulation nothing: `trajectory.integral("friction_power")` is a work [J].
-
-        Args:
-            name: of a signal or detail.
-            times: up to where [s], shape (n,); `t` if not given.
-
-        Raises:
-            ValueError: unknown name, a time outside the span.
-        """
-        self.check([name])
-        at = self.t if times is None else self._inside(times)
-        return integrals(self, self.model.expression(name), at)[0]
 
     def energy_balance(self) -> EnergyBalance:
         """Where the energy of a mechanism went, and what the books do not explain.

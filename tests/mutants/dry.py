@@ -26,6 +26,16 @@ DRY = (
         "            mu += self.kappa * v * v", "            mu += self.kappa * v * v / N", PRINTED,
     ),
     Mutant(
+        "the band of Karnopp holds what it cannot", "symfric/laws/static/applied_force.py",
+        "return (1 - w) * smooth.hold(F_e, static, self.F_eps) + w * slip",
+        "return (1 - w) * F_e + w * slip", ("tests/symfric/laws/test_driving.py",),
+    ),
+    Mutant(
+        "a law says that it is unverified, and not what that means", "symfric/laws/base/law.py",
+        'said = f"{self.confidence} ({CONFIDENCE[self.confidence]})"', "said = self.confidence",
+        ("tests/symfric/laws/test_contract.py",),
+    ),
+    Mutant(
         "a mode shows what error control adds to it", "symfric/model/kinds.py",
         "if kind != MODE:", "if kind:", ("tests/symfric/results/test_modes.py",),
     ),

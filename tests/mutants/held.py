@@ -9,6 +9,8 @@ T_INSTRUCTIONS = ("tests/symfric/foundation/test_instructions.py",)
 T_PACKED = ("tests/symfric/foundation/test_packed.py",)
 T_STORED = ("tests/symfric/integrator/test_stored.py",)
 T_SHOWN = ("tests/symfric/foundation/test_shown.py",)
+DOUBTS = "symfric/integrator/running/doubts.py"
+T_DOUBTS = ("tests/symfric/integrator/running/test_doubts.py",)
 T_ACCELERATIONS = ("tests/symfric/model/test_accelerations.py",)
 
 HELD = (
@@ -110,5 +112,26 @@ HELD = (
         "deflections follow the load", "symfric/laws/composed/normalised.py",
         "        return self.N_0\n", "        return N\n",
         ("tests/symfric/laws/composed/test_normalised.py",),
+    ),
+    Mutant(
+        "what a bristle carries beyond its level is not said", DOUBTS,
+        "if held.fixed and most <= 1 + MARGIN:", "if held.fixed:", T_DOUBTS,
+    ),
+    Mutant(
+        "a load that fell is taken for overload", DOUBTS,
+        "np.where(growth > 0, ratio, 0.0)", "ratio", T_DOUBTS,
+    ),
+    Mutant(
+        "what a user starts with is taken for overload", DOUBTS,
+        "start = max(1.0, ratio[0])", "start = 1.0", T_DOUBTS,
+    ),
+    Mutant(
+        "long runs are not looked at", DOUBTS,
+        "elif most > allowed and not run.complete:", "elif False:", T_DOUBTS,
+    ),
+    Mutant(
+        "behind a reversal Bliman and Sorine are taken to be overloaded",
+        "symfric/laws/dynamic/bliman_sorine.py",
+        "else self.mu_1 + self.mu_2)", "else self.mu_1)", T_DOUBTS,
     ),
 )  # fmt: skip

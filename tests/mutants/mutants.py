@@ -34,6 +34,7 @@ WATCH = "symfric/integrator/step/watch.py"
 EVENTS = "symfric/integrator/running/events.py"
 SEARCH = "symfric/integrator/running/search.py"
 CROSSINGS = "symfric/integrator/running/crossings.py"
+ISOLATION = "symfric/integrator/running/isolation.py"
 RUN = "symfric/integrator/running/run.py"
 INITIAL = "symfric/integrator/equations/initial.py"
 EMITTER = "symfric/emitter/emit.py"
@@ -45,6 +46,7 @@ T_OUTPUTS = ("tests/symfric/integrator/running/test_outputs.py",)
 T_STEP = ("tests/symfric/integrator/step/test_attempt.py",)
 T_WATCH = ("tests/symfric/integrator/step/test_watch.py",)
 T_SIMULATE = ("tests/symfric/integrator/test_simulate.py",)
+T_ISOLATION = ("tests/symfric/integrator/running/test_isolation.py",)
 T_EVENTS = ("tests/symfric/integrator/running/test_events.py",)
 T_EMITTER = ("tests/symfric/emitter/test_emit.py",)
 T_SOLVE = ("tests/ocp/test_solve.py",)
@@ -99,25 +101,42 @@ CONTROLLERS = (
 
 EVENT = (
     Mutant(
-        "a falling event fires on the way up", EVENTS,
-        "(before < 0) & (after >= 0) & (self._directions >= 0)", "(before < 0) & (after >= 0)",
+        "a falling event fires on the way up", ISOLATION,
+        "(before < 0) & (after >= 0) & (directions >= 0)", "(before < 0) & (after >= 0)",
         T_EVENTS,
     ),
     Mutant(
         "a step behind an event may be lost in t", EVENTS, ", SURE * abs(t))", ")", T_EVENTS,
     ),
     Mutant(
-        "a step is looked at at its ends only", CROSSINGS,
-        "LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)", "LOOKS = (0.0, 1.0)", T_EVENTS,
+        "no piece of a step is in doubt", ISOLATION,
+        "suspects = (doubts != 0) & long", "suspects = (doubts < 0) & long", T_ISOLATION,
+    ),
+    Mutant(
+        "no piece of a step is in doubt in compiled code", SEARCH,
+        "suspects[k][i] = doubts[k * EVENTS + i] != 0", "suspects[k][i] = f->left > 64",
+        T_ISOLATION,
+    ),
+    Mutant(
+        "outer pieces are never in doubt", CROSSINGS,
+        "sizes[0] < first - noise", "sizes[0] < first - inf", T_ISOLATION,
+    ),
+    Mutant(
+        "a piece before a sure root is taken for empty", ISOLATION,
+        "if at[k] >= sure:", "if sure <= 1:", T_ISOLATION,
+    ),
+    Mutant(
+        "rounding is taken for crossings", CROSSINGS, "ROUNDING = 64 *", "ROUNDING = 0 *",
+        ("tests/symfric/integrator/test_hybrid.py",),
     ),
     Mutant(
         "an expression that a jump leaves at zero counts as passed", EVENTS,
-        "jumped = self._passed(self._before, g[0]) & (g[0] != 0)",
-        "jumped = self._passed(self._before, g[0])", T_EVENTS,
+        "jumped = passed(self._before, g[0], self._directions) & (g[0] != 0)",
+        "jumped = passed(self._before, g[0], self._directions)", T_EVENTS,
     ),
     Mutant(
         "what happens together happens one by one", EVENTS,
-        "(roots - theta) * h <= self.tolerance", "roots == theta", T_EVENTS,
+        "(found.roots - theta) * h <= self.tolerance", "found.roots == theta", T_EVENTS,
     ),
     Mutant(
         "the dense output of a cut step is not rescaled", CROSSINGS,

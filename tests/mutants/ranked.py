@@ -81,7 +81,7 @@ RANKED = (
     ),
     Mutant(
         "a slow error is followed for ever", SOFTNESS,
-        "elif len(rungs) > DRIEST:",
+        "elif len(rungs) > MOST:",
         "elif False:", T_JUDGED_BY_HAND,
     ),
     Mutant(

@@ -8,6 +8,7 @@ ORACLE = "symfric/gallery/self_tuning/_oracle.py"
 PLATE = "symfric/gallery/plate.py"
 RENDERING = "symfric/gallery/rendering.py"
 T_HAND = ("tests/symfric/gallery/test_answers_by_hand.py",)
+T_FIGURES = ("tests/symfric/gallery/test_plates.py",)
 T_PLATES = ("tests/symfric/gallery/test_rendering.py",)
 T_COMMAND = ("tests/symfric/cli/test_gallery.py",)
 
@@ -67,6 +68,41 @@ SHOWN = (
         "for sentence, holds in claims.items() if not holds]",
         "for sentence, holds in claims.items() if holds is None]",
         ("tests/symfric/gallery/test_plates.py::test_a_figure_whose_text_is_untrue_is_not_drawn",),
+    ),
+    Mutant(
+        "a figure beyond its bound is drawn",
+        PLATE,
+        "if distance > within:",
+        "if distance > 1e3 * within:",
+        T_FIGURES,
+    ),
+    Mutant(
+        "verdicts are printed at reduced size",
+        PLATE,
+        "verdicts={} if quick else {",
+        "verdicts={",
+        T_FIGURES,
+    ),
+    Mutant(
+        "a block that still stretches its bristles has broken away",
+        "symfric/figures/break_away.py",
+        "way = 2 * (own.velocity + rate * stretch / own.static), SLID * stretch",
+        "way = 2 * (own.velocity + rate * stretch / own.static), 0.0",
+        ("tests/symfric/figures/test_break_away.py",),
+    ),
+    Mutant(
+        "quadrature does not look into a step",
+        "symfric/results/quadrature.py",
+        "rough = off > EXACT * ",
+        "rough = off > 1e9 * ",
+        ("tests/symfric/results/test_quadrature.py",),
+    ),
+    Mutant(
+        "an area forgets that its abscissa depends on time",
+        "symfric/results/quadrature.py",
+        " + ca.jacobian(signal, model.t)",
+        "",
+        ("tests/symfric/results/test_quadrature.py",),
     ),
     Mutant(
         "a figure that fails takes the others with it",

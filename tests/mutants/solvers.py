@@ -183,4 +183,8 @@ RESULTS = (
         "LEVEL if side == open_side else margin", "LEVEL if side == open_side else MARGIN",
         ("tests/ocp/friction/test_resting_margin.py",),
     ),
+    Mutant(
+        "meshes are looked at where they are used", "ocp/solve.py",
+        "    if intervals is not None:\n", "    if False:\n", ("tests/ocp/test_arguments.py",),
+    ),
 )  # fmt: skip

@@ -6,6 +6,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.gallery.generalized_maxwell_slip._laws import F_C
+
 Array = NDArray[np.float64]
 
 PEAK, RISE, FALL = 1.1, 0.5, 0.05  # N, s, s
@@ -55,20 +57,21 @@ def in_periods(t: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def said(numbers: dict[str, float], names: list[str], quick: bool) -> dict[str, bool]:
-    """What the evidence says of the ways and the break-aways."""
-    first, last, rate = (
+    """The claims on the ways and the break-aways."""
+    first, last, rate, least = (
         {name: numbers[f"{key}, {name}{end}"] for name in names}
         for key, end in (
             ("way in the first periods", " [m]"), ("way in the last periods", " [m]"),
-            ("break-away at 1 N/s over that at 10 N/s", " [1]"),
+            ("break-away at 1 N/s over that at 10 N/s", " [1]"), ("least break-away", " [N]"),
         )
     )  # fmt: skip
     claims = {
         "LuGre and Dahl drift": min(last["LuGre"], last["Dahl"]) > 1e-7,
         "ringing LuGre drifts more than three times as fast": first["LuGre"] > 3 * last["LuGre"],
-        "break-away falls with the rate, but for Maxwell slip": all(
-            (r > 1.02) == (name != "Maxwell slip") for name, r in rate.items()
+        "break-away falls with the rate, but for Maxwell slip and Dahl": all(
+            (r > 1.02) == (name not in ("Maxwell slip", "Dahl")) for name, r in rate.items()
         ),
+        "it stays at F_c or above": min(least.values()) > 0.999 * F_C,
     }
     if not quick:
         stay = ("GMS", "Leuven", "Maxwell slip", "generic model")

@@ -7,12 +7,14 @@ Compared: the force along the path with the paper's equations written again by h
 
 Distance: largest difference from them, over the force at break-away.
 
-Evidence: GMS, Maxwell slip and the generic model close their inner loop, LuGre and Dahl miss it by
-6 and 10 % of their force, as the paper says; Leuven, with the delta_l = 7 of table 1, misses it by
-2 %, and the elasto-plastic law is a spring on this path. Refuted is that pre-sliding does not
-depend on the velocity: 20 times faster the path runs at half of V_s, whatever slips there follows
-s(v), and GMS breaks away a quarter lower, Leuven a seventh; the generic model hardly does. With
-sigma_0 as printed, LuGre and the elasto-plastic law carry a fifth of what the others do.
+Reproduced: GMS, Maxwell slip and the generic model close their inner loop, LuGre and Dahl miss it
+by 6 and 10 % of their force, as the paper says; Leuven, with the delta_l = 7 of table 1, misses it
+by 2 %, and the elasto-plastic law is a spring on this path.
+
+Refuted: that pre-sliding does not depend on the velocity, at 20 times the speed of our path, where
+it runs at half of V_s. Whatever slips there follows s(v), and GMS breaks away a quarter lower,
+Leuven a seventh; the generic model hardly does. With sigma_0 as printed, LuGre and the
+elasto-plastic law carry a fifth of what the others do.
 """
 
 import numpy as np
@@ -77,7 +79,8 @@ def plate(quick: bool = False) -> Plate:
                 found, [k for k, _ in ELEMENTS], rtol=0.1
             ),
         }
-    return plate_of(__name__, figure, max(far.values()) / F_S, "1", numbers, claims)
+    worst, within = max(far.values()) / F_S, 4e-3 if quick else 2e-3
+    return plate_of(__name__, figure, worst, "1", numbers, claims, within=within, quick=quick)
 
 
 def at_turns(curve: Curve) -> np.ndarray:

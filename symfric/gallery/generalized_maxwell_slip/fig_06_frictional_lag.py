@@ -4,14 +4,16 @@ v = 250 um/s + 200 um/s sin(2 pi f t); the paper says a sine plus an offset, wit
 
 Compared: the force over the velocity in the third period with the equations written again by hand.
 
-Distance: largest difference from them, over the force at break-away.
+Distance: largest difference from them, over the force at break-away. For the elasto-plastic law it
+is that of its step, a quintic here and a sine in the paper.
 
-Evidence: all laws with lag carry less while the velocity falls, and their loops grow with the
-frequency, as the paper says. Only half confirmed is that LuGre and Leuven are alike and GMS like
-the generic model: the numbers of table 1 give Leuven less than an eighteenth of the loop of LuGre,
-since its hysteresis is that much stiffer than sigma_0, and LuGre is nearer to the generic model
-than GMS at 2 Hz, as near at 5 Hz, and farther away at 10 Hz. For the elasto-plastic law the
-distance is that of its step, a quintic here and a sine in the paper.
+Reproduced: all laws with lag carry less while the velocity falls, and their loops grow with the
+frequency, as the paper says.
+
+Undecided: whether LuGre and Leuven are alike and GMS like the generic model. With the numbers of
+table 1 and our elements Leuven has less than an eighteenth of the loop of LuGre, since its
+hysteresis is that much stiffer than sigma_0, and LuGre is nearer to the generic model than GMS at 2
+Hz, as near at 5 Hz, and farther away at 10 Hz; but elements, generic model and velocities are ours.
 """
 
 import numpy as np
@@ -65,7 +67,8 @@ def plate(quick: bool = False) -> Plate:
         claims["LuGre is nearer to the generic model than GMS at 2 Hz, as near at 5, not at 10"] = (
             nearer[0] < 0.9 < nearer[1] < 1.1 < nearer[2]
         )
-    return plate_of(__name__, figure, max(far.values()) / F_S, "1", numbers, claims)
+    worst, within = max(far.values()) / F_S, 1.1e-4 if quick else 0.0105
+    return plate_of(__name__, figure, worst, "1", numbers, claims, within=within, quick=quick)
 
 
 def curves(law: AnyLaw) -> tuple[Curve, ...]:

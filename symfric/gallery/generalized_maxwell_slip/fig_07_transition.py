@@ -6,10 +6,10 @@ Compared: the force over the velocity in the second period with the equations wr
 
 Distance: largest difference from them, over the force at break-away.
 
-Evidence: nothing is refuted. GMS and the generic model have their peak while the velocity rises, by
-9 % or more, LuGre and Leuven while it falls, by a quarter or more, as the paper says. The
-elasto-plastic law, which the paper leaves out here, goes with LuGre. All of them stay within the
-0.8 N at which the axes of the paper end; Maxwell slip, which knows no velocity, does not.
+Reproduced: GMS and the generic model have their peak while the velocity rises, by 9 % or more,
+LuGre and Leuven while it falls, by a quarter or more, as the paper says. The elasto-plastic law,
+which the paper leaves out here, goes with LuGre. All of them stay within the 0.8 N at which the
+axes of the paper end; Maxwell slip, which knows no velocity, does not.
 """
 
 import numpy as np
@@ -61,7 +61,8 @@ def plate(quick: bool = False) -> Plate:
         ),
         "within 0.8 N but for Maxwell slip": max(tops[n] for n in moving) < 0.81 < F_S,
     }
-    return plate_of(__name__, figure, max(far.values()) / F_S, "1", numbers, claims)
+    worst, within = max(far.values()) / F_S, 4.5e-3 if quick else 7e-3
+    return plate_of(__name__, figure, worst, "1", numbers, claims, within=within, quick=quick)
 
 
 def peaks(curve: Curve) -> tuple[float, float]:

@@ -8,10 +8,10 @@ Compared: when the block on Dahl's law stops with the time that its momentum nee
 
 Distance: of the two times.
 
-Evidence: a drift test that begins while the block still slides measures sliding. Below F_c by a
-force D the block needs its momentum over D to stop, whatever its mass: after half a second of push
-the last, on Dahl's law, rests at 2.6 s, and the vibration may begin; with a push of two seconds, as
-the axis of the figure suggests, it would still slide at the end of the test.
+Undecided: whether the paper's block rests when the vibration begins. A drift test that begins while
+it still slides measures sliding. Below F_c by a force D the block needs its momentum over D to
+stop, whatever its mass: after half a second of push the last, on Dahl's law, rests at 2.6 s, and
+the vibration may begin; with a push of two seconds it would still slide at the end of the test.
 """
 
 import numpy as np
@@ -57,4 +57,4 @@ def plate(quick: bool = False) -> Plate:
         "after a push of 2 s not before the end of the test": 2.0 + longer > 8.0,
     }
     far = abs(stops["Dahl"] - test.stop_of(F_C))
-    return plate_of(__name__, figure, far, "s", numbers, claims)
+    return plate_of(__name__, figure, far, "s", numbers, claims, within=4e-3, quick=quick)

@@ -1,6 +1,7 @@
 """Points like those of the two studies, and their parameters found again."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
+from functools import cache
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,6 +21,8 @@ UNSTABLE = 140 / 60e3
 """Speed up to which the sled moved in stick-slip, says the thesis [m/s]."""
 SMOOTH, ROUGH = 0.03, 0.14
 """Scatter of the mean of nine above this speed and below, chosen for the 8 % of the pilot study."""
+NOISES = 60
+"""Over how many noises a statement is checked."""
 UNITS = {"F_S": "N", "F_C": "N", "v_s": "m/s", "sigma_2": "N s/m", "delta": "1"}
 NAMES = tuple(UNITS)
 LINES: dict[str, tuple[Line, float]] = {
@@ -35,12 +38,14 @@ def curve(law: SteadyStateLuGre, v: Array) -> Array:
     return F_C + (F_S - F_C) * np.exp(-((v / v_s) ** delta)) + sigma_2 * v
 
 
-def measured(study: str, seed: int = 0) -> tuple[Array, Array]:
-    """Speeds [m/s] and mean forces [N], the printed curve with noise."""
+def measured(study: str, seed: int = 0, stable: bool = False) -> tuple[Array, Array]:
+    """Speeds [m/s] and mean forces [N], the printed curve with noise; stable speeds if wanted."""
     v = np.arange(SLOWEST[study], 501, 10) / 60e3
     scatter = np.where(v <= UNSTABLE, ROUGH, SMOOTH)
     noise = np.random.default_rng(seed).standard_normal(v.size)
-    return v, curve(PRINTED[study], v) * (1 + scatter * noise)
+    force = curve(PRINTED[study], v) * (1 + scatter * noise)
+    kept = v > UNSTABLE if stable else v > 0
+    return v[kept], force[kept]
 
 
 def at_once(v: Array, force: Array) -> tuple[SteadyStateLuGre, Mapping[str, float]]:
@@ -103,30 +108,57 @@ def told(laws: Mapping[str, SteadyStateLuGre], half: Mapping[str, float]) -> dic
     }
 
 
-def scatter(study: str, count: int) -> dict[str, float]:
-    """Spread of each parameter over `count` noises, by both ways: half the middle 68 % [%]."""
-    ways: dict[str, Callable[[Array, Array], SteadyStateLuGre | None]] = {
-        "all at once": lambda v, force: at_once(v, force)[0],
-        "six steps": in_steps,
+@cache
+def found(study: str, stable: bool = False, count: int = NOISES) -> tuple[SteadyStateLuGre, ...]:
+    """The law found at once with each of `count` noises; from stable speeds alone if wanted."""
+    return tuple(at_once(*measured(study, seed, stable))[0] for seed in range(count))
+
+
+def shares(laws: Sequence[SteadyStateLuGre], study: str) -> dict[str, Array]:
+    """Each parameter over the printed one, for every law."""
+    return {
+        name: np.array([float(getattr(law, name)) for law in laws])
+        / float(getattr(PRINTED[study], name))
+        for name in NAMES
     }
-    spread: dict[str, float] = {}
-    for way, identified in ways.items():
-        laws = [identified(*measured(study, seed)) for seed in range(count)]
-        found = [law for law in laws if law is not None]
-        spread[f"of {count} noises without a curve, {way} [1]"] = count - len(found)
-        for name in NAMES:
-            low, high = np.percentile([float(getattr(law, name)) for law in found], [16, 84])
-            printed = float(getattr(PRINTED[study], name))
-            spread[f"{name}, spread, {way} [%]"] = 50 * float(high - low) / printed
-    return spread
 
 
-def without_unstable(study: str, count: int) -> dict[str, float]:
-    """Lowest and highest F_s over `count` noises, found from the stable speeds alone [N]."""
-    found: list[float] = []
-    for seed in range(count):
-        v, force = measured(study, seed)
-        stable = v > UNSTABLE
-        found.append(float(at_once(v[stable], force[stable])[0].F_S))
-    said = f"of {count} noises, without the unstable speeds [N]"
-    return {f"F_S, lowest {said}": min(found), f"F_S, highest {said}": max(found)}
+def scatter(study: str) -> dict[str, float]:
+    """Spread of each parameter over all noises, by both ways: half the middle 68 % [%]."""
+    by_steps = [in_steps(*measured(study, seed)) for seed in range(NOISES)]
+    ways = {"all at once": found(study), "six steps": [law for law in by_steps if law is not None]}
+    numbers: dict[str, float] = {}
+    for way, laws in ways.items():
+        numbers[f"of {NOISES} noises without a curve, {way} [1]"] = NOISES - len(laws)
+        for name, values in shares(laws, study).items():
+            low, high = np.percentile(values, [16, 84])
+            numbers[f"{name}, spread, {way} [%]"] = 50 * float(high - low)
+    points = [measured(study, seed) for seed in range(NOISES)]
+    errors = [100 * error(law, *at) for law, at in zip(found(study), points, strict=True)]
+    ratios = [
+        100 * error(law, *at) / once
+        for law, at, once in zip(by_steps, points, errors, strict=True)
+        if law is not None
+    ]
+    return (
+        numbers
+        | percentiles("error of the curve, all at once", "%", errors)
+        | percentiles("error of the six steps over that", "1", ratios)
+    )
+
+
+def percentiles(what: str, unit: str, values: Sequence[float]) -> dict[str, float]:
+    """Of all noises: the median, and between what the middle 68 % lie."""
+    low, middle, high = np.percentile(values, [16, 50, 84]).tolist()
+    return {
+        f"{what}, median of {NOISES} noises [{unit}]": middle,
+        f"{what}, 16th percentile [{unit}]": low,
+        f"{what}, 84th percentile [{unit}]": high,
+    }
+
+
+def without_unstable(study: str) -> dict[str, float]:
+    """Lowest and highest F_s over all noises, found from the stable speeds alone [N]."""
+    levels = [float(law.F_S) for law in found(study, stable=True)]
+    said = f"of {NOISES} noises, without the unstable speeds [N]"
+    return {f"F_S, lowest {said}": min(levels), f"F_S, highest {said}": max(levels)}

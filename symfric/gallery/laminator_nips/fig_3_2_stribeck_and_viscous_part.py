@@ -7,10 +7,12 @@ equation 3.5.
 
 Distance: largest difference over the speeds, over F_s.
 
-Evidence: nothing is refuted: the viscous part raises the level and is the linear tail. But the tail
-of the pilot study reaches F_s again, within half a percent, at 500 mm/min, the end of the data, and
-is above it at the 650 mm/min of the machine: a plateau, which the thesis sees from 6.5 mm/s on, is
-not in its law.
+Reproduced: the viscous part raises the level and is the linear tail.
+
+Refuted: that friction keeps a stable value beyond a plateau, which the thesis sees from 6.5 mm/s
+on. In its law the tail of the pilot study rises from there by a tenth, reaches F_s again, within
+half a percent, at 500 mm/min, the end of the data, and is above it at the 650 mm/min of the
+machine.
 """
 
 import numpy as np
@@ -56,7 +58,7 @@ def plate(quick: bool = False) -> Plate:
         "and is above it at the end of the machine's range": machine > 1.1 * static,
         "it rises by a tenth from the plateau to the end of the data": end > 1.1 * plateau,
     }
-    return plate_of(__name__, figure, far, "1", numbers, claims)
+    return plate_of(__name__, figure, far, "1", numbers, claims, within=2e-9, quick=quick)
 
 
 def after_a_while(speed: float) -> float:

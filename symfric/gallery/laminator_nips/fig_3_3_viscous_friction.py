@@ -6,9 +6,9 @@ Compared: the speed of least force, found by the roots of the derivative, with t
 
 Distance: largest difference, over v_s.
 
-Evidence: nothing is refuted. Without viscous friction there is no minimum; the larger sigma_2, the
-slower and the higher it is. Above a value that follows from the steepest slope of the Stribeck part
-the force rises throughout: six times that of the pilot study.
+Reproduced: the viscous friction raises the curve. Without it there is no minimum; the larger
+sigma_2, the slower and the higher it is. Above a value that follows from the steepest slope of the
+Stribeck part the force rises throughout: six times that of the pilot study.
 """
 
 from dataclasses import replace
@@ -60,4 +60,6 @@ def plate(quick: bool = False) -> Plate:
             abs(steepest / (6 * float(pilot.sigma_2)) - 1) < 0.01
         ),
     }
-    return plate_of(__name__, figure, far, "1", numbers, claims)
+    return plate_of(
+        __name__, figure, far, "1", numbers, claims, within=0.01 if quick else 2e-4, quick=quick
+    )

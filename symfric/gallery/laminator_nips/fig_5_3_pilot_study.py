@@ -5,12 +5,16 @@ the thesis, with the printed one that made them.
 
 Distance: rms difference of the curve found at once from the printed one, over the mean force.
 
-Evidence: the curve comes back, with an error of 5 %, of the size of the thesis's 8 %. Refuted is
-that its five digits mean anything: with other noise of that size the parameters scatter by the
-shares given beside, 6 to 120 % at once, and the six steps, which read two levels off single points,
-leave three times the error. F_s and v_s rest on speeds that the thesis itself calls unstable:
-without them F_s is anything from half its value to any size. And 50 speeds of nine tests are 450
-tests, not 150.
+Reproduced: the curve comes back, and its error is of the size of the thesis's 8 %: 6 % in the
+median of 60 noises like it.
+
+Refuted: that its five digits mean anything. Over these noises the parameters scatter by the shares
+given beside, 7 to 110 % at once. The six steps, which read two levels off single points, leave 1.3
+to 2.4 times the error, 1.7 in the median. F_s and v_s rest on speeds that the thesis itself calls
+unstable: without them F_s is anything from half its value to any size. And 50 speeds of nine tests
+are 450 tests, not 150.
+
+Undecided: the noise of the points, which are not printed; ours has the size of its errors.
 """
 
 import numpy as np
@@ -21,7 +25,7 @@ from symfric.gallery.plate import Plate, plate_of
 
 
 def plate(quick: bool = False) -> Plate:
-    """Identify the pilot study again, with one noise and with many."""
+    """Identify the pilot study again, with one noise and with sixty."""
     printed = studies.PRINTED["pilot"]
     v, force = studies.measured("pilot")
     once, half = studies.at_once(v, force)
@@ -38,22 +42,24 @@ def plate(quick: bool = False) -> Plate:
         f"error of the curve, {way}, 8 % in the thesis [%]": 100 * studies.error(law, v, force)
         for way, law in laws.items()
     } | studies.told(laws, half)
-    claims = {
-        "the error is of the size of the thesis's 8 %": 0.04 < studies.error(once, v, force) < 0.1,
-        "50 speeds of nine tests are 450": v.size * 9 == 450,
-        "the six steps leave three times the error": steps is None
-        or 2.5 < studies.error(steps, v, force) / studies.error(once, v, force) < 3.5,
-    }
+    claims = {"50 speeds of nine tests are 450": v.size * 9 == 450}
     if not quick:
-        spread = studies.scatter("pilot", 20)
-        lowest, highest = (alone := studies.without_unstable("pilot", 20)).values()
+        spread = studies.scatter("pilot")
+        lowest, highest = (alone := studies.without_unstable("pilot")).values()
         numbers |= spread | alone
         shares = [spread[f"{name}, spread, all at once [%]"] for name in studies.NAMES]
+        low, middle, high = [*spread.values()][-2], [*spread.values()][-3], [*spread.values()][-1]
+        median = spread["error of the curve, all at once, median of 60 noises [%]"]
         claims |= {
-            "parameters scatter by 6 to 120 %": 5 < min(shares) < max(shares) < 150,
+            "the error is 6 % in the median of 60 noises": 5.5 < median < 7,
+            "parameters scatter by 7 to 110 %": 6 < min(shares) < 8 < 100 < max(shares) < 120,
+            "the six steps leave 1.3 to 2.4 times the error, 1.7 in the median": np.allclose(
+                [low, middle, high], [1.3, 1.7, 2.4], atol=0.1
+            ),
             "without unstable speeds F_s is anything from half its value up": (
                 lowest < 0.5 * float(printed.F_S) and highest > 100 * float(printed.F_S)
             ),
         }
     far = np.sqrt(np.mean((studies.curve(once, v) - studies.curve(printed, v)) ** 2))
-    return plate_of(__name__, figure, float(far / force.mean()), "1", numbers, claims)
+    far = float(far / force.mean())
+    return plate_of(__name__, figure, far, "1", numbers, claims, within=0.04, quick=quick)

@@ -5,11 +5,13 @@ made them; thin, the same with other noise of that size.
 
 Distance: rms difference of the first curve from the printed one, over the mean force.
 
-Evidence: any of the curves fits; refuted is that the main study tells five parameters. Up to 500
-mm/min the force only falls, so the points know neither sigma_2 nor how low F_c is: a bound of
-statistics, not of the method (standard errors below, for noise of 1 %). At 650 mm/min, where the
-machine runs, the curves spread. A plateau at 6 mm/s is not in the printed law, either: there it is
-still falling.
+Reproduced: the curves fit the points.
+
+Refuted: that the main study tells five parameters. Up to 500 mm/min the force only falls, so the
+points know neither sigma_2 nor how low F_c is: a bound of statistics, not of the method (standard
+errors below, for noise of 1 %). At 650 mm/min, where the machine runs, the curves of 60 noises lie
+between 2.3 and 3.7 N. A plateau at 6 mm/s is not in the printed law, either: there it is still
+falling.
 """
 
 import numpy as np
@@ -29,12 +31,11 @@ def plate(quick: bool = False) -> Plate:
     """Identify the main study again, with several noises."""
     printed = studies.PRINTED["main"]
     v, force = studies.measured("main")
-    seeds = range(2 if quick else 12)
-    found = [studies.at_once(*studies.measured("main", seed))[0] for seed in seeds]
+    found = studies.found("main", count=2 if quick else studies.NOISES)
 
     figure, (axis,) = panels(1, NARROW, 3.2)
     far_out = np.linspace(v[0], MACHINE, 300)
-    for k, law in enumerate(found[1:]):
+    for k, law in enumerate(found[1:12]):
         label = None if k else "found with other noises"
         axis.plot(
             far_out, studies.curve(law, far_out), **look("lugre"), lw=0.7, alpha=0.5, label=label
@@ -70,4 +71,9 @@ def plate(quick: bool = False) -> Plate:
         "at 6 mm/s the printed curve is still falling": plateau > 1.05 * least,
         "where the machine runs the curves spread": max(beyond) - min(beyond) > 0.1,
     }
-    return plate_of(__name__, figure, float(far / force.mean()), "1", numbers, claims)
+    if not quick:
+        claims["at 650 mm/min the curves of 60 noises lie between 2.3 and 3.7 N"] = (
+            2.3 < min(beyond) < 2.5 < 3.5 < max(beyond) < 3.7
+        )
+    far = float(far / force.mean())
+    return plate_of(__name__, figure, far, "1", numbers, claims, within=0.012, quick=quick)

@@ -7,16 +7,19 @@ Compared: the run with the paper's equations in small steps, where the body trul
 
 Distance: largest difference of the body over the amplitude of 50 mm.
 
-Evidence: friction removes the oscillation, as the paper says, if it is viscous enough: with other
-numbers that the paper leaves as open, it holds the body back and lets it go, and the overshoot is
-larger than without friction. The body rests where the paper says only within break-away over
-spring, 6.7 mm: between those it may stick anywhere. The body starts at 0.5 s, as figure 7 of the
-paper has it, with X_w - X_b = 7 mm, and at 1.5 s that is down to a fifth. Refuted are table 1 and
-what is concluded from it: its residual of X_b, 96 mm, is larger than the 67.5 mm that a constant
-leaves at most for a body between 0 and 135 mm, and that of X_w - X_b larger than the signal itself,
-so the model fits neither; and the 0.06 and 0.12 % by which Coulomb friction improves them are no
-reason for it. Refuted, too, is equation 12 as printed: at rest it holds any force, and the body
-never moves.
+Reproduced: friction removes the oscillation, if it is viscous enough: half the overshoot or less
+from sigma_v = 1500 N s/m on. The body starts at 0.5 s, as figure 7 of the paper has it, with X_w -
+X_b = 7 mm, and rests where the paper says within break-away over both springs, 6.9 mm; between
+those it may stick anywhere. These hold for ten readings of the numbers that the paper leaves open.
+
+Refuted: table 1 and what is concluded from it. Its residual of X_b, 96 mm, is larger than the 67.5
+mm that a constant leaves at most for a body between 0 and 135 mm, so the model does not fit it; and
+the 0.06 and 0.12 % by which Coulomb friction improves both residuals are no reason for it. Equation
+12 as printed: at rest it holds any force, and the body never moves.
+
+Undecided: the numbers of the friction. Weakly viscous it holds the body back and lets it go, and
+the overshoot is larger than without friction; at 1.5 s X_w - X_b is anything from -4 to 5 mm, where
+the paper has zero or near zero.
 """
 
 import numpy as np
@@ -28,10 +31,8 @@ from symfric.gallery.looks import look
 from symfric.gallery.plate import Plate, plate_of
 from symfric.gallery.quarter_car_friction import _by_hand
 from symfric.gallery.quarter_car_friction._printed import RANGE, RESIDUAL, residuals, start
-from symfric.gallery.quarter_car_friction._rig import FRICTION, STAGES, general, ride
-
-WEAK = {"C_e": 120.0, "e_1": 0.02, "mu": 0.08, "sigma_v": 80.0}
-"""Another reading of the numbers that the paper does not give."""
+from symfric.gallery.quarter_car_friction._readings import bodies, overshoot
+from symfric.gallery.quarter_car_friction._rig import FRICTION, STAGES, WEAK, general, ride
 
 
 def plate(quick: bool = False) -> Plate:
@@ -61,8 +62,7 @@ def plate(quick: bool = False) -> Plate:
     far = float(np.abs(np.interp(run.t, t, body) - run["X_b"]).max())
     numbers: dict[str, float] = {}
     for name, ridden in {"friction": run, **others}.items():
-        lowest = float(ridden["X_b"][ridden.t > STAGES["C"][0]].min())
-        numbers[f"overshoot after the last ramp, {name} [m]"] = 0.035 - lowest
+        numbers[f"overshoot after the last ramp, {name} [m]"] = overshoot(ridden)
     for stage, (end, height) in STAGES.items():
         place = float(np.interp(end, run.t, run["X_b"]))
         numbers[f"body at the end of stage {stage}, less {height:g} m of the paper [m]"] = (
@@ -71,25 +71,18 @@ def plate(quick: bool = False) -> Plate:
     numbers |= residuals(run) | start(run)
     printed = ride(general(form="as_printed"))
     numbers["way of the body by equation 12 as printed [m]"] = float(np.ptp(printed["X_b"]))
-    return plate_of(__name__, figure, far / 0.05, "1", numbers, said(numbers))
+    claims = said(numbers) | ({} if quick else bodies(numbers))
+    return plate_of(__name__, figure, far / 0.05, "1", numbers, claims, within=2e-3, quick=quick)
 
 
 def said(numbers: dict[str, float]) -> dict[str, bool]:
-    """What the evidence says."""
+    """What the run, and the numbers of the paper by themselves, say."""
     over = [value for name, value in numbers.items() if name.startswith("overshoot")]
-    rests = [value for name, value in numbers.items() if "less" in name]
     return {
         "friction halves the overshoot, weakly viscous friction makes it larger": (
             2 * over[0] < over[1] < over[2]
         ),
-        "the body rests within break-away over spring": (
-            max(map(abs, rests)) < _by_hand.BREAK_AWAY / _by_hand.K_S
-        ),
-        "it starts at 0.5 s": abs(numbers["the body starts, 0.5 s in figure 7 [s]"] - 0.5) < 0.03,
         "the residual of X_b is larger than any constant leaves": RESIDUAL["X_b"][0] > RANGE / 2,
-        "that of X_w - X_b larger than the signal": (
-            RESIDUAL["x_rel"][0] > numbers["rms of x_rel itself [m]"]
-        ),
         "equation 12 as printed holds the body for ever": (
             numbers["way of the body by equation 12 as printed [m]"] == 0.0
         ),

@@ -6,15 +6,18 @@ Compared: the force with that of the paper's equations in small steps, where the
 
 Distance: largest difference while the body moves faster than 5 mm/s, over break-away.
 
-Evidence: force over velocity makes loops, the gentle first ramp the smallest, the fall of twice the
-rise the largest, as the paper says, on a road whose first ramp is the gentlest; of the twice that
-it sees in the fall, speed and loop reach 1.6, as viscous friction slows the body. Refuted is that
-they are memory of the contact: the law has none; the loops are the Coulomb part, whose load follows
-the strut, and without it they close (figure 13). Refuted by itself is the static level: 0.0069 m of
-the spring are not its 193.8 N, and at the largest displacement there is no velocity to make up.
-"""
+Reproduced: force over velocity makes loops, and the fall of twice the rise a larger one than the
+rise, for ten readings of the numbers that the paper leaves open. Of the twice that it sees in the
+fall the speed reaches 1.6, as viscous friction slows the body.
 
-from itertools import pairwise
+Refuted: that they are memory of the contact. The law has none; the loops are the Coulomb part,
+whose load follows the strut, and without it they close (figure 13). The static level: 0.0069 m of
+the spring are not its 193.8 N, and at the largest displacement there is no velocity to make up.
+
+Undecided: the sizes of the loops. That of the fall is 1.2 ... 2.0 times that of the rise, as the
+invented numbers are, 1.69 times in the figure; and whether the first loop is the smallest, which it
+is here.
+"""
 
 import numpy as np
 
@@ -22,7 +25,8 @@ from symfric.foundation.panels import NARROW, panels
 from symfric.foundation.style import QUIET, line
 from symfric.gallery.plate import Plate, plate_of
 from symfric.gallery.quarter_car_friction import _by_hand
-from symfric.gallery.quarter_car_friction._rig import FRICTION, STAGES, general, ride
+from symfric.gallery.quarter_car_friction._readings import areas_and_speeds, loops
+from symfric.gallery.quarter_car_friction._rig import FRICTION, RAMPS, general, ride
 
 BREAK_AWAY, DEFLECTION = 193.8, 0.0069  # N, m
 
@@ -30,16 +34,13 @@ BREAK_AWAY, DEFLECTION = 193.8, 0.0069  # N, m
 def plate(quick: bool = False) -> Plate:
     """Ride over three roads."""
     runs = {mm: ride(general(), mm) for mm in ((50,) if quick else (30, 70, 50))}
-    run, ends = runs[50], [end for end, _ in STAGES.values()]
-    ramps = {
-        name: (run.t >= begin) & (run.t <= end)
-        for name, (begin, end) in zip(("first", "second", "third"), pairwise(ends), strict=True)
-    }
+    run = runs[50]
 
     figure, (axis,) = panels(1, NARROW, 3.4)
     for other in [*runs.values()][:-1]:
         axis.plot(1e3 * other["v_b"], other["friction"], color=QUIET, linewidth=0.7)
-    for k, (name, inside) in enumerate(ramps.items()):
+    for k, (name, (begin, end)) in enumerate(RAMPS.items()):
+        inside = (run.t >= begin) & (run.t <= end)
         v, force = run["v_b"][inside], run["friction"][inside]
         axis.plot(1e3 * v, force, **line(k), linewidth=1.2, label=f"{name} ramp")
     axis.plot([], [], color=QUIET, label="roads of 30 and 70 mm")
@@ -58,21 +59,19 @@ def plate(quick: bool = False) -> Plate:
         )
         / _by_hand.B_D,
     }
-    areas, speeds = list[float](), list[float]()
-    for name, inside in ramps.items():
-        v, force = run["v_b"][inside], run["friction"][inside]
-        areas.append(abs(float(np.trapezoid(force, v))))
-        speeds.append(float(np.abs(v).max()))
-        numbers[f"area of the loop of the {name} ramp [N m/s]"] = areas[-1]
-        numbers[f"largest speed on the {name} ramp [m/s]"] = speeds[-1]
+    areas, speeds = areas_and_speeds(run)
+    for name, area, speed in zip(RAMPS, areas, speeds, strict=True):
+        numbers[f"area of the loop of the {name} ramp [N m/s]"] = area
+        numbers[f"largest speed on the {name} ramp [m/s]"] = speed
     numbers["loop of the third ramp over that of the second, 2 in the paper [1]"] = (
         areas[2] / areas[1]
     )
     claims = {
         "the first loop is the smallest, the third the largest": areas == sorted(areas),
-        "the third has 1.6 times the speed and the loop of the second": all(
-            1.5 < each[2] / each[1] < 1.75 for each in (areas, speeds)
-        ),
+        "the third has 1.69 times the loop of the second": abs(areas[2] / areas[1] - 1.69) < 0.01,
         "0.0069 m of the spring are more than 193.8 N": _by_hand.K_S * DEFLECTION > BREAK_AWAY,
     }
-    return plate_of(__name__, figure, far, "1", numbers, claims)
+    if not quick:
+        claims |= loops(numbers)
+    within = 0.016 if quick else 0.026
+    return plate_of(__name__, figure, far, "1", numbers, claims, within=within, quick=quick)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy import float64
 from numpy.typing import NDArray
 
-from symfric import Karnopp, Law
+from symfric import Awrejcewicz, BengisuAkay, Karnopp, Law, Threlfall, VelocityBased
 from symfric.choice.jing_mi import PRINTED
 from symfric.foundation.panels import grid
 from symfric.foundation.style import colour
@@ -21,7 +21,15 @@ Array = NDArray[float64]
 LAWS: dict[str, Law] = {name: row.law() for name, row in PRINTED.items()}
 LAWS["Karnopp"] = Karnopp(form="event")
 """With the numbers of the library; a preset gives each those of the paper."""
+ORIGINAL: dict[str, Law] = {
+    "Threlfall": Threlfall(form="original"),
+    "Bengisu": BengisuAkay(form="original"),
+    "Velocity-based": VelocityBased(form="original"),
+    "Awrejcewicz": Awrejcewicz(form="original"),
+}
+"""The laws that `LAWS` has in a smooth form, in pieces as they were published."""
 BEHIND: dict[str, Any] = {**REFERENCE, "linewidth": 2.4}
+DOTTED: dict[str, Any] = {"color": "k", "linestyle": ":", "linewidth": 0.9}
 QUICK = ("Smooth", "Karnopp", "LuGre")
 """Who stands for all at reduced size."""
 SLIDING = ("Smooth", "Threlfall", "Dahl")
@@ -33,6 +41,20 @@ TABLE_4 = {name: 100 * row.S4 for name, row in PRINTED.items()}
 """Printed S x 100 [m] of the block on the belt."""
 TABLE_8 = {name: 100 * row.S8 for name, row in PRINTED.items()}
 """Printed S x 100 [m] of the box."""
+
+
+FORMS = LAWS | {f"{name}, original": law for name, law in ORIGINAL.items()}
+"""Every law in every form that is drawn."""
+
+
+def law_of(name: str) -> str:
+    """The law whose form `name` is."""
+    return name.partition(",")[0]
+
+
+def forms(names: tuple[str, ...]) -> tuple[str, ...]:
+    """These laws, and the original forms of those that have one."""
+    return (*names, *(name for name in FORMS if name not in LAWS and law_of(name) in names))
 
 
 def chosen(quick: bool) -> tuple[str, ...]:
@@ -48,15 +70,21 @@ def small_multiples(
 ) -> Figure:
     """A panel per law, exact dry friction behind each; the kinds of laws by colour.
 
-    Beside its name is the root mean square distance from exact dry friction.
+    Beside its name is the root mean square distance from exact dry friction; the original form of a
+    law that is smooth here is dotted.
     """
     unit = label[label.index("[") + 1 : -1]
-    rows = -(-(len(curves) + 1) // 3)
-    figure, axes = grid(rows, 3, height=0.9 + 1.45 * rows, sharex=True, sharey=True)
+    dotted = {law_of(name): curve for name, curve in curves.items() if name not in LAWS}
+    curves = {name: curve for name, curve in curves.items() if name in LAWS}
+    columns = 3 if len(curves) > 3 else 2
+    rows = -(-(len(curves) + 1) // columns)
+    figure, axes = grid(rows, columns, height=0.9 + 1.45 * rows, sharex=True, sharey=True)
     places = [axis for row in axes for axis in row]
     for axis, (name, (t, y)) in zip(places, curves.items(), strict=False):
         axis.plot(*reference, **BEHIND)
         axis.plot(t, y, color=colour(kind(name)), linewidth=1.1)
+        if name in dotted:
+            axis.plot(*dotted[name], **DOTTED)
         axis.set_title(name, fontsize="medium", loc="left", pad=3)
         off = rms(y - reference[1])
         axis.set_title(
@@ -66,9 +94,9 @@ def small_multiples(
         places[0].set_ylim(*limits)
     for axis in places[len(curves) :]:
         axis.axis("off")
-    for axis in places[len(curves) - 3 : len(curves)]:  # nothing stands below these
+    for axis in places[len(curves) - columns : len(curves)]:  # nothing stands below these
         axis.tick_params(labelbottom=True)
-    _legend(places[len(curves)])
+    _legend(places[len(curves)], bool(dotted))
     figure.supxlabel("time [s]", fontsize="medium")
     figure.supylabel(label, fontsize="medium")
     return figure
@@ -79,8 +107,10 @@ def kind(name: str) -> int:
     return 0 if name in SLIDING else 2 if name in BRISTLES else 1
 
 
-def _legend(axis: Axes) -> None:
+def _legend(axis: Axes, originals: bool) -> None:
     axis.plot([], [], label="exact dry friction", **BEHIND)
+    if originals:
+        axis.plot([], [], label="original form", **DOTTED)
     for k, text in enumerate(("no static level", "static level", "static level, states")):
         axis.plot([], [], color=colour(k), label=text)
     axis.legend(loc="center", frameon=False, fontsize="small")

@@ -1,4 +1,4 @@
-"""The block on the belt of figures 2 to 5: eleven laws with the numbers of tables 2 and 3."""
+"""The block on the belt of figures 2 to 5: the laws with the numbers of tables 2 and 3."""
 
 from functools import cache
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from symfric import Trajectory, simulate
 from symfric.gallery.belt import Belt
-from symfric.gallery.selection._laws import LAWS
+from symfric.gallery.selection._laws import FORMS
 from symfric.scenes import Rabinowicz
 
 Array = NDArray[np.float64]
@@ -18,7 +18,7 @@ M, K, V_BELT, F_S, F_C = 0.8, 2.1, 0.1, 0.15 * 0.8 * 9.81, 0.1 * 0.8 * 9.81
 @cache
 def run(name: str, t_end: float = T_END, rtol: float = 1e-7) -> Trajectory:
     """A law on the belt, seen every ms."""
-    model = Rabinowicz.preset("jing_mi_table_3", LAWS[name]).model()
+    model = Rabinowicz.preset("jing_mi_table_3", FORMS[name]).model()
     return simulate(model, t_end, rtol=rtol, t_eval=np.linspace(0, t_end, round(1000 * t_end) + 1))
 
 

@@ -1,19 +1,32 @@
-"""Acceleration of the box, eleven laws.
+"""Acceleration of the box, by the law.
+
+Four laws are drawn in a smooth form and, dotted, as they were published.
 
 Compared: the smooth Coulomb law with the same machine by equations written by hand; all laws with
 exact dry friction.
 
-Distance: largest difference of the acceleration from that by hand over 15 s, smooth Coulomb law.
+Distance: largest difference of the acceleration from that by hand, smooth Coulomb law.
 
-Evidence: that accelerations differ visibly is confirmed, but not as an effect of states: at every
-turn of the box friction jumps by twice mu_d N, and laws jump there as they are made, for some ms.
-The greatest differences are those of Velocity-based and of Stick-slip, one static and one dynamic,
-which share their curve; root mean square they are those of Karnopp and of the bristle laws.
+Reproduced: accelerations differ visibly, by 10 % of the greatest one or more, on all machines of
+figure 7.
+
+Refuted: that the states of a law make the difference. At every turn of the box friction jumps by
+twice mu_d N, and laws jump there as they are made, for some ms: on every machine Velocity-based,
+which has no state, is farther off than Gonthier, which has, and Stick-slip, which has states,
+differs from dry friction as Velocity-based does within a quarter.
 """
 
 from symfric.gallery.plate import Plate, plate_of
-from symfric.gallery.selection._laws import chosen
-from symfric.gallery.selection._runs_box import EXACT, T_END, distance, picture, signal
+from symfric.gallery.selection._laws import chosen, forms
+from symfric.gallery.selection._runs_box import (
+    EXACT,
+    MACHINES,
+    T_END,
+    distance,
+    off,
+    picture,
+    signal,
+)
 from symfric.gallery.signals import largest, rms
 
 
@@ -21,23 +34,39 @@ def plate(quick: bool = False) -> Plate:
     """15 s from 30 degrees, tables 6 and 7."""
     names, t_end = chosen(quick), 1.0 if quick else T_END
     figure = picture("x''", "acceleration of the box [m/s²]", names, t_end)
-    exact = signal(EXACT, "x''", t_end)
-    numbers = {"greatest acceleration, exact dry friction [m/s^2]": largest(exact)}
-    peaks, means = dict[str, float](), dict[str, float]()
-    for name in names:
-        off = signal(name, "x''", t_end) - exact
-        peaks[name], means[name] = largest(off), rms(off)
+    greatest = largest(signal(EXACT, "x''", t_end))
+    numbers = {"greatest acceleration, exact dry friction [m/s^2]": greatest}
+    peaks: dict[str, float] = {}
+    for name in forms(names):
+        away = off(name, "x''", t_end)
+        peaks[name] = largest(away)
         numbers[f"largest distance from exact dry friction, {name} [m/s^2]"] = peaks[name]
-        numbers[f"rms distance from exact dry friction, {name} [m/s^2]"] = means[name]
-    by_peak, by_mean = (sorted(one, key=lambda n, one=one: -one[n]) for one in (peaks, means))
-    claims = {"accelerations differ visibly": max(peaks.values()) > 0.1 * largest(exact)}
+        numbers[f"rms distance from exact dry friction, {name} [m/s^2]"] = rms(away)
+    claims = {"accelerations differ visibly": max(peaks.values()) > 0.1 * greatest}
     if not quick:
+        apart = [
+            {
+                n: largest(off(n, "x''", T_END, at))
+                for n in ("Velocity-based", "Stick-slip", "Gonthier")
+            }
+            for at in MACHINES
+        ]
+        parts = [
+            max(one.values()) / largest(signal(EXACT, "x''", T_END, at))
+            for one, at in zip(apart, MACHINES, strict=True)
+        ]
+        alike = [one["Stick-slip"] / one["Velocity-based"] for one in apart]
+        numbers["largest distance over the greatest acceleration, least of all machines [1]"] = min(
+            parts
+        )
+        numbers["Stick-slip over Velocity-based, least [1]"] = min(alike)
+        numbers["Stick-slip over Velocity-based, greatest [1]"] = max(alike)
         claims |= {
-            "most those of Velocity-based and Stick-slip": (
-                {*by_peak[:2]} == {"Velocity-based", "Stick-slip"}
+            "and so on all machines": min(parts) > 0.1,
+            "Velocity-based is farther off than Gonthier": all(
+                one["Velocity-based"] > one["Gonthier"] for one in apart
             ),
-            "root mean square those of Karnopp and the bristles": (
-                {*by_mean[:4]} == {"Karnopp", "Dahl", "LuGre", "Elasto-plastic"}
-            ),
+            "and as far as Stick-slip within a quarter": 0.8 < min(alike) < max(alike) < 1.25,
         }
-    return plate_of(__name__, figure, distance("x''", t_end), "m/s^2", numbers, claims)
+    far = distance("x''", t_end)
+    return plate_of(__name__, figure, far, "m/s^2", numbers, claims, within=3e-6, quick=quick)

@@ -1,15 +1,25 @@
-"""Angular acceleration of the pendulum, eleven laws.
+"""Angular acceleration of the pendulum, by the law.
+
+Four laws are drawn in a smooth form and, dotted, as they were published.
 
 Compared: the smooth Coulomb law with the same machine by equations written by hand; all laws with
-exact dry friction, over 15 s and over the last two.
+exact dry friction, over the run and over its last two seconds.
 
-Distance: largest difference from that by hand over 15 s, smooth Coulomb law.
+Distance: largest difference from that by hand, smooth Coulomb law.
 
-Evidence: that LuGre and Elasto-plastic err visibly at the end of the motion is confirmed. That this
-is an error of theirs is refuted: Dahl errs by as much, Smooth and Threlfall by two thirds to three
-quarters of it, and Karnopp by twice as much (figures 7 and 10). Bengisu and Gonthier are nearest.
-With the box held dry friction leaves a pendulum on a fixed hinge, whose acceleration is its angle
-times its frequency squared.
+Reproduced: LuGre and Elasto-plastic err visibly at the end of the motion, by 0.25 ... 0.8 of the
+swing, for both readings of table 6 and radii of the hinge of 3, 10 and 100 mm. With the box held
+dry friction leaves a pendulum on a fixed hinge, whose acceleration is its angle times its frequency
+squared.
+
+Refuted: that this is an error of laws with states, which should be avoided where something turns.
+On all these machines Threlfall as published, without a state, errs by 0.9 ... 1.4 times as much,
+and Gonthier, with states, by less than 0.65 times. Where dry friction holds the box, Dahl, LuGre
+and Elasto-plastic let it roll on bristles (figure 8), others let it creep, which takes energy from
+the pendulum.
+
+Undecided: how far Karnopp errs: by less than LuGre or by more than three times as much, as the
+radius is that table 6 does not give (figure 7).
 """
 
 from symfric.gallery.plate import Plate, plate_of
@@ -29,4 +39,13 @@ def plate(quick: bool = False) -> Plate:
     figure = picture("phi''", "angular acceleration of the pendulum [rad/s²]", names, t_end)
     numbers = departures("phi''", "rad/s^2", names, t_end)
     claims = end_of_motion("phi''", numbers, t_end)
-    return plate_of(__name__, figure, distance("phi''", t_end), "rad/s^2", numbers, claims)
+    return plate_of(
+        __name__,
+        figure,
+        distance("phi''", t_end),
+        "rad/s^2",
+        numbers,
+        claims,
+        within=5e-6,
+        quick=quick,
+    )

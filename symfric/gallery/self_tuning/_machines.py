@@ -11,8 +11,8 @@ from typing import final
 import casadi as ca
 import numpy as np
 
-Coefficient = Callable[[ca.SX], ca.SX]
-"""F/N at a sliding velocity [m/s]."""
+Coefficient = Callable[[ca.SX, ca.SX | float], ca.SX]
+"""F/N at a sliding velocity [m/s] under a normal force [N]."""
 
 
 @final
@@ -32,7 +32,7 @@ class Machine:
 def brown_mcphee(mu_s: float, mu_d: float, v_t: float) -> Coefficient:
     """Brown and McPhee's coefficient of friction."""
 
-    def mu(v: ca.SX) -> ca.SX:
+    def mu(v: ca.SX, _: ca.SX | float) -> ca.SX:
         x = v / v_t
         return mu_d * ca.tanh(4 * x) + (mu_s - mu_d) * x / (x**2 / 4 + 0.75) ** 2
 
@@ -43,8 +43,19 @@ def self_tuning(mu_s: float, mu_d: float, v_t: float) -> Coefficient:
     """The self-tuning coefficient with E = 0 and its peak at v_t."""
     C = 2 - 2 / np.pi * np.arcsin(mu_d / mu_s)
 
-    def mu(v: ca.SX) -> ca.SX:
+    def mu(v: ca.SX, _: ca.SX | float) -> ca.SX:
         return mu_s * ca.sin(C * ca.atan(np.tan(np.pi / 2 / C) * v / v_t))
+
+    return mu
+
+
+def own_stiffness(mu_s: float, mu_d: float, **_: float) -> Coefficient:
+    """The self-tuning coefficient whose B [s/m] follows load and mu_s - mu_d, as reconstructed."""
+    C = 2 - 2 / np.pi * np.arcsin(mu_d / mu_s)
+
+    def mu(v: ca.SX, N: ca.SX | float) -> ca.SX:
+        B = 1000 - 900 * ca.exp(-(mu_s - mu_d) / 0.05 * N / 50)
+        return mu_s * ca.sin(C * ca.atan(B * v))
 
     return mu
 
@@ -58,12 +69,13 @@ def four_mass(mu: Coefficient) -> Machine:
     v3 = -y2 * v2 / z3
     a1, a2 = -y2 * a - x1 * w**2, x1 * a - y2 * w**2
     a3 = -(v2**2 + y2 * a2 + v3**2) / z3
-    a4 = (-10 * (x4 - x1 - 1) - size(6 * g) * mu(v4)) / 6
+    a4 = (-10 * (x4 - x1 - 1) - size(6 * g) * mu(v4, size(6 * g))) / 6
     N1, N2 = size(l5 * y2) + size(2 * g), size(l5 * x1) + size(l6 * z3 - 2 * g)
+    N3 = size(l6 * y2)
     balance = ca.vertcat(
-        2 * a1 + 2 * (x1 - 3) - 10 * (x4 - x1 - 1) + l5 * x1 + N1 * mu(v1),
-        2 * a2 + 2 * (y2 - 4) + (l5 + l6) * y2 + N2 * mu(v2),
-        6 * (a3 + g) + 2 * (z3 - 3) + l6 * z3 + size(l6 * y2) * mu(v3),
+        2 * a1 + 2 * (x1 - 3) - 10 * (x4 - x1 - 1) + l5 * x1 + N1 * mu(v1, N1),
+        2 * a2 + 2 * (y2 - 4) + (l5 + l6) * y2 + N2 * mu(v2, N2),
+        6 * (a3 + g) + 2 * (z3 - 3) + l6 * z3 + N3 * mu(v3, N3),
     )
     names = ("x1", "y2", "z3", "x4", "x1'", "y2'", "z3'", "x4'", "x1''", "y2''", "z3''", "x4''")
     shown = ca.vertcat(x1, y2, z3, x4, v1, v2, v3, v4, a1, a2, a3, a4)
@@ -88,7 +100,7 @@ def slider_crank(mu: Coefficient, R: float = 0.1, a: float = 0.1) -> Machine:
     f2 = ca.vertcat(-ca.dot(across, T) / a, ca.dot(along, T) / a)
     f1 = ca.vertcat(-ca.dot(along, F), -ca.dot(across, F)) - f2
     balance = ca.vertcat(
-        J * alpha - moment[0] + R * N * mu(R * w),
+        J * alpha - moment[0] + R * N * mu(R * w, N),
         m_slider * acc - rod * x,
         N - size(f1) - size(f2) - size(F[0]),
     )

@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import root_scalar
 
 from symfric import BrownMcPhee, Law, SelfTuning, Trajectory, simulate
 from symfric.gallery.belt import Belt
@@ -21,11 +22,17 @@ LAWS = ("self-tuning, equal peak", "Brown-McPhee")
 BLOCK = {"m": 1.0, "k": 2.0, "v_belt": 0.1, "g": 10.0}
 
 
+def law(label: str, v_t: float) -> Law:
+    """One of LAWS with its peak at `v_t` [m/s]."""
+    if label.startswith("self"):
+        return SelfTuning.from_peak_velocity(v_t, **MU)
+    return BrownMcPhee(v_t=v_t, **MU)
+
+
 @cache
 def run(label: str, v_t: float, t_end: float) -> Trajectory:
     """One of LAWS on the belt."""
-    tuned = SelfTuning.from_peak_velocity(v_t, **MU)
-    return moved(tuned if label.startswith("self") else BrownMcPhee(v_t=v_t, **MU), t_end)
+    return moved(law(label, v_t), t_end)
 
 
 def moved(law: Law, t_end: float) -> Trajectory:
@@ -35,9 +42,9 @@ def moved(law: Law, t_end: float) -> Trajectory:
 
 
 def nearest(t_end: float) -> float:
-    """The least rms difference of positions [m] from Brown-McPhee for B from 60 to 140 s/m."""
+    """The least rms difference of positions [m] from Brown-McPhee for B from 30 to 300 s/m."""
     brown = run("Brown-McPhee", V_T, t_end)["x"]
-    laws = (SelfTuning(B=B, **MU) for B in (60.0, 80.0, 90.0, 95.0, 100.0, 110.0, 140.0))
+    laws = (SelfTuning(B=B, **MU) for B in np.geomspace(30.0, 300.0, 40).tolist())
     return min(rms(moved(law, t_end)["x"] - brown) for law in laws)
 
 
@@ -57,3 +64,19 @@ def exact() -> Belt:
     """Exact dry friction with the same levels."""
     N = BLOCK["m"] * BLOCK["g"]
     return Belt(BLOCK["m"], BLOCK["k"], BLOCK["v_belt"], MU["mu_s"] * N, MU["mu_d"] * N)
+
+
+def creeps(one: Law) -> float:
+    """The least sliding velocity at which a law without states is mu_d N [m/s]."""
+
+    def above(v: float) -> float:
+        return float(one.force(v, 1.0)) - MU["mu_d"]
+
+    return float(root_scalar(above, bracket=[0.0, 0.9 * V_T]).root)
+
+
+def creeping(one: Trajectory, v: float) -> bool:
+    """Whether the block passes this creep with a force of mu_d N."""
+    near = np.abs(one["v_rel"] + v) < 0.02 * v
+    level = MU["mu_d"] * BLOCK["m"] * BLOCK["g"]
+    return bool(near.any()) and np.allclose(-one["friction"][near], level, rtol=0.02)

@@ -1,7 +1,8 @@
 """The four-mass system of figures 13 to 16: both laws, and the same machine by other means.
 
 Haug's example has the counts of the paper, 22 constraints and two degrees of freedom; its data are
-taken, since the paper's table is lost. Both laws have their peak at the same velocity.
+taken, since the paper's table is lost. `TUNED` is the law as the paper has it, whose B follows from
+load and mu_s - mu_d, by the function that we reconstructed; `LAWS` have their peak at one velocity.
 """
 
 from functools import cache
@@ -10,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from symfric import BrownMcPhee, Law, SelfTuning, simulate
+from symfric import BrittleSelfTuning, BrownMcPhee, Law, SelfTuning, simulate
 from symfric.foundation.panels import grid
 from symfric.foundation.style import line
 from symfric.gallery.drawing import REFERENCE, legend_below
@@ -26,15 +27,26 @@ V_T = 0.01
 """Velocity of the peak [m/s], of Haug's example."""
 SLIDERS = ("x1", "y2", "z3", "x4")
 LAWS = ("self-tuning", "Brown-McPhee")
+TUNED = "self-tuning, own B"
+B_RANGE = (0.1e3, 0.2e3, 0.3e3, 0.5e3, 0.7e3, 1e3)
+"""Of the sweep of figure 8, in which B [s/m] lies whatever its function is."""
+PEAK = float(np.tan(np.pi / 2 / (2 - 2 / np.pi * np.arcsin(MU["mu_d"] / MU["mu_s"]))))
+"""B times the velocity of the peak [1]."""
 CONSTRAINTS = {
     "constraint_position": "m", "constraint_velocity": "m/s", "constraint_acceleration": "m/s^2",
 }  # fmt: skip
 """Norms of what joints and rods violate, with their units."""
-COEFFICIENTS = {"self-tuning": machines.self_tuning, "Brown-McPhee": machines.brown_mcphee}
+COEFFICIENTS = {
+    "self-tuning": machines.self_tuning,
+    "Brown-McPhee": machines.brown_mcphee,
+    TUNED: machines.own_stiffness,
+}
 
 
 def law(label: str, v_t: float) -> Law:
-    """One of LAWS with its peak at `v_t` [m/s]."""
+    """One of LAWS with its peak at `v_t` [m/s], or `TUNED`, which has its own."""
+    if label == TUNED:
+        return BrittleSelfTuning(**MU)
     if label == "self-tuning":
         return SelfTuning.from_peak_velocity(v_t, **MU)
     return BrownMcPhee(v_t=v_t, **MU)

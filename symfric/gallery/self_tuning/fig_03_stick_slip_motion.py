@@ -3,12 +3,15 @@
 Compared: the self-tuning law with Brown-McPhee at equal velocity of the peak, and both with exact
 dry friction in closed form.
 
-Distance: root mean square difference of the positions of both laws over 30 s.
+Distance: root mean square difference of the positions of both laws.
 
-Evidence: that both curves almost overlap is refuted for v_t = 15 mm/s with these data: the periods
-differ by 3 %, and no B brings them nearer than 39 mm. They do so at 1 mm/s. That sudden drops of
-the acceleration show stiction is refuted, too: both laws creep on the belt while they "stick".
-Their common distance from exact dry friction is larger than that from each other.
+Refuted: that sudden drops of the acceleration show stiction. Both laws are zero at rest and creep
+on the belt while they "stick": where the spring pulls with mu_d N, Brown-McPhee slides at 0.26 v_t,
+3.91 mm/s with v_t = 15 mm/s, and the self-tuning law at 0.31 times the velocity of its peak.
+
+Undecided: whether both curves almost overlap, since the data of the belt are lost. With ours they
+do not at v_t = 15 mm/s: the periods differ by 3 %, and with no B from 30 to 300 s/m are they nearer
+than 39 mm; at 1 mm/s they do, within 7 mm.
 """
 
 import numpy as np
@@ -21,7 +24,10 @@ from symfric.gallery.self_tuning._runs_belt import (
     LAWS,
     V_T,
     acceleration,
+    creeping,
+    creeps,
     exact,
+    law,
     nearest,
     period,
     run,
@@ -53,22 +59,24 @@ def plate(quick: bool = False) -> Plate:
     legend_below(figure, axes[0])
 
     tuned, brown = runs.values()
-    # halfway through a stick the spring pulls with mu_d N; what slips then is creep
-    stop = next(s for s in dry.stops if s > 5.0)
-    stick = stop + 0.5 * (dry.leaves[dry.stops.index(stop)] - stop)
     numbers = {
         "difference of velocities, rms [m/s]": rms(tuned["v"] - brown["v"]),
         "difference of accelerations, rms [m/s^2]": rms(acceleration(tuned) - acceleration(brown)),
         "Brown-McPhee from exact dry friction, rms [m]": rms(brown["x"] - motion["x"]),
         "self-tuning from exact dry friction, rms [m]": rms(tuned["x"] - motion["x"]),
         "period, exact dry friction [s]": float(np.diff(dry.leaves)[-1]),
-        "creep of Brown-McPhee at mu_d N, in stick [m/s]": -float(brown.at(stick)["v_rel"][0]),
     } | {f"period, {name} [s]": period(one) for name, one in runs.items()}
+    creep = {name: creeps(law(name, V_T)) for name in LAWS}
+    numbers |= {f"creep of {name} at mu_d N [m/s]": v for name, v in creep.items()}
     apart = rms(tuned["x"] - brown["x"])
     dry_off = [rms(one["x"] - motion["x"]) for one in runs.values()]
     claims = {
         "periods differ by 3 %": 0.025 < abs(period(brown) / period(tuned) - 1) < 0.035,
-        "both creep on the belt": all(one.at(stick)["v_rel"][0] < -1e-3 for one in runs.values()),
+        "Brown-McPhee creeps at 0.26 v_t, 3.91 mm/s, at mu_d N": (
+            abs(creep[LAWS[1]] / V_T - 0.26) < 0.005 and abs(creep[LAWS[1]] - 3.91e-3) < 5e-6
+        ),
+        "the self-tuning law at 0.31 times its peak": abs(creep[LAWS[0]] / V_T - 0.31) < 0.005,
+        "and so it is in the runs": all(creeping(runs[name], creep[name]) for name in LAWS),
         "both are farther from dry friction than from each other": min(dry_off) > apart,
     }
     if not quick:
@@ -77,6 +85,8 @@ def plate(quick: bool = False) -> Plate:
             one, other = (run(name, v_t, t_end)["x"] for name in LAWS)
             near = rms(one - other)
             numbers[f"difference of positions at {1e3 * v_t:g} mm/s, rms [m]"] = near
-        claims["no B brings them nearer than 39 mm"] = 0.0385 < least < 0.0399
+        claims["no B from 30 to 300 s/m brings them nearer than 39 mm"] = 0.0385 < least < 0.0399
         claims["they overlap at 1 mm/s, within 7 mm"] = near < 0.007
-    return plate_of(__name__, figure, apart, "m", numbers, claims)
+    return plate_of(
+        __name__, figure, apart, "m", numbers, claims, within=0.026 if quick else 0.044, quick=quick
+    )

@@ -3,12 +3,15 @@
 Compared: the self-tuning law with Brown-McPhee at equal velocity of the peak, and both with exact
 dry friction in closed form; over time, and over the slip velocity.
 
-Distance: root mean square difference of the forces of both laws over 30 s, relative to mu_s N.
+Distance: root mean square difference of the forces of both laws, relative to mu_s N.
 
-Evidence: the paper's table of errors is lost, so its numbers can neither be met nor refuted. The
-difference is not one of the forces but of the instants of break-away: over the slip velocity both
-forces lie within 10 % of mu_s N, as in figure 1. No law of the velocity alone jumps to its static
-level at rest: its force is that of the spring, with a creep that grows with it.
+Reproduced: both laws perform alike, as forces: over the slip velocity they lie within 10 % of mu_s
+N, as in figure 1. Over time they differ by the instants of break-away.
+
+Refuted: that a law of the velocity alone captures stiction. It does not jump to its static level at
+rest: its force is that of the spring, with a creep that grows with it.
+
+Undecided: the errors of both, since the paper's table of them is lost.
 """
 
 import numpy as np
@@ -61,7 +64,8 @@ def plate(quick: bool = False) -> Plate:
             for name in runs
         ),
     }
-    return plate_of(__name__, figure, rms(tuned - brown) / level, "1", numbers, claims)
+    far, within = rms(tuned - brown) / level, 0.06 if quick else 0.085
+    return plate_of(__name__, figure, far, "1", numbers, claims, within=within, quick=quick)
 
 
 def over(slips: np.ndarray, run: Trajectory) -> np.ndarray:

@@ -3,11 +3,13 @@
 Compared: both laws, each with the same machine in the crank's angle, written by hand and solved by
 SUNDIALS; and with each other.
 
-Distance: largest difference from that by hand over 0.25 s, both laws.
+Distance: largest difference from that by hand, both laws.
 
-Evidence: nothing is refuted: the laws overlap within 0.2 % of the greatest acceleration, and the
+Reproduced: the profiles are smooth, overlap within 0.2 % of the greatest acceleration, and the
 joints are not violated. That no jitter is seen here follows from figure 13: the bearing slides at 8
 m/s and more, eight hundred times the velocity of the peak, where both laws are flat.
+
+Undecided: the data of the machine, which are Haug's here.
 """
 
 from symfric.gallery.plate import Plate, plate_of
@@ -32,4 +34,5 @@ def plate(quick: bool = False) -> Plate:
         "constraints hold": numbers["largest norm of the constraints [m]"] < 1e-7,
     }
     figure = picture("crank''", "crank acceleration\n[rad/s²]", t_end)
-    return plate_of(__name__, figure, distance("crank''", t_end), "rad/s^2", numbers, claims)
+    far, within = distance("crank''", t_end), 2e-6 if quick else 6e-5
+    return plate_of(__name__, figure, far, "rad/s^2", numbers, claims, within=within, quick=quick)

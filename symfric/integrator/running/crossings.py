@@ -3,10 +3,16 @@
 Everything that takes arithmetic on many numbers is a Function, so that virtual machine and compiled
 code agree to the bit. What is left, signs and the Illinois method, is written twice, in the same
 operations: in Python (`symfric.integrator.running.events`) and in C (`.search`).
+
+Roots are isolated. Values at five places bound what the expression does between them if it is a
+polynomial of degree 4, as one that is linear in the states is on the dense output of all methods,
+or has one corner. Where a piece may have more roots than the signs at its ends say, it is cut in
+quarters of its own, down to the event tolerance.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Any, final
 
 import casadi as ca
@@ -19,7 +25,11 @@ from symfric.model.parts import Event
 
 Array = NDArray[np.float64]
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Where each step is looked at; a double crossing closer than this is not seen."""
+"""Where each step, and each piece in doubt, is looked at."""
+FINER = 64
+"""Pieces of a step that are cut, at most: more than two crossings an event tolerance apart take."""
+ROUNDING = 64 * float(np.finfo(float).eps)
+"""Bends of an expression below this part of its terms are rounding: no sign there is a crossing."""
 SHARPER = 1e-3
 """Events are located to this part of the tolerance: a ball whose impacts are all late gains by it,
 and where it loses little by them it would bounce for ever."""
@@ -74,7 +84,10 @@ class Crossings:
     """The events of a model on one accepted step, a record row (t0, t1, y0, y1, D).
 
     Attributes:
-        looks: (row, d) -> their values at `LOOKS` but the first, one look after the other.
+        looks: (low, values there, row, d) -> their values at `LOOKS` between low and 1, one look
+            after the other, of each piece whether it is in doubt, and the noise in the step.
+        doubts: (values at five places, one place after the other, noise) -> of each piece between
+            them, whether it is in doubt.
         values: (theta, row, d) -> their values within the step.
         cut: (theta, row) -> the row up to there, the same polynomial.
         jump: (row, d) -> their values at its end, and all resets from there.
@@ -86,6 +99,7 @@ class Crossings:
     """
 
     looks: ca.Function
+    doubts: ca.Function
     values: ca.Function
     cut: ca.Function
     jump: ca.Function
@@ -114,13 +128,14 @@ class Crossings:
     @property
     def functions(self) -> tuple[ca.Function, ...]:
         """What the compiled search calls."""
-        return self.looks, self.values, self.cut, self.jump
+        return self.looks, self.doubts, self.values, self.cut, self.jump
 
 
 def crossings(
     events: Sequence[Event],
     states: Sequence[str],
     expressions: ca.Function,
+    sizes: ca.Function,
     resets: ca.Function,
     rows: int,
     follows: bool,
@@ -132,6 +147,7 @@ def crossings(
         events: of the model.
         states: names, in the order of y.
         expressions: (t, y, d) -> value of each event.
+        sizes: (t, y, d) -> of each event, the sum of what t and y contribute, in magnitude.
         resets: (t, y, d) -> value of each reset, event after event.
         rows: of the dense output.
         follows, closes: as in `Crossings`.
@@ -140,10 +156,20 @@ def crossings(
     row, d = ca.SX.sym("row", at.width), ca.SX.sym("d", expressions.numel_in(2))
     theta = ca.SX.sym("theta")
     end = row[at.T1], row[at.y1]
-    looks = [_place(at, row, s) if s < 1 else end for s in LOOKS[1:]]
+    low = ca.SX.sym("low")
+    looks = [_place(at, row, low + s * (1 - low)) if s < 1 else end for s in LOOKS[1:]]
+    first, five = (ca.SX.sym("values", n * len(events)) for n in (1, len(LOOKS)))
+    noise, level = ca.SX.sym("noise", len(events)), ROUNDING * sizes(*end, d)
+    noise_of_step = ca.if_else(level < inf, level, 0)
+    found = [expressions(*look, d) for look in looks]
     states = list(states)
     return Crossings(
-        _function("looks", [row, d], [ca.vertcat(*(expressions(*look, d) for look in looks))]),
+        _function(
+            "looks",
+            [low, first, row, d],
+            [ca.vertcat(*found), _doubts([first, *found], noise_of_step), noise_of_step],
+        ),
+        _function("doubts", [five, noise], [_doubts(ca.vertsplit(five, len(events)), noise)]),
         _function("values", [theta, row, d], [expressions(*_inside(at, row, theta), d)]),
         cutting(at),
         _function("jump", [row, d], [expressions(*end, d), resets(*end, d)]),
@@ -159,6 +185,28 @@ def crossings(
 def _function(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Function:
     dense = [ca.densify(divided_once(result)) for result in results]
     return ca.Function(f"symfric_{name}", arguments, dense, {"cse": True})
+
+
+def _doubts(values: Sequence[ca.SX], noise: ca.SX) -> ca.SX:
+    """Of each piece between five values, whether events may have more roots than their signs say.
+
+    An expression is off its chord by at most S x (1 - x), 0 <= x <= 1, on inner pieces, and by
+    S (1 - x) from an outer end, if it is a polynomial of degree 4, or a line with one corner. On
+    inner pieces S is the sum of the second differences at their ends and an eighth of the third
+    one, on outer ones half the bend at their ends and some of the fourth difference. Where it is
+    above that, it has one sign, or rises or falls throughout. A bend below `noise` is rounding.
+    """
+    a, b, c = (x - 2 * y + z for x, y, z in zip(values, values[1:], values[2:], strict=False))
+    bows, sizes = [ca.fabs(x) for x in (a, b, c)], [ca.fabs(x) for x in values]
+    fourth = 0.21 * ca.fabs(a - 2 * b + c)
+    first = (ca.fmax(ca.fabs(3 * (a - b) + c), bows[0]) + fourth) / 2
+    last = (ca.fmax(ca.fabs(3 * (c - b) + a), bows[2]) + fourth) / 2
+    return ca.vertcat(
+        sizes[0] < first - noise,
+        sizes[1] + sizes[2] < bows[0] + bows[1] + bows[2] / 8 - noise,
+        sizes[2] + sizes[3] < bows[0] / 8 + bows[1] + bows[2] - noise,
+        sizes[4] < last - noise,
+    )
 
 
 def _place(at: Record, row: ca.SX, theta: Any) -> tuple[ca.SX, ca.SX]:

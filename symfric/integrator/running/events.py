@@ -7,6 +7,7 @@ C (`symfric.integrator.running.search`), operation by operation.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
+from functools import partial
 from typing import Any, cast, final
 
 import casadi as ca
@@ -21,11 +22,11 @@ from symfric.integrator.running.crossings import (
     LEAST,
     LOOKS,
     RESTART,
-    SHARPER,
     SOON,
     Crossings,
     Memory,
 )
+from symfric.integrator.running.isolation import Isolation, passed
 from symfric.integrator.step.layout import Given, Record, State
 
 Array = NDArray[np.float64]
@@ -157,7 +158,8 @@ class Search:
         self.eventful, self.crossings = eventful, eventful.crossings
         self.memory, self.tolerance = eventful.memory, eventful.tolerance
         self._before = self.memory[Memory.before(self.crossings.count)]
-        self._looks, self._values, self._cut, self._jump = map(_called, self.crossings.functions)
+        functions = map(_called, self.crossings.functions)
+        self._looks, self._doubts, self._values, self._cut, self._jump = functions
         self._directions = np.array(self.crossings.directions)
 
     def __call__(self, row: Array, S: Array, R: Array) -> tuple[Change, Happened]:
@@ -225,36 +227,30 @@ class Search:
         if memory[Memory.PHASE] == Memory.ON:
             g[0] = self._before
         elif memory[Memory.PHASE] == Memory.FRESH:
-            g[0] = self._values(np.zeros(1), row, d)[0]
+            g[0] = self._inside(row, d, 0.0)
         else:
             low = min(SOON * self.tolerance / h, 0.1)
-            g[0] = self._values(np.array([low]), row, d)[0]
-            jumped = self._passed(self._before, g[0]) & (g[0] != 0)
-        g[1:] = self._looks(row, d)[0].reshape(-1, count)
-        hits = self._passed(g[:-1], g[1:])
-        hits[0] |= jumped
-        if not hits.any():
-            self._before[:] = g[-1]
-            memory[Memory.PHASE] = Memory.ON
-            return None
-        look = int(np.argmax(hits.any(axis=1)))
-        share = max(SHARPER * self.tolerance / h, 1e-15)
-        begin, roots = LOOKS[look] if look else low, np.full(count, np.inf)
-        for i in np.flatnonzero(hits[look]):
+            g[0] = self._inside(row, d, low)
+            jumped = passed(self._before, g[0], self._directions) & (g[0] != 0)
+        found = self._looks(np.array([low]), g[0], row, d)
+        g[1:], doubts, noise = (a.reshape(-1, count).copy() for a in found)
+        inside, doubted = partial(self._inside, row, d), partial(self._doubted, noise[0])
+        found = Isolation(inside, doubted, self._directions, self.tolerance / h)
+        found.roots[jumped] = 0.0
+        theta = found.first([low + s * (1 - low) for s in LOOKS], g, doubts)
+        if theta <= 1:
+            return theta, (found.roots - theta) * h <= self.tolerance
+        self._before[:] = g[-1]
+        memory[Memory.PHASE] = Memory.ON
+        return None
 
-            def value(theta: float, i: int = int(i)) -> float:
-                return float(self._values(np.array([theta]), row, d)[0][i])
+    def _inside(self, row: Array, d: Array, theta: float) -> Array:
+        """Values of the events within a step."""
+        return self._values(np.array([theta]), row, d)[0].copy()
 
-            ends = float(g[look, i]), float(g[look + 1, i])
-            at_once = look == 0 and jumped[i]
-            roots[i] = 0.0 if at_once else locate(value, begin, LOOKS[look + 1], ends, share)
-        theta = float(roots.min())
-        return theta, (roots - theta) * h <= self.tolerance
-
-    def _passed(self, before: Array, after: Array) -> NDArray[np.bool_]:
-        """Where events, numbered along the last axis, go through zero in their direction."""
-        rising = (before < 0) & (after >= 0) & (self._directions >= 0)
-        return rising | ((before > 0) & (after <= 0) & (self._directions <= 0))
+    def _doubted(self, noise: Array, g: Array) -> Array:
+        """Of each piece between values at five places, whether events are in doubt there."""
+        return self._doubts(g.ravel(), noise)[0].reshape(-1, g.shape[1]).copy()
 
 
 def _called(function: ca.Function) -> Callable[..., list[Array]]:
@@ -274,36 +270,6 @@ def _called(function: ca.Function) -> Callable[..., list[Array]]:
         return results
 
     return called
-
-
-def locate(
-    value: Callable[[float], float], a: float, b: float, ends: tuple[float, float], tolerance: float
-) -> float:
-    """Root in [a, b] of a function with values of two signs at the `ends`; the side after it.
-
-    By the Illinois method.
-    """
-    fa, fb = ends
-    if fb == 0.0:
-        return b
-    side = 0
-    for _ in range(100):
-        if not b - a > tolerance:
-            break
-        c = (fa * b - fb * a) / (fa - fb)
-        c = min(max(c, a + 1e-3 * (b - a)), b - 1e-3 * (b - a)) if side else c
-        fc = value(c)
-        if fc == 0.0:
-            return c
-        if (fc > 0) == (fb > 0):
-            b, fb = c, fc
-            fa = fa / 2 if side == 1 else fa
-            side = 1
-        else:
-            a, fa = c, fc
-            fb = fb / 2 if side == -1 else fb
-            side = -1
-    return b
 
 
 def storm(memory: Array, t: float, which: NDArray[np.bool_]) -> bool:

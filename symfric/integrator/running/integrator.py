@@ -123,11 +123,20 @@ class Integrator:
             self.model.events,
             [v.name for v in self.model.x],
             self.events,
+            self._sizes(),
             self.resets,
             self.tableau.H.shape[0],
             self.follows,
             manifold is not None and manifold.m > 0,
         )
+
+    def _sizes(self) -> ca.Function:
+        """What t and y contribute to event expressions (t, y, d), in magnitude."""
+        s, t = self.system, ca.SX.sym("time")
+        values = stacked(ca.SX(e.expression) for e in self.model.events)
+        own = ca.vertcat(t, s.y)
+        slopes = ca.jacobian(self.of_time("events", ca.densify(values))(t, s.y, s.d), own)
+        return ca.Function("sizes", [t, s.y, s.d], [ca.fabs(slopes) @ ca.fabs(own)])
 
     def of_time(self, name: str, expression: ca.SX) -> ca.Function:
         """`expression` of the model as a Function (t, y, d), inputs put in."""

@@ -156,17 +156,25 @@ class Run:
         return np.array([np.min(least, axis=0), np.max(most, axis=0)])
 
     @property
+    def seen(self) -> tuple[Array, Array]:
+        """Start and ends of steps, (k,) and (k, n); of a long run the times of the result."""
+        if not self.complete:
+            return self.outputs.times[: self.outputs.found], self.outputs.reached.T
+        found = self._pieces()
+        times, unknowns = [p.t1 for p in found], [p.y1 for p in found]
+        return np.concatenate([[self.t], *times]), np.concatenate([self.y[None], *unknowns])
+
+    @property
     def largest(self) -> Array:
         """Largest magnitudes of the unknowns at the start and at the ends of steps, shape (n,)."""
         return np.abs(self.reach).max(axis=0)
 
-    def reaches(self, unknown: int, size: float) -> bool:
-        """Whether an unknown is that large at the start or at the end of a step."""
+    def farthest(self, unknown: int) -> float:
+        """Largest magnitude of an unknown at the start and at the ends of steps."""
         found = self._pieces()
         first = found[0].y0[0] if self._before is None else self._before.reach
-        return bool(np.abs(first[..., unknown]).max() >= size) or any(
-            np.abs(p.y1[:, unknown]).max() >= size for p in found
-        )
+        ends = (first[..., unknown], *(p.y1[:, unknown] for p in found))
+        return max(float(np.abs(y).max()) for y in ends)
 
     def at(self, times: Array) -> Array:
         """Unknowns at `times` [s], shape (n, times), of a long run as outputs of another one."""

@@ -6,6 +6,7 @@ from string import Template
 from symfric.integrator.equations.initial import SURE
 from symfric.integrator.running.crossings import (
     ALIKE,
+    FINER,
     KEPT,
     LEAST,
     LOOKS,
@@ -40,6 +41,7 @@ def search_source(crossings: Crossings | None, given: int) -> str:
         of_state=_table(j for _, j in crossings.resets),
         kept=KEPT,
         alike=ALIKE,
+        finer=FINER,
         sharper=repr(SHARPER),
         soon=repr(SOON),
         restart=repr(RESTART),
@@ -123,15 +125,94 @@ static double symfric_locate(const symfric_place *p, int event, double a, double
   return b;
 }
 
+/* What was found of the first roots in a step, beyond 1 where none is, the noise of the events, the
+   event tolerance as a part of the step, and how many pieces may still be cut. */
+typedef struct { double root[EVENTS], noise[EVENTS], tolerance; int left; } symfric_found;
+
+static double symfric_first(const symfric_place *p, symfric_found *f, const double *at,
+                            const double *g, const double *doubts);
+
+/* As symfric_first, from a to b, with values of which the first ones are there, where some events
+   are in doubt. */
+static double symfric_again(const symfric_place *p, symfric_found *f, double a, double b, double *g,
+                            const int *suspects)
+{
+  const double *arg[$arg];
+  double *res[$res];
+  double doubts[LOOKS * EVENTS], at[LOOKS + 1];
+  int i, k;
+  --f->left;
+  if (b < a) b = a;
+  for (k = 0; k <= LOOKS; ++k) at[k] = a + symfric_look_at[k] * (b - a);
+  for (k = 1; k <= LOOKS; ++k) symfric_within(p, at[k], g + k * EVENTS);
+  arg[0] = g;
+  arg[1] = f->noise;
+  res[0] = doubts;
+  symfric_doubts(arg, res, p->iw, p->w, 0);
+  for (k = 0; k < LOOKS; ++k)
+    for (i = 0; i < EVENTS; ++i)
+      if (!suspects[i]) doubts[k * EVENTS + i] = 0;
+  return symfric_first(p, f, at, g, doubts);
+}
+
+/* The first of all roots between the places `at` with values g, or one behind them. What is in
+   doubt is looked at again before the first sure root, since what jumps with that event does not do
+   so before it, or piece by piece where there is none, or it is its own. */
+static double symfric_first(const symfric_place *p, symfric_found *f, const double *at,
+                            const double *g, const double *doubts)
+{
+  double again[(LOOKS + 1) * EVENTS], sure = 2, share = $sharper * f->tolerance, found;
+  double width = f->tolerance < 1e-15 ? 1e-15 : f->tolerance;
+  int suspects[LOOKS][EVENTS], others[EVENTS], i, k, some = 0;
+  if (share < 1e-15) share = 1e-15;
+  for (i = 0; i < EVENTS; ++i)
+    if (f->root[i] < sure) sure = f->root[i];
+  for (k = 0; k < LOOKS; ++k) {
+    const double *g0 = g + k * EVENTS, *g1 = g0 + EVENTS, before = sure;
+    for (i = 0; i < EVENTS; ++i) {
+      suspects[k][i] = doubts[k * EVENTS + i] != 0 && at[k + 1] - at[k] > width && f->left > 0;
+      if (suspects[k][i] || at[k] >= before || f->root[i] <= at[0]) continue;
+      if (symfric_passed(g0[i], g1[i], symfric_directions[i]))
+        f->root[i] = symfric_locate(p, i, at[k], at[k + 1], g0[i], g1[i], share);
+      if (f->root[i] < sure) sure = f->root[i];
+    }
+  }
+  for (i = 0; i < EVENTS; ++i) {
+    others[i] = 0;
+    again[i] = g[i];
+    for (k = 0; k < LOOKS && sure <= at[LOOKS] && f->root[i] > 1; ++k) {
+      if (at[k] < sure && suspects[k][i]) others[i] = some = 1;
+      if (at[k] < sure) suspects[k][i] = 0;
+    }
+  }
+  if (some) sure = symfric_again(p, f, at[0], sure - share, again, others);
+  for (k = 0; k < LOOKS && at[k] < sure; ++k) {
+    some = 0;
+    for (i = 0; i < EVENTS; ++i) {
+      again[i] = g[k * EVENTS + i];
+      some += suspects[k][i];
+    }
+    if (!some) continue;
+    found = symfric_again(p, f, at[k], at[k + 1], again, suspects[k]);
+    if (found <= at[k + 1]) return found;
+  }
+  for (i = 0; i < EVENTS; ++i)
+    if (f->root[i] < sure) sure = f->root[i];
+  return sure;
+}
+
 /* Where in the step the first events happen, and which; -1 where none does. */
 static double symfric_crossing(const symfric_place *p, double *M, double *which)
 {
-  const double *arg[$arg], *g0, *g1;
+  const double *arg[$arg];
   double *res[$res];
-  double g[(LOOKS + 1) * EVENTS], root[EVENTS], low = 0, first, share;
+  double g[(LOOKS + 1) * EVENTS], doubts[LOOKS * EVENTS], at[LOOKS + 1], low = 0, first;
   double h = p->row[1] - p->row[0];
-  int jumped[EVENTS], i, look;
-  for (i = 0; i < EVENTS; ++i) jumped[i] = 0;
+  symfric_found f;
+  int i;
+  f.left = $finer;
+  f.tolerance = M[TOLERANCE] / h;
+  for (i = 0; i < EVENTS; ++i) f.root[i] = 2;
   if (M[PHASE] == ON) {
     for (i = 0; i < EVENTS; ++i) g[i] = M[BEFORE + i];
   } else if (M[PHASE] == FRESH) {
@@ -141,30 +222,21 @@ static double symfric_crossing(const symfric_place *p, double *M, double *which)
     if (low > 0.1) low = 0.1;
     symfric_within(p, low, g);
     for (i = 0; i < EVENTS; ++i)
-      jumped[i] = symfric_passed(M[BEFORE + i], g[i], symfric_directions[i]) && g[i] != 0;
+      if (symfric_passed(M[BEFORE + i], g[i], symfric_directions[i]) && g[i] != 0) f.root[i] = 0;
   }
-  arg[0] = p->row;
-  arg[1] = p->d;
+  arg[0] = &low;
+  arg[1] = g;
+  arg[2] = p->row;
+  arg[3] = p->d;
   res[0] = g + EVENTS;
+  res[1] = doubts;
+  res[2] = f.noise;
   symfric_looks(arg, res, p->iw, p->w, 0);
-  share = $sharper * M[TOLERANCE] / h;
-  if (share < 1e-15) share = 1e-15;
-  for (look = 0; look < LOOKS; ++look) {
-    g0 = g + look * EVENTS;
-    g1 = g0 + EVENTS;
-    first = 2;
-    for (i = 0; i < EVENTS; ++i) {
-      root[i] = 2;
-      if (look == 0 && jumped[i])
-        root[i] = 0;
-      else if (symfric_passed(g0[i], g1[i], symfric_directions[i]))
-        root[i] = symfric_locate(p, i, look ? symfric_look_at[look] : low,
-                                 symfric_look_at[look + 1], g0[i], g1[i], share);
-      if (root[i] < first) first = root[i];
-    }
-    if (first > 1) continue;
+  for (i = 0; i <= LOOKS; ++i) at[i] = low + symfric_look_at[i] * (1 - low);
+  first = symfric_first(p, &f, at, g, doubts);
+  if (first <= 1) {
     for (i = 0; i < EVENTS; ++i)
-      which[i] = root[i] <= 1 && (root[i] - first) * h <= M[TOLERANCE];
+      which[i] = f.root[i] <= 1 && (f.root[i] - first) * h <= M[TOLERANCE];
     return first;
   }
   for (i = 0; i < EVENTS; ++i) M[BEFORE + i] = g[LOOKS * EVENTS + i];

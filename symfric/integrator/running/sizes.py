@@ -24,7 +24,7 @@ def ample(run: Run, nominal: Array) -> bool:
     # few numbers: quicker than by NumPy
     ends = zip(run.end.tolist(), nominal.tolist(), strict=False)
     return all(
-        abs(end) >= SMALL * typical or run.reaches(i, SMALL * typical)
+        abs(end) >= SMALL * typical or run.farthest(i) >= SMALL * typical
         for i, (end, typical) in enumerate(ends)
     )
 

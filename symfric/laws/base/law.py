@@ -28,6 +28,16 @@ PHENOMENA = {
 }
 """What a law can show, by the codes in `Facts.phenomena`."""
 
+CONFIDENCE = {
+    "two sources": "the formula was compared with two independent ones",
+    "one source": "the formula was compared with one",
+    "textbook": "the formula stands in every textbook",
+    "rebuilt": "the formula was lost or garbled, and rebuilt from what is said of it",
+    "constructed": "made here",
+    "unverified": "written from memory, compared with no publication and no public code",
+}
+"""How sure a formula is, by the words in `Facts.confidence`."""
+
 
 @dataclass(frozen=True)
 class Facts:
@@ -36,11 +46,12 @@ class Facts:
     Attributes:
         phenomena: codes of `PHENOMENA`.
         smoothness: differentiability class in the velocity, and where it breaks.
-        confidence: how the formula was confirmed.
-        source: the publication.
+        confidence: one of `CONFIDENCE`.
+        source: the publication, read or not.
         odd: the force changes sign with v, states and further inputs together.
         load: how the dry force follows the normal force: "proportional", "independent" or in
             words.
+        checked: what the formula was compared with, or what else speaks for it.
     """
 
     phenomena: tuple[str, ...]
@@ -49,6 +60,13 @@ class Facts:
     source: str
     odd: bool = True
     load: str = "proportional"
+    checked: str = ""
+
+    @property
+    def formula(self) -> str:
+        """How sure the formula is, in words."""
+        said = f"{self.confidence} ({CONFIDENCE[self.confidence]})"
+        return f"{said}: {self.checked}" if self.checked else said
 
 
 @dataclass(frozen=True)
@@ -188,6 +206,13 @@ class Law(Parametric, ABC):
         The top of the curve at rest, unless the law says otherwise. Raises as `outside`.
         """
         return self.outside(0.0, N)
+
+    def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Largest force [N] that the states carry in any motion at a steady load: a bound.
+
+        The static level, unless the law says otherwise. Raises as `outside`.
+        """
+        return self.static_level(N, side, **inputs)
 
     @abstractmethod
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:

@@ -25,7 +25,7 @@ class Sum(Law):
     Source: superposition, as in Coulomb + viscous friction.
     """
 
-    facts: ClassVar[Facts] = Facts((), "that of its terms", "superposition", "superposition")
+    facts: ClassVar[Facts] = Facts((), "that of its terms", "constructed", "constructed")
 
     laws: tuple[Law, ...]
 
@@ -80,6 +80,11 @@ class Sum(Law):
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Largest force [N] at rest: that of all terms together."""
         first, *rest = [law.static_level(N, side, **chosen(law, inputs)) for law in self.laws]
+        return sum(rest, start=first)
+
+    def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """That of all terms together."""
+        first, *rest = [law.most_held(N, side, **chosen(law, inputs)) for law in self.laws]
         return sum(rest, start=first)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
@@ -207,7 +212,7 @@ class LoadDependent(Wrapper):
     """
 
     facts: ClassVar[Facts] = Facts(
-        (), "that of its law", "memory", "Bittencourt and Gunnarsson 2012"
+        (), "that of its law", "unverified", "Bittencourt and Gunnarsson 2012"
     )
 
     law: Law

@@ -66,3 +66,7 @@ class LoadNormalised(Wrapper):
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Largest force [N] at rest."""
         return N / self.N_0 * super().static_level(N, side)
+
+    def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """That at N_0, scaled."""
+        return N / self.N_0 * super().most_held(N, side)

@@ -200,7 +200,8 @@ class GenericAsperity(Population):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "P", "M", "L", "B", "N", "T"),
         smoothness="C0 in the position, random",
-        confidence="reconstruction from words",
+        confidence="rebuilt",
+        checked="from words",
         source="Al-Bender, Lampaert, Swevers, Tribol. Lett. 16(1-2), 2004",
         load="proportional in steady sliding",
     )
@@ -286,7 +287,7 @@ class RandomBristles(Population):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "P"),
         smoothness="jumps at random",
-        confidence="memory",
+        confidence="unverified",
         source="Haessig and Friedland, J. Dyn. Syst. Meas. Control 113(3), 1991",
         load="independent",
     )

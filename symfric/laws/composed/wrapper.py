@@ -60,6 +60,10 @@ class Wrapper(Law):
         """Largest force [N] at rest of the law inside, on its side."""
         return self.inner_of(side).static_level(self.load(N), side, **inputs)
 
+    def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """That of the law inside, on its side."""
+        return self.inner_of(side).most_held(self.load(N), side, **inputs)
+
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
         """Rates of the states."""
         return self.inner_at(v).rate(v, self.load(N), z, **inputs)

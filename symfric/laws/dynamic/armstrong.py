@@ -35,7 +35,8 @@ class Armstrong(Law):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V", "P", "L", "T"),
         smoothness="C∞ (the original is switched)",
-        confidence="memory; differential form constructed",
+        confidence="unverified",
+        checked="the differential form is constructed",
         source="Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994",
         load="proportional in steady sliding",
     )

@@ -34,7 +34,8 @@ class BlimanSorine(Law):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "P"),
         smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
-        confidence="memory, verified by its closed forms",
+        confidence="unverified",
+        checked="its closed forms hold",
         source="Bliman and Sorine, ECC 1995; Olsson et al. 1998",
         load="proportional in steady sliding",
     )
@@ -81,6 +82,10 @@ class BlimanSorine(Law):
         q = self.eta * self.mu_2 / self.mu_1  # exp(-s_p (1 - eta)/(eta s_f))
         slow, fast = q ** (self.eta / (1 - self.eta)), q ** (1 / (1 - self.eta))
         return N * (self.mu_1 * (1 - fast) - self.mu_2 * (1 - slow))
+
+    def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """That of both parts, which point the same way behind a reversal."""
+        return N * (self.mu_1 if self.order == "1" else self.mu_1 + self.mu_2)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Friction force [N]."""

@@ -32,7 +32,8 @@ class BoucWen(Law):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "P"),
         smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
-        confidence="memory, virgin curves verified",
+        confidence="one source",
+        checked="diegoandresalvarez/BWBN_TMCMC diff_eq_real.m",
         source="Wen, J. Eng. Mech. Div. ASCE 102(2), 1976",
         load="proportional in steady sliding",
     )

@@ -7,6 +7,7 @@ from symfric.foundation.numeric import Scalar, column, is_number
 from symfric.foundation.parameters import param
 from symfric.laws.base import smooth
 from symfric.laws.base.law import Law, State
+from symfric.laws.dynamic.element import deflection
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +42,7 @@ class Bristle(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """z: mean deflection of the bristles [m], positive with v."""
-        return (State("z", "m", 1e-5, doc="mean bristle deflection"),)
+        return (State("z", "m", deflection(self.sigma_0), doc="mean bristle deflection"),)
 
     @property
     def velocity_scale(self) -> Scalar:

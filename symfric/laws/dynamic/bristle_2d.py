@@ -7,6 +7,7 @@ from symfric.foundation.numeric import Scalar, column, equals, exp
 from symfric.foundation.parameters import param
 from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, Law, State
+from symfric.laws.dynamic.element import deflection
 
 ROOT_STEPS = 40
 """Steps of Newton's method that reach a cubic root of 1e-15 of its start."""
@@ -34,7 +35,8 @@ class Bristle2D(Law):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "P", "N"),
         smoothness="C2 (C0 as kappa -> 0)",
-        confidence="memory, behaviour verified",
+        confidence="one source",
+        checked="JuliaRobotics/RigidBodyDynamics.jl contact.jl (viscoelastic Coulomb friction)",
         source="Kikuuwe et al., IEEE T-RO 22(6), 2006; Liang, Fillmore, Ma 2012",
         load="proportional in steady sliding",
     )
@@ -56,7 +58,7 @@ class Bristle2D(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """z: deflection of the bristle [m], a vector in a plane."""
-        return (State("z", "m", 1e-5, doc="bristle deflection"),)
+        return (State("z", "m", deflection(self.sigma_0), doc="bristle deflection"),)
 
     @property
     def velocity_scale(self) -> Scalar:

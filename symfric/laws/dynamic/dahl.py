@@ -8,7 +8,7 @@ from symfric.foundation.numeric import Scalar, column, equals
 from symfric.foundation.parameters import param
 from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, Law, State
-from symfric.laws.dynamic.element import spent
+from symfric.laws.dynamic.element import deflection, spent
 
 
 @final
@@ -34,7 +34,8 @@ class Dahl(Law):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "P"),
         smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
-        confidence="two sources for n = 1; memory for the exponent",
+        confidence="two sources",
+        checked="n = 1: Altair MotionSolve's manual and public code; n is unverified",
         source="Dahl 1968, 1976",
     )
 
@@ -53,7 +54,7 @@ class Dahl(Law):
     @property
     def states(self) -> tuple[State, ...]:
         """z: deflection of the contact [m], positive with v."""
-        return (State("z", "m", 1e-5, doc="mean bristle deflection"),)
+        return (State("z", "m", deflection(self.sigma_0), doc="mean bristle deflection"),)
 
     @property
     def velocity_scale(self) -> Scalar:

@@ -40,6 +40,7 @@ class ElastoPlastic(Bristle):
         phenomena=("D", "S", "St", "V", "P", "L", "B", "N"),
         smoothness="C2 (C0 at v = 0 and C1 in z as v_eps -> 0)",
         confidence="two sources",
+        checked="jchristopherson/FrictionModels.jl ElastoPlasticModels.jl; MBDyn",
         source="Dupont, Hayward, Armstrong, Altpeter, IEEE TAC 47(5), 2002",
     )
 

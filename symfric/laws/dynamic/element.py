@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import final
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import Scalar, sqrt
+from symfric.foundation.numeric import Scalar, is_number, sqrt
 from symfric.foundation.parameters import Parametric
 from symfric.foundation.vector import ROUND, Vector, Vectors
 from symfric.laws.base import smooth
@@ -21,6 +21,18 @@ def check_elements(law: Law, kind: type[Parametric]) -> None:
     for element in elements:
         checks.kind(where, element, kind, f"an element, such as {one}")
     object.__setattr__(law, "elements", elements)
+
+
+TYPICAL, FIRM = 1e-5, 10.0
+"""Deflection of bristles [m], and the force [N] under which those have it that are stiffer."""
+
+
+def deflection(sigma_0: Scalar) -> float:
+    """The typical deflection [m] of a bristle of the stiffness `sigma_0` [N/m], if that is known.
+
+    Tolerances follow it: 1e-5 m is no scale for a bristle of 1e15 N/m, which breaks away at 1e-14.
+    """
+    return min(TYPICAL, FIRM / float(sigma_0)) if is_number(sigma_0) else TYPICAL
 
 
 def along(t: Vector, s: Vector) -> Scalar:

@@ -36,6 +36,7 @@ class ExactCoulomb(Sticking):
         phenomena=("D", "S", "St", "V"),
         smoothness="set-valued at v = 0, exact by modes",
         confidence="two sources",
+        checked="Modelica Standard Library; rleine/Keynote_Nonsmooth_Dynamics_ENOC2024",
         source="Coulomb 1785; Olsson et al., Eur. J. Control 4, 1998",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)

@@ -58,7 +58,8 @@ class GMS(Law):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V", "P", "M", "L", "B", "N"),
         smoothness="C2 (switched as rho -> 0)",
-        confidence="two sources; smooth form constructed",
+        confidence="two sources",
+        checked="jchristopherson/friction README; the paper of 2003; smooth form constructed",
         source="Al-Bender, Lampaert, Swevers, IEEE TAC 50(11), 2005",
         load="proportional in steady sliding",
     )

@@ -8,6 +8,7 @@ from symfric.foundation.parameters import param
 from symfric.foundation.vector import TINY
 from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, Law, State
+from symfric.laws.dynamic.element import deflection
 
 
 @final
@@ -35,7 +36,8 @@ class Gonthier(Law):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V", "P", "L", "B", "T"),
         smoothness="C1 (dir at v_d; C2 elsewhere)",
-        confidence="memory, behaviour verified; saturation constructed",
+        confidence="unverified",
+        checked="behaviour checked; the saturation is constructed",
         source="Gonthier, McPhee, Lange, Piedboeuf, Multibody Syst. Dyn. 11, 2004",
         load="proportional in steady sliding",
     )
@@ -69,7 +71,7 @@ class Gonthier(Law):
     def states(self) -> tuple[State, ...]:
         """Bristle deflection and dwell memory."""
         dwell = State("s_dw", "1", 1.0, even=True, doc="memory of the dwell, 1 after long rest")
-        return (State("z", "m", 1e-5, doc="bristle deflection"), dwell)
+        return (State("z", "m", deflection(self.sigma_0), doc="bristle deflection"), dwell)
 
     @property
     def velocity_scale(self) -> Scalar:

@@ -8,7 +8,7 @@ from symfric.foundation.numeric import Scalar, column
 from symfric.foundation.parameters import option, param
 from symfric.laws.base import smooth
 from symfric.laws.base.law import Facts, Law, State, Switch
-from symfric.laws.dynamic.element import Held, yielding
+from symfric.laws.dynamic.element import Held, deflection, yielding
 
 
 @final
@@ -28,14 +28,16 @@ class HaessigFriedland(Law):
         smooth: dz/dt = v [1 - |r|^n (1 + sign(v r)) / 2]
 
     Limits: steady state mu_d N sign(v); rate-independent for sigma_1 = 0; drifts as little as
-    `MaxwellSlip` with one element. |v| is smooth over v_eps. Not valid for N = 0.
+    `MaxwellSlip` with one element. While the bristle unloads F v < 0: it gives back what it stored,
+    at most mu_s mu_d N^2 / (2 sigma_0). |v| is smooth over v_eps. Not valid for N = 0.
     Source: Haessig and Friedland, ASME J. Dyn. Syst. Meas. Control 113(3), 1991.
     """
 
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "P", "N"),
         smoothness="C2 (jumps as knee -> 0)",
-        confidence="memory; smooth form constructed",
+        confidence="unverified",
+        checked="the smooth form is constructed",
         source="Haessig and Friedland, J. Dyn. Syst. Meas. Control 113(3), 1991",
         load="proportional in steady sliding",
     )
@@ -69,8 +71,8 @@ class HaessigFriedland(Law):
     def states(self) -> tuple[State, ...]:
         """The bristle deflection, and in the event form the mode."""
         slip = State("slip", "1", 1.0, even=True, doc="1 in slip", whole=True)
-        deflection = State("z", "m", 1e-5, doc="bristle deflection")
-        return (deflection, slip) if self.form == "event" else (deflection,)
+        bristle = State("z", "m", deflection(self.sigma_0), doc="bristle deflection")
+        return (bristle, slip) if self.form == "event" else (bristle,)
 
     @property
     def velocity_scale(self) -> Scalar:

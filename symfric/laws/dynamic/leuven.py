@@ -37,7 +37,8 @@ class Leuven(Law):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V", "P", "M", "L", "B", "N"),
         smoothness="C∞ (C0 as v_eps -> 0 and n -> inf)",
-        confidence="one source, signs corrected; behaviour verified",
+        confidence="one source",
+        checked="Lampaert, Al-Bender, Swevers 2003, signs corrected",
         source="Lampaert, Swevers, Al-Bender, IEEE TAC 47(4), 2002",
         load="proportional in steady sliding",
     )

@@ -25,10 +25,10 @@ class LuGre(Bristle):
     |z| <= mu_s N / sigma_0 is invariant. A bristle under a creep below v_eps does not relax: it
     stretches on instead of breaking away. Keep v_eps ten times below the creep of a contact that
     sticks, the loading rate over sigma_0, on a belt k v_belt / sigma_0; the default is below it on
-    belts of 1e-9 m/s and more. Passive from v to F only if sigma_2 >= sigma_1 (mu_s - mu_d) / mu_d,
-    which the default set does not meet: after a jump in v the force may point forward for an
-    instant. Not valid for N = 0 or a fast-varying N, since the deflection does not shrink with the
-    load.
+    belts of 1e-9 m/s and more, and a run whose bristles stretch on ends with an `OverloadWarning`.
+    Passive from v to F only if sigma_2 >= sigma_1 (mu_s - mu_d) / mu_d, which the default set does
+    not meet: after a jump in v the force may point forward for an instant. Not valid for N = 0 or a
+    fast-varying N, since the deflection does not shrink with the load.
     Source: Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE TAC 40(3), 1995, 419-425.
     """
 
@@ -36,6 +36,7 @@ class LuGre(Bristle):
         phenomena=("D", "S", "St", "V", "P", "L", "B"),
         smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
         confidence="two sources",
+        checked="auralius/LuGre lugre.m; jchristopherson/FrictionModels.jl",
         source="Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE TAC 40(3), 1995",
     )
 
@@ -66,6 +67,7 @@ class LuGreNormalised(Bristle):
         phenomena=("D", "S", "St", "V", "P", "L", "B"),
         smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
         confidence="two sources",
+        checked="documentation of Altair MotionSolve; LuGre at constant load",
         source="LuGre in coefficients of friction; Canudas de Wit and Tsiotras, CDC 1999",
     )
 
@@ -118,7 +120,8 @@ class LuGrePassive(Bristle):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V", "P", "L", "B"),
         smoothness="C∞ (C0 at v = 0 as v_eps -> 0)",
-        confidence="memory; passivity verified by computation",
+        confidence="one source",
+        checked="jchristopherson/FrictionModels.jl (v_d = v_s); passivity by computation",
         source="Olsson, PhD thesis, Lund 1996",
     )
 

@@ -53,6 +53,7 @@ class MaxwellSlip(Law):
         phenomena=("D", "P", "M", "N"),
         smoothness="C∞ (C0 at the corners as n -> inf)",
         confidence="two sources",
+        checked="jchristopherson/friction README; Lampaert, Al-Bender, Swevers 2003",
         source="Iwan, J. Appl. Mech. 33(4), 1966",
         load="proportional in steady sliding",
     )

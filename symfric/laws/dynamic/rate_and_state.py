@@ -38,6 +38,7 @@ class RateAndState(Law):
         phenomena=("D", "St", "L", "T"),
         smoothness="C∞",
         confidence="two sources",
+        checked="jrleeman/rsfmodel and public MATLAB code (inverse hyperbolic sine)",
         source="Dieterich 1979; Ruina 1983; Rice and Ben-Zion 1996",
         load="proportional",
     )

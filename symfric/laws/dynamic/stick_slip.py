@@ -37,7 +37,8 @@ class StickSlip(Law):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "P"),
         smoothness="C2",
-        confidence="structure one source, formula constructed",
+        confidence="rebuilt",
+        checked="the structure is that of the abstract, the formulas are made here",
         source="Cha, Choi, Ryu, Choi, J. Mech. Sci. Technol. 25, 2011",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)

@@ -40,8 +40,9 @@ class Karnopp(Sticking):
     rest only asymptotically, v ~ t^(-1/2) inside the band; in the original one v stays where it
     entered the band unless the integrator sets it to zero; in the event form it stops at once,
     which takes m D_v^2/2 of energy. D_v -> 0 is Coulomb friction with stiction (`ExactCoulomb`).
-    Inside the band F v may be negative, not so in the event form. Keep
-    sigma_2 D_v < (mu_s - mu_d) N: else that form enters the band again as soon as it has left it.
+    Inside the band friction may drive: F v >= -0.274 mu_s N D_v smooth, -mu_s N D_v original, and
+    never below zero in the event form. Keep sigma_2 D_v < (mu_s - mu_d) N: else that form enters
+    the band again as soon as it has left it.
     Source: Karnopp, ASME J. Dyn. Syst. Meas. Control 107, 1985 (not read), as in public codes.
     """
 
@@ -49,6 +50,7 @@ class Karnopp(Sticking):
         phenomena=("D", "S", "V"),
         smoothness="C2 at 0, |v| = D_v, |F_e| = mu_s N -+ F_eps (original: jump at |v| = D_v)",
         confidence="two sources",
+        checked="fellipegm/valve_estimation and other public code",
         source="Karnopp 1985, as in public codes",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -156,15 +158,17 @@ class Awrejcewicz(StaticLaw):
     Within |v| <= epsilon g = mu_s N, and the expression equals the four branches of the paper. The
     corners of the clip are rounded over +-F_eps in the smooth form. The fall beyond epsilon is a
     choice made here.
-    Limits: F(0) = F_e for |F_e| <= mu_s N - F_eps; F(epsilon) = mu_s N. Inside the window F v may
-    be negative. A moving body comes to rest only asymptotically, as with `Karnopp`.
+    Limits: F(0) = F_e for |F_e| <= mu_s N - F_eps; F(epsilon) = mu_s N. Inside the window friction
+    may drive: F v >= -0.204 mu_s N epsilon. A moving body comes to rest only asymptotically, as
+    with `Karnopp`.
     Source: Awrejcewicz, Grzelczyk, Pyryev 2008 (not read; branches checked to join).
     """
 
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C1 at |v| = epsilon, C2 at 0, |F_e| = mu_s N -+ F_eps (original: C0 in F_e)",
-        confidence="memory",
+        confidence="unverified",
+        checked="its four branches join",
         source="Awrejcewicz, Grzelczyk, Pyryev 2008",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -219,7 +223,8 @@ class LeineSwitch(Sticking):
     c v draws a sticking body to the middle of the band: with m alpha for c, dv/dt = -alpha v.
     |v| of the smooth form is rounded over 1e-4 v_eps.
     form = "event" (one state, the mode) has no band: sliding ends where v passes through zero,
-    rest where |F_e| reaches mu_s N. It needs a scene with events.
+    rest where |F_e| reaches mu_s N. It needs a scene with events. In the band of the original
+    friction may drive: F v >= -mu_s N eta.
     Limits: the level falls from mu_s N to zero, with no dynamic level. The smooth form creeps under
     load and is 6 % short of the original at 10 v_eps, since atan is slow.
     Source: Leine et al., Nonlinear Dynam. 16, 1998 (not read); smooth form and slip law as in the
@@ -229,7 +234,8 @@ class LeineSwitch(Sticking):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C∞ (original: jump at |v| = eta)",
-        confidence="one source; memory for the switching",
+        confidence="one source",
+        checked="rleine's stickslipsmooth.m (slip law, smooth form); switching unverified",
         source="Leine et al. 1998; the author's public code",
     )
 
@@ -312,7 +318,8 @@ class Wojewoda(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "L"),
         smoothness="C∞",
-        confidence="reconstruction",
+        confidence="rebuilt",
+        checked="of the paper only the abstract was read",
         source="after Wojewoda, Stefanski, Wiercigroch, Kapitaniak 2008",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)

@@ -26,6 +26,7 @@ class BrownMcPhee(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="two sources",
+        checked="public MATLAB function Friction_B and the code of a railway simulator",
         source="Brown and McPhee, J. Comput. Nonlinear Dynam. 11(5), 2016",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)

@@ -53,6 +53,7 @@ class Coulomb(StaticLaw):
         phenomena=("D",),
         smoothness="C∞ (shape saturation C0 at |v| = v_eps, quadratic C1 at 0 and |v| = v_eps)",
         confidence="two sources",
+        checked="projectchrono/chrono ChContactSMC (tanh); rleine's stickslipsmooth.m (arctangent)",
         source="Amontons 1699, Coulomb 1785; regularised by tanh",
     )
 
@@ -92,7 +93,7 @@ class Viscous(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("V",),
         smoothness="C∞",
-        confidence="two sources",
+        confidence="textbook",
         source="textbook",
         load="independent",
     )
@@ -128,7 +129,7 @@ class PowerLawViscous(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("V",),
         smoothness="C∞",
-        confidence="two sources",
+        confidence="textbook",
         source="textbook",
         load="independent",
     )

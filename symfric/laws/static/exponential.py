@@ -25,7 +25,8 @@ class Tustin(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
-        confidence="memory",
+        confidence="one source",
+        checked="MassWithStopAndFriction of the Modelica Standard Library; not the name",
         source="Tustin 1947, as cited in control literature",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -73,6 +74,7 @@ class Benson(StaticLaw):
         phenomena=("D", "S", "St"),
         smoothness="C∞",
         confidence="two sources",
+        checked="documentation of LS-DYNA and of COMSOL",
         source="Benson and Hallquist 1990, as in LS-DYNA and COMSOL",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -119,7 +121,8 @@ class Berger(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C∞",
-        confidence="reconstruction (interpretation of a review)",
+        confidence="rebuilt",
+        checked="an interpretation of a review that proposes no law",
         source="after Berger 2002",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -165,7 +168,8 @@ class DuanSingh(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S"),
         smoothness="C∞",
-        confidence="memory",
+        confidence="unverified",
+        checked="the expression is that of Andersson with p = 1",
         source="Duan and Singh 2006",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -210,6 +214,7 @@ class Andersson(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="one source",
+        checked="public MATLAB function Friction_A",
         source="Andersson, Soderberg, Bjorklund 2007, as in public code",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -262,6 +267,7 @@ class SteadyStateLuGre(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="two sources",
+        checked="the thesis, equation 4.1; auralius/LuGre lugre.m (delta = 2)",
         source="A Friction Model for Laminator Nips, MSc thesis, Lund 2015; LuGre",
         load="independent",
     )

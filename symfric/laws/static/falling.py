@@ -25,7 +25,8 @@ class Lorentzian(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
-        confidence="memory",
+        confidence="one source",
+        checked="g(v) of jchristopherson/friction README with alpha = 2; not the name",
         source="Hess and Soom 1990",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -74,7 +75,7 @@ class PoppStelter(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
-        confidence="memory",
+        confidence="unverified",
         source="Popp and Stelter 1990",
     )
 

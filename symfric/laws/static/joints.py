@@ -20,7 +20,9 @@ class Bittencourt(StaticLaw):
 
     N is the magnitude of the load torque [N m], v in rad/s, F in N m. sign(v) is smooth over v_eps,
     |v| over 1e-4 v_eps, the maximum over F_eps. Temperature is a parameter, so that it may be a
-    symbol. All defaults are invented.
+    symbol. The defaults of levels, velocities and viscous coefficients are those of the paper's
+    table of an industrial robot as it is remembered, unverified; its torques are normalised, and
+    it was identified from about 30 degC on. v_s(T) is above zero from 25 degC on only.
     Limits: at fixed N and T a `Stribeck` law with two falls; not valid outside the temperatures of
     its identification. Creeps under load.
     Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134(5), 2012 (abstract only).
@@ -29,7 +31,8 @@ class Bittencourt(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
-        confidence="memory",
+        confidence="unverified",
+        checked="formula and defaults",
         source="Bittencourt and Gunnarsson 2012",
         load="affine",
     )
@@ -38,33 +41,37 @@ class Bittencourt(StaticLaw):
         30.0, unit="degC", role="temperature", doc="temperature", lower=-60.0, upper=200.0
     )
     F_c0: Scalar = param(
-        0.03, unit="N m", role="level", doc="dynamic level without load", lower=0.0
+        0.031, unit="N m", role="level", doc="dynamic level without load", lower=0.0
     )
-    F_cl: Scalar = param(0.02, unit="1", role="level", doc="dynamic level by load", lower=0.0)
-    F_sl: Scalar = param(0.1, unit="1", role="level", doc="static excess by load", lower=0.0)
-    F_s0: Scalar = param(0.0, unit="N m", role="level", doc="static excess at 0 degC")
-    F_sT: Scalar = param(1e-3, unit="N m/K", role="level", doc="static excess by temperature")
+    F_cl: Scalar = param(0.023, unit="1", role="level", doc="dynamic level by load", lower=0.0)
+    F_sl: Scalar = param(0.126, unit="1", role="level", doc="static excess by load", lower=0.0)
+    F_s0: Scalar = param(-0.025, unit="N m", role="level", doc="static excess at 0 degC")
+    F_sT: Scalar = param(1.6e-3, unit="N m/K", role="level", doc="static excess by temperature")
     v_sl: Scalar = param(
-        10.0,
+        9.2,
         unit="rad/s",
         role="velocity scale",
         doc="Stribeck velocity of the load part",
         lower=1e-12,
     )
     v_s0: Scalar = param(
-        5.0, unit="rad/s", role="velocity scale", doc="Stribeck velocity at 0 degC"
+        -25.0, unit="rad/s", role="velocity scale", doc="Stribeck velocity at 0 degC"
     )
     v_sT: Scalar = param(
-        0.5, unit="rad/(s K)", role="velocity scale", doc="Stribeck velocity by temperature"
+        1.0, unit="rad/(s K)", role="velocity scale", doc="Stribeck velocity by temperature"
     )
     F_v0: Scalar = param(
-        1e-3, unit="N m s/rad", role="viscous", doc="viscous coefficient, hot", lower=0.0
+        1.3e-3, unit="N m s/rad", role="viscous", doc="viscous coefficient, hot", lower=0.0
     )
     F_vT: Scalar = param(
-        2e-3, unit="N m s/rad", role="viscous", doc="viscous coefficient, rise to 0 degC", lower=0.0
+        1.3e-3,
+        unit="N m s/rad",
+        role="viscous",
+        doc="viscous coefficient, rise to 0 degC",
+        lower=0.0,
     )
     T_v: Scalar = param(
-        20.0, unit="K", role="temperature", doc="temperature scale of the viscous part", lower=1e-12
+        20.7, unit="K", role="temperature", doc="temperature scale of the viscous part", lower=1e-12
     )
     delta: Scalar = param(
         1.3, unit="1", role="shape", doc="Stribeck exponent", lower=0.1, upper=10.0
@@ -134,6 +141,7 @@ class BAM(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="one source",
+        checked="Rhoban/bam",
         source="Duclusaud et al. 2025, public code",
         load="independent",
     )
@@ -245,7 +253,7 @@ class Capstan(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D",),
         smoothness="C∞",
-        confidence="memory (textbook)",
+        confidence="textbook",
         source="Euler 1769, Eytelwein 1808",
         odd=False,
     )

@@ -28,7 +28,8 @@ class BengisuAkay(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C1 at 0 and |v| = v_0 (original: C0 at |v| = v_0)",
-        confidence="memory",
+        confidence="unverified",
+        checked="parabola and fall join at the static level",
         source="Bengisu and Akay 1994",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -81,6 +82,7 @@ class VelocityBased(StaticLaw):
         phenomena=("D", "S"),
         smoothness="C2 at |v| = v_s and v_d (original: C1)",
         confidence="two sources",
+        checked="two pages of the documentation of MSC ADAMS",
         source="documentation of MSC ADAMS",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -148,6 +150,7 @@ class Ambrosio(StaticLaw):
         phenomena=("D",),
         smoothness="C2 at |v| = v_0 and v_1 (original: C0)",
         confidence="one source",
+        checked="public Python code of a multibody simulation",
         source="Ambrosio 2003, as in public multibody code",
     )
     strictly_ordered: ClassVar[tuple[tuple[str, str], ...]] = (("v_0", "v_1"),)
@@ -206,6 +209,7 @@ class Hollars(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C2 at |v| = v_t (1 -+ u_eps) (u_eps = 0: C0 at v_t)",
         confidence="one source",
+        checked="simbody/simbody HuntCrossleyForce.h",
         source="Simbody, HuntCrossleyForce",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -261,6 +265,7 @@ class Exudyn(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C2 at |v| = v_reg (1 -+ u_eps) (u_eps = 0: C0 at v_reg)",
         confidence="one source",
+        checked="jgerstmayr/EXUDYN, source of its regularised friction",
         source="Exudyn, public source",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -318,7 +323,8 @@ class Step5(StaticLaw):
         F = N {mu_s S(u) - (mu_s - mu_d) S((u - 1)/2) + mu_v |v|} sign(v)
 
     Limits: F(v_t) = mu_s N, F(3 v_t) = mu_d N exactly (without mu_v). The slope at rest is zero:
-    nothing resists slow creep and the linearisation at rest is singular.
+    nothing resists slow creep and the linearisation at rest is singular. The viscous coefficient of
+    Simbody is mu_v v_t.
     Source: Simbody, public source.
     """
 
@@ -326,7 +332,8 @@ class Step5(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C2 at |v| = v_t and 3 v_t",
         confidence="one source",
-        source="Simbody, HuntCrossleyForce",
+        checked="simbody/simbody CompliantContactSubsystem.cpp, function stribeck",
+        source="Simbody, CompliantContactSubsystem",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
 

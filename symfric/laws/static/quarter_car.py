@@ -39,7 +39,8 @@ class QuarterCarGeneral(StaticLaw):
     at rest is not limited, and exp(|v|/e_1) needs e_1 < 0: here e_1 is its magnitude.
     C_e, e_1, mu, sigma_v and L_d are not given in the paper; their defaults are invented, sigma_v
     so that friction lessens the overshoot of the body, as the paper says.
-    Limits: holds |f_sd| <= F_brk - F_eps at rest; mu = 0 leaves the simple law beyond v_eps;
+    Limits: holds |f_sd| <= F_brk - F_eps at rest; within v_eps friction may drive, F v >= -0.274
+    F_brk v_eps (as printed at any speed); mu = 0 leaves the simple law beyond v_eps;
     x_rel < L_d / (2 sin(theta)).
     Source: Al-Zughaibi, quarter-car friction, equations 7-12 and 24, corrected as said.
     """
@@ -48,6 +49,7 @@ class QuarterCarGeneral(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C2 at 0, |v| = v_eps, |f_sd| = F_brk -+ F_eps (as printed: jump at 0)",
         confidence="one source",
+        checked="the paper, corrected as said",
         source="Al-Zughaibi, quarter-car friction, corrected",
         odd=False,
         load="independent",
@@ -160,6 +162,7 @@ class QuarterCarSimple(StaticLaw):
         phenomena=("S", "St", "V"),
         smoothness="C∞",
         confidence="one source",
+        checked="the paper, corrected as said",
         source="Al-Zughaibi, quarter-car friction, corrected",
         load="independent",
     )

@@ -29,7 +29,7 @@ class RuiWang(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C∞",
-        confidence="reconstruction",
+        confidence="rebuilt",
         source="after Wang and Rui 2000 (equation lost)",
         load="independent",
     )

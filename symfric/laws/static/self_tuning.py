@@ -33,7 +33,7 @@ class SelfTuning(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C∞",
-        confidence="reconstruction",
+        confidence="rebuilt",
         source="after doi 10.1177/14644193231169325 (equations reconstructed)",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -114,7 +114,7 @@ class BrittleSelfTuning(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St"),
         smoothness="C∞",
-        confidence="reconstruction",
+        confidence="rebuilt",
         source="after doi 10.1177/14644193231169325 (equations reconstructed)",
         load="more than proportional below the peak, since B grows",
     )

@@ -27,6 +27,7 @@ class SimscapeBreakaway(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="two sources",
+        checked="documentation of Simscape, four pages",
         source="documentation of Simscape",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -74,7 +75,8 @@ class Specker(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
-        confidence="memory (viscous correction uncertain)",
+        confidence="unverified",
+        checked="v_t = v_sp/10 is SimscapeBreakaway; the part of sigma_2 is uncertain",
         source="Specker, Buchholz, Dietmayer 2014",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)
@@ -129,6 +131,7 @@ class MakkarDixon(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="one source",
+        checked="public code, in which a parenthesis is misplaced",
         source="Makkar, Dixon, Sawyer, Hu 2005, as in public code",
         load="independent",
     )

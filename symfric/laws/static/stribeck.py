@@ -29,6 +29,7 @@ class Stribeck(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C∞",
         confidence="two sources",
+        checked="jchristopherson/friction (delta = 2); the Lund thesis on laminator nips (delta)",
         source="Stribeck 1902; Bo and Pavelescu 1982 (exponent)",
     )
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_d", "mu_s"),)

@@ -34,6 +34,7 @@ class Table(StaticLaw):
         phenomena=("D", "S", "St", "V"),
         smoothness="C1 at the speeds of the table",
         confidence="two sources",
+        checked="Fritsch and Butland 1984, as in SciPy",
         source="Fritsch and Carlson 1980; Fritsch and Butland 1984",
     )
 

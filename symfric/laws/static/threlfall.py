@@ -37,6 +37,7 @@ class Threlfall(StaticLaw):
         phenomena=("D",),
         smoothness="C∞ (original: jump at |v| = v_r, C1 at 0)",
         confidence="one source",
+        checked="public Python code of a multibody simulation",
         source="Threlfall 1978, as in public multibody code",
     )
 
@@ -92,7 +93,8 @@ class ModifiedThrelfall(StaticLaw):
     facts: ClassVar[Facts] = Facts(
         phenomena=("D",),
         smoothness="C∞ (original: C0 at |v| = v_r, C1 at 0)",
-        confidence="memory (coefficient interpreted)",
+        confidence="unverified",
+        checked="the coefficient is an interpretation",
         source="Marques et al. 2016",
     )
 

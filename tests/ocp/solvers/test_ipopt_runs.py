@@ -1,6 +1,7 @@
 import os
 import signal
 import threading
+from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
@@ -14,6 +15,7 @@ from ocp.solving.one_solve import solve_once
 from ocp.text.cost import integral
 from ocp.text.phase import Phase
 from ocp.text.problem import Problem
+from ocp.text.signals import Signals
 from symfric import Model, Status, Variable
 
 HARD = fastest_move()
@@ -170,11 +172,15 @@ def test_more_equations_than_unknowns_are_told() -> None:
     assert "There are more equations than unknowns" in partial.message
 
 
-def test_a_cost_that_falls_without_end_is_told() -> None:
-    downhill = unit_move(cost=integral(lambda s: -s.x), end={})
-    partial = solve_once(downhill, 5)
+@pytest.mark.parametrize(("cost", "more"), [(lambda s: -s.x, {"end": {}}), (lambda s: 1 / s.x, {})])
+def test_unknowns_that_grow_without_end_are_told(
+    cost: Callable[[Signals], ca.SX], more: dict[str, dict[str, float]]
+) -> None:
+    """The first cost has no bound, the second falls to zero far away."""
+    partial = solve_once(unit_move(cost=integral(cost), **more), 50)
     assert partial.status is Status.UNBOUNDED
-    assert "The cost falls without bound" in partial.message
+    assert "The unknowns grow without bound" in partial.message
+    assert "cost falls without bound" not in partial.message
     assert partial.iterations < 100
 
 

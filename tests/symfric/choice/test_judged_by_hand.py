@@ -1,5 +1,6 @@
 """Rungs, standings, order and verdict of rows that are written down, not measured."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import nan
 
@@ -12,7 +13,7 @@ from symfric.choice.measured import _by_data  # pyright: ignore[reportPrivateUsa
 from symfric.choice.nature import otherwise
 from symfric.choice.needs import needed
 from symfric.choice.row import INACCURATE, RANKED, REFUSED, Row, ordered
-from symfric.choice.softness import Ladder, Rung, ladder, softness
+from symfric.choice.softness import MOST, NARROW, Ladder, Rung, ladder, softness
 from symfric.choice.text import number, short
 from symfric.choice.verdict import verdict
 from symfric.foundation.parameters import parameters
@@ -35,7 +36,7 @@ ROW = Row(
 def test_two_runs_in_a_row_must_keep_the_error() -> None:
     """One that keeps it by chance, as where errors change their sign, is not enough."""
     errors = {1.0: 0.1, 0.25: 1e-4, 0.0625: 0.05, 0.0625 / 4: 1e-3, 0.0625 / 16: 1e-4}
-    found = ladder(lambda s: Rung(s, errors[s], 1), 2e-3, 2e-3, True, (ValueError,))
+    found = ladder(lambda s: Rung(s, errors[s], 1), 2e-3, 2e-3, 1.0, (ValueError,))
     assert [rung.s for rung in found.rungs] == [*errors]
     assert found.softest(2e-3) is not None
     assert found.rungs[-2].s <= (found.softest(2e-3) or 0.0) < 0.0625
@@ -48,18 +49,54 @@ def test_between_two_rungs_the_error_is_a_power_of_the_softness() -> None:
     assert rungs.softest(9.0) == 1.0
 
 
-def test_errors_that_stay_the_same_are_followed_once_by_a_leap() -> None:
+def test_errors_that_stay_the_same_are_followed_by_leaps() -> None:
     """A law whose widths are far above the speeds of a machine looks settled, and is not."""
-    found = ladder(lambda s: Rung(s, min(0.4, 1e3 * s), 1), 1e-3, 1e-3, True, (ValueError,))
+    found = ladder(lambda s: Rung(s, min(0.4, 1e3 * s), 1), 1e-3, 1e-3, 1.0, (ValueError,))
     assert found.stopped == ""
     assert found.rungs[4].s == found.rungs[3].s / 4**4
-    other = ladder(lambda s: Rung(s, 0.4, 1), 1e-3, 1e-3, True, (ValueError,))
-    assert (len(other.rungs), other.stopped) == (5, "it tends to another motion")
+    later = ladder(lambda s: Rung(s, min(0.4, 1e9 * s), 1), 1e-3, 1e-3, 1.0, (ValueError,))
+    assert later.stopped == ""
+
+
+def near(limit: float, order: float, wide: float = 0.0) -> Callable[[float], Rung]:
+    """Runs of a law that is |limit + s^order| off, and keeps to `limit` + 1 while s > wide."""
+
+    def run(s: float) -> Rung:
+        off = limit + 0.1 * s**order + (0.3 if s > wide > 0 else 0.0)
+        return Rung(s, off, 1, motion=np.array([[1 + off]]))
+
+    return run
+
+
+def test_another_motion_is_said_of_a_limit_with_its_order_alone() -> None:
+    """Of runs that converge, narrower than the speeds of a machine, to what is off."""
+    for order in (0.5, 1.0, 2.0):
+        found = ladder(near(0.2, order), 1e-3, 1e-3, 1.0, (ValueError,))
+        assert found.stopped == f"it tends to another motion, with order {order:g}"
+    bristles = ladder(near(0.2, 0.5), 1e-3, 1e-3, 0.5, (ValueError,))
+    assert found.rungs[-1].s < NARROW
+    assert bristles.rungs[-1].s < NARROW**2
+    still = ladder(lambda s: Rung(s, 0.4, 1), 1e-3, 1e-3, 1.0, (ValueError,))
+    assert still.stopped.startswith("its error still changes")
+    assert (still.decided, found.decided) == (False, True)
+    first = ladder(near(0.0, 1.0, wide=1e-4), 1e-3, 1e-3, 1.0, (ValueError,))
+    assert (first.stopped, first.softest(1e-3) is not None) == ("", True)
+
+
+def test_a_law_of_which_nothing_is_scaled_is_run_once() -> None:
+    found = ladder(near(0.2, 1.0), 1e-3, 1e-3, 0.0, (ValueError,))
+    assert (len(found.rungs), found.stopped) == (1, "nothing of it is scaled")
+
+
+def test_every_width_of_a_bristle_is_scaled() -> None:
+    """Else it creeps below v_eps as sigma_0 grows, and relaxes no more."""
+    law = softness(LuGre(v_eps=1e-15), Friction(0.2, 0.1), 10.0).at(1e-6)
+    assert parameters(law)["v_eps"].value == pytest.approx(1e-21)
 
 
 def test_errors_that_follow_a_power_are_followed_in_strides() -> None:
     """0.5 s^(1/2) is 1e-3 at s = 4e-6: seven runs, where four times each would take eleven."""
-    found = ladder(lambda s: Rung(s, 0.5 * s**0.5, 1), 1e-3, 1e-3, True, (ValueError,))
+    found = ladder(lambda s: Rung(s, 0.5 * s**0.5, 1), 1e-3, 1e-3, 1.0, (ValueError,))
     assert len(found.rungs) == 7
     assert [rung.s for rung in found.rungs[:4]] == pytest.approx([1, 1 / 4, 1 / 16, 1 / 1024])
     assert found.softest(1e-3) == pytest.approx(4e-6)
@@ -71,14 +108,15 @@ def test_where_a_drier_run_fails_shorter_steps_are_tried() -> None:
             raise ValueError("too dry")
         return Rung(s, s, 1)
 
-    found = ladder(run, 1e-3, 1e-3, True, (ValueError,))
+    found = ladder(run, 1e-3, 1e-3, 1.0, (ValueError,))
     assert [rung.s for rung in found.rungs] == [1.0, 0.25, 0.125]
     assert found.stopped == "too dry"
 
 
 def test_an_error_that_falls_too_slowly_is_not_followed_for_ever() -> None:
-    found = ladder(lambda s: Rung(s, 0.4 * s**0.01, 1), 1e-3, 1e-3, True, (ValueError,))
-    assert (len(found.rungs), found.stopped) == (17, "its error falls too slowly")
+    found = ladder(lambda s: Rung(s, 0.4 * s**0.01, 1), 1e-3, 1e-3, 1.0, (ValueError,))
+    assert len(found.rungs) == MOST + 1
+    assert found.stopped.startswith("its error still changes")
 
 
 def test_bristles_of_all_stiffnesses_are_damped_alike() -> None:

@@ -95,7 +95,7 @@ def test_a_fall_that_is_known_is_kept() -> None:
     )  # fmt: skip
     assert [row.law for row in found.ranked] == ["stribeck"]
     assert (found["stribeck"].values or {})["v_s"] == 0.05
-    assert "it tends to another motion; sliding at 0.1 m/s it" in found["tustin"].reason
+    assert "it tends to another motion, with order 1; sliding at 0.1 m/s" in found["tustin"].reason
     assert "rubs with 0.107 of the load, not 0.101" in found["tustin"].reason  # e^-2 and e^-4
 
 

@@ -39,6 +39,8 @@ def test_one_law_shows_equation_source_and_parameters(
     assert "F " in out
     assert "Limits:" in out
     assert "Source:" in out
+    said = " ".join(out.split())  # as wrapped
+    assert f"Formula: {EVERY[name].facts.formula}." in said
     table = out[out.index("parameter ") :].splitlines()
     for parameter in parameters(EVERY[name]()).values():
         row = next(line for line in table if line.startswith(f"{parameter.name} "))
@@ -106,8 +108,8 @@ def test_the_picture_is_a_png(arguments: list[str], tmp_path: Path) -> None:
 
 
 LISTED = {
-    "name", "states", "phenomena", "smoothness", "confidence", "source", "parameters",
-    "instructions",
+    "name", "states", "phenomena", "smoothness", "confidence", "checked", "source",
+    "parameters", "instructions",
 }  # fmt: skip
 
 

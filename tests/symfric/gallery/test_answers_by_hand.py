@@ -52,7 +52,7 @@ def test_machines_by_hand_have_the_accelerations_of_the_other_ones_by_hand(name:
 
 
 def test_fixed_steps_are_of_order_four() -> None:
-    machine = machines.slider_crank(lambda v: 0 * v)
+    machine = machines.slider_crank(lambda v, _: 0 * v)
     exact = solve(machine, np.array([0.0, 0.02]))["crank"][-1]
     coarse, fine = (abs(fixed_steps(machine, h, 0.02)["crank"][-1] - exact) for h in (4e-3, 2e-3))
     assert coarse / fine == pytest.approx(16, rel=0.1)

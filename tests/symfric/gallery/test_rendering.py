@@ -26,7 +26,7 @@ def test_a_docstring_falls_into_its_parts() -> None:
         with that.
         Distance: of both.
 
-        Evidence: none
+        Refuted: none
 
         but this.
         """
@@ -35,7 +35,7 @@ def test_a_docstring_falls_into_its_parts() -> None:
         "text": "Some text.",
         "Compared": "this with that.",
         "Distance": "of both.",
-        "Evidence": "none\n\nbut this.",
+        "Refuted": "none\n\nbut this.",
     }
 
 
@@ -62,7 +62,8 @@ def test_a_plate_refuses_numbers_that_are_not_finite() -> None:
     import symfric.gallery.self_tuning.fig_07_shape_factor as script  # noqa: PLC0415
 
     with pytest.raises(ValueError, match="expected finite numbers, got distance, period"):
-        plate_of(script.__name__, None, float("nan"), "m", {"period [s]": float("inf")}, {})  # type: ignore[arg-type]
+        numbers = {"period [s]": float("inf")}
+        plate_of(script.__name__, None, float("nan"), "m", numbers, {}, within=1.0, quick=True)  # type: ignore[arg-type]
 
 
 def test_a_plate_whose_text_is_untrue_is_not_drawn() -> None:
@@ -72,8 +73,8 @@ def test_a_plate_whose_text_is_untrue_is_not_drawn() -> None:
     with pytest.raises(
         ValueError, match=r"bear out its text, got others for 'it is flat'; correct"
     ):
-        plate_of(script.__name__, None, 0.1, "m", {}, claims)  # type: ignore[arg-type]
-    held = plate_of(script.__name__, None, 0.1, "m", {}, {"it is round": 1})  # type: ignore[arg-type]
+        plate_of(script.__name__, None, 0.1, "m", {}, claims, within=0.1, quick=True)  # type: ignore[arg-type]
+    held = plate_of(script.__name__, None, 0.1, "m", {}, {"it is round": 1}, within=0.1, quick=True)  # type: ignore[arg-type]
     assert held.checked == ("it is round",)
 
 
@@ -85,14 +86,16 @@ def test_a_plate_is_written_whole(tmp_path: Path) -> None:
     assert f'src="{NAME}.png"' in page
     assert record["how_far"] in page
     assert all(escape(claim) in page for claim in record["checked"])
-    assert "reduced size" in page
+    assert "checked at reduced size" in page
+    assert "the law is the reconstruction of <code>SelfTuning</code>" in page
+    assert "observation reproduced" not in page
 
 
 def test_a_plate_shows_itself_in_one_screen() -> None:
     plate = plates()[NAME](quick=True)
     told = repr(plate).splitlines()
     assert told[0] == "Figure 7: Influence of the shape factor C on the friction force"
-    assert "how far: 0 of 4 statements" in repr(plate)
+    assert "how far: 0 of 4 statements (at most 0" in repr(plate)
     assert len(told) <= 25
     assert max(map(len, told)) <= 100
     assert "<img" in plate._repr_html_()  # pyright: ignore[reportPrivateUsage]
@@ -137,13 +140,13 @@ def test_what_was_there_before_is_not_what_was_done_now(
     first, second, third = names
     folder = tmp_path / "laminator_nips"
     folder.mkdir()
-    record = {"paper": "P", "figure": "F", "title": "T", "text": "", "compared": "c", "measure": "",
-              "evidence": "", "how_far": "0", "numbers": {}, "quick": True, "seconds": 0.1,
-              "unit": "1", "distance": 0.0, "symfric": "0"}  # fmt: skip
+    texts = dict.fromkeys(("paper", "figure", "text", "compared", "measure", "note", "unit"), "")
+    kept = {"verdicts": {}, "within": 0.0, "checked": [], "how_far": "0", "numbers": {}}
+    record = texts | kept | {"quick": True, "seconds": 0.1, "distance": 0.0, "symfric": "0"}
 
     def put(name: str, title: str) -> None:
-        kept = record | {"name": name, "title": title, "picture": f"{name}.png"}
-        (tmp_path / f"{name}.json").write_text(json.dumps(kept), "utf-8")
+        said = record | {"name": name, "title": title, "picture": f"{name}.png"}
+        (tmp_path / f"{name}.json").write_text(json.dumps(said), "utf-8")
 
     for name in names:
         put(name, "before")

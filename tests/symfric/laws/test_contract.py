@@ -24,6 +24,7 @@ from law_cases import (
     symbolic,
 )
 
+from docs.machine.law_pages import MADE_OF_LAWS
 from symfric import (
     ALL_LAWS,
     BrownMcPhee,
@@ -49,6 +50,7 @@ from symfric.laws import (
     Table,
     TemperatureDependent,
 )
+from symfric.laws.base.law import CONFIDENCE
 from symfric.scenes import ALL_SCENES, Robot
 
 magnitudes = st.floats(-12.0, 3.0).map(lambda e: 10.0**e)
@@ -276,8 +278,25 @@ def test_facts_are_complete(kind: type[Law]) -> None:
     assert facts.phenomena
     assert set(facts.phenomena) <= set(PHENOMENA)
     assert facts.smoothness
-    assert facts.confidence
     assert facts.source
+
+
+WITH_FACTS = [k for k in (ALL_LAWS | POPULATIONS | MADE_OF_LAWS).values() if hasattr(k, "facts")]
+
+
+@pytest.mark.parametrize("kind", WITH_FACTS)
+def test_a_law_says_what_its_formula_was_compared_with(kind: type[Law]) -> None:
+    facts = kind.facts
+    assert facts.confidence in CONFIDENCE
+    assert CONFIDENCE[facts.confidence] in facts.formula
+    assert facts.checked in facts.formula
+    if facts.confidence.endswith(("source", "sources")):
+        assert facts.checked
+        assert ("sources" not in facts.confidence) or re.search(
+            "; | and |two |four ", facts.checked
+        )
+    if facts.confidence == "unverified":
+        assert "written from memory" in facts.formula
 
 
 @each_law

@@ -144,11 +144,6 @@ def peak(v: float, fall: float, eps: float = 1e-4) -> float:
     return 0.3 * exp(-fall) * tanh(v / eps)
 
 
-def rounded(v: float) -> float:
-    """|v| with a rounded tip, in units of 1 mm/s."""
-    return sqrt((v / 1e-3) ** 2 + 1e-2) - 0.1
-
-
 def bengisu_akay(v: float) -> float:
     u = min(abs(v) / 1e-3, 1.0)
     beyond = max(abs(v) / 1e-3 - 1.0, 0.0)
@@ -157,8 +152,8 @@ def bengisu_akay(v: float) -> float:
 
 PLAIN = {
     "stribeck": lambda v: peak(v, (v / 1e-3) ** 2),
-    "tustin": lambda v: peak(v, rounded(v)),
-    "benson": lambda v: peak(v, rounded(v)),
+    "tustin": lambda v: peak(v, abs(v) / 1e-3),
+    "benson": lambda v: peak(v, abs(v) / 1e-3),
     "andersson": lambda v: peak(v, (v / 1e-3) ** 2),
     "simscape_breakaway": lambda v: 0.3 * sqrt(e) * (v / 1e-3) * exp(-((v / 1e-3) ** 2) / 2),
     "bengisu_akay": bengisu_akay,

@@ -14,23 +14,23 @@ from symfric.laws import BAM, Bittencourt, Capstan
 @given(v=st.floats(-100.0, 100.0), N=st.floats(0.0, 5.0))
 def test_bittencourt_at_one_temperature_is_two_stribeck_curves(v: float, N: float) -> None:
     law = Bittencourt(T=40.0, F_eps=0.0)
-    loaded = Stribeck(mu_s=0.12, mu_d=0.02, v_s=10.0, delta=1.3, v_eps=0.1)
-    free = Stribeck(mu_s=0.07, mu_d=0.03, v_s=25.0, delta=1.3, v_eps=0.1)
-    viscous = (1e-3 + 2e-3 * exp(-2.0)) * v
+    loaded = Stribeck(mu_s=0.149, mu_d=0.023, v_s=9.2, delta=1.3, v_eps=0.1)
+    free = Stribeck(mu_s=0.07, mu_d=0.031, v_s=15.0, delta=1.3, v_eps=0.1)
+    viscous = (1.3e-3 + 1.3e-3 * exp(-40 / 20.7)) * v
     expected = loaded.force(v, N) + free.force(v, 1.0) + viscous
     assert law.force(v, N) == pytest.approx(expected, rel=1e-13, abs=1e-300)
 
 
 def test_static_excess_never_turns_negative_in_the_cold() -> None:
-    cold = Bittencourt(T=-5.0, v_s0=10.0, F_eps=0.0)
-    assert cold.force(0.1, 0.0) == with_values(cold, {"F_sT": 0.0}).force(0.1, 0.0)
-    smooth = Bittencourt(T=-5.0, v_s0=10.0)
+    cold = Bittencourt(T=5.0, v_s0=10.0, F_eps=0.0)
+    assert cold.force(0.1, 0.0) == with_values(cold, {"F_s0": 0.0, "F_sT": 0.0}).force(0.1, 0.0)
+    smooth = Bittencourt(T=5.0, v_s0=10.0)
     assert smooth.force(0.1, 0.0) >= cold.force(0.1, 0.0)
 
 
 def test_temperature_at_which_the_stribeck_velocity_vanishes_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"v_s0 \+ v_sT T > 0, got -5 rad/s at T = -20"):
-        Bittencourt(T=-20.0)
+    with pytest.raises(ValueError, match=r"v_s0 \+ v_sT T > 0, got -5 rad/s at T = 20"):
+        Bittencourt(T=20.0)
 
 
 def test_temperature_may_be_a_symbol() -> None:

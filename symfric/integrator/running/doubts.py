@@ -1,0 +1,209 @@
+"""Doubts about a run that ended well: friction above its level, and friction that gains energy.
+
+Energy: see `symfric.integrator.running.gains`.
+
+Overload: the states of a law carry more than they may in any motion, mostly its static level.
+
+    |F(0, N, z)| > (1 + MARGIN) most_held(N)
+
+A bristle that creeps below its smoothing velocity, or below the rounding of the velocities that the
+slip is a difference of, does not relax but stretches on. Where the load is a number a look at how
+far the states went over all accepted steps costs nothing; where it varies a state may be beyond the
+level because the load fell, and only what still grows there is overload.
+Limits: laws that take the applied force, and those that give no static level, are not looked at.
+Long runs whose steps are not kept are looked at at the times of the result where the load varies,
+ensembles only where it is a number.
+"""
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import inf
+from typing import Any, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.status import EnergyWarning, OverloadWarning
+from symfric.foundation.symbols import strays, symbols_of
+from symfric.integrator.compiled.columns import Columns
+from symfric.integrator.equations.inputs import InputData
+from symfric.integrator.running.gains import closed, gains
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.record import Run
+from symfric.model import Model
+from symfric.model.contact import APPLIED, Contact
+
+Array = NDArray[np.float64]
+MARGIN = 0.05
+"""Share of its level that errors of the integrator may add to friction."""
+WIDE = 0.25
+"""The same where the load varies: laws that do not follow it at once pass their level by some."""
+LOOKS = 200
+"""Peaks of a run at which a load that varies is looked at."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Held:
+    """What the states of a law carry in one contact, and the most that rest holds there.
+
+    Attributes:
+        contact: where.
+        rows: places of its states among those of the model.
+        force: of the states at no slip [N].
+        level: the most that they may, at either side [N].
+        fixed: the load is no function of the motion.
+        screen: (z, p) -> both and the slope of the force; empty where the load varies.
+        columns: integrator -> (force, level, force times its rate) at many times.
+    """
+
+    contact: Contact
+    rows: list[int]
+    force: ca.SX
+    level: ca.SX
+    fixed: bool
+    screen: ca.Function
+    _columns: dict[Integrator, Columns] = field(default_factory=dict[Integrator, Columns])
+    _limits: dict[bytes, tuple[float, Array]] = field(default_factory=dict[bytes, Any])
+
+    @cached_property
+    def growth(self) -> ca.SX:
+        """The force times its rate: positive where it grows."""
+        z = symbols_of(self.contact.states)
+        return self.force * ca.jtimes(self.force, z, self.contact.rate)
+
+    def ratios(self, z: Array, p: Array) -> Array:
+        """Force over level of runs whose states `z` went so far, both (n, runs)."""
+        force, level, _ = (rows.full() for rows in self.screen(z, p))
+        return np.abs(force[0]) / np.where(level[0] > 0, level[0], np.inf)
+
+    def bound(self, run: Run, p: Array) -> float:
+        """Force over level in a run at most, by how far each state went."""
+        key = p.tobytes()
+        if key not in self._limits:
+            _, level, slope = self.screen(0.0, p)
+            self._limits[key] = float(level) or inf, np.abs(slope.full()[0])
+        level, slope = self._limits[key]
+        tops = np.array([run.farthest(i) for i in self.rows])
+        if self.linear:
+            return float(slope @ tops) / level
+        return max(float(self.ratios(side * tops[:, None], p)[0]) for side in (1.0, -1.0))
+
+    @cached_property
+    def linear(self) -> bool:
+        """Whether the force is a sum of the states."""
+        return bool(ca.is_linear(self.force, symbols_of(self.contact.states)))
+
+    def over_time(
+        self, integrator: Integrator, inputs: InputData, t: Array, y: Array, p: Array
+    ) -> tuple[Array, Array, Array]:
+        """Force, level and growth at the times `t` with the unknowns `y`, (times, n)."""
+        if integrator not in self._columns:
+            rows = ca.vertcat(self.force, self.level, self.growth)
+            self._columns[integrator] = Columns(integrator.of_time("held", rows))
+        d = np.hstack([np.tile(p, (t.size, 1)), inputs.values[:, inputs.interval(t)].T])
+        (values,) = self._columns[integrator]([t, y, d], backend="vm")
+        return values[:, 0], values[:, 1], values[:, 2]
+
+
+def doubts(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> list[UserWarning]:
+    """Return warnings about a run that ended well; none where nothing is known against it."""
+    if not run.status.ok:
+        return []
+    found: list[UserWarning] = [
+        OverloadWarning(said) for said in _overloads(integrator, inputs, run, p)
+    ]
+    return found + [EnergyWarning(said) for said in gains(integrator, inputs, run, p)]
+
+
+def _overloads(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> Iterator[str]:
+    for held in places(integrator.model):
+        most = held.bound(run, p) if held.fixed else 0.0
+        if held.fixed and most <= 1 + MARGIN:
+            continue
+        t, y = run.seen
+        if not held.fixed:
+            k = _peaks(y[:, held.rows])
+            t, y = t[k], y[k]
+        force, level, growth = held.over_time(integrator, inputs, t, y, p)
+        ratio = np.abs(force) / np.where(level > 0, level, np.inf)
+        start = max(1.0, ratio[0])  # it may have been given more than its level
+        allowed = (1 + (MARGIN if held.fixed else WIDE)) * start
+        ratio = ratio if held.fixed else np.where(growth > 0, ratio, 0.0)
+        k = int(ratio.argmax())
+        if ratio[k] > allowed:
+            yield overload(held, ratio[k], f" at t = {t[k]:.6g} s")
+        elif most > allowed and not run.complete:  # between the times of the result
+            yield overload(held, most)
+
+
+def overload(held: Held, ratio: float, when: str = "") -> str:
+    """The sentence about friction of so many times its level."""
+    law = type(held.contact.law).__name__
+    return (
+        f"In contact '{held.contact.name}' {law} carries {ratio:.3g} times its static level{when}: "
+        "its states do not relax, so this friction is not that of the law; give a smaller v_eps, "
+        "or a softer bristle, which creeps faster than v_eps and than velocities are rounded."
+    )
+
+
+def places(model: Model) -> tuple[Held, ...]:
+    """The contacts of a model whose law holds by its states."""
+    if "held" not in model.memory:
+        model.memory["held"] = tuple(h for c in model.contacts if (h := _held(model, c)))
+    return model.memory["held"]
+
+
+def _held(model: Model, contact: Contact) -> Held | None:
+    """What its states carry; None where that, or the level, is not known."""
+    if not contact.states or APPLIED in contact.given:
+        return None
+    z = symbols_of(contact.states)
+    try:
+        force = ca.SX(contact.law.force(0.0, contact.N, z, **contact.given))
+        level = contact.most_held
+    except (ValueError, TypeError, NotImplementedError):
+        return None
+    force, level = ca.vertsplit(both := closed(model, ca.vertcat(force, level)))
+    p = model.vector("p")
+    known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
+    if strays(both, known) or not ca.depends_on(force, z):
+        return None
+    fixed, screen = not strays(both, ca.vertcat(z, p)), ca.Function()
+    if fixed:
+        screen = ca.Function("held", [z, p], [force, level, ca.jacobian(force, z)])
+    own = [v.name for v in contact.states]
+    rows = [i for i, v in enumerate(model.x) if v.name in own]
+    return Held(contact, rows, force, level, fixed, screen)
+
+
+def _peaks(z: Array) -> NDArray[np.intp]:
+    """Where a state is farthest from zero, and just before; `LOOKS` of them at most."""
+    size = np.abs(z)
+    inner = (size[1:-1] >= size[:-2]) & (size[1:-1] >= size[2:])
+    k = np.flatnonzero(inner.any(axis=1)) + 1
+    found = np.unique(np.concatenate([k - 1, k, [0, size.shape[0] - 1]]))
+    return found[:: 1 + found.size // LOOKS]
+
+
+def of_members(
+    model: Model, reach: Mapping[str, Array], p: Array, given: Collection[str]
+) -> dict[int, str]:
+    """Member -> sentence, for runs that went so far.
+
+    Args:
+        reach: state -> least and greatest value, (2, members); NaN of those that did not start.
+        p: parameters, (members, np).
+        given: states with start values of the user, which may be anywhere.
+    """
+    found: dict[int, str] = {}
+    for held in places(model):
+        own = [v.name for v in held.contact.states]
+        if not held.fixed or not set(own).isdisjoint(given):
+            continue
+        ends = [held.ratios(np.array([reach[name][k] for name in own]), p.T) for k in (0, 1)]
+        ratio = np.fmax(*ends)
+        found |= {int(m): overload(held, ratio[m]) for m in np.flatnonzero(ratio > 1 + MARGIN)}
+    return found

@@ -1,0 +1,122 @@
+"""What a choice says holds away from the defaults: random machines, parameters over decades.
+
+Judged by runs of exact dry friction and of the ranked law itself at a hundredth of its tolerance,
+which `select` has no part in.
+"""
+
+import warnings
+from collections.abc import Callable
+from functools import partial
+from math import pi, sqrt
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric import ExactCoulomb, Law, Model, Variable, contact, simulate, with_values
+from symfric.choice import Friction, select
+from symfric.laws import ALL_LAWS
+from symfric.scenes import PendulumBox, Rabinowicz
+
+LAWS = ("stribeck", "brown_mcphee", "lugre", "elasto_plastic")
+"""Laws that all tend to dry friction: to none of them may another motion be ascribed."""
+ACCURACY = 1e-3
+STILL = 1e-9
+"""A signal that moves by less, in nominal values, is at rest: the box may never slide."""
+Random = np.random.Generator
+Made = tuple[Callable[[Law], Model], float]
+
+
+def belt(random: Random, mu_s: float, mu_d: float) -> Made:
+    """A few cycles of stick and slip, with belts from slow to nearly too fast for them."""
+    m, omega = 10 ** random.uniform(-1, 2), 10 ** random.uniform(-0.5, 1.3)
+    k, jump = m * omega**2, (mu_s - mu_d) * 9.81
+    v_belt = jump / omega * 10 ** random.uniform(-1.5, 0.0)
+    cycle = 2 * jump * m / (k * v_belt) + 2 * pi / omega
+    t_end = mu_s * m * 9.81 / (k * v_belt) + random.uniform(1.0, 4.0) * cycle
+    return lambda law: Rabinowicz(law, m=m, k=k, v_belt=v_belt).model(), t_end
+
+
+def box(random: Random, mu_s: float, mu_d: float) -> Made:
+    """A pendulum that swings on a box, for a few periods."""
+    L, m = 10 ** random.uniform(-1, 0.5), 10 ** random.uniform(-1, 2)
+    given = {"L": L, "m": m, "m_box": m * random.uniform(0.3, 3), "phi_0": random.uniform(0.3, 1)}
+    t_end = random.uniform(0.5, 2.0) * 2 * pi * sqrt(L / 9.81)
+    return lambda law: PendulumBox(law, **given).model(), t_end
+
+
+def push(law: Law, m: float, N: float, F: float, omega: float) -> Model:
+    """A mass on a guide under a force that swings."""
+    x, v, t = Variable("x", "m"), Variable("v", "m/s"), ca.SX.sym("t")
+    applied = F * ca.sin(omega * t)
+    guide = contact("guide", law, v.symbol, N, rest={"v": 0.0}, F_e=applied)
+    ode = ca.vertcat(v.symbol, (applied - guide.force) / m)
+    return Model("push", x=(x, v), ode=ode, contacts=(guide,), t=t)
+
+
+def drive(random: Random, mu_s: float, mu_d: float) -> Made:
+    m, N, omega = (10 ** random.uniform(*span) for span in ((-1, 2), (-1, 3), (0, 1.5)))
+    F = mu_s * N * random.uniform(1.2, 4.0)
+    return partial(push, m=m, N=N, F=F, omega=omega), random.uniform(1.0, 3.0) * 2 * pi / omega
+
+
+def own(random: Random, mu_s: float, mu_d: float) -> Made:
+    """Two masses in a row, the second one on a guide, pulled over a spring."""
+    m, N, omega = (10 ** random.uniform(*span) for span in ((-1, 1), (0, 2), (0, 1)))
+    k = m * omega**2
+    pace = (mu_s - mu_d) * N / (m * omega) * 10 ** random.uniform(-1, -0.3)
+    t_end = 2.5 * mu_s * N / (k * pace)
+
+    def model(law: Law) -> Model:
+        names = (("a", "m"), ("va", "m/s"), ("b", "m"), ("vb", "m/s"))
+        a, va, b, vb = (Variable(n, unit, nominal=0.1) for n, unit in names)
+        t = ca.SX.sym("t")
+        link = 9 * k * (a.symbol - b.symbol) + 0.3 * m * omega * (va.symbol - vb.symbol)
+        guide = contact("guide", law, vb.symbol, N, rest={"vb": 0.0}, F_e=link)
+        pull = k * (pace * t - a.symbol)
+        rates = va.symbol, (pull - link) / m, vb.symbol, (link - guide.force) / m
+        return Model("own", x=(a, va, b, vb), ode=ca.vertcat(*rates), contacts=(guide,), t=t)
+
+    return model, t_end
+
+
+def judged(seed: int) -> tuple[int, int]:
+    """How many of the laws are ranked on a random machine, of how many that run; all is true."""
+    random = np.random.default_rng(seed)
+    mu_s = 10 ** random.uniform(-1, 0)
+    mu_d = mu_s * random.uniform(0.4, 0.9)
+    made, t_end = (belt, box, drive, own)[seed % 4](random, mu_s, mu_d)
+    found = select(
+        made, LAWS, t_end=t_end, friction=Friction(mu_s, mu_d), accuracy=ACCURACY,
+        fixed_steps=False,
+    )  # fmt: skip
+    t = np.linspace(0.0, t_end, 2001)
+    model = made(ExactCoulomb(mu_s=mu_s, mu_d=mu_d))
+    exact = simulate(model, t_end, rtol=1e-9, t_eval=t, backend="vm")
+    moved = {v: np.ptp(exact[v.name]) for v in model.x if v.unit in ("m", "rad")}
+    sizes = {v.name: x if x > STILL * v.nominal else v.nominal for v, x in moved.items()}
+    for row in found:
+        assert "another motion" not in row.reason, (seed, row)
+        if not row.ranked:
+            continue
+        law = with_values(ALL_LAWS[row.law](), row.values or {})
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            run = simulate(made(law), t_end, rtol=row.rtol / 100, t_eval=t, backend="vm")
+        off = {n: np.abs(run[n] - exact[n]).max() / size for n, size in sizes.items()}
+        assert max(off.values()) < 2 * ACCURACY, (seed, off, row)
+    return len(found.ranked), len(found.placed)
+
+
+@pytest.mark.parametrize("seed", [0, 2, 3])
+def test_no_law_that_converges_is_said_to_tend_to_another_motion(seed: int) -> None:
+    ranked, placed = judged(seed)
+    assert placed == len(LAWS)
+    assert ranked >= 3
+
+
+@pytest.mark.slow
+def test_thirty_random_machines_are_judged_rightly() -> None:
+    counts = np.array([judged(seed) for seed in range(30)])
+    assert counts[:, 0].min() >= 2  # smooth laws always get there
+    assert counts[:, 0].sum() >= 0.8 * len(LAWS) * 30
