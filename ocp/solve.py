@@ -18,10 +18,14 @@ from ocp.solving.one_solve import Solver
 from ocp.solving.starts import Start
 from ocp.text.doubts import doubts
 from ocp.text.problem import Problem
+from ocp.text.sizes import cost_size, sized
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError
+
+OVER = "obj_scaling_factor"
+"""Option of Ipopt: what it multiplies the cost by."""
 
 
 def solve(
@@ -114,8 +118,11 @@ def solve(
         raise checks.refused("solve: solver", "a solver, such as Ipopt()", solver)
     if intervals is not None:
         make_meshes(problem, intervals)  # refuses what is no mesh, whatever the way
+    posed = sized(problem)
+    if posed is not problem and isinstance(solver, Ipopt) and OVER not in solver.options:
+        solver = solver.with_options(**{OVER: 1.0 / cost_size(posed)})
     job = Job(
-        problem=problem, scheme=scheme, solver=solver, intervals=intervals, guess=guess,
+        problem=posed, scheme=scheme, solver=solver, intervals=intervals, guess=guess,
         friction=friction, tolerance=tolerance, refine=refine, verify=verify, starts=starts,
         resting_margin=resting_margin, progress=progress, clock=Clock(max_time),
     )  # fmt: skip

@@ -28,6 +28,8 @@ from symfric.model import Contact, Model, Monitor, Output
 
 RANK = 1e-11
 """Singular values below this share of the scaled equations count as zero."""
+UNLOADED = 1e-9
+"""Static level [N] at the start below which nothing presses there."""
 WIDTH = 1e-3
 """Width [m/s] of a stand-in by default, where the law has no velocity scale."""
 
@@ -318,7 +320,7 @@ def nominal_load(model: Model, contact: Contact) -> float:
     level = ca.substitute(level, symbols, ca.vertcat(*map(ca.SX, starts), ca.SX(0)))
     level = ca.substitute(level, symbols, ca.SX.zeros(symbols.numel()))
     value = abs(float(at_start(level, model.p)))
-    return value if isfinite(value) and value > 1e-3 else 1.0
+    return value if isfinite(value) and value > UNLOADED else 1.0
 
 
 def _refuse_shared(model: Model, made: Model, held: Sequence[Contact]) -> None:

@@ -187,4 +187,12 @@ RESULTS = (
         "meshes are looked at where they are used", "ocp/solve.py",
         "    if intervals is not None:\n", "    if False:\n", ("tests/ocp/test_arguments.py",),
     ),
+    Mutant(
+        "costs are as large as they are", "ocp/solve.py",
+        "1.0 / cost_size(posed)", "1.0", ("tests/ocp/text/test_sizes.py",),
+    ),
+    Mutant(
+        "a nominal value that was given gives way", "ocp/text/sizes.py",
+        "(v.nominal == UNSAID and times >= FAR)", "times >= FAR", ("tests/ocp/text/test_sizes.py",),
+    ),
 )  # fmt: skip

@@ -12,7 +12,7 @@ SMALL = (0, 1, 4, 6, 8, 9, 10, 12, 20, 24)
 """Seeds of the suite, of all kinds but those with three and four contacts."""
 MANY = range(len(KINDS), len(KINDS) + 100)
 NEAR = 1e-3
-"""The tolerance of `solve`: the distance of the exact end from its goal, over the way."""
+"""Tolerance of `solve`: how far the exact motion may end from its goal, over the way it goes."""
 TELLING = ("Friction is still smooth", "Modes were not found", "re-simulated", "maximum number",
            "unstable", "No point satisfies", "time limit")  # fmt: skip
 """What a message has of a motion that is not right, or of another friction than was asked for."""
