@@ -13,6 +13,7 @@ from symfric.choice import nature
 from symfric.choice.budget import LEAST, RUN, Budget, counted
 from symfric.choice.climb import (
     EFFORT,
+    FINEST,
     Asked,
     AtEqualError,
     at_equal_error,
@@ -30,9 +31,11 @@ from symfric.choice.softness import MARGIN, OF_BRISTLES, Ladder
 from symfric.figures.regularisation import positions
 from symfric.figures.requirements import phenomena
 from symfric.foundation.parameters import parameters
-from symfric.foundation.status import SolveError
+from symfric.foundation.status import SolveError, Status
 from symfric.laws import Law
 
+TIGHTER = 1e-2
+"""Share of its tolerance at which a law has to keep the accuracy, too."""
 AS_GOOD = 1.1
 """Errors from data within this ratio of the smallest are the same."""
 ROUNDS, PATIENCE = 5, 0.2
@@ -174,7 +177,7 @@ def _placed(task: Task, held: Candidate, rungs: Ladder, runs: Budget, row: Row) 
     driest = held.law_at(rungs.rungs[-1].s)
     known = "" if task.own else nature.otherwise(driest, task.frictions[""], task.load)
     mark = "" if rungs.decided or not rungs.stopped else "not decided: "
-    said = [mark + (short(rungs.stopped) or "the integrator keeps no more"), known]
+    said = [mark + (short(rungs.stopped) or "no run keeps it, or not at tighter tolerances"), known]
     why = "; ".join(text for text in said if text)
     return replace(row, standing=INACCURATE, reason=f"{row.error:.1e} off: {why}")
 
@@ -191,10 +194,23 @@ def _judged(task: Task, rungs: Ladder, runs: Budget) -> AtEqualError:
         for softness in (s, last.s):  # between two rungs the error is an estimate
             with suppress(SolveError):
                 at = at_equal_error(runs, softness, task.reference, task.asked, last, whole=True)
-                if at.error <= task.accuracy:
+                if at.error <= task.accuracy and _holds(task, at, runs):
                     return at
+        off = tuple(rung for rung in rungs.rungs if rung.error > task.accuracy)
+        rungs = replace(rungs, rungs=off or rungs.rungs[:1])
     near = nearest(rungs)
     return at_equal_error(runs, near.s, task.reference, task.asked, near, whole=False)
+
+
+def _holds(task: Task, at: AtEqualError, runs: Budget) -> bool:
+    """Whether a far tighter run keeps the accuracy, too: stiff bristles may fail in rounding."""
+    tighter = max(TIGHTER * at.rtol, FINEST)
+    if not runs.held.law.states or tighter >= at.rtol:
+        return True
+    try:
+        return task.reference.off(runs.run(at.s, tighter).motion) <= task.accuracy
+    except SolveError as problem:
+        return problem.status is Status.MAX_STEPS
 
 
 def _own_numbers(law: Law) -> dict[str, float]:

@@ -103,6 +103,11 @@ JUDGED = (
         "if law.states or (value > NEGLIGIBLE", "if (value > NEGLIGIBLE", T_JUDGED,
     ),
     Mutant(
+        "a law is ranked whose tighter run fails in rounding", CHOICE + "measured.py",
+        "return problem.status is Status.MAX_STEPS", "return True",
+        ("tests/symfric/choice/test_budget.py",),
+    ),
+    Mutant(
         "bristles are damped another way as they grow stiff", CHOICE + "softness.py",
         '"damping": -0.5', '"damping": -1.0', T_JUDGED,
     ),

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from math import log, log10
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -11,10 +12,11 @@ from symfric import Model, SolveError, Status, Variable, rabinowicz, simulate
 from symfric.choice.budget import EVENTS, LEAST, LEAST_WHOLE, Budget, counted
 from symfric.choice.climb import ON_THE_WAY, Asked, at_equal_error, climbed, nearest
 from symfric.choice.machine import Candidate
+from symfric.choice.measured import _holds  # pyright: ignore[reportPrivateUsage]
 from symfric.choice.reference import Reference
 from symfric.choice.softness import Ladder, Rung
 from symfric.figures.regularisation import Sample
-from symfric.laws import LuGre
+from symfric.laws import LuGre, Stribeck
 from symfric.model import Event
 
 TRUTH = Reference("one", np.ones((1, 1)), np.ones(1), 0.0)
@@ -144,3 +146,25 @@ def test_a_fine_run_that_would_take_too_much_is_not_begun() -> None:
     found = at_equal_error(budget(held), 1.0, TRUTH, ASKED, rung, whole=True)
     assert all(rtol >= 1e-6 for _, rtol in held.asked)
     assert found.rtol == pytest.approx(10**-3.5)
+
+
+@pytest.mark.parametrize(
+    ("tight", "status", "kept"),
+    [(1e-4, Status.SOLVER_FAILED, True), (0.5, Status.SOLVER_FAILED, False),
+     (None, Status.SOLVER_FAILED, False), (None, Status.MAX_STEPS, True)],
+)  # fmt: skip
+def test_bristles_keep_the_accuracy_in_a_far_tighter_run_or_are_not_ranked(
+    tight: float | None, status: Status, kept: bool
+) -> None:
+    """What is off there, or fails for another reason than its cost, is rounding."""
+    held: Any = Written(
+        lambda _, rtol: tight if rtol < 1e-5 else 1e-4,
+        lambda _, rtol: 10**9 if tight is None and rtol < 1e-5 else 100,
+        status,
+    )
+    held.law = LuGre()
+    task: Any = SimpleNamespace(reference=TRUTH, accuracy=1e-3)
+    at: Any = SimpleNamespace(s=0.1, rtol=1e-4)
+    assert _holds(task, at, budget(held)) is kept
+    held.law = Stribeck()
+    assert _holds(task, at, budget(held))
