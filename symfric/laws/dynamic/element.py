@@ -23,14 +23,16 @@ def check_elements(law: Law, kind: type[Parametric]) -> None:
     object.__setattr__(law, "elements", elements)
 
 
-TYPICAL, FIRM = 1e-5, 10.0
-"""Deflection of bristles [m], and the force [N] under which those have it that are stiffer."""
+TYPICAL, FIRM = 1e-5, 1e5
+"""Deflection of bristles [m], and the force [N] at which stiffer ones have theirs."""
 
 
 def deflection(sigma_0: Scalar) -> float:
-    """The typical deflection [m] of a bristle of the stiffness `sigma_0` [N/m], if that is known.
+    """Return the nominal deflection [m] of a bristle of the stiffness `sigma_0` [N/m], if known.
 
-    Tolerances follow it: 1e-5 m is no scale for a bristle of 1e15 N/m, which breaks away at 1e-14.
+    Absolute tolerances follow it: 1e-5 m is no scale for a bristle of 1e15 N/m, which breaks away
+    at 1e-14 m. The scale is that of a large force, since on that of 10 N the ringing of a bristle
+    of 1e12 N/m is resolved: a thousand times the steps, for the same motion.
     """
     return min(TYPICAL, FIRM / float(sigma_0)) if is_number(sigma_0) else TYPICAL
 

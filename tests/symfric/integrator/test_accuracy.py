@@ -223,15 +223,14 @@ def test_bristles_may_be_stiff(sigma_0: float, v_eps: float) -> None:
 def test_stuck_block_is_still_there_after_an_hour(law: Law) -> None:
     """Under half the static load, in steps of minutes, once the bristle has rung out.
 
-    The stiff one rings at 1.8 kHz and 50 nm for 5,000 periods, which are resolved on the scale of
-    its deflection, 100 nm, in 16,000 steps; on that of a decimetre, in 1,283, it came to rest 1 %
-    off.
+    The stiff one rings at 1.8 kHz and 50 nm for 5,000 periods, which are resolved on their own
+    scale; on that of a decimetre, in 1,283 steps, it came to rest 1 % off.
     """
     run = simulate(drive(law), 3600.0, u={"force": 0.5 * 0.15 * 0.8 * 9.81}, t_eval=[10.0, 3600.0])
     creep = run["x"][1] - run["x"][0]
     assert abs(creep) < (1e-6 if isinstance(law, BrownMcPhee) else 1e-9)
     assert np.diff(run.step_times).max() > 100
-    assert run.statistics.steps < 17_000
+    assert run.statistics.steps < 8000
 
 
 def test_an_hour_of_stick_slip_keeps_its_period() -> None:
