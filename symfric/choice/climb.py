@@ -33,6 +33,8 @@ AS_NEAR = 2.0
 """Errors of a law that never keeps the accuracy are alike within this ratio of its smallest."""
 FINER = 3
 """Times the attempts of a coarse run that a fine one takes, about."""
+EFFORT = "see effort"
+"""What is said where more of it is asked for."""
 ON_THE_WAY = 0.6
 """Share of the budget for the way to dry friction; the rest is for the run at equal error."""
 
@@ -89,7 +91,7 @@ def climbed(runs: Budget, reference: Reference, asked: Asked) -> Ladder:
 
     def run(s: float) -> Rung:
         if not runs.left(ON_THE_WAY):
-            raise SpentError(f"drier runs take more than {sum(runs.attempts)} tries, see effort")
+            raise SpentError(f"drier runs take more than {sum(runs.attempts)} tries, {EFFORT}")
         before = runs.attempts[-1] if runs.attempts else runs.most
         found, rtol = _first_that_ends(runs, s, asked.coarse, GROWTH * before + LEAST)
         error = reference.off(found.motion)

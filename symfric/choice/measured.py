@@ -12,7 +12,7 @@ import numpy as np
 from symfric.choice import nature
 from symfric.choice.budget import LEAST, RUN, Budget, counted
 from symfric.choice.climb import (
-    ON_THE_WAY,
+    EFFORT,
     Asked,
     AtEqualError,
     at_equal_error,
@@ -103,7 +103,7 @@ def measured(task: Task, name: str, law: Law) -> Row:
             instructions, _ = counted(task.machine, held.first, task.asked.coarse)
         except FAILURES as problem:
             return replace(row, reason=_refusal(task.machine, problem))
-        runs = Budget(held, instructions, task.work)
+        runs, found = Budget(held, instructions, task.work), Ladder((), "")
         try:
             task = _from_own(task, held, runs)
             found = climbed(runs, task.reference, task.asked)
@@ -111,9 +111,9 @@ def measured(task: Task, name: str, law: Law) -> Row:
             tried.append((replace(placed, spent=not runs.left()), held, found))
         except FAILURES as problem:
             failed = replace(row, standing=FAILED, reason=short(problem))
-            tried.append((failed, held, Ladder((), "")))
-        again = tried[-1][0].standing in (INACCURATE, FAILED) and not tried[-1][2].decided
-        if not again or not runs.left(ON_THE_WAY):
+            tried.append((failed, held, found))
+        open_ended = not found.decided and EFFORT not in found.stopped
+        if tried[-1][0].standing not in (INACCURATE, FAILED) or not open_ended:
             break
     row, held, found = min(tried, key=lambda each: place(each[0]))
     if row.standing == FAILED:

@@ -34,7 +34,7 @@ RELATIVE = ("u_eps",)
 """Widths that are shares of another."""
 LEVEL_LIKE: dict[type[Law], tuple[str, ...]] = {LeineSwitch: ("delta", "c"), RateAndState: ("v_0",)}
 """Velocities that say how high friction is, and no width."""
-OF_BRISTLES = 0.45, 0.5
+OF_BRISTLES = 0.5, 0.45
 """Powers of the velocities of laws with states, tried in this order."""
 DIGITS = 12
 """Of scaled parameters: what is behind is rounding."""

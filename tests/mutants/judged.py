@@ -90,6 +90,19 @@ JUDGED = (
         "(wanted / good.error) ** (1 / order)", "(wanted / good.error) ** order", T_JUDGED,
     ),
     Mutant(
+        "another motion is said of widths far from the speeds of a machine",
+        CHOICE + "softness.py",
+        "if rungs[-1].s ** powers <= NARROW else None", "if True else None", T_JUDGED,
+    ),
+    Mutant(
+        "another motion is said of neighbours at an extremum", CHOICE + "softness.py",
+        " or min(a, b) < RATIO**LEAP:", ":", T_JUDGED,
+    ),
+    Mutant(
+        "v_eps stays as bristles grow stiff", CHOICE + "softness.py",
+        "if law.states or (value > NEGLIGIBLE", "if (value > NEGLIGIBLE", T_JUDGED,
+    ),
+    Mutant(
         "bristles are damped another way as they grow stiff", CHOICE + "softness.py",
         '"damping": -0.5', '"damping": -1.0', T_JUDGED,
     ),

@@ -16,9 +16,24 @@ import numpy as np
 from symfric.figures import hysteresis
 from symfric.foundation.panels import NARROW, panels
 from symfric.gallery.generalized_maxwell_slip._by_hand import stribeck
-from symfric.gallery.generalized_maxwell_slip._laws import PATH, V_S, laws
+from symfric.gallery.generalized_maxwell_slip._laws import (
+    DELTA,
+    DELTA_L,
+    F_C,
+    F_S,
+    PATH,
+    SIGMA_0,
+    SIGMA_1,
+    V_S,
+    Z_BA,
+    C,
+    laws,
+)
 from symfric.gallery.looks import look
 from symfric.gallery.plate import Plate, plate_of
+
+TABLE_1 = (1.05, 0.2, 98e-6, 0.78, 0.16e6, 0.08, 0.61e-6, 7.0, 24.0)
+"""F_s, F_c, V_s, delta, sigma_0, sigma_1, z_ba, delta_l, C as printed, in SI."""
 
 
 def plate(quick: bool = False) -> Plate:
@@ -49,5 +64,13 @@ def plate(quick: bool = False) -> Plate:
     for case, v, s in zip(("1x", "5x", "20x"), fastest, stribeck(fastest), strict=True):
         numbers[f"fastest, {case}, over V_s [1]"] = v / V_S
         numbers[f"Stribeck curve at the fastest, {case} [N]"] = s
-    claims = {"20 times faster it is half of V_s": 0.45 < fastest[-1] / V_S < 0.5}
+    table = laws(count=1)
+    given = [getattr(table["LuGre"], name) for name in ("mu_s", "mu_d", "v_s", "delta", "sigma_0")]
+    given += [table["LuGre"].sigma_1, table["elasto-plastic"].z_ba, table["Leuven"].delta_l]  # pyright: ignore
+    numbers_of = (F_S, F_C, V_S, DELTA, SIGMA_0, SIGMA_1, Z_BA, DELTA_L, C)
+    claims = {
+        "the laws have the numbers of table 1": [*map(float, given)] == [*TABLE_1[:-1]],
+        "so have the equations by hand": numbers_of == TABLE_1,
+        "20 times faster it is half of V_s": 0.45 < fastest[-1] / V_S < 0.5,
+    }
     return plate_of(__name__, figure, far, "m", numbers, claims, within=1e-11, quick=quick)

@@ -13,15 +13,16 @@ by 2 %, and the elasto-plastic law is a spring on this path.
 
 Refuted: that pre-sliding does not depend on the velocity, at 20 times the speed of our path, where
 it runs at half of V_s. Whatever slips there follows s(v), and GMS breaks away a quarter lower,
-Leuven a seventh; the generic model hardly does. With sigma_0 as printed, LuGre and the
-elasto-plastic law carry a fifth of what the others do.
+Leuven a seventh; the generic model hardly does. That the alternative state equation of section 4,
+dz/dt = v sgn(1 - F_h/s) |1 - F_h/s|^delta_l, is as good: with these elements it misses the inner
+loop by 15 % or more, for exponents of 1, 2 and 7.
 """
 
 import numpy as np
 
 from symfric.figures import Curve, hysteresis
 from symfric.gallery.generalized_maxwell_slip import _by_hand
-from symfric.gallery.generalized_maxwell_slip._elements import elements_again
+from symfric.gallery.generalized_maxwell_slip._elements import alternative, elements_again
 from symfric.gallery.generalized_maxwell_slip._grid import law_grid
 from symfric.gallery.generalized_maxwell_slip._laws import ELEMENTS, F_S, PATH, laws
 from symfric.gallery.plate import Plate, plate_of
@@ -65,10 +66,11 @@ def plate(quick: bool = False) -> Plate:
         "20 times faster GMS is a quarter lower, Leuven a seventh": (
             0.2 < slower["GMS"] < 0.28 and 0.12 < slower["Leuven"] < 0.17
         ),
-        "LuGre and the elasto-plastic law carry a fifth": all(
+        "LuGre and the elasto-plastic law carry a fifth, with sigma_0 as printed": all(
             0.13 < tops[name] / tops["generic model"] < 0.27 for name in ("LuGre", "elasto-plastic")
         ),
     }
+    claims |= alternative(numbers)
     if not quick:
         again = elements_again(runs["generic model"].curves[0])
         numbers |= again

@@ -83,6 +83,15 @@ def said(numbers: dict[str, float]) -> dict[str, bool]:
             2 * over[0] < over[1] < over[2]
         ),
         "the residual of X_b is larger than any constant leaves": RESIDUAL["X_b"][0] > RANGE / 2,
+        "Coulomb friction improves the residuals by 0.06 and 0.12 %": np.allclose(
+            [100 * (1 - residual / without) for residual, without in RESIDUAL.values()],
+            [0.0628, 0.1235],
+            atol=1e-4,
+        ),
+        "the body rests at the heights of the road": np.allclose(
+            [height for _, height in STAGES.values()], _by_hand.heights(50)[1::2]
+        )
+        and max(_by_hand.heights(50)) == RANGE,
         "equation 12 as printed holds the body for ever": (
             numbers["way of the body by equation 12 as printed [m]"] == 0.0
         ),

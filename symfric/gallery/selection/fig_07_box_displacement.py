@@ -39,6 +39,7 @@ from symfric.gallery.selection._runs_box import (
     positions,
     run,
 )
+from symfric.gallery.selection._tables import agree
 from symfric.gallery.signals import largest, spread
 from symfric.scenes import PendulumBox
 
@@ -69,7 +70,7 @@ def plate(quick: bool = False) -> Plate:
     for what, law in NARROW.items():
         numbers[f"the same, {what} [m]"] = apart(law, t_end)
     nearer = [*numbers.values()][-len(NARROW) :]
-    claims = {
+    claims = agree("7", "7, pendulum", "8") | {
         "a hundredth of its band, or its smooth form, brings Karnopp near": (5 * max(nearer) < wide)
     }
     if not quick:

@@ -85,7 +85,8 @@ class Crossings:
 
     Attributes:
         looks: (low, values there, row, d) -> their values at `LOOKS` between low and 1, one look
-            after the other, of each piece whether it is in doubt, and the noise in the step.
+            after the other, and of each piece whether it is in doubt.
+        noise: (row, d) -> what rounding leaves of each in the step.
         doubts: (values at five places, one place after the other, noise) -> of each piece between
             them, whether it is in doubt.
         values: (theta, row, d) -> their values within the step.
@@ -99,6 +100,7 @@ class Crossings:
     """
 
     looks: ca.Function
+    noise: ca.Function
     doubts: ca.Function
     values: ca.Function
     cut: ca.Function
@@ -128,7 +130,7 @@ class Crossings:
     @property
     def functions(self) -> tuple[ca.Function, ...]:
         """What the compiled search calls."""
-        return self.looks, self.doubts, self.values, self.cut, self.jump
+        return self.looks, self.noise, self.doubts, self.values, self.cut, self.jump
 
 
 def crossings(
@@ -160,15 +162,15 @@ def crossings(
     looks = [_place(at, row, low + s * (1 - low)) if s < 1 else end for s in LOOKS[1:]]
     first, five = (ca.SX.sym("values", n * len(events)) for n in (1, len(LOOKS)))
     noise, level = ca.SX.sym("noise", len(events)), ROUNDING * sizes(*end, d)
-    noise_of_step = ca.if_else(level < inf, level, 0)
     found = [expressions(*look, d) for look in looks]
     states = list(states)
     return Crossings(
         _function(
             "looks",
             [low, first, row, d],
-            [ca.vertcat(*found), _doubts([first, *found], noise_of_step), noise_of_step],
+            [ca.vertcat(*found), _doubts([first, *found])],
         ),
+        _function("noise", [row, d], [ca.if_else(level < inf, level, 0)]),
         _function("doubts", [five, noise], [_doubts(ca.vertsplit(five, len(events)), noise)]),
         _function("values", [theta, row, d], [expressions(*_inside(at, row, theta), d)]),
         cutting(at),
@@ -187,20 +189,19 @@ def _function(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Fun
     return ca.Function(f"symfric_{name}", arguments, dense, {"cse": True})
 
 
-def _doubts(values: Sequence[ca.SX], noise: ca.SX) -> ca.SX:
+def _doubts(values: Sequence[ca.SX], noise: Any = 0.0) -> ca.SX:
     """Of each piece between five values, whether events may have more roots than their signs say.
 
     An expression is off its chord by at most S x (1 - x), 0 <= x <= 1, on inner pieces, and by
     S (1 - x) from an outer end, if it is a polynomial of degree 4, or a line with one corner. On
     inner pieces S is the sum of the second differences at their ends and an eighth of the third
-    one, on outer ones half the bend at their ends and some of the fourth difference. Where it is
-    above that, it has one sign, or rises or falls throughout. A bend below `noise` is rounding.
+    one, on outer ones it bounds half the second derivative. Where it is above that, it has one
+    sign, or rises or falls throughout. A bend below `noise` is rounding.
     """
     a, b, c = (x - 2 * y + z for x, y, z in zip(values, values[1:], values[2:], strict=False))
     bows, sizes = [ca.fabs(x) for x in (a, b, c)], [ca.fabs(x) for x in values]
-    fourth = 0.21 * ca.fabs(a - 2 * b + c)
-    first = (ca.fmax(ca.fabs(3 * (a - b) + c), bows[0]) + fourth) / 2
-    last = (ca.fmax(ca.fabs(3 * (c - b) + a), bows[2]) + fourth) / 2
+    first = 0.75 * (ca.fabs(3 * (a - b) + c) + bows[0]) + bows[1] / 8
+    last = 0.75 * (ca.fabs(3 * (c - b) + a) + bows[2]) + bows[1] / 8
     return ca.vertcat(
         sizes[0] < first - noise,
         sizes[1] + sizes[2] < bows[0] + bows[1] + bows[2] / 8 - noise,

@@ -132,23 +132,30 @@ typedef struct { double root[EVENTS], noise[EVENTS], tolerance; int left; } symf
 static double symfric_first(const symfric_place *p, symfric_found *f, const double *at,
                             const double *g, const double *doubts);
 
+/* Of each piece between values at five places, whether events are in doubt there. */
+static void symfric_doubted(const symfric_place *p, const symfric_found *f, const double *g,
+                            double *doubts)
+{
+  const double *arg[$arg];
+  double *res[$res];
+  arg[0] = g;
+  arg[1] = f->noise;
+  res[0] = doubts;
+  symfric_doubts(arg, res, p->iw, p->w, 0);
+}
+
 /* As symfric_first, from a to b, with values of which the first ones are there, where some events
    are in doubt. */
 static double symfric_again(const symfric_place *p, symfric_found *f, double a, double b, double *g,
                             const int *suspects)
 {
-  const double *arg[$arg];
-  double *res[$res];
   double doubts[LOOKS * EVENTS], at[LOOKS + 1];
   int i, k;
   --f->left;
   if (b < a) b = a;
   for (k = 0; k <= LOOKS; ++k) at[k] = a + symfric_look_at[k] * (b - a);
   for (k = 1; k <= LOOKS; ++k) symfric_within(p, at[k], g + k * EVENTS);
-  arg[0] = g;
-  arg[1] = f->noise;
-  res[0] = doubts;
-  symfric_doubts(arg, res, p->iw, p->w, 0);
+  symfric_doubted(p, f, g, doubts);
   for (k = 0; k < LOOKS; ++k)
     for (i = 0; i < EVENTS; ++i)
       if (!suspects[i]) doubts[k * EVENTS + i] = 0;
@@ -209,7 +216,7 @@ static double symfric_crossing(const symfric_place *p, double *M, double *which)
   double g[(LOOKS + 1) * EVENTS], doubts[LOOKS * EVENTS], at[LOOKS + 1], low = 0, first;
   double h = p->row[1] - p->row[0];
   symfric_found f;
-  int i;
+  int i, doubtful = 0, busy = 0;
   f.left = $finer;
   f.tolerance = M[TOLERANCE] / h;
   for (i = 0; i < EVENTS; ++i) f.root[i] = 2;
@@ -222,7 +229,10 @@ static double symfric_crossing(const symfric_place *p, double *M, double *which)
     if (low > 0.1) low = 0.1;
     symfric_within(p, low, g);
     for (i = 0; i < EVENTS; ++i)
-      if (symfric_passed(M[BEFORE + i], g[i], symfric_directions[i]) && g[i] != 0) f.root[i] = 0;
+      if (symfric_passed(M[BEFORE + i], g[i], symfric_directions[i]) && g[i] != 0) {
+        f.root[i] = 0;
+        busy = 1;
+      }
   }
   arg[0] = &low;
   arg[1] = g;
@@ -230,10 +240,20 @@ static double symfric_crossing(const symfric_place *p, double *M, double *which)
   arg[3] = p->d;
   res[0] = g + EVENTS;
   res[1] = doubts;
-  res[2] = f.noise;
   symfric_looks(arg, res, p->iw, p->w, 0);
+  for (i = 0; i < LOOKS * EVENTS; ++i) {
+    doubtful |= doubts[i] != 0;
+    busy |= ((g[i] < 0) != (g[i + EVENTS] < 0)) | (g[i + EVENTS] == 0);
+  }
+  if (doubtful) {
+    arg[0] = p->row;
+    arg[1] = p->d;
+    res[0] = f.noise;
+    symfric_noise(arg, res, p->iw, p->w, 0);
+    symfric_doubted(p, &f, g, doubts);
+  }
   for (i = 0; i <= LOOKS; ++i) at[i] = low + symfric_look_at[i] * (1 - low);
-  first = symfric_first(p, &f, at, g, doubts);
+  first = busy || doubtful ? symfric_first(p, &f, at, g, doubts) : 2;
   if (first <= 1) {
     for (i = 0; i < EVENTS; ++i)
       which[i] = f.root[i] <= 1 && (f.root[i] - first) * h <= M[TOLERANCE];

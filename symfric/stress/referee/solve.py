@@ -19,7 +19,7 @@ from symfric.stress.referee.laws import LAWS, STATES
 from symfric.stress.referee.scenes import SCENES, Force, Scene
 
 Array = NDArray[np.float64]
-EVALUATIONS = 300_000
+EVALUATIONS = 150_000
 """Calls of the equations after which a solve is given up."""
 PIECES = 200
 """Steps that a solve takes at least: what SciPy's first estimates of an error may overlook."""

@@ -13,7 +13,7 @@ from symfric.choice.measured import _by_data  # pyright: ignore[reportPrivateUsa
 from symfric.choice.nature import otherwise
 from symfric.choice.needs import needed
 from symfric.choice.row import INACCURATE, RANKED, REFUSED, Row, ordered
-from symfric.choice.softness import MOST, NARROW, Ladder, Rung, ladder, softness
+from symfric.choice.softness import MOST, NARROW, Ladder, Rung, ladder, limit_order, softness
 from symfric.choice.text import number, short
 from symfric.choice.verdict import verdict
 from symfric.foundation.parameters import parameters
@@ -79,8 +79,23 @@ def test_another_motion_is_said_of_a_limit_with_its_order_alone() -> None:
     still = ladder(lambda s: Rung(s, 0.4, 1), 1e-3, 1e-3, 1.0, (ValueError,))
     assert still.stopped.startswith("its error still changes")
     assert (still.decided, found.decided) == (False, True)
+    later = ladder(near(0.0, 1.0, wide=1e-8), 1e-3, 1e-3, 0.5, (ValueError,))
+    assert later.stopped == ""  # by then its velocities are 1e-4 of what they were
     first = ladder(near(0.0, 1.0, wide=1e-4), 1e-3, 1e-3, 1.0, (ValueError,))
     assert (first.stopped, first.softest(1e-3) is not None) == ("", True)
+
+
+def test_no_limit_is_shown_by_neighbours_nor_by_runs_that_do_not_converge() -> None:
+    """Two errors that cancel have an extremum, where runs are alike and tend to nothing."""
+    law = near(0.2, 1.0)
+    assert limit_order([law(s) for s in (1.0, 4.0**-4, 4.0**-8)]) == pytest.approx(1.0, abs=1e-3)
+    assert limit_order([law(s) for s in (1.0, 0.25, 0.0625)]) is None
+    apart = [Rung(4.0 ** (-4 * k), 0.2, 1, motion=np.array([[x]])) for k, x in enumerate((0, 1, 3))]
+    assert limit_order(apart) is None
+    slow = [
+        Rung(4.0 ** (-4 * k), 0.2, 1, motion=np.array([[x]])) for k, x in enumerate((0, 1, 1.5))
+    ]
+    assert limit_order(slow) is None  # order 1/8: half of it is left to go
 
 
 def test_a_law_of_which_nothing_is_scaled_is_run_once() -> None:

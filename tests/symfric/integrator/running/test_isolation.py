@@ -8,6 +8,9 @@ from grazing import near_limits, wrong
 from oracles import damped_block_events
 
 from symfric import Event, ExactCoulomb, Model, Variable, rabinowicz, simulate
+from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.methods.tableaux import ADAPTIVE
+from symfric.integrator.running.integrator import Integrator
 
 x, c, w = Variable("x", "1"), Variable("c", "1"), Variable("w", "1")
 X, C, W = x.symbol, c.symbol, w.symbol
@@ -73,6 +76,29 @@ def test_roots_that_share_a_quarter_come_in_order(backend: str, direction: int) 
             ways = [sign * (-1) ** (count - 1 - k) for k in range(count)]
             expected = [r for r, way in zip(roots, ways, strict=False) if way * direction >= 0]
             assert crossings(model, sign, backend=backend) == pytest.approx(expected, abs=2e-10)
+
+
+def test_a_piece_that_is_not_in_doubt_has_the_roots_that_its_ends_show() -> None:
+    """Polynomials of degree 4, and lines with a corner, near zero somewhere in the step."""
+    model = clock(X)
+    doubts = Integrator(model, input_data(model, None, 0.0, 1.0), ADAPTIVE["rodas5p"]).crossings
+    assert doubts is not None
+    rng = np.random.default_rng(3)
+    fine = np.linspace(0, 1, 401)
+    polynomial = rng.standard_normal((5, 4000))
+    bends, corner = rng.uniform(-1, 1, (2, 4000)), rng.uniform(0, 1, 4000)
+    for values in (
+        lambda x: np.polyval(polynomial, x),
+        lambda x: bends[0] * (x - corner) + 2 * np.maximum(x - corner, 0) * bends[1],
+    ):
+        every = np.array([values(x) for x in fine])
+        every -= every[rng.integers(0, 401, 4000), np.arange(4000)] + rng.normal(0, 1e-2, 4000)
+        doubt = doubts.doubts(every[::100], 0.0).full() != 0
+        changes = np.diff(np.sign(every), axis=0).reshape(4, 100, -1) != 0
+        ends = np.diff(np.sign(every[::100]), axis=0) != 0
+        assert (changes.sum(axis=1) == ends)[~doubt].all()
+        assert (changes.sum(axis=1) > ends).any()
+        assert doubt.mean() < 0.7
 
 
 def test_the_earlier_of_two_events_happens_first() -> None:

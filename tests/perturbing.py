@@ -1,0 +1,153 @@
+"""A process that changes one number or law of the source by 5 % and asks the gallery what it says.
+
+Run as a script: it reads jobs as lines of JSON, forks for each, and answers with a line each. What
+is changed is imported by the child alone, so that no cache holds what was computed before.
+"""
+
+import ast
+import json
+import os
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.machinery import ModuleSpec, SourceFileLoader
+from importlib.util import spec_from_file_location
+from pathlib import Path
+from types import CodeType
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+FACTOR = 1.05
+
+
+@dataclass(frozen=True)
+class Job:
+    """One change: the `place`-th number of an assignment in a file, or the `method` of a law.
+
+    Attributes:
+        file: below the root of the repository.
+        name: what is assigned, or the class of the law.
+        place: which number in it; -1 for a law.
+        method: of the law.
+        plates: beginnings of the names of the figures that depend on it.
+    """
+
+    file: str
+    name: str
+    place: int
+    method: str
+    plates: tuple[str, ...]
+
+    def __str__(self) -> str:
+        what = f"{self.name}.{self.method}" if self.method else f"{self.name}[{self.place}]"
+        return f"{self.file}: {what}"
+
+
+def numbers(source: str, name: str) -> Iterator[ast.Constant]:
+    """The numbers in the assignments to `name`, also in a class, in the order of the text."""
+    for node in ast.walk(ast.parse(source)):
+        targets = (
+            node.targets
+            if isinstance(node, ast.Assign)
+            else [node.target]
+            if isinstance(node, ast.AnnAssign)
+            else []
+        )
+        names = {n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)}
+        if name not in names or not isinstance(node, ast.Assign | ast.AnnAssign) or not node.value:
+            continue
+        found = [n for n in ast.walk(node.value) if isinstance(n, ast.Constant)]
+        found = [n for n in found if type(n.value) in (int, float) and n.value]
+        yield from sorted(found, key=lambda n: (n.lineno, n.col_offset))
+
+
+def changed(job: Job) -> str:
+    """The source of the file with the change."""
+    source = (ROOT / job.file).read_text("utf-8")
+    if job.method:
+        return f"{source}\n{LAW.format(law=job.name, method=job.method, factor=FACTOR)}"
+    number = [*numbers(source, job.name)][job.place]
+    lines = source.splitlines(keepends=True)
+    line = lines[number.lineno - 1].encode()
+    assert isinstance(number.value, int | float)
+    assert number.end_col_offset is not None
+    text = repr(number.value * FACTOR).encode()
+    line = line[: number.col_offset] + text + line[number.end_col_offset :]
+    lines[number.lineno - 1] = line.decode()
+    return "".join(lines)
+
+
+LAW = """
+_before = {law}.{method}
+{law}.{method} = lambda self, *a, **k: {factor} * _before(self, *a, **k)
+"""
+
+
+class Loader(SourceFileLoader):
+    """Loads a changed source."""
+
+    job: Job
+
+    def get_code(self, fullname: str) -> CodeType:
+        return compile(changed(self.job), self.path, "exec", dont_inherit=True)
+
+
+class Finder:
+    """Finds the module of a job before anybody else does."""
+
+    def __init__(self, job: Job) -> None:
+        self.job = job
+        self.module = job.file.removesuffix(".py").replace("/", ".")
+
+    def find_spec(self, name: str, *_: Any) -> ModuleSpec | None:
+        if name != self.module:
+            return None
+        loader = Loader(name, str(ROOT / self.job.file))
+        loader.job = self.job
+        return spec_from_file_location(name, loader.path, loader=loader)
+
+
+def verdict(job: Job, quick: bool) -> str:
+    """Which figure refuses, and in which words; empty where all are drawn as before."""
+    sys.meta_path.insert(0, Finder(job))  # pyright: ignore[reportArgumentType]
+    name = "importing"
+    try:
+        gallery = import_module("symfric.gallery")
+        for name in gallery.chosen(job.plates):
+            import_module(gallery.scripts()[name]).plate(quick=quick)
+    except Exception as error:  # noqa: BLE001  (a figure that cannot be drawn is a verdict)
+        return f"{name}: {type(error).__name__}: {' '.join(str(error).split())[:400]}"
+    return ""
+
+
+def forked(job: Job, quick: bool) -> str:
+    """The verdict, found by a child."""
+    read, write = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(read)
+        with os.fdopen(write, "w") as out:
+            out.write(verdict(job, quick))
+        os._exit(0)
+    os.close(write)
+    with os.fdopen(read) as answers:
+        answer = answers.read()
+    _, status = os.waitpid(child, 0)
+    return answer if status == 0 else f"the process died, {status}"
+
+
+def main() -> None:
+    """Answer the jobs of the standard input."""
+    sys.path.insert(0, str(ROOT))
+    for name in ("numpy", "casadi", "scipy.integrate", "scipy.optimize", "matplotlib.figure"):
+        import_module(name)
+    for line in sys.stdin:
+        given = json.loads(line)
+        job = Job(**given | {"plates": tuple(given["plates"])})
+        said = forked(job, quick=sys.argv[1] == "quick")
+        print(json.dumps(given | {"verdict": said}), flush=True)  # noqa: T201
+
+
+if __name__ == "__main__":
+    main()
