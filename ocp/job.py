@@ -212,7 +212,8 @@ class Job:
         if any(one.solution.ok or one.solution.status in FOUND for one in tried):
             return max(tried, key=lambda one: one.worth).solution
         if tried:
-            said = f"{said} Modes were not found: {tried[-1].solution.message}".lstrip()
+            last = tried[-1].solution.message.removeprefix(f"ocp '{self.problem.name}': ")
+            said = f"{said} Modes were not found: {last}".lstrip()
         return self.unpolished(reached, "" if self.friction == "sharpen" else said)
 
     def polished(self, sharp: Sharp) -> "_Exact":
