@@ -27,9 +27,10 @@ class PendulumBox(MechanismScene):
     share a name); without it the hinge has the law of the box.
 
     Defaults: Jing and Mi, Selection Mechanism of Friction Models, tables 6 and 7 (box 6 kg,
-    pendulum 20 kg on 0.3 m, from 30 degrees), but with a point mass. Its 1.8 kg m^2 are m L^2, too,
-    but only about the mass do they give the standard deviations of its table 8: the preset has them
-    there. No radius of the hinge is given; 0.01 m here.
+    pendulum 20 kg on 0.3 m, from 30 degrees), with a point mass. Its 1.8 kg m^2 are m L^2, so that
+    they may be the inertia of that about the hinge; the preset has them about the mass, where the
+    standard deviation of positions at equal times is that of its table 8. The text does not decide.
+    No radius of the hinge is given; 0.01 m here.
     Limits: the ground does not pull: while N > 0 the box does not lift off, which is not checked.
     """
 
@@ -37,7 +38,7 @@ class PendulumBox(MechanismScene):
     presets: ClassVar[Mapping[str, Preset]] = {
         "jing_mi_table_7": Preset(
             "box and pendulum of table 6, every law with its own numbers in floor and hinge; its "
-            "1.8 kg m^2 are about the mass (table 8 says so, not the text), and the radius of the "
+            "1.8 kg m^2 are about the mass (the text does not say where), and the radius of the "
             "hinge, over which those of the hinge act, is not given: 0.01 m here",
             jing_mi.SOURCE + "6 and 7",
             {"m_box": 6.0, "m": 20.0, "L": 0.3, "J": 1.8, "R": 0.01, "phi_0": pi / 6, "g": 9.81},

@@ -88,10 +88,11 @@ def said(numbers: dict[str, float]) -> dict[str, bool]:
             [0.0628, 0.1235],
             atol=1e-4,
         ),
-        "the body rests at the heights of the road": np.allclose(
-            [height for _, height in STAGES.values()], _by_hand.heights(50)[1::2]
-        )
-        and max(_by_hand.heights(50)) == RANGE,
+        "the rests are where and until when the road is level": (
+            np.allclose([z for _, z in STAGES.values()], _by_hand.heights(50)[1::2])
+            and np.allclose([end for end, _ in STAGES.values()][:3], _by_hand.CORNERS[1:6:2])
+            and max(_by_hand.heights(50)) == RANGE
+        ),
         "equation 12 as printed holds the body for ever": (
             numbers["way of the body by equation 12 as printed [m]"] == 0.0
         ),

@@ -17,7 +17,7 @@ m^2 about the mass. Table 8 has S = 5.9 cm with the smooth Coulomb law. Every ms
 the point mass and 5.8 cm for the other; but table 8 does not say where it takes the positions. At
 the steps of our solver the point mass has 4.7 ... 5.7 cm, the other 5.8 ... 6.2 cm, by tolerances
 of 1e-5 to 1e-7. Figures 7 to 12 draw the second reading, and what they say of the paper holds for
-both, with radii of 3, 10 and 100 mm.
+both, with radii of 3 to 100 mm.
 """
 
 import numpy as np

@@ -9,8 +9,8 @@ positions with exact dry friction.
 Distance: median deviation of S from table 8 over the laws, relative.
 
 Reproduced: the law has little influence on the position of the box: all but Karnopp are within 11
-mm of exact dry friction, in both forms, for both readings of table 6 and radii of the hinge of 3,
-10 and 100 mm.
+mm of exact dry friction, in both forms, for both readings of table 6 and radii of the hinge of 3
+to 100 mm.
 
 Refuted: that S tells the stability of a solution. On each of these machines it is the same every ms
 for all of them, within 7 % of that of exact dry friction; at the steps of our solver the same

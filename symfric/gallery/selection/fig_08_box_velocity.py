@@ -9,7 +9,7 @@ Distance: largest difference of the velocity from that by hand, smooth Coulomb l
 
 Reproduced: the law has little influence on the velocity of the box, but for Karnopp's band in the
 hinge (figure 7): root mean square 17 mm/s at most, of 0.58 m/s and more, in both forms, for both
-readings of table 6 and radii of the hinge of 3, 10 and 100 mm. The farthest are those on bristles,
+readings of table 6 and radii of the hinge of 3 to 100 mm. The farthest are those on bristles,
 Dahl, LuGre and Elasto-plastic, and Threlfall as published, whose level is 5 % lower.
 
 Undecided: how far the box still rolls on its bristles at the end, where dry friction holds it: half

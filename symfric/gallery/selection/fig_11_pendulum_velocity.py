@@ -8,7 +8,7 @@ exact dry friction, over the run and over its last two seconds.
 Distance: largest difference from that by hand, smooth Coulomb law.
 
 Reproduced: LuGre and Elasto-plastic err visibly at the end of the motion, by 0.25 ... 0.8 of the
-swing, for both readings of table 6 and radii of the hinge of 3, 10 and 100 mm. With the box held
+swing, for both readings of table 6 and radii of the hinge of 3 to 100 mm. With the box held
 dry friction leaves a pendulum on a fixed hinge, whose velocity is its angle times its frequency.
 
 Refuted: that this is an error of laws with states, which should be avoided where something turns.

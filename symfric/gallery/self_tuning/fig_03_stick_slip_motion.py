@@ -21,6 +21,7 @@ from symfric.foundation.style import line
 from symfric.gallery.drawing import REFERENCE, legend_below
 from symfric.gallery.plate import Plate, plate_of
 from symfric.gallery.self_tuning._runs_belt import (
+    BLOCK,
     LAWS,
     V_T,
     acceleration,
@@ -33,6 +34,7 @@ from symfric.gallery.self_tuning._runs_belt import (
     run,
 )
 from symfric.gallery.signals import rms
+from symfric.scenes import Rabinowicz
 
 
 def plate(quick: bool = False) -> Plate:
@@ -71,6 +73,9 @@ def plate(quick: bool = False) -> Plate:
     apart = rms(tuned["x"] - brown["x"])
     dry_off = [rms(one["x"] - motion["x"]) for one in runs.values()]
     claims = {
+        "the data are those of the LuGre paper": (
+            Rabinowicz.presets["canudas_de_wit"].values == BLOCK
+        ),
         "periods differ by 3 %": 0.025 < abs(period(brown) / period(tuned) - 1) < 0.035,
         "Brown-McPhee creeps at 0.26 v_t, 3.91 mm/s, at mu_d N": (
             abs(creep[LAWS[1]] / V_T - 0.26) < 0.005 and abs(creep[LAWS[1]] - 3.91e-3) < 5e-6

@@ -9,9 +9,19 @@ Reproduced: both laws overlap. In sliding both are mu_d N but for their tails, s
 velocity of the peak; this machine says nothing of the transition to rest.
 """
 
+from symfric import BrownMcPhee
 from symfric.gallery.plate import Plate, plate_of
-from symfric.gallery.self_tuning._runs_crank import LAWS, apart, distance, picture, run
+from symfric.gallery.self_tuning._runs_crank import (
+    LAWS,
+    MU,
+    V_T,
+    apart,
+    distance,
+    picture,
+    run,
+)
 from symfric.gallery.signals import largest
+from symfric.scenes.slider_crank import BEARING
 
 
 def plate(quick: bool = False) -> Plate:
@@ -24,6 +34,9 @@ def plate(quick: bool = False) -> Plate:
         numbers[f"energy lost, {law} [J]"] = float(one["energy"][0] - one["energy"][-1])
     lost = [value for name, value in numbers.items() if name.startswith("energy")]
     claims = {
+        "the bearing has the data of Haug's example": (
+            {**BEARING.common, **BEARING.laws[BrownMcPhee]} == {**MU, "v_t": V_T}
+        ),
         "the laws overlap within 0.02 %": largest(apart("crank'", t_end)) < 2e-4 * 120,
         "they take the same energy within 0.1 %": abs(lost[0] / lost[1] - 1) < 1e-3,
     }
