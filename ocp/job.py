@@ -335,9 +335,12 @@ class Job:
         if not self.verify or solution.status in STOPPED:
             return solution
         laws = {c.name: c for phase in self.problem.chain for c in phase.model.contacts if c.states}
-        if not (solution.modes and laws):
-            return verified(solution, self.tolerance)
-        found = self.told(verify_solution(solution, self.tolerance))
+        try:
+            if not (solution.modes and laws):
+                return verified(solution, self.tolerance)
+            found = self.told(verify_solution(solution, self.tolerance))
+        except FAILURES as error:
+            return _said(solution, f"It was not verified: {_why(error)}.")
         names = ", ".join(f"{name}: {type(c.law).__name__}" for name, c in laws.items())
         said = (
             f"{solution.message} Friction with states ({names}) was taken as its steady sliding "

@@ -63,6 +63,13 @@ def test_a_failure_of_exact_friction_is_said(monkeypatch: pytest.MonkeyPatch) ->
     assert "With exact Coulomb friction it was not simulated: expected no events" in found.message
 
 
+def test_a_failure_of_verification_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(job, "verified", raising(RuntimeError("variables [z] are free")))
+    found = solve(out_and_back(v_t=0.05), throw=False, intervals=FINE, friction="smooth")
+    assert found.ok and not found.verified
+    assert "It was not verified: internal error, RuntimeError: variables" in found.message
+
+
 def test_ctrl_c_passes(monkeypatch: pytest.MonkeyPatch) -> None:
     def stopped(*_: object, **__: object) -> object:
         raise KeyboardInterrupt
