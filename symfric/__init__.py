@@ -16,7 +16,8 @@ What there is; `help` of each tells more:
     equations   Model of Variable, Output, Event and Monitor; contact puts a law into it (Contact)
     mechanisms  Mechanism of bodies and joints that rub, read_urdf; more in symfric.multibody
     running     simulate, simulate_many, stepper, flow; inputs as numbers, functions of time or
-                samples, Hold and Linear (rate_of: their rate); SolveError, Status where runs fail
+                samples, Hold and Linear (rate_of: their rate); SolveError, Status where runs fail,
+                OverloadWarning, EnergyWarning where they are in doubt
     results     Trajectory (run["x"], run.at(times), run.at(run.step_times), run.extremes, plot,
                 animate, save, to_csv, to_dataframe), load_run, Statistics, Plant, report; Ensemble
                 (varied, extremes, plot, save, to_dataframe), load_ensemble; for_print
