@@ -104,9 +104,10 @@ def pilot(
     swings, share = runs[:, 0] > 0.1, runs[:, 1] / shown
     last = [float(speeds[swing].max()) for swing in swings]
     error = 100 * np.sqrt(np.mean((runs[:, 1] - shown) ** 2, axis=1)) / shown.mean()
-    low = runs[swings[:, 0], 0][:, speeds <= 100]
+    light = [ratio <= 0.2 for _, ratio in wires]
+    low = runs[light, 0][:, speeds <= 100]
     spread = float((np.ptp(low, axis=1) / low.max(axis=1)).max())
-    numbers = {"change of amplitude from 10 to 100 mm/min, pilot study, largest [1]": spread}
+    numbers = {"change of amplitude, 10 to 100 mm/min, pilot study, ratio up to 0.2 [1]": spread}
     for name, unit, values in (
         ("last speed with stick-slip", "mm/min", last),
         ("error of the means by stick-slip", "%", error),
@@ -114,13 +115,14 @@ def pilot(
     ):
         numbers[f"{name}, pilot study, least [{unit}]"] = float(np.min(values))
         numbers[f"{name}, pilot study, largest [{unit}]"] = float(np.max(values))
-    claims = {"the amplitude is the same within a tenth from 10 to 100 mm/min": spread < 0.1}
+    claims = {
+        "lightly damped, it swings as much within a tenth from 10 to 100 mm/min": spread < 0.1
+    }
     if not quick:
         stiff = {v for v, (Z, _) in zip(last, wires, strict=True) if Z <= 100}
         claims |= {
             "sticks and slips up to 110 ... 180 mm/min": (min(last), max(last)) == (110, 180),
             "up to 120 or 130 for Z up to 100 N s/m": stiff == {120, 130},
-            "with one wire it does not stop at 10 mm/min": swings[:, 0].sum() == len(wires) - 1,
             "the error is 4 ... 9 %": 4 < error.min() < error.max() < 9.5,
             "means are 0.76 to 1.18 of the curve": (
                 np.allclose([share.min(), share.max()], [0.76, 1.18], atol=0.005)

@@ -21,7 +21,7 @@ bristles 10 or 100 times as stiff as the wire.
 
 Undecided: the nearly linear fall of the amplitude (figure 5.7), and the spread that grows towards
 rest (figure 6.5). Under the pilot study's curve the amplitude is the same within a tenth from 10 to
-100 mm/min, or the sled does not stop at 10. Points and runs (figures 5.1, 5.4, 6.4) are not given.
+100 mm/min, damping ratio up to 0.2. Points and runs (figures 5.1, 5.4, 6.4) are not given.
 """
 
 import numpy as np
