@@ -159,7 +159,8 @@ class Search:
         self.memory, self.tolerance = eventful.memory, eventful.tolerance
         self._before = self.memory[Memory.before(self.crossings.count)]
         functions = map(_called, self.crossings.functions)
-        self._looks, self._noise, self._doubts, self._values, self._cut, self._jump = functions
+        self._looks, self._noise, _, self._values, self._cut, self._jump = functions
+        self._doubts = _called(self.crossings.doubts)
         self._directions = np.array(self.crossings.directions)
 
     def __call__(self, row: Array, S: Array, R: Array) -> tuple[Change, Happened]:
@@ -232,10 +233,12 @@ class Search:
             low = min(SOON * self.tolerance / h, 0.1)
             g[0] = self._inside(row, d, low)
             jumped = passed(self._before, g[0], self._directions) & (g[0] != 0)
-        found = self._looks(np.array([low]), g[0], row, d)
-        g[1:], doubts = (a.reshape(-1, count) for a in found)
-        doubted = partial(self._doubted, self._noise(row, d)[0] if doubts.any() else doubts[0])
-        doubts = doubted(g) if doubts.any() else doubts
+        g[1:] = self._looks(np.array([low]), row, d)[0].reshape(-1, count)
+        doubted = partial(self._doubted, np.zeros(count))
+        doubts = doubted(g)
+        if doubts.any():
+            doubted = partial(self._doubted, self._noise(row, d)[0])
+            doubts = doubted(g)
         inside = partial(self._inside, row, d)
         found = Isolation(inside, doubted, self._directions, self.tolerance / h)
         found.roots[jumped] = 0.0
