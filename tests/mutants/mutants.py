@@ -110,7 +110,7 @@ EVENT = (
     ),
     Mutant(
         "no piece of a step is in doubt", ISOLATION,
-        "suspects = (doubts != 0) & long", "suspects = (doubts < 0) & long", T_ISOLATION,
+        "suspects, sure = doubts != 0,", "suspects, sure = doubts < 0,", T_ISOLATION,
     ),
     Mutant(
         "no piece of a step is in doubt in compiled code", SEARCH,

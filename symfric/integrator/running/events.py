@@ -162,6 +162,7 @@ class Search:
         self._looks, self._noise, _, self._values, self._cut, self._jump = functions
         self._doubts = _called(self.crossings.doubts)
         self._directions = np.array(self.crossings.directions)
+        self._none = np.zeros(self.crossings.count)
 
     def __call__(self, row: Array, S: Array, R: Array) -> tuple[Change, Happened]:
         """Look for events in the accepted step `row`, which led to S.
@@ -234,17 +235,15 @@ class Search:
             g[0] = self._inside(row, d, low)
             jumped = passed(self._before, g[0], self._directions) & (g[0] != 0)
         g[1:] = self._looks(np.array([low]), row, d)[0].reshape(-1, count)
-        doubted = partial(self._doubted, np.zeros(count))
-        doubts = doubted(g)
-        if doubts.any():
-            doubted = partial(self._doubted, self._noise(row, d)[0])
-            doubts = doubted(g)
-        inside = partial(self._inside, row, d)
-        found = Isolation(inside, doubted, self._directions, self.tolerance / h)
-        found.roots[jumped] = 0.0
-        theta = found.first([low + s * (1 - low) for s in LOOKS], g, doubts)
-        if theta <= 1:
-            return theta, (found.roots - theta) * h <= self.tolerance
+        doubts = self._doubted(self._none, g)
+        if doubts.any() or passed(g[:-1], g[1:], self._directions).any() or jumped.any():
+            noise = self._noise(row, d)[0] if doubts.any() else self._none
+            doubted, inside = partial(self._doubted, noise), partial(self._inside, row, d)
+            found = Isolation(inside, doubted, self._directions, self.tolerance / h)
+            found.roots[jumped] = 0.0
+            theta = found.first([low + s * (1 - low) for s in LOOKS], g, doubted(g))
+            if theta <= 1:
+                return theta, (found.roots - theta) * h <= self.tolerance
         self._before[:] = g[-1]
         memory[Memory.PHASE] = Memory.ON
         return None
