@@ -110,12 +110,15 @@ EVENT = (
     ),
     Mutant(
         "no piece of a step is in doubt", ISOLATION,
-        "suspects = (doubts != 0) & long", "suspects = (doubts < 0) & long", T_ISOLATION,
+        "suspects, sure = doubts != 0,", "suspects, sure = doubts < 0,", T_ISOLATION,
     ),
     Mutant(
         "no piece of a step is in doubt in compiled code", SEARCH,
-        "suspects[k][i] = doubts[k * EVENTS + i] != 0", "suspects[k][i] = f->left > 64",
-        T_ISOLATION,
+        "suspects[k][event] = doubts[k] != 0", "suspects[k][event] = f->left > 64", T_ISOLATION,
+    ),
+    Mutant(
+        "compiled code takes bent pieces for straight ones", CROSSINGS,
+        "STRAIGHT = 3.01", "STRAIGHT = 0.1", T_ISOLATION,
     ),
     Mutant(
         "outer pieces are never in doubt", CROSSINGS,

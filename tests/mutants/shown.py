@@ -6,6 +6,7 @@ BELT = "symfric/gallery/belt.py"
 MACHINES = "symfric/gallery/self_tuning/_machines.py"
 ORACLE = "symfric/gallery/self_tuning/_oracle.py"
 PLATE = "symfric/gallery/plate.py"
+SLED = "symfric/gallery/laminator_nips/_sled.py"
 RENDERING = "symfric/gallery/rendering.py"
 T_HAND = ("tests/symfric/gallery/test_answers_by_hand.py",)
 T_FIGURES = ("tests/symfric/gallery/test_plates.py",)
@@ -25,6 +26,20 @@ SHOWN = (
         BELT,
         "at = self.F_S / self.k if sticks",
         "at = self.F_C / self.k if sticks",
+        T_HAND,
+    ),
+    Mutant(
+        "a slack wire pushes",
+        SLED,
+        "np.maximum(spring + d * (V - w), 0.0)",
+        "spring + d * (V - w)",
+        T_HAND,
+    ),
+    Mutant(
+        "the sled rests half as long",
+        SLED,
+        "rest = np.linspace(0.0, (begin - spring[-1]) / (Z * V), 4001)",
+        "rest = np.linspace(0.0, (begin - spring[-1]) / (2 * Z * V), 4001)",
         T_HAND,
     ),
     Mutant(

@@ -30,6 +30,9 @@ FINER = 64
 """Pieces of a step that are cut, at most: more than two crossings an event tolerance apart take."""
 ROUNDING = 64 * float(np.finfo(float).eps)
 """Bends of an expression below this part of its terms are rounding: no sign there is a crossing."""
+STRAIGHT = 3.01
+"""Values above so many times all bends at five places leave no doubt: 3 by the formulas, and some
+for rounding. Compiled code tests that first."""
 SHARPER = 1e-3
 """Events are located to this part of the tolerance: a ball whose impacts are all late gains by it,
 and where it loses little by them it would bounce for ever."""
@@ -84,11 +87,12 @@ class Crossings:
     """The events of a model on one accepted step, a record row (t0, t1, y0, y1, D).
 
     Attributes:
-        looks: (low, values there, row, d) -> their values at `LOOKS` between low and 1, one look
-            after the other, and of each piece whether it is in doubt.
+        looks: (low, row, d) -> their values at `LOOKS` between low and 1, but for the first, one
+            look after the other.
         noise: (row, d) -> what rounding leaves of each in the step.
         doubts: (values at five places, one place after the other, noise) -> of each piece between
             them, whether it is in doubt.
+        doubt: the same of one event.
         values: (theta, row, d) -> their values within the step.
         cut: (theta, row) -> the row up to there, the same polynomial.
         jump: (row, d) -> their values at its end, and all resets from there.
@@ -102,6 +106,7 @@ class Crossings:
     looks: ca.Function
     noise: ca.Function
     doubts: ca.Function
+    doubt: ca.Function
     values: ca.Function
     cut: ca.Function
     jump: ca.Function
@@ -130,7 +135,7 @@ class Crossings:
     @property
     def functions(self) -> tuple[ca.Function, ...]:
         """What the compiled search calls."""
-        return self.looks, self.noise, self.doubts, self.values, self.cut, self.jump
+        return self.looks, self.noise, self.doubt, self.values, self.cut, self.jump
 
 
 def crossings(
@@ -160,18 +165,13 @@ def crossings(
     end = row[at.T1], row[at.y1]
     low = ca.SX.sym("low")
     looks = [_place(at, row, low + s * (1 - low)) if s < 1 else end for s in LOOKS[1:]]
-    first, five = (ca.SX.sym("values", n * len(events)) for n in (1, len(LOOKS)))
-    noise, level = ca.SX.sym("noise", len(events)), ROUNDING * sizes(*end, d)
-    found = [expressions(*look, d) for look in looks]
+    level = ROUNDING * sizes(*end, d)
     states = list(states)
     return Crossings(
-        _function(
-            "looks",
-            [low, first, row, d],
-            [ca.vertcat(*found), _doubts([first, *found])],
-        ),
+        _function("looks", [low, row, d], [ca.vertcat(*(expressions(*look, d) for look in looks))]),
         _function("noise", [row, d], [ca.if_else(level < inf, level, 0)]),
-        _function("doubts", [five, noise], [_doubts(ca.vertsplit(five, len(events)), noise)]),
+        _doubtful("doubts", len(events)),
+        _doubtful("doubt", 1),
         _function("values", [theta, row, d], [expressions(*_inside(at, row, theta), d)]),
         cutting(at),
         _function("jump", [row, d], [expressions(*end, d), resets(*end, d)]),
@@ -189,25 +189,28 @@ def _function(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Fun
     return ca.Function(f"symfric_{name}", arguments, dense, {"cse": True})
 
 
-def _doubts(values: Sequence[ca.SX], noise: Any = 0.0) -> ca.SX:
+def _doubtful(name: str, count: int) -> ca.Function:
     """Of each piece between five values, whether events may have more roots than their signs say.
 
     An expression is off its chord by at most S x (1 - x), 0 <= x <= 1, on inner pieces, and by
     S (1 - x) from an outer end, if it is a polynomial of degree 4, or a line with one corner. On
     inner pieces S is the sum of the second differences at their ends and an eighth of the third
     one, on outer ones it bounds half the second derivative. Where it is above that, it has one
-    sign, or rises or falls throughout. A bend below `noise` is rounding.
+    sign, or rises or falls throughout. A bend below the noise is rounding.
     """
+    five, noise = ca.SX.sym("values", len(LOOKS) * count), ca.SX.sym("noise", count)
+    values = ca.vertsplit(five, count)
     a, b, c = (x - 2 * y + z for x, y, z in zip(values, values[1:], values[2:], strict=False))
     bows, sizes = [ca.fabs(x) for x in (a, b, c)], [ca.fabs(x) for x in values]
     first = 0.75 * (ca.fabs(3 * (a - b) + c) + bows[0]) + bows[1] / 8
     last = 0.75 * (ca.fabs(3 * (c - b) + a) + bows[2]) + bows[1] / 8
-    return ca.vertcat(
+    doubts = ca.vertcat(
         sizes[0] < first - noise,
         sizes[1] + sizes[2] < bows[0] + bows[1] + bows[2] / 8 - noise,
         sizes[2] + sizes[3] < bows[0] / 8 + bows[1] + bows[2] - noise,
         sizes[4] < last - noise,
     )
+    return _function(name, [five, noise], [doubts])
 
 
 def _place(at: Record, row: ca.SX, theta: Any) -> tuple[ca.SX, ca.SX]:

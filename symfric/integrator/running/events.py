@@ -159,8 +159,10 @@ class Search:
         self.memory, self.tolerance = eventful.memory, eventful.tolerance
         self._before = self.memory[Memory.before(self.crossings.count)]
         functions = map(_called, self.crossings.functions)
-        self._looks, self._noise, self._doubts, self._values, self._cut, self._jump = functions
+        self._looks, self._noise, _, self._values, self._cut, self._jump = functions
+        self._doubts = _called(self.crossings.doubts)
         self._directions = np.array(self.crossings.directions)
+        self._none = np.zeros(self.crossings.count)
 
     def __call__(self, row: Array, S: Array, R: Array) -> tuple[Change, Happened]:
         """Look for events in the accepted step `row`, which led to S.
@@ -232,16 +234,16 @@ class Search:
             low = min(SOON * self.tolerance / h, 0.1)
             g[0] = self._inside(row, d, low)
             jumped = passed(self._before, g[0], self._directions) & (g[0] != 0)
-        found = self._looks(np.array([low]), g[0], row, d)
-        g[1:], doubts = (a.reshape(-1, count) for a in found)
-        doubted = partial(self._doubted, self._noise(row, d)[0] if doubts.any() else doubts[0])
-        doubts = doubted(g) if doubts.any() else doubts
-        inside = partial(self._inside, row, d)
-        found = Isolation(inside, doubted, self._directions, self.tolerance / h)
-        found.roots[jumped] = 0.0
-        theta = found.first([low + s * (1 - low) for s in LOOKS], g, doubts)
-        if theta <= 1:
-            return theta, (found.roots - theta) * h <= self.tolerance
+        g[1:] = self._looks(np.array([low]), row, d)[0].reshape(-1, count)
+        doubts = self._doubted(self._none, g)
+        if doubts.any() or passed(g[:-1], g[1:], self._directions).any() or jumped.any():
+            noise = self._noise(row, d)[0] if doubts.any() else self._none
+            doubted, inside = partial(self._doubted, noise), partial(self._inside, row, d)
+            found = Isolation(inside, doubted, self._directions, self.tolerance / h)
+            found.roots[jumped] = 0.0
+            theta = found.first([low + s * (1 - low) for s in LOOKS], g, doubted(g))
+            if theta <= 1:
+                return theta, (found.roots - theta) * h <= self.tolerance
         self._before[:] = g[-1]
         memory[Memory.PHASE] = Memory.ON
         return None

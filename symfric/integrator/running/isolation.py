@@ -49,16 +49,21 @@ class Isolation:
         event does not do so before it, or piece by piece where there is none, or it is its own.
         """
         hits = passed(g[:-1], g[1:], self.directions) & (self.roots > at[0])
-        long = np.diff(at)[:, None] > max(self.tolerance, LEAST)
-        suspects = (doubts != 0) & long & (self.left > 0)
-        sure = float(self.roots.min())
-        for k in np.flatnonzero((hits & ~suspects).any(axis=1)).tolist():
+        suspects, sure = doubts != 0, float(self.roots.min())
+        doubtful = bool(suspects.any())
+        if doubtful:
+            long = np.diff(at)[:, None] > max(self.tolerance, LEAST)
+            suspects &= long & (self.left > 0)
+        for k in np.flatnonzero((hits & ~suspects).any(axis=1)).tolist() if hits.any() else ():
             if at[k] < sure:
                 sure = self._sure((at[k], at[k + 1]), g[k : k + 2], hits[k] & ~suspects[k])
-        others = suspects & (self.roots > 1) & (np.array(at[:-1]) < sure)[:, None]
-        if sure <= at[-1] and others.any():
-            suspects &= ~others
-            sure = self._again(at[0], sure - self._share, g[0], np.any(others, axis=0))
+        if not doubtful:
+            return sure
+        if sure <= at[-1]:
+            others = suspects & (self.roots > 1) & (np.array(at[:-1]) < sure)[:, None]
+            if others.any():
+                suspects &= ~others
+                sure = self._again(at[0], sure - self._share, g[0], np.any(others, axis=0))
         for k in np.flatnonzero(suspects.any(axis=1)).tolist():
             if at[k] >= sure:
                 break

@@ -13,6 +13,7 @@ from symfric.integrator.running.crossings import (
     RESTART,
     SHARPER,
     SOON,
+    STRAIGHT,
     Crossings,
 )
 from symfric.integrator.step.layout import GROWTH_MEMORY, Given, State
@@ -44,6 +45,7 @@ def search_source(crossings: Crossings | None, given: int) -> str:
         finer=FINER,
         sharper=repr(SHARPER),
         soon=repr(SOON),
+        straight=repr(STRAIGHT),
         restart=repr(RESTART),
         least=repr(LEAST),
         sure=repr(SURE),
@@ -68,6 +70,7 @@ enum { EVENTS = $events, LOOKS = $looks, RESETS = $resets, UNKNOWNS = $n, KEPT =
 enum { PHASE, TOLERANCE, COUNT, ALIKE, RESUME, TIMES };
 enum { BEFORE = TIMES + KEPT, LAST = BEFORE + EVENTS };
 enum { FRESH, JUMPED, ON };
+enum { HITS = 1, DOUBTS = 2 };
 enum { NOTHING, RESUMED, CUT, DROPPED };
 static const double symfric_look_at[] = { $at_looks };
 static const int symfric_directions[] = { $directions };
@@ -125,65 +128,105 @@ static double symfric_locate(const symfric_place *p, int event, double a, double
   return b;
 }
 
-/* What was found of the first roots in a step, beyond 1 where none is, the noise of the events, the
-   event tolerance as a part of the step, and how many pieces may still be cut. */
-typedef struct { double root[EVENTS], noise[EVENTS], tolerance; int left; } symfric_found;
+/* What was found of the first roots in a step, beyond 1 where none is, the noise of the events once
+   it is known, the event tolerance as a part of the step, and how many pieces may still be cut. */
+typedef struct { double root[EVENTS], noise[EVENTS], tolerance; int known, left; } symfric_found;
 
-static double symfric_first(const symfric_place *p, symfric_found *f, const double *at,
-                            const double *g, const double *doubts);
-
-/* Of each piece between values at five places, whether events are in doubt there. */
-static void symfric_doubted(const symfric_place *p, const symfric_found *f, const double *g,
-                            double *doubts)
+/* HITS and DOUBTS of one event between five places; pieces in doubt, if `wanted`, are suspects. */
+static int symfric_examined(const symfric_place *p, symfric_found *f, const double *g, int event,
+                            int wanted, int (*suspects)[EVENTS])
 {
   const double *arg[$arg];
-  double *res[$res];
-  arg[0] = g;
-  arg[1] = f->noise;
-  res[0] = doubts;
-  symfric_doubts(arg, res, p->iw, p->w, 0);
+  double *res[$res], five[LOOKS + 1], doubts[LOOKS], none = 0;
+  int k, again = 0, found = 0;
+  for (k = 0; k <= LOOKS; ++k) five[k] = g[k * EVENTS + event];
+  for (k = 0; k < LOOKS; ++k)
+    if (symfric_passed(five[k], five[k + 1], symfric_directions[event])) found |= HITS;
+  while (wanted) {
+    arg[0] = five;
+    arg[1] = f->known ? f->noise + event : &none;
+    res[0] = doubts;
+    symfric_doubt(arg, res, p->iw, p->w, 0);
+    for (k = 0, wanted = 0; k < LOOKS; ++k) wanted |= doubts[k] != 0;
+    if (!wanted || f->known) break;
+    arg[0] = p->row;
+    arg[1] = p->d;
+    res[0] = f->noise;
+    symfric_noise(arg, res, p->iw, p->w, 0);
+    f->known = 1;
+  }
+  for (k = 0; k < LOOKS && wanted; ++k) suspects[k][event] = doubts[k] != 0;
+  return wanted ? found | DOUBTS : found;
 }
+
+/* The same of all events; those whose bends are small beside their values are neither in doubt nor
+   pass zero more than once (STRAIGHT). All is wanted where `wanted` is 0. */
+static int symfric_scanned(const symfric_place *p, symfric_found *f, const double *g,
+                           const int *wanted, int (*suspects)[EVENTS])
+{
+  int busy[EVENTS], i, k, found = 0;
+  for (i = 0; i < EVENTS; ++i) {
+    const double v0 = g[i], v1 = g[EVENTS + i], v2 = g[2 * EVENTS + i], v3 = g[3 * EVENTS + i];
+    const double v4 = g[4 * EVENTS + i];
+    double least = fabs(v0);
+    least = fabs(v1) < least ? fabs(v1) : least;
+    least = fabs(v2) < least ? fabs(v2) : least;
+    least = fabs(v3) < least ? fabs(v3) : least;
+    least = fabs(v4) < least ? fabs(v4) : least;
+    busy[i] = !(least >= $straight * (fabs(v0 - 2 * v1 + v2) + fabs(v1 - 2 * v2 + v3)
+                                 + fabs(v2 - 2 * v3 + v4)))
+              || symfric_passed(v0, v4, symfric_directions[i]);
+    found |= busy[i];
+  }
+  if (!found) return 0;
+  for (i = found = 0; i < EVENTS; ++i) {
+    for (k = 0; k < LOOKS; ++k) suspects[k][i] = 0;
+    if (busy[i]) found |= symfric_examined(p, f, g, i, !wanted || wanted[i], suspects);
+  }
+  return found;
+}
+
+static double symfric_first(const symfric_place *p, symfric_found *f, const double *at,
+                            const double *g, int found, int (*suspects)[EVENTS]);
 
 /* As symfric_first, from a to b, with values of which the first ones are there, where some events
    are in doubt. */
 static double symfric_again(const symfric_place *p, symfric_found *f, double a, double b, double *g,
-                            const int *suspects)
+                            const int *wanted)
 {
-  double doubts[LOOKS * EVENTS], at[LOOKS + 1];
-  int i, k;
+  double at[LOOKS + 1];
+  int suspects[LOOKS][EVENTS], k;
   --f->left;
   if (b < a) b = a;
   for (k = 0; k <= LOOKS; ++k) at[k] = a + symfric_look_at[k] * (b - a);
   for (k = 1; k <= LOOKS; ++k) symfric_within(p, at[k], g + k * EVENTS);
-  symfric_doubted(p, f, g, doubts);
-  for (k = 0; k < LOOKS; ++k)
-    for (i = 0; i < EVENTS; ++i)
-      if (!suspects[i]) doubts[k * EVENTS + i] = 0;
-  return symfric_first(p, f, at, g, doubts);
+  return symfric_first(p, f, at, g, symfric_scanned(p, f, g, wanted, suspects), suspects);
 }
 
 /* The first of all roots between the places `at` with values g, or one behind them. What is in
    doubt is looked at again before the first sure root, since what jumps with that event does not do
    so before it, or piece by piece where there is none, or it is its own. */
 static double symfric_first(const symfric_place *p, symfric_found *f, const double *at,
-                            const double *g, const double *doubts)
+                            const double *g, int found, int (*suspects)[EVENTS])
 {
-  double again[(LOOKS + 1) * EVENTS], sure = 2, share = $sharper * f->tolerance, found;
+  double again[(LOOKS + 1) * EVENTS], sure = 2, share = $sharper * f->tolerance, root;
   double width = f->tolerance < 1e-15 ? 1e-15 : f->tolerance;
-  int suspects[LOOKS][EVENTS], others[EVENTS], i, k, some = 0;
+  int others[EVENTS], i, k, some = 0;
   if (share < 1e-15) share = 1e-15;
   for (i = 0; i < EVENTS; ++i)
     if (f->root[i] < sure) sure = f->root[i];
-  for (k = 0; k < LOOKS; ++k) {
+  for (k = 0; k < LOOKS && found; ++k) {
     const double *g0 = g + k * EVENTS, *g1 = g0 + EVENTS, before = sure;
+    const int more = at[k + 1] - at[k] > width && f->left > 0;
     for (i = 0; i < EVENTS; ++i) {
-      suspects[k][i] = doubts[k * EVENTS + i] != 0 && at[k + 1] - at[k] > width && f->left > 0;
+      suspects[k][i] &= more;
       if (suspects[k][i] || at[k] >= before || f->root[i] <= at[0]) continue;
       if (symfric_passed(g0[i], g1[i], symfric_directions[i]))
         f->root[i] = symfric_locate(p, i, at[k], at[k + 1], g0[i], g1[i], share);
       if (f->root[i] < sure) sure = f->root[i];
     }
   }
+  if (!(found & DOUBTS)) return sure;
   for (i = 0; i < EVENTS; ++i) {
     others[i] = 0;
     again[i] = g[i];
@@ -200,8 +243,8 @@ static double symfric_first(const symfric_place *p, symfric_found *f, const doub
       some += suspects[k][i];
     }
     if (!some) continue;
-    found = symfric_again(p, f, at[k], at[k + 1], again, suspects[k]);
-    if (found <= at[k + 1]) return found;
+    root = symfric_again(p, f, at[k], at[k + 1], again, suspects[k]);
+    if (root <= at[k + 1]) return root;
   }
   for (i = 0; i < EVENTS; ++i)
     if (f->root[i] < sure) sure = f->root[i];
@@ -213,10 +256,11 @@ static double symfric_crossing(const symfric_place *p, double *M, double *which)
 {
   const double *arg[$arg];
   double *res[$res];
-  double g[(LOOKS + 1) * EVENTS], doubts[LOOKS * EVENTS], at[LOOKS + 1], low = 0, first;
+  double g[(LOOKS + 1) * EVENTS], at[LOOKS + 1], low = 0, first = 2;
   double h = p->row[1] - p->row[0];
   symfric_found f;
-  int i, doubtful = 0, busy = 0;
+  int suspects[LOOKS][EVENTS], i, found, jumped = 0;
+  f.known = 0;
   f.left = $finer;
   f.tolerance = M[TOLERANCE] / h;
   for (i = 0; i < EVENTS; ++i) f.root[i] = 2;
@@ -231,29 +275,19 @@ static double symfric_crossing(const symfric_place *p, double *M, double *which)
     for (i = 0; i < EVENTS; ++i)
       if (symfric_passed(M[BEFORE + i], g[i], symfric_directions[i]) && g[i] != 0) {
         f.root[i] = 0;
-        busy = 1;
+        jumped = 1;
       }
   }
   arg[0] = &low;
-  arg[1] = g;
-  arg[2] = p->row;
-  arg[3] = p->d;
+  arg[1] = p->row;
+  arg[2] = p->d;
   res[0] = g + EVENTS;
-  res[1] = doubts;
   symfric_looks(arg, res, p->iw, p->w, 0);
-  for (i = 0; i < LOOKS * EVENTS; ++i) {
-    doubtful |= doubts[i] != 0;
-    busy |= ((g[i] < 0) != (g[i + EVENTS] < 0)) | (g[i + EVENTS] == 0);
+  found = symfric_scanned(p, &f, g, 0, suspects);
+  if (found || jumped) {
+    for (i = 0; i <= LOOKS; ++i) at[i] = low + symfric_look_at[i] * (1 - low);
+    first = symfric_first(p, &f, at, g, found, suspects);
   }
-  if (doubtful) {
-    arg[0] = p->row;
-    arg[1] = p->d;
-    res[0] = f.noise;
-    symfric_noise(arg, res, p->iw, p->w, 0);
-    symfric_doubted(p, &f, g, doubts);
-  }
-  for (i = 0; i <= LOOKS; ++i) at[i] = low + symfric_look_at[i] * (1 - low);
-  first = busy || doubtful ? symfric_first(p, &f, at, g, doubts) : 2;
   if (first <= 1) {
     for (i = 0; i < EVENTS; ++i)
       which[i] = f.root[i] <= 1 && (f.root[i] - first) * h <= M[TOLERANCE];

@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 from oracles import rabinowicz_coulomb, rabinowicz_motion
 from scipy.integrate import solve_ivp
 
+from symfric import SteadyStateLuGre
 from symfric.gallery.belt import Belt
+from symfric.gallery.laminator_nips import _sled
 from symfric.gallery.self_tuning import _machines as machines
 from symfric.gallery.self_tuning._oracle import fixed_steps, solve
 
@@ -56,3 +58,28 @@ def test_fixed_steps_are_of_order_four() -> None:
     exact = solve(machine, np.array([0.0, 0.02]))["crank"][-1]
     coarse, fine = (abs(fixed_steps(machine, h, 0.02)["crank"][-1] - exact) for h in (4e-3, 2e-3))
     assert coarse / fine == pytest.approx(16, rel=0.1)
+
+
+def test_the_sled_under_coulomb_friction_is_the_block_on_the_belt(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A curve that falls at once from 4 N to 3 N: amplitude and mean are those of `Belt`."""
+    jump = SteadyStateLuGre(F_S=4.0, F_C=3.0, v_s=1e-11, sigma_2=0.0)
+    monkeypatch.setitem(_sled.PRINTED, "jump", jump)
+    Z, speed = 50.0, 600.0
+    (amplitude,), (mean,) = _sled.swept("jump", (Z, 0.0), np.array([speed]))
+    belt = Belt(m=1.0, k=Z**2, v_belt=speed / 60e3, F_S=4.0, F_C=3.0)
+    times = np.linspace(0.0, 1.0, 100001)
+    force = Z**2 * belt.motion(times)["x"]
+    first, last = (belt.leaves[k] for k in (1, -2))
+    whole = (times >= first) & (times <= last)
+    assert amplitude == pytest.approx(2 * np.hypot(1.0, Z * speed / 60e3), rel=1e-5)
+    assert amplitude == pytest.approx(np.ptp(force[whole]), rel=1e-5)
+    assert mean == pytest.approx(np.mean(force[whole]), rel=1e-4)
+
+
+def test_a_slack_wire_does_not_push() -> None:
+    """A heavy sled under the main study's curve overtakes the wire."""
+    _, force = _sled.cycle("main", (300.0, 0.0), 500 / 60e3)
+    assert force.min() == 0.0
+    assert np.mean(force == 0.0) > 0.1

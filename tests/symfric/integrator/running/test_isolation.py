@@ -10,6 +10,7 @@ from oracles import damped_block_events
 from symfric import Event, ExactCoulomb, Model, Variable, rabinowicz, simulate
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import ADAPTIVE
+from symfric.integrator.running.crossings import STRAIGHT
 from symfric.integrator.running.integrator import Integrator
 
 x, c, w = Variable("x", "1"), Variable("c", "1"), Variable("w", "1")
@@ -42,6 +43,17 @@ def test_dips_of_any_width_are_seen(backend: str) -> None:
                 found = crossings(dip, at, width, backend)
                 assert found == pytest.approx([at - width, at + width], abs=2e-10)
         assert crossings(clock(sign * ((X - C) ** 2 + W)), 0.4321, 1e-12, backend) == []
+
+
+@each_backend
+def test_dips_of_flat_polynomials_are_seen(backend: str) -> None:
+    """A pair of roots in degree 4 with small bends beside the least of values at five places."""
+    at, width = 0.283, 1e-4
+    for sign in (1, -1):
+        flat = clock(sign * ((X - C) ** 2 * ((X - 1.106) ** 2 + 0.235) - W**2))
+        half = width / np.sqrt((at - 1.106) ** 2 + 0.235)
+        found = crossings(flat, at, width, backend)
+        assert found == pytest.approx([at - half, at + half], abs=1e-7)
 
 
 @each_backend
@@ -99,6 +111,25 @@ def test_a_piece_that_is_not_in_doubt_has_the_roots_that_its_ends_show() -> None
         assert (changes.sum(axis=1) == ends)[~doubt].all()
         assert (changes.sum(axis=1) > ends).any()
         assert doubt.mean() < 0.7
+
+
+def test_values_far_above_their_bends_are_not_in_doubt() -> None:
+    """And pass zero once at most: compiled code does not look at them any further."""
+    model = clock(X)
+    found = Integrator(model, input_data(model, None, 0.0, 1.0), ADAPTIVE["rodas5p"]).crossings
+    assert found is not None
+    rng = np.random.default_rng(4)
+    bends = rng.standard_normal((3, 9000)) * 10 ** rng.uniform(-3, 0, (3, 9000))
+    start, slope = rng.standard_normal((2, 9000))
+    lines = start + np.arange(5)[:, None] * slope
+    g = lines + np.vstack([np.zeros((2, 9000)), bends.cumsum(axis=0).cumsum(axis=0)])
+    least, most = np.abs(g).min(axis=0), np.abs(np.diff(g, 2, axis=0)).sum(axis=0)
+    doubt = found.doubt(g, 0.0).full().any(axis=0)
+    straight = least >= STRAIGHT * most
+    assert 1000 < straight.sum() < 8000
+    assert not doubt[straight].any()
+    assert doubt[~straight & (least >= 0.8 * STRAIGHT * most)].any()
+    assert (np.diff(np.sign(g[:, straight]), axis=0) != 0).sum(axis=0).max() == 1
 
 
 def test_the_earlier_of_two_events_happens_first() -> None:
