@@ -138,7 +138,7 @@ static int symfric_examined(const symfric_place *p, symfric_found *f, const doub
 {
   const double *arg[$arg];
   double *res[$res], five[LOOKS + 1], doubts[LOOKS], none = 0;
-  int k, again = 0, found = 0;
+  int k, found = 0;
   for (k = 0; k <= LOOKS; ++k) five[k] = g[k * EVENTS + event];
   for (k = 0; k < LOOKS; ++k)
     if (symfric_passed(five[k], five[k + 1], symfric_directions[event])) found |= HITS;
