@@ -129,7 +129,8 @@ def plate_of(
         numbers: what the verdicts stand on.
         claims: sentence -> whether the numbers bear it out. At reduced size these sentences are
             all that is said; a plate whose text is untrue is not drawn.
-        within: the largest distance of a figure that is computed again.
+        within: the largest distance of a figure that is computed again; for the error of two
+            integrations four times what one machine gave, since steps depend on rounding.
         quick: whether it is computed at reduced size.
 
     Raises:

@@ -58,7 +58,7 @@ def plate(quick: bool = False) -> Plate:
         numbers[f"body at the end of stage {stage}, {height:g} m in the paper [m]"] = float(
             np.interp(end, run.t, run["X_b"])
         )
-    return plate_of(__name__, figure, far, "m", numbers, claims, within=5e-10, quick=quick)
+    return plate_of(__name__, figure, far, "m", numbers, claims, within=2e-9, quick=quick)
 
 
 def peaks(t: np.ndarray, x: np.ndarray) -> np.ndarray:

@@ -68,7 +68,7 @@ def plate(quick: bool = False) -> Plate:
     )
     claims["they are within 40 % of each other for ratios from 0.3 to 0.9"] = max(apart) < 0.4
     far = max(errors)
-    return plate_of(__name__, figure, far, "1", numbers, claims, within=1e-10, quick=quick)
+    return plate_of(__name__, figure, far, "1", numbers, claims, within=3e-10, quick=quick)
 
 
 def ratio_of_largest(ratio: float) -> float:

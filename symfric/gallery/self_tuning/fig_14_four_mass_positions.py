@@ -48,5 +48,5 @@ def plate(quick: bool = False) -> Plate:
         "laws are within 18 mm": most < 0.0185,
     }
     figure = picture("", "position [m]", t_end)
-    far, within = distance("", t_end), 3e-9
+    far, within = distance("", t_end), 1e-8
     return plate_of(__name__, figure, far, "m", numbers, claims, within=within, quick=quick)

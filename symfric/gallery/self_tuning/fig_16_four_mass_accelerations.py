@@ -53,5 +53,5 @@ def plate(quick: bool = False) -> Plate:
             abs(total / totals[LAWS[1]][1] - 1) < 0.05 for total in (*swept, own)
         )
     figure = picture("''", "acceleration [m/s²]", t_end)
-    far, within = distance("''", t_end), 1e-8 if quick else 1.5e-5
+    far, within = distance("''", t_end), 4e-8 if quick else 4e-5
     return plate_of(__name__, figure, far, "m/s^2", numbers, claims, within=within, quick=quick)

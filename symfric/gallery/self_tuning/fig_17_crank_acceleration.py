@@ -34,5 +34,5 @@ def plate(quick: bool = False) -> Plate:
         "constraints hold": numbers["largest norm of the constraints [m]"] < 1e-7,
     }
     figure = picture("crank''", "crank acceleration\n[rad/s²]", t_end)
-    far, within = distance("crank''", t_end), 2e-6 if quick else 6e-5
+    far, within = distance("crank''", t_end), 6e-6 if quick else 1.5e-4
     return plate_of(__name__, figure, far, "rad/s^2", numbers, claims, within=within, quick=quick)

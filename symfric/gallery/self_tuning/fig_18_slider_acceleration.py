@@ -21,5 +21,5 @@ def plate(quick: bool = False) -> Plate:
     apart_by, greatest = numbers.values()
     claims = {"the laws overlap within 0.2 %": apart_by < 2e-3 * greatest}
     figure = picture("slider''", "slider acceleration\n[m/s²]", t_end)
-    far, within = distance("slider''", t_end), 1e-6 if quick else 4e-5
+    far, within = distance("slider''", t_end), 4e-6 if quick else 1e-4
     return plate_of(__name__, figure, far, "m/s^2", numbers, claims, within=within, quick=quick)

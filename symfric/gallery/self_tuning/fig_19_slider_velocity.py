@@ -27,5 +27,5 @@ def plate(quick: bool = False) -> Plate:
     _, early, late = numbers.values()
     claims = {"they drift apart": late > 2 * early}
     figure = picture("slider'", "slider velocity\n[m/s]", t_end, "m")
-    far, within = distance("slider'", t_end), 1e-8 if quick else 5e-7
+    far, within = distance("slider'", t_end), 4e-8 if quick else 1.5e-6
     return plate_of(__name__, figure, far, "m/s", numbers, claims, within=within, quick=quick)

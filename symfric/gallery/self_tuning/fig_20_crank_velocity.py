@@ -41,5 +41,5 @@ def plate(quick: bool = False) -> Plate:
         "they take the same energy within 0.1 %": abs(lost[0] / lost[1] - 1) < 1e-3,
     }
     figure = picture("crank'", "crank velocity\n[rad/s]", t_end, "m")
-    far, within = distance("crank'", t_end), 8e-8 if quick else 1e-6
+    far, within = distance("crank'", t_end), 3e-7 if quick else 4e-6
     return plate_of(__name__, figure, far, "rad/s", numbers, claims, within=within, quick=quick)

@@ -32,5 +32,5 @@ def plate(quick: bool = False) -> Plate:
         ),
     }
     figure = picture("slider", "slider position\n[m]", t_end, "µ")
-    far, within = distance("slider", t_end), 1e-10 if quick else 4e-9
+    far, within = distance("slider", t_end), 4e-10 if quick else 1.2e-8
     return plate_of(__name__, figure, far, "m", numbers, claims, within=within, quick=quick)
