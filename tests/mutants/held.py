@@ -114,6 +114,10 @@ HELD = (
         ("tests/symfric/laws/composed/test_normalised.py",),
     ),
     Mutant(
+        "friction that adds energy is not said", "symfric/integrator/running/gains.py",
+        "steady[worst] * slip[worst] < 0", "steady[worst] * slip[worst] > 0", T_DOUBTS,
+    ),
+    Mutant(
         "what a bristle carries beyond its level is not said", DOUBTS,
         "if held.fixed and most <= 1 + MARGIN:", "if held.fixed:", T_DOUBTS,
     ),
