@@ -81,15 +81,19 @@ class Held:
 
     def bound(self, run: Run, p: Array) -> float:
         """Force over level in a run at most, by how far each state went."""
+        tops = np.array([run.farthest(i) for i in self.rows])
+        if self.linear:
+            level, slope = self.limits(p)
+            return float(np.abs(slope) @ tops) / level
+        return max(float(self.ratios(side * tops[:, None], p)[0]) for side in (1.0, -1.0))
+
+    def limits(self, p: Array) -> tuple[float, Array]:
+        """Return the level and the slope of a force that is a sum of the states."""
         key = p.tobytes()
         if key not in self._limits:
             _, level, slope = self.screen(0.0, p)
-            self._limits[key] = float(level) or inf, np.abs(slope.full()[0])
-        level, slope = self._limits[key]
-        tops = np.array([run.farthest(i) for i in self.rows])
-        if self.linear:
-            return float(slope @ tops) / level
-        return max(float(self.ratios(side * tops[:, None], p)[0]) for side in (1.0, -1.0))
+            self._limits[key] = float(level) or inf, slope.full()[0]
+        return self._limits[key]
 
     @cached_property
     def linear(self) -> bool:
@@ -124,6 +128,10 @@ def _overloads(integrator: Integrator, inputs: InputData, run: Run, p: Array) ->
         if held.fixed and most <= 1 + MARGIN:
             continue
         t, y = run.seen
+        if held.fixed and held.linear and run.complete:
+            level, slope = held.limits(p)
+            if np.abs(y[:, held.rows] @ slope).max() <= (1 + MARGIN) * level:
+                continue
         if not held.fixed:
             k = _peaks(y[:, held.rows])
             t, y = t[k], y[k]
