@@ -216,6 +216,16 @@ class Contact:
         return (Monitor(self.slip, scale),) if isfinite(float(at_start(scale, p))) else ()
 
 
+def by_laws(model: "Model", expression: ca.SX) -> ca.SX:
+    """Return `expression` with the laws of all contacts in the place of their forces.
+
+    Raises:
+        ValueError: friction forces that need each other.
+    """
+    forces = {c.name: c.friction for c in model.contacts}
+    return _Put(f"model '{model.name}': contacts", model.contacts, forces)(expression)
+
+
 def closed(model: "Model") -> dict[str, Any]:
     """The parts of an open model that change as the laws of its contacts close it.
 

@@ -29,11 +29,11 @@ from symfric.foundation.status import EnergyWarning, OverloadWarning
 from symfric.foundation.symbols import strays, symbols_of
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.running.gains import closed, gains
+from symfric.integrator.running.gains import gains
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Run
 from symfric.model import Model
-from symfric.model.contact import APPLIED, Contact
+from symfric.model.contact import APPLIED, Contact, by_laws
 
 Array = NDArray[np.float64]
 MARGIN = 0.05
@@ -171,10 +171,10 @@ def _held(model: Model, contact: Contact) -> Held | None:
     z = symbols_of(contact.states)
     try:
         force = ca.SX(contact.law.force(0.0, contact.N, z, **contact.given))
-        level = contact.most_held
+        both = by_laws(model, ca.vertcat(force, contact.most_held))
     except (ValueError, TypeError, NotImplementedError):
         return None
-    force, level = ca.vertsplit(both := closed(model, ca.vertcat(force, level)))
+    force, level = ca.vertsplit(both)
     p = model.vector("p")
     known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
     if strays(both, known) or not ca.depends_on(force, z):

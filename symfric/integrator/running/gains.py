@@ -25,7 +25,7 @@ from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Run
 from symfric.model import Model
-from symfric.model.contact import Contact
+from symfric.model.contact import Contact, by_laws
 
 Array = NDArray[np.float64]
 SPEEDS = np.array([1e-6, 1e-3, 1.0, 1e3])
@@ -104,19 +104,11 @@ def _sliding(model: Model, contact: Contact) -> Sliding | None:
         alone = ca.SX(law.force(v, N, law.steady_state(v, N), **still)) * v
         z = law.steady_state(contact.slip, contact.N)
         steady = ca.SX(law.force(contact.slip, contact.N, z, **contact.given))
+        rows = by_laws(model, ca.vertcat(contact.slip, contact.friction, steady))
     except (ValueError, TypeError, NotImplementedError):
         return None
-    rows = closed(model, ca.vertcat(contact.slip, contact.friction, steady))
     known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
     if strays(rows, known) or strays(alone, ca.vertcat(v, N, p)):
         return None
     needs = [i for i in range(p.numel()) if ca.depends_on(alone, p[i])]
     return Sliding(contact, ca.Function("power", [v, N, p], [alone]), needs, rows)
-
-
-def closed(model: Model, expression: ca.SX) -> ca.SX:
-    """`expression` with the laws of all contacts in the place of their forces."""
-    forces = {c.force: c.friction for c in model.contacts}
-    for _ in forces:  # a load may follow from the friction of another contact
-        expression = ca.substitute(expression, ca.vertcat(*forces), ca.vertcat(*forces.values()))
-    return expression
