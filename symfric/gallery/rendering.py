@@ -17,7 +17,7 @@ from symfric.foundation.files import write_text
 from symfric.foundation.panels import save
 from symfric.gallery.pages import index_page
 from symfric.gallery.plate import Plate, chosen, scripts
-from symfric.stress.crew import Crew, Died, Hung
+from symfric.stress.workers import Crashed, TimedOut, WorkerPool
 
 LIMIT = 600.0
 """Seconds that the figures of one process may take before they count as hanging."""
@@ -82,7 +82,7 @@ def render(
                 place(folder, name, ending).unlink()
     tasks = ((i, (group, str(folder), quick)) for i, group in enumerate(groups))
     size = min(workers or os.cpu_count() or 1, len(groups))
-    crew = Crew(_rendered, tasks, size, LIMIT)
+    pool = WorkerPool(_rendered, tasks, size, LIMIT)
     failures = dict[str, str]()
 
     def tell() -> None:
@@ -92,12 +92,12 @@ def render(
 
     try:
         with _repeated(tell):
-            for number, outcome in crew.outcomes():
+            for number, outcome in pool.outcomes():
                 failures |= _failures(groups[number], folder, outcome)
     except KeyboardInterrupt:
         pass
     finally:
-        crew.dismiss()
+        pool.stop()
     tell()
     there = read(folder)
     write_text(folder / "index.html", index_page([*there.values()]))
@@ -182,10 +182,14 @@ def _rendered(task: tuple[tuple[str, ...], str, bool]) -> dict[str, str]:
 
 
 def _failures(
-    group: tuple[str, ...], folder: Path, outcome: dict[str, str] | Died | Hung
+    group: tuple[str, ...], folder: Path, outcome: dict[str, str] | Crashed | TimedOut
 ) -> dict[str, str]:
     if isinstance(outcome, dict):
         return outcome
-    died = isinstance(outcome, Died)
-    why = f"its process died, {outcome.how}: {outcome.words}" if died else "no end within its time"
+    died = isinstance(outcome, Crashed)
+    why = (
+        f"its process died, {outcome.how}: {outcome.last_line}"
+        if died
+        else "no end within its time"
+    )
     return {name: why for name in group if not place(folder, name, ".json").exists()}

@@ -11,7 +11,7 @@ from symfric.gallery import rendering
 from symfric.gallery.pages import index_page
 from symfric.gallery.plate import chosen, figure_of, plate_of, plates, sections, short
 from symfric.gallery.rendering import draw, read, render, together
-from symfric.stress.crew import Died, Hung
+from symfric.stress.workers import Crashed, TimedOut
 
 NAME = "self_tuning/fig_07_shape_factor"
 
@@ -103,9 +103,9 @@ def test_a_plate_shows_itself_in_one_screen() -> None:
 
 def test_plates_that_died_are_told_apart_from_those_that_were_done(tmp_path: Path) -> None:
     draw(NAME, tmp_path, quick=True)
-    found = rendering._failures((NAME, "other"), tmp_path, Died("SIGKILL", "out of memory"))  # pyright: ignore[reportPrivateUsage]
+    found = rendering._failures((NAME, "other"), tmp_path, Crashed("SIGKILL", "out of memory"))  # pyright: ignore[reportPrivateUsage]
     assert found == {"other": "its process died, SIGKILL: out of memory"}
-    hung = rendering._failures(("other",), tmp_path, Hung(600.0))  # pyright: ignore[reportPrivateUsage]
+    hung = rendering._failures(("other",), tmp_path, TimedOut(600.0))  # pyright: ignore[reportPrivateUsage]
     assert hung == {"other": "no end within its time"}
 
 
@@ -164,10 +164,10 @@ def test_what_was_there_before_is_not_what_was_done_now(
             yield 1, {second: "ValueError: no"}
             raise KeyboardInterrupt
 
-        def dismiss(self) -> None:
+        def stop(self) -> None:
             pass
 
-    monkeypatch.setattr(rendering, "Crew", OneByOne)
+    monkeypatch.setattr(rendering, "WorkerPool", OneByOne)
     monkeypatch.setattr(rendering, "together", lambda names: [(n,) for n in names])  # pyright: ignore
     done = render(tmp_path, names, quick=True)
     assert {name: kept["title"] for name, kept in done.records.items()} == {first: "now"}
