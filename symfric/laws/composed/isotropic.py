@@ -10,6 +10,7 @@ import casadi as ca
 from symfric.foundation.numeric import Scalar, column, empty
 from symfric.foundation.parameters import Parametric, param
 from symfric.foundation.vector import NotIsotropicError, Vector, Vectors
+from symfric.laws.base.fields import WIDTH
 from symfric.laws.base.law import Input, Law, State, Switch, check_law, chosen
 from symfric.laws.composed.compose import Asymmetric, Sum
 from symfric.laws.composed.wrap import Lagged
@@ -45,9 +46,7 @@ class Isotropic(Parametric):
 
     law: Law
     v_eps: Scalar = param(1e-9, unit="m/s", role="width", doc="smoothing of the speed", lower=1e-15)
-    turn: Scalar = param(
-        1e-2, unit="1", role="width", doc="rounding from unloading to loading", lower=1e-9
-    )
+    turn: Scalar = WIDTH(1e-2, doc="rounding from unloading to loading", lower=1e-9)
 
     def __post_init__(self) -> None:
         name = type(self).__name__
