@@ -4,8 +4,7 @@ from abc import abstractmethod
 from dataclasses import dataclass
 
 from symfric.foundation.numeric import Scalar, column, empty
-from symfric.laws.base import smooth
-from symfric.laws.base.fields import MU_S
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import APPLIED_FORCE, Input, Law, State, Switch
 
 FINEST = 1e-7
@@ -22,7 +21,7 @@ class Sticking(Law):
     A form without modes (`has_mode` false) has no states.
     """
 
-    mu_s: Scalar = MU_S(0.15)
+    mu_s: Scalar = fields.MU_S(0.15)
 
     @property
     @abstractmethod

@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, column, expm1, sin
 from symfric.foundation.parameters import Parametric, param
-from symfric.laws.base import smooth
-from symfric.laws.base.fields import COEFFICIENT, LENGTH, SHAPE, STIFFNESS, TIME
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, Input, Law, State
 
 Array = NDArray[np.float64]
@@ -209,12 +208,12 @@ class GenericAsperity(Population):
     ordered: ClassVar[tuple[tuple[str, str], ...]] = (("mu_0", "mu_inf"),)
     redraws: ClassVar[bool] = False
 
-    k: Scalar = STIFFNESS(1e6, doc="stiffness of all asperities in contact")
-    mu_0: Scalar = COEFFICIENT(0.05, doc="friction coefficient of a new contact")
-    mu_inf: Scalar = COEFFICIENT(0.2, doc="friction coefficient of an old contact")
-    tau_c: Scalar = TIME(0.05, doc="time in which a contact ages")
-    lam: Scalar = LENGTH(2e-5, doc="period of the counterface")
-    duty: Scalar = SHAPE(0.6, doc="share of a period in contact", lower=1e-3, upper=1.0)
+    k: Scalar = fields.STIFFNESS(1e6, doc="stiffness of all asperities in contact")
+    mu_0: Scalar = fields.COEFFICIENT(0.05, doc="friction coefficient of a new contact")
+    mu_inf: Scalar = fields.COEFFICIENT(0.2, doc="friction coefficient of an old contact")
+    tau_c: Scalar = fields.TIME(0.05, doc="time in which a contact ages")
+    lam: Scalar = fields.LENGTH(2e-5, doc="period of the counterface")
+    duty: Scalar = fields.SHAPE(0.6, doc="share of a period in contact", lower=1e-3, upper=1.0)
     count: int = param(1000, unit="1", role="sampling", doc="number of asperities", lower=1)
     seed: int = param(0, unit="1", role="sampling", doc="seed of the random numbers", lower=0)
 
@@ -284,8 +283,8 @@ class RandomBristles(Population):
     )
     redraws: ClassVar[bool] = True
 
-    sigma_0: Scalar = STIFFNESS(1e5, doc="stiffness of all bristles")
-    delta_s: Scalar = LENGTH(1e-5, doc="stretch at which a bristle snaps")
+    sigma_0: Scalar = fields.STIFFNESS(1e5, doc="stiffness of all bristles")
+    delta_s: Scalar = fields.LENGTH(1e-5, doc="stretch at which a bristle snaps")
     count: int = param(25, unit="1", role="sampling", doc="number of bristles", lower=1)
     seed: int = param(0, unit="1", role="sampling", doc="seed of the random numbers", lower=0)
 

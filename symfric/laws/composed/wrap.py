@@ -1,11 +1,12 @@
 """Laws around a law: lagging, at a temperature, and normalised by the load."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from dataclasses import fields as fields_of
 from typing import final
 
 from symfric.foundation.numeric import Scalar, column, exp
 from symfric.foundation.parameters import param, parameters, with_values
-from symfric.laws.base.fields import TIME
+from symfric.laws.base import fields
 from symfric.laws.base.law import Facts, Input, Law, State, Switch, check_law
 
 
@@ -20,7 +21,7 @@ class Wrapper(Law):
     law: Law
 
     def __post_init__(self) -> None:
-        for item in fields(self):
+        for item in fields_of(self):
             if "unit" not in item.metadata:
                 check_law(type(self).__name__, getattr(self, item.name))
         super().__post_init__()
@@ -119,7 +120,7 @@ class Lagged(Wrapper):
     facts = Facts(("L",), "that of its law", "constructed", "Hess and Soom 1990")
 
     law: Law
-    tau_L: Scalar = TIME(0.01, doc="time constant of the lag")
+    tau_L: Scalar = fields.TIME(0.01, doc="time constant of the lag")
 
     def __post_init__(self) -> None:
         super().__post_init__()

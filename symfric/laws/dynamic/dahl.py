@@ -6,19 +6,7 @@ from typing import final
 
 from symfric.foundation.numeric import Scalar, column, equals, is_number
 from symfric.foundation.parameters import option
-from symfric.laws.base import smooth
-from symfric.laws.base.fields import (
-    COEFFICIENT,
-    LENGTH,
-    MU_D,
-    R_EPS,
-    REST_EPS,
-    SHAPE,
-    SHARPNESS,
-    SIGMA_0,
-    STIFFNESS,
-    WIDTH,
-)
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, Law, State
 from symfric.laws.dynamic.element import deflection, onward, spent
 
@@ -51,11 +39,11 @@ class Dahl(Law):
         source="Dahl 1968, 1976",
     )
 
-    sigma_0: Scalar = SIGMA_0(1e5)
-    mu_d: Scalar = MU_D(0.1, lower=1e-12)
-    n: Scalar = SHAPE(1.0, doc="exponent", lower=0.0, upper=10.0)
-    v_eps: Scalar = REST_EPS(1e-15)
-    rho_eps: Scalar = WIDTH(1e-3, doc="smoothing of |rho|, for n != 1")
+    sigma_0: Scalar = fields.SIGMA_0(1e5)
+    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
+    n: Scalar = fields.SHAPE(1.0, doc="exponent", lower=0.0, upper=10.0)
+    v_eps: Scalar = fields.REST_EPS(1e-15)
+    rho_eps: Scalar = fields.WIDTH(1e-3, doc="smoothing of |rho|, for n != 1")
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -115,11 +103,11 @@ class BlimanSorine(Law):
     )
     ordered = (("mu_2", "mu_1"),)
 
-    mu_1: Scalar = COEFFICIENT(0.3, doc="coefficient of the fast part", lower=1e-12)
-    mu_2: Scalar = COEFFICIENT(0.2, doc="coefficient of the slow part")
-    eta: Scalar = SHAPE(0.4, doc="path ratio, fast to slow", lower=1e-6, upper=0.999)
-    s_f: Scalar = LENGTH(1e-5, doc="path constant of the slow part")
-    v_eps: Scalar = REST_EPS(1e-15)
+    mu_1: Scalar = fields.COEFFICIENT(0.3, doc="coefficient of the fast part", lower=1e-12)
+    mu_2: Scalar = fields.COEFFICIENT(0.2, doc="coefficient of the slow part")
+    eta: Scalar = fields.SHAPE(0.4, doc="path ratio, fast to slow", lower=1e-6, upper=0.999)
+    s_f: Scalar = fields.LENGTH(1e-5, doc="path constant of the slow part")
+    v_eps: Scalar = fields.REST_EPS(1e-15)
     order: str = option("2", choices=("1", "2"), doc="number of states")
 
     @property
@@ -199,14 +187,14 @@ class BoucWen(Law):
         load="proportional in steady sliding",
     )
 
-    mu_d: Scalar = MU_D(0.1, lower=1e-12)
-    sigma_0: Scalar = STIFFNESS(1e5, doc="initial stiffness for A = 1")
-    A: Scalar = SHAPE(1.0, doc="scale of the stiffness", lower=1e-12)
-    beta: Scalar = SHAPE(0.5, doc="yielding while loading", lower=1e-12)
-    gamma: Scalar = SHAPE(0.5, doc="yielding in either direction")
-    n: Scalar = SHARPNESS(2.0)
-    v_eps: Scalar = REST_EPS(1e-15)
-    z_eps: Scalar = R_EPS(1e-8)
+    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
+    sigma_0: Scalar = fields.STIFFNESS(1e5, doc="initial stiffness for A = 1")
+    A: Scalar = fields.SHAPE(1.0, doc="scale of the stiffness", lower=1e-12)
+    beta: Scalar = fields.SHAPE(0.5, doc="yielding while loading", lower=1e-12)
+    gamma: Scalar = fields.SHAPE(0.5, doc="yielding in either direction")
+    n: Scalar = fields.SHARPNESS(2.0)
+    v_eps: Scalar = fields.REST_EPS(1e-15)
+    z_eps: Scalar = fields.R_EPS(1e-8)
 
     def __post_init__(self) -> None:
         super().__post_init__()

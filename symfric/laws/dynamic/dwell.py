@@ -16,24 +16,7 @@ from symfric.foundation.numeric import (
 )
 from symfric.foundation.parameters import option, param
 from symfric.foundation.vector import TINY
-from symfric.laws.base import smooth
-from symfric.laws.base.fields import (
-    COEFFICIENT,
-    LENGTH,
-    MU_D,
-    MU_S,
-    R_EPS,
-    REST_EPS,
-    SHARPNESS,
-    SIGMA_0,
-    SIGMA_1,
-    SIGMA_2,
-    STIFFNESS,
-    TIME,
-    V_S,
-    VELOCITY,
-    WIDTH,
-)
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, Law, State, one_sided
 from symfric.laws.dynamic.element import deflection, yielding
 
@@ -71,16 +54,16 @@ class Gonthier(Law):
     ordered = (("mu_d", "mu_s"),)
     strictly_ordered = (("v_d", "v_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1, lower=1e-12)
-    v_s: Scalar = V_S(1e-3)
-    v_d: Scalar = VELOCITY(1e-4, doc="velocity of full direction")
-    sigma_0: Scalar = SIGMA_0(1e5)
-    sigma_1: Scalar = SIGMA_1(190.0, lower=1e-12)
-    sigma_2: Scalar = SIGMA_2(0.0)
-    tau_dw: Scalar = TIME(0.1, doc="time constant of the dwell")
-    kappa: Scalar = WIDTH(1e-3, doc="rounding of the saturation", lower=0.0, upper=1.0)
-    s_eps: Scalar = WIDTH(1e-3, doc="smoothing of the dwell switch")
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
+    v_s: Scalar = fields.V_S(1e-3)
+    v_d: Scalar = fields.VELOCITY(1e-4, doc="velocity of full direction")
+    sigma_0: Scalar = fields.SIGMA_0(1e5)
+    sigma_1: Scalar = fields.SIGMA_1(190.0, lower=1e-12)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
+    tau_dw: Scalar = fields.TIME(0.1, doc="time constant of the dwell")
+    kappa: Scalar = fields.WIDTH(1e-3, doc="rounding of the saturation", lower=0.0, upper=1.0)
+    s_eps: Scalar = fields.WIDTH(1e-3, doc="smoothing of the dwell switch")
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -169,19 +152,19 @@ class Armstrong(Law):
     )
     ordered = (("mu_a", "mu_inf"),)
 
-    k_t: Scalar = STIFFNESS(1e5, doc="tangential stiffness")
-    mu_d: Scalar = MU_D(0.1, lower=1e-12)
-    sigma_2: Scalar = SIGMA_2(0.0)
-    mu_inf: Scalar = COEFFICIENT(0.05, doc="static excess after long rest")
-    mu_a: Scalar = COEFFICIENT(0.01, doc="static excess right after slip")
-    v_s: Scalar = V_S(1e-3)
-    tau_L: Scalar = TIME(0.02, doc="lag of the Stribeck curve")
-    gamma: Scalar = TIME(0.2, doc="dwell that recovers half the excess")
-    v_e: Scalar = VELOCITY(1e-4, doc="velocity that ends the rest")
-    tau_r: Scalar = TIME(0.01, doc="time that forgets the rest in slip")
-    n: Scalar = SHARPNESS(20.0)
-    v_eps: Scalar = REST_EPS(1e-15)
-    r_eps: Scalar = R_EPS(1e-8)
+    k_t: Scalar = fields.STIFFNESS(1e5, doc="tangential stiffness")
+    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
+    mu_inf: Scalar = fields.COEFFICIENT(0.05, doc="static excess after long rest")
+    mu_a: Scalar = fields.COEFFICIENT(0.01, doc="static excess right after slip")
+    v_s: Scalar = fields.V_S(1e-3)
+    tau_L: Scalar = fields.TIME(0.02, doc="lag of the Stribeck curve")
+    gamma: Scalar = fields.TIME(0.2, doc="dwell that recovers half the excess")
+    v_e: Scalar = fields.VELOCITY(1e-4, doc="velocity that ends the rest")
+    tau_r: Scalar = fields.TIME(0.01, doc="time that forgets the rest in slip")
+    n: Scalar = fields.SHARPNESS(20.0)
+    v_eps: Scalar = fields.REST_EPS(1e-15)
+    r_eps: Scalar = fields.R_EPS(1e-8)
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -289,11 +272,11 @@ class RateAndState(Law):
         load="proportional",
     )
 
-    mu_0: Scalar = COEFFICIENT(0.12, doc="friction coefficient at v_0", lower=1e-12)
-    a: Scalar = COEFFICIENT(0.01, doc="direct effect", lower=1e-6)
-    b: Scalar = COEFFICIENT(0.015, doc="evolution effect")
-    v_0: Scalar = VELOCITY(1e-6, doc="reference velocity", lower=1e-15)
-    D_c: Scalar = LENGTH(1e-5, doc="slip that renews the contacts")
+    mu_0: Scalar = fields.COEFFICIENT(0.12, doc="friction coefficient at v_0", lower=1e-12)
+    a: Scalar = fields.COEFFICIENT(0.01, doc="direct effect", lower=1e-6)
+    b: Scalar = fields.COEFFICIENT(0.015, doc="evolution effect")
+    v_0: Scalar = fields.VELOCITY(1e-6, doc="reference velocity", lower=1e-15)
+    D_c: Scalar = fields.LENGTH(1e-5, doc="slip that renews the contacts")
     v_eps: Scalar = param(
         1e-12,
         unit="m/s",

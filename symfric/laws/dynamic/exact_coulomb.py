@@ -6,8 +6,7 @@ from typing import final
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import option
-from symfric.laws.base import smooth
-from symfric.laws.base.fields import MU_D, SIGMA_2, V_S
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, Switch
 from symfric.laws.base.sticking import Sticking, carried, stick_and_slip
 
@@ -42,10 +41,10 @@ class ExactCoulomb(Sticking):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_d: Scalar = MU_D(0.1)
+    mu_d: Scalar = fields.MU_D(0.1)
 
-    v_s: Scalar = V_S(1e-2)
-    sigma_2: Scalar = SIGMA_2(0.0)
+    v_s: Scalar = fields.V_S(1e-2)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
     form: str = option("jump", choices=("jump", "stribeck"), doc="fall at once, or over v_s")
 
     @property

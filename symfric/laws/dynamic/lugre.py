@@ -6,19 +6,7 @@ from typing import final
 
 from symfric.foundation.numeric import Scalar, column, equals, exp, is_number, sin
 from symfric.foundation.parameters import param
-from symfric.laws.base import smooth
-from symfric.laws.base.fields import (
-    DELTA,
-    LENGTH,
-    MU_D,
-    MU_S,
-    REST_EPS,
-    SIGMA_0,
-    SIGMA_1,
-    SIGMA_2,
-    V_S,
-    VELOCITY,
-)
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, State
 from symfric.laws.dynamic.element import StribeckLevel, ahead, deflection
 
@@ -35,14 +23,14 @@ class Bristle(StribeckLevel):
 
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1, lower=1e-12)
-    v_s: Scalar = V_S(1e-3)
-    delta: Scalar = DELTA(2.0)
-    sigma_0: Scalar = SIGMA_0(1e5)
-    sigma_1: Scalar = SIGMA_1(190.0)
-    sigma_2: Scalar = SIGMA_2(0.0)
-    v_eps: Scalar = REST_EPS(1e-15)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
+    v_s: Scalar = fields.V_S(1e-3)
+    delta: Scalar = fields.DELTA(2.0)
+    sigma_0: Scalar = fields.SIGMA_0(1e5)
+    sigma_1: Scalar = fields.SIGMA_1(190.0)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
+    v_eps: Scalar = fields.REST_EPS(1e-15)
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -184,7 +172,7 @@ class LuGrePassive(Bristle):
         source="Olsson, PhD thesis, Lund 1996",
     )
 
-    v_d: Scalar = VELOCITY(1e-3, doc="velocity over which damping fades")
+    v_d: Scalar = fields.VELOCITY(1e-3, doc="velocity over which damping fades")
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Rate of the bristle deflection [m/s], shape (1, 1)."""
@@ -233,7 +221,7 @@ class ElastoPlastic(Bristle):
         source="Dupont, Hayward, Armstrong, Altpeter, IEEE TAC 47(5), 2002",
     )
 
-    z_ba: Scalar = LENGTH(1e-7, doc="break-away deflection", lower=0.0)
+    z_ba: Scalar = fields.LENGTH(1e-7, doc="break-away deflection", lower=0.0)
 
     def sliding_share(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
         """alpha: 0 while the bristle is elastic, 1 when it slides."""

@@ -5,22 +5,7 @@ from typing import final
 
 from symfric.foundation.numeric import Scalar, both, column, either, expm1, is_number
 from symfric.foundation.parameters import Parametric, option, param
-from symfric.laws.base import smooth
-from symfric.laws.base.fields import (
-    COEFFICIENT,
-    DELTA,
-    MU_D,
-    MU_S,
-    R_EPS,
-    REST_EPS,
-    SHAPE,
-    SHARPNESS,
-    SIGMA_1,
-    SIGMA_2,
-    STIFFNESS,
-    V_S,
-    WIDTH,
-)
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, State, Switch
 from symfric.laws.dynamic.element import (
     Elements,
@@ -37,8 +22,8 @@ from symfric.laws.dynamic.element import (
 class Slider(Parametric):
     """A spring of stiffness k on a slider that carries mu N."""
 
-    k: Scalar = STIFFNESS(1e5, doc="stiffness")
-    mu: Scalar = COEFFICIENT(0.1, doc="friction coefficient of the slider", lower=1e-12)
+    k: Scalar = fields.STIFFNESS(1e5, doc="stiffness")
+    mu: Scalar = fields.COEFFICIENT(0.1, doc="friction coefficient of the slider", lower=1e-12)
 
 
 SLIDERS = (Slider(5e4, 0.025), Slider(2.5e4, 0.025), Slider(1.5e4, 0.025), Slider(1e4, 0.025))
@@ -81,9 +66,9 @@ class MaxwellSlip(Elements):
     kind = Slider
 
     elements: tuple[Slider, ...] = SLIDERS
-    n: Scalar = SHARPNESS(20.0)
-    v_eps: Scalar = REST_EPS(1e-15)
-    r_eps: Scalar = R_EPS(1e-8)
+    n: Scalar = fields.SHARPNESS(20.0)
+    v_eps: Scalar = fields.REST_EPS(1e-15)
+    r_eps: Scalar = fields.R_EPS(1e-8)
     form: str = option("smooth", choices=("smooth", "event"), doc="rounded, or exact with modes")
 
     @property
@@ -187,16 +172,16 @@ class Leuven(StribeckLevel, Elements):
     kind = Slider
 
     elements: tuple[Slider, ...] = LEUVEN_SLIDERS
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1, lower=1e-12)
-    v_s: Scalar = V_S(1e-3)
-    delta: Scalar = DELTA(2.0)
-    delta_l: Scalar = SHAPE(7.0, doc="sharpness of the transition", lower=1.0, upper=1e2)
-    sigma_1: Scalar = SIGMA_1(0.8)
-    sigma_2: Scalar = SIGMA_2(0.0)
-    n: Scalar = SHARPNESS(20.0)
-    v_eps: Scalar = REST_EPS(1e-15)
-    r_eps: Scalar = WIDTH(1e-8, doc="smoothing of the load shares")
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
+    v_s: Scalar = fields.V_S(1e-3)
+    delta: Scalar = fields.DELTA(2.0)
+    delta_l: Scalar = fields.SHAPE(7.0, doc="sharpness of the transition", lower=1.0, upper=1e2)
+    sigma_1: Scalar = fields.SIGMA_1(0.8)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
+    n: Scalar = fields.SHARPNESS(20.0)
+    v_eps: Scalar = fields.REST_EPS(1e-15)
+    r_eps: Scalar = fields.WIDTH(1e-8, doc="smoothing of the load shares")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -240,8 +225,8 @@ class Leuven(StribeckLevel, Elements):
 class Element(Parametric):
     """One element: a spring of stiffness k that carries the share alpha of the friction."""
 
-    k: Scalar = STIFFNESS(1e5, doc="stiffness")
-    alpha: Scalar = SHAPE(1.0, doc="share of the friction", lower=1e-12)
+    k: Scalar = fields.STIFFNESS(1e5, doc="stiffness")
+    alpha: Scalar = fields.SHAPE(1.0, doc="share of the friction", lower=1e-12)
 
 
 ELEMENTS = (Element(5e4, 0.25), Element(2.5e4, 0.25), Element(1.5e4, 0.25), Element(1e4, 0.25))
@@ -292,18 +277,18 @@ class GMS(StribeckLevel, Elements):
     kind = Element
 
     elements: tuple[Element, ...] = ELEMENTS
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1, lower=1e-12)
-    v_s: Scalar = V_S(1e-3)
-    delta: Scalar = DELTA(2.0)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
+    v_s: Scalar = fields.V_S(1e-3)
+    delta: Scalar = fields.DELTA(2.0)
     C: Scalar = param(
         24.0, unit="N/s", role="time", doc="attraction to the Stribeck curve", lower=1e-12
     )
-    sigma_2: Scalar = SIGMA_2(0.0)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
     v_eps: Scalar = param(
         1e-15, unit="m/s", role="width", doc="smoothing velocity of sign(v)", lower=1e-15
     )
-    rho: Scalar = SHAPE(0.03, doc="share over which slip sets in", lower=1e-6, upper=0.5)
+    rho: Scalar = fields.SHAPE(0.03, doc="share over which slip sets in", lower=1e-6, upper=0.5)
     form: str = option("smooth", choices=("smooth", "event"), doc="latched, or exact with modes")
 
     @property

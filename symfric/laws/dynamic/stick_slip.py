@@ -5,22 +5,7 @@ from typing import final
 
 from symfric.foundation.numeric import Scalar, column, equals, exp
 from symfric.foundation.parameters import option, param
-from symfric.laws.base import smooth
-from symfric.laws.base.fields import (
-    LENGTH,
-    MU_D,
-    MU_S,
-    R_EPS,
-    REST_EPS,
-    SHAPE,
-    SHARPNESS,
-    SIGMA_0,
-    SIGMA_1,
-    STIFFNESS,
-    V_S,
-    VELOCITY,
-    WIDTH,
-)
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, Law, State, Switch
 from symfric.laws.dynamic.element import Held, deflection, yielding
 
@@ -59,14 +44,14 @@ class StickSlip(Law):
     ordered = (("mu_d", "mu_s"),)
     strictly_ordered = (("v_s", "v_d"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
-    v_s: Scalar = VELOCITY(1e-3, doc="velocity of full slip")
-    v_d: Scalar = VELOCITY(1.5e-3, doc="velocity of the dynamic level")
-    D_max: Scalar = LENGTH(1e-6, doc="largest stiction deformation")
-    n: Scalar = SHARPNESS(20.0)
-    v_eps: Scalar = REST_EPS(1e-15)
-    r_eps: Scalar = WIDTH(1e-8, doc="smoothing of the deformation")
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_s: Scalar = fields.VELOCITY(1e-3, doc="velocity of full slip")
+    v_d: Scalar = fields.VELOCITY(1.5e-3, doc="velocity of the dynamic level")
+    D_max: Scalar = fields.LENGTH(1e-6, doc="largest stiction deformation")
+    n: Scalar = fields.SHARPNESS(20.0)
+    v_eps: Scalar = fields.REST_EPS(1e-15)
+    r_eps: Scalar = fields.WIDTH(1e-8, doc="smoothing of the deformation")
     branch: str = option("plateau", choices=("plateau", "published"), doc="mu_v within v_s")
 
     @property
@@ -146,16 +131,16 @@ class HaessigFriedland(Law):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1, lower=1e-12)
-    sigma_0: Scalar = STIFFNESS(1e5, doc="bristle stiffness in slip")
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
+    sigma_0: Scalar = fields.STIFFNESS(1e5, doc="bristle stiffness in slip")
     sigma_1: Scalar = param(
         190.0, unit="N s/m", role="damping", doc="bristle damping in stick", lower=0.0
     )
-    n: Scalar = SHARPNESS(50.0)
-    knee: Scalar = SHAPE(0.05, doc="share over which excess is lost", lower=1e-6, upper=1)
-    v_eps: Scalar = REST_EPS(1e-15)
-    r_eps: Scalar = R_EPS(1e-8)
+    n: Scalar = fields.SHARPNESS(50.0)
+    knee: Scalar = fields.SHAPE(0.05, doc="share over which excess is lost", lower=1e-6, upper=1)
+    v_eps: Scalar = fields.REST_EPS(1e-15)
+    r_eps: Scalar = fields.R_EPS(1e-8)
     form: str = option("smooth", choices=("smooth", "event"), doc="rounded, or exact with modes")
 
     @property
@@ -252,12 +237,12 @@ class Bristle2D(Law):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1, lower=1e-12)
-    v_s: Scalar = V_S(1e-3)
-    sigma_0: Scalar = SIGMA_0(1e5)
-    sigma_1: Scalar = SIGMA_1(190.0, lower=1e-12)
-    kappa: Scalar = WIDTH(0.02, doc="rounding of the saturation", lower=0.0, upper=1.0)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1, lower=1e-12)
+    v_s: Scalar = fields.V_S(1e-3)
+    sigma_0: Scalar = fields.SIGMA_0(1e5)
+    sigma_1: Scalar = fields.SIGMA_1(190.0, lower=1e-12)
+    kappa: Scalar = fields.WIDTH(0.02, doc="rounding of the saturation", lower=0.0, upper=1.0)
 
     @property
     def states(self) -> tuple[State, ...]:

@@ -6,8 +6,7 @@ from typing import final
 
 from symfric.foundation.numeric import Scalar, atan, column, exp, is_number
 from symfric.foundation.parameters import option, param
-from symfric.laws.base import smooth
-from symfric.laws.base.fields import F_EPS, MU_D, MU_S, SIGMA_2, STEEPNESS, V_EPS, V_S
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import (
     APPLIED_FORCE,
     Facts,
@@ -56,7 +55,7 @@ class Karnopp(Sticking):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_d: Scalar = MU_D(0.1)
+    mu_d: Scalar = fields.MU_D(0.1)
     D_v: Scalar = param(
         1e-3,
         unit="m/s",
@@ -65,8 +64,8 @@ class Karnopp(Sticking):
         doc="half width of the band around rest",
         lower=1e-12,
     )
-    sigma_2: Scalar = SIGMA_2(0.0)
-    F_eps: Scalar = F_EPS(1e-3)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
+    F_eps: Scalar = fields.F_EPS(1e-3)
     form: str = option("smooth", choices=WITH_MODES, doc="window, hard switch, or exact with mode")
 
     @property
@@ -167,13 +166,13 @@ class Awrejcewicz(StaticLaw):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
     epsilon: Scalar = param(
         1e-3, unit="m/s", role="width", width=1, doc="half width of the window", lower=1e-12
     )
-    v_s: Scalar = V_S(1e-2)
-    F_eps: Scalar = F_EPS(1e-3)
+    v_s: Scalar = fields.V_S(1e-2)
+    F_eps: Scalar = fields.F_EPS(1e-3)
     form: str = option("smooth", choices=FORMS, doc="quintic or cubic window")
 
     @property
@@ -224,8 +223,8 @@ class LeineSwitch(Sticking):
         source="Leine et al. 1998; the author's public code",
     )
 
-    delta: Scalar = STEEPNESS(3.0, doc="steepness of the fall", lower=0.0)
-    v_eps: Scalar = V_EPS(1e-4, lower=1e-12)
+    delta: Scalar = fields.STEEPNESS(3.0, doc="steepness of the fall", lower=0.0)
+    v_eps: Scalar = fields.V_EPS(1e-4, lower=1e-12)
     eta: Scalar = param(
         1e-6, unit="m/s", role="width", width=1, doc="half width of the band of rest", lower=1e-15
     )
@@ -300,13 +299,13 @@ class Wojewoda(StaticLaw):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
     a_1: Scalar = param(100.0, unit="1/s", role="shape", doc="decay of the hysteresis", lower=0.0)
     a_2: Scalar = param(
         0.1, unit="m/s^2", role="shape", doc="acceleration of half the decay", lower=1e-12
     )
-    v_eps: Scalar = V_EPS(1e-4, lower=1e-12)
+    v_eps: Scalar = fields.V_EPS(1e-4, lower=1e-12)
     a_eps: Scalar = param(
         1e-2, unit="m/s^2", role="width", doc="smoothing acceleration", lower=1e-12
     )

@@ -7,8 +7,7 @@ from typing import final
 
 from symfric.foundation.numeric import Scalar, atan, equals, erf, sqrt, tanh
 from symfric.foundation.parameters import option, param
-from symfric.laws.base import smooth
-from symfric.laws.base.fields import MU_D, SHAPE, SIGMA_2, V_EPS
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, StaticLaw
 
 
@@ -58,8 +57,8 @@ class Coulomb(StaticLaw):
         source="Amontons 1699, Coulomb 1785; regularised by tanh",
     )
 
-    mu_d: Scalar = MU_D(0.1)
-    v_eps: Scalar = V_EPS(1e-3)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_eps: Scalar = fields.V_EPS(1e-3)
     shape: str = option("tanh", choices=tuple(SHAPES), doc="smooth sign")
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
@@ -84,15 +83,9 @@ class Viscous(StaticLaw):
     Source: textbook; Olsson et al., Eur. J. Control 4, 1998.
     """
 
-    facts = Facts(
-        phenomena=("V",),
-        smoothness="C∞",
-        confidence="textbook",
-        source="textbook",
-        load="independent",
-    )
+    facts = Facts(("V",), "C∞", "textbook", "textbook", load="independent")
 
-    sigma_2: Scalar = SIGMA_2(0.4)
+    sigma_2: Scalar = fields.SIGMA_2(0.4)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0; none at rest."""
@@ -115,16 +108,10 @@ class PowerLawViscous(StaticLaw):
     Source: textbook; the general exponent as in drive and fluid-film models.
     """
 
-    facts = Facts(
-        phenomena=("V",),
-        smoothness="C∞",
-        confidence="textbook",
-        source="textbook",
-        load="independent",
-    )
+    facts = Facts(("V",), "C∞", "textbook", "textbook", load="independent")
 
-    sigma_2: Scalar = SIGMA_2(0.4, unit="N (s/m)^d")
-    d: Scalar = SHAPE(2.0, doc="exponent", lower=0.1, upper=10.0)
+    sigma_2: Scalar = fields.SIGMA_2(0.4, unit="N (s/m)^d")
+    d: Scalar = fields.SHAPE(2.0, doc="exponent", lower=0.1, upper=10.0)
     v_eps: Scalar = param(1e-4, unit="m/s", role="width", doc="smoothing velocity", lower=1e-12)
 
     @property

@@ -4,19 +4,8 @@ from dataclasses import dataclass
 from typing import final
 
 from symfric.foundation.numeric import Scalar
+from symfric.laws.base import fields
 from symfric.laws.base.curve import Curve, Fall
-from symfric.laws.base.fields import (
-    DELTA,
-    LEVEL,
-    MU_D,
-    MU_S,
-    SHAPE,
-    SIGMA_2,
-    STEEPNESS,
-    V_EPS,
-    V_S,
-    V_T,
-)
 from symfric.laws.base.law import Facts
 
 
@@ -45,12 +34,12 @@ class Stribeck(Curve):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
-    v_s: Scalar = V_S(1e-3)
-    delta: Scalar = DELTA(2.0)
-    v_eps: Scalar = V_EPS(1e-4)
-    sigma_2: Scalar = SIGMA_2(0.0)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_s: Scalar = fields.V_S(1e-3)
+    delta: Scalar = fields.DELTA(2.0)
+    v_eps: Scalar = fields.V_EPS(1e-4)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
         """Friction force [N] in the direction `s`."""
@@ -80,11 +69,11 @@ class Tustin(Curve):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
-    v_s: Scalar = V_S(1e-3)
-    v_eps: Scalar = V_EPS(1e-4)
-    sigma_2: Scalar = SIGMA_2(0.0)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_s: Scalar = fields.V_S(1e-3)
+    v_eps: Scalar = fields.V_EPS(1e-4)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
         """Friction force [N] in the direction `s`."""
@@ -113,10 +102,10 @@ class Benson(Curve):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
-    d_c: Scalar = STEEPNESS(1e3, doc="decay coefficient")
-    v_eps: Scalar = V_EPS(1e-4)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    d_c: Scalar = fields.STEEPNESS(1e3, doc="decay coefficient")
+    v_eps: Scalar = fields.V_EPS(1e-4)
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
         """Friction force [N] in the direction `s`."""
@@ -146,10 +135,10 @@ class Berger(Curve):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
-    v_s: Scalar = V_S(1e-3)
-    v_t: Scalar = V_T(1e-4)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_s: Scalar = fields.V_S(1e-3)
+    v_t: Scalar = fields.V_T(1e-4)
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
         """Friction force [N] in the direction `s`."""
@@ -179,10 +168,10 @@ class DuanSingh(Curve):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
-    c: Scalar = STEEPNESS(1e3, doc="decay coefficient")
-    sigma: Scalar = STEEPNESS(1e4, width=-1, doc="conditioning factor")
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    c: Scalar = fields.STEEPNESS(1e3, doc="decay coefficient")
+    sigma: Scalar = fields.STEEPNESS(1e4, width=-1, doc="conditioning factor")
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
         """Friction force [N] in the direction `s`."""
@@ -212,12 +201,12 @@ class Andersson(Curve):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
-    v_s: Scalar = V_S(1e-3)
-    p: Scalar = SHAPE(2.0, doc="exponent", lower=0.1, upper=10.0)
-    k_t: Scalar = STEEPNESS(1e4, width=-1, doc="steepness at rest")
-    sigma_2: Scalar = SIGMA_2(0.0)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_s: Scalar = fields.V_S(1e-3)
+    p: Scalar = fields.SHAPE(2.0, doc="exponent", lower=0.1, upper=10.0)
+    k_t: Scalar = fields.STEEPNESS(1e4, width=-1, doc="steepness at rest")
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
         """Friction force [N] in the direction `s`."""
@@ -251,12 +240,12 @@ class SteadyStateLuGre(Curve):
     )
     ordered = (("F_C", "F_S"),)
 
-    F_S: Scalar = LEVEL(4.4861, doc="static level")
-    F_C: Scalar = LEVEL(2.5498, doc="dynamic level")
-    v_s: Scalar = V_S(1.2e-3)
-    sigma_2: Scalar = SIGMA_2(230.0)
-    delta: Scalar = DELTA(2.0)
-    v_eps: Scalar = V_EPS(1e-5)
+    F_S: Scalar = fields.LEVEL(4.4861, doc="static level")
+    F_C: Scalar = fields.LEVEL(2.5498, doc="dynamic level")
+    v_s: Scalar = fields.V_S(1.2e-3)
+    sigma_2: Scalar = fields.SIGMA_2(230.0)
+    delta: Scalar = fields.DELTA(2.0)
+    v_eps: Scalar = fields.V_EPS(1e-5)
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
         """Friction force [N] in the direction `s`."""

@@ -5,9 +5,8 @@ from typing import final
 
 from symfric.foundation.numeric import Scalar, equals, exp, expm1, is_number, tanh
 from symfric.foundation.parameters import param
-from symfric.laws.base import smooth
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.curve import Curve, Fall
-from symfric.laws.base.fields import COEFFICIENT, DELTA, MU_D, SIGMA_2, TORQUE, V_EPS, V_S
 from symfric.laws.base.law import Facts, Input, StaticLaw
 
 
@@ -42,9 +41,9 @@ class Bittencourt(Curve):
     T: Scalar = param(
         30.0, unit="degC", role="temperature", doc="temperature", lower=-60.0, upper=200.0
     )
-    F_c0: Scalar = TORQUE(0.031, doc="dynamic level without load")
-    F_cl: Scalar = COEFFICIENT(0.023, doc="dynamic level by load")
-    F_sl: Scalar = COEFFICIENT(0.126, doc="static excess by load")
+    F_c0: Scalar = fields.TORQUE(0.031, doc="dynamic level without load")
+    F_cl: Scalar = fields.COEFFICIENT(0.023, doc="dynamic level by load")
+    F_sl: Scalar = fields.COEFFICIENT(0.126, doc="static excess by load")
     F_s0: Scalar = param(-0.025, unit="N m", role="level", doc="static excess at 0 degC")
     F_sT: Scalar = param(1.6e-3, unit="N m/K", role="level", doc="static excess by temperature")
     v_sl: Scalar = param(
@@ -73,8 +72,8 @@ class Bittencourt(Curve):
     T_v: Scalar = param(
         20.7, unit="K", role="temperature", doc="temperature scale of the viscous part", lower=1e-12
     )
-    delta: Scalar = DELTA(1.3)
-    v_eps: Scalar = V_EPS(0.1, unit="rad/s", lower=1e-12)
+    delta: Scalar = fields.DELTA(1.3)
+    v_eps: Scalar = fields.V_EPS(0.1, unit="rad/s", lower=1e-12)
     F_eps: Scalar = param(1e-4, unit="N m", role="width", doc="smoothing of the maximum", lower=0.0)
 
     def __post_init__(self) -> None:
@@ -125,22 +124,22 @@ class BAM(StaticLaw):
         load="independent",
     )
 
-    K_b: Scalar = TORQUE(0.05, doc="dynamic level without load")
-    K_s: Scalar = TORQUE(0.05, doc="static excess without load")
-    K_e: Scalar = COEFFICIENT(0.05, doc="dynamic level by external torque")
-    K_m: Scalar = COEFFICIENT(0.05, doc="dynamic level by motor torque")
-    K_es: Scalar = COEFFICIENT(0.05, doc="static excess by external torque")
-    K_ms: Scalar = COEFFICIENT(0.05, doc="static excess by motor torque")
+    K_b: Scalar = fields.TORQUE(0.05, doc="dynamic level without load")
+    K_s: Scalar = fields.TORQUE(0.05, doc="static excess without load")
+    K_e: Scalar = fields.COEFFICIENT(0.05, doc="dynamic level by external torque")
+    K_m: Scalar = fields.COEFFICIENT(0.05, doc="dynamic level by motor torque")
+    K_es: Scalar = fields.COEFFICIENT(0.05, doc="static excess by external torque")
+    K_ms: Scalar = fields.COEFFICIENT(0.05, doc="static excess by motor torque")
     Q_e: Scalar = param(
         0.0, unit="1/(N m)", role="level", doc="excess by external torque squared", lower=0.0
     )
     Q_m: Scalar = param(
         0.0, unit="1/(N m)", role="level", doc="excess by motor torque squared", lower=0.0
     )
-    v_s: Scalar = V_S(0.2, unit="rad/s")
-    alpha: Scalar = DELTA(1.35)
-    K_v: Scalar = SIGMA_2(0.1, unit="N m s/rad")
-    v_eps: Scalar = V_EPS(0.01, unit="rad/s", lower=1e-12)
+    v_s: Scalar = fields.V_S(0.2, unit="rad/s")
+    alpha: Scalar = fields.DELTA(1.35)
+    K_v: Scalar = fields.SIGMA_2(0.1, unit="N m s/rad")
+    v_eps: Scalar = fields.V_EPS(0.01, unit="rad/s", lower=1e-12)
     tau_eps: Scalar = param(1e-3, unit="N m", role="width", doc="smoothing torque", lower=1e-12)
 
     @property
@@ -210,19 +209,13 @@ class Capstan(StaticLaw):
     Source: Euler 1769, Eytelwein 1808; textbook.
     """
 
-    facts = Facts(
-        phenomena=("D",),
-        smoothness="C∞",
-        confidence="textbook",
-        source="Euler 1769, Eytelwein 1808",
-        odd=False,
-    )
+    facts = Facts(("D",), "C∞", "textbook", "Euler 1769, Eytelwein 1808", odd=False)
 
-    mu_d: Scalar = MU_D(0.1)
+    mu_d: Scalar = fields.MU_D(0.1)
     beta: Scalar = param(
         3.141592653589793, unit="rad", role="geometry", doc="wrap angle", lower=0.0
     )
-    v_eps: Scalar = V_EPS(1e-3)
+    v_eps: Scalar = fields.V_EPS(1e-3)
 
     def sliding(self, v: Scalar, N: Scalar, side: int) -> Scalar:
         """Sliding force [N] to one side as the widths vanish."""

@@ -7,9 +7,8 @@ from typing import final
 
 from symfric.foundation.numeric import Scalar, exp, tanh
 from symfric.foundation.parameters import option
-from symfric.laws.base import smooth
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.curve import TwoLevels
-from symfric.laws.base.fields import MU_D, MU_S, MU_V, STEEPNESS, U_EPS, V_T, VELOCITY
 from symfric.laws.base.law import Facts, StaticLaw
 
 FORMS = ("smooth", "original")
@@ -21,8 +20,8 @@ RISE = 1 - exp_of_float(-3.0)
 class Rise(StaticLaw):
     """A law that rises to mu_d N within the velocity v_r, in its smooth form as tanh(3 v / v_r)."""
 
-    mu_d: Scalar = MU_D(0.1)
-    v_r: Scalar = VELOCITY(1e-3, width=1, doc="velocity of the transition")
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_r: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of the transition")
     form: str = option("smooth", choices=FORMS, doc="form of the rise")
 
     @property
@@ -140,10 +139,10 @@ class BengisuAkay(StaticLaw):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
-    v_0: Scalar = VELOCITY(1e-3, width=1, doc="velocity of the peak")
-    xi: Scalar = STEEPNESS(1e3, doc="steepness of the fall", lower=0.0)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_0: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of the peak")
+    xi: Scalar = fields.STEEPNESS(1e3, doc="steepness of the fall", lower=0.0)
     form: str = option("smooth", choices=FORMS, doc="fall behind the peak")
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
@@ -185,10 +184,10 @@ class VelocityBased(TwoLevels):
     ordered = (("mu_d", "mu_s"),)
     strictly_ordered = (("v_s", "v_d"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
-    v_s: Scalar = VELOCITY(1e-3, width=1, doc="stiction transition velocity")
-    v_d: Scalar = VELOCITY(1.5e-3, width=1, doc="friction transition velocity")
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_s: Scalar = fields.VELOCITY(1e-3, width=1, doc="stiction transition velocity")
+    v_d: Scalar = fields.VELOCITY(1.5e-3, width=1, doc="friction transition velocity")
     form: str = option("smooth", choices=FORMS, doc="quintic or cubic steps")
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
@@ -225,9 +224,9 @@ class Ambrosio(StaticLaw):
     )
     strictly_ordered = (("v_0", "v_1"),)
 
-    mu_d: Scalar = MU_D(0.1)
-    v_0: Scalar = VELOCITY(2e-4, width=1, doc="velocity below which nothing acts", lower=0.0)
-    v_1: Scalar = VELOCITY(1e-3, width=1, doc="velocity of full friction")
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_0: Scalar = fields.VELOCITY(2e-4, width=1, doc="velocity below which nothing acts", lower=0.0)
+    v_1: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of full friction")
     form: str = option("smooth", choices=FORMS, doc="quintic step or ramp")
 
     @property
@@ -270,11 +269,11 @@ class Hollars(TwoLevels):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
-    v_t: Scalar = V_T(1e-2)
-    mu_v: Scalar = MU_V(0.0)
-    u_eps: Scalar = U_EPS(0.2)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_t: Scalar = fields.V_T(1e-2)
+    mu_v: Scalar = fields.MU_V(0.0)
+    u_eps: Scalar = fields.U_EPS(0.2)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""
@@ -311,12 +310,12 @@ class Exudyn(TwoLevels):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
-    v_reg: Scalar = VELOCITY(1e-3, width=1, doc="velocity of the ramp's end")
-    v_exp: Scalar = VELOCITY(1e-3, doc="velocity of the fall")
-    mu_v: Scalar = MU_V(0.0)
-    u_eps: Scalar = U_EPS(0.2)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_reg: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of the ramp's end")
+    v_exp: Scalar = fields.VELOCITY(1e-3, doc="velocity of the fall")
+    mu_v: Scalar = fields.MU_V(0.0)
+    u_eps: Scalar = fields.U_EPS(0.2)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""
@@ -356,10 +355,10 @@ class Step5(TwoLevels):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
-    v_t: Scalar = V_T(1e-3)
-    mu_v: Scalar = MU_V(0.0)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_t: Scalar = fields.V_T(1e-3)
+    mu_v: Scalar = fields.MU_V(0.0)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""

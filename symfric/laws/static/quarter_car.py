@@ -6,9 +6,8 @@ from typing import final
 
 from symfric.foundation.numeric import Scalar, asin, cos, equals, exp, sin, sqrt, tan
 from symfric.foundation.parameters import option, param
-from symfric.laws.base import smooth
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.curve import Curve, Fall
-from symfric.laws.base.fields import COEFFICIENT, LEVEL, SIGMA_2, STIFFNESS, V_EPS, VELOCITY
 from symfric.laws.base.law import Facts, Input, StaticLaw, one_sided
 
 
@@ -57,17 +56,17 @@ class QuarterCarGeneral(StaticLaw):
         load="independent",
     )
 
-    k_s: Scalar = STIFFNESS(28900.0, doc="spring stiffness", lower=0.0)
+    k_s: Scalar = fields.STIFFNESS(28900.0, doc="spring stiffness", lower=0.0)
     b_d: Scalar = param(260.0, unit="N s/m", role="damping", doc="damper coefficient", lower=0.0)
     theta: Scalar = param(
         pi / 4, unit="rad", role="geometry", doc="angle of the strut", lower=0.01, upper=1.56
     )
     L_d: Scalar = param(0.4, unit="m", role="geometry", doc="length of the strut", lower=1e-12)
-    F_brk: Scalar = LEVEL(193.8, doc="break-away force")
-    C_e: Scalar = LEVEL(180.0, doc="static excess at rest")
-    e_1: Scalar = VELOCITY(0.01, doc="velocity of the decay")
-    mu: Scalar = COEFFICIENT(0.05, doc="friction coefficient of the guide")
-    sigma_v: Scalar = SIGMA_2(1500.0)
+    F_brk: Scalar = fields.LEVEL(193.8, doc="break-away force")
+    C_e: Scalar = fields.LEVEL(180.0, doc="static excess at rest")
+    e_1: Scalar = fields.VELOCITY(0.01, doc="velocity of the decay")
+    mu: Scalar = fields.COEFFICIENT(0.05, doc="friction coefficient of the guide")
+    sigma_v: Scalar = fields.SIGMA_2(1500.0)
     v_eps: Scalar = param(
         1e-3, unit="m/s", role="width", width=1, doc="half width of the stick window", lower=1e-12
     )
@@ -158,10 +157,10 @@ class QuarterCarSimple(Curve):
         load="independent",
     )
 
-    C_e: Scalar = LEVEL(180.0, doc="static level")
-    e_1: Scalar = VELOCITY(0.01, doc="velocity of the decay")
-    sigma_v: Scalar = SIGMA_2(1500.0)
-    v_eps: Scalar = V_EPS(1e-3)
+    C_e: Scalar = fields.LEVEL(180.0, doc="static level")
+    e_1: Scalar = fields.VELOCITY(0.01, doc="velocity of the decay")
+    sigma_v: Scalar = fields.SIGMA_2(1500.0)
+    v_eps: Scalar = fields.V_EPS(1e-3)
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
         """Friction force [N] in the direction `s`."""

@@ -10,9 +10,8 @@ from typing import final
 
 from symfric.foundation.numeric import Scalar, asin, atan, equals, exp, is_casadi, sin, tan
 from symfric.foundation.parameters import param
-from symfric.laws.base import smooth
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.curve import TwoLevels
-from symfric.laws.base.fields import CURVATURE, LEVEL, MU_D, MU_S, SHAPE, STEEPNESS
 from symfric.laws.base.law import Facts, StaticLaw
 
 
@@ -40,10 +39,10 @@ class RuiWang(StaticLaw):
         load="independent",
     )
 
-    D: Scalar = LEVEL(1.5, doc="peak")
-    C: Scalar = SHAPE(1.5, doc="shape factor", lower=0.0, upper=2.0)
-    B: Scalar = STEEPNESS(1000.0, width=-1, doc="stiffness factor")
-    E: Scalar = CURVATURE(0.0)
+    D: Scalar = fields.LEVEL(1.5, doc="peak")
+    C: Scalar = fields.SHAPE(1.5, doc="shape factor", lower=0.0, upper=2.0)
+    B: Scalar = fields.STEEPNESS(1000.0, width=-1, doc="stiffness factor")
+    E: Scalar = fields.CURVATURE(0.0)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""
@@ -85,10 +84,10 @@ class SelfTuning(TwoLevels):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15, lower=1e-12)
-    mu_d: Scalar = MU_D(0.1)
-    B: Scalar = STEEPNESS(1000.0, width=-1, doc="stiffness factor")
-    E: Scalar = CURVATURE(0.0)
+    mu_s: Scalar = fields.MU_S(0.15, lower=1e-12)
+    mu_d: Scalar = fields.MU_D(0.1)
+    B: Scalar = fields.STEEPNESS(1000.0, width=-1, doc="stiffness factor")
+    E: Scalar = fields.CURVATURE(0.0)
 
     @property
     def C(self) -> Scalar:
@@ -150,13 +149,13 @@ class BrittleSelfTuning(TwoLevels):
     )
     ordered = (("mu_d", "mu_s"), ("B_0", "B_max"))
 
-    mu_s: Scalar = MU_S(0.15, lower=1e-12)
-    mu_d: Scalar = MU_D(0.1)
-    B_0: Scalar = STEEPNESS(100.0, width=-1, doc="stiffness factor without load")
-    B_max: Scalar = STEEPNESS(1000.0, width=-1, doc="stiffness factor under heavy load")
-    difference_ref: Scalar = SHAPE(0.05, doc="reference of mu_s - mu_d", lower=1e-12)
+    mu_s: Scalar = fields.MU_S(0.15, lower=1e-12)
+    mu_d: Scalar = fields.MU_D(0.1)
+    B_0: Scalar = fields.STEEPNESS(100.0, width=-1, doc="stiffness factor without load")
+    B_max: Scalar = fields.STEEPNESS(1000.0, width=-1, doc="stiffness factor under heavy load")
+    difference_ref: Scalar = fields.SHAPE(0.05, doc="reference of mu_s - mu_d", lower=1e-12)
     N_ref: Scalar = param(50.0, unit="N", role="load", doc="reference of the load", lower=1e-12)
-    E: Scalar = CURVATURE(0.0)
+    E: Scalar = fields.CURVATURE(0.0)
 
     @property
     def velocity_scale(self) -> Scalar:

@@ -6,20 +6,8 @@ from typing import final
 
 from symfric.foundation.numeric import Scalar, equals, exp, tanh
 from symfric.foundation.parameters import param
-from symfric.laws.base import smooth
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.curve import Curve, Fall, TwoLevels
-from symfric.laws.base.fields import (
-    LEVEL,
-    MU_D,
-    MU_S,
-    SHAPE,
-    SIGMA_2,
-    STEEPNESS,
-    V_EPS,
-    V_S,
-    V_T,
-    VELOCITY,
-)
 from symfric.laws.base.law import Facts, StaticLaw
 
 
@@ -46,10 +34,10 @@ class BrownMcPhee(TwoLevels):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
-    v_t: Scalar = V_T(1e-3)
-    mu_v: Scalar = SIGMA_2(0.0)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_t: Scalar = fields.V_T(1e-3)
+    mu_v: Scalar = fields.SIGMA_2(0.0)
     N_t: Scalar = param(1.0, unit="N", role="load", doc="transition normal force", lower=1e-12)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
@@ -91,10 +79,10 @@ class SimscapeBreakaway(TwoLevels):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
-    v_brk: Scalar = VELOCITY(1e-3, width=1, doc="breakaway velocity")
-    sigma_2: Scalar = SIGMA_2(0.0)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_brk: Scalar = fields.VELOCITY(1e-3, width=1, doc="breakaway velocity")
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -135,11 +123,11 @@ class Specker(TwoLevels):
     ordered = (("mu_d", "mu_s"),)
     strictly_ordered = (("v_t", "v_sp"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
-    v_sp: Scalar = VELOCITY(1e-3, width=1, doc="velocity of the peak")
-    v_t: Scalar = V_T(1e-4)
-    sigma_2: Scalar = SIGMA_2(0.0)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_sp: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of the peak")
+    v_t: Scalar = fields.V_T(1e-4)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -182,12 +170,12 @@ class MakkarDixon(StaticLaw):
     )
     strictly_ordered = (("gamma_3", "gamma_2"),)
 
-    gamma_1: Scalar = LEVEL(0.5, doc="static excess")
-    gamma_2: Scalar = STEEPNESS(1e4, width=-1, doc="steepness of the rise")
-    gamma_3: Scalar = STEEPNESS(1e3, doc="steepness of the fall")
-    gamma_4: Scalar = LEVEL(1.0, doc="dynamic level")
-    gamma_5: Scalar = STEEPNESS(1e4, width=-1, doc="steepness of the dynamic part")
-    gamma_6: Scalar = SIGMA_2(0.0)
+    gamma_1: Scalar = fields.LEVEL(0.5, doc="static excess")
+    gamma_2: Scalar = fields.STEEPNESS(1e4, width=-1, doc="steepness of the rise")
+    gamma_3: Scalar = fields.STEEPNESS(1e3, doc="steepness of the fall")
+    gamma_4: Scalar = fields.LEVEL(1.0, doc="dynamic level")
+    gamma_5: Scalar = fields.STEEPNESS(1e4, width=-1, doc="steepness of the dynamic part")
+    gamma_6: Scalar = fields.SIGMA_2(0.0)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""
@@ -222,11 +210,11 @@ class Lorentzian(Curve):
     )
     ordered = (("mu_d", "mu_s"),)
 
-    mu_s: Scalar = MU_S(0.15)
-    mu_d: Scalar = MU_D(0.1)
-    v_s: Scalar = V_S(1e-3)
-    v_eps: Scalar = V_EPS(1e-4)
-    sigma_2: Scalar = SIGMA_2(0.0)
+    mu_s: Scalar = fields.MU_S(0.15)
+    mu_d: Scalar = fields.MU_D(0.1)
+    v_s: Scalar = fields.V_S(1e-3)
+    v_eps: Scalar = fields.V_EPS(1e-4)
+    sigma_2: Scalar = fields.SIGMA_2(0.0)
 
     def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
         """Friction force [N] in the direction `s`."""
@@ -248,20 +236,15 @@ class PoppStelter(StaticLaw):
     Source: Popp and Stelter, Phil. Trans. R. Soc. A 332, 1990 (not read).
     """
 
-    facts = Facts(
-        phenomena=("D", "S", "St", "V"),
-        smoothness="C∞",
-        confidence="unverified",
-        source="Popp and Stelter 1990",
-    )
+    facts = Facts(("D", "S", "St", "V"), "C∞", "unverified", "Popp and Stelter 1990")
 
-    mu_s: Scalar = MU_S(0.15)
-    eta: Scalar = SHAPE(0.5, doc="share that remains", lower=0.0, upper=1.0)
-    d: Scalar = STEEPNESS(1e3, doc="steepness of the fall")
+    mu_s: Scalar = fields.MU_S(0.15)
+    eta: Scalar = fields.SHAPE(0.5, doc="share that remains", lower=0.0, upper=1.0)
+    d: Scalar = fields.STEEPNESS(1e3, doc="steepness of the fall")
     kappa: Scalar = param(
         0.0, unit="s^2/m^2", role="viscous", doc="quadratic coefficient", lower=0.0
     )
-    v_eps: Scalar = V_EPS(1e-4)
+    v_eps: Scalar = fields.V_EPS(1e-4)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Sliding force [N] at a speed >= 0 as the widths vanish."""

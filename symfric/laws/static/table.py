@@ -9,8 +9,7 @@ import numpy as np
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
-from symfric.laws.base import smooth
-from symfric.laws.base.fields import V_EPS
+from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, StaticLaw
 
 
@@ -40,7 +39,7 @@ class Table(StaticLaw):
 
     speeds: tuple[float, ...]
     coefficients: tuple[float, ...]
-    v_eps: Scalar = V_EPS(1e-4, lower=1e-12)
+    v_eps: Scalar = fields.V_EPS(1e-4, lower=1e-12)
 
     def __post_init__(self) -> None:
         super().__post_init__()
