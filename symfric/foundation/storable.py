@@ -41,6 +41,18 @@ MOVED = {
     "symfric.laws.static.rui_wang": "symfric.laws.static.self_tuning",
     "symfric.laws.static.stribeck": "symfric.laws.static.exponential",
     "symfric.laws.static.threlfall": "symfric.laws.static.piecewise",
+    "symfric.scenes.arm": "symfric.scenes.spatial",
+    "symfric.scenes.clutch": "symfric.scenes.rotating",
+    "symfric.scenes.coupled_blocks": "symfric.scenes.rabinowicz",
+    "symfric.scenes.drill_string": "symfric.scenes.rotating",
+    "symfric.scenes.four_bar": "symfric.scenes.linkages",
+    "symfric.scenes.four_mass": "symfric.scenes.spatial",
+    "symfric.scenes.nip": "symfric.scenes.rotating",
+    "symfric.scenes.pendulum": "symfric.scenes.linkages",
+    "symfric.scenes.pendulum_box": "symfric.scenes.linkages",
+    "symfric.scenes.prescribed": "symfric.scenes.rigs",
+    "symfric.scenes.quarter_car": "symfric.scenes.rigs",
+    "symfric.scenes.robot": "symfric.scenes.spatial",
 }
 """Module in older files -> module that holds its classes now."""
 OURS = tuple(f"{package}{mark}" for package in OWN for mark in ".:")
