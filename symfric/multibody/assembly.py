@@ -31,10 +31,9 @@ from symfric.multibody.applied import Rest, rests
 from symfric.multibody.equations import Equations, normals_with
 from symfric.multibody.friction import Contact as Rubbing
 from symfric.multibody.mass import solve_mass
-from symfric.multibody.results import Put
+from symfric.multibody.results import Put, constraint_units, multiplier_units
 from symfric.multibody.slips import Slip, depends_on_load, events, keeps_deflection, slips
 from symfric.multibody.topology import Topology
-from symfric.multibody.units import constraint_units, multiplier_units
 
 AT_REST = 1e-9
 """Sliding velocity [m/s] below which a law that rests by modes does so in pictures: it is exact but
