@@ -16,8 +16,8 @@ from symfric.figures.scales import NORMAL_FORCE
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
 from symfric.laws import PHENOMENA, POPULATIONS, AnyLaw, Population
+from symfric.laws.catalogue import ALIASES
 from symfric.laws.cost import cost
-from symfric.laws.names import ALIASES
 from symfric.scenes import ALL_SCENES
 
 

@@ -120,42 +120,42 @@ JUDGED = (
         "np.multiply(k + 0.5, h", "np.multiply(k, h", T_STEPS,
     ),
     Mutant(
-        "the load does not slow the clutch that holds", SCENES + "clutch.py",
+        "the load does not slow the clutch that holds", SCENES + "rotating.py",
         "pull = (self.T_1 / self.J_1 + self.T_2", "pull = (self.T_1 / self.J_1 - self.T_2",
         of("clutch"),
     ),
     Mutant(
-        "the nip roller lags the other way", SCENES + "nip.py",
+        "the nip roller lags the other way", SCENES + "rotating.py",
         "(v_rel.symbol - self.lag * line.symbol)", "(v_rel.symbol + self.lag * line.symbol)",
         of("nip"),
     ),
     Mutant(
-        "pieces of the string are as soft as the whole", SCENES + "drill_string.py",
+        "pieces of the string are as soft as the whole", SCENES + "rotating.py",
         "torques = n * (self.k", "torques = (self.k", of("drill_string"),
     ),
     Mutant(
-        "mud does not brake the bit", SCENES + "drill_string.py",
+        "mud does not brake the bit", SCENES + "rotating.py",
         "torques[n - 1] - self.c_b * bit.symbol", "torques[n - 1] - 0 * self.c_b * bit.symbol",
         of("drill_string"),
     ),
     Mutant(
-        "the second block rubs as the first", SCENES + "coupled_blocks.py",
+        "the second block rubs as the first", SCENES + "rabinowicz.py",
         '(self.law_of("block_2"), self.m_2)', "(self.law, self.m_2)", of("coupled_blocks"),
     ),
     Mutant(
-        "samples of a law are rubbed from somewhere else", SCENES + "prescribed.py",
+        "samples of a law are rubbed from somewhere else", SCENES + "rigs.py",
         "            ode=v.symbol,", "            ode=2 * v.symbol,", of("prescribed"),
     ),
     Mutant(
-        "a level of the main study has two digits swapped", SCENES + "prescribed.py",
+        "a level of the main study has two digits swapped", SCENES + "rigs.py",
         "4.2672, 2.6063,", "4.2672, 2.6036,", of("prescribed"),
     ),
     Mutant(
-        "mud of the paper is ten times thinner", SCENES + "drill_string.py",
+        "mud of the paper is ten times thinner", SCENES + "rotating.py",
         '"c": 172.3067, "c_b": 50.0}', '"c": 172.3067, "c_b": 5.0}', of("drill_string"),
     ),
     Mutant(
-        "a road of 30 mm rises by 60", SCENES + "quarter_car.py",
+        "a road of 30 mm rises by 60", SCENES + "rigs.py",
         '"amplitude": millimetres / 1000,', '"amplitude": millimetres / 500,', T_PRESETS,
     ),
     Mutant(

@@ -3,7 +3,7 @@
 from mutants.mutant import Mutant
 
 RANDOM = "symfric/figures/random_motion.py"
-CAR = "symfric/scenes/quarter_car.py"
+CAR = "symfric/scenes/rigs.py"
 
 PICTURED = (
     Mutant(

@@ -5,7 +5,7 @@ from mutants.mutant import Mutant
 RECOMMENDED = "symfric/figures/recommended.py"
 SCALED = "symfric/figures/regularisation.py"
 MEASURED = "symfric/bench/regularisation.py"
-CLOSING, EQUATIONS = "symfric/multibody/closing.py", "symfric/multibody/equations.py"
+CLOSING, EQUATIONS = "symfric/multibody/joints.py", "symfric/multibody/equations.py"
 T_RECOMMENDED = ("tests/symfric/figures/test_recommended.py",)
 T_SCALED = ("tests/symfric/figures/test_regularisation.py",)
 T_MEASURED = ("tests/symfric/bench/test_regularisation.py",)

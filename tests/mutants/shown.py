@@ -114,7 +114,7 @@ SHOWN = (
     ),
     Mutant(
         "an area forgets that its abscissa depends on time",
-        "symfric/results/quadrature.py",
+        "symfric/results/signals.py",
         " + ca.jacobian(signal, model.t)",
         "",
         ("tests/symfric/results/test_quadrature.py",),

@@ -82,7 +82,7 @@ EXCEPTIONS: dict[str, str] = {
     "symfric/gallery/quarter_car_friction/_rig.py: FRICTION[1]": OURS,
     "symfric/gallery/quarter_car_friction/_rig.py: FRICTION[2]": OURS,
     "symfric/laws/dynamic/stick_slip.py: StickSlip.rate": STEADY,
-    "symfric/laws/dynamic/gonthier.py: Gonthier.rate": STEADY,
+    "symfric/laws/dynamic/dwell.py: Gonthier.rate": STEADY,
 }
 """Changes that no figure sees, and why."""
 

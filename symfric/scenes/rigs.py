@@ -1,4 +1,4 @@
-"""Quarter-car test rig: body and wheel on vertical guides, friction where the body is guided."""
+"""Test rigs: a tribometer, whose motion is given, and a quarter car."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,14 +9,132 @@ from typing import Any, ClassVar, final
 import casadi as ca
 
 from symfric.foundation.numeric import Scalar, sqrt, tan
-from symfric.foundation.parameters import Variable, param, parameters, with_values
+from symfric.foundation.parameters import Variable, option, param, parameters, with_values
+from symfric.laws import GMS, Dahl, ElastoPlastic, Leuven, LuGre, SteadyStateLuGre, Stribeck
 from symfric.laws.base import smooth
+from symfric.laws.base.law import FORCE
 from symfric.laws.static.quarter_car import QuarterCarGeneral, tilt
 from symfric.model import Model, Monitor, Output, Variables
 from symfric.model.sketch import Sketch
-from symfric.scenes.base import Scene, contact
+from symfric.scenes import fields
+from symfric.scenes.base import GivenInput, Scene, contact
 from symfric.scenes.drawn import Block, drawn
 from symfric.scenes.presets import Numbers, Preset
+
+
+def strokes(t: ca.SX) -> ca.SX:
+    """Velocity 0.005 sin(2 pi t) m/s: through rest and five Stribeck velocities of most laws."""
+    return 5e-3 * ca.sin(2 * ca.pi * t)
+
+
+_CURVE = {"v_s": 98e-6, "delta": 0.78}
+_BRISTLE = _CURVE | {"sigma_0": 0.16e6, "sigma_1": 0.08}
+_LEVELS = {"mu_s": 1.05, "mu_d": 0.2, "sigma_2": 0.0}
+
+
+def _sled(
+    study: str, slowest: int, F_S: float, F_C: float, v_s: float, sigma_2: float, delta: float
+) -> Preset:
+    """Carton pulled over rubber from `slowest` [mm/min] on: forces as coefficients under 1 N."""
+    curve = {"v_s": v_s, "delta": delta}
+    levels = {"mu_s": F_S, "mu_d": F_C, "sigma_2": sigma_2}
+    measured = {"F_S": F_S, "F_C": F_C, "sigma_2": sigma_2, **curve}
+    return Preset(
+        f"sled of the {study} study, forces as coefficients under 1 N (its weight is not given); "
+        f"measured from {slowest} to 500 mm/min, smooth above 140; the machine runs up to 650",
+        f"A Friction Model for Laminator Nips, MSc thesis TFRT-5968, Lund 2015, {study} study",
+        {"N": 1.0},
+        {"law": Numbers(levels, {SteadyStateLuGre: measured, Stribeck: curve, LuGre: curve})},
+    )
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Prescribed(Scene):
+    """A law under measured or imagined motion: velocity in, friction out.
+
+        x' = v,   z' = rate(v, N, z),   friction = F(v, N, z)
+
+    `v` is the input, constant, a function of time or samples (`Hold`, `Linear`). A position that
+    was measured becomes one by `rate_of(Linear(t, x))`, straight between its samples; on the
+    command line write `--input x=FILE.csv:COLUMN`. With load = "input" the normal force is the
+    input `load`, N where nothing is given, and not below `N_least`, so that noise around an open
+    contact does not press backwards. What else a law needs, such as an acceleration or a
+    temperature, is an input of its name.
+
+    Limits: no laws that need the force F_e which rest must carry (`Karnopp`, `ExactCoulomb`, ...):
+    a given motion does not say it. Internal states start as after long
+    rest, whatever the first velocity is.
+    """
+
+    t_end: ClassVar[float] = 2.0
+    inputs: ClassVar[Mapping[str, GivenInput]] = {
+        "v": GivenInput("0.005 sin(2 pi t)", strokes),
+    }
+    integrals: ClassVar[Mapping[str, str]] = {"x": "v"}
+    presets: ClassVar[Mapping[str, Preset]] = {
+        "lampaert_table_1": Preset(
+            "levels as coefficients under 1 N; the stiffnesses of the elements are not given",
+            "Lampaert, Al-Bender, Swevers, A Generalized Maxwell-Slip Friction Model appropriate "
+            "for Control Purposes, table 1",
+            {"N": 1.0},
+            {
+                "law": Numbers(
+                    _LEVELS,
+                    {
+                        LuGre: _BRISTLE,
+                        ElastoPlastic: _BRISTLE | {"z_ba": 0.61e-6},
+                        Leuven: _CURVE | {"delta_l": 7.0, "sigma_1": 0.08},
+                        Dahl: {"sigma_0": 0.16e6},
+                        GMS: _CURVE | {"C": 24.0},
+                        Stribeck: _CURVE,
+                    },
+                )
+            },
+        ),
+        "laminator_pilot": _sled("pilot", 10, 4.4861, 2.5498, 0.0012, 230.0, 2.0),
+        "laminator_main": _sled("main", 100, 4.2672, 2.6063, 0.0049, 5.0, 3.2),
+    }
+
+    N: Scalar = fields.LOAD(1.0, doc="normal force")
+    N_least: Scalar = fields.LOAD(1e-3, doc="least normal force of the input `load`")
+    load: str = option("parameter", choices=("parameter", "input"), doc="where N comes from")
+
+    def equations(self, p: Variables) -> Model:
+        """States x and those of the law; inputs v, load and what else the law takes."""
+        x = Variable("x", "m", nominal=0.01, doc="path")
+        v = Variable("v", "m/s", nominal=0.01, doc="sliding velocity")
+        load = Variable("load", "N", start=self.N, nominal=1.0, doc="normal force")
+        varying = self.load == "input"
+        N = smooth.positive(load.symbol - self.N_least, 0.0) + self.N_least if varying else self.N
+        if any(i.name == FORCE for i in self.law.inputs):
+            raise ValueError(
+                f"Prescribed: expected a law of motion and load, got {type(self.law).__name__}, "
+                "which needs the force that rest must carry; a given motion does not say it, a "
+                "`Drive` does"
+            )
+        further = tuple(
+            Variable(i.name, i.unit, start=i.steady, nominal=i.nominal, doc=i.doc)
+            for i in self.law.inputs
+        )
+        given: dict[str, Any] = {u.name: u.symbol for u in further}
+        least = self.N_least if varying else None
+        slip = contact("sample", self.law, v.symbol, N, rest={}, least=least, **given)
+        return Model(
+            name="prescribed",
+            x=(x,),
+            u=(v, *([load] if varying else []), *further),
+            p=p,
+            ode=v.symbol,
+            contacts=(slip,),
+            outputs={
+                "friction": Output(slip.force, "N", "friction force opposing v"),
+                "power": Output(slip.force * v.symbol, "W", "power taken by friction"),
+                **({"N": Output(N, "N", "normal force")} if varying else {}),
+            },
+            sketch=lambda: drawn({"sample": Block(x.symbol, 0.0, "x", "v", self.law)}),
+        )
+
 
 ANY = 1e100
 """Scale [N] of a load that error control does not resolve, but looks at for being a number."""
@@ -68,36 +186,26 @@ class QuarterCar(Scene):
         f"al_zughaibi_{a}_mm": _road(a) for a in (30, 50, 70)
     }
 
-    M_b: Scalar = param(240.0, unit="kg", role="mass", doc="mass of the body", lower=1e-12)
-    M_w: Scalar = param(40.0, unit="kg", role="mass", doc="mass of the wheel", lower=1e-12)
-    k_s: Scalar = param(
-        28900.0, unit="N/m", role="stiffness", doc="suspension stiffness", lower=0.0
-    )
-    b_d: Scalar = param(260.0, unit="N s/m", role="damping", doc="suspension damping", lower=0.0)
-    k_t: Scalar = param(920000.0, unit="N/m", role="stiffness", doc="tyre stiffness", lower=0.0)
-    b_t: Scalar = param(3886.0, unit="N s/m", role="damping", doc="tyre damping", lower=0.0)
+    M_b: Scalar = fields.MASS(240.0, doc="mass of the body")
+    M_w: Scalar = fields.MASS(40.0, doc="mass of the wheel")
+    k_s: Scalar = fields.SPRING(28900.0, doc="suspension stiffness")
+    b_d: Scalar = fields.DAMPER(260.0, doc="suspension damping")
+    k_t: Scalar = fields.SPRING(920000.0, doc="tyre stiffness")
+    b_t: Scalar = fields.DAMPER(3886.0, doc="tyre damping")
     theta: Scalar = param(
         pi / 4, unit="rad", role="geometry", doc="angle of the strut", lower=0.01, upper=1.56
     )
-    L_d: Scalar = param(0.4, unit="m", role="geometry", doc="length of the strut", lower=1e-12)
-    N_0: Scalar = param(1093.0, unit="N", role="load", doc="preload of the guide", lower=0.0)
+    L_d: Scalar = fields.SIZE(0.4, doc="length of the strut")
+    N_0: Scalar = fields.LOAD(1093.0, doc="preload of the guide")
     eps: Scalar = param(
         1.0, unit="N", role="width", doc="rounding of the strut's side force", lower=1e-12
     )
-    middle: Scalar = param(
-        0.085, unit="m", role="motion", doc="height of the road after its first ramp"
-    )
-    amplitude: Scalar = param(
-        0.05, unit="m", role="motion", doc="rise of the second ramp, half fall of the third"
-    )
-    t_0: Scalar = param(0.5, unit="s", role="motion", doc="start of the first ramp", lower=0.0)
-    t_first: Scalar = param(
-        1.0, unit="s", role="motion", doc="duration of the first ramp", lower=1e-12
-    )
-    t_ramp: Scalar = param(
-        1.0, unit="s", role="motion", doc="duration of the other ramps", lower=1e-12
-    )
-    t_hold: Scalar = param(2.0, unit="s", role="motion", doc="rest after a ramp", lower=0.0)
+    middle: Scalar = fields.START(0.085, doc="height of the road after its first ramp")
+    amplitude: Scalar = fields.START(0.05, doc="rise of the second ramp, half fall of the third")
+    t_0: Scalar = fields.DURATION(0.5, doc="start of the first ramp", lower=0.0)
+    t_first: Scalar = fields.DURATION(1.0, doc="duration of the first ramp")
+    t_ramp: Scalar = fields.DURATION(1.0, doc="duration of the other ramps")
+    t_hold: Scalar = fields.DURATION(2.0, doc="rest after a ramp", lower=0.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
