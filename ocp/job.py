@@ -12,6 +12,7 @@ from ocp.checking.refining import Goals, refined_solve
 from ocp.checking.verification import Verification
 from ocp.checking.verify import verified
 from ocp.checking.verify import verify as verify_solution
+from ocp.formulation.problem import Problem
 from ocp.friction.own_law import STEPS, OwnLaw
 from ocp.friction.polish import polish, refusal
 from ocp.friction.referee import verify_exactly
@@ -24,7 +25,6 @@ from ocp.solvers.outcome import Report
 from ocp.solving.clock import Clock
 from ocp.solving.one_solve import Solver
 from ocp.solving.starts import Start
-from ocp.text.problem import Problem
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Radau, Scheme, Shooting
 from symfric.foundation import checks

@@ -6,6 +6,9 @@ from typing import get_args
 
 from numpy.typing import ArrayLike
 
+from ocp.formulation.doubts import doubts
+from ocp.formulation.problem import Problem
+from ocp.formulation.sizes import cost_size, sized
 from ocp.friction.sharpen import STARTS
 from ocp.job import Friction, Job
 from ocp.result.solution import Solution
@@ -16,9 +19,6 @@ from ocp.solvers.sqp import Sqp
 from ocp.solving.clock import Clock
 from ocp.solving.one_solve import Solver
 from ocp.solving.starts import Start
-from ocp.text.doubts import doubts
-from ocp.text.problem import Problem
-from ocp.text.sizes import cost_size, sized
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
 from symfric.foundation import checks

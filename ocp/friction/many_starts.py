@@ -6,8 +6,8 @@ from math import isfinite, pi
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.bounds import Box
 from ocp.solving.starts import rates_of
-from ocp.text.ranges import Box
 from ocp.transcription.points import Points, SpanPoints
 from ocp.transcription.transcription import Transcription
 

@@ -26,6 +26,7 @@ import numpy as np
 from ocp.checking.arcs import arcs_of
 from ocp.checking.local_errors import local_errors
 from ocp.checking.refine import MeshErrors, refined
+from ocp.formulation.problem import Problem
 from ocp.friction.arcs import MARGIN
 from ocp.friction.carry import Known
 from ocp.friction.mode_models import restless
@@ -38,7 +39,6 @@ from ocp.result.solution import Solution
 from ocp.solvers.ipopt import Ipopt
 from ocp.solvers.outcome import Report
 from ocp.solving.clock import Clock
-from ocp.text.problem import Problem
 from ocp.transcription.schemes import Radau, Scheme
 from symfric.foundation.status import Status
 

@@ -30,6 +30,9 @@ from numpy.typing import NDArray
 
 from ocp.checking.arcs import arcs_of
 from ocp.checking.local_errors import local_errors
+from ocp.formulation.bounds import Free
+from ocp.formulation.phase import Chain
+from ocp.formulation.problem import Problem
 from ocp.friction.many_starts import starts_around
 from ocp.friction.mode_models import smooth_model
 from ocp.friction.scales import Scale, Scales, guessed, same_size, scales_of, widths_at
@@ -44,9 +47,6 @@ from ocp.solvers.sqp import Sqp
 from ocp.solving.clock import Clock
 from ocp.solving.one_solve import solution_of, when
 from ocp.solving.starts import Start, resample, start_of
-from ocp.text.phase import Chain
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
 from ocp.transcription.grid import make_meshes, split
 from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme

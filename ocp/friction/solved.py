@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.holding import holding_losses
+from ocp.formulation.problem import Problem
+from ocp.formulation.span import Row
 from ocp.friction.arc_models import CAUGHT, FIRST, PULLED, STOPPED, breaks_away
 from ocp.friction.arcs import MARGIN, in_arcs
 from ocp.friction.carry import Known, points_in
@@ -20,8 +22,6 @@ from ocp.solvers.ipopt import Ipopt
 from ocp.solvers.outcome import Iterate, Outcome, Report, in_stage
 from ocp.solving.clock import Clock
 from ocp.solving.one_solve import when
-from ocp.text.problem import Problem
-from ocp.text.span import Row
 from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise

@@ -6,6 +6,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ocp.formulation.bounds import Free
+from ocp.formulation.cost import Cost
+from ocp.formulation.problem import Problem
+from ocp.formulation.span import Row, Span
 from ocp.mpc.horizon import (
     FLAT,
     Costs,
@@ -19,10 +23,6 @@ from ocp.mpc.horizon import (
     step_function,
     total,
 )
-from ocp.text.cost import Cost
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
-from ocp.text.span import Row, Span
 from symfric.foundation import checks
 from symfric.model import Model
 

@@ -8,10 +8,10 @@ from math import pi
 
 import casadi as ca
 
+from ocp.formulation.cost import integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.problems.ready import Ready
-from ocp.text.cost import integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
 from symfric.foundation.parameters import Variable
 from symfric.laws import BrownMcPhee
 from symfric.model import Model

@@ -5,11 +5,11 @@ Each is stated with the data of its source, so that its optimum can be compared 
 
 import casadi as ca
 
+from ocp.formulation.bounds import Free
+from ocp.formulation.cost import TIME, at_end, integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from ocp.problems.ready import Ready
-from ocp.text.cost import TIME, at_end, integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
 from symfric.foundation.parameters import Variable
 from symfric.model import Model, Output
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, final
 
 if TYPE_CHECKING:
-    from ocp.text.problem import Problem
+    from ocp.formulation.problem import Problem
 
 
 @final

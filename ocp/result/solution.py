@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, Protocol, final
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.bounds import Free
+from ocp.formulation.problem import Problem
+from ocp.formulation.serialise import Posed, posed
 from ocp.result.motion import Motion, Stretch
 from ocp.result.stored import Stored, stored_spans, structure_of
 from ocp.solvers.outcome import Iterate, SolverStatistics
-from ocp.text.posed import Posed, posed
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
 from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
 from symfric.foundation import packed
@@ -84,7 +84,7 @@ class Solution:
     `solution.scenarios["oiled"]["v"]` is that of another.
 
     Attributes:
-        problem: what was solved; of a stored solution its resolved form, `ocp.text.posed.Posed`.
+        problem: what was solved; of a stored solution its resolved form, `Posed`.
         status: how it ended; `message` says it in a sentence.
         cost: J.
         motions: what moves, for each scenario.

@@ -8,8 +8,8 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.problem import Problem
 from ocp.solvers.outcome import Iterate
-from ocp.text.problem import Problem
 from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
 

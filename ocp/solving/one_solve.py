@@ -9,6 +9,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ocp.formulation.problem import Problem
 from ocp.result.motion import Motion, motion_of
 from ocp.result.solution import Solution
 from ocp.solvers.fatrop import Fatrop
@@ -18,7 +19,6 @@ from ocp.solvers.prepared import Prepared
 from ocp.solvers.sqp import Sqp
 from ocp.solving.kinks import narrow_widths
 from ocp.solving.starts import Start, start_of
-from ocp.text.problem import Problem
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.points import Points
 from ocp.transcription.program import Place

@@ -6,7 +6,7 @@ from math import isfinite, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.text.ranges import Box, Free
+from ocp.formulation.bounds import Box, Free
 from ocp.transcription.points import Points, SpanPoints
 from ocp.transcription.transcription import Transcription
 from symfric.foundation import checks

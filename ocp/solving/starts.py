@@ -9,12 +9,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ocp.formulation.bounds import Box, Free
+from ocp.formulation.problem import Problem
+from ocp.formulation.span import Link, Span
 from ocp.result.solution import Solution
 from ocp.result.stored import Stored, StoredSpan, along, structure_of
 from ocp.solvers.outcome import Iterate
-from ocp.text.problem import Problem
-from ocp.text.ranges import Box, Free
-from ocp.text.span import Link, Span
 from ocp.transcription.points import Points, SpanPoints
 from ocp.transcription.transcription import Transcription
 from symfric.foundation import checks

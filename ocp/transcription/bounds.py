@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ocp.text.problem import Problem
-from ocp.text.ranges import Box, Free
-from ocp.text.span import Span
+from ocp.formulation.bounds import Box, Free
+from ocp.formulation.problem import Problem
+from ocp.formulation.span import Span
 from ocp.transcription.blocks import Array
 from ocp.transcription.local import time_scale
 from ocp.transcription.points import Layout, SpanLayout

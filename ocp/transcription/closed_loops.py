@@ -21,8 +21,8 @@ from typing import final
 import casadi as ca
 import numpy as np
 
-from ocp.text.ranges import Box, Free, fixed, meet
-from ocp.text.span import Span
+from ocp.formulation.bounds import Box, Free, fixed, meet
+from ocp.formulation.span import Span
 from ocp.transcription.blocks import Array, Block, Indices, Piece, block, order_of, select
 from ocp.transcription.local import Data, Local
 from ocp.transcription.loops import RANK, Loops, dependent

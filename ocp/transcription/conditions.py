@@ -8,9 +8,9 @@ from typing import final
 import casadi as ca
 import numpy as np
 
-from ocp.text.problem import Problem
-from ocp.text.ranges import Box, Free
-from ocp.text.span import Join, Row, Span
+from ocp.formulation.bounds import Box, Free
+from ocp.formulation.problem import Problem
+from ocp.formulation.span import Join, Row, Span
 from ocp.transcription.blocks import (
     LAST,
     Array,

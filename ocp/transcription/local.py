@@ -8,8 +8,8 @@ from typing import final
 import casadi as ca
 import numpy as np
 
-from ocp.text.ranges import Free
-from ocp.text.span import Span
+from ocp.formulation.bounds import Free
+from ocp.formulation.span import Span
 from ocp.transcription.blocks import Array, Indices
 from ocp.transcription.points import Layout
 from symfric.foundation.symbols import stacked

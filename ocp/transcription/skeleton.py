@@ -8,9 +8,9 @@ from typing import final
 import casadi as ca
 import numpy as np
 
-from ocp.text.problem import Problem
-from ocp.text.ranges import Box, Free
-from ocp.text.span import Span
+from ocp.formulation.bounds import Box, Free
+from ocp.formulation.problem import Problem
+from ocp.formulation.span import Span
 from ocp.transcription.assembly import Assembled, Slot, assemble
 from ocp.transcription.blocks import Array, Piece
 from ocp.transcription.bounds import bounds_of, scale_of

@@ -8,7 +8,7 @@ in this order already, the gap first.
 
 import numpy as np
 
-from ocp.text.problem import Problem
+from ocp.formulation.problem import Problem
 from ocp.transcription.assembly import Assembled
 from ocp.transcription.blocks import Array, Indices, Piece
 from ocp.transcription.points import Layout

@@ -7,8 +7,8 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
+from ocp.formulation.bounds import Free
+from ocp.formulation.problem import Problem
 from ocp.transcription.blocks import Array, Indices
 from ocp.transcription.grid import check_meshes
 from ocp.transcription.points import Layout, Points, SpanPoints

@@ -16,7 +16,7 @@ MODULES = (
     "symfric.integrator.stored", "symfric.integrator.derivatives.seeds",
     "symfric.integrator.equations.inputs", "symfric.integrator.running.dense",
     "symfric.integrator.running.events",
-    "ocp.checking.verification", "ocp.result.", "ocp.solvers.outcome", "ocp.text.",
+    "ocp.checking.verification", "ocp.result.", "ocp.solvers.outcome", "ocp.formulation.",
     "ocp.transcription.points", "ocp.transcription.schemes",
     "identification.data.", "identification.fit", "identification.residuals.closed_loop",
     "identification.residuals.inverse", "identification.residuals.points",
@@ -24,12 +24,25 @@ MODULES = (
     "identification.signals.velocity", "identification.unknowns.spec", "identification.verdict.",
 )  # fmt: skip
 """Modules whose classes a file may name; a dot at the end means all modules of that package."""
+MOVED = {
+    "ocp.text.choice": "ocp.formulation.choice",
+    "ocp.text.posed": "ocp.formulation.serialise",
+    "ocp.text.ranges": "ocp.formulation.bounds",
+    "ocp.text.span": "ocp.formulation.span",
+}
+"""Module in older files -> module that holds its classes now."""
 OURS = tuple(f"{package}{mark}" for package in OWN for mark in ".:")
 
 
 def path_of(named: Any) -> str:
     """Return module and name of a class or function."""
     return f"{named.__module__}:{named.__qualname__}"
+
+
+def current(path: str) -> str:
+    """Return the present path of a class or function that a file may name by an older one."""
+    place, _, name = path.partition(":")
+    return f"{MOVED.get(place, place)}:{name}"
 
 
 def found_at(path: str) -> Any:

@@ -121,7 +121,7 @@ RESULTS = (
         "a phase starts at zero", MOTION, "begin += points[k].T", "begin += 0.0", T_SOLVED,
     ),
     Mutant(
-        "a stored problem forgets its phases", "ocp/text/posed.py",
+        "a stored problem forgets its phases", "ocp/formulation/serialise.py",
         "        problem.spans,\n", "        problem.spans[:1],\n",
         T_STORED,
     ),
@@ -189,10 +189,11 @@ RESULTS = (
     ),
     Mutant(
         "costs are as large as they are", "ocp/solve.py",
-        "1.0 / cost_size(posed)", "1.0", ("tests/ocp/text/test_sizes.py",),
+        "1.0 / cost_size(posed)", "1.0", ("tests/ocp/formulation/test_sizes.py",),
     ),
     Mutant(
-        "a nominal value that was given gives way", "ocp/text/sizes.py",
-        "(v.nominal == UNSAID and times >= FAR)", "times >= FAR", ("tests/ocp/text/test_sizes.py",),
+        "a nominal value that was given gives way", "ocp/formulation/sizes.py",
+        "(v.nominal == UNSAID and times >= FAR)", "times >= FAR",
+        ("tests/ocp/formulation/test_sizes.py",),
     ),
 )  # fmt: skip

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from ocp.formulation.phase import Chain
 from ocp.friction.carry import Known
 from ocp.friction.mode_models import smooth_model, widths
 from ocp.friction.polish import KICK, SHORTEST, Polisher, better, parameters_of, settled
@@ -16,7 +17,6 @@ from ocp.friction.solved import Solved
 from ocp.problems.friction import out_and_back
 from ocp.solvers.ipopt import Ipopt
 from ocp.solving.one_solve import solve_once
-from ocp.text.phase import Chain
 from ocp.transcription.schemes import Radau
 
 

@@ -3,10 +3,10 @@ import numpy as np
 import pytest
 from phases import unit_move
 
+from ocp.formulation.cost import at_end, integral
 from ocp.solvers.answers import not_finite, plainly, worst
 from ocp.solvers.outcome import outside, worst_of
 from ocp.solvers.watch import Seen
-from ocp.text.cost import at_end, integral
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.program import Program
 from ocp.transcription.schemes import Radau

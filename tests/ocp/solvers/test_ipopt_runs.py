@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from phases import fastest_move, unit_move
 
+from ocp.formulation.cost import integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
+from ocp.formulation.signals import Signals
 from ocp.result.solution import Solution
 from ocp.solvers.ipopt import ANSWERS, Ipopt
 from ocp.solvers.outcome import Progress, in_stage
 from ocp.solving.one_solve import solve_once
-from ocp.text.cost import integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.signals import Signals
 from symfric import Model, Status, Variable
 
 HARD = fastest_move()

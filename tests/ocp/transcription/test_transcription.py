@@ -17,11 +17,11 @@ from discretised import (
 )
 from phases import UNIT, there_and_back, unit_move
 
-from ocp.text.cost import at_end, integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
-from ocp.text.span import Row
+from ocp.formulation.bounds import Free
+from ocp.formulation.cost import at_end, integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
+from ocp.formulation.span import Row
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.points import Points, SpanPoints
 from ocp.transcription.schemes import Legendre, Radau, Scheme

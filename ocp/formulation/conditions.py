@@ -6,7 +6,7 @@ from typing import Any
 
 import casadi as ca
 
-from ocp.text.expressions import BRANCH, MATH, called, constants
+from ocp.formulation.expressions import BRANCH, MATH, called, constants
 from symfric.foundation import checks
 
 COMPARISON = "a comparison such as lambda s: s.tip_z <= 0.9"

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.text.ranges import Box, Free
+from ocp.formulation.bounds import Box, Free
 from symfric.model import Model
 
 Array = NDArray[np.float64]

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import Literal, final
 
-from ocp.text.choice import Choice
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
-from ocp.text.span import Span
+from ocp.formulation.bounds import Free
+from ocp.formulation.choice import Choice
+from ocp.formulation.problem import Problem
+from ocp.formulation.span import Span
 from symfric.model import Model
 
 

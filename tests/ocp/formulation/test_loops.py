@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from ocp.text.cost import integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.ranges import FREE
-from ocp.text.span import Span
+from ocp.formulation.bounds import FREE
+from ocp.formulation.cost import integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
+from ocp.formulation.span import Span
 from symfric import BrownMcPhee, Model
 from symfric.multibody import JointSpringDamper
 from symfric.scenes import SliderCrank

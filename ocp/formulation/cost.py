@@ -6,8 +6,8 @@ from typing import final
 
 import casadi as ca
 
-from ocp.text.expressions import value_of
-from ocp.text.signals import Signals
+from ocp.formulation.expressions import value_of
+from ocp.formulation.signals import Signals
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
 from symfric.model import Model

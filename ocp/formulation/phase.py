@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import final
 
-from ocp.text.cost import Cost
-from ocp.text.ranges import Free, Range
-from ocp.text.signals import Signals
+from ocp.formulation.bounds import Free, Range
+from ocp.formulation.cost import Cost
+from ocp.formulation.signals import Signals
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
 from symfric.model import Model, check_model

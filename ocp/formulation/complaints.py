@@ -5,17 +5,17 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from math import inf
 from typing import TYPE_CHECKING, Any
 
-from ocp.text.kinds import COST, labelled_phases, said
-from ocp.text.phase import Phase
-from ocp.text.ranges import RANGE, Free, as_box, is_range
-from ocp.text.rates import rate_name
-from ocp.text.settings import goals, names_of
+from ocp.formulation.bounds import RANGE, Free, as_box, is_range
+from ocp.formulation.kinds import COST, labelled_phases, said
+from ocp.formulation.phase import Phase
+from ocp.formulation.rates import rate_name
+from ocp.formulation.settings import goals, names_of
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number
 from symfric.model import Model
 
 if TYPE_CHECKING:
-    from ocp.text.problem import Problem
+    from ocp.formulation.problem import Problem
 
 DURATION = "a duration T > 0 [s] or Free(lower, upper)"
 

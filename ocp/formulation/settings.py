@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING, TypeVar, final
 
-from ocp.text.cost import Cost
-from ocp.text.phase import Phase, Ranges
-from ocp.text.ranges import Range, as_box, is_range
-from ocp.text.rates import rate_name, with_parameters, with_rates
+from ocp.formulation.bounds import Range, as_box, is_range
+from ocp.formulation.cost import Cost
+from ocp.formulation.phase import Phase, Ranges
+from ocp.formulation.rates import rate_name, with_parameters, with_rates
 from symfric.model import Model
 
 if TYPE_CHECKING:
-    from ocp.text.problem import Problem
+    from ocp.formulation.problem import Problem
 
 T = TypeVar("T")
 

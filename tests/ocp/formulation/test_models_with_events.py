@@ -2,8 +2,8 @@
 
 import pytest
 
+from ocp.formulation.templates import rest_to_rest
 from ocp.solve import solve
-from ocp.text.moves import rest_to_rest
 from ocp.transcription.schemes import Shooting
 from symfric import ExactCoulomb, drive
 

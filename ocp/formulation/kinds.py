@@ -3,14 +3,14 @@
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from ocp.text.cost import Cost
-from ocp.text.phase import Chain, Phase
+from ocp.formulation.cost import Cost
+from ocp.formulation.phase import Chain, Phase
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number
 from symfric.model import Model
 
 if TYPE_CHECKING:
-    from ocp.text.problem import Problem
+    from ocp.formulation.problem import Problem
 
 COST = "a cost made of integral(...), at_end(...) and TIME"
 CONDITION = "functions of the signals such as lambda s: s.tip_z <= 0.9"

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any, final
 
 import casadi as ca
 
-from ocp.text.conditions import Comparison, comparisons
-from ocp.text.expressions import value_of
-from ocp.text.settings import Setting
-from ocp.text.signals import MissingError, Signals, fresh_symbols
-from ocp.text.span import Condition, Join, Link, Row
+from ocp.formulation.conditions import Comparison, comparisons
+from ocp.formulation.expressions import value_of
+from ocp.formulation.settings import Setting
+from ocp.formulation.signals import MissingError, Signals, fresh_symbols
+from ocp.formulation.span import Condition, Join, Link, Row
 from symfric.foundation.symbols import strays
 from symfric.model import Model
 
 if TYPE_CHECKING:
-    from ocp.text.problem import Problem
+    from ocp.formulation.problem import Problem
 
 
 @final

@@ -3,11 +3,11 @@ from math import inf
 import pytest
 from motions import double_integrator, stage
 
-from ocp.text.cost import TIME, effort, integral
-from ocp.text.moves import rest_to_rest
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.ranges import FREE, Free
+from ocp.formulation.bounds import FREE, Free
+from ocp.formulation.cost import TIME, effort, integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
+from ocp.formulation.templates import rest_to_rest
 
 MODEL = stage(free=["m", "mu_d"])
 

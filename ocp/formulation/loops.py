@@ -5,7 +5,7 @@ from collections.abc import Collection, Mapping
 import casadi as ca
 import numpy as np
 
-from ocp.text.span import Array, Span
+from ocp.formulation.span import Array, Span
 from symfric.model import Model
 
 ROUNDS = 50

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from motions import double_integrator, stage
 
-from ocp.text.cost import TIME, at_end, effort, integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.ranges import FREE, Free
-from ocp.text.signals import Signals
-from ocp.text.span import Row, Span
+from ocp.formulation.bounds import FREE, Free
+from ocp.formulation.cost import TIME, at_end, effort, integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
+from ocp.formulation.signals import Signals
+from ocp.formulation.span import Row, Span
 from symfric import BrownMcPhee, LuGre, drive
 from symfric.scenes import PendulumBox
 

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
-from ocp.text.choice import Choice, chosen_of
-from ocp.text.lambdas import Written, gathered, written
-from ocp.text.ranges import FREE, Box, Free, as_box, fixed, meet
-from ocp.text.rates import with_outputs
-from ocp.text.settings import Setting, settings_of
-from ocp.text.span import Link, Row, Span
-from ocp.text.starts import start_of
+from ocp.formulation.bounds import FREE, Box, Free, as_box, fixed, meet
+from ocp.formulation.choice import Choice, chosen_of
+from ocp.formulation.evaluate_callbacks import Written, gathered, written
+from ocp.formulation.rates import with_outputs
+from ocp.formulation.settings import Setting, settings_of
+from ocp.formulation.span import Link, Row, Span
+from ocp.formulation.starts import start_of
 from symfric.model import Model
 
 if TYPE_CHECKING:
-    from ocp.text.problem import Problem
+    from ocp.formulation.problem import Problem
 
 
 def function_problems(problem: "Problem") -> list[str]:

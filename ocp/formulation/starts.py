@@ -4,11 +4,11 @@ from collections.abc import Collection, Mapping, Sequence
 
 import casadi as ca
 
-from ocp.text.loops import closed, following_loops, has_loops
-from ocp.text.ranges import FREE, Box, as_box, fixed, meet
-from ocp.text.rates import rate_name
-from ocp.text.settings import Setting
-from ocp.text.span import Row, Span
+from ocp.formulation.bounds import FREE, Box, as_box, fixed, meet
+from ocp.formulation.loops import closed, following_loops, has_loops
+from ocp.formulation.rates import rate_name
+from ocp.formulation.settings import Setting
+from ocp.formulation.span import Row, Span
 from symfric.foundation.symbols import stacked
 from symfric.model import Model
 

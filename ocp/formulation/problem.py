@@ -6,16 +6,16 @@ from functools import cached_property
 from importlib import import_module
 from typing import Any, Literal, final
 
-from ocp.text.choice import Choice, chosen_of
-from ocp.text.complaints import input_problems
-from ocp.text.cost import Cost
-from ocp.text.kinds import kind_problems
-from ocp.text.phase import Chain, PathCondition, Phase
-from ocp.text.ranges import Free, Range
-from ocp.text.rates import rate_name
-from ocp.text.resolve import function_problems, resolved
-from ocp.text.settings import settings_of
-from ocp.text.span import Span
+from ocp.formulation.bounds import Free, Range
+from ocp.formulation.choice import Choice, chosen_of
+from ocp.formulation.complaints import input_problems
+from ocp.formulation.cost import Cost
+from ocp.formulation.kinds import kind_problems
+from ocp.formulation.phase import Chain, PathCondition, Phase
+from ocp.formulation.rates import rate_name
+from ocp.formulation.resolve import function_problems, resolved
+from ocp.formulation.settings import settings_of
+from ocp.formulation.span import Span
 
 Duration = tuple[Sequence[int], float | Free]
 """Numbers of phases, and what their durations add up to [s]."""

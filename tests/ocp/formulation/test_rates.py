@@ -2,11 +2,11 @@ from math import inf
 
 import pytest
 
-from ocp.text.cost import integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.ranges import FREE
-from ocp.text.rates import with_parameters, with_rates
+from ocp.formulation.bounds import FREE
+from ocp.formulation.cost import integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
+from ocp.formulation.rates import with_parameters, with_rates
 from symfric import BrownMcPhee, LuGre, Model, drive, simulate
 from symfric.multibody import JointSpringDamper
 from symfric.scenes import SliderCrank

@@ -4,12 +4,12 @@ from collections.abc import Iterator
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from ocp.text.ranges import as_box
-from ocp.text.settings import settings_of
+from ocp.formulation.bounds import as_box
+from ocp.formulation.settings import settings_of
 from symfric.foundation.variable import Variable
 
 if TYPE_CHECKING:
-    from ocp.text.problem import Problem
+    from ocp.formulation.problem import Problem
 
 FAR = 300.0
 """Factor between a number and the usual size of its variable from which on it is doubted."""

@@ -2,11 +2,11 @@ import casadi as ca
 import pytest
 from motions import double_integrator, stage
 
-from ocp.text.cost import TIME, Cost, at_end, effort, integral, track, worst
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
-from ocp.text.signals import Signals
+from ocp.formulation.bounds import Free
+from ocp.formulation.cost import TIME, Cost, at_end, effort, integral, track, worst
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
+from ocp.formulation.signals import Signals
 
 MODEL = double_integrator()
 

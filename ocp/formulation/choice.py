@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from math import inf, isfinite, sqrt
 from typing import final
 
-from ocp.text.ranges import Box, as_box
-from ocp.text.settings import Setting
+from ocp.formulation.bounds import Box, as_box
+from ocp.formulation.settings import Setting
 
 
 @final

@@ -1,9 +1,9 @@
 """Ready problems: moves of a driven mass."""
 
-from ocp.text.cost import TIME, integral
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free
+from ocp.formulation.bounds import Free
+from ocp.formulation.cost import TIME, integral
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from symfric.foundation import checks
 from symfric.model import Model, check_model
 

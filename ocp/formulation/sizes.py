@@ -17,9 +17,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ocp.text.phase import Chain
-from ocp.text.problem import Problem
-from ocp.text.ranges import Free, Range, as_box
+from ocp.formulation.bounds import Free, Range, as_box
+from ocp.formulation.phase import Chain
+from ocp.formulation.problem import Problem
 from symfric.foundation.variable import Variable
 from symfric.model import Model
 

@@ -7,9 +7,9 @@ import casadi as ca
 import pytest
 from motions import double_integrator, stage
 
-from ocp.text.cost import TIME, at_end, integral, track, worst
-from ocp.text.phase import Phase
-from ocp.text.problem import Problem
+from ocp.formulation.cost import TIME, at_end, integral, track, worst
+from ocp.formulation.phase import Phase
+from ocp.formulation.problem import Problem
 from symfric import Event, ExactCoulomb, Model, Variable, drive
 
 MODEL = double_integrator()
