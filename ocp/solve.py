@@ -6,9 +6,8 @@ from typing import get_args
 
 from numpy.typing import ArrayLike
 
-from ocp.formulation.doubts import doubts
-from ocp.formulation.problem import Problem
-from ocp.formulation.sizes import cost_size, sized
+from ocp.formulation.problem import Problem, cost_size, sized
+from ocp.formulation.validate import doubts
 from ocp.friction.sharpen import STARTS
 from ocp.job import Friction, Job
 from ocp.result.solution import Solution

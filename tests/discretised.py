@@ -3,7 +3,7 @@
 import casadi as ca
 
 from ocp.formulation.bounds import Free
-from ocp.formulation.cost import TIME, at_end, integral, worst
+from ocp.formulation.expressions import TIME, at_end, integral, worst
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from symfric import BrownMcPhee, Model, Output, Variable, drive

@@ -5,7 +5,7 @@ from typing import Any
 from motions import double_integrator, stage
 
 from ocp.formulation.bounds import Free
-from ocp.formulation.cost import TIME, integral
+from ocp.formulation.expressions import TIME, integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import casadi as ca
 
-from ocp.formulation.cost import at_end, effort, track
+from ocp.formulation.expressions import at_end, effort, track
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.mpc.controller import Controller, controller_of

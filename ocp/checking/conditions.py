@@ -13,8 +13,8 @@ from ocp.checking.arcs import Arc
 from ocp.checking.resimulate import Run
 from ocp.checking.verification import Miss
 from ocp.formulation.bounds import FREE, Box, fixed
+from ocp.formulation.phase import Row
 from ocp.formulation.problem import Problem
-from ocp.formulation.span import Row
 from symfric.foundation.symbols import stacked
 
 Array = NDArray[np.float64]

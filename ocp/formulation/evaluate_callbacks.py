@@ -1,22 +1,26 @@
-"""What the functions of a problem make of the signals: costs, conditions, links, joins."""
+"""Evaluate the callbacks of a problem at symbols: costs, conditions, links, joins."""
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, final
+from operator import itemgetter
+from typing import Any, final
 
 import casadi as ca
 
-from ocp.formulation.conditions import Comparison, comparisons
-from ocp.formulation.expressions import value_of
-from ocp.formulation.settings import Setting
-from ocp.formulation.signals import MissingError, Signals, fresh_symbols
-from ocp.formulation.span import Condition, Join, Link, Row
+from ocp.formulation.expressions import (
+    Comparison,
+    MissingError,
+    Signals,
+    arguments,
+    comparisons,
+    fresh_symbols,
+    value_of,
+)
+from ocp.formulation.phase import Join, Link, Row
+from ocp.formulation.statement import Setting, Statement
 from symfric.foundation.symbols import strays
 from symfric.model import Model
-
-if TYPE_CHECKING:
-    from ocp.formulation.problem import Problem
 
 
 @final
@@ -37,9 +41,9 @@ class Written:
 
 
 def written(
-    problem: "Problem", settings: Sequence[Setting], tell: list[str]
+    problem: Statement, settings: Sequence[Setting], tell: list[str]
 ) -> tuple[Written, ...]:
-    """What each phase says in functions; what is wrong with them goes to `tell`."""
+    """Results of the functions of each phase; what is wrong with them goes to `tell`."""
     found: list[Written] = []
     before: Model | None = None
     for setting in settings:
@@ -52,7 +56,9 @@ def written(
         costs = _costs(setting, signals, last=setting is settings[-1], tell=tell)
         found.append(Written(*costs, path, links, joins, signals()))
         before = setting.model
-    _missing_paths(problem.path, settings, tell)
+    for number, condition in enumerate(problem.path):
+        if text := _missing(condition, settings):
+            tell.append(f"{_called_so('path condition', number, condition)}: {text}")
     return tuple(found)
 
 
@@ -87,29 +93,24 @@ def _costs(
     return running, end, tuple(squares)
 
 
-def _known_only(expression: ca.SX, *models: Model) -> None:
-    known = ca.vertcat(*(_symbols(model) for model in models))
-    if stray := strays(expression, known):
+def _known_only(expression: ca.SX, model: Model) -> None:
+    if stray := strays(expression, ca.vertcat(*arguments(model))):
         raise ValueError(f"expected only signals of the model, got {', '.join(stray)}")
 
 
-def _symbols(model: Model) -> ca.SX:
-    return ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
-
-
-def _path(problem: "Problem", setting: Setting, signals: Signals, tell: list[str]) -> Iterator[Row]:
+def _path(problem: Statement, setting: Setting, signals: Signals, tell: list[str]) -> Iterator[Row]:
     """Path conditions of the problem, where the names exist, and of the phase."""
     model, own = setting.model, tuple(setting.phase.path)
-    changing = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
+    changing = ca.vertcat(*arguments(model))
     for group, everywhere in ((tuple(problem.path), True), (own, False)):
         for number, condition in enumerate(group):
-            label = called_so("path condition", number, condition)
+            label = _called_so("path condition", number, condition)
             with gathered(tell, f"{setting.where}{label}: "):
                 try:
                     rows = comparisons(condition, signals)
                 except MissingError:
                     if everywhere:
-                        continue  # `_missing_paths` asks whether any phase has the names
+                        continue  # `_missing` finds out whether any phase has the names
                     raise
                 for expression, low, high in rows:
                     _known_only(expression, model)
@@ -126,25 +127,23 @@ def _check_open(row: Comparison, changing: ca.SX) -> None:
         raise ValueError("expected a condition on the motion, got a constant")
 
 
-def called_so(what: str, number: int, condition: Condition) -> str:
+def _called_so(what: str, number: int, condition: Callable[..., object]) -> str:
     """Its number, or its name where it has one."""
     name = getattr(condition, "__name__", "<lambda>")
     return f"{what} {number + 1}" if name == "<lambda>" else f"{what} {name}"
 
 
-def _missing_paths(path: Sequence[Condition], settings: Sequence[Setting], tell: list[str]) -> None:
-    """Conditions of the problem whose names no phase has."""
-    for number, condition in enumerate(path):
-        errors: list[MissingError] = []
-        for setting in settings:
-            try:
-                comparisons(condition, Signals(setting.model))
-            except MissingError as error:
-                errors.append(error)
-            except ValueError:
-                break  # told by `_path`
-        if len(errors) == len(settings):
-            tell.append(f"{called_so('path condition', number, condition)}: {errors[0]}")
+def _missing(condition: Callable[..., object], settings: Sequence[Setting]) -> str:
+    """Message about names of a condition of the problem that no phase has."""
+    errors: list[MissingError] = []
+    for setting in settings:
+        try:
+            comparisons(condition, Signals(setting.model))
+        except MissingError as error:
+            errors.append(error)
+        except ValueError:
+            break  # reported by `_path`
+    return str(errors[0]) if len(errors) == len(settings) else ""
 
 
 def _links(setting: Setting, before: Model, tell: list[str]) -> Iterator[Link]:
@@ -152,18 +151,14 @@ def _links(setting: Setting, before: Model, tell: list[str]) -> Iterator[Link]:
     there = {v.name for v in before.x}
     signals = Signals(before)
     for v in setting.model.x:
-        given: Any = setting.phase.link.get(v.name, "") if v.name in setting.phase.link else v.name
-        if given is None or (v.name not in setting.phase.link and v.name not in there):
+        given: Any = setting.phase.link.get(v.name, v.name if v.name in there else None)
+        if given is None:
             continue
         with gathered(tell, f"{setting.where}link of {v.name}: "):
-            function: Callable[..., Any] = given if callable(given) else _signal(given)
+            function: Callable[..., Any] = given if callable(given) else itemgetter(given)
             expression = value_of(function, signals)
             _known_only(expression, before)
             yield Link(v.name, expression)
-
-
-def _signal(name: str) -> Callable[[Signals], ca.SX]:
-    return lambda before: before[name]
 
 
 def _joins(setting: Setting, before: Model, tell: list[str]) -> Iterator[Join]:
@@ -173,7 +168,7 @@ def _joins(setting: Setting, before: Model, tell: list[str]) -> Iterator[Join]:
     left, ending = fresh_symbols(before, "before")
     right, starting = fresh_symbols(setting.model, "after")
     for number, condition in enumerate(setting.phase.joins):
-        name = called_so("join", number, condition)
+        name = _called_so("join", number, condition)
         with gathered(tell, f"{setting.where}{name}: "):
             for row in comparisons(condition, ending, starting):
                 expression, low, high = row

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Literal, final
 
 from ocp.formulation.bounds import Free
-from ocp.formulation.choice import Choice
+from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
-from ocp.formulation.span import Span
+from ocp.formulation.statement import Choice
 from symfric.model import Model
 
 

@@ -1,7 +1,7 @@
 """Ready problems: moves of a driven mass."""
 
 from ocp.formulation.bounds import Free
-from ocp.formulation.cost import TIME, integral
+from ocp.formulation.expressions import TIME, integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from symfric.foundation import checks

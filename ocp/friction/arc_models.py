@@ -6,7 +6,7 @@ from typing import Any
 
 import casadi as ca
 
-from ocp.formulation.span import Span
+from ocp.formulation.phase import Span
 from ocp.friction.mode_models import mode_model, with_outputs
 from ocp.friction.release import SIDES, holding, rubbing
 from symfric.foundation.parameters import Variable

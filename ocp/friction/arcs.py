@@ -33,7 +33,8 @@ import casadi as ca
 
 from ocp.formulation.bounds import Free, Range, meet
 from ocp.formulation.phase import Chain, Phase, Start
-from ocp.formulation.problem import Duration, Problem
+from ocp.formulation.problem import Problem
+from ocp.formulation.statement import Duration
 from ocp.friction.arc_models import CAUGHT, FIRST, LEFT, PULLED, STOPPED, arc_model, carrier
 from ocp.friction.release import SIDES, excess, rubbing
 from ocp.friction.sequence import Arc, Leg

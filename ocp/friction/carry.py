@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.formulation.bounds import Free
-from ocp.formulation.span import Span
+from ocp.formulation.phase import Span
 from ocp.friction.arc_models import LEFT
 from ocp.friction.sequence import Arc
 from ocp.result.motion import Motion

@@ -8,8 +8,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
-from ocp.formulation.span import Span
 from ocp.friction.mode_models import jumps, widths
 from ocp.transcription.points import Points, SpanPoints
 from symfric.model import Contact

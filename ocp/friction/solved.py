@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.holding import holding_losses
+from ocp.formulation.phase import Row
 from ocp.formulation.problem import Problem
-from ocp.formulation.span import Row
 from ocp.friction.arc_models import CAUGHT, FIRST, PULLED, STOPPED, breaks_away
 from ocp.friction.arcs import MARGIN, in_arcs
 from ocp.friction.carry import Known, points_in

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
-from ocp.formulation.span import Span
 from ocp.friction.sequence import Leg, shown, tracks_of
 from ocp.friction.solved import Solved
 from ocp.result.motion import Motion, motion_of

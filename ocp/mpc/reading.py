@@ -7,9 +7,9 @@ import casadi as ca
 import numpy as np
 
 from ocp.formulation.bounds import Free
-from ocp.formulation.cost import Cost
+from ocp.formulation.expressions import Cost
+from ocp.formulation.phase import Row, Span
 from ocp.formulation.problem import Problem
-from ocp.formulation.span import Row, Span
 from ocp.mpc.horizon import (
     FLAT,
     Costs,

@@ -8,7 +8,7 @@ from math import pi
 
 import casadi as ca
 
-from ocp.formulation.cost import integral
+from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.problems.ready import Ready

@@ -6,7 +6,7 @@ Each is stated with the data of its source, so that its optimum can be compared 
 import casadi as ca
 
 from ocp.formulation.bounds import Free
-from ocp.formulation.cost import TIME, at_end, integral
+from ocp.formulation.expressions import TIME, at_end, integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.problems.ready import Ready

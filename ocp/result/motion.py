@@ -7,7 +7,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.formulation.span import Span
+from ocp.formulation.phase import Span
 from ocp.transcription.points import SpanPoints
 from ocp.transcription.schemes import Coefficients
 from symfric.foundation.parameters import check_names

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.formulation.span import Span
+from ocp.formulation.phase import Span
 from ocp.transcription.points import Points, SpanPoints
 from ocp.transcription.transcription import Transcription
 from symfric.foundation import checks

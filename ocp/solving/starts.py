@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ocp.formulation.bounds import Box, Free
+from ocp.formulation.phase import Link, Span
 from ocp.formulation.problem import Problem
-from ocp.formulation.span import Link, Span
 from ocp.result.solution import Solution
 from ocp.result.stored import Stored, StoredSpan, along, structure_of
 from ocp.solvers.outcome import Iterate

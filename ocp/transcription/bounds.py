@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ocp.formulation.bounds import Box, Free
+from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
-from ocp.formulation.span import Span
 from ocp.transcription.blocks import Array
 from ocp.transcription.local import time_scale
 from ocp.transcription.points import Layout, SpanLayout

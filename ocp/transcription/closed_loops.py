@@ -22,7 +22,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.formulation.bounds import Box, Free, fixed, meet
-from ocp.formulation.span import Span
+from ocp.formulation.phase import Span
 from ocp.transcription.blocks import Array, Block, Indices, Piece, block, order_of, select
 from ocp.transcription.local import Data, Local
 from ocp.transcription.loops import RANK, Loops, dependent

@@ -19,7 +19,7 @@ from typing import final
 import casadi as ca
 import numpy as np
 
-from ocp.formulation.span import Row, Span
+from ocp.formulation.phase import Row, Span
 from ocp.transcription.blocks import Array, Block, Indices, Linear, Piece, block, order_of, select
 from ocp.transcription.compiled import Engine
 from ocp.transcription.local import Data, Local

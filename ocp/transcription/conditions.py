@@ -9,8 +9,8 @@ import casadi as ca
 import numpy as np
 
 from ocp.formulation.bounds import Box, Free
+from ocp.formulation.phase import Join, Row, Span
 from ocp.formulation.problem import Problem
-from ocp.formulation.span import Join, Row, Span
 from ocp.transcription.blocks import (
     LAST,
     Array,

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
-from ocp.formulation.span import Span
 from symfric.foundation import checks
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.formulation.bounds import Free
-from ocp.formulation.span import Span
+from ocp.formulation.phase import Span
 from ocp.transcription.blocks import Array, Indices
 from ocp.transcription.points import Layout
 from symfric.foundation.symbols import stacked

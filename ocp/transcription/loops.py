@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.formulation.span import Span
+from ocp.formulation.phase import Span
 from symfric.model.holonomic import Holonomic
 
 Array = NDArray[np.float64]

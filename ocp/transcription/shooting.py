@@ -13,7 +13,7 @@ from typing import Any, final
 import casadi as ca
 import numpy as np
 
-from ocp.formulation.span import Row, Span
+from ocp.formulation.phase import Row, Span
 from ocp.transcription.blocks import LAST, Block, Piece, block, order_of, select
 from ocp.transcription.local import Data, Local
 from ocp.transcription.points import Layout

@@ -9,8 +9,8 @@ import casadi as ca
 import numpy as np
 
 from ocp.formulation.bounds import Box, Free
+from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
-from ocp.formulation.span import Span
 from ocp.transcription.assembly import Assembled, Slot, assemble
 from ocp.transcription.blocks import Array, Piece
 from ocp.transcription.bounds import bounds_of, scale_of

@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import final
 
+from ocp.formulation.phase import Row
 from ocp.formulation.problem import Problem
-from ocp.formulation.span import Row
 from ocp.transcription.blocks import Array
 from ocp.transcription.closed_loops import Closing, closing
 from ocp.transcription.collocation import PointEquations, point_equations

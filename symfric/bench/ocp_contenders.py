@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.formulation.bounds import Free
+from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
-from ocp.formulation.span import Span
 
 Array = NDArray[np.float64]
 IPOPT = {

@@ -7,7 +7,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.formulation.cost import at_end, effort, track
+from ocp.formulation.expressions import at_end, effort, track
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.problems.friction import guide

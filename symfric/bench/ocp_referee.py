@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
-from ocp.formulation.span import Span
 from ocp.friction.exact import set_valued
 from ocp.result.solution import Solution
 from symfric.bench.ocp_contenders import Attempt

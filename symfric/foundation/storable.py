@@ -25,10 +25,10 @@ MODULES = (
 )  # fmt: skip
 """Modules whose classes a file may name; a dot at the end means all modules of that package."""
 MOVED = {
-    "ocp.text.choice": "ocp.formulation.choice",
+    "ocp.text.choice": "ocp.formulation.statement",
     "ocp.text.posed": "ocp.formulation.serialise",
     "ocp.text.ranges": "ocp.formulation.bounds",
-    "ocp.text.span": "ocp.formulation.span",
+    "ocp.text.span": "ocp.formulation.phase",
 }
 """Module in older files -> module that holds its classes now."""
 OURS = tuple(f"{package}{mark}" for package in OWN for mark in ".:")

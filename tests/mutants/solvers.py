@@ -192,7 +192,7 @@ RESULTS = (
         "1.0 / cost_size(posed)", "1.0", ("tests/ocp/formulation/test_sizes.py",),
     ),
     Mutant(
-        "a nominal value that was given gives way", "ocp/formulation/sizes.py",
+        "a nominal value that was given gives way", "ocp/formulation/problem.py",
         "(v.nominal == UNSAID and times >= FAR)", "times >= FAR",
         ("tests/ocp/formulation/test_sizes.py",),
     ),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ocp.checking.holding import holding_losses
 from ocp.checking.refine import MeshErrors, refined
 from ocp.formulation.bounds import Free, Range
-from ocp.formulation.cost import TIME, Cost, at_end, integral
+from ocp.formulation.expressions import TIME, Cost, at_end, integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.problems.others import brachistochrone, bryson_denham

@@ -10,7 +10,7 @@ import pytest
 from ocp.checking.refining import Goals, refined_solve
 from ocp.checking.verify import verify
 from ocp.formulation.bounds import Free
-from ocp.formulation.cost import TIME, integral
+from ocp.formulation.expressions import TIME, integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.problems.others import (

@@ -11,10 +11,9 @@ from ocp.checking.local_errors import local_errors
 from ocp.checking.resimulate import resimulated
 from ocp.checking.verify import verified, verified_arcs, verify
 from ocp.formulation.bounds import FREE
-from ocp.formulation.cost import integral
+from ocp.formulation.expressions import Signals, integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
-from ocp.formulation.signals import Signals
 from ocp.solving.one_solve import solve_once
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import Status

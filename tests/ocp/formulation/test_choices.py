@@ -4,7 +4,7 @@ import pytest
 from motions import double_integrator, stage
 
 from ocp.formulation.bounds import FREE, Free
-from ocp.formulation.cost import TIME, effort, integral
+from ocp.formulation.expressions import TIME, effort, integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.formulation.templates import rest_to_rest

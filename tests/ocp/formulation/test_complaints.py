@@ -7,7 +7,7 @@ import casadi as ca
 import pytest
 from motions import double_integrator, stage
 
-from ocp.formulation.cost import TIME, at_end, integral, track, worst
+from ocp.formulation.expressions import TIME, at_end, integral, track, worst
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from symfric import Event, ExactCoulomb, Model, Variable, drive

@@ -3,10 +3,9 @@ import pytest
 from motions import double_integrator, stage
 
 from ocp.formulation.bounds import Free
-from ocp.formulation.cost import TIME, Cost, at_end, effort, integral, track, worst
+from ocp.formulation.expressions import TIME, Cost, Signals, at_end, effort, integral, track, worst
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
-from ocp.formulation.signals import Signals
 
 MODEL = double_integrator()
 

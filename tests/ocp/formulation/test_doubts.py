@@ -4,7 +4,7 @@ import casadi as ca
 import pytest
 
 from ocp import TIME, Free, Phase, Problem, integral, solve
-from ocp.formulation.doubts import doubts
+from ocp.formulation.validate import doubts
 from symfric import Model, Variable
 
 

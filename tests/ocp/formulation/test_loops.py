@@ -2,10 +2,9 @@ import numpy as np
 import pytest
 
 from ocp.formulation.bounds import FREE
-from ocp.formulation.cost import integral
-from ocp.formulation.phase import Phase
+from ocp.formulation.expressions import integral
+from ocp.formulation.phase import Phase, Span
 from ocp.formulation.problem import Problem
-from ocp.formulation.span import Span
 from symfric import BrownMcPhee, Model
 from symfric.multibody import JointSpringDamper
 from symfric.scenes import SliderCrank

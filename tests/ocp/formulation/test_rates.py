@@ -3,10 +3,10 @@ from math import inf
 import pytest
 
 from ocp.formulation.bounds import FREE
-from ocp.formulation.cost import integral
+from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
-from ocp.formulation.rates import with_parameters, with_rates
+from ocp.formulation.statement import with_parameters, with_rates
 from symfric import BrownMcPhee, LuGre, Model, drive, simulate
 from symfric.multibody import JointSpringDamper
 from symfric.scenes import SliderCrank

@@ -4,7 +4,7 @@ import casadi as ca
 import pytest
 
 from ocp import TIME, Free, Ipopt, Phase, Problem, integral, solve
-from ocp.formulation.sizes import cost_size, sized
+from ocp.formulation.problem import cost_size, sized
 from symfric import BrownMcPhee, Model, Variable, drive
 
 SIZES = [1e-9, 1e-6, 1e-3, 0.1, 1.0, 1e3, 1e6]

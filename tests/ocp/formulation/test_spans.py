@@ -7,11 +7,9 @@ import pytest
 from motions import double_integrator, stage
 
 from ocp.formulation.bounds import FREE, Free
-from ocp.formulation.cost import TIME, at_end, effort, integral
-from ocp.formulation.phase import Phase
+from ocp.formulation.expressions import TIME, Signals, at_end, effort, integral
+from ocp.formulation.phase import Phase, Row, Span
 from ocp.formulation.problem import Problem
-from ocp.formulation.signals import Signals
-from ocp.formulation.span import Row, Span
 from symfric import BrownMcPhee, LuGre, drive
 from symfric.scenes import PendulumBox
 

@@ -7,7 +7,7 @@ import casadi as ca
 import pytest
 
 import ocp.job as job
-from ocp.formulation.cost import integral
+from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.friction.mode_models import mode_model

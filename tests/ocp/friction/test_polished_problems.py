@@ -3,7 +3,7 @@
 import casadi as ca
 import pytest
 
-from ocp.formulation.cost import integral
+from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.friction.referee import verify_exactly

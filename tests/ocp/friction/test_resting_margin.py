@@ -6,7 +6,7 @@ import casadi as ca
 import pytest
 
 from ocp.formulation.bounds import FREE
-from ocp.formulation.cost import at_end
+from ocp.formulation.expressions import at_end
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.friction.arcs import in_arcs

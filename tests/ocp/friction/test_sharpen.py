@@ -8,7 +8,7 @@ from math import tanh
 import pytest
 from phases import unit_move
 
-from ocp.formulation.cost import integral
+from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.friction import sharpen

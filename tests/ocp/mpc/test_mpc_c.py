@@ -7,7 +7,7 @@ import pytest
 from backends import needs_compiler
 from receding import controller, linear_model
 
-from ocp.formulation.cost import effort, track
+from ocp.formulation.expressions import effort, track
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.mpc.controller import controller_of

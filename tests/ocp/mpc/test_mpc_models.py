@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from receding import linear_model, positioning
 
-from ocp.formulation.cost import at_end, effort, track
+from ocp.formulation.expressions import at_end, effort, track
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.mpc.controller import controller_of

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from phases import UNIT, fastest_move, there_and_back, unit_move
 
-from ocp.formulation.cost import integral
+from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.result.motion import Stretch

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from phases import unit_move
 
-from ocp.formulation.cost import at_end, integral
+from ocp.formulation.expressions import at_end, integral
 from ocp.solvers.answers import not_finite, plainly, worst
 from ocp.solvers.outcome import outside, worst_of
 from ocp.solvers.watch import Seen

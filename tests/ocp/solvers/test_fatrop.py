@@ -8,7 +8,7 @@ from discretised import dae, stage
 from phases import there_and_back, unit_move
 
 from ocp.formulation.bounds import Free
-from ocp.formulation.cost import at_end, integral
+from ocp.formulation.expressions import at_end, integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.solvers.fatrop import Fatrop

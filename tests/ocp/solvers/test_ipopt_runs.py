@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from phases import fastest_move, unit_move
 
-from ocp.formulation.cost import integral
+from ocp.formulation.expressions import Signals, integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
-from ocp.formulation.signals import Signals
 from ocp.result.solution import Solution
 from ocp.solvers.ipopt import ANSWERS, Ipopt
 from ocp.solvers.outcome import Progress, in_stage

@@ -5,7 +5,7 @@ from motions import stage
 from phases import fastest_move, unit_move
 
 from ocp.formulation.bounds import Free
-from ocp.formulation.cost import integral
+from ocp.formulation.expressions import integral
 from ocp.solvers.convexify import Convexified
 from ocp.solvers.ipopt import Ipopt
 from ocp.solvers.outcome import Progress

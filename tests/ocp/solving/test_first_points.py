@@ -6,7 +6,7 @@ from motions import double_integrator
 from phases import UNIT, there_and_back, unit_move
 
 from ocp.formulation.bounds import FREE, Free
-from ocp.formulation.cost import integral
+from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.solving.one_solve import solve_once

@@ -2,7 +2,7 @@ import pytest
 from motions import stage
 from phases import fastest_move
 
-from ocp.formulation.cost import integral
+from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.solvers.ipopt import Ipopt

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from discretised import angles, double_pendulum, four_bar
 
-from ocp.formulation.cost import integral
+from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.transcription.grid import make_meshes

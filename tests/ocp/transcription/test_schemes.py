@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from ocp.formulation.cost import at_end
+from ocp.formulation.expressions import at_end
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.transcription.grid import make_meshes

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from discretised import EFFORT, all_at_once, free_time, mean_of_scenarios, stage, three_phases
 
-from ocp.formulation.cost import integral
+from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.transcription.grid import make_meshes

@@ -5,7 +5,7 @@ from discretised import stage
 from phases import UNIT, there_and_back, unit_move
 
 from ocp.formulation.bounds import FREE, Free
-from ocp.formulation.cost import integral
+from ocp.formulation.expressions import integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.transcription.grid import make_meshes

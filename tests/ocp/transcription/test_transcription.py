@@ -18,10 +18,9 @@ from discretised import (
 from phases import UNIT, there_and_back, unit_move
 
 from ocp.formulation.bounds import Free
-from ocp.formulation.cost import at_end, integral
-from ocp.formulation.phase import Phase
+from ocp.formulation.expressions import at_end, integral
+from ocp.formulation.phase import Phase, Row
 from ocp.formulation.problem import Problem
-from ocp.formulation.span import Row
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.points import Points, SpanPoints
 from ocp.transcription.schemes import Legendre, Radau, Scheme
