@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
-from ocp.transcription.points import Points
+from ocp.transcription.unknowns import Points
 
 Array = NDArray[np.float64]
 

@@ -22,8 +22,7 @@ from ocp.solvers.prepared import Prepared
 from ocp.solving.one_solve import Solver, solve_on
 from ocp.solving.starts import Start
 from ocp.transcription.schemes import Radau, Scheme, Shooting
-from ocp.transcription.skeleton import Skeleton
-from ocp.transcription.transcribe import Discretisation, discretise
+from ocp.transcription.transcribe import Discretisation, Skeleton, discretise
 from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]

@@ -137,7 +137,7 @@ class Row:
     @property
     def nominal(self) -> float:
         """Typical magnitude: that of its bounds, 1 where they are zero or none."""
-        return max((abs(b) for b in (self.lower, self.upper) if b and isfinite(b)), default=1.0)
+        return _size(self.lower, self.upper)
 
 
 @final
@@ -164,6 +164,15 @@ class Join:
     function: ca.Function
     lower: float
     upper: float
+
+    @property
+    def nominal(self) -> float:
+        """Typical magnitude, as that of a `Row`."""
+        return _size(self.lower, self.upper)
+
+
+def _size(*bounds: float) -> float:
+    return max((abs(b) for b in bounds if b and isfinite(b)), default=1.0)
 
 
 @final

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from ocp.formulation.bounds import Box
 from ocp.solving.starts import rates_of
-from ocp.transcription.points import Points, SpanPoints
 from ocp.transcription.transcription import Transcription
+from ocp.transcription.unknowns import Points, SpanPoints
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ocp.formulation.phase import Span
 from ocp.formulation.problem import Problem
 from ocp.friction.mode_models import jumps, widths
-from ocp.transcription.points import Points, SpanPoints
+from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.model import Contact
 
 Array = NDArray[np.float64]

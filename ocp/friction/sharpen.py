@@ -48,10 +48,10 @@ from ocp.solving.clock import Clock
 from ocp.solving.one_solve import solution_of, when
 from ocp.solving.starts import Start, resample, start_of
 from ocp.transcription.grid import make_meshes, split
-from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Transcription
+from ocp.transcription.unknowns import Points
 
 Array = NDArray[np.float64]
 Solver = Ipopt | Fatrop | Sqp

@@ -22,10 +22,10 @@ from ocp.solvers.ipopt import Ipopt
 from ocp.solvers.outcome import Iterate, Outcome, Report, in_stage
 from ocp.solving.clock import Clock
 from ocp.solving.one_solve import when
-from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Transcription
+from ocp.transcription.unknowns import Points
 from symfric.foundation.symbols import stacked
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from ocp.friction.solved import Solved
 from ocp.result.motion import Motion, motion_of
 from ocp.result.solution import Mode, Solution
 from ocp.solvers.outcome import Iterate, SolverStatistics
-from ocp.transcription.points import Points, SpanPoints
+from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation.parameters import Variable
 
 Array = NDArray[np.float64]

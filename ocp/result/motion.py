@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.formulation.phase import Span
-from ocp.transcription.points import SpanPoints
 from ocp.transcription.schemes import Coefficients
+from ocp.transcription.unknowns import SpanPoints
 from symfric.foundation.parameters import check_names
 from symfric.foundation.typed import agree
 

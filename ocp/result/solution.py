@@ -16,8 +16,8 @@ from ocp.formulation.serialise import Posed, posed
 from ocp.result.motion import Motion, Stretch
 from ocp.result.stored import Stored, stored_spans, structure_of
 from ocp.solvers.outcome import Iterate, SolverStatistics
-from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
+from ocp.transcription.unknowns import Points
 from symfric.foundation import packed
 from symfric.foundation.files import write_table, write_text
 from symfric.foundation.parameters import check_names

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ocp.formulation.problem import Problem
 from ocp.solvers.outcome import Iterate
-from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
+from ocp.transcription.unknowns import Points
 
 Array = NDArray[np.float64]
 

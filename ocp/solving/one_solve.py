@@ -20,11 +20,11 @@ from ocp.solvers.sqp import Sqp
 from ocp.solving.kinks import narrow_widths
 from ocp.solving.starts import Start, start_of
 from ocp.transcription.grid import make_meshes
-from ocp.transcription.points import Points
 from ocp.transcription.program import Place
 from ocp.transcription.schemes import Radau, Scheme
 from ocp.transcription.transcribe import discretise
 from ocp.transcription.transcription import Transcription
+from ocp.transcription.unknowns import Points
 from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]

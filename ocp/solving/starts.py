@@ -15,8 +15,8 @@ from ocp.formulation.problem import Problem
 from ocp.result.solution import Solution
 from ocp.result.stored import Stored, StoredSpan, along, structure_of
 from ocp.solvers.outcome import Iterate
-from ocp.transcription.points import Points, SpanPoints
 from ocp.transcription.transcription import Transcription
+from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation import checks
 from symfric.model import Model
 

@@ -17,7 +17,7 @@ MODULES = (
     "symfric.integrator.equations.inputs", "symfric.integrator.running.dense",
     "symfric.integrator.running.events",
     "ocp.checking.verification", "ocp.result.", "ocp.solvers.outcome", "ocp.formulation.",
-    "ocp.transcription.points", "ocp.transcription.schemes",
+    "ocp.transcription.unknowns", "ocp.transcription.schemes",
     "identification.data.", "identification.fit", "identification.residuals.closed_loop",
     "identification.residuals.inverse", "identification.residuals.points",
     "identification.residuals.shooting", "identification.result.", "identification.signals.filters",
@@ -29,6 +29,7 @@ MOVED = {
     "ocp.text.posed": "ocp.formulation.serialise",
     "ocp.text.ranges": "ocp.formulation.bounds",
     "ocp.text.span": "ocp.formulation.phase",
+    "ocp.transcription.points": "ocp.transcription.unknowns",
 }
 """Module in older files -> module that holds its classes now."""
 OURS = tuple(f"{package}{mark}" for package in OWN for mark in ".:")

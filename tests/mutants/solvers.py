@@ -4,7 +4,7 @@ from mutants.mutant import Mutant
 
 WATCH, PREPARED = "ocp/solvers/watch.py", "ocp/solvers/prepared.py"
 OUTCOME, ANSWERS = "ocp/solvers/outcome.py", "ocp/solvers/answers.py"
-CONVEXIFY, STAGES = "ocp/solvers/convexify.py", "ocp/transcription/stages.py"
+CONVEXIFY, STAGES = "ocp/solvers/convexify.py", "ocp/transcription/program.py"
 MOTION, STORED = "ocp/result/motion.py", "ocp/result/stored.py"
 STARTS, ONE = "ocp/solving/starts.py", "ocp/solving/one_solve.py"
 
