@@ -18,9 +18,9 @@ from ocp.friction.polish import polish, refusal
 from ocp.friction.referee import verify_exactly
 from ocp.friction.scales import has_jumps, own_level, speeds_at
 from ocp.friction.sharpen import FINE, LAST, Sharp, sharpened
+from ocp.result.motion import Stored
 from ocp.result.solution import Solution
-from ocp.result.stored import Stored
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solvers.outcome import Report
 from ocp.solving.clock import Clock
 from ocp.solving.one_solve import Solver

@@ -11,10 +11,8 @@ from ocp.formulation.validate import doubts
 from ocp.friction.sharpen import STARTS
 from ocp.job import Friction, Job
 from ocp.result.solution import Solution
-from ocp.solvers.fatrop import Fatrop
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Fatrop, Ipopt, Sqp
 from ocp.solvers.outcome import Report
-from ocp.solvers.sqp import Sqp
 from ocp.solving.clock import Clock
 from ocp.solving.one_solve import Solver
 from ocp.solving.starts import Start

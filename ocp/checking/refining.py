@@ -16,7 +16,7 @@ from ocp.checking.refine import MeshErrors, refined
 from ocp.checking.verify import TOLERANCE, near_runs
 from ocp.formulation.problem import Problem
 from ocp.result.solution import Solution
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solvers.outcome import Report, in_stage
 from ocp.solvers.prepared import Prepared
 from ocp.solving.one_solve import Solver, solve_on

@@ -26,7 +26,7 @@ from ocp.checking.local_errors import local_errors
 from ocp.checking.verify import verified
 from ocp.formulation.problem import Problem
 from ocp.result.solution import Solution
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solvers.outcome import Iterate, Outcome, Report, in_stage
 from ocp.solvers.prepared import Prepared
 from ocp.solving.clock import Clock

@@ -36,7 +36,7 @@ from ocp.friction.sequence import Leg, pruned, shown
 from ocp.friction.solved import Polisher, Solved
 from ocp.friction.whole import whole_solution
 from ocp.result.solution import Solution
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solvers.outcome import Report
 from ocp.solving.clock import Clock
 from ocp.transcription.schemes import Radau, Scheme

@@ -37,13 +37,11 @@ from ocp.friction.many_starts import starts_around
 from ocp.friction.mode_models import smooth_model
 from ocp.friction.scales import Scale, Scales, guessed, same_size, scales_of, widths_at
 from ocp.friction.steps import Step, finalists, least
+from ocp.result.motion import Stored, stored_spans
 from ocp.result.solution import Solution
-from ocp.result.stored import Stored, stored_spans
-from ocp.solvers.fatrop import Fatrop
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Fatrop, Ipopt, Sqp
 from ocp.solvers.outcome import Iterate, Report, SolverStatistics, in_stage
 from ocp.solvers.prepared import Prepared
-from ocp.solvers.sqp import Sqp
 from ocp.solving.clock import Clock
 from ocp.solving.one_solve import solution_of, when
 from ocp.solving.starts import Start, resample, start_of

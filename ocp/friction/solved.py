@@ -18,7 +18,7 @@ from ocp.friction.carry import Known, points_in
 from ocp.friction.release import SIDES
 from ocp.friction.sequence import Leg, flat, placed, shown
 from ocp.result.motion import motion_of
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solvers.outcome import Iterate, Outcome, Report, in_stage
 from ocp.solving.clock import Clock
 from ocp.solving.one_solve import when

@@ -12,11 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from ocp.formulation.problem import Problem
 from ocp.result.motion import Motion, motion_of
 from ocp.result.solution import Solution
-from ocp.solvers.fatrop import Fatrop
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Fatrop, Ipopt, Sqp
 from ocp.solvers.outcome import Outcome, Report
 from ocp.solvers.prepared import Prepared
-from ocp.solvers.sqp import Sqp
 from ocp.solving.kinks import narrow_widths
 from ocp.solving.starts import Start, start_of
 from ocp.transcription.grid import make_meshes

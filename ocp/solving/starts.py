@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from ocp.formulation.bounds import Box, Free
 from ocp.formulation.phase import Link, Span
 from ocp.formulation.problem import Problem
+from ocp.result.motion import Stored, StoredSpan, along, structure_of
 from ocp.result.solution import Solution
-from ocp.result.stored import Stored, StoredSpan, along, structure_of
 from ocp.solvers.outcome import Iterate
 from ocp.transcription.transcription import Transcription
 from ocp.transcription.unknowns import Points, SpanPoints

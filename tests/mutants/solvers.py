@@ -3,9 +3,9 @@
 from mutants.mutant import Mutant
 
 WATCH, PREPARED = "ocp/solvers/watch.py", "ocp/solvers/prepared.py"
-OUTCOME, ANSWERS = "ocp/solvers/outcome.py", "ocp/solvers/answers.py"
+OUTCOME, ANSWERS = "ocp/solvers/outcome.py", WATCH
 CONVEXIFY, STAGES = "ocp/solvers/convexify.py", "ocp/transcription/program.py"
-MOTION, STORED = "ocp/result/motion.py", "ocp/result/stored.py"
+MOTION = STORED = "ocp/result/motion.py"
 STARTS, ONE = "ocp/solving/starts.py", "ocp/solving/one_solve.py"
 
 T_FALLBACK = ("tests/ocp/friction/test_fallback.py",)
@@ -79,7 +79,7 @@ SOLVERS = (
         T_ONE,
     ),
     Mutant(
-        "a start with multipliers is taken for a cold one", "ocp/solvers/ipopt.py",
+        "a start with multipliers is taken for a cold one", "ocp/solvers/methods.py",
         "(WARM if warm else {})", "{}", T_ONE,
     ),
     Mutant(

@@ -14,7 +14,7 @@ from ocp.formulation.expressions import TIME, Cost, at_end, integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.problems.others import brachistochrone, bryson_denham
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solving.one_solve import solve_on
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.schemes import Radau

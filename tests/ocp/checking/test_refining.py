@@ -22,7 +22,7 @@ from ocp.problems.others import (
     hang_glider,
 )
 from ocp.result.solution import Solution
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solvers.outcome import Progress
 from ocp.transcription.grid import make_meshes
 from symfric.foundation.parameters import Variable

@@ -15,7 +15,7 @@ from ocp.friction.repair import neighbours
 from ocp.friction.sequence import Leg, Run, Track, cut, shown, with_rests
 from ocp.friction.solved import Solved
 from ocp.problems.friction import out_and_back
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solving.one_solve import solve_once
 from ocp.transcription.schemes import Radau
 

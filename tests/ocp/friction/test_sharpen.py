@@ -15,7 +15,7 @@ from ocp.friction import sharpen
 from ocp.friction.scales import Scale, has_jumps, own_level, same_size, speeds_at, widths_at
 from ocp.friction.sharpen import FIRST, LAST, Sharp, sharpened, smoothed
 from ocp.problems.friction import out_and_back, parcel_on_tray
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.transcription.schemes import Radau
 from symfric import BrownMcPhee, ExactCoulomb, LuGre, drive
 

@@ -7,8 +7,8 @@ import pytest
 from phases import there_and_back, unit_move
 
 from ocp import Phase, Problem, integral, solve, verify
+from ocp.result.motion import along
 from ocp.result.solution import SOLUTION, Solution, load
-from ocp.result.stored import along
 from ocp.solving.one_solve import solve_once
 from ocp.solving.starts import start_of
 from ocp.transcription.grid import make_meshes

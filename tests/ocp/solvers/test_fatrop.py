@@ -11,8 +11,7 @@ from ocp.formulation.bounds import Free
 from ocp.formulation.expressions import at_end, integral
 from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
-from ocp.solvers.fatrop import Fatrop
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Fatrop, Ipopt
 from ocp.solvers.outcome import Progress
 from ocp.solving.one_solve import solve_once
 from ocp.solving.starts import start_of

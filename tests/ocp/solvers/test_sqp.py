@@ -7,9 +7,8 @@ from phases import fastest_move, unit_move
 from ocp.formulation.bounds import Free
 from ocp.formulation.expressions import integral
 from ocp.solvers.convexify import Convexified
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt, Sqp
 from ocp.solvers.outcome import Progress
-from ocp.solvers.sqp import Sqp
 from ocp.solving.one_solve import solve_once
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.program import Place, Program

@@ -3,7 +3,7 @@ import pytest
 from phases import fastest_move, there_and_back, unit_move
 
 from ocp.formulation.bounds import FREE, Free
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solving.one_solve import solve_on, solve_once, when
 from ocp.transcription.grid import make_meshes
 from ocp.transcription.program import Place
