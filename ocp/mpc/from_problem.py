@@ -1,7 +1,6 @@
-"""A problem as the horizon of a controller, and what of it a controller cannot take."""
+"""The horizon of a controller from a problem; parts that no controller takes are refused."""
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
@@ -94,34 +93,13 @@ def _split(
     others: list[tuple[float, ca.SX]],
 ) -> tuple[Costs, Costs]:
     """Costs of an interval: those with inputs in them at its begin, the others at its end."""
-    moving = [ca.depends_on(e, inputs) for _, e in squared]
-    split = [ca.depends_on(e, inputs) for _, e in others]
-    early_of = ca.vertcat(at.x, at.u)
-    early = total(
-        [
-            squares([(w, at.early(e)) for (w, e), yes in _both(squared, moving) if yes], early_of),
-            *(
-                quadratic(where, w * at.early(e), early_of)
-                for (w, e), yes in _both(others, split)
-                if yes
-            ),
-        ],
-        early_of.numel(),
-    )
-    late = total(
-        [
-            squares(
-                [(w, at.late(e)) for (w, e), yes in _both(squared, moving) if not yes], at.after
-            ),
-            *(
-                quadratic(where, w * at.late(e), at.after)
-                for (w, e), yes in _both(others, split)
-                if not yes
-            ),
-        ],
-        at.after.numel(),
-    )
-    return early, late
+
+    def share(moving: bool, place: Callable[[ca.SX], ca.SX], v: ca.SX) -> Costs:
+        mine = [(w, place(e)) for w, e in squared if ca.depends_on(e, inputs) == moving]
+        rest = [(w, place(e)) for w, e in others if ca.depends_on(e, inputs) == moving]
+        return total([squares(mine, v), *(quadratic(where, w * e, v) for w, e in rest)], v.numel())
+
+    return share(True, at.early, ca.vertcat(at.x, at.u)), share(False, at.late, at.after)
 
 
 def _advance(at: Places, following: ca.Function, h: float) -> ca.Function:
@@ -129,10 +107,6 @@ def _advance(at: Places, following: ca.Function, h: float) -> ca.Function:
     arguments = [at.x, at.u, at.r, at.p]
     found = following(at.x, at.u, at.parameters(at.r), h)
     return ca.Function("advance", arguments, [ca.densify(found)], {"cse": True})
-
-
-def _both(terms: Sequence[tuple[float, ca.SX]], flags: Sequence[bool]) -> Any:
-    return zip(terms, flags, strict=True)
 
 
 def _span(problem: Problem, step: float) -> tuple[Span, int]:
