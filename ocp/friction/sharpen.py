@@ -44,7 +44,7 @@ from ocp.solvers.outcome import Iterate, Report, SolverStatistics, in_stage
 from ocp.solvers.prepared import Prepared
 from ocp.solving.clock import Clock
 from ocp.solving.one_solve import solution_of, when
-from ocp.solving.starts import Start, resample, start_of
+from ocp.solving.starts import STARTS, Start, resample, start_of
 from ocp.transcription.grid import make_meshes, split
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise
@@ -75,7 +75,6 @@ TOLERANCE = 1e-3
 """Local error of an interval, relative to the size of the states, that asks for no refinement."""
 PASSES = 4
 """Refinements at one width."""
-STARTS = 6
 SPREAD = 0.5
 """How far the further starts are from the given one; see `starts_around`."""
 FURTHER = 2

@@ -28,6 +28,9 @@ Guess = float | ArrayLike | Callable[[Array], ArrayLike]
 Start = Mapping[str, Guess] | Solution | Stored | Points | None
 """Guesses by name, a solution of this or of a similar problem, points, or nothing."""
 
+STARTS = 6
+"""Coarse solves of a problem with friction, of which the best goes on."""
+
 
 def start_of(into: Transcription, guess: Start) -> tuple[Iterate, bool]:
     """The first iterate, and whether it comes with multipliers.

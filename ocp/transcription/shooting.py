@@ -17,9 +17,9 @@ from ocp.formulation.phase import Span
 from ocp.transcription.blocks import LAST, Block, Piece, Rows, block, order_of, select
 from ocp.transcription.schemes import Shooting
 from ocp.transcription.unknowns import Data, Layout, Local
+from symfric import integrator
 from symfric.foundation.parameters import Variable
 from symfric.foundation.symbols import stacked
-from symfric.integrator import flow
 from symfric.model import Model
 
 LARGEST = 20_000
@@ -59,7 +59,7 @@ def shot(local: Local, scheme: Shooting) -> Shot:
     outputs = [*local.values, local.h]
     values = ca.Function("values", [local.x, local.u, local.rest, local.theta], outputs)
     t, x_si, _, u_si, p, h = values(x, u, rest, theta)
-    F = flow(model, steps=scheme.steps, method=scheme.method)
+    F = integrator.flow(model, steps=scheme.steps, method=scheme.method)
     ends = F(ca.vertcat(x_si, *([0.0] * added)), u_si, ca.vertcat(p, t), h)
     nominal = ca.DM(span.model.nominal("x"))
     v, n = ca.vertcat(x, u, rest), len(span.model.x)
