@@ -6,9 +6,9 @@ from typing import Any
 
 import casadi as ca
 
+from ocp.formulation.phase import Span
 from ocp.friction.mode_models import mode_model, with_outputs
 from ocp.friction.release import SIDES, holding, rubbing
-from ocp.text.span import Span
 from symfric.foundation.parameters import Variable
 from symfric.model import Contact, Model, Output
 

@@ -26,6 +26,7 @@ import numpy as np
 from ocp.checking.arcs import arcs_of
 from ocp.checking.local_errors import local_errors
 from ocp.checking.refine import MeshErrors, refined
+from ocp.formulation.problem import Problem
 from ocp.friction.arcs import MARGIN
 from ocp.friction.carry import Known
 from ocp.friction.mode_models import restless
@@ -35,10 +36,9 @@ from ocp.friction.sequence import Leg, pruned, shown
 from ocp.friction.solved import Polisher, Solved
 from ocp.friction.whole import whole_solution
 from ocp.result.solution import Solution
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solvers.outcome import Report
 from ocp.solving.clock import Clock
-from ocp.text.problem import Problem
 from ocp.transcription.schemes import Radau, Scheme
 from symfric.foundation.status import Status
 

@@ -10,22 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.holding import holding_losses
+from ocp.formulation.phase import Row
+from ocp.formulation.problem import Problem
 from ocp.friction.arc_models import CAUGHT, FIRST, PULLED, STOPPED, breaks_away
 from ocp.friction.arcs import MARGIN, in_arcs
 from ocp.friction.carry import Known, points_in
 from ocp.friction.release import SIDES
 from ocp.friction.sequence import Leg, flat, placed, shown
 from ocp.result.motion import motion_of
-from ocp.solvers.ipopt import Ipopt
+from ocp.solvers.methods import Ipopt
 from ocp.solvers.outcome import Iterate, Outcome, Report, in_stage
 from ocp.solving.clock import Clock
 from ocp.solving.one_solve import when
-from ocp.text.problem import Problem
-from ocp.text.span import Row
-from ocp.transcription.points import Points
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.transcription import Transcription
+from ocp.transcription.unknowns import Points
 from symfric.foundation.symbols import stacked
 
 Array = NDArray[np.float64]

@@ -9,9 +9,7 @@ from ocp import Problem, Solution, load, solve
 from ocp.problems.catalogue import READY
 from ocp.problems.ready import Ready
 from ocp.solve import Friction
-from ocp.solvers.fatrop import Fatrop
-from ocp.solvers.ipopt import Ipopt
-from ocp.solvers.sqp import Sqp
+from ocp.solvers.methods import Fatrop, Ipopt, Sqp
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
 from symfric import SolveError
 from symfric.cli import completions, output

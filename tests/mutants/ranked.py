@@ -19,8 +19,8 @@ PLATE = "symfric/gallery/plate.py"
 T_RENDERING = ("tests/symfric/gallery/test_rendering.py",)
 APP = "symfric/cli/app.py"
 T_OUTPUT = ("tests/symfric/cli/test_output.py",)
-DOUBTS = "ocp/text/doubts.py"
-T_DOUBTS = ("tests/ocp/text/test_doubts.py",)
+DOUBTS = "ocp/formulation/validate.py"
+T_DOUBTS = ("tests/ocp/formulation/test_doubts.py",)
 
 RANKED = (
     Mutant(
