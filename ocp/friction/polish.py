@@ -19,6 +19,7 @@ Applied Optimal Control, 1975, 3.7 (conditions at instants that are free).
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import product
 from math import inf, sqrt
 
 import numpy as np
@@ -80,8 +81,9 @@ LOCAL = 1e-7
 HALVED = 4.0
 """Multiple of the largest local error that has an interval halved, of order 5."""
 
-MOST_ITERATIONS = 100
-"""Of one solve: a sequence that needs more is a wrong one."""
+MOST_ITERATIONS, PATIENT = 100, 400
+"""Of one solve: a sequence that needs more is a wrong one as a rule. Where no sequence leads to a
+solution the first solves are repeated with more: an arm whose joints stop needs 350."""
 
 CLOSER = 5.0
 """Factor to the margin of a motion that only shows what a margin costs."""
@@ -139,6 +141,7 @@ def polish(
     """
     if reason := refusal(problem):
         raise ValueError(f"polish: {reason}")
+    solver = solver or Ipopt()
     known = Known(smooth.motions[0], parameters_of(problem, smooth.chosen), smooth.chosen)
     N = max(LEAST_INTERVALS, smooth.motions[0].t_control.size // 2)
     whole, first = known.motion.T, max(MARGIN, margin)
@@ -146,7 +149,9 @@ def polish(
         problem=problem,
         sizes=sizes_of(problem, known),
         at_rest=starts_at_rest(problem, known, widths),
-        solver=_patient(solver or Ipopt()),
+        solver=solver
+        if "max_iter" in solver.options
+        else solver.with_options(max_iter=MOST_ITERATIONS),
         scheme=scheme or Radau(3),
         shortest=SHORTEST * whole,
         kick=KICK * whole,
@@ -163,9 +168,10 @@ def polish(
         return solved
 
     best: Solved | None = None
+    sequences = list(_readings(problem, known, widths))
     with suppress(_StoppedError):
-        for legs in _readings(problem, known, widths):
-            found = keep(polisher.solve(legs, known, N, 1e-2))
+        for first_solve, legs in product(_first_solves(polisher), sequences):
+            found = keep(first_solve.solve(legs, known, N, 1e-2))
             if found.ok:
                 best = found
                 best = settled(polisher, best, keep)
@@ -221,11 +227,11 @@ def parameters_of(problem: Problem, chosen: Mapping[str, float]) -> dict[str, fl
     return found | dict(chosen)
 
 
-def _patient(solver: Ipopt) -> Ipopt:
-    """`solver` with a limit of iterations, where the user has set none."""
-    if "max_iter" in solver.options:
-        return solver
-    return solver.with_options(max_iter=MOST_ITERATIONS)
+def _first_solves(polisher: Polisher) -> Iterator[Polisher]:
+    """`polisher` with limits of iterations for first solves; with that of the user if there is."""
+    yield polisher
+    if polisher.solver.options["max_iter"] == MOST_ITERATIONS:
+        yield replace(polisher, solver=polisher.solver.with_options(max_iter=PATIENT))
 
 
 def _readings(
