@@ -266,7 +266,10 @@ def _end_of(place: Place, contact: Contact, end: Ranges) -> Ranges:
 
 
 def _caught(place: Place, limited: Collection[str]) -> tuple[dict[str, int], dict[str, int]]:
-    """Contacts that come to rest under a control that may jump, and all; the side they slipped to."""
+    """Contacts that come to rest under a control that may jump, and all that come to rest.
+
+    With the sides to which they slipped.
+    """
     modes = place.arc.modes
     stopped = {n: side for n, side in place.before.items() if side and modes.get(n) == 0}
     caught = {

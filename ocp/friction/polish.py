@@ -142,6 +142,9 @@ def polish(
     if reason := refusal(problem):
         raise ValueError(f"polish: {reason}")
     solver = solver or Ipopt()
+    limits = [MOST_ITERATIONS, PATIENT]
+    if "max_iter" in solver.options:
+        limits = [int(solver.options["max_iter"])]
     known = Known(smooth.motions[0], parameters_of(problem, smooth.chosen), smooth.chosen)
     N = max(LEAST_INTERVALS, smooth.motions[0].t_control.size // 2)
     whole, first = known.motion.T, max(MARGIN, margin)
@@ -149,9 +152,7 @@ def polish(
         problem=problem,
         sizes=sizes_of(problem, known),
         at_rest=starts_at_rest(problem, known, widths),
-        solver=solver
-        if "max_iter" in solver.options
-        else solver.with_options(max_iter=MOST_ITERATIONS),
+        solver=solver.with_options(max_iter=limits[0]),
         scheme=scheme or Radau(3),
         shortest=SHORTEST * whole,
         kick=KICK * whole,
@@ -168,10 +169,10 @@ def polish(
         return solved
 
     best: Solved | None = None
-    sequences = list(_readings(problem, known, widths))
     with suppress(_StoppedError):
-        for first_solve, legs in product(_first_solves(polisher), sequences):
-            found = keep(first_solve.solve(legs, known, N, 1e-2))
+        for limit, legs in _attempts(limits, problem, known, widths):
+            patient = replace(polisher, solver=solver.with_options(max_iter=limit))
+            found = keep(patient.solve(legs, known, N, 1e-2))
             if found.ok:
                 best = found
                 best = settled(polisher, best, keep)
@@ -227,13 +228,6 @@ def parameters_of(problem: Problem, chosen: Mapping[str, float]) -> dict[str, fl
     return found | dict(chosen)
 
 
-def _first_solves(polisher: Polisher) -> Iterator[Polisher]:
-    """`polisher` with limits of iterations for first solves; with that of the user if there is."""
-    yield polisher
-    if polisher.solver.options["max_iter"] == MOST_ITERATIONS:
-        yield replace(polisher, solver=polisher.solver.with_options(max_iter=PATIENT))
-
-
 def _readings(
     problem: Problem, known: Known, widths: Mapping[str, float]
 ) -> Iterator[tuple[Leg, ...]]:
@@ -246,6 +240,17 @@ def _readings(
             if shown(legs) not in seen:
                 seen.add(shown(legs))
                 yield legs
+
+
+def _attempts(
+    limits: Sequence[int], problem: Problem, known: Known, widths: Mapping[str, float]
+) -> Iterator[tuple[int, tuple[Leg, ...]]]:
+    """Limits of iterations and sequences: all of these with the first limit, then with the next."""
+    sequences: list[tuple[Leg, ...]] = []
+    for legs in _readings(problem, known, widths):
+        sequences.append(legs)
+        yield limits[0], legs
+    yield from product(limits[1:], sequences)
 
 
 def settled(polisher: Polisher, solved: Solved, keep: Keep) -> Solved:
