@@ -1,7 +1,8 @@
 """Stick-slip of the sled over speed; and figures 5.1, 5.2, 5.4, 5.6 and 6.3 to 6.6.
 
 The sled obeys a printed curve and is pulled by a wire. Sled and wire are not given; what is said
-holds for 16 of them: Z = sqrt(k m) from 10 to 300 N s/m, damping ratios from 0 to 0.5.
+holds for 16 of them: Z = sqrt(k m) from 10 to 300 N s/m, damping ratios from 0 to 0.5. The picture
+shows Z = 30 N s/m with a ratio of 0.05.
 
 Compared: the amplitude of the wire's force by hand, with dry friction, with that of `Rabinowicz`,
 simulated with the smooth law, for Z up to 100 N s/m.
@@ -27,7 +28,7 @@ rest (figure 6.5). Under the pilot study's curve the amplitude is the same withi
 import numpy as np
 
 from symfric.foundation.panels import panels
-from symfric.foundation.style import line
+from symfric.foundation.style import colour, line
 from symfric.gallery.laminator_nips._sled import (
     WIRES,
     bristles,
@@ -51,11 +52,13 @@ def plate(quick: bool = False) -> Plate:
     wires = [SHOWN] if quick else WIRES
     speeds = np.array([10.0, 100.0, 200.0]) if quick else np.arange(10.0, 501.0, 10.0)
     figure, (over, level, trace) = panels(3, shared=False)
+    between = np.linspace(speeds[0], speeds[-1], 401)
     for j, (study, law) in enumerate(PRINTED.items()):
         amplitudes, means = swept(study, SHOWN, speeds)
-        over.plot(speeds, amplitudes, **line(j), label=study)
-        level.plot(speeds, means, "o", color=line(j)["color"], markersize=3)
-        level.plot(speeds, curve(law, speeds / 60e3), **line(j), label=f"{study}, curve")
+        dots = {"marker": "os"[j], "linestyle": "none", "color": colour(j), "markersize": 3}
+        over.plot(speeds, amplitudes, **dots, label=study)
+        level.plot(between, curve(law, between / 60e3), **line(j), label=f"{study}, curve")
+        level.plot(speeds, means, **dots, label=f"{study}, mean of a cycle")
         for style, v in enumerate((100, 210)):
             t, force = cycle(study, SHOWN, v / 60e3)
             trace.plot(
@@ -65,7 +68,10 @@ def plate(quick: bool = False) -> Plate:
              "force [N]": "part of a cycle [1]"}  # fmt: skip
     for axis, (ordinate, abscissa) in zip((over, level, trace), names.items(), strict=True):
         axis.set(xlabel=abscissa, ylabel=ordinate)
-        axis.legend(fontsize="small")
+        axis.legend(
+            loc="lower right", bbox_to_anchor=(1, 1), ncols=4, fontsize="small", frameon=False,
+            columnspacing=1.2, handlelength=1.7,
+        )  # fmt: skip
 
     numbers, claims = pilot(wires, speeds, quick)
     low, high = np.transpose([swept("main", w, ENDS)[0] for w in wires])
