@@ -28,8 +28,8 @@ from symfric.choice.needs import lacking
 from symfric.choice.reference import OWN, Reference
 from symfric.choice.row import FAILED, INACCURATE, LACKING, RANKED, REFUSED, Row, best_of, place
 from symfric.choice.softness import MARGIN, OF_BRISTLES, Ladder
+from symfric.figures.magnitudes import phenomena
 from symfric.figures.regularisation import positions
-from symfric.figures.requirements import phenomena
 from symfric.foundation.parameters import parameters
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import Law

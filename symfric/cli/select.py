@@ -37,7 +37,7 @@ from symfric.cli.options import (
     with_settings,
 )
 from symfric.cli.user_file import function_of_file
-from symfric.figures.requirements import phenomena
+from symfric.figures.magnitudes import phenomena
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
 from symfric.laws import ALL_LAWS

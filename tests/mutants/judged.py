@@ -172,23 +172,23 @@ JUDGED = (
         T_PRESETS,
     ),
     Mutant(
-        "a pushed block is shown with the force for its friction", FIGURES + "push.py",
+        "a pushed block is shown with the force for its friction", FIGURES + "pushing.py",
         '"F": "friction"}', '"F": "force"}', figure("push"),
     ),
     Mutant(
-        "every rest lasts as long as the first", FIGURES + "dwell.py",
+        "every rest lasts as long as the first", FIGURES + "sliding.py",
         "t < slide_for + hold)", "t < slide_for + 0.01)", figure("dwell"),
     ),
     Mutant(
-        "the faster leg is as long in time as the slow one", FIGURES + "velocity_step.py",
+        "the faster leg is as long in time as the slow one", FIGURES + "sliding.py",
         "[0.5 * slow, slow / factor, slow]", "[0.5 * slow, slow, slow]", figure("velocity_step"),
     ),
     Mutant(
-        "the velocity does not jump back", FIGURES + "velocity_step.py",
+        "the velocity does not jump back", FIGURES + "sliding.py",
         "ca.logic_and(t >= ends[0], t < ends[1])", "t >= ends[0]", figure("velocity_step"),
     ),
     Mutant(
-        "the block that is pulled to and fro stops half way", FIGURES + "stiction.py",
+        "the block that is pulled to and fro stops half way", FIGURES + "pushing.py",
         "force, 1.5 * period)", "force, 0.5 * period)", figure("stiction"),
     ),
     Mutant(

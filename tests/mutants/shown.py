@@ -100,7 +100,7 @@ SHOWN = (
     ),
     Mutant(
         "a block that still stretches its bristles has broken away",
-        "symfric/figures/break_away.py",
+        "symfric/figures/pushing.py",
         "way = 2 * (own.velocity + rate * stretch / own.static), SLID * stretch",
         "way = 2 * (own.velocity + rate * stretch / own.static), 0.0",
         ("tests/symfric/figures/test_break_away.py",),
