@@ -44,7 +44,6 @@ def test_what_was_made_with_another_key_is_stale(
     [
         ("symfric/gallery/belt.py", None),
         ("symfric/gallery/drawing.py", None),
-        ("symfric/gallery/looks.py", None),
         ("symfric/gallery/rendering.py", None),
         ("symfric/gallery/signals.py", None),
         ("symfric/gallery/plate.py", None),

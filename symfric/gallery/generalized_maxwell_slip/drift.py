@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from symfric.figures import break_away, push
 from symfric.foundation.panels import WIDE, grid, panels
+from symfric.gallery.drawing import look
 from symfric.gallery.generalized_maxwell_slip.by_hand import stribeck
 from symfric.gallery.generalized_maxwell_slip.laws import F_C, SIGMA_0, SIGNALS, laws
-from symfric.gallery.looks import look
 from symfric.gallery.plate import Drawn, plate
 from symfric.laws import law_name
 
@@ -138,8 +138,7 @@ def fig_08_applied_force(quick: bool) -> Drawn:
         "all of them before the vibration": max(stops.values()) < SINCE,
         "after a push of 2 s not before the end of the test": 2.0 + longer > 8.0,
     }
-    far = abs(stops["Dahl"] - stop_of(F_C))
-    return figure, far, numbers, claims
+    return figure, abs(stops["Dahl"] - stop_of(F_C)), numbers, claims
 
 
 SHOWN, T_END = 8.0, 24.0  # s

@@ -9,11 +9,11 @@ from symfric import GenericAsperity
 from symfric.figures import Curve, lag, phenomena, transition
 from symfric.foundation.panels import WIDE, grid
 from symfric.foundation.style import line
+from symfric.gallery.drawing import look
 from symfric.gallery.generalized_maxwell_slip import by_hand
 from symfric.gallery.generalized_maxwell_slip.by_hand import rigid, stribeck
 from symfric.gallery.generalized_maxwell_slip.laws import F_S, SIGNALS, generic, law_grid, laws
 from symfric.gallery.generalized_maxwell_slip.laws import C as TABLE_C
-from symfric.gallery.looks import look
 from symfric.gallery.plate import Drawn, plate
 from symfric.laws import AnyLaw, steady_force
 
@@ -99,8 +99,7 @@ def fig_02_lag_of_the_generic_model(quick: bool) -> Drawn:
         a: ("time [s]", "velocity [mm/s]"), b: ("time [s]", "friction force [N]"),
         c: ("velocity [mm/s]", "friction force [N]"), d: ("time [s]", "h [N/mm]"),
     }.items():  # fmt: skip
-        axis.set_xlabel(x)
-        axis.set_ylabel(y)
+        axis.set(xlabel=x, ylabel=y)
     for axis in (b, c, d):
         axis.legend(fontsize="small")
 

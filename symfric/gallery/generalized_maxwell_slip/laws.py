@@ -30,7 +30,7 @@ from symfric import (
 from symfric.figures import Scales
 from symfric.foundation.panels import WIDE, grid
 from symfric.foundation.style import DASHES, EDGE, QUIET
-from symfric.gallery.looks import look
+from symfric.gallery.drawing import look
 from symfric.laws import AnyLaw, law_name
 from symfric.scenes import Prescribed
 

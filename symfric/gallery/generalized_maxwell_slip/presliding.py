@@ -7,31 +7,16 @@ import numpy as np
 from identification import Measured, fit_elements
 from symfric.figures import Curve, hysteresis
 from symfric.foundation.panels import NARROW, panels
-from symfric.gallery.generalized_maxwell_slip import by_hand
+from symfric.gallery.drawing import look
+from symfric.gallery.generalized_maxwell_slip import by_hand, laws
 from symfric.gallery.generalized_maxwell_slip.by_hand import stribeck
-from symfric.gallery.generalized_maxwell_slip.laws import (
-    DELTA,
-    DELTA_L,
-    ELEMENTS,
-    F_C,
-    F_S,
-    PATH,
-    SIGMA_0,
-    SIGMA_1,
-    V_S,
-    Z_BA,
-    C,
-    law_grid,
-    laws,
-)
-from symfric.gallery.looks import look
 from symfric.gallery.plate import Drawn, plate
 
 
 def elements_again(curve: Curve) -> dict[str, float]:
     """The elements of `_laws` once more, from the loops of the generic model."""
     data = Measured(curve["v"], curve["F"], curve["x"], curve["t"])
-    found = fit_elements(data, len(ELEMENTS), viscous=False, offset=False)
+    found = fit_elements(data, len(laws.ELEMENTS), viscous=False, offset=False)
     return {
         "elements fitted to the generic model: rms [N]": found.rms,
         "sum of their levels, F_s = 1.05 N in table 1 [N]": float(found.levels.sum()),
@@ -45,7 +30,7 @@ def alternative(numbers: dict[str, float]) -> dict[str, bool]:
     missed: list[float] = []
     for delta in (1.0, 2.0, by_hand.DELTA_L):
         step = partial(by_hand.leuven, alternative=True, delta=delta)
-        missed.append(by_hand.opening(PATH, 8.0, step))
+        missed.append(by_hand.opening(laws.PATH, 8.0, step))
         numbers[f"inner loop missed by the equation of section 4, delta_l = {delta:g} [1]"] = (
             missed[-1]
         )
@@ -70,40 +55,49 @@ def fig_04_position(quick: bool) -> Drawn:
     Undecided: the speed of the signal, which matters in figure 5: 20 times faster ours is half the
     Stribeck velocity of table 1.
     """
-    run = hysteresis(laws(count=1)["Dahl"], 1.0, speeds=(1.0,), route=PATH)
+    run = hysteresis(laws.laws(count=1)["Dahl"], 1.0, speeds=(1.0,), route=laws.PATH)
     t, x = run.curves[0]["t"], run.curves[0]["x"]
 
     figure, (axis,) = panels(1, NARROW, 2.4)
     axis.plot(t, 1e6 * x, **look("generic_asperity"))
-    turns = np.linspace(0.0, t[-1], len(PATH))
+    turns = np.linspace(0.0, t[-1], len(laws.PATH))
     axis.plot(
         turns,
-        1e6 * np.array(PATH),
+        1e6 * np.array(laws.PATH),
         "o",
         color=look("leuven")["color"],
         label="turning points, at rest",
     )
-    axis.set_xlabel("time [s]")
-    axis.set_ylabel("position [µm]")
+    axis.set(xlabel="time [s]", ylabel="position [µm]")
     axis.legend()
 
-    leg = np.minimum((t / t[-1] * (len(PATH) - 1)).astype(int), len(PATH) - 2)
-    share = (1 - np.cos(np.pi * (t / t[-1] * (len(PATH) - 1) - leg))) / 2
-    begin, end = np.array(PATH[:-1])[leg], np.array(PATH[1:])[leg]
+    leg = np.minimum((t / t[-1] * (len(laws.PATH) - 1)).astype(int), len(laws.PATH) - 2)
+    share = (1 - np.cos(np.pi * (t / t[-1] * (len(laws.PATH) - 1) - leg))) / 2
+    begin, end = np.array(laws.PATH[:-1])[leg], np.array(laws.PATH[1:])[leg]
     far = np.abs(begin + (end - begin) * share - x).max()
     fastest = np.array([1.0, 5.0, 20.0]) * np.abs(run.curves[0]["v"]).max()
     numbers: dict[str, float] = {}
     for case, v, s in zip(("1x", "5x", "20x"), fastest, stribeck(fastest), strict=True):
-        numbers[f"fastest, {case}, over V_s [1]"] = v / V_S
+        numbers[f"fastest, {case}, over V_s [1]"] = v / laws.V_S
         numbers[f"Stribeck curve at the fastest, {case} [N]"] = s
-    table = laws(count=1)
+    table = laws.laws(count=1)
     given = [getattr(table["LuGre"], name) for name in ("mu_s", "mu_d", "v_s", "delta", "sigma_0")]
     given += [table["LuGre"].sigma_1, table["elasto-plastic"].z_ba, table["Leuven"].delta_l]  # pyright: ignore
-    numbers_of = (F_S, F_C, V_S, DELTA, SIGMA_0, SIGMA_1, Z_BA, DELTA_L, C)
+    numbers_of = (
+        laws.F_S,
+        laws.F_C,
+        laws.V_S,
+        laws.DELTA,
+        laws.SIGMA_0,
+        laws.SIGMA_1,
+        laws.Z_BA,
+        laws.DELTA_L,
+        laws.C,
+    )
     claims = {
         "the laws have the numbers of table 1": [*map(float, given)] == [*TABLE_1[:-1]],
         "so have the equations by hand": numbers_of == TABLE_1,
-        "20 times faster it is half of V_s": 0.45 < fastest[-1] / V_S < 0.5,
+        "20 times faster it is half of V_s": 0.45 < fastest[-1] / laws.V_S < 0.5,
     }
     return figure, far, numbers, claims
 
@@ -134,13 +128,13 @@ def fig_05_presliding(quick: bool) -> Drawn:
     section 4, dz/dt = v sgn(1 - F_h/s) |1 - F_h/s|^delta_l, is as good: with these elements it
     misses the inner loop by 15 % or more, for exponents of 1, 2 and 7.
     """
-    made = laws(count=200 if quick else 2000)
+    made = laws.laws(count=200 if quick else 2000)
     chosen = {name: made[name] for name in ORDER}
-    runs = {n: hysteresis(law, 1.0, route=PATH, speeds=SPEEDS) for n, law in chosen.items()}
+    runs = {n: hysteresis(law, 1.0, route=laws.PATH, speeds=SPEEDS) for n, law in chosen.items()}
     loops = {
         name: {c.case: (1e6 * c["x"], c["F"]) for c in run.curves} for name, run in runs.items()
     }
-    figure = law_grid(chosen, loops, ("position [µm]", "friction force [N]"), behind=[0])
+    figure = laws.law_grid(chosen, loops, ("position [µm]", "friction force [N]"), behind=[0])
 
     far = {
         f"difference from the equations by hand, {name} [N]": max(
@@ -174,26 +168,25 @@ def fig_05_presliding(quick: bool) -> Drawn:
     if not quick:
         again = elements_again(runs["generic model"].curves[0])
         numbers |= again
-        found = [again[f"k_{i + 1} [N/m]"] for i in range(len(ELEMENTS))]
+        found = [again[f"k_{i + 1} [N/m]"] for i in range(len(laws.ELEMENTS))]
         claims |= {
             "the generic model hardly depends on the speed": slower["generic model"] < 0.08,
             "its loops give the elements again": np.allclose(
-                found, [k for k, _ in ELEMENTS], rtol=0.1
+                found, [k for k, _ in laws.ELEMENTS], rtol=0.1
             ),
         }
-    worst = max(far.values()) / F_S
-    return figure, worst, numbers, claims
+    return figure, max(far.values()) / laws.F_S, numbers, claims
 
 
 def at_turns(curve: Curve) -> np.ndarray:
     """Force at the turning points [N]."""
-    return curve["F"][:: (curve["F"].size - 1) // (len(PATH) - 1)]
+    return curve["F"][:: (curve["F"].size - 1) // (len(laws.PATH) - 1)]
 
 
 def along_path(name: str, curve: Curve, steps: int) -> float:
     """Largest difference of a curve from the equations by hand [N]."""
     end = float(curve["t"][-1])
     t = np.linspace(0.0, end, steps + 1)
-    legs, phase = np.diff(PATH), t / end * (len(PATH) - 1)
+    legs, phase = np.diff(laws.PATH), t / end * (len(laws.PATH) - 1)
     v = legs[np.minimum(phase.astype(int), legs.size - 1)] * np.sin(np.pi * (phase % 1))
     return by_hand.difference(name, curve.columns, t, v * np.pi / 2 * legs.size / end)

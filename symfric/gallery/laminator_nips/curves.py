@@ -47,8 +47,7 @@ def fig_2_5_contact_area(quick: bool) -> Drawn:
     for k, (A, name) in enumerate(zip(areas, names, strict=True)):
         axis.plot(W, A, **line(k), label=name)
     axis.plot(W, W / areas[0], **line(4), label="pressure, smooth sphere")
-    axis.set_xlabel("load [1]")
-    axis.set_ylabel("area and pressure [1]")
+    axis.set(xlabel="load [1]", ylabel="area and pressure [1]")
     axis.legend(fontsize="small")
 
     constants = [(0.75 * (1 - nu**2) / 0.5) ** (1 / 3) for nu in (0.5, 0.3, 0.0)]
@@ -124,8 +123,7 @@ def fig_3_2_stribeck_and_viscous_part(quick: bool) -> Drawn:
     speeds = np.array([30.0, 300.0] if quick else [10.0, 30.0, 60.0, 130.0, 300.0, 500.0]) / 60e3
     steady = np.array([after_a_while(speed) for speed in speeds.tolist()])
     axis.plot(speeds, steady, "o", color="k", label="dynamic LuGre law")
-    axis.set_xlabel("velocity [m/s]")
-    axis.set_ylabel("friction force [N]")
+    axis.set(xlabel="velocity [m/s]", ylabel="friction force [N]")
     legend_below(figure, axis, 2)
 
     far = float(np.abs(steady - curve(law, speeds)).max()) / float(law.F_S)
@@ -192,8 +190,7 @@ def fig_3_3_viscous_friction(quick: bool) -> Drawn:
             numbers[f"speed of least force, sigma_2 = {sigma_2:g} N s/m [m/s]"] = least
             lowest.append((least, float(force.min())))
             far = max(far, abs(float(v[np.argmin(force)]) - least) / v_s)
-    axis.set_xlabel("velocity [m/s]")
-    axis.set_ylabel("friction force [N]")
+    axis.set(xlabel="velocity [m/s]", ylabel="friction force [N]")
     axis.legend(
         title="viscous friction", loc="upper left", bbox_to_anchor=(0.2, 1), fontsize="small"
     )

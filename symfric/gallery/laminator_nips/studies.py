@@ -13,7 +13,7 @@ from identification.starts.stribeck import StribeckCurve
 from symfric import SteadyStateLuGre
 from symfric.foundation.panels import NARROW, panels
 from symfric.foundation.style import QUIET, Line
-from symfric.gallery.looks import look
+from symfric.gallery.drawing import look
 from symfric.gallery.plate import Drawn, plate
 
 Array = NDArray[np.float64]
@@ -226,8 +226,7 @@ def fig_5_3_pilot_study(quick: bool) -> Drawn:
             ),
         }
     far = np.sqrt(np.mean((curve(once, v) - curve(printed, v)) ** 2))
-    far = float(far / force.mean())
-    return figure, far, numbers, claims
+    return figure, float(far / force.mean()), numbers, claims
 
 
 MACHINE = 650 / 60e3
@@ -295,8 +294,7 @@ def fig_5_5_main_study(quick: bool) -> Drawn:
         claims["at 650 mm/min the curves of 60 noises lie between 2.3 and 3.7 N"] = (
             2.3 < min(beyond) < 2.5 < 3.5 < max(beyond) < 3.7
         )
-    far = float(far / force.mean())
-    return figure, far, numbers, claims
+    return figure, float(far / force.mean()), numbers, claims
 
 
 @plate("1", within=0.012)
@@ -333,8 +331,7 @@ def fig_5_8_stable_region(quick: bool) -> Drawn:
     claims = {"the curve is the same within 2 %": far < 0.02 * force.mean()}
     if not quick:
         claims |= over_noises(numbers)
-    far = float(far / force.mean())
-    return figure, far, numbers, claims
+    return figure, float(far / force.mean()), numbers, claims
 
 
 def over_noises(numbers: dict[str, float]) -> dict[str, bool]:

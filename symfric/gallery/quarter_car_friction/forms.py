@@ -9,17 +9,10 @@ from numpy.typing import NDArray
 from symfric import QuarterCarSimple, Trajectory
 from symfric.foundation.panels import NARROW, panels
 from symfric.foundation.style import QUIET, line
-from symfric.gallery.looks import look
+from symfric.gallery.drawing import look
 from symfric.gallery.plate import Drawn, plate
+from symfric.gallery.quarter_car_friction import rig
 from symfric.gallery.quarter_car_friction.readings import as_printed, driven
-from symfric.gallery.quarter_car_friction.rig import (
-    BREAK_AWAY,
-    FRICTION,
-    READINGS,
-    general,
-    read,
-    ride,
-)
 from symfric.results.quadrature import integral_between
 
 Array = NDArray[np.float64]
@@ -55,8 +48,7 @@ def fig_08_break_points(quick: bool) -> Drawn:
         axis.plot(
             at, stribeck(at, 1.5, 2.0), marker=".", **line(k), label=f"break points: {points}"
         )
-    axis.set_xlabel("velocity / Stribeck velocity [1]")
-    axis.set_ylabel("friction / F_C [1]")
+    axis.set(xlabel="velocity / Stribeck velocity [1]", ylabel="friction / F_C [1]")
     axis.legend(fontsize="small")
 
     numbers, better = dict[str, float](), list[bool]()
@@ -72,8 +64,7 @@ def fig_08_break_points(quick: bool) -> Drawn:
     exact = 0.5 * max(chord(a, b) for a, b in pairwise(knots(v, 4, 1.5, 1.0).tolist()))
     numbers["largest error of four pieces, exponent of 1, over F_C [1]"] = error(v, 4, 1.5, 1.0)
     claims = {"each break point makes it better, the first by half": all(better)}
-    far = abs(error(v, 4, 1.5, 1.0) / exact - 1)
-    return figure, far, numbers, claims
+    return figure, abs(error(v, 4, 1.5, 1.0) / exact - 1), numbers, claims
 
 
 def stribeck(v: Array, level: float, delta: float) -> Array:
@@ -120,16 +111,15 @@ def fig_13_simple_form(quick: bool) -> Drawn:
     Refuted: the sign of its exponent. As printed it grows, beyond all bounds at the speeds of the
     figure, where the text says that the force quickly dips; it falls for e1 < 0.
     """
-    C_e, e_1, sigma_v = (FRICTION[name] for name in ("C_e", "e_1", "sigma_v"))
+    C_e, e_1, sigma_v = (rig.FRICTION[name] for name in ("C_e", "e_1", "sigma_v"))
     law = QuarterCarSimple(C_e=C_e, e_1=e_1, sigma_v=sigma_v, v_eps=1e-5)
-    run = ride(law, samples=601 if quick else 6001)
+    run = rig.ride(law, samples=601 if quick else 6001)
     v, force = run["v_b"], run["friction"]
 
     figure, (axis,) = panels(1, NARROW, 3.0)
     axis.plot(1e3 * v, force, color=look("quarter_car_simple")["color"], marker=".", markersize=2,
               linewidth=0.6)  # fmt: skip
-    axis.set_xlabel("velocity of the body [mm/s]")
-    axis.set_ylabel("damping friction [N]")
+    axis.set(xlabel="velocity of the body [mm/s]", ylabel="damping friction [N]")
 
     exact = C_e * np.exp(-np.abs(v) / e_1) * np.sign(v) + sigma_v * v
     moves = np.abs(v) > 1e-3
@@ -165,11 +155,11 @@ def fig_14_two_parts(quick: bool) -> Drawn:
 
     Undecided: how far damping dominates. Here it takes ten times the work of the Coulomb part.
     """
-    run = ride(general(), samples=1201 if quick else 6001)
+    run = rig.ride(rig.general(), samples=1201 if quick else 6001)
     v = run["v_b"]
-    damping = FRICTION["C_e"] * np.exp(-np.abs(v) / FRICTION["e_1"]) * np.sign(v)
-    damping += FRICTION["sigma_v"] * v
-    printed = as_printed(run, FRICTION["mu"])
+    damping = rig.FRICTION["C_e"] * np.exp(-np.abs(v) / rig.FRICTION["e_1"]) * np.sign(v)
+    damping += rig.FRICTION["sigma_v"] * v
+    printed = as_printed(run, rig.FRICTION["mu"])
     coulomb = np.abs(printed) * np.sign(v)
 
     moves = np.abs(v) > 1e-3
@@ -177,12 +167,11 @@ def fig_14_two_parts(quick: bool) -> Drawn:
     for force, k, name in ((damping, 0, "damping friction"), (coulomb, 1, "Coulomb friction")):
         axis.plot(1e3 * v[moves], force[moves], ".", color=line(k)["color"], markersize=2.5,
                   label=name)  # fmt: skip
-    axis.set_xlabel("velocity of the body [mm/s]")
-    axis.set_ylabel("friction force [N]")
+    axis.set(xlabel="velocity of the body [mm/s]", ylabel="friction force [N]")
     axis.legend(markerscale=3)
 
-    far = float(np.abs(damping + coulomb - run["friction"])[moves].max()) / BREAK_AWAY
-    power, share = driven(run, FRICTION["mu"])
+    far = float(np.abs(damping + coulomb - run["friction"])[moves].max()) / rig.BREAK_AWAY
+    power, share = driven(run, rig.FRICTION["mu"])
     whole, ends = run.work("friction", "v_b"), np.array([v[0], v[-1]])
     rubbed = whole - worked(run)
     numbers = {
@@ -201,7 +190,7 @@ def fig_14_two_parts(quick: bool) -> Drawn:
         "with up to a quarter of a watt": -0.26 < power < -0.23,
     }
     if not quick:
-        parts = [driven(read(k), reading["mu"])[1] for k, reading in enumerate(READINGS)]
+        parts = [driven(rig.read(k), reading["mu"])[1] for k, reading in enumerate(rig.READINGS)]
         numbers["the same share, least of ten readings [1]"] = min(parts)
         numbers["the same share, greatest [1]"] = max(parts)
         claims["and in each of ten readings on 1 ... 50 % of it"] = (
@@ -213,11 +202,11 @@ def fig_14_two_parts(quick: bool) -> Drawn:
 def worked(run: Trajectory) -> float:
     """Work of damping friction [J]."""
     v = run.model.expression("v_b")
-    damping = FRICTION["C_e"] * ca.exp(-ca.fabs(v) / FRICTION["e_1"]) * ca.fabs(v)
-    return integral_between(run, damping + FRICTION["sigma_v"] * v**2, *run.span)
+    damping = rig.FRICTION["C_e"] * ca.exp(-ca.fabs(v) / rig.FRICTION["e_1"]) * ca.fabs(v)
+    return integral_between(run, damping + rig.FRICTION["sigma_v"] * v**2, *run.span)
 
 
 def below(v: np.ndarray) -> np.ndarray:
     """Area below the curve of damping friction from 0 to v [N m/s]."""
-    e_1, sigma_v = FRICTION["e_1"], FRICTION["sigma_v"]
-    return FRICTION["C_e"] * e_1 * (1 - np.exp(-np.abs(v) / e_1)) + sigma_v * v**2 / 2
+    e_1, sigma_v = rig.FRICTION["e_1"], rig.FRICTION["sigma_v"]
+    return rig.FRICTION["C_e"] * e_1 * (1 - np.exp(-np.abs(v) / e_1)) + sigma_v * v**2 / 2

@@ -3,18 +3,7 @@
 import numpy as np
 
 from symfric import Trajectory
-from symfric.gallery.quarter_car_friction.rig import (
-    B_D,
-    BREAK_AWAY,
-    K_S,
-    K_T,
-    L_D,
-    RAMPS,
-    READINGS,
-    STAGES,
-    THETA,
-    read,
-)
+from symfric.gallery.quarter_car_friction import rig
 
 RESIDUAL = {"x_rel": (0.006362, 0.006366), "X_b": (0.096267, 0.096386)}
 """Table 1: residuals with Coulomb friction and without [m]."""
@@ -45,22 +34,22 @@ def start(run: Trajectory) -> dict[str, float]:
     }
 
 
-PLAY = BREAK_AWAY * (1 / K_S + 1 / K_T)
+PLAY = rig.BREAK_AWAY * (1 / rig.K_S + 1 / rig.K_T)
 """How far from where the paper has it the body may rest [m]."""
 
 
 def overshoot(run: Trajectory) -> float:
     """How far the body falls below its last place [m]."""
-    return 0.035 - float(run["X_b"][run.t > STAGES["C"][0]].min())
+    return 0.035 - float(run["X_b"][run.t > rig.STAGES["C"][0]].min())
 
 
 def bodies(numbers: dict[str, float]) -> dict[str, bool]:
     """What holds of all readings of the friction; adds the ranges to `numbers`."""
-    runs = [read(k) for k in range(len(READINGS))]
+    runs = [rig.read(k) for k in range(len(rig.READINGS))]
     rests = [
         abs(float(np.interp(end, run.t, run["X_b"])) - height)
         for run in runs
-        for end, height in STAGES.values()
+        for end, height in rig.STAGES.values()
     ]
     starts, early, late = np.array([[*start(run).values()] for run in runs]).T
     free = numbers["overshoot after the last ramp, without friction [m]"]
@@ -72,7 +61,7 @@ def bodies(numbers: dict[str, float]) -> dict[str, bool]:
     return {
         "viscous friction from 1500 N s/m on halves the overshoot": all(
             overshoot(run) < free / 2
-            for run, reading in zip(runs, READINGS, strict=True)
+            for run, reading in zip(runs, rig.READINGS, strict=True)
             if reading["sigma_v"] >= 1500
         ),
         "the body rests within break-away over both springs": max(rests) < PLAY,
@@ -87,16 +76,16 @@ def bodies(numbers: dict[str, float]) -> dict[str, bool]:
 
 def areas_and_speeds(run: Trajectory) -> tuple[list[float], list[float]]:
     """Area of the loop [N m/s] and largest speed [m/s] of each ramp."""
-    areas = [abs(run.area("friction", "v_b", between)) for between in RAMPS.values()]
+    areas = [abs(run.area("friction", "v_b", between)) for between in rig.RAMPS.values()]
     speeds = [
-        float(np.abs(run["v_b"][(run.t >= a) & (run.t <= b)]).max()) for a, b in RAMPS.values()
+        float(np.abs(run["v_b"][(run.t >= a) & (run.t <= b)]).max()) for a, b in rig.RAMPS.values()
     ]
     return areas, speeds
 
 
 def loops(numbers: dict[str, float]) -> dict[str, bool]:
     """What holds of all readings of the friction; adds the ranges to `numbers`."""
-    both = np.array([areas_and_speeds(read(k)) for k in range(len(READINGS))])
+    both = np.array([areas_and_speeds(rig.read(k)) for k in range(len(rig.READINGS))])
     ratios, speeds = (both[:, :, 2] / both[:, :, 1]).T
     numbers |= {
         "the same, least of ten readings [1]": float(ratios.min()),
@@ -116,9 +105,9 @@ def loops(numbers: dict[str, float]) -> dict[str, bool]:
 def as_printed(run: Trajectory, mu: float) -> np.ndarray:
     """Coulomb friction with the sign of the strut's force [N]."""
     x = run["x_rel"]
-    strut = K_S * x + B_D * (run["v_w"] - run["v_b"])
-    lean = np.arcsin(x * np.sin(THETA) / (L_D - x * np.sin(THETA)))
-    return mu * strut / np.tan(THETA - lean)
+    strut = rig.K_S * x + rig.B_D * (run["v_w"] - run["v_b"])
+    lean = np.arcsin(x * np.sin(rig.THETA) / (rig.L_D - x * np.sin(rig.THETA)))
+    return mu * strut / np.tan(rig.THETA - lean)
 
 
 def driven(run: Trajectory, mu: float) -> tuple[float, float]:

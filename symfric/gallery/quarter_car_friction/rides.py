@@ -5,19 +5,9 @@ import numpy as np
 from symfric import Viscous
 from symfric.foundation.panels import NARROW, panels
 from symfric.foundation.style import QUIET, line
-from symfric.gallery.looks import look
+from symfric.gallery.drawing import look
 from symfric.gallery.plate import Drawn, plate
-from symfric.gallery.quarter_car_friction import rig
-from symfric.gallery.quarter_car_friction.readings import (
-    RANGE,
-    RESIDUAL,
-    areas_and_speeds,
-    bodies,
-    loops,
-    overshoot,
-    residuals,
-    start,
-)
+from symfric.gallery.quarter_car_friction import readings, rig
 from symfric.gallery.quarter_car_friction.rig import FRICTION, RAMPS, STAGES, WEAK, general, ride
 
 
@@ -44,8 +34,7 @@ def fig_04_without_friction(quick: bool) -> Drawn:
     axis.plot(run.t, 1e3 * run["X_r"], color=QUIET, linewidth=4.0, label="road")
     axis.plot(run.t, 1e3 * run["X_w"], **line(1), label="wheel")
     axis.plot(run.t, 1e3 * run["X_b"], **line(0), label="body")
-    axis.set_xlabel("time [s]")
-    axis.set_ylabel("displacement [mm]")
+    axis.set(xlabel="time [s]", ylabel="displacement [mm]")
     axis.legend()
 
     exact = rig.without_friction(run.t)
@@ -125,24 +114,23 @@ def fig_11_body(quick: bool) -> Drawn:
         label = "rests, in the paper" if stage == "A" else None
         axis.plot(end, 1e3 * height, "k^", markersize=5, label=label)
         axis.annotate(stage, (end, 1e3 * height), (-13, 5), textcoords="offset points")
-    axis.set_xlabel("time [s]")
-    axis.set_ylabel("displacement of the body [mm]")
+    axis.set(xlabel="time [s]", ylabel="displacement of the body [mm]")
     axis.legend(loc="upper left", fontsize="small")
 
     t, body, _ = rig.with_friction(5e-4 if quick else 2.5e-5, 50, **FRICTION)
     far = float(np.abs(np.interp(run.t, t, body) - run["X_b"]).max())
     numbers: dict[str, float] = {}
     for name, ridden in {"friction": run, **others}.items():
-        numbers[f"overshoot after the last ramp, {name} [m]"] = overshoot(ridden)
+        numbers[f"overshoot after the last ramp, {name} [m]"] = readings.overshoot(ridden)
     for stage, (end, height) in STAGES.items():
         place = float(np.interp(end, run.t, run["X_b"]))
         numbers[f"body at the end of stage {stage}, less {height:g} m of the paper [m]"] = (
             place - height
         )
-    numbers |= residuals(run) | start(run)
+    numbers |= readings.residuals(run) | readings.start(run)
     printed = ride(general(form="as_printed"))
     numbers["way of the body by equation 12 as printed [m]"] = float(np.ptp(printed["X_b"]))
-    claims = said(numbers) | ({} if quick else bodies(numbers))
+    claims = said(numbers) | ({} if quick else readings.bodies(numbers))
     return figure, far / 0.05, numbers, claims
 
 
@@ -153,16 +141,17 @@ def said(numbers: dict[str, float]) -> dict[str, bool]:
         "friction halves the overshoot, weakly viscous friction makes it larger": (
             2 * over[0] < over[1] < over[2]
         ),
-        "the residual of X_b is larger than any constant leaves": RESIDUAL["X_b"][0] > RANGE / 2,
+        "the residual of X_b is larger than any constant leaves": readings.RESIDUAL["X_b"][0]
+        > readings.RANGE / 2,
         "Coulomb friction improves the residuals by 0.06 and 0.12 %": np.allclose(
-            [100 * (1 - residual / without) for residual, without in RESIDUAL.values()],
+            [100 * (1 - residual / without) for residual, without in readings.RESIDUAL.values()],
             [0.0628, 0.1235],
             atol=1e-4,
         ),
         "the rests are where and until when the road is level": (
             np.allclose([z for _, z in STAGES.values()], rig.heights(50)[1::2])
             and np.allclose([end for end, _ in STAGES.values()][:3], rig.CORNERS[1:6:2])
-            and max(rig.heights(50)) == RANGE
+            and max(rig.heights(50)) == readings.RANGE
         ),
         "equation 12 as printed holds the body for ever": (
             numbers["way of the body by equation 12 as printed [m]"] == 0.0
@@ -208,8 +197,7 @@ def fig_12_friction_loops(quick: bool) -> Drawn:
         v, force = run["v_b"][inside], run["friction"][inside]
         axis.plot(1e3 * v, force, **line(k), linewidth=1.2, label=f"{name} ramp")
     axis.plot([], [], color=QUIET, label="roads of 30 and 70 mm")
-    axis.set_xlabel("velocity of the body [mm/s]")
-    axis.set_ylabel("friction force [N]")
+    axis.set(xlabel="velocity of the body [mm/s]", ylabel="friction force [N]")
     axis.legend(loc="upper left", fontsize="small")
 
     t, _, friction = rig.with_friction(5e-4 if quick else 2.5e-5, 50, **FRICTION)
@@ -223,7 +211,7 @@ def fig_12_friction_loops(quick: bool) -> Drawn:
         )
         / rig.B_D,
     }
-    areas, speeds = areas_and_speeds(run)
+    areas, speeds = readings.areas_and_speeds(run)
     for name, area, speed in zip(RAMPS, areas, speeds, strict=True):
         numbers[f"area of the loop of the {name} ramp [N m/s]"] = area
         numbers[f"largest speed on the {name} ramp [m/s]"] = speed
@@ -236,5 +224,5 @@ def fig_12_friction_loops(quick: bool) -> Drawn:
         "0.0069 m of the spring are more than 193.8 N": rig.K_S * DEFLECTION > BREAK_AWAY,
     }
     if not quick:
-        claims |= loops(numbers)
+        claims |= readings.loops(numbers)
     return figure, far, numbers, claims

@@ -8,16 +8,7 @@ from numpy.typing import NDArray
 from symfric import Trajectory, simulate
 from symfric.gallery.belt import Belt
 from symfric.gallery.plate import Drawn, plate
-from symfric.gallery.selection.laws import (
-    FORMS,
-    SLIDING,
-    TABLE_4,
-    agree,
-    chosen,
-    forms,
-    law_of,
-    small_multiples,
-)
+from symfric.gallery.selection import laws
 from symfric.gallery.signals import largest, rms, spread
 from symfric.scenes import Rabinowicz
 
@@ -29,7 +20,7 @@ M, K, V_BELT, F_S, F_C = 0.8, 2.1, 0.1, 0.15 * 0.8 * 9.81, 0.1 * 0.8 * 9.81
 @cache
 def run(name: str, t_end: float = T_END, rtol: float = 1e-7) -> Trajectory:
     """A law on the belt, seen every ms."""
-    model = Rabinowicz.preset("jing_mi_table_3", FORMS[name]).model()
+    model = Rabinowicz.preset("jing_mi_table_3", laws.FORMS[name]).model()
     return simulate(model, t_end, rtol=rtol, t_eval=np.linspace(0, t_end, round(1000 * t_end) + 1))
 
 
@@ -77,27 +68,27 @@ def fig_02_belt_displacement(quick: bool) -> Drawn:
     steps of 1 us and the text says ode15s; equal steps of 1 us would give the S of every ms, which
     is not that of table 4.
     """
-    names, t_end = chosen(quick), 8.0 if quick else T_END
-    runs = {name: run(name, t_end) for name in forms(names)}
+    names, t_end = laws.chosen(quick), 8.0 if quick else T_END
+    runs = {name: run(name, t_end) for name in laws.forms(names)}
     _, dry = exact(t_end)
 
     t = runs[names[0]].t
     curves = {name: (one.t, one["x"]) for name, one in runs.items()}
-    figure = small_multiples(curves, (t, dry["x"]), "displacement of the block [m]")
+    figure = laws.small_multiples(curves, (t, dry["x"]), "displacement of the block [m]")
 
     S = {name: spread(one["x"]) for name, one in runs.items()}
     at_steps = {name: spread(one.at(one.step_times)["x"]) for name, one in runs.items()}
-    off = [abs(S[name] / TABLE_4[name] - 1) for name in names]
+    off = [abs(S[name] / laws.TABLE_4[name] - 1) for name in names]
     numbers = {"S x 100, exact dry friction [m]": spread(dry["x"])}
     for name, one in runs.items():
         numbers[f"S x 100, {name} [m]"] = S[name]
         numbers[f"S x 100 at the steps of the solver, {name} [m]"] = at_steps[name]
         numbers[f"rms distance from exact dry friction, {name} [m]"] = rms(one["x"] - dry["x"])
         numbers[f"greatest displacement, {name} [m]"] = float(one["x"].max())
-    numbers |= {f"S x 100 in table 4, {name} [m]": TABLE_4[name] for name in names}
-    claims = agree("3", "4") | {
+    numbers |= {f"S x 100 in table 4, {name} [m]": laws.TABLE_4[name] for name in names}
+    claims = laws.agree("3", "4") | {
         "only laws with a static level reach its elongation F_S/k": all(
-            (one["x"].max() < 0.9 * F_S / K) == (law_of(name) in SLIDING)
+            (one["x"].max() < 0.9 * F_S / K) == (laws.law_of(name) in laws.SLIDING)
             for name, one in runs.items()
         ),
         "one motion has two S, every ms and at the steps of the solver": any(
@@ -105,7 +96,7 @@ def fig_02_belt_displacement(quick: bool) -> Drawn:
         ),
     }
     if not quick:
-        held = [S[name] for name in runs if law_of(name) not in SLIDING]
+        held = [S[name] for name in runs if laws.law_of(name) not in laws.SLIDING]
         sharper = (run(name, t_end, 1e-9)["x"] - one["x"] for name, one in runs.items())
         numbers["largest change by a tolerance of 1e-9 [m]"] = max(map(largest, sharper))
         for what, one in (("least", min), ("greatest", max)):
@@ -139,13 +130,13 @@ def fig_03_belt_velocity(quick: bool) -> Drawn:
     laws without a static level never stick, in either form, and swing with the period of the free
     block, 3.9 s instead of 6.1 s.
     """
-    names, t_end = chosen(quick), 14.0 if quick else T_END
+    names, t_end = laws.chosen(quick), 14.0 if quick else T_END
     belt, dry = exact(t_end)
-    runs = {name: run(name, t_end) for name in forms(names)}
+    runs = {name: run(name, t_end) for name in laws.forms(names)}
 
     t = runs[names[0]].t
     curves = {name: (one.t, one["v_rel"]) for name, one in runs.items()}
-    figure = small_multiples(curves, (t, dry["v_rel"]), "velocity relative to the belt [m/s]")
+    figure = laws.small_multiples(curves, (t, dry["v_rel"]), "velocity relative to the belt [m/s]")
 
     period = float(np.diff(belt.leaves)[0])
     numbers = {
@@ -160,9 +151,9 @@ def fig_03_belt_velocity(quick: bool) -> Drawn:
         numbers[f"greatest slip, {name} [m/s]"] = -float(one["v_rel"].min())
         numbers[f"break-aways, {name} [1]"] = leaves.size
         periods[name] = numbers[f"period, {name} [s]"] = float(np.diff(leaves)[0])
-        if law_of(name) not in SLIDING:
+        if laws.law_of(name) not in laws.SLIDING:
             off.append(abs(periods[name] - period))
-    held = [p for name, p in periods.items() if law_of(name) not in SLIDING]
+    held = [p for name, p in periods.items() if laws.law_of(name) not in laws.SLIDING]
     free = np.array([p for p in periods.values() if p not in held])
     free /= numbers["period of the free block [s]"]
     claims = {
@@ -198,13 +189,15 @@ def fig_04_belt_acceleration(quick: bool) -> Drawn:
     Awrejcewicz without, peak at 1.3 ... 1.9 times that for some ms, in both forms; Karnopp without
     states and the other bristle laws do not.
     """
-    names, t_end = chosen(quick), 14.0 if quick else T_END
+    names, t_end = laws.chosen(quick), 14.0 if quick else T_END
     _, dry = exact(t_end)
-    runs = {name: run(name, t_end) for name in forms(names)}
+    runs = {name: run(name, t_end) for name in laws.forms(names)}
 
     t = runs[names[0]].t
     curves = {name: (one.t, acceleration(one)) for name, one in runs.items()}
-    figure = small_multiples(curves, (t, dry["a"]), "acceleration of the block [m/s²]", (-0.8, 1.6))
+    figure = laws.small_multiples(
+        curves, (t, dry["a"]), "acceleration of the block [m/s²]", (-0.8, 1.6)
+    )
 
     after = t > 2.0
     slips = after & (dry["v_rel"] < -0.02)
@@ -215,18 +208,20 @@ def fig_04_belt_acceleration(quick: bool) -> Drawn:
     for name, one in runs.items():
         a, slips = acceleration(one), after & (one["v_rel"] < -0.02)
         numbers[f"greatest, {name} [m/s^2]"] = float(np.abs(a[after]).max())
-        if law_of(name) not in SLIDING:
+        if laws.law_of(name) not in laws.SLIDING:
             own = float(np.abs(a[slips]).max())
             numbers[f"greatest in slip, {name} [m/s^2]"] = own
             off.append(abs(own / greatest - 1))
             peaks[name] = numbers[f"greatest, {name} [m/s^2]"] / greatest
     claims = {
-        "the others do not peak": all(peaks[n] < 1.1 for n in peaks if law_of(n) not in PEAKED),
+        "the others do not peak": all(
+            peaks[n] < 1.1 for n in peaks if laws.law_of(n) not in PEAKED
+        ),
     }
     if not quick:
         claims[
             "Bengisu, Velocity-based, Awrejcewicz and Stick-slip peak at 1.3 ... 1.9 times it"
-        ] = all(1.3 < peaks[name] < 1.95 for name in peaks if law_of(name) in PEAKED)
+        ] = all(1.3 < peaks[name] < 1.95 for name in peaks if laws.law_of(name) in PEAKED)
     return figure, max(off), numbers, claims
 
 
@@ -254,14 +249,14 @@ def fig_05_belt_friction(quick: bool) -> Drawn:
     to 0.1 %. That laws with states are the smooth ones: the undamped bristles of Dahl and
     Stick-slip ring.
     """
-    names, t_end = chosen(quick), 14.0 if quick else T_END
+    names, t_end = laws.chosen(quick), 14.0 if quick else T_END
     _, dry = exact(t_end)
-    runs = {name: run(name, t_end) for name in forms(names)}
+    runs = {name: run(name, t_end) for name in laws.forms(names)}
 
     t = runs[names[0]].t
     curves = {name: (one.t, -one["friction"]) for name, one in runs.items()}
     label, reference = "friction on the block [N]", (t, -dry["friction"])
-    figure = small_multiples(curves, reference, label, (-0.15, 1.35))
+    figure = laws.small_multiples(curves, reference, label, (-0.15, 1.35))
 
     after = t > 2.0
     numbers = {"static level [N]": F_S, "dynamic level [N]": F_C}
@@ -276,7 +271,7 @@ def fig_05_belt_friction(quick: bool) -> Drawn:
             numbers[f"mean force in slip beyond 50 mm/s, {name} [N]"] = slides
             slips[name] = slides / LEVEL.get(name, 1.0) / F_C
         rings[name] = numbers[f"ringing in the first stick, {name} [N]"] = ringing(one)
-        if law_of(name) not in SLIDING:
+        if laws.law_of(name) not in laws.SLIDING:
             off.append(abs(greatest / F_S - 1))
     claims = {
         "in slip all are at mu_d N, Threlfall as published at 0.95 of it, to 0.1 %": np.allclose(
@@ -285,10 +280,11 @@ def fig_05_belt_friction(quick: bool) -> Drawn:
         "Coulomb, Threlfall and Dahl show that level alone": all(
             abs(numbers[f"greatest force, {name} [N]"] / F_C - LEVEL.get(name, 1.0)) < 1.1e-3
             for name in runs
-            if law_of(name) in SLIDING
+            if laws.law_of(name) in laws.SLIDING
         ),
         "Dahl and Stick-slip ring, the others do not": all(
-            (ring > 1.0) == (law_of(name) in ("Dahl", "Stick-slip")) for name, ring in rings.items()
+            (ring > 1.0) == (laws.law_of(name) in ("Dahl", "Stick-slip"))
+            for name, ring in rings.items()
         ),
     }
     return figure, max(off), numbers, claims

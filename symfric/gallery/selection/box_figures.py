@@ -9,21 +9,6 @@ from symfric.foundation.panels import NARROW, grid
 from symfric.foundation.style import EDGE, QUIET, colour, line
 from symfric.gallery.plate import Drawn, plate
 from symfric.gallery.selection import box
-from symfric.gallery.selection.box import (
-    DRAWN,
-    EXACT,
-    MACHINES,
-    T_END,
-    departures,
-    distance,
-    end_of_motion,
-    last_swing,
-    off,
-    picture,
-    positions,
-    run,
-    signal,
-)
 from symfric.gallery.selection.laws import FORMS, LAWS, TABLE_8, agree, chosen, forms
 from symfric.gallery.signals import acceleration, largest, rms, spread
 from symfric.scenes import PendulumBox
@@ -57,8 +42,8 @@ def fig_06_pendulum_box(quick: bool) -> Drawn:
     cm, by tolerances of 1e-5 to 1e-7. Figures 7 to 12 draw the second reading, and what they say of
     the paper holds for both, with radii of 3 to 100 mm.
     """
-    t_end = 1.0 if quick else T_END
-    table = run("Smooth", t_end)
+    t_end = 1.0 if quick else box.T_END
+    table = box.run("Smooth", t_end)
     figure, [[axis]] = grid(1, 1, width=NARROW, height=3.4)
     swing = np.flatnonzero(np.diff(np.sign(table["phi_rate"][1:])))[0] + 1
     x, phi = table["x"][: swing + 1], table["phi"][: swing + 1]
@@ -70,16 +55,15 @@ def fig_06_pendulum_box(quick: bool) -> Drawn:
         axis.plot(x[at] + rod[0], TOP + np.array(rod[1]), "o-", color=colour(k), markersize=7)
     axis.axhline(0.0, color=EDGE, linewidth=2.5, zorder=0)
     axis.set_aspect("equal")
-    axis.set_xlabel("x [m]")
-    axis.set_ylabel("height [m]")
+    axis.set(xlabel="x [m]", ylabel="height [m]")
     figure.legend(loc="outside lower center", ncols=2, frameon=False)
     by_hand = box.at_start()
     found = [float(acceleration(table, rate)[0]) for rate in ("x_rate", "phi_rate")]
     S: dict[str, float] = {}
     at_steps: dict[str, list[float]] = {}
     for reading, J in READINGS.items():
-        S[reading] = spread(run("Smooth", t_end, (J, box.R))["x"])
-        runs = [run("Smooth", t_end, (J, box.R), rtol) for rtol in (1e-5, 1e-6, 1e-7)]
+        S[reading] = spread(box.run("Smooth", t_end, (J, box.R))["x"])
+        runs = [box.run("Smooth", t_end, (J, box.R), rtol) for rtol in (1e-5, 1e-6, 1e-7)]
         at_steps[reading] = [spread(one.at(one.step_times)["x"]) for one in runs]
     numbers = {
         "acceleration of the box at the start [m/s^2]": found[0],
@@ -106,8 +90,7 @@ def fig_06_pendulum_box(quick: bool) -> Drawn:
             ),
             "and the other has 5.8 ... 6.2 cm": 5.8 < min(other) < max(other) < 6.2,
         }
-    far = max(abs(a / b - 1) for a, b in zip(found, by_hand, strict=True))
-    return figure, far, numbers, claims
+    return figure, max(abs(a / b - 1) for a, b in zip(found, by_hand, strict=True)), numbers, claims
 
 
 WEAKER: dict[str, Law] = {
@@ -143,19 +126,19 @@ def fig_07_box_displacement(quick: bool) -> Drawn:
     at 100 mm it is 3 ... 5 mm off. With a hundredth of that band it is where the others are, and so
     it is in its smooth form, which stops nothing.
     """
-    names, t_end = chosen(quick), 1.0 if quick else T_END
-    figure = picture("x", "displacement of the box [m]", names, t_end)
-    exact = run(EXACT, t_end)["x"]
+    names, t_end = chosen(quick), 1.0 if quick else box.T_END
+    figure = box.picture("x", "displacement of the box [m]", names, t_end)
+    exact = box.run(box.EXACT, t_end)["x"]
     numbers = {
         "S x 100, exact dry friction [m]": spread(exact),
-        "Smooth from equations by hand, largest difference [m]": distance("x", t_end),
+        "Smooth from equations by hand, largest difference [m]": box.distance("x", t_end),
     }
-    S = {name: spread(run(name, t_end)["x"]) for name in names}
+    S = {name: spread(box.run(name, t_end)["x"]) for name in names}
     for name, mine in S.items():
         numbers[f"S x 100, {name} [m]"] = mine
         numbers[f"S x 100 in table 8, {name} [m]"] = TABLE_8[name]
         numbers[f"largest distance from exact dry friction, {name} [m]"] = largest(
-            off(name, "x", t_end)
+            box.off(name, "x", t_end)
         )
     wide = numbers["largest distance from exact dry friction, Karnopp [m]"]
     for what, law in WEAKER.items():
@@ -165,7 +148,7 @@ def fig_07_box_displacement(quick: bool) -> Drawn:
         "a hundredth of its band, or its smooth form, brings Karnopp near": (5 * max(nearer) < wide)
     }
     if not quick:
-        claims |= positions(numbers)
+        claims |= box.positions(numbers)
     far = float(np.median([abs(S[name] / TABLE_8[name] - 1) for name in names]))
     return figure, far, numbers, claims
 
@@ -175,8 +158,8 @@ def apart(hinge: Law, t_end: float) -> float:
     floor = (
         LAWS["Karnopp"] if hinge is WEAKER["Karnopp with a hundredth of its band"] else Karnopp()
     )
-    scene = replace(PendulumBox.preset("jing_mi_table_7", floor, R=DRAWN[1]), hinge=hinge)
-    exact = run(EXACT, t_end)
+    scene = replace(PendulumBox.preset("jing_mi_table_7", floor, R=box.DRAWN[1]), hinge=hinge)
+    exact = box.run(box.EXACT, t_end)
     return largest(simulate(scene.model(), t_end, rtol=1e-7, t_eval=exact.t)["x"] - exact["x"])
 
 
@@ -203,25 +186,29 @@ def fig_08_box_velocity(quick: bool) -> Drawn:
     half a millimetre to either side on the machine drawn, 0.55 ... 0.60 mm, and from 4 um up on the
     others.
     """
-    names, t_end = chosen(quick), 1.0 if quick else T_END
-    figure = picture("x'", "velocity of the box [m/s]", names, t_end)
-    greatest = largest(signal(EXACT, "x'", t_end))
+    names, t_end = chosen(quick), 1.0 if quick else box.T_END
+    figure = box.picture("x'", "velocity of the box [m/s]", names, t_end)
+    greatest = largest(box.signal(box.EXACT, "x'", t_end))
     numbers = {"greatest velocity, exact dry friction [m/s]": greatest}
-    away = {name: rms(off(name, "x'", t_end)) for name in forms(names)}
+    away = {name: rms(box.off(name, "x'", t_end)) for name in forms(names)}
     for name, far in away.items():
         numbers[f"rms distance from exact dry friction, {name} [m/s]"] = far
     claims = {"all but Karnopp are within 17 mm/s": max(without(away).values()) < 0.017}
     if not quick:
-        rolls = {at: [last_swing(name, "x", T_END, at) for name in BRISTLY] for at in MACHINES}
+        rolls = {
+            at: [box.last_swing(name, "x", box.T_END, at) for name in BRISTLY]
+            for at in box.MACHINES
+        }
         least, most = min(map(min, rolls.values())), max(map(max, rolls.values()))
-        for name, roll in zip(BRISTLY, rolls[DRAWN], strict=True):
+        for name, roll in zip(BRISTLY, rolls[box.DRAWN], strict=True):
             numbers[f"swing of the place in the last 2 s, {name} [m]"] = roll
         numbers["the same, least of all machines [m]"] = least
         numbers["the same, greatest of all machines [m]"] = most
         others = [
-            without({name: rms(off(name, "x'", T_END, at)) for name in FORMS}) for at in MACHINES
+            without({name: rms(box.off(name, "x'", box.T_END, at)) for name in FORMS})
+            for at in box.MACHINES
         ]
-        speeds = [largest(signal(EXACT, "x'", T_END, at)) for at in MACHINES]
+        speeds = [largest(box.signal(box.EXACT, "x'", box.T_END, at)) for at in box.MACHINES]
         numbers["rms distance, greatest of all machines [m/s]"] = max(
             max(o.values()) for o in others
         )
@@ -234,11 +221,11 @@ def fig_08_box_velocity(quick: bool) -> Drawn:
                 {*sorted(one, key=lambda n, one=one: one[n])[-4:]} == far_off for one in others
             ),
             "their boxes roll by half a millimetre on the machine drawn": all(
-                0.54e-3 < roll < 0.6e-3 for roll in rolls[DRAWN]
+                0.54e-3 < roll < 0.6e-3 for roll in rolls[box.DRAWN]
             ),
             "by 4 um or more on all": least > 4e-6,
         }
-    return figure, distance("x'", t_end), numbers, claims
+    return figure, box.distance("x'", t_end), numbers, claims
 
 
 def without(away: dict[str, float]) -> dict[str, float]:
@@ -265,13 +252,13 @@ def fig_09_box_acceleration(quick: bool) -> Drawn:
     Velocity-based, which has no state, is farther off than Gonthier, which has, and Stick-slip,
     which has states, differs from dry friction as Velocity-based does within a quarter.
     """
-    names, t_end = chosen(quick), 1.0 if quick else T_END
-    figure = picture("x''", "acceleration of the box [m/s²]", names, t_end)
-    greatest = largest(signal(EXACT, "x''", t_end))
+    names, t_end = chosen(quick), 1.0 if quick else box.T_END
+    figure = box.picture("x''", "acceleration of the box [m/s²]", names, t_end)
+    greatest = largest(box.signal(box.EXACT, "x''", t_end))
     numbers = {"greatest acceleration, exact dry friction [m/s^2]": greatest}
     peaks: dict[str, float] = {}
     for name in forms(names):
-        away = off(name, "x''", t_end)
+        away = box.off(name, "x''", t_end)
         peaks[name] = largest(away)
         numbers[f"largest distance from exact dry friction, {name} [m/s^2]"] = peaks[name]
         numbers[f"rms distance from exact dry friction, {name} [m/s^2]"] = rms(away)
@@ -279,14 +266,14 @@ def fig_09_box_acceleration(quick: bool) -> Drawn:
     if not quick:
         apart = [
             {
-                n: largest(off(n, "x''", T_END, at))
+                n: largest(box.off(n, "x''", box.T_END, at))
                 for n in ("Velocity-based", "Stick-slip", "Gonthier")
             }
-            for at in MACHINES
+            for at in box.MACHINES
         ]
         parts = [
-            max(one.values()) / largest(signal(EXACT, "x''", T_END, at))
-            for one, at in zip(apart, MACHINES, strict=True)
+            max(one.values()) / largest(box.signal(box.EXACT, "x''", box.T_END, at))
+            for one, at in zip(apart, box.MACHINES, strict=True)
         ]
         alike = [one["Stick-slip"] / one["Velocity-based"] for one in apart]
         numbers["largest distance over the greatest acceleration, least of all machines [1]"] = min(
@@ -301,7 +288,7 @@ def fig_09_box_acceleration(quick: bool) -> Drawn:
             ),
             "and as far as Stick-slip within a quarter": 0.8 < min(alike) < max(alike) < 1.25,
         }
-    return figure, distance("x''", t_end), numbers, claims
+    return figure, box.distance("x''", t_end), numbers, claims
 
 
 def pendulum(what: str, label: str, quick: bool) -> Drawn:
@@ -326,11 +313,11 @@ def pendulum(what: str, label: str, quick: bool) -> Drawn:
     Undecided: how far Karnopp errs: by less than LuGre or by more than three times as much, as the
     radius is that table 6 does not give (figure 7).
     """
-    names, t_end = chosen(quick), 2.5 if quick else T_END
+    names, t_end = chosen(quick), 2.5 if quick else box.T_END
     unit = label[label.index("[") + 1 : -1].replace("²", "^2")
-    numbers = departures(what, unit, names, t_end)
-    claims = end_of_motion(what, numbers, t_end)
-    return picture(what, label, names, t_end), distance(what, t_end), numbers, claims
+    numbers = box.departures(what, unit, names, t_end)
+    claims = box.end_of_motion(what, numbers, t_end)
+    return box.picture(what, label, names, t_end), box.distance(what, t_end), numbers, claims
 
 
 @plate("rad", within=4e-8, like=pendulum)

@@ -13,10 +13,10 @@ from numpy import float64
 from numpy.typing import NDArray
 
 from symfric import Awrejcewicz, BengisuAkay, Karnopp, Law, Threlfall, VelocityBased
-from symfric.choice.jing_mi import PRINTED
 from symfric.foundation.panels import grid
 from symfric.foundation.style import colour
 from symfric.gallery.drawing import REFERENCE
+from symfric.gallery.selection.tables import PRINTED
 from symfric.gallery.signals import rms
 from symfric.scenes import jing_mi
 

@@ -120,8 +120,7 @@ def fig_03_stick_slip_motion(quick: bool) -> Drawn:
     axes[2].plot(t, motion["a"], **REFERENCE)
     for k, one in enumerate(runs.values()):
         axes[2].plot(t, acceleration(one), **line(k))
-    axes[2].set_ylabel("acceleration\n[m/s²]")
-    axes[2].set_xlabel("time [s]")
+    axes[2].set(xlabel="time [s]", ylabel="acceleration\n[m/s²]")
     figure.align_ylabels(axes)
     legend_below(figure, axes[0])
 
@@ -189,8 +188,7 @@ def fig_04_stick_slip_force(quick: bool) -> Drawn:
     for k, (name, one) in enumerate(runs.items()):
         over_time.plot(t, -one["friction"], label=name, **line(k))
         over_slip.plot(1e3 * one["v_rel"], -one["friction"], **line(k))
-    over_time.set_xlabel("time [s]")
-    over_time.set_ylabel("friction on the block [N]")
+    over_time.set(xlabel="time [s]", ylabel="friction on the block [N]")
     over_slip.set_xlabel("slip velocity [mm/s]")
     legend_below(figure, over_time)
 
@@ -214,8 +212,7 @@ def fig_04_stick_slip_force(quick: bool) -> Drawn:
             for name in runs
         ),
     }
-    far = rms(tuned - brown) / level
-    return figure, far, numbers, claims
+    return figure, rms(tuned - brown) / level, numbers, claims
 
 
 def over(slips: np.ndarray, run: Trajectory) -> np.ndarray:

@@ -50,8 +50,9 @@ def fig_01_force_profiles(quick: bool) -> Drawn:
         above.plot(1e3 * v, -F, label=name, **line(k))
         below.plot(1e3 * v, -(F - forces["Brown-McPhee"]) / MU["mu_s"], **line(k))
     above.set_ylabel("friction on the body / N [1]")
-    below.set_ylabel("difference from\nBrown-McPhee / $\\mu_s N$ [1]")
-    below.set_xlabel("slip velocity [mm/s]")
+    below.set(
+        xlabel="slip velocity [mm/s]", ylabel="difference from\nBrown-McPhee / $\\mu_s N$ [1]"
+    )
     legend_below(figure, above)
 
     peak = forces["self-tuning, equal peak"]

@@ -32,8 +32,7 @@ def draw_sweep(curves: Mapping[str, Array], v: Array, title: str, parts: Iterabl
     figure, (axis,) = panels(1, height=3.6)
     for (label, F), part in zip(curves.items(), parts, strict=True):
         axis.plot(v, -F, label=label, color=shade(part), linewidth=1.8)
-    axis.set_xlabel("sliding velocity [mm/s]")
-    axis.set_ylabel("friction on the body / $\\mu_s N$ [1]")
+    axis.set(xlabel="sliding velocity [mm/s]", ylabel="friction on the body / $\\mu_s N$ [1]")
     figure.legend(loc="outside right center", title=title, frameon=False)
     return figure
 
@@ -248,10 +247,8 @@ def fig_12_stiffness_function(quick: bool) -> Drawn:
     for k, N in enumerate(LOADS):
         left.plot(difference, stiffness[N], label=f"{N:g}", color=shade(k / 5))
         right.plot(1e3 * v, [float(law.force(one, N)) / N for one in v], color=shade(k / 5))
-    left.set_xlabel("$\\mu_s - \\mu_d$ [1]")
-    left.set_ylabel("stiffness factor B [s/mm]")
-    right.set_xlabel("slip velocity [mm/s]")
-    right.set_ylabel("friction force / N [1]")
+    left.set(xlabel="$\\mu_s - \\mu_d$ [1]", ylabel="stiffness factor B [s/mm]")
+    right.set(xlabel="slip velocity [mm/s]", ylabel="friction force / N [1]")
     figure.legend(loc="outside right center", title="N [N]", frameon=False)
 
     table = np.array([*stiffness.values()])

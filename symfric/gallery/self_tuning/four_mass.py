@@ -182,8 +182,7 @@ def fig_13_jitter(quick: bool) -> Drawn:
     claims = {"in steps of 1 ms the law with its own B does not jitter": rough[TUNED] < 1.1}
     if not quick:
         claims |= jitter(rough, smooth, numbers)
-    far = max(abs(one / smooth[LAWS[1]] - 1) for one in smooth.values())
-    return figure, far, numbers, claims
+    return figure, max(abs(one / smooth[LAWS[1]] - 1) for one in smooth.values()), numbers, claims
 
 
 def jitter(
@@ -249,8 +248,7 @@ def fig_14_four_mass_positions(quick: bool) -> Drawn:
         "laws are within 18 mm": most < 0.0185,
     }
     figure = picture("", "position [m]", t_end)
-    far = distance("", t_end)
-    return figure, far, numbers, claims
+    return figure, distance("", t_end), numbers, claims
 
 
 @plate("m/s", within=2e-8)
@@ -286,8 +284,7 @@ def fig_15_four_mass_velocities(quick: bool) -> Drawn:
         )
         claims["over the B of figure 8 by 0.18 m/s"] = 0.175 < swept < 0.185
     figure = picture("'", "velocity [m/s]", t_end)
-    far = distance("'", t_end)
-    return figure, far, numbers, claims
+    return figure, distance("'", t_end), numbers, claims
 
 
 def changed(law: str, one: float, other: float, t_end: float) -> float:
@@ -336,5 +333,4 @@ def fig_16_four_mass_accelerations(quick: bool) -> Drawn:
             abs(total / totals[LAWS[1]][1] - 1) < 0.05 for total in (*swept, own)
         )
     figure = picture("''", "acceleration [m/s²]", t_end)
-    far = distance("''", t_end)
-    return figure, far, numbers, claims
+    return figure, distance("''", t_end), numbers, claims

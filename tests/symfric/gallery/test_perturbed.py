@@ -21,7 +21,7 @@ CAR, NIPS = ("quarter_car_friction",), ("laminator_nips",)
 SELECTION, TUNING = "symfric/gallery/selection/", "symfric/gallery/self_tuning/"
 
 TABLES: tuple[tuple[str, str, tuple[str, ...]], ...] = (
-    ("symfric/choice/jing_mi.py", "PRINTED", ("selection/fig_02", "selection/fig_07")),
+    ("symfric/gallery/selection/tables.py", "PRINTED", ("selection/fig_02", "selection/fig_07")),
     ("symfric/scenes/jing_mi.py", "BELT", BELT),
     ("symfric/scenes/jing_mi.py", "BOX", BOX),
     ("symfric/scenes/jing_mi.py", "HINGE", BOX),
@@ -122,7 +122,7 @@ def unseen(told: dict[str, str]) -> set[str]:
 
 def test_a_changed_number_and_a_changed_law_change_a_verdict() -> None:
     """One of each kind, in the figure that shows it."""
-    table = Job("symfric/choice/jing_mi.py", "PRINTED", 1, "", ("selection/fig_02",))
+    table = Job("symfric/gallery/selection/tables.py", "PRINTED", 1, "", ("selection/fig_02",))
     machine = Job(SELECTION + "box.py", "M_BOX", 0, "", ("selection/fig_06",))
     law = Job("symfric/laws/static/quarter_car.py", "QuarterCarSimple", -1, "force",
               ("quarter_car_friction/fig_13",))  # fmt: skip

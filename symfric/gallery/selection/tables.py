@@ -9,12 +9,15 @@ motion: it grows with its amplitude and depends on where the solver puts its ste
 of the stability of a solution. Ranks per need are those of T and of S among the laws that the
 table ranks for it; J, S and Y are the paper's letters for static friction, the Stribeck effect and
 pre-sliding.
+
+Behind them stand, in eighty columns, what cannot be reproduced, with numbers.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
 from math import inf, isfinite, nan
+from textwrap import wrap
 from time import process_time
 from typing import Any, final
 
@@ -26,26 +29,13 @@ from scipy.integrate import solve_ivp
 from symfric.choice.friction import Friction
 from symfric.choice.machine import Machine, machine_of
 from symfric.choice.measured import Task, measured
+from symfric.choice.ranking import Row
 from symfric.choice.reference import OWN
-from symfric.choice.row import Row
+from symfric.choice.text import WIDTH
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError
 from symfric.integrator.simulate import simulate
-from symfric.laws import (
-    Awrejcewicz,
-    BengisuAkay,
-    BrownMcPhee,
-    Coulomb,
-    Dahl,
-    ElastoPlastic,
-    Gonthier,
-    Karnopp,
-    Law,
-    LuGre,
-    StickSlip,
-    Threlfall,
-    VelocityBased,
-)
+from symfric.laws import ALL_LAWS, BrownMcPhee, Law
 from symfric.model import Model
 from symfric.scenes import PendulumBox, Rabinowicz, Scene
 
@@ -65,28 +55,32 @@ PATIENCE = 30.0
 @final
 @dataclass(frozen=True)
 class Printed:
-    """A law of the paper: which of ours it is, the needs it is ranked for, T [s] and S [m]."""
+    """A law of the paper: what ours is called, the needs it is ranked for, T [s] and S [m]."""
 
-    law: Callable[[], Law]
+    name: str
     needs: str
     T4: float
     S4: float
     T8: float
     S8: float
 
+    def law(self) -> Law:
+        """The law of the catalogue."""
+        return ALL_LAWS[self.name]()
+
 
 PRINTED = {
-    "Smooth": Printed(Coulomb, "", 2.6988, 0.127889, 3.5109, 0.058842),
-    "Threlfall": Printed(Threlfall, "", 2.7909, 0.116026, 4.3273, 0.064755),
-    "Bengisu": Printed(BengisuAkay, "JS", 2.6242, 0.138757, 5.8561, 0.067982),
-    "Karnopp": Printed(Karnopp, "J", 2.3851, 0.139528, 6.5503, 0.070905),
-    "Velocity-based": Printed(VelocityBased, "J", 2.1976, 0.138141, 8.3748, 0.037149),
-    "Awrejcewicz": Printed(Awrejcewicz, "J", 2.3762, 0.125478, 6.1151, 0.071542),
-    "Dahl": Printed(Dahl, "Y", 9.6875, 0.134439, 45.3545, 0.068376),
-    "LuGre": Printed(LuGre, "JSY", 11.3336, 0.150088, 76.8279, 0.062963),
-    "Elasto-plastic": Printed(ElastoPlastic, "JSY", inf, 0.145011, 229.0278, 0.033126),
-    "Stick-slip": Printed(StickSlip, "JS", 10.4979, 0.133829, 99.3741, 0.014088),
-    "Gonthier": Printed(Gonthier, "JSY", 16.7579, 0.146707, 129.9982, 0.053765),
+    "Smooth": Printed("coulomb", "", 2.6988, 0.127889, 3.5109, 0.058842),
+    "Threlfall": Printed("threlfall", "", 2.7909, 0.116026, 4.3273, 0.064755),
+    "Bengisu": Printed("bengisu_akay", "JS", 2.6242, 0.138757, 5.8561, 0.067982),
+    "Karnopp": Printed("karnopp", "J", 2.3851, 0.139528, 6.5503, 0.070905),
+    "Velocity-based": Printed("velocity_based", "J", 2.1976, 0.138141, 8.3748, 0.037149),
+    "Awrejcewicz": Printed("awrejcewicz", "J", 2.3762, 0.125478, 6.1151, 0.071542),
+    "Dahl": Printed("dahl", "Y", 9.6875, 0.134439, 45.3545, 0.068376),
+    "LuGre": Printed("lugre", "JSY", 11.3336, 0.150088, 76.8279, 0.062963),
+    "Elasto-plastic": Printed("elasto_plastic", "JSY", inf, 0.145011, 229.0278, 0.033126),
+    "Stick-slip": Printed("stick_slip", "JS", 10.4979, 0.133829, 99.3741, 0.014088),
+    "Gonthier": Printed("gonthier", "JSY", 16.7579, 0.146707, 129.9982, 0.053765),
 }
 """Tables 4 and 8 as printed (S in m: the heading has a factor 100; "> 100" s is infinite here), and
 the columns of tables 5 and 9 that have a rank for the law."""
@@ -187,9 +181,18 @@ class PaperComparison:
 
     def lines(self) -> list[str]:
         """Tables and evidence for a screen of eighty columns."""
-        from symfric.choice.evidence import lines  # noqa: PLC0415  (only who asks)
-
-        return lines(self)
+        lacking = [f"{row.name}: {row.reason}" for row in self.rows if not isfinite(row.time_s)]
+        texts = [
+            [LEGEND, *lacking],
+            [f"{self.ranks}: laws by printed and by our numbers, the smallest first"],
+            reasons(self),
+        ]
+        first, ranks, last = ([line for t in text for line in wrap(t, WIDTH)] for text in texts)
+        title = f"{PAPER}: {self.scene}, {self.times}"
+        rows = map(_line, self.rows)
+        return [
+            *wrap(title, WIDTH), "", HEAD, *rows, "", *first, "", *ranks, *_orders(self), "", *last,
+        ]  # fmt: skip
 
 
 def _sorted(rows: Iterable[PaperRow], value: Callable[[PaperRow], float]) -> list[str]:
@@ -279,3 +282,106 @@ def _peer(model: Model, t_end: float) -> tuple[float, int]:
         return nan, int(found.t.size)
     place = [v.name for v in model.x].index("x")
     return spread(found.y[place]), int(found.t.size)
+
+
+PAPER = "Jing and Mi, Investigation of Selection Mechanism of Friction Models in Multibody Systems"
+STEP = 1e-6
+"""Printed step size [s]."""
+HEAD = (
+    f"{'':<15}{'T [s]':>8}{'time [ms]':>11}{'tries':>8} |"
+    f"{'S [cm]':>8}{'equal':>8}{'steps':>8}{'BDF':>8}"
+)
+
+
+LEGEND = (
+    "T, S: printed. time, tries: processor time and attempts of our run whose integrator is 1e-4 "
+    "off. equal, steps, BDF: S over equal times, over our steps, and over those of SciPy's BDF, "
+    "the relative of ode15s, with the paper's absolute tolerance; explicit equations only."
+)
+
+
+def _line(row: PaperRow) -> str:
+    T = "> 100" if row.T > 1e300 else f"{row.T:.2f}"
+    spread = (row.S_uniform, row.S_steps, row.S_peer)
+    time = f"{1e3 * row.time_s:.2f}" if isfinite(row.time_s) else "-"
+    shown = "".join(f"{100 * s:>8.2f}" if isfinite(s) else f"{'-':>8}" for s in spread)
+    tries = row.attempts or "-"
+    return f"{row.name:<15}{T:>8}{time:>11}{tries:>8} |{100 * row.S:>8.2f}{shown}"
+
+
+def _orders(found: PaperComparison) -> Iterator[str]:
+    for column, orders in found.orders().items():
+        for by, names in orders.items():
+            text = f"{column:<6}{by:<10} {' < '.join(names)}"
+            yield from wrap(text, WIDTH, subsequent_indent=17 * " ")
+
+
+def reasons(found: PaperComparison) -> list[str]:
+    """Why printed numbers cannot be had again: sentences with what was measured."""
+    return [text for text in (_of_times(found), _of_spread(found), _of_ranks(found), OPEN) if text]
+
+
+def _of_times(found: PaperComparison) -> str:
+    printed = [row.T for row in found.rows if isfinite(row.T)]
+    ours = [row.time_s for row in found.rows if isfinite(row.time_s)]
+    if not ours:
+        return ""
+    count = found.t_end / STEP
+    steps = [row.explicit_step for row in found.rows if row.explicit_step]
+    able = "; no explicit method takes this machine, whose reactions are unknowns of its equations"
+    if steps:
+        able = (
+            f"; explicit steps of {min(steps):g} to {max(steps):g} s follow within 5 % for "
+            f"{len(steps)} of {len(found.rows)} laws"
+        )
+    return (
+        f"T: the table of the machine says Runge-Kutta with steps of {STEP:g} s, which are "
+        f"{count:.2g} steps, {1e9 * min(printed) / count:.0f} ns each in the fastest run; the text "
+        f"says ode15s, which chooses its steps{able}. Printed times span a factor "
+        f"of {max(printed) / min(printed):.0f}, ours at equal error "
+        f"{max(ours) / min(ours):.0f}. Processor and program are not named."
+    )
+
+
+def _of_spread(found: PaperComparison) -> str:
+    known = [row for row in found.rows if isfinite(row.S_uniform) and isfinite(row.S_steps)]
+    if not known:
+        return ""
+    most = max(known, key=lambda row: abs(row.S_steps / row.S_uniform - 1))
+    off = {
+        "equal times": [abs(row.S_uniform / row.S - 1) for row in known],
+        "our steps": [abs(row.S_steps / row.S - 1) for row in known],
+    }
+    said = ", ".join(
+        f"{100 * min(each):.0f} to {100 * max(each):.0f} % over {what}"
+        for what, each in off.items()
+    )
+    return (
+        "S is the standard deviation of x over the points that a solver returns, an amplitude and "
+        f"no measure of stability: one motion of {most.name} has {100 * most.S_uniform:.1f} cm "
+        f"over equal times and {100 * most.S_steps:.1f} cm over our steps. What is printed is "
+        f"{said} away."
+    )
+
+
+def _of_ranks(found: PaperComparison) -> str:
+    orders = found.orders().items()
+    same = {
+        by: [column for column, each in orders if each[f"printed {by}"] == each[ours]]
+        for by, ours in (("T", "our time"), ("S", "S steps"))
+    }
+    said = [
+        f"the order by {by} is ours in {', '.join(columns) or 'no column'}"
+        for by, columns in same.items()
+    ]
+    return f"Ranks: {'; '.join(said)}."
+
+
+OPEN = (
+    "Not printed: who takes which velocity of tables 3 and 7 (the presets say how they are read "
+    "here), Gonthier's v_d, the radius of the hinge in which table 7's N/m and m/s act, relative "
+    "tolerances, initial conditions beyond positions. z_max = z_ba in table 7 leaves the "
+    "elasto-plastic law of that form 0/0; here z_ss follows from sigma_0. The text contradicts its "
+    "tables: for pre-sliding by S it chooses Elasto-plastic in both machines, table 5 has Dahl "
+    "first; and it compares three machines, of which one, with its tables, is missing."
+)

@@ -1,9 +1,11 @@
-"""What was measured of one law, and where it stands."""
+"""What was measured of the laws, and where they stand."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import inf, isfinite
 from typing import Any, final
+
+from symfric.foundation.checks import check_names
 
 RANKED, INACCURATE, LACKING, REFUSED, FAILED = (
     "ranked", "inaccurate", "lacks", "cannot run", "failed",
@@ -138,3 +140,68 @@ def place(row: Row) -> tuple[int, float, float, str]:
 def _tied(head: Row, row: Row) -> bool:
     """Whether `row` is as good as the first of its rank."""
     return place(head)[:2] == place(row)[:2] and row.work <= ALIKE * head.work
+
+
+@dataclass(frozen=True, eq=False)
+class Ranking:
+    """Laws on a machine, the best first, and what was asked of them.
+
+    Attributes:
+        machine: its name.
+        needs: what the law has to show, words of `NEEDS`.
+        accuracy: largest error relative to the motion.
+        friction: that all laws describe.
+        reference, uncertain: what errors are measured from, and how far that may be off itself.
+        control: largest error of fixed steps.
+        t_end: length of the motion [s].
+        rows: one for each candidate.
+        wall_s: how long it took [s].
+        unmeasured: laws without a row, since somebody interrupted it.
+    """
+
+    machine: str
+    needs: tuple[str, ...]
+    accuracy: float
+    friction: str
+    reference: str
+    uncertain: float
+    control: float
+    t_end: float
+    rows: tuple[Row, ...]
+    wall_s: float
+    unmeasured: tuple[str, ...] = ()
+
+    def __getitem__(self, law: str) -> Row:
+        """The row of a law."""
+        found = {row.law: row for row in self.rows}
+        check_names("choice", [law], found)
+        return found[law]
+
+    def __iter__(self) -> Iterator[Row]:
+        return iter(self.rows)
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether somebody stopped it before all laws were measured."""
+        return bool(self.unmeasured)
+
+    @property
+    def placed(self) -> tuple[Row, ...]:
+        """The rows of all laws that run here, by their rank."""
+        return tuple(row for row in self.rows if row.rank)
+
+    @property
+    def ranked(self) -> tuple[Row, ...]:
+        """The rows of laws that show what is needed and keep the accuracy, least work first."""
+        return tuple(row for row in self.rows if row.ranked)
+
+    @property
+    def best(self) -> Row | None:
+        """The first of them; None where there is none."""
+        return next(iter(self.ranked), None)
+
+    @property
+    def title(self) -> str:
+        """What was asked, in a line."""
+        asked = f"laws that show {' and '.join(self.needs)}" if self.needs else "all laws"
+        return f"{self.machine}: {asked}, {self.accuracy:g} off at most"

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from symfric.choice.jing_mi import PRINTED, PaperComparison, PaperRow, compare_with_paper, spread
+from symfric.gallery.selection.tables import (
+    PRINTED,
+    PaperComparison,
+    PaperRow,
+    compare_with_paper,
+    spread,
+)
 
 
 def of_tables(first: bool) -> PaperComparison:
