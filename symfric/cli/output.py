@@ -85,6 +85,16 @@ def progress(text: str) -> Generator[Callable[[float], None]]:
         yield tell
 
 
+def unnamed(tell: Callable[[float], None]) -> Callable[[str, float], None]:
+    """`tell` as what takes the name of the item, too."""
+
+    def advance(name: str, fraction: float) -> None:
+        del name
+        tell(fraction)
+
+    return advance
+
+
 def note(text: str) -> None:
     """Say `text` on standard error, where it disturbs no result."""
     typer.echo(text, err=True)
