@@ -12,8 +12,7 @@ from symfric.cli import completions
 from symfric.cli.options import assignments
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
-from symfric.multibody.urdf.read import relative
-from symfric.scenes import ALL_SCENES, Robot, Scene
+from symfric.scenes import ALL_SCENES, Scene
 
 SceneArgument = Annotated[
     str,
@@ -68,6 +67,9 @@ def kind_of(
     """
     others = {place: law_from_text(text) for place, text in assignments("--law-of", law_of).items()}
     if scene.endswith(".urdf"):
+        from symfric.multibody.urdf.read import relative  # noqa: PLC0415  (of robots only)
+        from symfric.scenes import Robot  # noqa: PLC0415
+
         check_names("--preset of a robot", [preset] if preset else [], ())
         laws = tuple(relative(law) for law in others.values())
         return lambda law: Robot(relative(law), scene, tuple(others), laws)

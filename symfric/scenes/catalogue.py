@@ -1,42 +1,61 @@
 """The ready machines by name."""
 
-from symfric.scenes.arm import Arm
-from symfric.scenes.base import Scene
-from symfric.scenes.clutch import Clutch
-from symfric.scenes.coupled_blocks import CoupledBlocks
-from symfric.scenes.drill_string import DrillString
-from symfric.scenes.drive import Drive
-from symfric.scenes.four_bar import FourBar
-from symfric.scenes.four_mass import FourMass
-from symfric.scenes.mechanism import MechanismScene
-from symfric.scenes.nip import Nip
-from symfric.scenes.pendulum import DoublePendulum, Pendulum
-from symfric.scenes.pendulum_box import PendulumBox
-from symfric.scenes.prescribed import Prescribed
-from symfric.scenes.quarter_car import QuarterCar
-from symfric.scenes.rabinowicz import Rabinowicz
-from symfric.scenes.slider_crank import SliderCrank
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from typing import TYPE_CHECKING, TypeVar, final
 
-MECHANISMS: dict[str, type[MechanismScene]] = {
-    "pendulum": Pendulum,
-    "double_pendulum": DoublePendulum,
-    "pendulum_box": PendulumBox,
-    "four_mass": FourMass,
-    "slider_crank": SliderCrank,
-    "four_bar": FourBar,
-    "arm": Arm,
+from symfric.scenes.base import Scene
+
+if TYPE_CHECKING:
+    from symfric.scenes.mechanism import MechanismScene
+
+S = TypeVar("S", bound=Scene, covariant=True)
+
+
+@final
+class Catalogue(Mapping[str, type[S]]):
+    """Scenes by name, each loaded when it is taken: one that rubs alone loads no mechanism."""
+
+    def __init__(self, places: Mapping[str, str]) -> None:
+        self._places = dict(places)
+
+    def __getitem__(self, name: str) -> type[S]:
+        module, kind = self._places[name].split()
+        return getattr(import_module(f"symfric.scenes.{module}"), kind)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._places
+
+
+_MECHANISMS = {
+    "pendulum": "pendulum Pendulum",
+    "double_pendulum": "pendulum DoublePendulum",
+    "pendulum_box": "pendulum_box PendulumBox",
+    "four_mass": "four_mass FourMass",
+    "slider_crank": "slider_crank SliderCrank",
+    "four_bar": "four_bar FourBar",
+    "arm": "arm Arm",
 }
+MECHANISMS: "Catalogue[MechanismScene]" = Catalogue(_MECHANISMS)
 """Scenes of several bodies, with the same law in several joints."""
 
-ALL_SCENES: dict[str, type[Scene]] = {
-    "rabinowicz": Rabinowicz,
-    "drive": Drive,
-    "quarter_car": QuarterCar,
-    "coupled_blocks": CoupledBlocks,
-    "drill_string": DrillString,
-    "clutch": Clutch,
-    "nip": Nip,
-    "prescribed": Prescribed,
-    **MECHANISMS,
-}
+ALL_SCENES: Catalogue[Scene] = Catalogue(
+    {
+        "rabinowicz": "rabinowicz Rabinowicz",
+        "drive": "drive Drive",
+        "quarter_car": "quarter_car QuarterCar",
+        "coupled_blocks": "coupled_blocks CoupledBlocks",
+        "drill_string": "drill_string DrillString",
+        "clutch": "clutch Clutch",
+        "nip": "nip Nip",
+        "prescribed": "prescribed Prescribed",
+        **_MECHANISMS,
+    }
+)
 """Every scene by the name the command line uses."""
