@@ -4,10 +4,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from symfric.cli import output
-from symfric.cli.options import JsonOption, PlotOption, check_outputs
+from symfric.cli.options import JsonOption, PlotOption, argument, check_outputs, option
 from symfric.foundation.parameters import check_names
 
 if TYPE_CHECKING:
@@ -38,21 +36,17 @@ def _completed(incomplete: str) -> list[str]:
 def bench(
     subject: Annotated[
         str,
-        typer.Argument(
-            metavar="SUBJECT",
-            help=f"What to measure, default integrator: {', '.join(SUBJECTS)}.",
-            autocompletion=_completed,
+        argument(
+            "SUBJECT", f"What to measure, default integrator: {', '.join(SUBJECTS)}.", _completed
         ),
     ] = "integrator",
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer points, fewer others.")] = False,
+    quick: Annotated[bool, option("--quick", "Fewer points, fewer others.")] = False,
     links: Annotated[
-        str | None,
-        typer.Option("--links", metavar="N,N,...", help="Lengths of chains; multibody only."),
+        str | None, option("--links N,N,...", "Lengths of chains; multibody only.")
     ] = None,
     plot: PlotOption = None,
     csv: Annotated[
-        Path | None,
-        typer.Option("--csv", metavar="FILE.csv", help="Runs of multibody, regularisation."),
+        Path | None, option("--csv FILE.csv", "Runs of multibody, regularisation.")
     ] = None,
     json: JsonOption = None,
 ) -> None:

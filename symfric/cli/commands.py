@@ -23,6 +23,8 @@ COMMANDS = {
     "stress": "Judge runs of random laws in random scenes.",
 }
 """What there is, and the first line of each."""
+MODULES = {"report": "run"}
+"""Commands that do not stand in a module of their own name."""
 
 SETTINGS: dict[str, Any] = {
     "add_completion": False,
@@ -85,7 +87,7 @@ class Commands(TyperGroup):
             return None
         one = typer.Typer(**SETTINGS)
         name = cmd_name.replace("-", "_")
-        function = getattr(import_module(f"symfric.cli.{name}"), name)
+        function = getattr(import_module(f"symfric.cli.{MODULES.get(name, name)}"), name)
         one.command(cls=Command)(function)
         return typer.main.get_command(one)
 
