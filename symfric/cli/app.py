@@ -19,7 +19,6 @@ import typer
 
 from symfric import SolveError, Status, __version__
 from symfric.cli.commands import SETTINGS, Commands, argument_shown, is_option
-from symfric.cli.options import option
 from symfric.foundation.programs import ProgramError
 
 BAD_INPUT, FAILED_SOLVE, INTERRUPTED = 2, 1, 130
@@ -37,7 +36,7 @@ app = typer.Typer(
 @app.callback(invoke_without_command=True)
 def symfric(
     context: typer.Context,
-    version: Annotated[bool, option("--version", "Show the version and exit.")] = False,
+    version: Annotated[bool, typer.Option("--version", help="Show the version and exit.")] = False,
 ) -> None:
     """Show the version, or what there is when no command is given."""
     if version:
